@@ -1,0 +1,75 @@
+# `make demo` installs what is missing, runs a first case and draws it; `make test` checks everything.
+# Needs Debian 12 with git and make; `setup` fetches the rest. What is up to date is not done again.
+
+SHELL  := /bin/bash
+PYTHON := /usr/bin/python3
+BIN    := .venv/bin
+
+DEBIAN_PACKAGES := \
+  build-essential cmake ninja-build python3-venv python3-dev \
+  python3-dolfinx python3-petsc4py python3-mpi4py python3-h5py-mpi python3-scipy libopenblas0-pthread \
+  libosmesa6 libegl1 libgl1 libglu1-mesa libxrender1 libxft2 libxcursor1 libxinerama1 libxfixes3
+
+# One thread per process; Open MPI as root, on few cores and without shared-memory complaints (containers, CI).
+export OPENBLAS_NUM_THREADS ?= 1
+export OMPI_ALLOW_RUN_AS_ROOT ?= 1
+export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM ?= 1
+export OMPI_MCA_rmaps_base_oversubscribe ?= 1
+export OMPI_MCA_btl_vader_single_copy_mechanism ?= none
+export PYVISTA_OFF_SCREEN ?= true
+
+PACKAGES_STAMP := .venv/debian-packages.stamp
+PROJECT_STAMP  := .venv/project.stamp
+DOCS_STAMP     := .venv/docs.stamp
+KERNEL_SOURCES := $(wildcard solvers/kernels/CMakeLists.txt solvers/kernels/*.hpp solvers/kernels/*.cpp)
+INSTALL        := $(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation
+
+.PHONY: setup demo test test-slow lint bench docs clean
+
+setup: $(PROJECT_STAMP)
+
+$(PACKAGES_STAMP): Makefile .ci/install-packages
+	.ci/install-packages $(DEBIAN_PACKAGES)
+	@mkdir -p .venv && touch $@
+
+$(PROJECT_STAMP): pyproject.toml $(KERNEL_SOURCES) | $(PACKAGES_STAMP)
+	@test -x $(BIN)/pip || $(PYTHON) -m venv --system-site-packages .venv
+	@echo "setup: building and installing fsci into .venv"
+	$(INSTALL) nanobind scikit-build-core
+	$(INSTALL) --editable '.[test]'
+	@touch $@
+
+$(DOCS_STAMP): pyproject.toml | $(PROJECT_STAMP)
+	$(INSTALL) --editable '.[docs]'
+	@touch $@
+
+demo: setup
+	$(BIN)/fsci run cases/csm3 -o results/csm3
+	$(BIN)/fsci plot results/csm3
+	@echo "Pictures: results/csm3/*.png   ParaView: results/csm3/fields/   curves: results/csm3/history.csv"
+
+test: setup lint
+	$(BIN)/python -m pytest -n 2 -m "not slow"
+
+test-slow: setup
+	$(BIN)/python -m pytest -n 2 -m slow --durations=10
+
+lint: setup
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
+
+bench: setup
+	$(BIN)/python -m fsci.bench
+
+docs: $(DOCS_STAMP)
+	mkdir -p docs/reference
+	$(BIN)/fsci schema --markdown > docs/reference/case.md
+	$(BIN)/python -m sphinx -W --keep-going -b html docs docs/_build/html
+	@echo "Open docs/_build/html/index.html"
+
+# Back to a fresh clone, except for results/: they may have taken days.
+clean:
+	rm -rf .venv build docs/_build docs/reference .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -prune -exec rm -rf {} +

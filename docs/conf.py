@@ -1,0 +1,16 @@
+"""Sphinx settings: MyST pages, formulas by MathJax."""
+
+import tomllib
+from pathlib import Path
+
+_project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
+
+project = _project["name"]
+author = "The fsci developers"
+release = _project["version"]
+extensions = ["myst_parser", "sphinx.ext.mathjax"]
+myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+exclude_patterns = ["_build"]
+html_theme = "alabaster"
+html_theme_options = {"description": _project["description"], "page_width": "1080px"}

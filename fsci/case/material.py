@@ -1,0 +1,68 @@
+"""Section `material` of a body."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from fsci.case.section import Section, fault, setting
+from fsci.case.values import PoissonFormula, PositiveFormula, SpaceFormula, chosen
+
+PAIRS = ({"E", "nu"}, {"lambda", "mu"}, {"mu", "nu"})
+
+
+class Elastic(Section):
+    """A hyperelastic law with two constants: exactly E and nu, or lambda and mu, or mu and nu.
+
+    - st_venant_kirchhoff: W = lambda/2 (tr E)^2 + mu E:E with the Green-Lagrange strain E; for small strains.
+    - neo_hooke: W = mu/2 (I1 - 3) - mu ln J + lambda/2 (ln J)^2.
+    - coup_neo_hooke: W = c/beta (J^(-2 beta) - 1) + c (I1 - 3), c = mu/2, beta = nu/(1 - 2 nu), nu above 0.
+    """
+
+    law: Literal["st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke"] = setting(..., "stored energy")
+    E: PositiveFormula | None = setting(None, "Young's modulus", unit="Pa")
+    nu: PoissonFormula | None = setting(None, "Poisson's ratio", unit="1")
+    lmbda: SpaceFormula | None = setting(None, "first Lame constant", unit="Pa", name="lambda")
+    mu: PositiveFormula | None = setting(None, "second Lame constant, the shear modulus", unit="Pa")
+    density: PositiveFormula | None = setting(
+        None, "mass per reference volume; needed for dynamics, gravity and probes of mass", unit="kg/m^3"
+    )
+
+    @model_validator(mode="after")
+    def _two_constants(self) -> Elastic:
+        constants = {"E": self.E, "nu": self.nu, "lambda": self.lmbda, "mu": self.mu}
+        given = [name for name, value in constants.items() if value is not None]
+        if set(given) not in PAIRS:
+            raise fault(
+                f"law '{self.law}' needs two constants, either E and nu, or lambda and mu, or mu and nu; "
+                f"given: {', '.join(given) or 'none'}"
+            )
+        for name in ("nu", "lambda"):
+            value = constants[name]
+            if self.law == "coup_neo_hooke" and value and value.constant is not None and value.constant <= 0:
+                raise fault("must be greater than 0 for the law 'coup_neo_hooke'", name)
+        return self
+
+
+class MooneyRivlin(Section):
+    """W = c10 (J^(-2/3) I1 - 3) + c01 (J^(-4/3) I2 - 3) + bulk/2 (J - 1)^2; the shear modulus is 2 (c10 + c01)."""
+
+    law: Literal["mooney_rivlin"] = setting(..., "stored energy")
+    c10: SpaceFormula = setting(..., "factor of the first invariant", unit="Pa")
+    c01: SpaceFormula = setting(..., "factor of the second invariant", unit="Pa")
+    bulk: PositiveFormula = setting(..., "bulk modulus", unit="Pa")
+    density: PositiveFormula | None = setting(
+        None, "mass per reference volume; needed for dynamics, gravity and probes of mass", unit="kg/m^3"
+    )
+
+    @model_validator(mode="after")
+    def _stiff(self) -> MooneyRivlin:
+        c10, c01 = self.c10.constant, self.c01.constant
+        if c10 is not None and c01 is not None and c10 + c01 <= 0:
+            raise fault(f"the sum of c10 and c01 must be greater than 0, not {c10 + c01:g}", "c10")
+        return self
+
+
+LAWS = ("st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke", "mooney_rivlin")
+Material = Annotated[Elastic | MooneyRivlin, Field(discriminator="law"), chosen("law", LAWS)]

@@ -1,0 +1,34 @@
+"""Section `solver`."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from fsci.case.section import Section, setting
+from fsci.case.values import Count, NotNegative, Positive, Switch
+
+
+class Newton(Section):
+    """When a time step is solved: the residual is small, and the increment too if that is asked for."""
+
+    residual: Positive = setting(1e-8, "residual, relative to the largest one of the step", unit="1")
+    residual_absolute: NotNegative = setting(0.0, "residual that is small enough in any case", unit="N")
+    increment: Positive | None = setting(None, "increment, relative to the solution; empty: any", unit="1")
+    max_iterations: Count = setting(25, "iterations after which a step has failed")
+    line_search: Switch = setting(False, "halve increments that do not reduce the residual")
+
+
+class Linear(Section):
+    """How linear systems are solved."""
+
+    method: Literal["auto", "direct", "iterative"] = setting(
+        "auto", "auto takes direct in 2D and for small systems, else iterative"
+    )
+    tolerance: Positive = setting(1e-8, "residual of iterative solvers, relative to the first", unit="1")
+
+
+class Solver(Section):
+    """How the equations of a step are solved."""
+
+    newton: Newton = setting(Newton, "nonlinear iteration")
+    linear: Linear = setting(Linear, "linear solver")

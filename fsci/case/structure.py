@@ -1,0 +1,136 @@
+"""Section `structure`: elastic bodies, how they are held and loaded, and how they move in time."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, model_validator
+
+from fsci.case.material import Material
+from fsci.case.mesh import Mesh
+from fsci.case.section import Section, fault, setting
+from fsci.case.values import (
+    Formula,
+    Name,
+    NotNegative,
+    Number,
+    Positive,
+    Share,
+    Surfaces,
+    Switch,
+    Text,
+    Vector,
+    entries,
+)
+
+ALPHAS = ("alpha_m", "alpha_f", "beta", "gamma")
+
+
+class Damping(Section):
+    """Rayleigh damping: C = mass M + stiffness K, with the stiffness K of the undeformed body."""
+
+    mass: NotNegative = setting(0.0, "factor of the mass matrix", unit="1/s")
+    stiffness: NotNegative = setting(0.0, "factor of the stiffness matrix", unit="s")
+
+
+class Dynamics(Section):
+    """Generalised-alpha time integration, by rho_inf or by its four parameters."""
+
+    rho_inf: Share | None = setting(
+        None, "spectral radius at infinite frequency: 1 keeps energy, smaller damps; default 1", unit="1"
+    )
+    alpha_m: Number | None = setting(None, "weight of the old acceleration", unit="1")
+    alpha_f: Number | None = setting(None, "weight of the old forces", unit="1")
+    beta: Positive | None = setting(None, "Newmark's beta", unit="1")
+    gamma: Positive | None = setting(None, "Newmark's gamma", unit="1")
+    predictor: Literal["constant_displacement", "constant_velocity"] = setting(
+        "constant_displacement", "first guess of a step"
+    )
+    damping: Damping = setting(Damping, "Rayleigh damping")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_form(cls, data: Any) -> Any:
+        """rho_inf or all four parameters; rho_inf = 1 if there is neither."""
+        if not isinstance(data, dict):
+            return data
+        given = [name for name in ALPHAS if name in data]
+        if "rho_inf" in data and given:
+            raise fault("give either 'rho_inf' or the four of alpha_m, alpha_f, beta and gamma", given[0])
+        if 0 < len(given) < len(ALPHAS):
+            absent = [name for name in ALPHAS if name not in given]
+            raise fault(
+                f"alpha_m, alpha_f, beta and gamma belong together; missing: {', '.join(absent)}", given[0]
+            )
+        return data if given or data.get("rho_inf") is not None else data | {"rho_inf": 1.0}
+
+
+class Support(Section):
+    """Surfaces whose displacement is prescribed, or that are planes of symmetry."""
+
+    on: Surfaces = setting(..., "name of a surface, or list of names")
+    displacement: Annotated[tuple[Formula | None, ...], entries(2, 3)] | None = setting(
+        None, "displacement by components; null leaves one free", unit="m"
+    )
+    symmetry: Switch = setting(False, "true: only the component normal to the plane (along an axis) is held")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Support:
+        if self.displacement is not None and self.symmetry:
+            raise fault("give either 'displacement' or 'symmetry: true', not both", "symmetry")
+        if self.displacement is None and not self.symmetry:
+            raise fault("a support needs 'displacement' or 'symmetry: true'")
+        return self
+
+
+class Traction(Section):
+    """A dead load: it keeps its direction and acts on the reference area."""
+
+    on: Surfaces = setting(..., "name of a surface, or list of names")
+    value: Vector = setting(..., "force per reference area", unit="Pa")
+
+
+class Pressure(Section):
+    """A follower load: it stays normal to the deformed surface."""
+
+    on: Surfaces = setting(..., "name of a surface, or list of names")
+    value: Formula = setting(..., "pressure; a positive one pushes against the surface", unit="Pa")
+
+
+class Body(Section):
+    """One elastic body."""
+
+    mesh: Mesh = setting(..., "mesh file or built-in shape")
+    region: Text | None = setting(None, "name of the group of cells in the mesh file that is the body")
+    material: Material = setting(..., "hyperelastic law")
+    supports: tuple[Support, ...] = setting(tuple, "where the body is held")
+    gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
+    body_force: Vector | None = setting(None, "force per reference volume", unit="N/m^3")
+    tractions: tuple[Traction, ...] = setting(tuple, "dead loads on surfaces")
+    pressures: tuple[Pressure, ...] = setting(tuple, "follower loads on surfaces")
+    initial_displacement: Vector | None = setting(None, "displacement at the start", unit="m")
+    initial_velocity: Vector | None = setting(None, "velocity at the start", unit="m/s")
+
+
+def _not_empty(value: Any) -> Any:
+    if value is None:
+        raise fault("is empty: write 'dynamics: {}' for its defaults, or remove the line for a static case")
+    return value
+
+
+def _some(value: Any) -> Any:
+    if value == {}:
+        raise fault("needs at least one body")
+    return value
+
+
+class Structure(Section):
+    """Elastic bodies of finite deformation."""
+
+    plane: Literal["strain", "stress"] = setting(
+        "strain", "2D only: plane strain or plane stress (st_venant_kirchhoff)"
+    )
+    dynamics: Annotated[Dynamics | None, BeforeValidator(_not_empty)] = setting(
+        None, "time integration; absent: static, without inertia"
+    )
+    bodies: Annotated[dict[Name, Body], BeforeValidator(_some)] = setting(..., "the bodies by name")

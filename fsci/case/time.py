@@ -1,0 +1,30 @@
+"""Section `time`."""
+
+from __future__ import annotations
+
+from pydantic import model_validator
+
+from fsci.case.section import Section, fault, setting
+from fsci.case.values import Count, CountOrNone, Number, Positive
+
+
+class Retry(Section):
+    """What happens when a step has no solution: it is repeated as two half steps."""
+
+    halvings: CountOrNone = setting(4, "how many times a step may be halved before the run gives up")
+    recover_after: Count = setting(5, "accepted steps after which a halved step is doubled again")
+
+
+class Time(Section):
+    """The time interval and its steps; a static case takes its load steps as time steps."""
+
+    start: Number = setting(0.0, "first time", unit="s")
+    step: Positive = setting(..., "time step", unit="s")
+    end: Number = setting(..., "last time", unit="s")
+    retry: Retry = setting(Retry, "repetition of steps that fail")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Time:
+        if self.end <= self.start:
+            raise fault(f"must be later than 'start', {self.start:g}, not {self.end:g}", "end")
+        return self

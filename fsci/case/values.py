@@ -1,0 +1,201 @@
+"""Kinds of values that settings take; each reader says in plain words what it does not accept."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, PlainValidator, WithJsonSchema
+
+from fsci.case.errors import did_you_mean
+from fsci.case.section import fault
+from fsci.expression import VARIABLES, Expression, ExpressionError
+
+
+def spoken(value: Any) -> str:
+    """A value as an error message names it."""
+    match value:
+        case None:
+            return "empty"
+        case bool():
+            return "true" if value else "false"
+        case int() | float():
+            return f"{value:.12g}" if abs(value) < 1e300 else "a number without bound"
+        case str():
+            text = value if len(value) <= 40 else value[:37] + "..."
+            return f"'{text}'"
+        case dict():
+            return "a section"
+        case _:
+            return "a list"
+
+
+def _expression(value: Any, wanted: str, variables: str) -> Expression:
+    """An expression of the given variables, from a number or text."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise fault(f"must be {wanted}, not {spoken(value)}")
+    if isinstance(value, int | float) and not abs(value) < math.inf:
+        raise fault("must be a finite number")
+    try:
+        expression = Expression.parse(value)
+    except ExpressionError as error:
+        raise fault(f": {error.message}", column=error.column) from None
+    if extra := sorted(expression.uses - set(variables)):
+        hint = " (it is a fixed number)" if not variables else ""
+        raise fault(f"must not depend on {' or '.join(extra)}{hint}")
+    return expression
+
+
+def _number(allowed: Callable[[float], bool], words: str) -> BeforeValidator:
+    """A plain number, or constant arithmetic such as 2*pi, that is allowed."""
+
+    def read(value: Any) -> float:
+        number = _expression(value, "a number", "").constant
+        assert number is not None, "an expression without variables is constant"
+        if not allowed(number):
+            raise fault(f"must be {words}, not {spoken(float(number))}")
+        return float(number)
+
+    return BeforeValidator(read)
+
+
+def _whole(least: int) -> BeforeValidator:
+    def read(value: Any) -> int:
+        number = _expression(value, "a whole number", "").constant
+        assert number is not None, "an expression without variables is constant"
+        if number != round(number) or abs(number) > 2**53:
+            raise fault(f"must be a whole number, not {spoken(value)}")
+        if number < least:
+            raise fault(f"must be at least {least}, not {spoken(int(number))}")
+        return int(number)
+
+    return BeforeValidator(read)
+
+
+def _formula(variables: str, allowed: Callable[[float], bool] = lambda _: True, words: str = "") -> PlainValidator:
+    """An expression of the given variables; if it is constant, its value must be allowed."""
+    wanted = f"a number or an expression of {', '.join(variables)}"
+
+    def read(value: Any) -> Expression:
+        expression = value if isinstance(value, Expression) else _expression(value, wanted, variables)
+        if expression.constant is not None and not allowed(expression.constant):
+            raise fault(f"must be {words}, not {spoken(float(expression.constant))}")
+        return expression
+
+    return PlainValidator(read)
+
+
+def _schema(words: str, **keywords: Any) -> WithJsonSchema:
+    """JSON schema of a number that may be written as an expression; the comment names it in the reference."""
+    return WithJsonSchema({"type": ["number", "string"], "$comment": words, **keywords})
+
+
+Number = Annotated[float, _number(lambda _: True, ""), _schema("number")]
+Positive = Annotated[
+    float, _number(lambda v: v > 0, "greater than 0"), _schema("number > 0", exclusiveMinimum=0)
+]
+NotNegative = Annotated[float, _number(lambda v: v >= 0, "at least 0"), _schema("number >= 0", minimum=0)]
+Share = Annotated[
+    float, _number(lambda v: 0 <= v <= 1, "from 0 to 1"), _schema("number from 0 to 1", minimum=0, maximum=1)
+]
+Count = Annotated[int, _whole(1), _schema("whole number >= 1", minimum=1)]
+CountOrNone = Annotated[int, _whole(0), _schema("whole number >= 0", minimum=0)]
+
+_SPACE, _ALL = "xyz", "".join(VARIABLES)
+Formula = Annotated[Expression, _formula(_ALL), _schema("expression of x, y, z, t")]
+SpaceFormula = Annotated[Expression, _formula(_SPACE), _schema("expression of x, y, z")]
+PositiveFormula = Annotated[
+    Expression,
+    _formula(_SPACE, lambda v: v > 0, "greater than 0"),
+    _schema("expression of x, y, z, > 0", exclusiveMinimum=0),
+]
+PoissonFormula = Annotated[
+    Expression,
+    _formula(_SPACE, lambda v: -1 < v < 0.5, "above -1 and below 0.5"),
+    _schema("expression of x, y, z, above -1 and below 0.5", exclusiveMinimum=-1, exclusiveMaximum=0.5),
+]
+
+
+def entries(fewest: int, most: int | None = None) -> BeforeValidator:
+    """A list of so many entries."""
+    most = most or fewest
+    words = f"{fewest}" if fewest == most else f"{fewest} or {most}"
+
+    def check(value: Any) -> Any:
+        if not isinstance(value, list | tuple):
+            raise fault(f"must be a list of {words} entries, not {spoken(value)}")
+        if not fewest <= len(value) <= most:
+            raise fault(f"must have {words} entries, not {len(value)}")
+        return value
+
+    return BeforeValidator(check)
+
+
+Vector = Annotated[tuple[Formula, ...], entries(2, 3)]
+NumberVector = Annotated[tuple[Number, ...], entries(2, 3)]
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise fault(f"must be a text, not {spoken(value)}" + (" (put it in quotes)" if _plain(value) else ""))
+    if not value.strip():
+        raise fault("must be a text, not an empty one")
+    return value
+
+
+def _plain(value: Any) -> bool:
+    return isinstance(value, bool | int | float)
+
+
+def _name(value: Any) -> str:
+    name = _text(value)
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_-]*", name):
+        raise fault(f"must be a name of letters, digits, '_' and '-' that begins with a letter, not {spoken(name)}")
+    return name
+
+
+def _texts(value: Any) -> list[str]:
+    values = value if isinstance(value, list | tuple) else [value]
+    if not values:
+        raise fault("must name at least one surface")
+    return [_text(item) for item in values]
+
+
+def _switch(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise fault(f"must be true or false, not {spoken(value)}")
+    return value
+
+
+Text = Annotated[str, BeforeValidator(_text)]
+Name = Annotated[str, BeforeValidator(_name)]
+Switch = Annotated[bool, BeforeValidator(_switch)]
+Surfaces = Annotated[
+    tuple[str, ...],
+    BeforeValidator(_texts),
+    WithJsonSchema(
+        {
+            "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
+            "$comment": "surface name, or list of them",
+        }
+    ),
+]
+
+
+def chosen(key: str, names: Sequence[str]) -> BeforeValidator:
+    """A section whose other settings depend on `key`, which is one of the names."""
+
+    def check(value: Any) -> Any:
+        if not isinstance(value, dict):
+            raise fault(f"must be a section with '{key}', not {spoken(value)}")
+        if key not in value:
+            raise fault(f"needs the setting '{key}' (available: {', '.join(names)})")
+        word = value[key]
+        if word not in names:
+            hint = did_you_mean(word, names) if isinstance(word, str) else f" (available: {', '.join(names)})"
+            raise fault(f"unknown {key} {spoken(word)}{hint}", key)
+        return value
+
+    return BeforeValidator(check)

@@ -1,0 +1,38 @@
+"""Section `verify`."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import model_validator
+
+from fsci.case.section import Section, fault, setting
+from fsci.case.values import NotNegative, Number, Text
+
+
+class Check(Section):
+    """A result that the run must reach; exactly one of `relative` and `absolute` says how closely.
+
+    With the largest and smallest value M and m in the window, mean is (M + m)/2 and amplitude (M - m)/2.
+    """
+
+    value: Text = setting(..., "column of a probe such as A.y, or balance.NAME")
+    statistic: Literal["final", "min", "max", "mean", "amplitude", "frequency"] = setting(
+        "final", "what is taken of the column's values"
+    )
+    from_: Number | None = setting(
+        None, "start of the window of time; default: the start of the run", unit="s", name="from"
+    )
+    reference: Number = setting(..., "the value to reach")
+    relative: NotNegative | None = setting(None, "allowed deviation, relative to the reference", unit="1")
+    absolute: NotNegative | None = setting(None, "allowed deviation, in the unit of the value")
+
+    @model_validator(mode="after")
+    def _one_tolerance(self) -> Check:
+        if self.relative is not None and self.absolute is not None:
+            raise fault("give either 'relative' or 'absolute', not both", "absolute")
+        if self.relative is None and self.absolute is None:
+            raise fault("a check needs a tolerance: 'relative' or 'absolute'")
+        if self.relative is not None and self.reference == 0:
+            raise fault("a reference of 0 needs an 'absolute' tolerance", "relative")
+        return self

@@ -1,0 +1,101 @@
+"""The mesh a case asks for: a built-in shape or a file, put in its place, its parts found by name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from inspect import signature
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsci import shapes
+from fsci.mesh_files import MeshError, read_mesh, unknown
+from solvers.mesh import Mesh
+from solvers.mesh_topology import CORNERS, FACET_TYPE, find_facets
+
+__all__ = ["MeshError", "build_mesh", "extract_region", "place", "require_region", "require_surface"]
+
+
+def build_mesh(settings: Any, folder: Path) -> Mesh:
+    """The mesh of a case's `mesh:` section; file names count from `folder`. Raises MeshError."""
+    if getattr(settings, "shape", None) is not None:
+        mesh = _shape(settings)
+    else:
+        order, parameters = getattr(settings, "order", None), getattr(settings, "parameters", None)
+        mesh = read_mesh(folder / settings.file, order, parameters)
+    return place(mesh, getattr(settings, "rotate", None), getattr(settings, "translate", None))
+
+
+def _shape(settings: Any) -> Mesh:
+    function = getattr(shapes, settings.shape)
+    given = {name: getattr(settings, name, None) for name in signature(function).parameters}
+    try:
+        return function(**{name: value for name, value in given.items() if value is not None})
+    except ValueError as error:
+        raise MeshError(f"{settings.shape}: {error}") from None
+
+
+def place(mesh: Mesh, rotate: Any = None, translate: Sequence[float] | None = None) -> Mesh:
+    """Rotate about the origin, then translate [m].
+
+    `rotate` is one rotation or a list of them, each with attributes `axis` and `angle` [degrees].
+    """
+    points = mesh.points
+    dim = points.shape[1]
+    for rotation in rotate if isinstance(rotate, list | tuple) else [rotate] if rotate else []:
+        points = points @ _rotation(getattr(rotation, "axis", None), rotation.angle, dim).T
+    if translate is not None:
+        if len(translate) != dim:
+            raise MeshError(f"translate has {len(translate)} numbers, the mesh has {dim} dimensions")
+        points = points + np.asarray(translate, dtype=float)
+    return replace(mesh, points=points)
+
+
+def _rotation(axis: Sequence[float] | None, angle: float, dim: int) -> NDArray[np.float64]:
+    """Matrix of the right-handed rotation by `angle` degrees about k: cos I + sin [k] + (1 - cos) k k^T."""
+    if axis is None and dim == 3:
+        raise MeshError("rotate: a mesh of three dimensions needs an axis")
+    k = np.array([0, 0, 1] if axis is None else axis, dtype=float)
+    if k.shape != (3,) or not k.any():
+        raise MeshError(f"rotate: the axis must be three numbers, not all zero, got {list(k)}")
+    if dim == 2 and k[:2].any():
+        raise MeshError("rotate: a mesh of two dimensions turns in its plane, give the angle only")
+    k /= np.linalg.norm(k)
+    cos, sin = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    cross = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
+    return (cos * np.eye(3) + sin * cross + (1 - cos) * np.outer(k, k))[:dim, :dim]
+
+
+def require_surface(mesh: Mesh, name: str) -> NDArray[np.int64]:
+    """Corner nodes of a named surface, shape (facets, corners); a MeshError lists the names there are."""
+    if name not in mesh.surfaces:
+        raise unknown("surface", name, mesh.surfaces)
+    return mesh.surfaces[name]
+
+
+def require_region(mesh: Mesh, name: str) -> NDArray[np.int64]:
+    """Indices of the cells of a named region; a MeshError lists the names there are."""
+    if name not in mesh.regions:
+        raise unknown("region", name, mesh.regions)
+    return mesh.regions[name]
+
+
+def extract_region(mesh: Mesh, name: str) -> Mesh:
+    """The cells of a region as a mesh of its own, with its share of the surfaces and of other regions."""
+    chosen = require_region(mesh, name)
+    used, cells = np.unique(mesh.cells[chosen], return_inverse=True)
+    part = Mesh(mesh.points[used], cells.reshape(len(chosen), -1), mesh.cell_type)
+
+    index = np.full(len(mesh.points), -1)
+    index[used] = np.arange(len(used))
+    corners = CORNERS[FACET_TYPE[mesh.cell_type]]
+    surfaces = {key: find_facets(part, index[facets])[:, :corners] for key, facets in mesh.surfaces.items()}
+    regions = {key: np.flatnonzero(np.isin(chosen, of)) for key, of in mesh.regions.items()}
+    return replace(
+        part,
+        surfaces={key: facets for key, facets in surfaces.items() if len(facets)},
+        regions={key: of for key, of in regions.items() if len(of)},
+    )

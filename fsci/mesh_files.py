@@ -1,0 +1,282 @@
+"""Mesh files: gmsh's own through gmsh, any other format through meshio, to one `Mesh` with named parts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.mesh import Mesh
+from solvers.mesh_topology import (
+    CORNERS,
+    FACET_TYPE,
+    FIRST_ORDER,
+    MIRROR,
+    boundary_facets,
+    find_facets,
+    reference_nodes,
+    signed_volumes,
+)
+
+Indices = NDArray[np.int64]
+
+
+class MeshError(Exception):
+    """A mesh that cannot be built as asked; the message says why, for the user."""
+
+
+def unknown(kind: str, name: str, names: Iterable[str]) -> MeshError:
+    """The error of a name that is not among the names there are."""
+    there = sorted(names)
+    close = get_close_matches(name, there, n=1)
+    hint = f", did you mean '{close[0]}'?" if close else ";"
+    listed = f"there are: {', '.join(there)}" if there else "there are none"
+    return MeshError(f"unknown {kind} '{name}'{hint} {listed}")
+
+
+@dataclass(frozen=True)
+class Block:
+    """Cells of one type in a file, of any dimension."""
+
+    cell_type: str
+    dim: int
+    nodes: Indices  #: shape (cells, nodes per cell)
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a file holds, before the cells of the highest dimension become the mesh."""
+
+    points: NDArray[np.float64]
+    blocks: list[Block]
+    groups: list[tuple[str, int, Indices]]  #: name, block, cells of this block
+    point_sets: dict[str, Indices] = field(default_factory=dict)  #: name -> nodes
+
+
+def read_mesh(path: Path, order: int | None = None, parameters: Mapping[str, float] | None = None) -> Mesh:
+    """The mesh of a file; `order` (1 or 2) and `parameters` (for DefineConstant) are for gmsh's .geo scripts.
+
+    Raises MeshError: file missing or unreadable, unknown parameter, several cell types or a foreign one.
+    """
+    if not path.is_file():
+        raise MeshError(f"there is no mesh file {path}")
+    if path.suffix in (".geo", ".geo_unrolled"):
+        content = _read_gmsh(path, order, parameters or {})
+    elif parameters:
+        raise MeshError(f"parameters are for .geo files, {path.name} has none")
+    elif path.suffix == ".msh":
+        content = _read_gmsh(path, None, {})
+    else:
+        content = _read_meshio(path)
+    try:
+        return _mesh(content)
+    except MeshError as error:
+        raise MeshError(f"{path.name}: {error}") from None
+
+
+def _mesh(content: Content) -> Mesh:
+    dim = max((block.dim for block in content.blocks), default=0)
+    if dim < 2:
+        raise MeshError("the file has no cells of two or three dimensions")
+    types = sorted({block.cell_type for block in content.blocks if block.dim == dim})
+    if len(types) > 1 or types[0] not in FACET_TYPE:
+        allowed = ", ".join(FACET_TYPE)
+        raise MeshError(f"the cells are {' and '.join(types)}; all must be of one type, one of {allowed}")
+    cell_type = types[0]
+
+    cells = np.concatenate([block.nodes for block in content.blocks if block.dim == dim])
+    used, numbers = np.unique(cells, return_inverse=True)
+    mesh = Mesh(_positions(content.points[used], dim), numbers.reshape(cells.shape), cell_type)
+    mesh = replace(mesh, cells=_positive(mesh))
+
+    index = np.full(len(content.points), -1)
+    index[used] = np.arange(len(used))
+    return replace(mesh, regions=_regions(content, dim), surfaces=_surfaces(content, mesh, index))
+
+
+def _positions(points: NDArray[np.float64], dim: int) -> NDArray[np.float64]:
+    """A mesh of plane cells keeps x and y only."""
+    across = points[:, dim:]
+    if across.size and np.ptp(across, axis=0).max() > 1e-9 * np.ptp(points, axis=0).max():
+        raise MeshError("the cells are a surface in space; a plane mesh must have the same z everywhere")
+    return np.ascontiguousarray(points[:, :dim], dtype=float)
+
+
+def _positive(mesh: Mesh) -> Indices:
+    """The cells, those of negative volume turned inside out: files number them either way."""
+    volumes = signed_volumes(mesh)
+    if (volumes == 0).any():
+        raise MeshError(f"{np.count_nonzero(volumes == 0)} cells have no volume")
+    return np.where(volumes[:, None] > 0, mesh.cells, mesh.cells[:, MIRROR[mesh.cell_type]])
+
+
+def _regions(content: Content, dim: int) -> dict[str, Indices]:
+    sizes = [len(block.nodes) if block.dim == dim else 0 for block in content.blocks]
+    start = np.cumsum([0, *sizes])
+    parts: dict[str, list[Indices]] = {}
+    for name, block, cells in content.groups:
+        if content.blocks[block].dim == dim and len(cells):
+            parts.setdefault(name, []).append(start[block] + cells)
+    return {name: np.unique(np.concatenate(cells)) for name, cells in parts.items()}
+
+
+def _surfaces(content: Content, mesh: Mesh, index: Indices) -> dict[str, Indices]:
+    """Groups of facets, and sets of points that cover facets; `index` takes the file's nodes to the mesh's."""
+    facet_type = FACET_TYPE[mesh.cell_type]
+    count = CORNERS[facet_type]
+    parts: dict[str, list[Indices]] = {}
+    for name, block, cells in content.groups:
+        if FIRST_ORDER.get(content.blocks[block].cell_type) == FIRST_ORDER[facet_type]:
+            parts.setdefault(name, []).append(index[content.blocks[block].nodes[cells, :count]])
+    surfaces = {}
+    for name, corners in parts.items():
+        # overlapping groups of one name must not count a facet twice
+        surfaces[name] = np.unique(find_facets(mesh, np.concatenate(corners))[:, :count], axis=0)
+    if content.point_sets:
+        boundary = boundary_facets(mesh)[:, :count]
+        for name, nodes in content.point_sets.items():
+            inside = np.isin(boundary, index[nodes]).all(axis=1)
+            surfaces.setdefault(name, boundary[inside])
+    return {name: facets for name, facets in surfaces.items() if len(facets)}
+
+
+def _read_gmsh(path: Path, order: int | None, parameters: Mapping[str, float]) -> Content:
+    import gmsh
+
+    # interruptible would take the signal handlers that end a run cleanly
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        if parameters:
+            _set_parameters(path, parameters)
+        _merge(path)
+        if path.suffix != ".msh":
+            _check_parameters(path, parameters)
+            if order is not None:
+                gmsh.option.setNumber("Mesh.ElementOrder", order)
+                gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 0)
+            gmsh.model.mesh.generate(gmsh.model.getDimension())
+        return _gmsh_content()
+    except MeshError:
+        raise
+    except Exception as error:  # gmsh raises nothing more special
+        raise MeshError(f"{path.name}: gmsh says: {error}") from None
+    finally:
+        gmsh.finalize()
+
+
+def _merge(path: Path) -> None:
+    """Load a file into the current model: unlike open, this keeps parameters that are set already."""
+    import gmsh
+
+    # an exception in the middle of a script would leave gmsh's parser there, to trip over the next file
+    gmsh.option.setNumber("General.AbortOnError", 0)
+    gmsh.logger.start()
+    try:
+        gmsh.merge(str(path))
+        errors = [line.removeprefix("Error: ") for line in gmsh.logger.get() if line.startswith("Error")]
+    finally:
+        gmsh.logger.stop()
+        gmsh.option.setNumber("General.AbortOnError", 2)
+    if errors:
+        raise MeshError(f"{path.name}: gmsh says: {errors[0]}")
+
+
+def _set_parameters(path: Path, parameters: Mapping[str, float]) -> None:
+    import gmsh
+
+    _merge(path)
+    names = sorted(gmsh.parser.getNames())
+    gmsh.clear()
+    for name, value in parameters.items():
+        if name not in names:
+            raise unknown(f"{path.name} parameter", name, names)
+        gmsh.parser.setNumber(name, [value])
+
+
+def _check_parameters(path: Path, parameters: Mapping[str, float]) -> None:
+    import gmsh
+
+    for name, value in parameters.items():
+        if list(gmsh.parser.getNumber(name)) != [value]:
+            raise MeshError(f"{path.name} sets '{name}' itself; DefineConstant[ {name} = ... ]; makes it a parameter")
+
+
+def _gmsh_content() -> Content:
+    """The current model: its physical groups, and all of the highest dimension if there is no group of it."""
+    import gmsh
+
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    number = np.zeros(int(tags.max(initial=0)) + 1, dtype=np.int64)
+    number[tags] = np.arange(len(tags))
+
+    names: dict[tuple[int, int], list[str]] = {}
+    for dim, tag in gmsh.model.getPhysicalGroups():
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag):
+            names.setdefault((dim, entity), []).append(gmsh.model.getPhysicalName(dim, tag))
+    top = gmsh.model.getDimension()
+    if not any(dim == top for dim, _ in names):
+        names |= {entity: [] for entity in gmsh.model.getEntities(top)}
+
+    blocks: list[Block] = []
+    groups: list[tuple[str, int, Indices]] = []
+    for (dim, entity), entity_names in names.items():
+        for kind, elements, nodes in zip(*gmsh.model.mesh.getElements(dim, entity), strict=True):
+            cell_type, order = _gmsh_type(kind)
+            groups += [(name, len(blocks), np.arange(len(elements))) for name in entity_names if name]
+            blocks.append(Block(cell_type, dim, number[nodes.reshape(len(elements), -1)[:, order]]))
+    return Content(coordinates.reshape(-1, 3), blocks, groups)
+
+
+def _gmsh_type(kind: int) -> tuple[str, Indices]:
+    """Name of one of gmsh's element types (gmsh's own if unknown here), and its nodes in VTK's order."""
+    import gmsh
+
+    names = {1: "line", 2: "triangle", 3: "quad", 4: "tetra", 5: "hexahedron"}
+    names |= {8: "line3", 9: "triangle6", 10: "quad9", 11: "tetra10", 12: "hexahedron27"}
+    name, dim, _, count, positions, _ = gmsh.model.mesh.getElementProperties(kind)
+    if kind not in names:
+        return name, np.arange(count)
+    ours = reference_nodes(names[kind])
+    theirs = positions.reshape(count, dim)
+    if not name.startswith(("Triangle", "Tetrahedron")):
+        theirs = (theirs + 1) / 2  # from -1 to 1, as gmsh has lines, quadrilaterals and hexahedra
+    return names[kind], np.abs(ours[:, None] - theirs).sum(axis=2).argmin(axis=1)
+
+
+def _read_meshio(path: Path) -> Content:
+    import meshio
+
+    printed = StringIO()
+    try:
+        with redirect_stdout(printed), redirect_stderr(printed):
+            mesh = meshio.read(path)
+    except (Exception, SystemExit) as error:  # meshio prints and exits when no reader takes the file
+        reason = printed.getvalue().strip() or str(error) or type(error).__name__
+        raise MeshError(f"{path.name}: meshio says: {' '.join(reason.split())}") from None
+    blocks = [Block(block.type, block.dim, np.asarray(block.data, dtype=np.int64)) for block in mesh.cells]
+    point_sets = {name: np.asarray(nodes, dtype=np.int64) for name, nodes in mesh.point_sets.items()}
+    return Content(np.asarray(mesh.points), blocks, list(_meshio_groups(mesh)), point_sets)
+
+
+def _meshio_groups(mesh: Any) -> Iterator[tuple[str, int, Indices]]:
+    """Cell sets, physical groups kept with the cells (as converted from gmsh), and families (MED)."""
+    for name, parts in mesh.cell_sets.items():
+        for block, cells in enumerate(parts):
+            if cells is not None:
+                yield name, block, np.asarray(cells, dtype=np.int64)
+    for name, (tag, dim) in mesh.field_data.items():
+        for block, data in enumerate(mesh.cell_data.get("gmsh:physical", [])):
+            if mesh.cells[block].dim == dim:
+                yield name, block, np.flatnonzero(data == tag)
+    for tag, names in getattr(mesh, "cell_tags", {}).items():
+        for block, data in enumerate(mesh.cell_data["cell_tags"]):
+            for name in names:
+                yield name, block, np.flatnonzero(data == tag)

@@ -1,0 +1,20 @@
+"""Built-in structured meshes: plain functions from sizes and cell counts to a `Mesh` with named surfaces."""
+
+from fsci.shapes.plane import disc, rectangle, ring
+from fsci.shapes.solid import beam, box, cylinder, hollow_sphere, hollow_torus, solid_torus, tube
+
+annulus = tube
+
+__all__ = [
+    "annulus",
+    "beam",
+    "box",
+    "cylinder",
+    "disc",
+    "hollow_sphere",
+    "hollow_torus",
+    "rectangle",
+    "ring",
+    "solid_torus",
+    "tube",
+]

@@ -1,0 +1,154 @@
+"""Structured lattices of nodes: lines, discs, spheres, their products, and the cells picked from them.
+
+Nodes are identified by integers, never by distance: seams are joined exactly, wherever the points move.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.mesh import Mesh
+from solvers.mesh_topology import CORNERS, FACET_TYPE, NODES, boundary_facets, reference_nodes
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+#: Directions -> name of a cell -> its types of first and second order.
+CELL_TYPES = {
+    2: {"quad": ("quad", "quad9"), "tri": ("triangle", "triangle6")},
+    3: {"hex": ("hexahedron", "hexahedron27"), "tet": ("tetra", "tetra10")},
+}
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Blocks of nodes; a cell takes `order` intervals of its block in every direction."""
+
+    points: Array  #: node positions or parameters, shape (n, any)
+    blocks: tuple[Indices, ...]  #: node numbers, each of shape (order * cells + 1, ...) with one axis per direction
+    sides: dict[str, Indices]  #: name of a part of the boundary -> its nodes
+    order: int  #: 1 or 2
+
+    def mapped(self, function: Callable[..., Sequence[Array]]) -> Lattice:
+        """The same lattice with its points moved: `function(x, y, ...)` gives the new coordinates."""
+        return replace(self, points=np.column_stack(function(*self.points.T)))
+
+
+def line(cells: int, order: int, sides: tuple[str, str] | None = None) -> Lattice:
+    """Parameter 0 to 1 in equal steps; without sides it is closed: its end is its start."""
+    if sides is None and cells < 3:
+        raise ValueError(f"at least 3 cells are needed all the way around, got {cells}")
+    steps = order * cells
+    parameter = np.arange(steps + 1) / steps
+    if sides is None:
+        return Lattice(parameter[:-1, None], (np.arange(steps + 1) % steps,), {}, order)
+    ends = {sides[0]: np.array([0]), sides[1]: np.array([steps])}
+    return Lattice(parameter[:, None], (np.arange(steps + 1),), ends, order)
+
+
+def product(first: Lattice, second: Lattice) -> Lattice:
+    """Every node of the first with every node of the second: coordinates, directions and sides of both."""
+    size, along = len(second.points), np.arange(len(second.points))
+    points = np.hstack([np.repeat(first.points, size, axis=0), np.tile(second.points, (len(first.points), 1))])
+    blocks = tuple(np.add.outer(a * size, b) for a in first.blocks for b in second.blocks)
+    across = np.arange(len(first.points)) * size
+    sides = {name: np.add.outer(nodes * size, along).ravel() for name, nodes in first.sides.items()}
+    sides |= {name: np.add.outer(across, nodes).ravel() for name, nodes in second.sides.items()}
+    return Lattice(points, blocks, sides, first.order)
+
+
+def disc(around: int, radial: int, order: int) -> Lattice:
+    """Unit disc: a square core with bulged sides inside a shell of `radial` layers; side `outer`.
+
+    `around` counts the cells on the circle, a multiple of 4: each side of the core has a quarter of them.
+    """
+    if around % 4 or around < 4:
+        raise ValueError(f"the number of cells around must be a multiple of 4, got {around}")
+    quarter = around // 4
+    edge, turn, layers = order * quarter, order * around, order * radial
+
+    # cells of core and shell of about the same size
+    half = np.clip(quarter / (2 * radial + 1.25 * quarter), 0.3, 0.5)
+    u, v = np.meshgrid(np.linspace(-1, 1, edge + 1), np.linspace(-1, 1, edge + 1), indexing="ij")
+    # three cells meet at a corner of the core: the bulge opens its angle from 90 degrees to nearly 120
+    bulge = 0.12
+    square = np.stack([u * (1 + bulge * (1 - v**2)), v * (1 + bulge * (1 - u**2))], axis=-1)
+    square = half * square.reshape(-1, 2)
+
+    core = np.arange((edge + 1) ** 2).reshape(edge + 1, edge + 1)
+    rim = np.concatenate([core[-1, :-1], core[:0:-1, -1], core[0, :0:-1], core[:-1, 0]])
+    angle = 2 * np.pi * (np.arange(turn) / turn - 1 / 8)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    part = (np.arange(1, layers + 1) / layers)[:, None, None]
+    shell_points = (1 - part) * square[rim] + part * circle
+
+    shell = np.vstack([rim, core.size + np.arange(layers * turn).reshape(layers, turn)])
+    shell = np.column_stack([shell, shell[:, 0]])
+    points = np.vstack([square, shell_points.reshape(-1, 2)])
+    return Lattice(points, (core, shell), {"outer": shell[-1, :-1]}, order)
+
+
+def sphere(cells: int, order: int) -> Lattice:
+    """Unit sphere: the six faces of a cube, `cells` per edge, at equal angles (equiangular gnomonic)."""
+    steps = order * cells
+    cube = np.arange((steps + 1) ** 3).reshape(3 * (steps + 1,))
+    faces = [cube[0].T, cube[-1], cube[:, 0], cube[:, -1].T, cube[:, :, 0].T, cube[:, :, -1]]
+    used = np.unique(np.stack(faces))
+    index = np.column_stack(np.unravel_index(used, cube.shape))
+    points = np.tan(np.pi / 4 * (2 * index / steps - 1))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    return Lattice(points, tuple(np.searchsorted(used, face) for face in faces), {}, order)
+
+
+def mesh(lattice: Lattice, cell: str) -> Mesh:
+    """The mesh of a lattice of 2 directions (cell quad or tri) or 3 (hex or tet), its sides as surfaces."""
+    directions = lattice.blocks[0].ndim
+    if cell not in CELL_TYPES[directions]:
+        raise ValueError(f"unknown cell '{cell}'; there are: {', '.join(CELL_TYPES[directions])}")
+    cell_type = CELL_TYPES[directions][cell][lattice.order - 1]
+    window = (lattice.order + 1,) * directions
+    every = (slice(None, None, lattice.order),) * directions
+    windows = [np.lib.stride_tricks.sliding_window_view(block, window)[every] for block in lattice.blocks]
+    nodes = np.concatenate([part.reshape(-1, *window) for part in windows])
+    if cell in ("quad", "hex"):
+        position = np.rint(lattice.order * reference_nodes(cell_type)).astype(int)
+        cells = nodes[(slice(None), *position.T)]
+    else:
+        cells = _simplices(nodes, cell_type, lattice.order)
+    plain = Mesh(np.ascontiguousarray(lattice.points), np.ascontiguousarray(cells), cell_type)
+    facets = boundary_facets(plain)[:, : CORNERS[FACET_TYPE[cell_type]]]
+    surfaces = {name: facets[np.isin(facets, side).all(axis=1)] for name, side in lattice.sides.items()}
+    return replace(plain, surfaces=surfaces)
+
+
+def _simplices(nodes: Indices, cell_type: str, order: int) -> Indices:
+    """Two triangles for each quad; six tetrahedra for each hexahedron, three in the prism on each triangle.
+
+    The diagonals of the prisms' sides go from the lower node number at the bottom to the higher one at the
+    top, so that neighbours agree on them however their blocks are turned.
+    """
+    count, directions = len(nodes), nodes.ndim - 1
+    triangles = np.array([[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]])
+    corners = np.repeat(triangles[None], count, axis=0)  # (cells, 2, 3, 2)
+    if directions == 3:
+        cell = np.arange(count)[:, None, None]
+        number = nodes[cell, order * corners[..., 0], order * corners[..., 1], 0]
+        corners = np.take_along_axis(corners, np.argsort(number, axis=2)[..., None], axis=2)
+        bottom = np.concatenate([corners, np.zeros_like(corners[..., :1])], axis=-1)
+        top = bottom + np.array([0, 0, 1])
+        # the path from bottom to top rises after 1, 2 or 3 corners of the triangle
+        rises = [np.concatenate([bottom[:, :, :rise], top[:, :, rise - 1 :]], axis=2) for rise in (1, 2, 3)]
+        corners = np.stack(rises, axis=2)
+    corners = corners.reshape(count, -1, directions + 1, directions)
+    inside_out = np.linalg.det(corners[:, :, 1:] - corners[:, :, :1]) < 0
+    corners[inside_out] = corners[inside_out][:, [0, 2, 1, *range(3, directions + 1)]]
+
+    # the sum of two corners (0 or 1) is the middle between them, counted in half cells
+    groups = [(group[0], group[-1]) for group in NODES[cell_type]]
+    position = np.stack([corners[:, :, a] + corners[:, :, b] for a, b in groups], axis=2) * order // 2
+    cell = np.arange(count)[:, None, None]
+    return nodes[(cell, *np.moveaxis(position, -1, 0))].reshape(-1, len(groups))

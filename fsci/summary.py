@@ -1,0 +1,167 @@
+"""summary.json: what a run was, what it took and what came out."""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+import resource
+import time
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fsci.history import History
+from fsci.output import write_text
+from solvers.api import State, StepInfo
+
+
+@dataclass
+class Timer:
+    """Wall time [s] by name: `with timer("assembly"): ...`; a part inside another counts for both."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[None]:
+        begin = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
+
+
+@dataclass
+class RunRecord:
+    """What the history does not keep: retries, Newton residuals of the steps asked for, where time goes."""
+
+    residual_steps: Collection[int] = ()  #: steps whose residuals summary.json keeps
+    residuals: dict[int, list[float]] = field(default_factory=dict)  #: step -> residual norms, first to last
+    retried: int = 0  #: attempts that failed and were repeated with a smaller step
+    timer: Timer = field(default_factory=Timer)
+    begin: float = field(default_factory=time.perf_counter)
+    earlier: float = 0.0  #: wall time of the run before it was resumed [s]
+
+    def accept(self, step: int, info: StepInfo) -> None:
+        """Notes an accepted step."""
+        if step in self.residual_steps:
+            self.residuals[step] = [float(norm) for norm in info.residuals]
+
+    def retry(self) -> None:
+        """Notes a failed attempt."""
+        self.retried += 1
+
+    def wall(self) -> float:
+        """Wall time since the run began [s], without the pauses between stop and resume."""
+        return self.earlier + time.perf_counter() - self.begin
+
+    def save(self) -> State:
+        """What a checkpoint keeps, so that the summary of a resumed run covers all of it."""
+        return {
+            "retried": self.retried,
+            "residuals": {str(step): norms for step, norms in self.residuals.items()},
+            "seconds": dict(self.timer.seconds),
+            "wall": self.wall(),
+        }
+
+    def restore(self, state: State) -> None:
+        """Inverse of save."""
+        self.retried = state["retried"]
+        self.residuals = {int(step): norms for step, norms in state["residuals"].items()}
+        self.timer.seconds = dict(state["seconds"])
+        self.earlier = state["wall"]
+
+
+def summarize(
+    record: RunRecord,
+    history: History,
+    *,
+    status: str,
+    title: str,
+    processes: int,
+    dofs: Mapping[str, int],
+    memory: float,
+    probes: Sequence[str] = (),
+    balances: Sequence[str] = (),
+    verify: Sequence[Mapping[str, Any]] = (),
+    units: Mapping[str, str] | None = None,
+    message: str = "",
+) -> dict[str, Any]:
+    """The content of summary.json.
+
+    `status` is finished, stopped or failed and `message` says why; `memory` is the peak of the largest
+    process [MB]; `probes` and `balances` are history columns; `units` are those of length, mass and time.
+    """
+    iterations = [int(count) for count in history.get("iterations", ())]
+    columns = {name: history[name] for name in (*probes, *balances) if len(history.get(name, ()))}
+    return {
+        "title": title,
+        "status": status,
+        "message": message,
+        "processes": processes,
+        "versions": versions(),
+        "dofs": dict(dofs),
+        "steps": {"accepted": len(iterations), "retried": record.retried},
+        "newton": {
+            "total": sum(iterations),
+            "max": max(iterations, default=0),
+            "per_step": iterations,
+            "residuals": {str(step): norms for step, norms in sorted(record.residuals.items())},
+        },
+        "wall": {"total": record.wall(), **record.timer.seconds},
+        "memory_mb": memory,
+        "probes": {
+            name: {"final": values[-1], "min": values.min(), "max": values.max()}
+            for name, values in columns.items()
+            if name in probes
+        },
+        "balances": {
+            name: {"final": values[-1], "max_abs": np.abs(values).max()}
+            for name, values in columns.items()
+            if name in balances
+        },
+        "verify": [dict(result) for result in verify],
+        "units": dict(units or {}),
+    }
+
+
+def write_summary(path: Path, data: Mapping[str, Any]) -> None:
+    """Writes JSON, whole or not at all; numbers that are not finite become null."""
+    write_text(path, json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
+
+
+def plain(value: Any) -> Any:
+    """A value in the types of JSON."""
+    if isinstance(value, Mapping):
+        return {str(name): plain(item) for name, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def memory_mb() -> float:
+    """Peak resident set of this process [MB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def versions() -> dict[str, str]:
+    """Of the program and what its results depend on."""
+    from importlib import metadata
+
+    from petsc4py import PETSc
+
+    found = {"python": platform.python_version(), "petsc": ".".join(map(str, PETSc.Sys.getVersion()))}
+    for name, package in {"fsci": "fsci", "dolfinx": "fenics-dolfinx", "numpy": "numpy"}.items():
+        try:
+            found[name] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            found[name] = "unknown"
+    return found

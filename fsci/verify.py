@@ -1,0 +1,149 @@
+"""The `verify:` block of a case: statistics of history columns against reference values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Check(Protocol):
+    """One entry of `verify:`; exactly one of `relative` and `absolute` is given."""
+
+    @property
+    def value(self) -> str: ...  #: history column
+    @property
+    def statistic(self) -> str: ...  #: final, min, max, mean, amplitude or frequency
+    @property
+    def start(self) -> float | None: ...  #: only times from here on count
+    @property
+    def reference(self) -> float: ...
+    @property
+    def relative(self) -> float | None: ...
+    @property
+    def absolute(self) -> float | None: ...
+
+
+def evaluate(history: Mapping[str, Array], checks: Sequence[Check]) -> list[dict[str, Any]]:
+    """One dict {name, value, reference, tolerance, ok, message} per check.
+
+    `tolerance` is the difference allowed between value and reference; `message` says why there is no value.
+    """
+    return [evaluate_one(history, check) for check in checks]
+
+
+def evaluate_one(history: Mapping[str, Array], check: Check) -> dict[str, Any]:
+    """The result of one check; see evaluate."""
+    value, message = math.nan, ""
+    if check.value not in history:
+        message = f"'{check.value}' is not in the history"
+    else:
+        time, values = window(history["time"], history[check.value], check.start)
+        if len(time) == 0:
+            message = "no step in the time window"
+        elif not np.all(np.isfinite(values)):
+            message = f"'{check.value}' is not finite everywhere"
+        else:
+            value = STATISTICS[check.statistic](time, values)
+            if math.isnan(value):
+                message = "less than one full period in the time window"
+    relative = (check.relative or 0.0) * abs(check.reference)
+    tolerance = relative if check.absolute is None else check.absolute
+    since = "" if check.start is None else f" from {check.start:g}"
+    return {
+        "name": f"{check.value} {check.statistic}{since}",
+        "value": value,
+        "reference": check.reference,
+        "tolerance": tolerance,
+        "ok": bool(abs(value - check.reference) <= tolerance),
+        "message": message,
+    }
+
+
+def window(time: Array, values: Array, start: float | None) -> tuple[Array, Array]:
+    """The samples from `start` on; a sample that misses it by rounding belongs to them."""
+    if start is None or len(time) == 0:
+        return time, values
+    inside = time >= start - 1e-9 * max(abs(start), abs(time[-1]))
+    return time[inside], values[inside]
+
+
+def highest(time: Array, values: Array) -> float:
+    """The maximum of a sampled signal; interior peaks are refined by the parabola through three samples.
+
+    With the slopes s1, s2 left and right of the middle sample and the steps h1, h2 the parabola about it is
+    y = y1 + b t + c t^2 with c = (s2 - s1)/(h1 + h2), b = s1 + c h1; its top is y1 - b^2/(4c).
+    """
+    steps, slopes = np.diff(time), np.diff(values) / np.diff(time)
+    peak = (slopes[:-1] >= 0) & (slopes[1:] <= 0) & (slopes[:-1] > slopes[1:])
+    s1, s2, h1, h2 = slopes[:-1][peak], slopes[1:][peak], steps[:-1][peak], steps[1:][peak]
+    curvature = (s2 - s1) / (h1 + h2)
+    tops = values[1:-1][peak] - (s1 + curvature * h1) ** 2 / (4 * curvature)
+    return float(max(values.max(), tops.max(initial=-math.inf)))
+
+
+def extremes(time: Array, values: Array) -> tuple[float, float]:
+    """Refined (minimum, maximum) of a sampled signal."""
+    return -highest(time, -values), highest(time, values)
+
+
+def mean(time: Array, values: Array) -> float:
+    """(max + min)/2, as Turek and Hron define it."""
+    low, high = extremes(time, values)
+    return (high + low) / 2
+
+
+def amplitude(time: Array, values: Array) -> float:
+    """(max - min)/2, as Turek and Hron define it."""
+    low, high = extremes(time, values)
+    return (high - low) / 2
+
+
+def frequency(time: Array, values: Array) -> float:
+    """Whole periods over the time they take, from crossings of the mean level; NaN with less than one period.
+
+    A crossing counts when the signal passes the whole band of a tenth of the amplitude around the mean, so
+    that ripples do not. Rising and falling crossings are counted apart: an error of the level cancels.
+    """
+    low, high = extremes(time, values)
+    if not high > low:
+        return math.nan
+    signal = (values - (high + low) / 2) / ((high - low) / 2)
+    outside = np.flatnonzero(np.abs(signal) > 0.1)
+    turns = np.flatnonzero(np.diff(np.sign(signal[outside])))
+    periods, duration = 0, 0.0
+    for sign in (1.0, -1.0):
+        times = [
+            crossing(time, sign * signal, int(outside[turn]))
+            for turn in turns
+            if sign * signal[outside[turn]] < 0
+        ]
+        if len(times) > 1:
+            periods, duration = periods + len(times) - 1, duration + times[-1] - times[0]
+    return periods / duration if periods else math.nan
+
+
+def crossing(time: Array, signal: Array, first: int) -> float:
+    """The time of the first rise through zero after sample `first`, on the cubic through four samples."""
+    from scipy.interpolate import BarycentricInterpolator
+    from scipy.optimize import brentq
+
+    left = first + int(np.flatnonzero(signal[first + 1 :] >= 0)[0])
+    near = slice(max(left - 1, 0), left + 3)
+    cubic = BarycentricInterpolator(time[near], signal[near])
+    return float(brentq(cubic, time[left], time[left + 1], xtol=1e-12 * (time[left + 1] - time[left])))
+
+
+STATISTICS = {
+    "final": lambda time, values: float(values[-1]),
+    "min": lambda time, values: float(values.min()),
+    "max": lambda time, values: float(values.max()),
+    "mean": mean,
+    "amplitude": amplitude,
+    "frequency": frequency,
+}

@@ -1,0 +1,51 @@
+"""Several distributed vectors and matrices as one: on each process the owned rows of block 0, then of block 1, ..."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from solvers.api import Array
+
+
+class Layout:
+    """Where the blocks stand in the concatenated owned dofs."""
+
+    def __init__(self, comm: MPI.Comm, sizes: Sequence[int]):
+        self.comm = comm
+        self.offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+    @property
+    def size(self) -> int:
+        """Owned dofs of all blocks."""
+        return int(self.offsets[-1])
+
+    @property
+    def start(self) -> int:
+        """Global number of the first owned dof (collective)."""
+        return self.comm.exscan(self.size) or 0  # type: ignore[attr-defined]
+
+    def split(self, array: Array) -> list[Array]:
+        """Views of the blocks of a concatenated owned array."""
+        return [array[a:b] for a, b in zip(self.offsets[:-1], self.offsets[1:], strict=True)]
+
+    def vector(self) -> PETSc.Vec:
+        """A new distributed vector of zeros."""
+        return PETSc.Vec().createMPI((self.size, None), comm=self.comm)
+
+
+def block_diagonal(blocks: Sequence[PETSc.Mat], out: PETSc.Mat | None = None) -> PETSc.Mat:
+    """diag(blocks) as one AIJ matrix; `out` from an earlier call with the same sparsity is filled again.
+
+    One block is returned as it is, without a copy.
+    """
+    if len(blocks) == 1:
+        return blocks[0]
+    rows = [[block if i == j else None for j in range(len(blocks))] for i, block in enumerate(blocks)]
+    nest = PETSc.Mat().createNest(rows, comm=blocks[0].comm)
+    if out is None:
+        return nest.convert(PETSc.Mat.Type.AIJ, PETSc.Mat())
+    return nest.convert(PETSc.Mat.Type.AIJ, out)

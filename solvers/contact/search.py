@@ -1,0 +1,113 @@
+"""Search: which slave facets may touch which master facets; only these pairs reach the mortar kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from solvers.api import Array, StepFailed
+from solvers.kernels import KdopTree2, KdopTree3
+
+#: Build a tree anew once its nodes cover this many times as much as when it was new (a build costs 4 refits).
+REBUILD_ABOVE = 2.0
+
+Facets = NDArray[np.int64]  #: node indices in VTK order, shape (k, nodes per facet)
+Tree: TypeAlias = KdopTree2 | KdopTree3
+
+
+class Search:
+    """Facet pairs of two surfaces: a tree of k-DOPs on each, built when they first come near, then refitted.
+
+    Facets: line2, line3 (2D), tri3, quad4, tri6, quad9 (3D). The result depends on the arguments of
+    `pairs`, never on earlier calls. One object serves one thread at a time.
+    """
+
+    def __init__(self, slave_facets: Facets, master_facets: Facets):
+        self._slave_facets = np.ascontiguousarray(slave_facets, dtype=np.int64)
+        self._master_facets = np.ascontiguousarray(master_facets, dtype=np.int64)
+        self._trees: tuple[Tree, Tree] | None = None
+
+    def pairs(
+        self,
+        xs: Array,
+        xm: Array,
+        inflation: ArrayLike,
+        xs_previous: Array | None = None,
+        xm_previous: Array | None = None,
+    ) -> NDArray[np.int32]:
+        """Every (slave facet, master facet) closer than `inflation`, and some more; shape (p, 2), sorted.
+
+        xs, xm: node positions [m], shapes (n, dim). inflation [m]: one number, or one per slave facet. With
+        previous positions also every pair that comes so close while the nodes go straight from there to here.
+        ValueError if shapes do not fit, StepFailed if a position is not finite.
+        """
+        way_s, way_m = _way(xs, xs_previous), _way(xm, xm_previous)
+        if not all(np.isfinite(x).all() for x in way_s + way_m):
+            raise StepFailed("contact", "surface positions are not finite")
+        radii = np.ascontiguousarray(np.broadcast_to(np.asarray(inflation, float), len(self._slave_facets)))
+        if self._trees is None:
+            kdop_tree = KdopTree2 if np.shape(xs)[1] == 2 else KdopTree3
+            self._trees = kdop_tree(self._slave_facets), kdop_tree(self._master_facets)
+        slave, master = self._trees
+
+        low_s, high_s = slave.box(*way_s)
+        low_m, high_m = master.box(*way_m)
+        if np.any(low_s - radii.max() > high_m) or np.any(low_m > high_s + radii.max()):
+            return np.empty((0, 2), np.int32)
+        _update(slave, way_s, radii)
+        _update(master, way_m, np.zeros(len(self._master_facets)))
+        return slave.candidates(master)[0]
+
+
+def _way(x: Array, x_previous: Array | None) -> list[Array]:
+    return [np.ascontiguousarray(y, float) for y in (x, x_previous) if y is not None]
+
+
+def _update(tree: Tree, way: list[Array], radii: Array) -> None:
+    x, *previous = way
+    tree.refit(x, radii, *previous)
+    if tree.quality() > REBUILD_ABOVE:
+        tree.build(x, radii, *previous)
+
+
+def measure_search(facets: int) -> dict[str, float]:
+    """What the search costs for two wavy sheets of about so many quads each, a tenth of an edge apart.
+
+    Seconds for `build` and `refit` (one tree), `query` and `box` (both surfaces), best of three; numbers of
+    `facets`, `pairs` and k-DOP `tests`.
+    """
+    cells = round(np.sqrt(facets))
+    edge = 1 / cells
+    (xs, slave_facets), (xm, master_facets) = _sheet(cells, 0.0), _sheet(cells + 1, 0.1 * edge)
+    slave, master = KdopTree3(slave_facets), KdopTree3(master_facets)
+    radii = np.full(len(slave_facets), 0.3 * edge)
+    master.build(xm, np.zeros(len(master_facets)))
+    times = {
+        "build": _seconds(lambda: slave.build(xs, radii)),
+        "refit": _seconds(lambda: slave.refit(xs, radii)),
+        "query": _seconds(lambda: slave.candidates(master)),
+        "box": _seconds(lambda: (slave.box(xs), master.box(xm))),
+    }
+    pairs, tests = slave.candidates(master)
+    return {"facets": len(slave_facets), **times, "pairs": len(pairs), "tests": tests}
+
+
+def _sheet(cells: int, height: float) -> tuple[Array, Facets]:
+    s, t = np.meshgrid(*2 * [np.linspace(0, 1, cells + 1)], indexing="ij")
+    points = np.stack([s, t, height + 0.1 * np.sin(7 * s) * np.cos(5 * t)], axis=-1).reshape(-1, 3)
+    node = np.arange(len(points)).reshape(s.shape)
+    corners = [node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]]
+    return points, np.stack(corners, axis=-1).reshape(-1, 4)
+
+
+def _seconds(call: Callable[[], object]) -> float:
+    times = []
+    for _ in range(3):
+        start = perf_counter()
+        call()
+        times.append(perf_counter() - start)
+    return min(times)

@@ -1,0 +1,11 @@
+// The extension module: numpy arrays in, numpy arrays out; no DOLFINx types.
+#include <nanobind/nanobind.h>
+
+void bind_kdop(nanobind::module_& module);
+void bind_mortar(nanobind::module_& module);
+
+NB_MODULE(_kernels, module)
+{
+  bind_kdop(module);
+  bind_mortar(module);
+}

@@ -1,0 +1,24 @@
+"""The mesh of one body as plain arrays: what shapes and mesh files become before any finite element sees them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """One cell type, first or second order, with named surfaces and regions.
+
+    Node order within a cell is VTK's (as meshio and pyvista use it).
+    """
+
+    points: NDArray[np.float64]  #: node positions [m], shape (n, dim), dim 2 or 3
+    cells: NDArray[np.int64]  #: node indices, shape (cells, nodes per cell)
+    cell_type: str  #: triangle, triangle6, quad, quad9, tetra, tetra10, hexahedron, hexahedron27
+    surfaces: dict[str, NDArray[np.int64]] = field(
+        default_factory=dict
+    )  #: name -> corner nodes, shape (facets, corners)
+    regions: dict[str, NDArray[np.int64]] = field(default_factory=dict)  #: name -> cell indices

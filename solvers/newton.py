@@ -1,0 +1,111 @@
+"""Newton's method as a generator of iterates, and the caller that judges them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from solvers.api import StepFailed, StepInfo
+
+
+class System(Protocol):
+    """A nonlinear system of one field or many, at its current iterate."""
+
+    name: str
+
+    def residual(self) -> float:
+        """Assemble the residual; its norm over the rows that are solved for."""
+        ...
+
+    def advance(self) -> float:
+        """Linearise, solve and update; the norm of the increment relative to the solution."""
+        ...
+
+    def retreat(self, fraction: float) -> None:
+        """Take back a fraction of the last increment."""
+        ...
+
+    def round_off(self) -> float:
+        """Norm below which the residual is only rounding error of the terms that it is the sum of."""
+        ...
+
+    def settled(self) -> bool:
+        """False while the iterate does not yet fulfil what is imposed on it (supports, active sets)."""
+        ...
+
+    def worst(self) -> tuple[float, ...] | None:
+        """Where the residual is largest [m], for messages."""
+        ...
+
+
+@dataclass(frozen=True)
+class Iterate:
+    """One look at the system."""
+
+    number: int  #: linear solves so far
+    residual: float
+    increment: float  #: relative size of the last increment; infinite before the first
+    settled: bool
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """When an iterate is accepted: the residual is small and, if asked for, the increment too."""
+
+    residual: float = 1e-8  #: relative to the largest residual of the step
+    residual_absolute: float = 0.0  #: [N]
+    increment: float = math.inf  #: relative to the solution
+    max_iterations: int = 25
+    line_search: bool = False
+
+
+def iterates(system: System, *, line_search: bool = False) -> Iterator[Iterate]:
+    """Newton iterates without end: the caller owns tolerance, limits and logging."""
+    number, increment, residual = 0, math.inf, system.residual()
+    while True:
+        yield Iterate(number, residual, increment, system.settled())
+        before = residual
+        imposed = system.settled()
+        increment = system.advance()
+        residual = system.residual()
+        if line_search and imposed:
+            increment, residual = _halve(system, before, increment, residual)
+        number += 1
+
+
+def _halve(system: System, before: float, increment: float, residual: float) -> tuple[float, float]:
+    """Halve the increment until the residual falls; after six halvings take what there is."""
+    remaining = 1.0
+    for _ in range(6):
+        if residual < before:
+            break
+        system.retreat(0.5 * remaining)
+        remaining *= 0.5
+        residual = system.residual()
+    return increment * remaining, residual
+
+
+def converge(system: System, tolerance: Tolerance) -> StepInfo:
+    """Iterate until accepted. Raises StepFailed with the history of residuals and the worst place."""
+    history: list[float] = []
+    for iterate in iterates(system, line_search=tolerance.line_search):
+        history.append(iterate.residual)
+        if not math.isfinite(iterate.residual):
+            reason = "the residual is not a number"
+        elif iterate.settled and _accepted(iterate, max(history), system.round_off(), tolerance):
+            return StepInfo(iterate.number, tuple(history))
+        elif iterate.number == tolerance.max_iterations:
+            reason = f"Newton did not converge in {iterate.number} iterations (residual {history[-1]:.3g} N)"
+        else:
+            continue
+        raise StepFailed(system.name, reason, iteration=iterate.number, where=system.worst(), history=tuple(history))
+    raise AssertionError("unreachable: iterates() has no end")
+
+
+def _accepted(iterate: Iterate, largest: float, round_off: float, tolerance: Tolerance) -> bool:
+    if iterate.residual <= round_off:
+        return True
+    small = max(tolerance.residual * largest, tolerance.residual_absolute)
+    return iterate.residual <= small and (iterate.increment <= tolerance.increment or iterate.residual == 0.0)

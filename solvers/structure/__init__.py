@@ -1,0 +1,1 @@
+"""Finite-deformation solids: bodies of hyperelastic material, static or in motion."""

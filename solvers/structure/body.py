@@ -1,0 +1,236 @@
+"""One elastic body: its mesh, material, loads and supports, and the forms assembled from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from solvers import fem
+from solvers.api import Array
+from solvers.structure import forms
+from solvers.structure.materials import Material, Parameter, Value, parameters
+
+#: Cell type -> quadrature degree of (internal forces, mass): full integration of the affine cell.
+QUADRATURE = {
+    "triangle": (1, 2),
+    "triangle6": (2, 4),
+    "quad": (3, 3),
+    "quad9": (5, 5),
+    "tetra": (1, 2),
+    "tetra10": (2, 4),
+    "hexahedron": (3, 3),
+    "hexahedron27": (5, 5),
+}
+
+
+@dataclass(frozen=True)
+class Support:
+    """Prescribed displacement components [m] on a surface; None leaves a component free."""
+
+    surface: str
+    displacement: tuple[Value | None, ...]
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """No displacement normal to an axis-aligned plane surface."""
+
+    surface: str
+
+
+@dataclass(frozen=True)
+class Traction:
+    """Dead load [N/m^2 of reference surface]."""
+
+    surface: str
+    value: tuple[Value, ...]
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """Follower pressure [Pa], positive against the surface."""
+
+    surface: str
+    value: Value
+
+
+@dataclass(frozen=True)
+class BodySettings:
+    """What the user says of a body, besides its mesh. Vectors have one entry per dimension."""
+
+    name: str
+    material: Material
+    supports: Sequence[Support | Symmetry] = ()
+    gravity: tuple[Value, ...] | None = None  #: [m/s^2]
+    body_force: tuple[Value, ...] | None = None  #: [N/m^3]
+    tractions: Sequence[Traction] = ()
+    pressures: Sequence[Pressure] = ()
+    initial_displacement: tuple[Value, ...] | None = None  #: [m]
+    initial_velocity: tuple[Value, ...] | None = None  #: [m/s]
+
+
+class Body:
+    """Assembles mass, internal forces, loads and tangent of one body at the displacement `u`."""
+
+    def __init__(self, domain: fem.Domain, settings: BodySettings):
+        self.name, self.domain, self.settings = settings.name, domain, settings
+        self.space = fem.vector_space(domain)
+        self.u = fem.function(self.space)
+        self.nodes = fem.node_of_block(domain, self.space)
+        self.points = fem.block_points(self.space)
+        self.owned = self.space.dofmap.index_map.size_local
+        self.stiffness_degree, self.mass_degree = QUADRATURE[domain.cell_type]
+        self.density = self._parameter(settings.material.density)
+        self.parameters = {k: self._parameter(p) for k, p in parameters(settings.material).items()}
+        self._compile()
+
+    @cached_property
+    def _stress(self):
+        """Compiled only when a picture or file asks for it."""
+        sigma = forms.cauchy_stress(self.u, self.settings.material, self.parameters)
+        return fem.compile_expression(sigma, fem.reference_nodes(self.domain))
+
+    @property
+    def dim(self) -> int:
+        return self.domain.dim
+
+    @property
+    def size(self) -> int:
+        """Owned dofs."""
+        return self.owned * self.dim
+
+    def _parameter(self, value: Parameter):
+        """A UFL coefficient: one number, or one number per cell taken at its midpoint."""
+        if not callable(value):
+            return fem.constant(self.domain, float(value))
+        cellwise = fem.function(fem.cellwise_space(self.domain))
+        cellwise.x.array[:] = value(fem.cell_midpoints(self.domain), 0.0)
+        return cellwise
+
+    def _compile(self) -> None:
+        v, du = ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
+        dx = fem.volume_measure(self.domain, self.stiffness_degree)
+        mass_dx = fem.volume_measure(self.domain, self.mass_degree)
+        energy = forms.stored_energy(self.u, self.settings.material, self.parameters, dx)
+        internal = ufl.derivative(energy, self.u, v)
+        self._energy = fem.compile_form(energy)
+        self._internal = fem.compile_form(internal)
+        self._tangent = fem.compile_form(ufl.derivative(internal, self.u, du))
+        self._mass = fem.compile_form(forms.inertia(du, v, self.density, mass_dx))
+        self._force = fem.function(self.space)
+        nodes = fem.reference_nodes(self.domain)
+        self._jacobian = fem.compile_expression(ufl.det(forms.deformation_gradient(self.u)), nodes)
+        self._compile_loads(v, du, mass_dx)
+
+    def _compile_loads(self, v, du, dx: ufl.Measure) -> None:
+        settings = self.settings
+        self._dead: list[tuple[Any, tuple[Value, ...]]] = []
+        self._dead_forms = []
+        if settings.gravity or settings.body_force:
+            b, g = fem.function(self.space), fem.function(self.space)
+            self._dead += [(f, val) for f, val in ((b, settings.body_force), (g, settings.gravity)) if val]
+            self._dead_forms.append(fem.compile_form(forms.volume_load(b, g, self.density, v, dx)))
+        for traction in settings.tractions:
+            t = fem.function(self.space)
+            ds = fem.surface_measure(self.domain, traction.surface, self.mass_degree)
+            self._dead.append((t, traction.value))
+            self._dead_forms.append(fem.compile_form(forms.dead_traction(t, v, ds)))
+        self._dead_load: Array | None = None
+
+        self._pressures: list[tuple[Any, Value]] = []
+        self._pressure_forms, self._pressure_tangents = [], []
+        N = ufl.FacetNormal(self.domain.mesh)
+        for pressure in settings.pressures:
+            p = fem.function(fem.scalar_space(self.domain))
+            ds = fem.surface_measure(self.domain, pressure.surface, self.mass_degree)
+            load = forms.follower_pressure(p, self.u, v, N, ds)
+            self._pressures.append((p, pressure.value))
+            self._pressure_forms.append(fem.compile_form(load))
+            self._pressure_tangents.append(fem.compile_form(-ufl.derivative(load, self.u, du)))
+
+    # ------------------------------------------------------------------------------------------------- state
+
+    def nodal(self, value: Sequence[Value], t: float) -> Array:
+        """A vector field given by its components at all local nodes, shape (blocks, dim)."""
+        return np.stack([component(self.points, t) for component in value], axis=1)
+
+    def set_displacement(self, owned: Array) -> None:
+        """Set the displacement from owned dofs [m], shape (size,)."""
+        self.u.x.array[: self.size] = owned
+        self.u.x.scatter_forward()
+
+    def set_time(self, t: float) -> None:
+        """Evaluate the loads at time t."""
+        changed = self._dead_load is None
+        for function, value in self._dead:
+            new = self.nodal(value, t).ravel()
+            changed = changed or not np.array_equal(new, function.x.array)
+            function.x.array[:] = new
+        for p, scalar in self._pressures:
+            p.x.array[:] = scalar(fem.block_points(p.function_space), t)
+        if self.domain.comm.allreduce(changed):
+            self._dead_load = self._assemble(self._dead_forms)
+
+    # ---------------------------------------------------------------------------------------------- assembly
+
+    def _assemble(self, compiled: Sequence) -> Array:
+        self._force.x.array[:] = 0.0
+        for form in compiled:
+            fem.assemble_vector(form, self._force.x.array)
+        fem.accumulate(self._force)
+        return self._force.x.array[: self.size].copy()
+
+    def internal_force(self) -> Array:
+        """int P : grad v dX [N], shape (size,)."""
+        return self._assemble([self._internal])
+
+    def external_force(self) -> Array:
+        """Loads at the time of `set_time` and the present displacement [N], shape (size,)."""
+        assert self._dead_load is not None, "set_time comes first"
+        if not self._pressure_forms:
+            return self._dead_load.copy()
+        return self._dead_load + self._assemble(self._pressure_forms)
+
+    def mass(self) -> PETSc.Mat:
+        """Consistent mass matrix [kg]."""
+        matrix = fem.create_matrix(self._mass)
+        fem.assemble_matrix(matrix, self._mass)
+        matrix.assemble()
+        return matrix
+
+    def create_tangent(self) -> PETSc.Mat:
+        """An empty matrix for `assemble_tangent`."""
+        return fem.create_matrix(self._tangent)
+
+    def assemble_tangent(self, matrix: PETSc.Mat) -> None:
+        """d(internal - external force)/du [N/m]."""
+        matrix.zeroEntries()
+        for form in (self._tangent, *self._pressure_tangents):
+            fem.assemble_matrix(matrix, form)
+        matrix.assemble()
+
+    def smallest_jacobian(self) -> tuple[float, str, tuple[float, ...]]:
+        """(smallest det F at the cells' nodes, body name, reference position [m]) over all processes."""
+        values = fem.evaluate_cells(self.domain, self._jacobian)
+        cell = int(np.argmin(values.min(axis=1))) if values.size else 0
+        low = float(values[cell].min()) if values.size else np.inf
+        low, rank = self.domain.comm.allreduce((low, self.domain.comm.rank), op=MPI.MINLOC)
+        place = None
+        if rank == self.domain.comm.rank and not low > 0.0:
+            place = tuple(fem.cell_midpoints(self.domain)[: self.dim, cell].tolist())
+        return low, self.name, self.domain.comm.bcast(place, root=rank) if not low > 0.0 else ()
+
+    def stress(self) -> Array:
+        """Nodal averages of the Cauchy stress [Pa] at owned nodes, 3x3 by rows, shape (owned, 9)."""
+        return fem.average_at_nodes(self.domain, self._stress, components=9)[: self.owned]
+
+    def internal_energy(self) -> float:
+        """int W dX [J]."""
+        return fem.assemble_scalar(self._energy, self.domain.comm)

@@ -1,0 +1,47 @@
+"""Energies of the structure, and the balance that tells whether time integration and Newton were right."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from solvers.api import State
+
+if TYPE_CHECKING:
+    from solvers.structure.field import Structure
+
+
+class EnergyBalance:
+    """kinetic + internal - work of loads and supports + damping = initial energy, up to the error in time [J]."""
+
+    def __init__(self) -> None:
+        self.kinetic = self.internal = self.work = self.damping = self.initial = 0.0
+
+    def start(self, structure: Structure) -> None:
+        """Measure the initial energy."""
+        self._measure(structure)
+        self.initial = self.kinetic + self.internal
+
+    def _measure(self, structure: Structure) -> None:
+        self.kinetic = structure.time.kinetic_energy(structure)
+        self.internal = sum(body.internal_energy() for body in structure.bodies)
+
+    def add_step(self, structure: Structure) -> None:
+        """Work of the averaged external forces and of the supports over the accepted step."""
+        du = structure.now.u - structure.old.u
+        held = structure.prescribed
+        external, damping = structure.time.averaged_forces(structure)
+        reaction_work = structure.comm.allreduce(float(structure.residual_force[held] @ du[held]))
+        self.work += structure.dot(external, du) + reaction_work
+        self.damping += structure.dot(damping, du)
+        self._measure(structure)
+
+    @property
+    def error(self) -> float:
+        """What the balance misses [J]."""
+        return self.kinetic + self.internal + self.damping - self.work - self.initial
+
+    def save(self) -> State:
+        return dict(vars(self))
+
+    def restore(self, state: State) -> None:
+        vars(self).update(state)

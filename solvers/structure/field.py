@@ -1,0 +1,254 @@
+"""The structure: bodies of finite deformation, static or in motion, as one nonlinear system."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from solvers import linear
+from solvers.api import Array, State, StepFailed, StepInfo
+from solvers.blocks import Layout, block_diagonal
+from solvers.distributed import Nodal
+from solvers.newton import Tolerance, converge
+from solvers.structure.body import Body
+from solvers.structure.energy import EnergyBalance
+from solvers.structure.supports import prescribe
+from solvers.structure.time import TimeScheme
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """How the nonlinear and the linear systems are solved."""
+
+    newton: Tolerance = Tolerance()
+    linear: linear.Method = "auto"
+    linear_tolerance: float = 1e-8
+
+
+@dataclass
+class Instant:
+    """The structure at one time: owned dofs of all bodies, one body after the other."""
+
+    u: Array  #: displacement [m]
+    v: Array  #: velocity [m/s]
+    a: Array  #: acceleration [m/s^2]
+    internal: Array  #: internal force [N]
+    external: Array  #: loads [N]
+
+    @classmethod
+    def zeros(cls, size: int) -> Instant:
+        return cls(*(np.zeros(size) for _ in fields(cls)))
+
+    def copy(self) -> Instant:
+        return Instant(**{name: array.copy() for name, array in vars(self).items()})
+
+
+class Structure:
+    """All bodies together. The balance f_int - f_ext (+ inertia and damping, by `time`) = 0 is solved by Newton."""
+
+    name = "structure"
+
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        bodies: Sequence[Body],
+        time: TimeScheme,
+        settings: SolverSettings = SolverSettings(),
+    ):
+        self.comm, self.bodies, self.time, self.settings = comm, list(bodies), time, settings
+        self.dim = bodies[0].dim
+        self.layout = Layout(comm, [body.size for body in bodies])
+        self.supports = [prescribe(body) for body in bodies]
+        self.prescribed = np.concatenate(
+            [s.dofs + start for s, start in zip(self.supports, self.layout.offsets[:-1], strict=True)]
+        ).astype(np.int64)
+        self.free = np.ones(self.layout.size, dtype=bool)
+        self.free[self.prescribed] = False
+        self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
+        self.energy = EnergyBalance()
+        self.residual_force = np.zeros(self.layout.size)  #: left-hand side of the balance, supports included [N]
+        self._target = np.zeros(len(self.prescribed))
+        self._increment = np.zeros(self.layout.size)
+        self._diagonal = np.zeros(self.layout.size)
+        self._tangents = [body.create_tangent() for body in bodies]
+        self._combined: PETSc.Mat | None = None
+        self._b, self._x = self.layout.vector(), self.layout.vector()
+        self._ksp = self._linear_solver()
+
+    def _linear_solver(self) -> PETSc.KSP:
+        # the tangent of a follower pressure has an unsymmetric boundary term
+        symmetric = not any(body.settings.pressures for body in self.bodies)
+        if linear.choose(self.settings.linear, self.dim, self.dofs()) == "direct":
+            return linear.direct_solver(self.comm, symmetric=symmetric)
+        return linear.elastic_solver(self.comm, symmetric=symmetric, tolerance=self.settings.linear_tolerance)
+
+    def dofs(self) -> int:
+        """Unknowns of all bodies on all processes, prescribed ones included."""
+        return self.comm.allreduce(self.layout.size)
+
+    @cached_property
+    def mass(self) -> PETSc.Mat:
+        """Consistent mass matrix of all bodies [kg]."""
+        return block_diagonal([body.mass() for body in self.bodies])
+
+    # ------------------------------------------------------------------------------------------------- steps
+
+    def initialise(self, t: float, dt: float) -> None:
+        """Initial displacement and velocity, and the acceleration that is in balance with the loads at t."""
+        for body, u, v in zip(self.bodies, self.split(self.now.u), self.split(self.now.v), strict=True):
+            for target, value in (
+                (u, body.settings.initial_displacement),
+                (v, body.settings.initial_velocity),
+            ):
+                if value is not None:
+                    target[:] = body.nodal(value, t)[: body.owned].ravel()
+        self.now.u[self.prescribed] = self.prescribed_displacement(t)
+        self._set_time(t)
+        self._assemble_force()
+        self.time.start(self, t, dt)
+        self.energy.start(self)
+
+    def begin_step(self, t: float, dt: float) -> None:
+        """Remember the state at t and predict the one at t + dt."""
+        self.old = self.now.copy()
+        self._set_time(t + dt)
+        self._target = self.prescribed_displacement(t + dt)
+        self.time.predict(self, dt)
+
+    def solve(self) -> StepInfo:
+        """Newton to the tolerance. Raises StepFailed."""
+        try:
+            info = converge(self, self.settings.newton)
+        except StepFailed as failure:
+            self._check_inversion(failure.iteration, failure.history)
+            raise
+        self._check_inversion(info.iterations, info.residuals)
+        return info
+
+    def _check_inversion(self, iteration: int, history: tuple[float, ...]) -> None:
+        """Raise StepFailed if the material is turned inside out anywhere."""
+        worst = min((body.smallest_jacobian() for body in self.bodies), key=lambda jacobian: jacobian[0])
+        volume_ratio, name, place = worst
+        if not volume_ratio > 0.0:
+            reason = f"element of body '{name}' inverted (volume ratio {volume_ratio:.3g})"
+            raise StepFailed(self.name, reason, iteration=iteration, where=place, history=history)
+
+    def end_step(self) -> None:
+        """Accept the step."""
+        self.energy.add_step(self)
+
+    def prescribed_displacement(self, t: float) -> Array:
+        """Displacement [m] of the prescribed dofs."""
+        return np.concatenate([support.displacement(t) for support in self.supports])
+
+    def _set_time(self, t: float) -> None:
+        for body in self.bodies:
+            body.set_time(t)
+
+    def split(self, array: Array) -> list[Array]:
+        """Views of the bodies' parts of an array of owned dofs."""
+        return self.layout.split(array)
+
+    # ---------------------------------------------------------------------------- the system that Newton solves
+
+    def _assemble_force(self) -> None:
+        now = self.now
+        parts = zip(self.bodies, *(self.split(a) for a in (now.u, now.internal, now.external)), strict=True)
+        for body, u, internal, external in parts:
+            body.set_displacement(u)
+            internal[:] = body.internal_force()
+            external[:] = body.external_force()
+
+    def residual(self) -> float:
+        """Norm [N] of the balance over the free dofs."""
+        self._assemble_force()
+        self.residual_force = self.time.balance(self)
+        return self.norm(np.where(self.free, self.residual_force, 0.0))
+
+    def tangent(self) -> PETSc.Mat:
+        """d(balance)/du, supports not yet imposed; the next call overwrites the matrix."""
+        for body, matrix in zip(self.bodies, self._tangents, strict=True):
+            body.assemble_tangent(matrix)
+        self._combined = block_diagonal(self._tangents, self._combined)
+        return self.time.tangent(self, self._combined)
+
+    def advance(self) -> float:
+        """One Newton step; returns |du| / |u|."""
+        matrix = self.tangent()
+        self._diagonal = matrix.getDiagonal().array.copy()
+        self._b.array[:] = -self.residual_force
+        self._x.array[:] = 0.0
+        self._x.array[self.prescribed] = self._target - self.now.u[self.prescribed]
+        rows = (self.layout.start + self.prescribed).astype(PETSc.IntType)
+        matrix.zeroRowsColumns(rows, 1.0, self._x, self._b)
+        try:
+            linear.solve(self._ksp, matrix, self._b, self._x)
+        except linear.LinearSolveFailed as failure:
+            raise StepFailed(self.name, str(failure), where=self.worst()) from failure
+        self._increment = self._x.array.copy()
+        self.now.u += self._increment
+        self.now.u[self.prescribed] = self._target
+        size = self.norm(self.now.u)
+        return self.norm(self._increment) / size if size > 0.0 else 0.0
+
+    def retreat(self, fraction: float) -> None:
+        """Take back a fraction of the last increment."""
+        self.now.u -= fraction * self._increment
+
+    def settled(self) -> bool:
+        """True once the prescribed displacements are reached."""
+        reached = np.array_equal(self.now.u[self.prescribed], self._target)
+        return self.comm.allreduce(reached, op=MPI.LAND)
+
+    def round_off(self) -> float:
+        """Rounding error of the residual: that of u, of the size eps |u|, seen through the stiffness."""
+        return float(np.finfo(float).eps) * self.norm(np.where(self.free, self._diagonal * self.now.u, 0.0))
+
+    def worst(self) -> tuple[float, ...] | None:
+        """Reference position [m] of the node with the largest residual (collective)."""
+        size = np.where(self.free, np.nan_to_num(np.abs(self.residual_force), nan=np.inf), 0.0)
+        index = int(np.argmax(size)) if len(size) else 0
+        largest = float(size[index]) if len(size) else -1.0
+        _, rank = self.comm.allreduce((largest, self.comm.rank), op=MPI.MAXLOC)
+        place = None
+        if rank == self.comm.rank:
+            block = int(np.searchsorted(self.layout.offsets, index, side="right")) - 1
+            node = (index - int(self.layout.offsets[block])) // self.dim
+            place = tuple(float(c) for c in self.bodies[block].points[: self.dim, node])
+        return self.comm.bcast(place, root=rank)
+
+    def norm(self, array: Array) -> float:
+        """Euclidean norm of owned dofs over all processes."""
+        return float(np.sqrt(self.dot(array, array)))
+
+    def dot(self, a: Array, b: Array) -> float:
+        """Inner product of owned dofs over all processes."""
+        return self.comm.allreduce(float(a @ b))
+
+    # ---------------------------------------------------------------------------------------- save and restore
+
+    def save(self) -> State:
+        """Everything a step starts from, per body."""
+        state: State = {name: self.per_body(array) for name, array in vars(self.now).items()}
+        return {**state, "energy": self.energy.save()}
+
+    def per_body(self, array: Array) -> State:
+        """Owned dofs as nodal values by body."""
+        return {
+            body.name: Nodal(part.reshape(-1, self.dim).copy(), body.nodes[: body.owned])
+            for body, part in zip(self.bodies, self.split(array), strict=True)
+        }
+
+    def restore(self, state: State) -> None:
+        """Go back to a saved state."""
+        for name, array in vars(self.now).items():
+            for body, part in zip(self.bodies, self.split(array), strict=True):
+                part[:] = state[name][body.name].values.ravel()
+        for body, u in zip(self.bodies, self.split(self.now.u), strict=True):
+            body.set_displacement(u)
+        self.energy.restore(state["energy"])

@@ -1,0 +1,62 @@
+"""Weak forms of a body in its reference configuration.
+
+Find u(t) such that for all v, with W the stored energy, F = I + grad u, J = det F and N the outward normal,
+
+    int rho u_tt.v dX + int dW/dF : grad v dX = int (b + rho g).v dX + int_G t.v dA - int_G p J F^-T N . v dA
+
+Source: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (2008), sections 4.2 and 8.5.
+"""
+
+from __future__ import annotations
+
+import ufl
+
+from solvers.structure.materials import Material, Tensor, in_space
+
+
+def deformation_gradient(u: Tensor) -> Tensor:
+    """F = I + grad u."""
+    return ufl.Identity(len(u)) + ufl.grad(u)
+
+
+def stored_energy(u: Tensor, material: Material, parameters: dict[str, Tensor], dx: ufl.Measure) -> ufl.Form:
+    """int W(F) dX [J]."""
+    return material.energy(deformation_gradient(u), **parameters) * dx
+
+
+def first_piola_kirchhoff(u: Tensor, material: Material, parameters: dict[str, Tensor]) -> Tensor:
+    """P = dW/dF [Pa]."""
+    F = ufl.variable(deformation_gradient(u))
+    return ufl.diff(material.energy(F, **parameters), F)
+
+
+def inertia(a: Tensor, v: Tensor, rho: Tensor, dx: ufl.Measure) -> ufl.Form:
+    """int rho a.v dX."""
+    return rho * ufl.inner(a, v) * dx
+
+
+def volume_load(b: Tensor, g: Tensor, rho: Tensor, v: Tensor, dx: ufl.Measure) -> ufl.Form:
+    """int (b + rho g).v dX."""
+    return ufl.inner(b + rho * g, v) * dx
+
+
+def dead_traction(t: Tensor, v: Tensor, ds: ufl.Measure) -> ufl.Form:
+    """int t.v dA: direction and size belong to the reference surface."""
+    return ufl.inner(t, v) * ds
+
+
+def follower_pressure(p: Tensor, u: Tensor, v: Tensor, N: Tensor, ds: ufl.Measure) -> ufl.Form:
+    """- int p J F^-T N . v dA = - int p n . v da on the deformed surface (Nanson)."""
+    F = deformation_gradient(u)
+    return -p * ufl.det(F) * ufl.inner(ufl.inv(F).T * N, v) * ds
+
+
+def cauchy_stress(u: Tensor, material: Material, parameters: dict[str, Tensor]) -> Tensor:
+    """sigma = P F^T / J [Pa], 3x3 in 2D too: sigma_33 is zero in plane stress and follows from F_33 = 1 in plane strain."""
+    F = deformation_gradient(u)
+    F = ufl.variable(F if material.plane_stress else in_space(F))
+    P = ufl.diff(material.energy(F, **parameters), F)
+    sigma = P * F.T / ufl.det(F)
+    if sigma.ufl_shape == (3, 3):
+        return sigma
+    return ufl.as_tensor([[sigma[0, 0], sigma[0, 1], 0], [sigma[1, 0], sigma[1, 1], 0], [0, 0, 0]])

@@ -1,0 +1,162 @@
+"""What can be measured on the structure: at points, on surfaces, of whole bodies.
+
+A probe is a function without arguments that every process calls; it returns the values by component.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+
+from solvers import fem
+from solvers.api import Array
+from solvers.structure import forms
+from solvers.structure.body import Body
+from solvers.structure.field import Structure
+
+Probe = Callable[[], dict[str, float]]
+
+AXES = ("x", "y", "z")
+
+
+class PointOutside(ValueError):
+    """A probe's point is not in the body."""
+
+
+def at_point(structure: Structure, body: Body, quantity: str, point: Sequence[float]) -> Probe:
+    """displacement [m], velocity [m/s] or acceleration [m/s^2] of a material point. Raises PointOutside. Collective."""
+    comm = structure.comm
+    found = fem.locate_point(body.domain, np.asarray(point, dtype=float))
+    owner = comm.allreduce(comm.rank if found is not None else -1, op=MPI.MAX)
+    if owner < 0:
+        raise PointOutside(f"the point {tuple(point)} is not in body '{body.name}'")
+    index = structure.bodies.index(body)
+    function = fem.function(body.space)
+    name = {"displacement": "u", "velocity": "v", "acceleration": "a"}[quantity]
+
+    def probe() -> dict[str, float]:
+        function.x.array[: body.size] = structure.split(getattr(structure.now, name))[index]
+        function.x.scatter_forward()
+        value = None
+        if found is not None:
+            cell, reference = found
+            nodal = function.x.array.reshape(-1, body.dim)[body.space.dofmap.cell_dofs(cell)]
+            value = fem.tabulate(body.domain, reference) @ nodal
+        return _components(comm.bcast(value, root=owner))
+
+    return probe
+
+
+def on_surface(structure: Structure, body: Body, quantity: str, surface: str) -> Probe:
+    """Resultants and means over a named surface (reference area). Collective.
+
+    reaction: force [N] of the supports on the body; traction: int P N dA [N]; displacement: mean [m]; area [m^2].
+    """
+    if quantity == "reaction":
+        return _reaction(structure, body, surface)
+    ds = fem.surface_measure(body.domain, surface, body.mass_degree)
+    area = fem.compile_form(fem.constant(body.domain, 1.0) * ds)
+    if quantity == "area":
+        return lambda: {"": fem.assemble_scalar(area, structure.comm)}
+    if quantity == "displacement":
+        mean = [fem.compile_form(body.u[i] * ds) for i in range(body.dim)]
+
+        def displacement() -> dict[str, float]:
+            size = fem.assemble_scalar(area, structure.comm)
+            return _components([fem.assemble_scalar(form, structure.comm) / size for form in mean])
+
+        return displacement
+    P = forms.first_piola_kirchhoff(body.u, body.settings.material, body.parameters)
+    traction = P * ufl.FacetNormal(body.domain.mesh)
+    resultant = [fem.compile_form(traction[i] * ds) for i in range(body.dim)]
+    return lambda: _components([fem.assemble_scalar(form, structure.comm) for form in resultant])
+
+
+def _reaction(structure: Structure, body: Body, surface: str) -> Probe:
+    index = structure.bodies.index(body)
+    blocks = fem.surface_blocks(body.domain, body.space, surface)
+    blocks = np.unique(blocks[blocks < body.owned])
+
+    def probe() -> dict[str, float]:
+        force = structure.split(structure.time.reaction(structure))[index].reshape(-1, body.dim)[blocks]
+        return _components(structure.comm.allreduce(force.sum(axis=0)))
+
+    return probe
+
+
+def of_bodies(structure: Structure, bodies: Sequence[Body], quantity: str) -> Probe:
+    """Integrals over bodies. Collective.
+
+    energy [J] of the whole structure: kinetic, internal, work (of loads and supports), total; mass [kg];
+    volume [m^3], present; centre [m] of mass; momentum [kg m/s]; angular_momentum [kg m^2/s] about the origin.
+    """
+    return {
+        "energy": lambda: _energy(structure),
+        "mass": lambda: {"": float(_moments(structure, bodies, np.ones_like(structure.now.u))[0])},
+        "centre": lambda: _centre(structure, bodies),
+        "momentum": lambda: _components(_moments(structure, bodies, structure.now.v)),
+        "angular_momentum": lambda: _angular_momentum(structure, bodies),
+        "volume": _volume(structure, bodies) if quantity == "volume" else dict,
+    }[quantity]
+
+
+def _energy(structure: Structure) -> dict[str, float]:
+    energy = structure.energy
+    return {
+        "kinetic": energy.kinetic,
+        "internal": energy.internal,
+        "work": energy.work,
+        "total": energy.kinetic + energy.internal,
+    }
+
+
+def _times_mass(structure: Structure, array: Array) -> Array:
+    x, y = structure.mass.createVecs("right"), structure.mass.createVecs("left")
+    x.array[:] = array
+    structure.mass.mult(x, y)
+    return y.array
+
+
+def _moments(structure: Structure, bodies: Sequence[Body], array: Array) -> Array:
+    """int rho f dX by component: shape functions sum to one, so the nodal values of M f do, too."""
+    parts = zip(structure.bodies, structure.split(_times_mass(structure, array)), strict=True)
+    total = sum(part.reshape(-1, structure.dim).sum(axis=0) for body, part in parts if body in bodies)
+    return structure.comm.allreduce(total)
+
+
+def _positions(structure: Structure) -> Array:
+    reference = [body.points[: body.dim, : body.owned].T.ravel() for body in structure.bodies]
+    return np.concatenate(reference) + structure.now.u
+
+
+def _centre(structure: Structure, bodies: Sequence[Body]) -> dict[str, float]:
+    mass = _moments(structure, bodies, np.ones_like(structure.now.u))[0]
+    return _components(_moments(structure, bodies, _positions(structure)) / mass)
+
+
+def _angular_momentum(structure: Structure, bodies: Sequence[Body]) -> dict[str, float]:
+    momenta = structure.split(_times_mass(structure, structure.now.v))
+    total = np.zeros(3)
+    for body, x, p in zip(structure.bodies, structure.split(_positions(structure)), momenta, strict=True):
+        if body in bodies:
+            arms, moments = (np.pad(a.reshape(-1, body.dim), ((0, 0), (0, 3 - body.dim))) for a in (x, p))
+            total += np.cross(arms, moments).sum(axis=0)
+    total = structure.comm.allreduce(total)
+    return _components(total) if structure.dim == 3 else {"z": float(total[2])}
+
+
+def _volume(structure: Structure, bodies: Sequence[Body]) -> Probe:
+    volumes = [
+        fem.compile_form(
+            ufl.det(forms.deformation_gradient(body.u)) * fem.volume_measure(body.domain, body.mass_degree)
+        )
+        for body in bodies
+    ]
+    return lambda: {"": sum(fem.assemble_scalar(form, structure.comm) for form in volumes)}
+
+
+def _components(values: Sequence[float] | Array) -> dict[str, float]:
+    return {axis: float(value) for axis, value in zip(AXES, values, strict=False)}

@@ -1,0 +1,43 @@
+"""The structure as files and pictures show it: deformed bodies with nodal fields."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solvers.api import Array, Snapshot
+from solvers.distributed import Nodal, gather_nodal
+from solvers.structure.body import Body
+from solvers.structure.field import Structure
+
+
+def snapshots(structure: Structure) -> list[Snapshot]:
+    """One snapshot per body on rank 0, an empty list elsewhere (collective)."""
+    found = []
+    now = structure.now
+    for body, u, v in zip(structure.bodies, structure.split(now.u), structure.split(now.v), strict=True):
+        displacement, velocity = (_gather(body, array) for array in (u, v))
+        von_mises = gather_nodal(structure.comm, Nodal(_von_mises(body.stress())[:, None], body.nodes[: body.owned]))
+        if displacement is None or velocity is None or von_mises is None:
+            continue
+        assert body.domain.points is not None
+        assert body.domain.cells is not None
+        fields = {"displacement": displacement, "velocity": velocity, "von_mises": von_mises[:, 0]}
+        points = _in_space(body.domain.points) + displacement
+        found.append(Snapshot(body.name, points, body.domain.cells, body.domain.cell_type, fields))
+    return found
+
+
+def _gather(body: Body, array: Array) -> Array | None:
+    values = gather_nodal(body.domain.comm, Nodal(array.reshape(-1, body.dim), body.nodes[: body.owned]))
+    return None if values is None else _in_space(values)
+
+
+def _in_space(vectors: Array) -> Array:
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
+
+
+def _von_mises(stress: Array) -> Array:
+    """sqrt(3/2 s:s) [Pa] with s the deviator of nodal stresses given by rows, shape (n, 9) -> (n,)."""
+    sigma = stress.reshape(-1, 3, 3)
+    deviator = sigma - np.trace(sigma, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3.0
+    return np.sqrt(1.5 * np.einsum("nij,nij->n", deviator, deviator))

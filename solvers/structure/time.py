@@ -1,0 +1,199 @@
+"""How the structure moves in time: not at all (load steps), or by the generalised-alpha method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Protocol
+
+import numpy as np
+from petsc4py import PETSc
+
+from solvers.api import Array
+from solvers.blocks import block_diagonal
+from solvers.time import GeneralisedAlpha
+
+if TYPE_CHECKING:
+    from solvers.structure.field import Structure
+
+
+class TimeScheme(Protocol):
+    """What a time scheme adds to f_int - f_ext."""
+
+    def start(self, structure: Structure, t: float, dt: float) -> None:
+        """Prepare; velocity and acceleration at the start."""
+        ...
+
+    def predict(self, structure: Structure, dt: float) -> None:
+        """First iterate of a step of size dt."""
+        ...
+
+    def balance(self, structure: Structure) -> Array:
+        """The residual [N] at the present iterate; velocity and acceleration follow the displacement."""
+        ...
+
+    def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
+        """d(balance)/du from the static stiffness, which may be overwritten."""
+        ...
+
+    def reaction(self, structure: Structure) -> Array:
+        """The out-of-balance force [N] at the present time: what the supports hold."""
+        ...
+
+    def averaged_forces(self, structure: Structure) -> tuple[Array, Array]:
+        """(external, damping) force [N] of the step's balance."""
+        ...
+
+    def kinetic_energy(self, structure: Structure) -> float:
+        """v.M v / 2 [J]."""
+        ...
+
+
+class Statics:
+    """f_int(u) = f_ext(t): every time step is a load step."""
+
+    def start(self, structure: Structure, t: float, dt: float) -> None: ...
+    def predict(self, structure: Structure, dt: float) -> None: ...
+
+    def balance(self, structure: Structure) -> Array:
+        return structure.now.internal - structure.now.external
+
+    def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
+        return stiffness
+
+    def reaction(self, structure: Structure) -> Array:
+        return structure.now.internal - structure.now.external
+
+    def averaged_forces(self, structure: Structure) -> tuple[Array, Array]:
+        external = 0.5 * (structure.now.external + structure.old.external)
+        return external, np.zeros_like(external)
+
+    def kinetic_energy(self, structure: Structure) -> float:
+        return 0.0
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Rayleigh damping C = mass * M + stiffness * K(u = 0)."""
+
+    mass: float = 0.0  #: [1/s]
+    stiffness: float = 0.0  #: [s]
+
+
+class Dynamics:
+    """Generalised-alpha: M a_{1-alpha_m} + C v_{1-alpha_f} + (1 - alpha_f) f_{n+1} + alpha_f f_n = 0, f = f_int - f_ext."""
+
+    def __init__(
+        self,
+        scheme: GeneralisedAlpha,
+        *,
+        damping: Damping = Damping(),
+        predictor: Literal["constant_displacement", "constant_velocity"] = "constant_displacement",
+    ):
+        self.scheme, self.damping, self.predictor = scheme, damping, predictor
+        self._dt = 0.0
+        self._damping_matrix: PETSc.Mat | None = None
+        self._effective: PETSc.Mat | None = None
+        self._effective_dt = 0.0
+
+    # ------------------------------------------------------------------------------------------------- start
+
+    def start(self, structure: Structure, t: float, dt: float) -> None:
+        """a_0 from M a_0 = -C v_0 - f_0; prescribed dofs follow their functions."""
+        self._work = structure.mass.createVecs("right"), structure.mass.createVecs("left")
+        self._damping_matrix = self._assemble_damping(structure)
+        self._effective = None
+        self._start_supports(structure, t, 1e-3 * dt)
+        self._solve_acceleration(structure)
+
+    def _assemble_damping(self, structure: Structure) -> PETSc.Mat | None:
+        if self.damping == Damping():
+            return None
+        damping = structure.mass.copy()
+        damping.scale(self.damping.mass)
+        if self.damping.stiffness:
+            damping.axpy(self.damping.stiffness, _initial_stiffness(structure))
+        return damping
+
+    def _start_supports(self, structure: Structure, t: float, h: float) -> None:
+        """One-sided differences, so that a support that starts to move does not ring."""
+        u = [structure.prescribed_displacement(t + k * h) for k in range(4)]
+        structure.now.v[structure.prescribed] = (-3.0 * u[0] + 4.0 * u[1] - u[2]) / (2.0 * h)
+        structure.now.a[structure.prescribed] = (2.0 * u[0] - 5.0 * u[1] + 4.0 * u[2] - u[3]) / h**2
+
+    def _solve_acceleration(self, structure: Structure) -> None:
+        now, (x, b) = structure.now, self._work
+        b.array[:] = now.external - now.internal - self._damping_force(now.v)
+        x.array[:] = now.a
+        matrix = structure.mass.copy()
+        rows = (structure.layout.start + structure.prescribed).astype(PETSc.IntType)
+        matrix.zeroRowsColumns(rows, 1.0, x, b)
+        ksp = PETSc.KSP().create(structure.comm)
+        ksp.setOperators(matrix)
+        ksp.setType(PETSc.KSP.Type.CG)
+        ksp.getPC().setType(PETSc.PC.Type.JACOBI)
+        ksp.setTolerances(rtol=1e-15, atol=0.0, max_it=1000)
+        ksp.solve(b, x)
+        now.a[:] = x.array
+
+    # ------------------------------------------------------------------------------------------------- steps
+
+    def predict(self, structure: Structure, dt: float) -> None:
+        """Displacement unchanged, or moved on with the velocity."""
+        self._dt = dt
+        if self.predictor == "constant_velocity":
+            structure.now.u[structure.free] += dt * structure.now.v[structure.free]
+
+    def balance(self, structure: Structure) -> Array:
+        scheme, dt, now, old = self.scheme, self._dt, structure.now, structure.old
+        du = now.u - old.u
+        now.a = scheme.acceleration(du, old.v, old.a, dt)
+        now.v = scheme.velocity(du, old.v, old.a, dt)
+        inertia = self._times(structure.mass, (1.0 - scheme.alpha_m) * now.a + scheme.alpha_m * old.a)
+        internal = (1.0 - scheme.alpha_f) * now.internal + scheme.alpha_f * old.internal
+        external, damping = self.averaged_forces(structure)
+        return inertia + damping + internal - external
+
+    def averaged_forces(self, structure: Structure) -> tuple[Array, Array]:
+        alpha, now, old = self.scheme.alpha_f, structure.now, structure.old
+        external = (1.0 - alpha) * now.external + alpha * old.external
+        return external, self._damping_force((1.0 - alpha) * now.v + alpha * old.v)
+
+    def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
+        """(1 - alpha_f) K + mass_factor M + damping_factor C."""
+        if self._effective is None or self._effective_dt != self._dt:
+            self._effective = structure.mass.copy()
+            self._effective.scale(self.scheme.mass_factor(self._dt))
+            if self._damping_matrix is not None:
+                self._effective.axpy(self.scheme.damping_factor(self._dt), self._damping_matrix)
+            self._effective_dt = self._dt
+        stiffness.scale(1.0 - self.scheme.alpha_f)
+        stiffness.axpy(1.0, self._effective, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        return stiffness
+
+    def reaction(self, structure: Structure) -> Array:
+        """M a + C v + f_int - f_ext at the present time."""
+        now = structure.now
+        dynamic = self._times(structure.mass, now.a) + self._damping_force(now.v)
+        return dynamic + now.internal - now.external
+
+    def kinetic_energy(self, structure: Structure) -> float:
+        return 0.5 * structure.dot(structure.now.v, self._times(structure.mass, structure.now.v))
+
+    def _damping_force(self, v: Array) -> Array:
+        return np.zeros_like(v) if self._damping_matrix is None else self._times(self._damping_matrix, v)
+
+    def _times(self, matrix: PETSc.Mat, array: Array) -> Array:
+        x, y = self._work
+        x.array[:] = array
+        matrix.mult(x, y)
+        return y.array.copy()
+
+
+def _initial_stiffness(structure: Structure) -> PETSc.Mat:
+    matrices = []
+    for body, u in zip(structure.bodies, structure.split(structure.now.u), strict=True):
+        body.set_displacement(np.zeros_like(u))
+        matrices.append(body.create_tangent())
+        body.assemble_tangent(matrices[-1])
+        body.set_displacement(u)
+    return block_diagonal(matrices)

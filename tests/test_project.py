@@ -1,0 +1,101 @@
+"""The project as a whole: its tools are content, what its pages say exists, and its files are portable."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+BIN = Path(sys.executable).parent
+PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md"))]
+
+
+@pytest.mark.parametrize("tool", ["ruff check", "ruff format --check", "mypy", "lint-imports"])
+def test_tools_are_content(tool):
+    program, *arguments = tool.split()
+    done = subprocess.run([BIN / program, *arguments], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_make_targets_of_the_pages_exist(page):
+    named = set(re.findall(r"(?:^|`)make ([a-z-]+)", page.read_text(), re.MULTILINE))
+    assert named <= make_targets()
+
+
+def test_readme_begins_with_demo_and_test():
+    assert commands(ROOT / "README.md")[:2] == ["make demo", "make test"]
+
+
+def make_targets() -> set[str]:
+    return set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+
+
+def commands(page: Path) -> list[str]:
+    """Lines of the page's shell blocks, without comments."""
+    blocks = re.findall(r"^```sh\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
+    lines = [line.split("  #")[0].strip() for block in blocks for line in block.splitlines()]
+    return [line for line in lines if line]
+
+
+def test_subcommands_of_the_pages_exist():
+    lines = [line for page in PAGES for line in commands(page)]
+    named = {found[1] for line in lines if (found := re.search(r"\bfsci ([a-z]+)", line))}
+    assert {"new", "check", "run", "resume", "plot", "schema"} <= named
+    for name in sorted(named):
+        program = [sys.executable, "-c", "from fsci.cli import main; main()", name, "--help"]
+        done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True)
+        assert done.returncode == 0, f"fsci {name}: {done.stderr}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_of_the_pages_exist(page):
+    targets = re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text())
+    generated = {"reference/case.md"}
+    assert [
+        target for target in targets if target not in generated and not (page.parent / target).exists()
+    ] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", ["quickstart", "running"])
+def test_commands_of_the_docs_run(page, tmp_path):
+    shutil.copytree(ROOT / "cases", tmp_path / "cases")
+    environment = {
+        **os.environ,
+        "PATH": f"{BIN}:{os.environ['PATH']}",
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    }
+    lines = [line for line in commands(ROOT / "docs" / f"{page}.md") if not line.startswith("make")]
+    assert lines
+    settings = {"cwd": tmp_path, "env": environment, "capture_output": True, "text": True, "timeout": 600}
+    for line in lines:
+        done = subprocess.run(["bash", "-c", line], **settings)
+        assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+
+
+def text_files() -> list[Path]:
+    """What is, or would be, under version control, except pictures and other binary files."""
+    listing = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"]
+    names = subprocess.run(listing, cwd=ROOT, check=True, capture_output=True, text=True).stdout.split("\0")
+    paths = [ROOT / name for name in names if name]
+    return [path for path in paths if path.is_file() and b"\0" not in path.read_bytes()]
+
+
+def test_files_are_portable():
+    """No paths of one machine, no addresses in a network, nothing but ASCII."""
+    path_of_a_machine = rb"(?<![\w.])/(?:work|home|root|Users)/\w"
+    host = rb"\b\d{1,3}(?:\.\d{1,3}){3}\b|\blocal(?:host|domain)\b"
+    places = re.compile(path_of_a_machine + rb"|" + host)
+    found = []
+    for path in text_files():
+        for number, line in enumerate(path.read_bytes().splitlines(), start=1):
+            if places.search(line) or not line.isascii():
+                found.append(f"{path.relative_to(ROOT)}:{number}: {line.decode(errors='replace')}")
+    assert not found, "\n".join(found)
