@@ -36,9 +36,8 @@ def unknown(kind: str, name: str, names: Iterable[str]) -> MeshError:
     """The error of a name that is not among the names there are."""
     there = sorted(names)
     close = get_close_matches(name, there, n=1)
-    hint = f", did you mean '{close[0]}'?" if close else ";"
-    listed = f"there are: {', '.join(there)}" if there else "there are none"
-    return MeshError(f"unknown {kind} '{name}'{hint} {listed}")
+    hint = f"; did you mean '{close[0]}'?" if close else ""
+    return MeshError(f"unknown {kind} '{name}'{hint} (available: {', '.join(there) or 'none'})")
 
 
 @dataclass(frozen=True)
@@ -92,13 +91,21 @@ def _mesh(content: Content) -> Mesh:
     cell_type = types[0]
 
     cells = np.concatenate([block.nodes for block in content.blocks if block.dim == dim])
+    cells, place = _once(cells)
     used, numbers = np.unique(cells, return_inverse=True)
     mesh = Mesh(_positions(content.points[used], dim), numbers.reshape(cells.shape), cell_type)
     mesh = replace(mesh, cells=_positive(mesh))
 
     index = np.full(len(content.points), -1)
     index[used] = np.arange(len(used))
-    return replace(mesh, regions=_regions(content, dim), surfaces=_surfaces(content, mesh, index))
+    return replace(mesh, regions=_regions(content, dim, place), surfaces=_surfaces(content, mesh, index))
+
+
+def _once(cells: Indices) -> tuple[Indices, Indices]:
+    """The cells, and where each went: some formats repeat a cell for every group it belongs to."""
+    _, first, same = np.unique(np.sort(cells, axis=1), axis=0, return_index=True, return_inverse=True)
+    kept = np.sort(first)
+    return cells[kept], np.searchsorted(kept, first[same])
 
 
 def _positions(points: NDArray[np.float64], dim: int) -> NDArray[np.float64]:
@@ -113,17 +120,18 @@ def _positive(mesh: Mesh) -> Indices:
     """The cells, those of negative volume turned inside out: files number them either way."""
     volumes = signed_volumes(mesh)
     if (volumes == 0).any():
-        raise MeshError(f"{np.count_nonzero(volumes == 0)} cells have no volume")
+        raise MeshError(f"cells without volume: {np.count_nonzero(volumes == 0)}")
     return np.where(volumes[:, None] > 0, mesh.cells, mesh.cells[:, MIRROR[mesh.cell_type]])
 
 
-def _regions(content: Content, dim: int) -> dict[str, Indices]:
+def _regions(content: Content, dim: int, place: Indices) -> dict[str, Indices]:
+    """Groups of cells; `place` takes the file's cells to the mesh's."""
     sizes = [len(block.nodes) if block.dim == dim else 0 for block in content.blocks]
     start = np.cumsum([0, *sizes])
     parts: dict[str, list[Indices]] = {}
     for name, block, cells in content.groups:
         if content.blocks[block].dim == dim and len(cells):
-            parts.setdefault(name, []).append(start[block] + cells)
+            parts.setdefault(name, []).append(place[start[block] + cells])
     return {name: np.unique(np.concatenate(cells)) for name, cells in parts.items()}
 
 
@@ -197,7 +205,7 @@ def _set_parameters(path: Path, parameters: Mapping[str, float]) -> None:
     gmsh.clear()
     for name, value in parameters.items():
         if name not in names:
-            raise unknown(f"{path.name} parameter", name, names)
+            raise unknown(f"parameter of {path.name}", name, names)
         gmsh.parser.setNumber(name, [value])
 
 
@@ -267,15 +275,16 @@ def _read_meshio(path: Path) -> Content:
 
 
 def _meshio_groups(mesh: Any) -> Iterator[tuple[str, int, Indices]]:
-    """Cell sets, physical groups kept with the cells (as converted from gmsh), and families (MED)."""
+    """Cell sets, numbers of cells that have names (gmsh's groups, Netgen's indices), and families (MED)."""
     for name, parts in mesh.cell_sets.items():
         for block, cells in enumerate(parts):
             if cells is not None:
                 yield name, block, np.asarray(cells, dtype=np.int64)
-    for name, (tag, dim) in mesh.field_data.items():
-        for block, data in enumerate(mesh.cell_data.get("gmsh:physical", [])):
-            if mesh.cells[block].dim == dim:
-                yield name, block, np.flatnonzero(data == tag)
+    for key in mesh.cell_data.keys() & {"gmsh:physical", "netgen:index"}:
+        for name, (tag, dim) in mesh.field_data.items():
+            for block, data in enumerate(mesh.cell_data[key]):
+                if mesh.cells[block].dim == dim:
+                    yield name, block, np.flatnonzero(data == tag)
     for tag, names in getattr(mesh, "cell_tags", {}).items():
         for block, data in enumerate(mesh.cell_data["cell_tags"]):
             for name in names:

@@ -26,11 +26,17 @@ COLUMNS = {
 
 
 class Monitor:
-    """Shows the progress of a run on `stream` and in a log file; says nothing unless `enabled` (rank 0)."""
+    """Shows the progress of a run on `stream` and in a log file; says nothing unless `enabled` (rank 0).
 
-    def __init__(self, *, enabled: bool = True, log: Path | None = None, stream: TextIO | None = None):
+    `live` allows colours and a progress bar on a terminal; mpirun gives its processes one that is none.
+    """
+
+    def __init__(
+        self, *, enabled: bool = True, live: bool = True, log: Path | None = None, stream: TextIO | None = None
+    ):
         self.enabled = enabled
         self.stream = stream or sys.stdout
+        self.live = live and self.stream.isatty()
         self.log = log.open("a", encoding="utf-8") if enabled and log else None
         self.progress: Any = None  # rich's progress bar, on a terminal
         self.lines = 0
@@ -53,7 +59,7 @@ class Monitor:
         sizes = ", ".join(f"{name} {count:,} dofs" for name, count in dofs.items())
         self.say(title, style="bold")
         self.say(f"{sizes}; {processes} process{'es' if processes > 1 else ''}; time {time:g} to {end:g}")
-        if self.enabled and self.stream.isatty():
+        if self.enabled and self.live:
             self.progress = start_progress(self.stream)
             self.task = self.progress.add_task("", total=end - begin, completed=time - begin)
 
@@ -113,10 +119,8 @@ class Monitor:
         """One line, coloured on a terminal."""
         if not self.enabled:
             return
-        if self.stream.isatty():
-            console(self.progress, self.stream).print(
-                text, style=style, markup=False, highlight=False, soft_wrap=True
-            )
+        if self.live:
+            console(self.progress, self.stream).print(text, style=style, markup=False, highlight=False, soft_wrap=True)
         else:
             print(text, file=self.stream, flush=True)
         if self.log:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes.util
 import os
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Pixels = NDArray[np.uint8]  #: shape (height, width, 3)
 
 SUBDIVISION = 3  #: times the faces of second-order cells are halved to look curved
 EDGES_UP_TO = 20_000  #: faces of a body; beyond that its element edges would cover everything
 SUPERSAMPLING = 2  #: pixels rendered per pixel shown, along each side
 ISOMETRIC = np.array([1.0, -1.0, 0.8]) / np.sqrt(2.64)  #: from the bodies to the camera
 CORNERS = {5: 3, 9: 4, 22: 3, 23: 4, 28: 4}  #: VTK type of a face -> its corners; second-order edges have a midnode
+
+FLAT: Any = {"lighting": False}
+ROUND: Any = {"smooth_shading": True, "split_sharp_edges": True, "feature_angle": 40.0, "ambient": 0.4, "diffuse": 0.65}
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,7 @@ class View:
     half_height: float
 
 
+@cache
 def import_pyvista() -> Any:
     """pyvista, told to render without a display: by OSMesa where it is installed, else by EGL."""
     if ctypes.util.find_library("OSMesa"):
@@ -101,27 +107,32 @@ def face_edges(faces: Any) -> tuple[Array, NDArray[np.bool_]]:
     return lines, counts > 1
 
 
-def frame(points: Array, *, flat: bool, aspect: float) -> View:
-    """The view that shows all points, shape (n, 3), with a margin of 4 %; `aspect` is width / height of the image.
+def axes_of_view(flat: bool) -> Array:
+    """The unit vectors right, up and away (towards the camera) as columns, shape (3, 3).
 
     Flat bodies are seen from the front, others isometrically with z upwards.
     """
-    away = np.array([0.0, 0.0, 1.0]) if flat else ISOMETRIC
-    right = np.cross([0.0, 1.0, 0.0] if flat else [0.0, 0.0, 1.0], away)
+    if flat:
+        return np.eye(3)
+    right = np.cross([0.0, 0.0, 1.0], ISOMETRIC)
     right /= np.linalg.norm(right)
-    up = np.cross(away, right)
-    seen = points @ np.column_stack([right, up, away])
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    width, height = 1.08 * np.maximum(high - low, 1e-12 * max(np.abs(seen).max(), 1e-300))[:2]
-    half_height = max(height, width / aspect) / 2
-    centre = np.column_stack([right, up, away]) @ ((low + high) / 2)
-    return View(centre, right, up, half_height * aspect, half_height)
+    return np.column_stack([right, np.cross(ISOMETRIC, right), ISOMETRIC])
+
+
+def frame(axes: Array, low: Array, high: Array, *, aspect: float) -> View:
+    """The view of the box from `low` to `high`, given along the axes of the view, with a margin of 4 %.
+
+    `aspect` is width / height of the image.
+    """
+    width, height = 1.08 * (high - low)[:2]
+    half_height = max(height, width / aspect, 1e-300) / 2
+    return View(axes @ (low + high) / 2, axes[:, 0], axes[:, 1], half_height * aspect, half_height)
 
 
 def render(
     bodies: list[Body], view: View, *, size: tuple[int, int], limits: tuple[float, float], colours: str
-) -> NDArray[np.uint8]:
-    """The picture of the bodies without any text, shape (height, width, 3), for `size` = (width, height)."""
+) -> Pixels:
+    """The picture of the bodies without any text; `size` is (width, height)."""
     pyvista = import_pyvista()
     from PIL import Image
 
@@ -130,24 +141,21 @@ def render(
     plotter.set_background("white")
     away = np.cross(view.right, view.up)
     flat = np.allclose(away, [0, 0, 1])
+    shading = FLAT if flat else ROUND
+    lift = 0.005 * view.half_height * away  # keeps edges clear of the surface they lie in
     for body in bodies:
-        shading = (
-            {"lighting": False}
-            if flat
-            else {"smooth_shading": True, "split_sharp_edges": True, "feature_angle": 40.0, "ambient": 0.2}
-        )
         surface = body.surface.copy(deep=False)
         if body.values is None:
             plotter.add_mesh(surface, color="lightgray", **shading)
         else:
             surface.point_data["colour"] = body.values
-            plotter.add_mesh(
-                surface, scalars="colour", clim=limits, cmap=colours, show_scalar_bar=False, **shading
-            )
+            plotter.add_mesh(surface, scalars="colour", clim=limits, cmap=colours, show_scalar_bar=False, **shading)
         if len(body.edges) <= 2 * EDGES_UP_TO:
-            plotter.add_mesh(polylines(body.edges), color="black", line_width=SUPERSAMPLING, opacity=0.5)
+            lines = polylines(body.edges + lift)
+            plotter.add_mesh(lines, color="black", line_width=SUPERSAMPLING, opacity=0.5, lighting=False)
         if flat:
-            plotter.add_mesh(polylines(body.outline), color="black", line_width=2 * SUPERSAMPLING)
+            lines = polylines(body.outline + lift)
+            plotter.add_mesh(lines, color="black", line_width=2 * SUPERSAMPLING, lighting=False)
     distance = 10 * np.hypot(view.half_width, view.half_height)
     plotter.camera.focal_point = view.centre
     plotter.camera.position = view.centre + distance * away

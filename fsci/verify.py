@@ -119,9 +119,7 @@ def frequency(time: Array, values: Array) -> float:
     periods, duration = 0, 0.0
     for sign in (1.0, -1.0):
         times = [
-            crossing(time, sign * signal, int(outside[turn]))
-            for turn in turns
-            if sign * signal[outside[turn]] < 0
+            crossing(time, sign * signal, int(outside[turn])) for turn in turns if sign * signal[outside[turn]] < 0
         ]
         if len(times) > 1:
             periods, duration = periods + len(times) - 1, duration + times[-1] - times[0]

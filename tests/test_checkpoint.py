@@ -68,9 +68,7 @@ def test_round_trip_is_exact(tmp_path):
     assert same(meta, read_meta)
 
 
-@pytest.mark.parametrize(
-    "value", [(1.0, 2.0), {1, 2}, np.array(["text"]), np.array([None]), [np.zeros(2)], object()]
-)
+@pytest.mark.parametrize("value", [(1.0, 2.0), {1, 2}, np.array(["text"]), np.array([None]), [np.zeros(2)], object()])
 def test_what_cannot_be_kept_exactly_is_refused_by_name(tmp_path, value):
     with pytest.raises(TypeError, match="state/flag/bad"):
         write_checkpoint(tmp_path, {"flag": {"bad": value}}, {"step": 1})

@@ -9,11 +9,10 @@ import pytest
 
 from solvers.api import StepFailed
 from solvers.contact import search as search_module
-from solvers.contact.search import REBUILD_ABOVE, Search, measure_search
+from solvers.contact.search import REBUILD_ABOVE, Search, measure_search, wavy_sheet
 from solvers.kernels import KdopTree2, KdopTree3
 
 TYPES = {"line2": (2, 2), "line3": (2, 3), "tri3": (3, 3), "quad4": (3, 4), "tri6": (3, 6), "quad9": (3, 9)}
-EMPTY_CIRCUIT = "the boxes are apart, no tree may be touched"
 
 
 def bernstein(kind: str, s: np.ndarray) -> np.ndarray:
@@ -34,9 +33,7 @@ def bernstein(kind: str, s: np.ndarray) -> np.ndarray:
     elif kind == "quad4":
         functions = [linear[i](x) * linear[j](y) for i, j in ring]
     else:
-        functions = [
-            quadratic[i](x) * quadratic[j](y) for i, j in [*ring, (2, 0), (1, 2), (2, 1), (0, 2), (2, 2)]
-        ]
+        functions = [quadratic[i](x) * quadratic[j](y) for i, j in [*ring, (2, 0), (1, 2), (2, 1), (0, 2), (2, 2)]]
     return np.stack(functions, axis=-1)
 
 
@@ -65,16 +62,12 @@ def brute_force(kind: str, slave: list[np.ndarray], master: list[np.ndarray], ra
     """Pairs of overlapping k-DOPs, all against all; a surface: one or two arrays (k, nodes, dim)."""
     dim = TYPES[kind][0]
     diagonals = [
-        np.eye(dim)[i] + sign * np.eye(dim)[j]
-        for i, j in itertools.combinations(range(dim), 2)
-        for sign in (1, -1)
+        np.eye(dim)[i] + sign * np.eye(dim)[j] for i, j in itertools.combinations(range(dim), 2) for sign in (1, -1)
     ]
     directions = np.array([*np.eye(dim), *diagonals])
 
     def slabs(configurations, r):
-        values = (
-            np.concatenate([control_points(kind, nodes) for nodes in configurations], axis=1) @ directions.T
-        )
+        values = np.concatenate([control_points(kind, nodes) for nodes in configurations], axis=1) @ directions.T
         grow = np.multiply.outer(r, np.linalg.norm(directions, axis=1))
         return values.min(axis=1) - grow, values.max(axis=1) + grow
 
@@ -156,12 +149,8 @@ def test_flat_quadratic_facets_cost_no_margin():
     assert len(Search(facet, facet).pairs(flat, flat + np.array([0, 0.1]), 0.1 - 1e-9)) == 0
 
 
-def sheet(cells: int, height: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    return search_module._sheet(cells, height)
-
-
 def test_a_step_cannot_jump_through_the_other_surface():
-    (xs, slave), (xm, master) = sheet(6, 1.0), sheet(5)
+    (xs, slave), (xm, master) = wavy_sheet(6, 1.0), wavy_sheet(5)
     search = Search(slave, master)
     below = xs - np.array([0, 0, 2.0])
     assert len(search.pairs(xs, xm, 0.01)) == 0
@@ -175,11 +164,11 @@ def test_a_step_cannot_jump_through_the_other_surface():
 
 
 def test_surfaces_that_never_meet_touch_no_tree(monkeypatch):
-    (xs, slave), (xm, master) = sheet(10, 5.0), sheet(10)
+    (xs, slave), (xm, master) = wavy_sheet(10, 5.0), wavy_sheet(10)
     search = Search(slave, master)
 
     def forbidden(*_):
-        raise AssertionError(EMPTY_CIRCUIT)
+        raise AssertionError("tree touched")
 
     with monkeypatch.context() as patch:
         patch.setattr(search_module, "_update", forbidden)
@@ -187,27 +176,42 @@ def test_surfaces_that_never_meet_touch_no_tree(monkeypatch):
             found = search.pairs(xs, xm, inflation, xs + 0.01, xm)
             assert found.shape == (0, 2)
             assert found.dtype == np.int32
-        with pytest.raises(AssertionError, match=EMPTY_CIRCUIT):
+        with pytest.raises(AssertionError, match="tree touched"):
             search.pairs(xs, xm, 5.0)
     assert len(search.pairs(xs, xm, 5.0)) > 0
 
 
+def loose_sheet(cells: int) -> tuple[np.ndarray, np.ndarray]:
+    """A sheet whose facets share no nodes; positions (k, 4, 3), facets (k, 4)."""
+    x, facets = wavy_sheet(cells)
+    return x[facets], np.arange(facets.size).reshape(-1, 4)
+
+
+def swap_places(x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Every facet keeps its shape but goes to the place of another."""
+    centres = x.mean(axis=1, keepdims=True)
+    return x - centres + rng.permutation(centres)
+
+
 def test_earlier_calls_leave_no_trace():
-    """Refitted, degraded and rebuilt trees give what a fresh search gives."""
+    """Refitted, degraded and rebuilt trees give what a fresh search gives; degraded ones are rebuilt."""
     rng = np.random.default_rng(3)
-    (xs, slave), (xm, master) = sheet(20, 0.01), sheet(23)
+    (start, slave), (xm, master) = loose_sheet(20), wavy_sheet(23, 0.01)
+    swapped = swap_places(start, rng)
     search = Search(slave, master)
     for step in range(8):
-        moved = rng.permutation(xs) if step == 4 else xs + 0.02 * step * np.sin(9 * xs[:, ::-1])
-        before = xs if step % 2 else None
-        found = search.pairs(moved, xm, 0.005 * step, before)
+        xs = (start if step < 4 else swapped) + 0.02 * step * np.sin(9 * start[..., ::-1])
+        now, before = xs.reshape(-1, 3), start.reshape(-1, 3) if step % 2 else None
+        found = search.pairs(now, xm, 0.005 * step, before)
         assert len(found) > 0
-        np.testing.assert_array_equal(found, Search(slave, master).pairs(moved, xm, 0.005 * step, before))
+        np.testing.assert_array_equal(found, Search(slave, master).pairs(now, xm, 0.005 * step, before))
+        assert search._trees is not None
+        assert max(tree.quality() for tree in search._trees) <= REBUILD_ABOVE
 
 
 def test_quality_tells_when_to_rebuild():
     rng = np.random.default_rng(4)
-    x, facets = sheet(40)
+    x, facets = wavy_sheet(40)
     none = np.zeros(len(facets))
     tree, other = KdopTree3(facets), KdopTree3(facets)
     assert tree.quality() == np.inf
@@ -220,14 +224,12 @@ def test_quality_tells_when_to_rebuild():
         tree.refit(harmless, none)
         assert 0.7 < tree.quality() < 1.4
 
-    # Every facet keeps its shape but goes to the place of another.
-    centres = x[facets].mean(axis=1, keepdims=True)
-    loose = x[facets] - centres + rng.permutation(centres)
-    nodes = np.arange(4 * len(facets)).reshape(-1, 4)
+    apart, nodes = loose_sheet(40)
+    swapped = swap_places(apart, rng).reshape(-1, 3)
     tree, new = KdopTree3(nodes), KdopTree3(nodes)
-    tree.build(x[facets].reshape(-1, 3), none)
-    tree.refit(loose.reshape(-1, 3), none)
-    new.build(loose.reshape(-1, 3), none)
+    tree.build(apart.reshape(-1, 3), none)
+    tree.refit(swapped, none)
+    new.build(swapped, none)
     assert tree.quality() > REBUILD_ABOVE
     np.testing.assert_array_equal(tree.candidates(other)[0], new.candidates(other)[0])
     other.refit(x + np.array([0, 0, 0.05]), none)
@@ -278,14 +280,14 @@ def test_coinciding_facets_and_single_facets():
     ],
 )
 def test_wrong_arguments_are_named(message, arguments):
-    x, facets = sheet(2)
+    x, facets = wavy_sheet(2)
     search = Search(arguments.get("slave", facets), arguments.get("master", facets))
     with pytest.raises(ValueError, match=message):
         search.pairs(x, arguments.get("xm", x), arguments.get("inflation", 0.0))
 
 
 def test_lost_positions_fail_the_step():
-    x, facets = sheet(2)
+    x, facets = wavy_sheet(2)
     lost = x.copy()
     lost[3, 1] = np.nan
     for arguments in ((lost, x, 0.1), (x, x, 0.1, None, lost)):
@@ -294,7 +296,7 @@ def test_lost_positions_fail_the_step():
 
 
 def test_an_unbuilt_tree_finds_nothing():
-    x, facets = sheet(2)
+    x, facets = wavy_sheet(2)
     built, unbuilt = KdopTree3(facets), KdopTree3(facets)
     built.build(x, np.zeros(4))
     with pytest.raises(ValueError, match="must be built"):

@@ -21,9 +21,7 @@ class Check:
     start: float | None = None
 
 
-def sine(
-    samples: int, periods: float, *, frequency: float = 1.1, phase: float = 0.3
-) -> dict[str, np.ndarray]:
+def sine(samples: int, periods: float, *, frequency: float = 1.1, phase: float = 0.3) -> dict[str, np.ndarray]:
     """-0.06 + 0.065 sin(2 pi f t + phase), sampled from the first step on like a history."""
     time = np.arange(1, round(samples * periods) + 1) / (samples * frequency)
     return {"time": time, "A.y": -0.06 + 0.065 * np.sin(2 * math.pi * frequency * time + phase)}

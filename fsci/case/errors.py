@@ -28,7 +28,8 @@ class Problem:
     line: str = ""  #: the offending line of the file
 
     def __str__(self) -> str:
-        first = f"{self.place}: {self.message}"
+        message = self.message.replace("\n", " ")  # of a text quoted in it
+        first = f"{self.place}: {message}"
         if not self.line:
             return first
         # tabs before the caret stay tabs, so that it stands below its column
@@ -41,7 +42,10 @@ class CaseError(Exception):
 
     def __init__(self, problems: Iterable[Problem]):
         self.problems = tuple(sorted(problems, key=lambda p: (p.place.line, p.place.column)))
-        super().__init__("\n".join(str(problem) for problem in self.problems))
+        super().__init__(self.problems)  # its only argument, so that it can be sent between processes
+
+    def __str__(self) -> str:
+        return "\n".join(str(problem) for problem in self.problems)
 
 
 def did_you_mean(word: str, options: Iterable[str]) -> str:

@@ -38,6 +38,10 @@ class Elastic(Section):
                 f"law '{self.law}' needs two constants, either E and nu, or lambda and mu, or mu and nu; "
                 f"given: {', '.join(given) or 'none'}"
             )
+        if self.lmbda is not None and self.mu is not None:
+            lmbda, mu = self.lmbda.constant, self.mu.constant
+            if lmbda is not None and mu is not None and lmbda <= -2 * mu / 3:
+                raise fault(f"must be greater than -2/3 mu, {-2 * mu / 3:g}, not {lmbda:g}", "lambda")
         for name in ("nu", "lambda"):
             value = constants[name]
             if self.law == "coup_neo_hooke" and value and value.constant is not None and value.constant <= 0:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, get_args
 
-from pydantic import BeforeValidator, Discriminator, Tag
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from fsci.case.section import fault, setting
 from fsci.case.shapes import (
@@ -20,23 +20,19 @@ from fsci.case.shapes import (
     SolidTorus,
     Tube,
 )
-from fsci.case.values import Name, Number, Text, chosen, spoken
+from fsci.case.values import Name, Number, Order, Text, chosen, spoken
 
 
 class FileMesh(Placed):
     """A mesh from a file: gmsh's .geo or .msh with physical names, or any format that meshio reads."""
 
     file: Text = setting(..., "path of the file, relative to the case file")
-    order: Literal[1, 2] = setting(1, "polynomial order of the cells (.geo only; other files have theirs)")
+    order: Order = setting(1, "polynomial order of the cells (.geo only; other files have theirs)")
     parameters: dict[Name, Number] = setting(dict, "values for the script's DefineConstant names (.geo only)")
 
 
-#: shapes by their names in case files
-SHAPES = {
-    name: shape
-    for shape in (Rectangle, Disc, Ring, Box, Beam, Cylinder, Tube, SolidTorus, HollowTorus, HollowSphere)
-    for name in get_args(shape.model_fields["shape"].annotation)
-}
+Shape = Rectangle | Disc | Ring | Box | Beam | Cylinder | Tube | SolidTorus | HollowTorus | HollowSphere
+SHAPES = [name for shape in get_args(Shape) for name in get_args(shape.model_fields["shape"].annotation)]
 
 
 def _file_or_shape(value: Any) -> Any:
@@ -49,6 +45,10 @@ def _file_or_shape(value: Any) -> Any:
     return value
 
 
-def _kind(value: Any) -> str:
-    """Which of the alternatives a mesh is, from data that has passed `_file_or_shape`."""
-    ...
+# The tags are no names of settings, so that an error's path cannot be misread.
+Mesh = Annotated[
+    Annotated[FileMesh, Tag("mesh file")]
+    | Annotated[Shape, Field(discriminator="shape"), chosen("shape", SHAPES), Tag("built-in mesh")],
+    Discriminator(lambda value: "mesh file" if "file" in value else "built-in mesh"),
+    BeforeValidator(_file_or_shape),
+]

@@ -14,6 +14,7 @@ from fsci.case.yaml_text import Keys
 
 #: sections of the case format that are not there yet
 PLANNED = ("contact", "fluid", "coupling")
+EMPTY = "is empty: give it a value"
 
 
 def problems(error: ValidationError, document: Document) -> list[Problem]:
@@ -33,7 +34,8 @@ def _problem(item: dict[str, Any], document: Document) -> Problem:
             return document.problem(document.key_place(keys), _unknown(keys, item["input"].names))
         case "fault":
             keys = (*keys, *context["keys"])
-            message = _with_subject(context["message"], keys)
+            empty = item["input"] is None and context["message"].startswith("must ")
+            message = _with_subject(EMPTY if empty else context["message"], keys)
             if item["loc"] and item["loc"][-1] == "[key]":
                 return document.problem(document.key_place(keys), message)
             column = context["column"]
@@ -46,14 +48,15 @@ def _wanted(item: dict[str, Any]) -> str:
     """What is asked of a value, and what was found."""
     value = item["input"]
     if value is None:
-        return "is empty: give it a value, or remove the line"
+        return EMPTY
     match item["type"]:
         case "model_type" | "model_attributes_type":
             return f"must be a section of settings, not {spoken(value)}"
         case "dict_type":
             return f"must be a section of names, not {spoken(value)}"
         case "tuple_type" | "list_type":
-            return f"must be a list, not {spoken(value)}"
+            hint = ": begin each entry with '- '" if isinstance(value, dict) else ""
+            return f"must be a list, not {spoken(value)}{hint}"
         case "literal_error":
             expected = item["ctx"]["expected"]
             if names := re.findall(r"'([^']*)'", expected):
@@ -79,7 +82,7 @@ def _unknown(keys: Keys, names: list[str]) -> str:
 def _with_subject(message: str, keys: Keys) -> str:
     if message.startswith(":"):
         return subject(keys) + message
-    return f"{subject(keys)} {message}" if message.startswith(("must ", "needs ")) else message
+    return f"{subject(keys)} {message}" if message.startswith(("must ", "needs ", "is ")) else message
 
 
 def subject(keys: Keys) -> str:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from fsci.case.section import Section, setting
-from fsci.case.values import Count, CountOrNone
+from fsci.case.values import Count, CountOrZero
 
 
 class Output(Section):
     """What a run writes, and how often."""
 
-    fields_every: CountOrNone = setting(
-        1, "steps between two states written for ParaView; 0 writes only the last"
+    fields_every: CountOrZero = setting(
+        1, "steps between two states written for ParaView; 0 writes only the first and the last"
     )
-    checkpoint_every: CountOrNone = setting(0, "steps between two checkpoints; 0 writes only the last")
-    residuals: tuple[Count, ...] = setting(
-        tuple, "numbers of the steps whose Newton residuals summary.json keeps"
-    )
+    checkpoint_every: CountOrZero = setting(0, "steps between two checkpoints; 0 writes only the last")
+    residuals: tuple[Count, ...] = setting(tuple, "numbers of the steps whose Newton residuals summary.json keeps")

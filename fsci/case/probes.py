@@ -12,6 +12,9 @@ from fsci.case.values import Name, NumberVector, Text
 AT_POINT = ("displacement", "velocity", "acceleration")
 ON_SURFACE = ("reaction", "traction", "displacement", "area")
 OF_BODY = ("energy", "momentum", "angular_momentum", "mass", "volume", "centre")
+ENERGIES = ("kinetic", "internal", "work", "total")
+#: columns of history.csv that cannot be names of probes
+RESERVED = ("step", "time", "dt", "iterations", "wall", "residual")
 
 
 class Probe(Section):
@@ -22,11 +25,14 @@ class Probe(Section):
       displacement (mean over the area), area
     - with neither, of the body: energy, momentum, angular_momentum, mass, volume, centre (of mass)
 
-    Vectors have the columns NAME.x, NAME.y, NAME.z (the last one in 3D), energy has NAME.kinetic, NAME.internal and
-    NAME.total, angular_momentum in 2D and all others have the column NAME.
+    Vectors have the columns NAME.x, NAME.y, NAME.z (the last one in 3D); energy, always of all bodies, has
+    NAME.kinetic, NAME.internal, NAME.work (of loads and supports) and NAME.total (kinetic + internal); all others,
+    angular_momentum in 2D too, have the column NAME.
     """
 
-    body: Name | None = setting(None, "name of the body; needed if there are several")
+    body: Name | None = setting(
+        None, "name of the body; default: the only one, or all bodies together where neither `at` nor `on` is given"
+    )
     quantity: Literal[
         "displacement",
         "velocity",
@@ -61,7 +67,7 @@ class Probe(Section):
         """The columns of history.csv that the probe called `name` fills."""
         match self.quantity:
             case "energy":
-                return f"{name}.kinetic", f"{name}.internal", f"{name}.total"
+                return tuple(f"{name}.{part}" for part in ENERGIES)
             case "area" | "mass" | "volume":
                 return (name,)
             case "angular_momentum" if dimension == 2:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic.config import JsonDict
 from pydantic_core import PydanticCustomError
 
 
@@ -39,7 +40,7 @@ def setting(default: Any = ..., meaning: str = "", *, unit: str = "", name: str 
 
     `name` is how case files call it, where Python cannot.
     """
-    extra = {"unit": unit} if unit else None
+    extra: JsonDict | None = {"unit": unit} if unit else None
     if isinstance(default, type):
         return Field(default_factory=default, description=meaning, json_schema_extra=extra, alias=name)
     return Field(default, description=meaning, json_schema_extra=extra, alias=name)
@@ -48,7 +49,7 @@ def setting(default: Any = ..., meaning: str = "", *, unit: str = "", name: str 
 def fault(message: str, *keys: str | int, column: int = 0) -> PydanticCustomError:
     """An error for a validator to raise; `keys` lead from its section or value to the setting that is wrong.
 
-    A message that begins with "must", "needs" or ":" gets the name of the setting in front. `column` counts the
+    A message that begins with "must", "needs", "is" or ":" gets the name of the setting in front. `column` counts the
     characters of a text from 1.
     """
     return PydanticCustomError("fault", "{message}", {"message": message, "keys": keys, "column": column})

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
-from pydantic import BeforeValidator, model_validator
+from pydantic import model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Count, Number, NumberVector, Positive, entries
+from fsci.case.values import Count, Entries, Number, NumberVector, OneOrMany, Order, Positive
 
 
 class Rotation(Section):
     """A rotation about an axis through the origin; in 2D about the origin."""
 
-    axis: NumberVector | None = setting(None, "direction of the axis (3D only)", unit="1")
+    axis: Annotated[tuple[Number, ...], Entries(3, 3)] | None = setting(
+        None, "direction of the axis (3D only)", unit="1"
+    )
     angle: Number = setting(..., "angle, counterclockwise seen against the axis", unit="degrees")
 
 
 #: One rotation or a list of them.
-Rotations = Annotated[
-    tuple[Rotation, ...], BeforeValidator(lambda value: [value] if isinstance(value, dict) else value)
-]
-Cells2 = Annotated[tuple[Count, ...], entries(2)]
-Cells3 = Annotated[tuple[Count, ...], entries(3)]
+Rotations = Annotated[tuple[Rotation, ...], OneOrMany()]
+Cells2 = Annotated[tuple[Count, ...], Entries(2, 2)]
+Cells3 = Annotated[tuple[Count, ...], Entries(3, 3)]
 
 
 class Placed(Section):
@@ -32,32 +32,27 @@ class Placed(Section):
     translate: NumberVector | None = setting(None, "displacement after the rotations", unit="m")
 
 
-class Shape(Placed):
+class BuiltIn(Placed):
     """A built-in mesh."""
 
     dimension: ClassVar[int]
     sides: ClassVar[tuple[str, ...]]  #: its surfaces, if it is complete
-    order: Literal[1, 2] = setting(1, "polynomial order of the cells")
+    order: Order = setting(1, "polynomial order of the cells")
 
     @property
     def surfaces(self) -> tuple[str, ...]:
         """Names that supports, loads and probes can use."""
         return self.sides
 
-    def arguments(self) -> dict[str, Any]:
-        """The settings of the shape itself, as the function that makes its mesh takes them."""
-        names = type(self).model_fields
-        return {name: getattr(self, name) for name in names if name not in ("shape", "rotate", "translate")}
 
-
-class Plane(Shape):
+class Plane(BuiltIn):
     """A built-in mesh in 2D."""
 
     dimension = 2
     cell: Literal["quad", "tri"] = setting("quad", "type of the cells; a tri is half a quad")
 
 
-class Solid(Shape):
+class Solid(BuiltIn):
     """A built-in mesh in 3D."""
 
     dimension = 3
@@ -74,9 +69,7 @@ def _around(cells: tuple[int, ...], at: int, *, disc: bool = False) -> None:
 
 def _wall(inner_radius: float, outer_radius: float) -> None:
     if outer_radius <= inner_radius:
-        raise fault(
-            f"must be greater than 'inner_radius', {inner_radius:g}, not {outer_radius:g}", "outer_radius"
-        )
+        raise fault(f"must be greater than 'inner_radius', {inner_radius:g}, not {outer_radius:g}", "outer_radius")
 
 
 class Rectangle(Plane):
@@ -84,9 +77,9 @@ class Rectangle(Plane):
 
     sides = ("left", "right", "bottom", "top")
     shape: Literal["rectangle"] = setting(..., "kind of shape")
-    size: Annotated[tuple[Positive, ...], entries(2)] = setting(..., "extent along x and y", unit="m")
+    size: Annotated[tuple[Positive, ...], Entries(2, 2)] = setting(..., "extent along x and y", unit="m")
     cells: Cells2 = setting(..., "number of cells along x and y")
-    origin: Annotated[tuple[Number, ...], entries(2)] = setting((0.0, 0.0), "lower left corner", unit="m")
+    origin: Annotated[tuple[Number, ...], Entries(2, 2)] = setting((0.0, 0.0), "lower left corner", unit="m")
 
 
 class Disc(Plane):
@@ -133,9 +126,9 @@ class Box(Solid):
 
     sides = ("left", "right", "front", "back", "bottom", "top")
     shape: Literal["box"] = setting(..., "kind of shape")
-    size: Annotated[tuple[Positive, ...], entries(3)] = setting(..., "extent along x, y and z", unit="m")
+    size: Annotated[tuple[Positive, ...], Entries(3, 3)] = setting(..., "extent along x, y and z", unit="m")
     cells: Cells3 = setting(..., "number of cells along x, y and z")
-    origin: Annotated[tuple[Number, ...], entries(3)] = setting((0.0, 0.0, 0.0), "lower corner", unit="m")
+    origin: Annotated[tuple[Number, ...], Entries(3, 3)] = setting((0.0, 0.0, 0.0), "lower corner", unit="m")
 
 
 class Beam(Solid):
@@ -210,9 +203,7 @@ class HollowTorus(Solid):
     major_radius: Positive = setting(..., "radius of the circle of section centres", unit="m")
     inner_radius: Positive = setting(..., "inner radius of the section", unit="m")
     outer_radius: Positive = setting(..., "outer radius of the section", unit="m")
-    cells: Cells3 = setting(
-        ..., "number of cells around the y axis, around the section, and through the wall"
-    )
+    cells: Cells3 = setting(..., "number of cells around the y axis, around the section, and through the wall")
 
     @model_validator(mode="after")
     def _possible(self) -> HollowTorus:

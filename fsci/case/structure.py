@@ -10,6 +10,7 @@ from fsci.case.material import Material
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import (
+    Entries,
     Formula,
     Name,
     NotNegative,
@@ -20,7 +21,6 @@ from fsci.case.values import (
     Switch,
     Text,
     Vector,
-    entries,
 )
 
 ALPHAS = ("alpha_m", "alpha_f", "beta", "gamma")
@@ -59,9 +59,7 @@ class Dynamics(Section):
             raise fault("give either 'rho_inf' or the four of alpha_m, alpha_f, beta and gamma", given[0])
         if 0 < len(given) < len(ALPHAS):
             absent = [name for name in ALPHAS if name not in given]
-            raise fault(
-                f"alpha_m, alpha_f, beta and gamma belong together; missing: {', '.join(absent)}", given[0]
-            )
+            raise fault(f"alpha_m, alpha_f, beta and gamma belong together; missing: {', '.join(absent)}", given[0])
         return data if given or data.get("rho_inf") is not None else data | {"rho_inf": 1.0}
 
 
@@ -69,7 +67,7 @@ class Support(Section):
     """Surfaces whose displacement is prescribed, or that are planes of symmetry."""
 
     on: Surfaces = setting(..., "name of a surface, or list of names")
-    displacement: Annotated[tuple[Formula | None, ...], entries(2, 3)] | None = setting(
+    displacement: Annotated[tuple[Formula | None, ...], Entries(2, 3)] | None = setting(
         None, "displacement by components; null leaves one free", unit="m"
     )
     symmetry: Switch = setting(False, "true: only the component normal to the plane (along an axis) is held")

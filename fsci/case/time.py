@@ -5,13 +5,13 @@ from __future__ import annotations
 from pydantic import model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Count, CountOrNone, Number, Positive
+from fsci.case.values import Count, CountOrZero, Number, Positive
 
 
 class Retry(Section):
     """What happens when a step has no solution: it is repeated as two half steps."""
 
-    halvings: CountOrNone = setting(4, "how many times a step may be halved before the run gives up")
+    halvings: CountOrZero = setting(4, "how many times a step may be halved before the run gives up")
     recover_after: Count = setting(5, "accepted steps after which a halved step is doubled again")
 
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
-from typing import Annotated, Any
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, PlainValidator, WithJsonSchema
+from pydantic import BeforeValidator, GetCoreSchemaHandler, GetJsonSchemaHandler, PlainValidator, WithJsonSchema
+from pydantic_core import CoreSchema
+from pydantic_core.core_schema import no_info_before_validator_function
 
-from fsci.case.errors import did_you_mean
+from fsci.case.errors import did_you_mean, listed
 from fsci.case.section import fault
 from fsci.expression import VARIABLES, Expression, ExpressionError
 
@@ -62,6 +65,8 @@ def _number(allowed: Callable[[float], bool], words: str) -> BeforeValidator:
 
 
 def _whole(least: int) -> BeforeValidator:
+    """A whole number, or constant arithmetic with such a result."""
+
     def read(value: Any) -> int:
         number = _expression(value, "a whole number", "").constant
         assert number is not None, "an expression without variables is constant"
@@ -93,15 +98,14 @@ def _schema(words: str, **keywords: Any) -> WithJsonSchema:
 
 
 Number = Annotated[float, _number(lambda _: True, ""), _schema("number")]
-Positive = Annotated[
-    float, _number(lambda v: v > 0, "greater than 0"), _schema("number > 0", exclusiveMinimum=0)
-]
+Positive = Annotated[float, _number(lambda v: v > 0, "greater than 0"), _schema("number > 0", exclusiveMinimum=0)]
 NotNegative = Annotated[float, _number(lambda v: v >= 0, "at least 0"), _schema("number >= 0", minimum=0)]
 Share = Annotated[
     float, _number(lambda v: 0 <= v <= 1, "from 0 to 1"), _schema("number from 0 to 1", minimum=0, maximum=1)
 ]
 Count = Annotated[int, _whole(1), _schema("whole number >= 1", minimum=1)]
-CountOrNone = Annotated[int, _whole(0), _schema("whole number >= 0", minimum=0)]
+CountOrZero = Annotated[int, _whole(0), _schema("whole number >= 0", minimum=0)]
+Order = Annotated[Literal[1, 2], _whole(1)]
 
 _SPACE, _ALL = "xyz", "".join(VARIABLES)
 Formula = Annotated[Expression, _formula(_ALL), _schema("expression of x, y, z, t")]
@@ -118,35 +122,53 @@ PoissonFormula = Annotated[
 ]
 
 
-def entries(fewest: int, most: int | None = None) -> BeforeValidator:
+@dataclass(frozen=True)
+class Entries:
     """A list of so many entries."""
-    most = most or fewest
-    words = f"{fewest}" if fewest == most else f"{fewest} or {most}"
 
-    def check(value: Any) -> Any:
+    fewest: int
+    most: int | None  #: None: any number
+
+    def __call__(self, value: Any) -> Any:
+        words = f"{self.fewest}" if self.fewest == self.most else f"{self.fewest} or {self.most or 'more'}"
         if not isinstance(value, list | tuple):
             raise fault(f"must be a list of {words} entries, not {spoken(value)}")
-        if not fewest <= len(value) <= most:
+        if len(value) < self.fewest or (self.most is not None and len(value) > self.most):
             raise fault(f"must have {words} entries, not {len(value)}")
         return value
 
-    return BeforeValidator(check)
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return no_info_before_validator_function(self, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        most = {} if self.most is None else {"maxItems": self.most}
+        return handler(schema) | {"minItems": self.fewest, **most}
 
 
-Vector = Annotated[tuple[Formula, ...], entries(2, 3)]
-NumberVector = Annotated[tuple[Number, ...], entries(2, 3)]
+class OneOrMany:
+    """A list; a single value stands for a list of one."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return no_info_before_validator_function(
+            lambda value: list(value) if isinstance(value, list | tuple) else [value], handler(source)
+        )
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        many = handler(schema)
+        return {"anyOf": [many["items"], many]}
+
+
+Vector = Annotated[tuple[Formula, ...], Entries(2, 3)]
+NumberVector = Annotated[tuple[Number, ...], Entries(2, 3)]
 
 
 def _text(value: Any) -> str:
     if not isinstance(value, str):
-        raise fault(f"must be a text, not {spoken(value)}" + (" (put it in quotes)" if _plain(value) else ""))
+        hint = " (put it in quotes)" if isinstance(value, int | float) else ""
+        raise fault(f"must be a text, not {spoken(value)}{hint}")
     if not value.strip():
         raise fault("must be a text, not an empty one")
     return value
-
-
-def _plain(value: Any) -> bool:
-    return isinstance(value, bool | int | float)
 
 
 def _name(value: Any) -> str:
@@ -154,13 +176,6 @@ def _name(value: Any) -> str:
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_-]*", name):
         raise fault(f"must be a name of letters, digits, '_' and '-' that begins with a letter, not {spoken(name)}")
     return name
-
-
-def _texts(value: Any) -> list[str]:
-    values = value if isinstance(value, list | tuple) else [value]
-    if not values:
-        raise fault("must name at least one surface")
-    return [_text(item) for item in values]
 
 
 def _switch(value: Any) -> bool:
@@ -172,16 +187,7 @@ def _switch(value: Any) -> bool:
 Text = Annotated[str, BeforeValidator(_text)]
 Name = Annotated[str, BeforeValidator(_name)]
 Switch = Annotated[bool, BeforeValidator(_switch)]
-Surfaces = Annotated[
-    tuple[str, ...],
-    BeforeValidator(_texts),
-    WithJsonSchema(
-        {
-            "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
-            "$comment": "surface name, or list of them",
-        }
-    ),
-]
+Surfaces = Annotated[tuple[Text, ...], Entries(1, None), OneOrMany()]
 
 
 def chosen(key: str, names: Sequence[str]) -> BeforeValidator:
@@ -193,9 +199,10 @@ def chosen(key: str, names: Sequence[str]) -> BeforeValidator:
         if key not in value:
             raise fault(f"needs the setting '{key}' (available: {', '.join(names)})")
         word = value[key]
+        if not isinstance(word, str):
+            raise fault(f"must be {listed(names)}, not {spoken(word)}", key)
         if word not in names:
-            hint = did_you_mean(word, names) if isinstance(word, str) else f" (available: {', '.join(names)})"
-            raise fault(f"unknown {key} {spoken(word)}{hint}", key)
+            raise fault(f"unknown {key} '{word}'{did_you_mean(word, names)}", key)
         return value
 
     return BeforeValidator(check)

@@ -9,6 +9,9 @@ from pydantic import model_validator
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import NotNegative, Number, Text
 
+#: columns of history.csv that every run has; structure.energy is the error of the energy balance
+RUN_COLUMNS = ("iterations", "residual", "structure.energy")
+
 
 class Check(Section):
     """A result that the run must reach; exactly one of `relative` and `absolute` says how closely.
@@ -16,11 +19,13 @@ class Check(Section):
     With the largest and smallest value M and m in the window, mean is (M + m)/2 and amplitude (M - m)/2.
     """
 
-    value: Text = setting(..., "column of a probe such as A.y, or balance.NAME")
+    value: Text = setting(
+        ..., "column of history.csv: of a probe such as A.y, iterations, residual or structure.energy"
+    )
     statistic: Literal["final", "min", "max", "mean", "amplitude", "frequency"] = setting(
         "final", "what is taken of the column's values"
     )
-    from_: Number | None = setting(
+    start: Number | None = setting(
         None, "start of the window of time; default: the start of the run", unit="s", name="from"
     )
     reference: Number = setting(..., "the value to reach")

@@ -19,16 +19,26 @@ PLAIN_WORDS = {
     "mapping values are not allowed here": "unexpected ':'; check the indentation, and quote a text with ': ' in it",
     "sequence entries are not allowed here": "a list written with '-' must begin on a line of its own",
     "expected <block end>, but found '<block": "the indentation does not match the lines above",
-    "expected <block end>, but found '<scalar>'": "this text does not belong here; check the quotes and the indentation",
+    "expected <block end>, but found '<scalar>'": "this text does not belong here; check quotes and indentation",
     "expected <block end>": "this does not belong here; check the indentation",
-    "expected ',' or ']'": "',' or ']' is missing in the list that begins in line {line}",
-    "expected ',' or '}'": "',' or '}' is missing in the section that begins in line {line}",
-    "found unexpected end of stream": "the quote that begins in line {line} is not closed",
     "could not find expected ':'": "':' is missing after the name of a setting",
+    "but found '<stream end>'": "the text ends before the value is complete",
     "expected the node content": "this bracket does not belong here",
     "but found another document": "a case file has only one document; remove the line '---'",
+    "expected '<document start>'": "this does not belong here; check the indentation",
+    "mapping keys are not allowed here": "'?' does not belong here",
+    "expected alphabetic or numeric character": "'&' and '*' need a name, or the value quotes",
+    "expected chomping or indentation indicators": "put a value that begins with '|' or '>' in quotes",
+    "expected a comment or a line break": "put a value that begins with '|' or '>' in quotes",
+    "expected URI": "put a value that begins with '!' in quotes",
     "that cannot start any token": "a value cannot begin with this character; put it in quotes",
     "found undefined alias": "there is no section marked with '&' and this name",
+}
+#: the same for what is opened and not closed: the place is where it is opened
+UNCLOSED = {
+    "expected ',' or ']'": "this list needs ',' or ']'",
+    "expected ',' or '}'": "this section needs ',' or '}'",
+    "found unexpected end of stream": "this quote is not closed",
 }
 
 
@@ -50,10 +60,9 @@ def parse_yaml(text: str, source: str) -> Parsed:
         if node is not None:
             reader.parsed.data = reader.read(node, ())
     except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        begin = error.context_mark or mark
-        line, column = (mark.line, mark.column) if mark else (0, 0)
-        raise reader.error(line, column, _plain(error.problem or "", begin.line + 1 if begin else 1)) from None
+        message, opened = _plain(error.problem or "")
+        mark = (opened and error.context_mark) or error.problem_mark or error.context_mark
+        raise reader.error(mark.line, mark.column, message) from None
     except YAMLError as error:
         before = text[: getattr(error, "position", 0)]
         line, column = before.count("\n"), len(before) - before.rfind("\n") - 1
@@ -63,11 +72,12 @@ def parse_yaml(text: str, source: str) -> Parsed:
     return reader.parsed
 
 
-def _plain(problem: str, line: int) -> str:
-    for pattern, words in PLAIN_WORDS.items():
+def _plain(problem: str) -> tuple[str, bool]:
+    """The problem in plain words, and whether something opened is not closed."""
+    for pattern, words in (UNCLOSED | PLAIN_WORDS).items():
         if pattern in problem:
-            return words.replace("{line}", str(line))
-    return f"not valid YAML: {problem}"
+            return words, pattern in UNCLOSED
+    return f"not valid YAML: {problem}", False
 
 
 class _Reader:

@@ -82,7 +82,7 @@ def measure_search(facets: int) -> dict[str, float]:
     """
     cells = round(np.sqrt(facets))
     edge = 1 / cells
-    (xs, slave_facets), (xm, master_facets) = _sheet(cells, 0.0), _sheet(cells + 1, 0.1 * edge)
+    (xs, slave_facets), (xm, master_facets) = wavy_sheet(cells), wavy_sheet(cells + 1, 0.1 * edge)
     slave, master = KdopTree3(slave_facets), KdopTree3(master_facets)
     radii = np.full(len(slave_facets), 0.3 * edge)
     master.build(xm, np.zeros(len(master_facets)))
@@ -96,7 +96,8 @@ def measure_search(facets: int) -> dict[str, float]:
     return {"facets": len(slave_facets), **times, "pairs": len(pairs), "tests": tests}
 
 
-def _sheet(cells: int, height: float) -> tuple[Array, Facets]:
+def wavy_sheet(cells: int, height: float = 0.0) -> tuple[Array, Facets]:
+    """Node positions and quads (cells x cells) of a sheet over the unit square."""
     s, t = np.meshgrid(*2 * [np.linspace(0, 1, cells + 1)], indexing="ij")
     points = np.stack([s, t, height + 0.1 * np.sin(7 * s) * np.cos(5 * t)], axis=-1).reshape(-1, 3)
     node = np.arange(len(points)).reshape(s.shape)

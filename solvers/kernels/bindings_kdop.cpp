@@ -65,9 +65,9 @@ kdop::Placement to_placement(const kdop::Facets<Dim>& facets, const Positions& x
       throw std::invalid_argument(
         "positions must have shape (n >= " + std::to_string(facets.nodes_needed()) + ", " +
         std::to_string(Dim) + "), not (" + std::to_string(rows) + ", " + std::to_string(columns) + ")");
-    bool finite = true;
-    for (std::size_t i = 0; i < positions.size(); ++i) finite &= std::isfinite(positions.data()[i]);
-    if (!finite) throw std::invalid_argument("positions must be finite");
+    const double* end = positions.data() + positions.size();
+    if (!std::all_of(positions.data(), end, [](double value) { return std::isfinite(value); }))
+      throw std::invalid_argument("positions must be finite");
     placement.positions.push_back(positions.data());
   };
   add(x);

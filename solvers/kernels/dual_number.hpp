@@ -16,7 +16,7 @@ constexpr int pack_size = 8;
 template <int N>
 struct Gradient {
     static constexpr int packs = (N + pack_size - 1) / pack_size;
-    Pack pack[packs] = {};
+    Pack pack[packs];  // not set to zero unless value-initialised, as double
 
     double operator[](int i) const { return pack[i / pack_size][i % pack_size]; }
     void set(int i, double value) { pack[i / pack_size][i % pack_size] = value; }
@@ -38,11 +38,11 @@ struct Gradient {
 template <int N>
 struct Dual {
     static constexpr int directions = N;
-    double value = 0.0;
+    double value;
     Gradient<N> gradient;
 
     Dual() = default;
-    Dual(double constant) : value(constant) {}
+    Dual(double constant) : value(constant), gradient{} {}
     static Dual variable(double value, int direction) {
         Dual result(value);
         result.gradient.set(direction, 1.0);
@@ -70,13 +70,14 @@ struct Dual {
     friend Dual operator-(Dual a, const Dual& b) { return a -= b; }
     friend Dual operator-(const Dual& a) { return -1.0 * a; }
     friend Dual operator*(const Dual& a, const Dual& b) {
-        Dual result;
+        Dual result{};
         result.add_product(a, b);
         return result;
     }
     friend Dual operator*(double a, const Dual& b) {
-        Dual result(a * b.value);
-        result.gradient.add(a, b.gradient);
+        Dual result;
+        result.value = a * b.value;
+        for (int k = 0; k < Gradient<N>::packs; ++k) result.gradient.pack[k] = a * b.gradient.pack[k];
         return result;
     }
     friend Dual operator*(const Dual& a, double b) { return b * a; }

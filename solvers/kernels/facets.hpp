@@ -63,7 +63,7 @@ struct Tri3 {
         N[2] = xi[1];
         const double slopes[2][nodes] = {{-1, 1, 0}, {-1, 0, 1}};
         for (int a = 0; a < 2; ++a)
-            for (int i = 0; i < nodes; ++i) dN[a][i] = slopes[a][i];
+            for (int i = 0; i < nodes; ++i) dN[a][i] = slopes[a][i] + T{};
     }
     static bool inside(const double* xi, double slack) {
         return xi[0] >= -slack && xi[1] >= -slack && xi[0] + xi[1] <= 1.0 + slack;

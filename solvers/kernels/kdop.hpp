@@ -34,7 +34,7 @@ template <int Dim>
 using Projections = std::array<double, directions<Dim>>;
 
 template <int Dim>
-Projections<Dim> project(const double* x) {
+Projections<Dim> project(const std::array<double, Dim>& x) {
   if constexpr (Dim == 2)
     return {x[0], x[1], x[0] + x[1], x[0] - x[1]};
   else
@@ -261,7 +261,7 @@ private:
     for (const double* x : placement.positions) {
       const auto points = facets_.control_points(facet, x);
       for (int i = 0; i < facets_.nodes_per_facet(); ++i)
-        slabs.include(project<Dim>(points[i].data()));
+        slabs.include(project<Dim>(points[i]));
     }
     slabs.inflate(placement.inflation[facet]);
     return slabs;

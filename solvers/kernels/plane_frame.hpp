@@ -9,7 +9,9 @@
 //     dg^a = -(g^a.dg_b) g^b + (g^a.g^b) (n.dg_b) n,    d|g_1 x g_2| = |g_1 x g_2| g^b.dg_b.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "dual_number.hpp"
 #include "facets.hpp"
@@ -23,13 +25,12 @@ inline void cross(const double* a, const double* b, double* result) {
     result[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-// Position and tangents of a facet at xi from its nodes x.
+// A nodal field of vectors on a facet (its position, its normals) at a point: value and slopes.
 template <typename Facet>
 struct SurfacePoint {
-    double x[3] = {}, tangent[2][3] = {}, N[Facet::nodes], dN[2][Facet::nodes];
+    double x[3] = {}, tangent[2][3] = {};
 
-    SurfacePoint(const double* xi, const double (*nodes)[3]) {
-        Facet::shape(xi, N, dN);
+    SurfacePoint(const double* N, const double (*dN)[Facet::nodes], const double (*nodes)[3]) {
         for (int i = 0; i < Facet::nodes; ++i)
             for (int c = 0; c < 3; ++c) {
                 x[c] += N[i] * nodes[i][c];
@@ -39,13 +40,21 @@ struct SurfacePoint {
     }
 };
 
+// Shape functions at a point.
+template <typename Facet>
+struct Shape {
+    double N[Facet::nodes], dN[2][Facet::nodes];
+    explicit Shape(const double* xi) { Facet::shape(xi, N, dN); }
+};
+
 template <typename Slave>
 struct PlaneFrame {
     static constexpr int n = Slave::nodes;
+    Shape<Slave> shape;
     SurfacePoint<Slave> centre;
     double normal[3], dual[2][3], metric[2][2], area;  // g^a, g^a.g^b, |g_1 x g_2|
 
-    explicit PlaneFrame(const double (*x)[3]) : centre(Slave::centre, x) {
+    explicit PlaneFrame(const double (*x)[3]) : shape(Slave::centre), centre(shape.N, shape.dN, x) {
         cross(centre.tangent[0], centre.tangent[1], normal);
         area = std::sqrt(dot(normal, normal));
         for (double& component : normal) component /= area;
@@ -57,12 +66,28 @@ struct PlaneFrame {
             for (int b = 0; b < 2; ++b) metric[a][b] = dot(dual[a], dual[b]);
     }
 
+    // Whether two facets, given by their nodes, are seen side by side along the normal (by their boxes in the plane).
+    template <int ns, int nm>
+    bool apart(const double (*xs)[3], const double (*xm)[3]) const {
+        for (const auto& g : dual) {
+            double low[2] = {dot(g, xs[0]), dot(g, xm[0])}, high[2] = {low[0], low[1]};
+            auto widen = [&](int side, double coordinate) {
+                low[side] = std::min(low[side], coordinate);
+                high[side] = std::max(high[side], coordinate);
+            };
+            for (int i = 1; i < ns; ++i) widen(0, dot(g, xs[i]));
+            for (int l = 1; l < nm; ++l) widen(1, dot(g, xm[l]));
+            if (high[0] <= low[1] || high[1] <= low[0]) return true;
+        }
+        return false;
+    }
+
     // row[3 i + c] = d(g^a.r)/dx_ic for r = sum_i coefficient_i x_i + (what does not depend on the slave).
     void slopes(int a, const double* r, const double* coefficient, double* row) const {
         const double along[2] = {dot(dual[0], r), dot(dual[1], r)}, height = dot(normal, r);
         for (int i = 0; i < n; ++i) {
-            const double tangential = coefficient[i] - centre.dN[0][i] * along[0] - centre.dN[1][i] * along[1];
-            const double out = height * (metric[a][0] * centre.dN[0][i] + metric[a][1] * centre.dN[1][i]);
+            const double tangential = coefficient[i] - shape.dN[0][i] * along[0] - shape.dN[1][i] * along[1];
+            const double out = height * (metric[a][0] * shape.dN[0][i] + metric[a][1] * shape.dN[1][i]);
             for (int c = 0; c < 3; ++c) row[3 * i + c] = tangential * dual[a][c] + out * normal[c];
         }
     }
@@ -70,7 +95,7 @@ struct PlaneFrame {
     void area_slopes(double* row) const {
         for (int i = 0; i < n; ++i)
             for (int c = 0; c < 3; ++c)
-                row[3 * i + c] = area * (centre.dN[0][i] * dual[0][c] + centre.dN[1][i] * dual[1][c]);
+                row[3 * i + c] = area * (shape.dN[0][i] * dual[0][c] + shape.dN[1][i] * dual[1][c]);
     }
 };
 
@@ -110,7 +135,7 @@ struct PlanePair {
 
     T slave[Slave::nodes][2], master[Master::nodes][2];
     // slopes[p][column] of direction p with respect to the nodes of the slave, then of the master
-    double slopes[is_dual<T> ? plane_directions<Slave, Master> : 1][columns];
+    Gradient<columns> slopes[is_dual<T> ? plane_directions<Slave, Master> : 1];
 
     PlanePair(const PlaneFrame<Slave>& frame, const double (*xs)[3], const double (*xm)[3]) {
         for (int i = 0; i < Slave::nodes; ++i)
@@ -127,7 +152,7 @@ struct PlanePair {
             }
         }
         double minus_N[Slave::nodes];
-        for (int i = 0; i < Slave::nodes; ++i) minus_N[i] = -frame.centre.N[i];
+        for (int i = 0; i < Slave::nodes; ++i) minus_N[i] = -frame.shape.N[i];
         for (int l = 0; l < Master::nodes; ++l) {
             const double r[3] = {xm[l][0] - frame.centre.x[0], xm[l][1] - frame.centre.x[1],
                                  xm[l][2] - frame.centre.x[2]};
@@ -136,7 +161,7 @@ struct PlanePair {
                 master[l][a] = variable(Slave::centre[a] + dot(frame.dual[a], r), p);
                 if constexpr (is_dual<T>) {
                     row(p, frame, a, r, minus_N);
-                    for (int c = 0; c < 3; ++c) slopes[p][slave_columns + 3 * l + c] = frame.dual[a][c];
+                    for (int c = 0; c < 3; ++c) slopes[p].set(slave_columns + 3 * l + c, frame.dual[a][c]);
                 }
             }
         }
@@ -150,8 +175,9 @@ struct PlanePair {
             return value;
     }
     void row(int p, const PlaneFrame<Slave>& frame, int a, const double* r, const double* coefficient) {
-        for (int column = slave_columns; column < columns; ++column) slopes[p][column] = 0.0;
-        frame.slopes(a, r, coefficient, slopes[p]);
+        double values[Gradient<columns>::packs * pack_size] = {};
+        frame.slopes(a, r, coefficient, values);
+        std::memcpy(slopes[p].pack, values, sizeof values);
     }
 };
 

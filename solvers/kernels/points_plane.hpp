@@ -15,106 +15,115 @@
 
 namespace mortar {
 
-// Reference coordinates on both facets and the weight (area times quadrature weight), all differentiated.
-template <typename T>
-struct Point {
-    T slave[2], master[2], weight;
-};
-
-// The reference coordinates xi at which a facet passes over the point x of the plane. The root is found in plain
-// numbers; one more Newton step with derivatives then differentiates it (implicit function theorem). False if there is
-// none nearby.
+// Where a point is on a facet: reference coordinates, and the shape functions there.
 template <typename Facet, typename T>
-bool map_back(const T (*nodes)[2], const T* x, const double* guess, T* xi) {
-    constexpr int n = Facet::nodes;
-    double plain[n][2], at[2] = {guess[0], guess[1]}, N[n], dN[2][n], inverse[2][2];
-    for (int i = 0; i < n; ++i)
-        for (int a = 0; a < 2; ++a) plain[i][a] = value_of(nodes[i][a]);
-
-    auto linearize = [&] {
-        Facet::shape(at, N, dN);
-        double J[2][2] = {};
-        for (int i = 0; i < n; ++i)
-            for (int a = 0; a < 2; ++a)
-                for (int b = 0; b < 2; ++b) J[a][b] += dN[b][i] * plain[i][a];
-        const double determinant = J[0][0] * J[1][1] - J[0][1] * J[1][0];
-        inverse[0][0] = J[1][1] / determinant;
-        inverse[0][1] = -J[0][1] / determinant;
-        inverse[1][0] = -J[1][0] / determinant;
-        inverse[1][1] = J[0][0] / determinant;
-    };
-    bool found = false;
-    for (int iteration = 0; iteration < 15 && !found; ++iteration) {
-        linearize();
-        double r[2] = {-value_of(x[0]), -value_of(x[1])};
-        for (int i = 0; i < n; ++i)
-            for (int a = 0; a < 2; ++a) r[a] += N[i] * plain[i][a];
-        double step = 0.0;
-        for (int a = 0; a < 2; ++a) {
-            const double change = inverse[a][0] * r[0] + inverse[a][1] * r[1];
-            at[a] -= change;
-            step = std::max(step, std::abs(change));
-        }
-        found = step < 1e-7;  // the next one would be its square
-        if (!(step < 1e3)) return false;
-    }
-    if (!found) return false;
-    linearize();
-    T r[2] = {-1.0 * x[0], -1.0 * x[1]};
-    for (int i = 0; i < n; ++i)
-        for (int a = 0; a < 2; ++a) add_scaled(r[a], N[i], nodes[i][a]);
-    for (int a = 0; a < 2; ++a) {
-        xi[a] = at[a];
-        add_scaled(xi[a], -inverse[a][0], r[0]);
-        add_scaled(xi[a], -inverse[a][1], r[1]);
-    }
-    return true;
-}
-
-// Maps points of the plane to both facets of a pair.
-template <typename Slave, typename Master, typename T>
-struct MapBack {
-    const PlanePair<Slave, Master, T>& pair;
-    double centre[2] = {}, inverse[2][2] = {};  // first guess on the master: its affine part
-
-    explicit MapBack(const PlanePair<Slave, Master, T>& pair) : pair(pair) {
-        double N[Master::nodes], dN[2][Master::nodes], J[2][2] = {};
-        Master::shape(Master::centre, N, dN);
-        for (int l = 0; l < Master::nodes; ++l)
-            for (int a = 0; a < 2; ++a) {
-                centre[a] += N[l] * value_of(pair.master[l][a]);
-                for (int b = 0; b < 2; ++b) J[a][b] += dN[b][l] * value_of(pair.master[l][a]);
-            }
-        const double determinant = J[0][0] * J[1][1] - J[0][1] * J[1][0];
-        inverse[0][0] = J[1][1] / determinant;
-        inverse[0][1] = -J[0][1] / determinant;
-        inverse[1][0] = -J[1][0] / determinant;
-        inverse[1][1] = J[0][0] / determinant;
-    }
-    bool to_slave(const T* x, T* xi) const {
-        if constexpr (Slave::modes == 0) {  // the plane coordinates are the reference coordinates
-            xi[0] = x[0];
-            xi[1] = x[1];
-            return true;
-        } else {
-            const double guess[2] = {value_of(x[0]), value_of(x[1])};
-            return map_back<Slave>(pair.slave, x, guess, xi);
-        }
-    }
-    bool to_master(const T* x, T* xi) const {
-        const double r[2] = {value_of(x[0]) - centre[0], value_of(x[1]) - centre[1]};
-        double guess[2];
-        for (int a = 0; a < 2; ++a) guess[a] = Master::centre[a] + inverse[a][0] * r[0] + inverse[a][1] * r[1];
-        return map_back<Master>(pair.master, x, guess, xi);
-    }
+struct PointOn {
+    T xi[2];
+    double N[Facet::nodes], dN[2][Facet::nodes];
 };
 
-// Calls visit(point) for the integration points of the cells of a pair.
+// A point on both facets and its weight (area times quadrature weight).
+template <typename Slave, typename Master, typename T>
+struct Point {
+    PointOn<Slave, T> slave;
+    PointOn<Master, T> master;
+    T weight;
+};
+
+// Finds the points of a facet that lie over given points of the plane. The roots are found in plain numbers, eight at
+// once by Newton's method; one more step, with derivatives, differentiates them (implicit function theorem).
+template <typename Facet, typename T>
+class MapBack {
+    static constexpr int n = Facet::nodes;
+
+  public:
+    explicit MapBack(const T (*nodes)[2]) : nodes_(nodes) {
+        for (int i = 0; i < n; ++i)
+            for (int a = 0; a < 2; ++a) plain_[i][a] = value_of(nodes[i][a]);
+        double N[n], dN[2][n], J[2][2] = {};
+        Facet::shape(Facet::centre, N, dN);
+        for (int i = 0; i < n; ++i)
+            for (int a = 0; a < 2; ++a) {
+                centre_[a] += N[i] * plain_[i][a];
+                for (int b = 0; b < 2; ++b) J[a][b] += dN[b][i] * plain_[i][a];
+            }
+        invert(J, first_);
+    }
+
+    // points[k] over x[k], k < count <= 8; found[k] is false where there is none.
+    void find(const T (*x)[2], int count, PointOn<Facet, T>* points, bool* found) const {
+        Pack target[2] = {}, xi[2], step[2], N[n], dN[2][n], inverse[2][2];
+        for (int k = 0; k < pack_size; ++k)
+            for (int a = 0; a < 2; ++a) target[a][k] = value_of(x[k < count ? k : 0][a]);
+        for (int a = 0; a < 2; ++a)  // first guess: the facet's affine part
+            xi[a] = Facet::centre[a] + first_[a][0] * (target[0] - centre_[0]) + first_[a][1] * (target[1] - centre_[1]);
+        auto linearize = [&] {
+            Facet::shape(xi, N, dN);
+            Pack J[2][2] = {};
+            for (int i = 0; i < n; ++i)
+                for (int a = 0; a < 2; ++a)
+                    for (int b = 0; b < 2; ++b) J[a][b] += dN[b][i] * plain_[i][a];
+            invert(J, inverse);
+        };
+        bool settled = n == 3;  // an affine facet is its affine part
+        for (int k = 0; k < count; ++k) found[k] = settled;
+        for (int iteration = 0; iteration < 15 && !settled; ++iteration) {
+            linearize();
+            Pack r[2] = {-target[0], -target[1]};
+            for (int i = 0; i < n; ++i)
+                for (int a = 0; a < 2; ++a) r[a] += N[i] * plain_[i][a];
+            for (int a = 0; a < 2; ++a) {
+                step[a] = inverse[a][0] * r[0] + inverse[a][1] * r[1];
+                xi[a] -= step[a];
+            }
+            const auto small = step[0] * step[0] + step[1] * step[1] < 1e-14;  // the next step would be this squared
+            settled = true;
+            for (int k = 0; k < count; ++k) settled &= found[k] = small[k];
+        }
+        linearize();
+        for (int k = 0; k < count; ++k) {
+            PointOn<Facet, T>& point = points[k];
+            for (int i = 0; i < n; ++i) {
+                point.N[i] = N[i][k];
+                point.dN[0][i] = dN[0][i][k];
+                point.dN[1][i] = dN[1][i][k];
+            }
+            for (int a = 0; a < 2; ++a) point.xi[a] = xi[a][k];
+            if constexpr (is_dual<T>) {
+                auto r = x[k][0].gradient, s = x[k][1].gradient;  // dx - N_i dx_i
+                for (int i = 0; i < n; ++i) {
+                    r.add(-point.N[i], nodes_[i][0].gradient);
+                    s.add(-point.N[i], nodes_[i][1].gradient);
+                }
+                for (int a = 0; a < 2; ++a) {
+                    point.xi[a].gradient.add(inverse[a][0][k], r);
+                    point.xi[a].gradient.add(inverse[a][1][k], s);
+                }
+            }
+        }
+    }
+
+  private:
+    template <typename Number>
+    static void invert(const Number (*J)[2], Number (*inverse)[2]) {
+        const Number factor = 1.0 / (J[0][0] * J[1][1] - J[0][1] * J[1][0]);
+        inverse[0][0] = factor * J[1][1];
+        inverse[0][1] = -factor * J[0][1];
+        inverse[1][0] = -factor * J[1][0];
+        inverse[1][1] = factor * J[0][0];
+    }
+
+    const T (*nodes_)[2];
+    double plain_[n][2], centre_[2] = {}, first_[2][2];
+};
+
+// Calls visit(point on slave, point on master, weight) for the integration points of the cells of a pair.
 template <typename Slave, typename Master, typename T, typename Visit>
 void visit_cells(const PlanePair<Slave, Master, T>& pair, Visit&& visit) {
     constexpr int ns = Slave::corners, nm = Master::corners;
     static const std::vector<RulePoint> rule = triangle_rule(Slave::order == 1 && Master::order == 1 ? 7 : 12);
-    const MapBack<Slave, Master, T> map(pair);
+    const MapBack<Slave, T> to_slave(pair.slave);
+    const MapBack<Master, T> to_master(pair.master);
 
     for (const auto& slave_part : Slave::part)
         for (const auto& master_part : Master::part) {
@@ -162,46 +171,58 @@ void visit_cells(const PlanePair<Slave, Master, T>& pair, Visit&& visit) {
                 const T *a = vertex[k], *b = vertex[(k + 1) % polygon.size];
                 const T u[2] = {a[0] - centre[0], a[1] - centre[1]}, v[2] = {b[0] - centre[0], b[1] - centre[1]};
                 const T twice_area = u[0] * v[1] - u[1] * v[0];
-                for (const RulePoint& q : rule) {
-                    T x[2] = {centre[0], centre[1]};
-                    for (int c = 0; c < 2; ++c) {
-                        add_scaled(x[c], q.x[0], u[c]);
-                        add_scaled(x[c], q.x[1], v[c]);
-                    }
-                    Point<T> point;
-                    if (!map.to_slave(x, point.slave) || !map.to_master(x, point.master)) continue;
-                    point.weight = q.weight * twice_area;
-                    visit(point);
+                for (std::size_t first = 0; first < rule.size(); first += pack_size) {
+                    const int count = static_cast<int>(std::min<std::size_t>(pack_size, rule.size() - first));
+                    T x[pack_size][2];
+                    for (int q = 0; q < count; ++q)
+                        for (int c = 0; c < 2; ++c) {
+                            x[q][c] = centre[c];
+                            add_scaled(x[q][c], rule[first + q].x[0], u[c]);
+                            add_scaled(x[q][c], rule[first + q].x[1], v[c]);
+                        }
+                    PointOn<Slave, T> on_slave[pack_size];
+                    PointOn<Master, T> on_master[pack_size];
+                    bool found_slave[pack_size], found_master[pack_size];
+                    to_slave.find(x, count, on_slave, found_slave);
+                    to_master.find(x, count, on_master, found_master);
+                    for (int q = 0; q < count; ++q)
+                        if (found_slave[q] && found_master[q])
+                            visit(on_slave[q], on_master[q], rule[first + q].weight * twice_area);
                 }
             }
         }
 }
 
-// Fixed points on the slave facet (element-based integration; Farah, Popp & Wall 2015).
-template <typename Slave>
-const std::vector<RulePoint>& element_rule() {
-    static const std::vector<RulePoint> rule = Slave::corners == 3 ? triangle_rule(12) : square_rule(3 + Slave::order);
-    return rule;
-}
-
-// The point q of the slave facet seen on the plane and on the master; false if it does not pass over the master.
+// The points of the rule seen on the plane and on the master; found[q] is false where they do not pass over it.
 template <typename Slave, typename Master, typename T>
-bool element_point(const PlanePair<Slave, Master, T>& pair, const RulePoint& q, Point<T>& point) {
-    double N[Slave::nodes], dN[2][Slave::nodes];
-    Slave::shape(q.x, N, dN);
-    T x[2] = {0.0, 0.0}, J[2][2] = {{0.0, 0.0}, {0.0, 0.0}};
-    for (int i = 0; i < Slave::nodes; ++i)
-        for (int a = 0; a < 2; ++a) {
-            add_scaled(x[a], N[i], pair.slave[i][a]);
-            for (int b = 0; b < 2; ++b) add_scaled(J[a][b], dN[b][i], pair.slave[i][a]);
+void find_element_points(const PlanePair<Slave, Master, T>& pair, const std::vector<RulePoint>& rule,
+                         Point<Slave, Master, T>* points, bool* found) {
+    const MapBack<Master, T> to_master(pair.master);
+    for (std::size_t first = 0; first < rule.size(); first += pack_size) {
+        const int count = static_cast<int>(std::min<std::size_t>(pack_size, rule.size() - first));
+        T x[pack_size][2];
+        PointOn<Master, T> on_master[pack_size];
+        for (int q = 0; q < count; ++q) {
+            auto& [slave, master, weight] = points[first + q];
+            Slave::shape(rule[first + q].x, slave.N, slave.dN);
+            T J[2][2] = {};
+            for (int a = 0; a < 2; ++a) {
+                slave.xi[a] = rule[first + q].x[a];
+                x[q][a] = 0.0;
+                for (int i = 0; i < Slave::nodes; ++i) {
+                    add_scaled(x[q][a], slave.N[i], pair.slave[i][a]);
+                    for (int b = 0; b < 2; ++b) add_scaled(J[a][b], slave.dN[b][i], pair.slave[i][a]);
+                }
+            }
+            weight = rule[first + q].weight * (J[0][0] * J[1][1] - J[0][1] * J[1][0]);
         }
-    if (!MapBack<Slave, Master, T>(pair).to_master(x, point.master)) return false;
-    const double xi[2] = {value_of(point.master[0]), value_of(point.master[1])};
-    if (!Master::inside(xi, 1e-10)) return false;
-    point.slave[0] = q.x[0];
-    point.slave[1] = q.x[1];
-    point.weight = q.weight * (J[0][0] * J[1][1] - J[0][1] * J[1][0]);
-    return true;
+        to_master.find(x, count, on_master, found + first);
+        for (int q = 0; q < count; ++q) {
+            points[first + q].master = on_master[q];
+            const double xi[2] = {value_of(on_master[q].xi[0]), value_of(on_master[q].xi[1])};
+            found[first + q] = found[first + q] && Master::inside(xi, 1e-10);
+        }
+    }
 }
 
 }  // namespace mortar

@@ -63,4 +63,13 @@ inline std::vector<RulePoint> triangle_rule(int points) {
     return rule;
 }
 
+// Fixed points on a facet (element-based integration; Farah, Popp & Wall 2015).
+template <typename Facet>
+const std::vector<RulePoint>& element_rule() {
+    static const std::vector<RulePoint> rule = Facet::dim == 2                            ? line_rule(5)
+                                               : Facet::nodes == 3 || Facet::nodes == 6 ? triangle_rule(12)
+                                                                                          : square_rule(3 + Facet::order);
+    return rule;
+}
+
 }  // namespace mortar

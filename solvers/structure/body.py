@@ -97,6 +97,11 @@ class Body:
         sigma = forms.cauchy_stress(self.u, self.settings.material, self.parameters)
         return fem.compile_expression(sigma, fem.reference_nodes(self.domain))
 
+    @cached_property
+    def cell_size(self) -> float:
+        """Typical edge [m] of a cell."""
+        return fem.mean_cell_size(self.domain)
+
     @property
     def dim(self) -> int:
         return self.domain.dim

@@ -19,6 +19,7 @@ from solvers.structure.body import Body
 from solvers.structure.energy import EnergyBalance
 from solvers.structure.supports import prescribe
 from solvers.structure.time import TimeScheme
+from solvers.timing import Timer
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,10 @@ class Structure:
         bodies: Sequence[Body],
         time: TimeScheme,
         settings: SolverSettings = SolverSettings(),
+        timer: Timer | None = None,
     ):
         self.comm, self.bodies, self.time, self.settings = comm, list(bodies), time, settings
+        self.timer = timer or Timer()
         self.dim = bodies[0].dim
         self.layout = Layout(comm, [body.size for body in bodies])
         self.supports = [prescribe(body) for body in bodies]
@@ -84,7 +87,7 @@ class Structure:
         # the tangent of a follower pressure has an unsymmetric boundary term
         symmetric = not any(body.settings.pressures for body in self.bodies)
         if linear.choose(self.settings.linear, self.dim, self.dofs()) == "direct":
-            return linear.direct_solver(self.comm, symmetric=symmetric)
+            return linear.direct_solver(self.comm, dim=self.dim, dofs=self.dofs(), symmetric=symmetric)
         return linear.elastic_solver(self.comm, symmetric=symmetric, tolerance=self.settings.linear_tolerance)
 
     def dofs(self) -> int:
@@ -107,7 +110,6 @@ class Structure:
             ):
                 if value is not None:
                     target[:] = body.nodal(value, t)[: body.owned].ravel()
-        self.now.u[self.prescribed] = self.prescribed_displacement(t)
         self._set_time(t)
         self._assemble_force()
         self.time.start(self, t, dt)
@@ -166,8 +168,9 @@ class Structure:
 
     def residual(self) -> float:
         """Norm [N] of the balance over the free dofs."""
-        self._assemble_force()
-        self.residual_force = self.time.balance(self)
+        with self.timer("assembly"):
+            self._assemble_force()
+            self.residual_force = self.time.balance(self)
         return self.norm(np.where(self.free, self.residual_force, 0.0))
 
     def tangent(self) -> PETSc.Mat:
@@ -179,7 +182,8 @@ class Structure:
 
     def advance(self) -> float:
         """One Newton step; returns |du| / |u|."""
-        matrix = self.tangent()
+        with self.timer("assembly"):
+            matrix = self.tangent()
         self._diagonal = matrix.getDiagonal().array.copy()
         self._b.array[:] = -self.residual_force
         self._x.array[:] = 0.0
@@ -187,7 +191,8 @@ class Structure:
         rows = (self.layout.start + self.prescribed).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, self._x, self._b)
         try:
-            linear.solve(self._ksp, matrix, self._b, self._x)
+            with self.timer("solve"):
+                linear.solve(self._ksp, matrix, self._b, self._x)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         self._increment = self._x.array.copy()
@@ -206,8 +211,11 @@ class Structure:
         return self.comm.allreduce(reached, op=MPI.LAND)
 
     def round_off(self) -> float:
-        """Rounding error of the residual: that of u, of the size eps |u|, seen through the stiffness."""
-        return float(np.finfo(float).eps) * self.norm(np.where(self.free, self._diagonal * self.now.u, 0.0))
+        """Rounding error of the residual: eps |u| in u and eps in F = I + grad u, seen through the stiffness."""
+        size = np.abs(self.now.u)
+        for body, part in zip(self.bodies, self.split(size), strict=True):
+            part += body.cell_size
+        return float(np.finfo(float).eps) * self.norm(np.where(self.free, self._diagonal * size, 0.0))
 
     def worst(self) -> tuple[float, ...] | None:
         """Reference position [m] of the node with the largest residual (collective)."""

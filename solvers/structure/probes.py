@@ -145,7 +145,7 @@ def _angular_momentum(structure: Structure, bodies: Sequence[Body]) -> dict[str,
             arms, moments = (np.pad(a.reshape(-1, body.dim), ((0, 0), (0, 3 - body.dim))) for a in (x, p))
             total += np.cross(arms, moments).sum(axis=0)
     total = structure.comm.allreduce(total)
-    return _components(total) if structure.dim == 3 else {"z": float(total[2])}
+    return _components(total) if structure.dim == 3 else {"": float(total[2])}
 
 
 def _volume(structure: Structure, bodies: Sequence[Body]) -> Probe:

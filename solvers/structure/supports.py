@@ -18,7 +18,7 @@ class SupportError(ValueError):
 
     def __init__(self, body: str, surface: str, message: str):
         super().__init__(f"body '{body}', surface '{surface}': {message}")
-        self.body, self.surface = body, surface
+        self.body, self.surface, self.message = body, surface, message
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,72 @@
+"""The whole case: all sections, and the file they come from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import PrivateAttr
+
+from fsci.case.document import Document
+from fsci.case.errors import CaseError, Place
+from fsci.case.mesh import Shape
+from fsci.case.output import Output
+from fsci.case.probes import Probe
+from fsci.case.section import Section, setting
+from fsci.case.solver import Solver
+from fsci.case.structure import Structure
+from fsci.case.time import Time
+from fsci.case.units import Units
+from fsci.case.values import Name, Text
+from fsci.case.verify import Check
+
+
+class Case(Section):
+    """One simulation."""
+
+    title: Text = setting("", "what it is about, for pictures and tables")
+    units: Units = setting(Units, "units of all numbers")
+    time: Time = setting(..., "time interval and steps")
+    structure: Structure = setting(..., "elastic bodies")
+    probes: dict[Name, Probe] = setting(dict, "quantities that every step records, by name")
+    output: Output = setting(Output, "what is written, and how often")
+    verify: tuple[Check, ...] = setting(tuple, "results that the run must reach")
+    solver: Solver = setting(Solver, "how equations are solved")
+
+    _document: Document = PrivateAttr()
+    _warnings: tuple[str, ...] = PrivateAttr(default=())
+
+    @property
+    def path(self) -> Path:
+        """The case file, as the user gave it."""
+        return self._document.path
+
+    @property
+    def folder(self) -> Path:
+        """Where paths in the case file start."""
+        return self._document.path.parent
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What looks implausible, with its place."""
+        return self._warnings
+
+    @property
+    def dimension(self) -> int | None:
+        """2 or 3 if a built-in mesh tells, else None: mesh files are not read here."""
+        meshes = [body.mesh for body in self.structure.bodies.values()]
+        return next((mesh.dimension for mesh in meshes if isinstance(mesh, Shape)), None)
+
+    def place(self, *keys: str | int) -> Place:
+        return self._document.place(keys)
+
+    def locate(self, *keys: str | int) -> str:
+        """Where a setting stands, as case.yaml:12:5; the nearest section around it if it is not in the file."""
+        return str(self.place(*keys))
+
+    def error(self, keys: tuple[str | int, ...], message: str) -> CaseError:
+        """An error to raise about a setting, with its place and line."""
+        return CaseError([self._document.problem(self.place(*keys), message)])
+
+    def dump(self) -> str:
+        """The YAML text of the case with overrides applied; comments stay."""
+        return self._document.dump()

@@ -1,0 +1,45 @@
+"""From a file to a case that can be run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from fsci.case.case import Case
+from fsci.case.checks import mistakes
+from fsci.case.document import override, read_document
+from fsci.case.errors import CaseError
+from fsci.case.messages import problems
+from fsci.case.plausible import doubts
+
+
+def load_case(path: str | Path, overrides: Iterable[tuple[str, str]] = ()) -> Case:
+    """Read, override and validate a case; raises CaseError with all problems found.
+
+    `path` is the file, or the folder with its case.yaml; `overrides` are dotted names and values as YAML text.
+    """
+    path = Path(path)
+    document = read_document(path / "case.yaml" if path.is_dir() else path)
+    for dotted, text in overrides:
+        document = override(document, dotted, text)
+    try:
+        case = Case.model_validate(document.data)
+    except ValidationError as error:
+        raise CaseError(problems(error, document)) from None
+    case._document = document
+    found = [document.problem(document.place(keys), message) for keys, message in mistakes(case)]
+    if found:
+        raise CaseError(found)
+    case._warnings = tuple(f"{document.place(keys)}: {message}" for keys, message in doubts(case))
+    return _with_bodies(case)
+
+
+def _with_bodies(case: Case) -> Case:
+    """Probes that name no body belong to the only one, if there is only one."""
+    if len(case.structure.bodies) > 1:
+        return case
+    update = {"body": next(iter(case.structure.bodies))}
+    probes = {name: probe.model_copy(update=update) for name, probe in case.probes.items()}
+    return case.model_copy(update={"probes": probes})

@@ -1,0 +1,82 @@
+"""Doubts about a case that can be run: numbers that are probably slips."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from fsci.case.case import Case
+from fsci.case.material import Elastic, Material
+from fsci.case.mesh import FileMesh, Shape
+from fsci.case.yaml_text import Keys
+from fsci.estimate import aspect
+
+DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from aerogel to osmium, with a margin
+STIFFNESSES = (1.0, 2e12)  #: [Pa] Young's modulus from the softest gel to diamond, with a margin
+
+
+def doubts(case: Case) -> Iterator[tuple[Keys, str]]:
+    """Paths of settings with a warning about each."""
+    span = case.time.end - case.time.start
+    if case.time.step > span * (1 + 1e-12):
+        yield ("time", "step"), f"the step {case.time.step:g} is longer than the run, {span:g}"
+    for name, body in case.structure.bodies.items():
+        keys: Keys = ("structure", "bodies", name)
+        yield from _material(case, body.material, (*keys, "material"))
+        nu = poisson(body.material)
+        if nu is not None and nu > 0.495 and body.mesh.order == 1 and not _order_from_file(body.mesh):
+            yield (
+                (*keys, "mesh"),
+                f"first-order cells lock for nearly incompressible material (nu = {nu:.4g}); take 'order: 2'",
+            )
+        if isinstance(body.mesh, Shape) and (ratio := aspect(body.mesh)) > 50:
+            yield (*keys, "mesh", "cells"), f"the cells are {ratio:.0f} times longer than wide"
+
+
+def _order_from_file(mesh: object) -> bool:
+    return isinstance(mesh, FileMesh) and not mesh.file.endswith(".geo")
+
+
+def _material(case: Case, material: Material, keys: Keys) -> Iterator[tuple[Keys, str]]:
+    units = case.units
+    density = None if material.density is None else material.density.constant
+    if density is not None and not DENSITIES[0] <= density * units.density <= DENSITIES[1]:
+        unit = f"{units.mass}/{units.length}^3"
+        value = f"{density:g} {unit} is {density * units.density:.3g} kg/m^3"
+        yield (*keys, "density"), f"implausible density: {value}; check 'units'"
+    stiffness = young(material)
+    if stiffness is not None and not STIFFNESSES[0] <= stiffness * units.stress <= STIFFNESSES[1]:
+        key = "E" if isinstance(material, Elastic) and material.E is not None else "law"
+        yield (
+            (*keys, key),
+            f"implausible stiffness: Young's modulus is {stiffness * units.stress:.3g} Pa; check 'units'",
+        )
+
+
+def young(material: Material) -> float | None:
+    """Young's modulus at small strains, in the case's unit; None if it varies."""
+    nu, mu = poisson(material), shear(material)
+    return None if nu is None or mu is None else 2 * mu * (1 + nu)
+
+
+def shear(material: Material) -> float | None:
+    """The shear modulus at small strains, in the case's unit; None if it varies."""
+    if not isinstance(material, Elastic):
+        c10, c01 = material.c10.constant, material.c01.constant
+        return None if c10 is None or c01 is None else 2 * (c10 + c01)
+    if material.mu is not None:
+        return material.mu.constant
+    E, nu = None if material.E is None else material.E.constant, poisson(material)
+    return None if E is None or nu is None else E / 2 / (1 + nu)
+
+
+def poisson(material: Material) -> float | None:
+    """Poisson's ratio at small strains; None if it varies."""
+    if isinstance(material, Elastic) and material.nu is not None:
+        return material.nu.constant
+    mu = shear(material)
+    if isinstance(material, Elastic):
+        lmbda = None if material.lmbda is None else material.lmbda.constant
+    else:
+        bulk = material.bulk.constant
+        lmbda = None if bulk is None or mu is None else bulk - 2 * mu / 3
+    return None if mu is None or lmbda is None else lmbda / (2 * (lmbda + mu))

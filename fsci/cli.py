@@ -1,0 +1,181 @@
+"""The command line. Exit codes: 0 success, 1 a run that failed, 2 a bad case or command, 3 a run that was stopped."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+DESCRIPTION = "Fluid-structure-contact interaction from one YAML case file."
+EPILOG = """\
+first steps:
+  fsci new beam            write a commented case into the folder beam
+  fsci check beam          is it right?
+  fsci run beam            compute it; results in results/beam
+  fsci plot results/beam   draw it
+
+`mpirun -n 4 fsci run CASE` runs on four processes. `fsci COMMAND --help` tells more."""
+
+
+def main() -> None:
+    """Entry point of the program `fsci`."""
+    sys.exit(execute(sys.argv[1:]))
+
+
+def execute(arguments: Sequence[str]) -> int:
+    """Run one command; returns its exit code. Wrong arguments raise SystemExit(2) with the usage on stderr."""
+    options = _parser().parse_args(arguments)
+    return int(options.command(options))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="fsci",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"fsci {_version()}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    def command(function, words: str) -> argparse.ArgumentParser:  # type: ignore[no-untyped-def]
+        name = function.__name__.strip("_")
+        new = commands.add_parser(name, help=words, description=words[0].upper() + words[1:] + ".")
+        new.set_defaults(command=function)
+        return new
+
+    new = command(_new, "write a small case that runs into a new folder")
+    new.add_argument("name", metavar="NAME", type=Path, help="folder to make")
+
+    for function, words in (
+        (_check, "say what is wrong with a case, or what it is"),
+        (_run, "compute a case"),
+    ):
+        one = command(function, words)
+        one.add_argument("case", metavar="CASE", type=Path, help="case file, or folder with a case.yaml")
+        one.add_argument(
+            "--set",
+            dest="overrides",
+            metavar="NAME=VALUE",
+            action="append",
+            default=[],
+            type=_override,
+            help="replace a setting: --set time.end=2 --set structure.bodies.beam.supports.0.on=top",
+        )
+        if function is _run:
+            one.add_argument(
+                "-o", "--out", metavar="OUT", type=Path, help="folder for the results (default: results/NAME_OF_CASE)"
+            )
+
+    resume = command(_resume, "continue a run from its last checkpoint")
+    resume.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
+
+    plot = command(_plot, "draw the results of a run")
+    plot.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
+    plot.add_argument("--field", metavar="FIELD", help="field to colour by (default: the displacement)")
+    plot.add_argument("--movie", action="store_true", help="make an animation too")
+
+    schema = command(_schema, "print the JSON schema of case files, for editors")
+    schema.add_argument("--markdown", action="store_true", help="print the input reference instead")
+    return parser
+
+
+def _override(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not name or not equals:
+        raise argparse.ArgumentTypeError(f"write NAME=VALUE, not '{text}'")
+    return name, value
+
+
+def _version() -> str:
+    try:
+        return version("fsci")
+    except PackageNotFoundError:
+        return "(not installed)"
+
+
+def _new(options: argparse.Namespace) -> int:
+    from fsci.new import new_case
+
+    try:
+        files = new_case(options.name)
+    except OSError as error:
+        return _fail(f"fsci new: cannot make the folder '{options.name}': {error.strerror}")
+    print(f"wrote {' and '.join(str(path) for path in files)}; next: fsci run {options.name}")
+    return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError, load_case
+    from fsci.check import summary
+
+    try:
+        case = load_case(options.case, options.overrides)
+    except CaseError as error:
+        return _fail(str(error))
+    print(f"{case.path}\n{summary(case)}")
+    for warning in case.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    print("ok")
+    return 0
+
+
+def _run(options: argparse.Namespace) -> int:
+    from mpi4py import MPI
+
+    from fsci.case import CaseError, load_case
+
+    first = MPI.COMM_WORLD.rank == 0
+    try:
+        case = load_case(options.case, options.overrides)
+        for warning in case.warnings if first else ():
+            print(f"warning: {warning}", file=sys.stderr)
+        from fsci.run import run_case
+
+        return int(run_case(case, options.out or Path("results") / case.folder.absolute().name))
+    except CaseError as error:
+        return _fail(str(error)) if first else 2
+
+
+def _resume(options: argparse.Namespace) -> int:
+    from mpi4py import MPI
+
+    from fsci.case import CaseError
+    from fsci.run import resume_run
+
+    try:
+        return int(resume_run(options.out))
+    except CaseError as error:
+        return _fail(str(error)) if MPI.COMM_WORLD.rank == 0 else 2
+    except FileNotFoundError as error:
+        if MPI.COMM_WORLD.rank == 0:
+            print(f"fsci resume: {error}", file=sys.stderr)
+        return 1
+
+
+def _plot(options: argparse.Namespace) -> int:
+    from fsci.picture import plot_run
+
+    if not options.out.is_dir():
+        return _fail(f"fsci plot: there is no folder '{options.out}'")
+    try:
+        files = plot_run(options.out, movie=options.movie, field=options.field)
+    except (ValueError, RuntimeError) as error:
+        return _fail(f"fsci plot: {error}")
+    print("\n".join(str(path) for path in files))
+    return 0
+
+
+def _schema(options: argparse.Namespace) -> int:
+    from fsci.schema import json_schema, reference_markdown
+
+    print(reference_markdown() if options.markdown else json_schema())
+    return 0
+
+
+def _fail(message: str) -> int:
+    print(message, file=sys.stderr)
+    return 2

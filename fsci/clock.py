@@ -1,0 +1,72 @@
+"""Time of a run: steps of the case's size, halved where they fail, on a grid that rounding cannot leave."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from solvers.api import State
+
+
+@dataclass
+class Clock:
+    """Counts time in ticks: a nominal step has 2^halvings of them. All steps of one level have the same size."""
+
+    start: float
+    end: float
+    nominal: float  #: step size of the case [s]
+    halvings: int  #: how often a step may be halved
+    recover_after: int  #: accepted steps after which a halved step is doubled
+    tick: int = 0
+    level: int = 0  #: the present step is nominal / 2^level
+    accepted: int = 0  #: accepted steps since the level changed
+    step: int = 0  #: accepted steps
+
+    @property
+    def ticks(self) -> int:
+        """Ticks of the present step."""
+        return 2 ** (self.halvings - self.level)
+
+    def at(self, tick: int) -> float:
+        """Time [s] of a tick; the last step ends at `end` exactly."""
+        time = self.start + self.nominal * (tick / 2**self.halvings)
+        return self.end if time >= self.end - 1e-9 * self.nominal else time
+
+    @property
+    def time(self) -> float:
+        """Present time [s]."""
+        return self.at(self.tick)
+
+    @property
+    def dt(self) -> float:
+        """Size [s] of the next step."""
+        size = self.nominal / 2**self.level
+        left = self.end - self.time
+        return size if left >= size * (1.0 - 1e-9) else left
+
+    @property
+    def done(self) -> bool:
+        return self.time >= self.end
+
+    def accept(self) -> None:
+        """Move on by the present step; double the step if it has been halved for long enough."""
+        self.tick += self.ticks
+        self.step += 1
+        self.accepted += 1
+        on_coarser_grid = self.tick % (2 * self.ticks) == 0
+        if self.level > 0 and self.accepted >= self.recover_after and on_coarser_grid:
+            self.level -= 1
+            self.accepted = 0
+
+    def halve(self) -> bool:
+        """Halve the present step; False if that has been done often enough."""
+        if self.level == self.halvings:
+            return False
+        self.level += 1
+        self.accepted = 0
+        return True
+
+    def save(self) -> State:
+        return {"tick": self.tick, "level": self.level, "accepted": self.accepted, "step": self.step}
+
+    def restore(self, state: State) -> None:
+        vars(self).update(state)

@@ -1,0 +1,39 @@
+"""An animation of all output times with a fixed frame and fixed colours."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from fsci.output import Series
+from fsci.render import Body, Pixels, load_body
+from fsci.scene import animate, compose
+
+FRAMES = 200  #: at most; of a longer series every second, third, ... time is shown
+DOTS = 120  #: pixels per inch: 960 x 600
+MILLISECONDS = 50  #: per frame
+
+
+def plot_movie(path: Path, bodies: list[Series], field: str, title: str, units: Mapping[str, str]) -> Path:
+    """Animates the series of all bodies, coloured by a field, as a GIF."""
+    moments = list(zip(*bodies, strict=False))
+    shown = moments[:: -(-len(moments) // FRAMES)]
+
+    def states() -> Iterator[tuple[float, list[Body]]]:
+        for moment in shown:
+            yield moment[0][0], [load_body(file, field) for _, file in moment]
+
+    scene = compose((state for _, state in states()), field, title, units)
+    write_gif(path, animate(scene, states(), dots=DOTS))
+    return path
+
+
+def write_gif(path: Path, frames: Iterable[Pixels]) -> None:
+    """Writes a GIF that repeats for ever; all frames have the colours of the last one, the fullest in most runs."""
+    from PIL import Image
+
+    images: list[Any] = [Image.fromarray(pixels) for pixels in frames]
+    palette = images[-1].quantize(256, method=Image.Quantize.MAXCOVERAGE)  # keeps white white
+    images = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    images[0].save(path, save_all=True, append_images=images[1:], duration=MILLISECONDS, loop=0)

@@ -1,0 +1,77 @@
+"""A first case to start from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+CASE = """\
+# A cantilever beam is released from its straight shape and swings under its own weight.
+# Check it:    fsci check {folder}
+# Run it:      fsci run {folder}
+# See it:      fsci plot results/{name}
+# All settings: fsci schema --markdown
+title: {name}
+
+# The units of all numbers below; they are written to the results.
+units: {{length: m, mass: kg, time: s}}
+
+# 0.4 s are two periods of the slowest oscillation.
+time: {{step: 0.004, end: 0.4}}
+
+structure:
+  # Without this line the case is static. rho_inf: 1 keeps the energy, smaller values damp the fastest oscillations.
+  dynamics: {{rho_inf: 0.9}}
+  bodies:
+    beam:
+      # A built-in shape: 1 m long, 0.1 m high, with the surfaces left, right, bottom and top.
+      mesh: {{shape: rectangle, size: [1, 0.1], cells: [20, 2], order: 2}}
+      material: {{law: st_venant_kirchhoff, E: 1e8, nu: 0.3, density: 1000}}
+      supports:
+        - {{on: left, displacement: [0, 0]}}   # null instead of a number leaves a component free
+      gravity: [0, -9.81]
+      # More loads; numbers may be expressions of x, y, z and t:
+      # tractions:
+      #   - {{on: right, value: [0, "1e4*min(t/0.1, 1)"]}}
+      # pressures:
+      #   - {{on: top, value: "500*sin(2*pi*x)"}}
+
+# Every step writes these to history.csv.
+probes:
+  tip: {{quantity: displacement, at: [1, 0.05]}}
+  clamp: {{quantity: reaction, on: left}}
+  energy: {{quantity: energy}}
+
+# States for ParaView: every second step.
+output: {{fields_every: 2}}
+
+# The run fails if it misses these. By beam theory in plane strain, with E' = E/(1 - nu^2), height h and length l,
+# the tip swings about the static deflection -1.5 density gravity l^4/(E' h^2) with the frequency
+# 0.1615 h/l^2 sqrt(E'/density).
+verify:
+  - {{value: tip.y, statistic: mean, reference: -0.0134, relative: 0.05}}
+  - {{value: tip.y, statistic: frequency, reference: 5.355, relative: 0.05}}
+"""
+
+README = """\
+# {name}
+
+A cantilever beam, 1 m x 0.1 m in plane strain, is released from its straight shape and swings under its own weight.
+
+    fsci check {folder}           # is the case right?
+    fsci run {folder}             # results in results/{name}
+    fsci plot results/{name}      # pictures
+
+Other settings without editing:
+
+    fsci run {folder} --set structure.bodies.beam.material.E=2e8 --set verify=[] -o results/stiffer
+"""
+
+
+def new_case(folder: Path) -> list[Path]:
+    """Write a commented case that runs; raises FileExistsError rather than overwrite anything."""
+    folder.mkdir(parents=True)
+    name = folder.absolute().name
+    files = {folder / "case.yaml": CASE, folder / "README.md": README}
+    for path, text in files.items():
+        path.write_text(text.format(name=name, folder=folder), encoding="utf-8")
+    return list(files)

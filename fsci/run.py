@@ -1,0 +1,301 @@
+"""A run: steps through time with retries, checkpoints, output; stops cleanly when asked to; resumes."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import signal
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fsci.case import Case, CaseError, load_case
+from fsci.checkpoint import read_checkpoint, write_checkpoint
+from fsci.clock import Clock
+from fsci.history import HistoryWriter, read_history
+from fsci.monitor import Monitor
+from fsci.output import FieldWriter, write_text
+from fsci.summary import RunRecord, memory_mb, summarize, write_summary
+from fsci.verify import evaluate
+from solvers.api import State, StepFailed, StepInfo
+
+if TYPE_CHECKING:
+    from fsci.build import Simulation
+
+FINISHED, FAILED, BAD_CASE, STOPPED = 0, 1, 2, 3  #: exit codes
+
+
+def run_case(case: Case, out: Path) -> int:
+    """Compute a case from its start into the folder `out`; returns the exit code. Raises CaseError."""
+    from mpi4py import MPI
+
+    comm = MPI.COMM_WORLD
+    if comm.rank == 0:
+        prepare_folder(case, out)
+    comm.Barrier()
+    return Run(case, out, comm).from_start()
+
+
+def resume_run(out: Path) -> int:
+    """Continue a run from the newest checkpoint of its folder; returns the exit code. Raises CaseError."""
+    from mpi4py import MPI
+
+    comm = MPI.COMM_WORLD
+    case = load_case(out / "case.yaml")
+    checkpoint = None
+    if comm.rank == 0:
+        try:
+            checkpoint = read_checkpoint(out / "checkpoint")
+        except FileNotFoundError as error:
+            checkpoint = error
+    checkpoint = comm.bcast(checkpoint)
+    if isinstance(checkpoint, Exception):
+        raise checkpoint
+    state, _ = checkpoint
+    return Run(case, out, comm).from_checkpoint(state)
+
+
+def prepare_folder(case: Case, out: Path) -> None:
+    """An empty results folder with everything needed to repeat the run: the case and its mesh files."""
+    for old in ("fields", "checkpoint", "failure", "pictures"):
+        shutil.rmtree(out / old, ignore_errors=True)
+    for old in ("summary.json", "history.csv", "log.txt", "STOP"):
+        (out / old).unlink(missing_ok=True)
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / "case.yaml", case.dump())
+    meshes = [body.mesh for body in case.structure.bodies.values()]
+    for file in (Path(mesh.file) for mesh in meshes if getattr(mesh, "file", None) is not None):
+        if not file.is_absolute() and (case.folder / file).resolve() != (out / file).resolve():
+            (out / file).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(case.folder / file, out / file)
+
+
+@dataclass
+class Run:
+    """One run of a case on all processes; files are written by rank 0."""
+
+    case: Case
+    out: Path
+    comm: Any
+    record: RunRecord = field(default_factory=RunRecord)
+    stop_asked: bool = False
+    probes: dict[str, float] = field(default_factory=dict)  #: latest values
+    balances: dict[str, float] = field(default_factory=dict)  #: latest values
+
+    def __post_init__(self) -> None:
+        time = self.case.time
+        self.root = self.comm.rank == 0
+        self.clock = Clock(time.start, time.end, time.step, time.retry.halvings, time.retry.recover_after)
+        self.record.residual_steps = self.case.output.residuals
+
+    # ------------------------------------------------------------------------------------------------- start
+
+    def from_start(self) -> int:
+        """Compute from the initial state."""
+        simulation = self._build()
+        with self.record.timer("start"):
+            simulation.initialise(self.clock.time, self.clock.dt)
+        if self.root:
+            self.history = HistoryWriter(self.out / "history.csv")
+            self.fields = FieldWriter(self.out / "fields")
+        self._write_fields()
+        return self._watched_loop()
+
+    def from_checkpoint(self, state: State) -> int:
+        """Compute from a checkpoint."""
+        from solvers.distributed import scatter
+
+        simulation = self._build()
+        self.clock.restore(state["clock"])
+        self.record.restore(state["record"])
+        with self.record.timer("start"):
+            simulation.initialise(self.case.time.start, self.case.time.step)
+            simulation.scheme.restore(scatter(self.comm, state["scheme"], simulation.scheme.save()))
+        if self.root:
+            (self.out / "STOP").unlink(missing_ok=True)
+            self.history = HistoryWriter(self.out / "history.csv", resume_after=self.clock.step)
+            self.fields = FieldWriter.resume(self.out / "fields", self.clock.time)
+        return self._watched_loop()
+
+    def _build(self) -> Simulation:
+        from fsci.build import build
+
+        with self.record.timer("start"):
+            self.simulation = build(self.case, self.comm, self.record.timer)
+        return self.simulation
+
+    # -------------------------------------------------------------------------------------------------- loop
+
+    def _watched_loop(self) -> int:
+        """The loop with live output, signals caught and the summary written whatever happens."""
+        monitor = Monitor(enabled=self.root, live=self.comm.size == 1, log=self.out / "log.txt")
+        caught = {number: signal.signal(number, self._on_signal) for number in (signal.SIGTERM, signal.SIGINT)}
+        try:
+            with monitor as self.monitor:
+                clock = self.clock
+                monitor.start(
+                    self.case.title,
+                    self.simulation.dofs,
+                    self.comm.size,
+                    begin=clock.start,
+                    end=clock.end,
+                    time=clock.time,
+                )
+                return self._loop()
+        finally:
+            for number, handler in caught.items():
+                signal.signal(number, handler)
+
+    def _on_signal(self, number: int, frame: Any) -> None:
+        self.stop_asked = True
+
+    def _asked_to_stop(self) -> bool:
+        """Any process got a signal, or there is a file STOP in the results folder."""
+        asked = self.stop_asked or (self.root and (self.out / "STOP").exists())
+        return bool(self.comm.allreduce(int(asked)))
+
+    def _loop(self) -> int:
+        every = self.case.output.checkpoint_every
+        while not self.clock.done:
+            if self._asked_to_stop():
+                self._write_checkpoint()
+                return self._end("stopped", f"stopped at time {self.clock.time:g}; continue with fsci resume")
+            try:
+                self._step()
+            except StepFailed as failure:
+                return self._fail(failure)
+            if every and self.clock.step % every == 0:
+                self._write_checkpoint()
+        self._write_checkpoint()
+        return self._end("finished", "")
+
+    def _step(self) -> None:
+        """One accepted step. Raises StepFailed if halving does not help."""
+        before, clock = self.record.wall(), self.clock
+        while True:
+            state = self.simulation.scheme.save()
+            try:
+                dt = clock.dt
+                info = self.simulation.scheme.step(clock.time, dt)
+                break
+            except StepFailed as failure:
+                if not clock.halve():
+                    self._keep_failure(failure)
+                    self.simulation.scheme.restore(state)
+                    raise
+                self.simulation.scheme.restore(state)
+                self.record.retry()
+                self.monitor.retry(failure, clock.dt)
+        clock.accept()
+        self.record.accept(clock.step, info)
+        self._note(dt, info, before)
+        every = self.case.output.fields_every
+        if clock.done or (every and clock.step % every == 0):
+            self._write_fields()
+
+    def _note(self, dt: float, info: StepInfo, before: float) -> None:
+        """One line in the history and on the screen."""
+        with self.record.timer("probes"):
+            self.probes, self.balances = self.simulation.probes(), self.simulation.balances()
+        wall = self.record.wall() - before
+        numbers = {"residual": info.residuals[-1], **self.probes, **info.numbers, **self.balances}
+        if self.root:
+            clock = self.clock
+            self.history.write(clock.step, clock.time, dt, info.iterations, wall, numbers)
+            self.monitor.step(clock.step, clock.time, dt, info, wall)
+
+    # ------------------------------------------------------------------------------------------------- files
+
+    def _write_fields(self) -> None:
+        with self.record.timer("output"):
+            snapshots = self.simulation.snapshots()
+            if self.root:
+                self.fields.write(self.clock.step, self.clock.time, snapshots)
+
+    def _write_checkpoint(self) -> None:
+        from solvers.distributed import gather
+
+        with self.record.timer("checkpoint"):
+            scheme = gather(self.comm, self.simulation.scheme.save())
+            if self.root:
+                state = {"scheme": scheme, "clock": self.clock.save(), "record": self.record.save()}
+                meta = {"step": self.clock.step, "time": self.clock.time, "title": self.case.title}
+                write_checkpoint(self.out / "checkpoint", state, meta)
+
+    def _keep_failure(self, failure: StepFailed) -> None:
+        """Folder `failure`: the case, where it failed, and the fields of the iterate that failed."""
+        snapshots = self.simulation.snapshots()
+        if not self.root:
+            return
+        folder = self.out / "failure"
+        FieldWriter(folder / "fields").write(self.clock.step + 1, self.clock.time + self.clock.dt, snapshots)
+        write_text(folder / "case.yaml", self.case.dump())
+        what = {
+            "field": failure.field,
+            "reason": failure.reason,
+            "iteration": failure.iteration,
+            "where": failure.where,
+            "residuals": failure.history,
+            "step": self.clock.step + 1,
+            "time": self.clock.time,
+            "dt": self.clock.dt,
+        }
+        write_text(folder / "failure.json", json.dumps(what, indent=2) + "\n")
+
+    # --------------------------------------------------------------------------------------------------- end
+
+    def _fail(self, failure: StepFailed) -> int:
+        from solvers.distributed import gather
+
+        self._write_checkpoint()
+        state = gather(self.comm, self.simulation.scheme.save())
+        clock = self.clock
+        if self.root:
+            meta = {"step": clock.step, "time": clock.time, "title": self.case.title}
+            write_checkpoint(self.out / "failure", {"scheme": state, "clock": clock.save()}, meta)
+        message = f"step {clock.step + 1} from time {clock.time:g} failed with dt = {clock.dt:.3g}: {failure}"
+        return self._end("failed", message)
+
+    def _end(self, status: str, message: str) -> int:
+        """Summary and verification; the exit code is the same on all processes."""
+        memory = max(self.comm.allgather(memory_mb()))
+        code = None
+        if self.root:
+            self.history.close()
+            code = self._summarize(status, message, memory)
+        return self.comm.bcast(code, root=0)
+
+    def _summarize(self, status: str, message: str, memory: float) -> int:
+        history = read_history(self.out / "history.csv")
+        results = evaluate(history, self.case.verify) if status == "finished" else []
+        data = summarize(
+            self.record,
+            history,
+            status=status,
+            title=self.case.title,
+            processes=self.comm.size,
+            dofs=self.simulation.dofs,
+            memory=memory,
+            probes=list(self.probes),
+            balances=list(self.balances),
+            verify=results,
+            units=self.case.units.model_dump(),
+            message=message,
+        )
+        write_summary(self.out / "summary.json", data)
+        return self._report(status, message, results)
+
+    def _report(self, status: str, message: str, results: list[dict[str, Any]]) -> int:
+        for result in results:
+            word = "ok    " if result["ok"] else "MISSED"
+            found = f"{result['value']:.6g}, reference {result['reference']:.6g} +- {result['tolerance']:.2g}"
+            self.monitor.say(f"verify {word} {result['name']}: {found} {result['message']}".rstrip())
+        missed = any(not result["ok"] for result in results)
+        if status == "finished":
+            message = f"finished in {self.record.wall():.3g} s; results in {self.out}"
+            message += "; the verification was missed" if missed else ""
+        self.monitor.finish(message, ok=status == "finished" and not missed)
+        return {"finished": FAILED if missed else FINISHED, "stopped": STOPPED, "failed": FAILED}[status]
+
+
+__all__ = ["BAD_CASE", "FAILED", "FINISHED", "STOPPED", "CaseError", "Run", "resume_run", "run_case"]

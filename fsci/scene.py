@@ -1,0 +1,172 @@
+"""Bodies with title, axes and colour bar: one figure per state, the same frame and colours for all of a movie."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from fsci.curves import SIZE, STYLE, label
+from fsci.render import Body, Pixels, View, axes_of_view, frame, render
+
+Rectangle = tuple[float, float, float, float]  #: left, bottom, width, height in parts of the figure
+
+#: where the picture and its colour bar are: beside each other, or one above the other
+UPRIGHT = ((0.125, 0.12, 0.70, 0.785), (0.85, 0.16, 0.018, 0.70))
+LONG = ((0.125, 0.31, 0.845, 0.60), (0.25, 0.125, 0.5, 0.025))
+SPATIAL = ((0.02, 0.05, 0.80, 0.855), (0.85, 0.16, 0.018, 0.70))
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What the states of a run have in common when they are drawn."""
+
+    view: View
+    flat: bool  #: bodies in the plane: seen from the front, with coordinates at the axes
+    limits: tuple[float, float]  #: values at the ends of the colour bar
+    colours: str  #: name of the colour map
+    title: str
+    label: str  #: of the colour bar
+    units: Mapping[str, str]  #: of length, mass and time
+    layout: tuple[Rectangle, Rectangle]  #: of the picture and of the colour bar
+
+
+def compose(states: Iterable[list[Body]], field: str, title: str, units: Mapping[str, str]) -> Scene:
+    """The scene that has room and colours for all the given states, of which there must be one.
+
+    Raises ValueError if no body has the field.
+    """
+    states = iter(states)
+    first = next(states)
+    spans = np.max([np.ptp(body.surface.points, axis=0) for body in first], axis=0)
+    flat = bool(spans[2] <= 1e-9 * spans.max())
+    axes = axes_of_view(flat)
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    least, most = np.inf, -np.inf
+    for body in chain(first, chain.from_iterable(states)):
+        seen = np.asarray(body.surface.points, dtype=np.float64) @ axes
+        low, high = np.minimum(low, seen.min(axis=0)), np.maximum(high, seen.max(axis=0))
+        if body.values is not None:
+            least, most = min(least, float(body.values.min())), max(most, float(body.values.max()))
+    if least > most:
+        known = sorted({name for body in first for name in body.surface.point_data if not name.startswith("vtk")})
+        raise ValueError(f"no body has a field '{field}'; there are {', '.join(known)}")
+    signed = least < 0 < most
+    if signed:
+        least, most = -max(-least, most), max(-least, most)
+    elif least == most:
+        most = least + (abs(least) or 1.0)
+    width, height = (high - low)[:2]
+    layout = SPATIAL if not flat else LONG if width > 2.2 * height else UPRIGHT
+    return Scene(
+        view=frame(axes, low, high, aspect=SIZE[0] * layout[0][2] / (SIZE[1] * layout[0][3])),
+        flat=flat,
+        limits=(least, most),
+        colours="coolwarm" if signed else "viridis",
+        title=title,
+        label=field_label(field, first, units),
+        units=units,
+        layout=layout,
+    )
+
+
+def draw(scene: Scene, bodies: list[Body], time: float, *, dots: int) -> Any:
+    """The figure of one state, at `dots` pixels per inch."""
+    figure, image, title = lay_out(scene, dots)
+    image.set_data(render_into(scene, bodies, dots))
+    title.set_text(headline(scene, time))
+    return figure
+
+
+def animate(scene: Scene, states: Iterable[tuple[float, list[Body]]], *, dots: int) -> Iterator[Pixels]:
+    """The pictures of many states (time, bodies), shape (height, width, 3); what stays is drawn only once."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure, image, title = lay_out(scene, dots)
+    canvas = FigureCanvasAgg(figure)
+    moving = [image, *image.axes.spines.values(), title] if scene.flat else [image, title]
+    for artist in moving:
+        artist.set_animated(True)
+    canvas.draw()
+    still = canvas.copy_from_bbox(figure.bbox)
+    for time, bodies in states:
+        canvas.restore_region(still)
+        image.set_data(render_into(scene, bodies, dots))
+        title.set_text(headline(scene, time))
+        for artist in moving:
+            image.axes.draw_artist(artist)
+        yield np.array(canvas.buffer_rgba())[..., :3]
+
+
+def lay_out(scene: Scene, dots: int) -> tuple[Any, Any, Any]:
+    """(figure, its picture, its title): everything around the picture, which is still white."""
+    import matplotlib
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+    from matplotlib.figure import Figure
+
+    view = scene.view
+    x, y = float(view.centre @ view.right), float(view.centre @ view.up)
+    extent = (x - view.half_width, x + view.half_width, y - view.half_height, y + view.half_height)
+    with matplotlib.rc_context({**STYLE, "axes.grid": False}):
+        figure = Figure(SIZE, dpi=dots)
+        axes = figure.add_axes(scene.layout[0])
+        image = axes.imshow(np.full((1, 1, 3), 255), extent=extent, interpolation="none", aspect="auto")
+        if scene.flat:
+            axes.spines[:].set_visible(True)
+            axes.set_xlabel(label("x", "displacement", scene.units))
+            axes.set_ylabel(label("y", "displacement", scene.units))
+            axes.locator_params(nbins=6)
+        else:
+            axes.set_axis_off()
+            draw_triad(figure, view)
+        title = axes.set_title("", pad=10)
+        _, _, width, height = scene.layout[1]
+        colour_bar = figure.colorbar(
+            ScalarMappable(Normalize(*scene.limits), scene.colours),
+            cax=figure.add_axes(scene.layout[1]),
+            orientation="horizontal" if width > height else "vertical",
+            label=scene.label,
+        )
+        colour_bar.outline.set_linewidth(0.6)
+        if height > width:  # the power of ten belongs above the numbers, not over the picture
+            colour_bar.ax.yaxis.set_offset_position("right")
+            colour_bar.ax.yaxis.get_offset_text().set_horizontalalignment("left")
+    return figure, image, title
+
+
+def render_into(scene: Scene, bodies: list[Body], dots: int) -> Pixels:
+    """The bodies at the size of the picture."""
+    _, _, width, height = scene.layout[0]
+    size = (round(SIZE[0] * width * dots), round(SIZE[1] * height * dots))
+    return render(bodies, scene.view, size=size, limits=scene.limits, colours=scene.colours)
+
+
+def headline(scene: Scene, time: float) -> str:
+    """The title with the time."""
+    return f"{scene.title}, t = {time:g} {scene.units['time']}"
+
+
+def field_label(field: str, bodies: list[Body], units: Mapping[str, str]) -> str:
+    """What the colours are: |displacement| [m], displacement x [m], stress_xx [Pa]."""
+    for body in bodies:
+        data = body.surface.point_data
+        if field in data:
+            return label(f"|{field}|" if data[field].ndim > 1 else field, field, units)
+    name, _, component = field.rpartition(".")
+    return label(f"{name} {component}", name, units)
+
+
+def draw_triad(figure: Any, view: View) -> None:
+    """The directions of x, y and z in the lower left corner."""
+    axes = figure.add_axes((0.02, 0.03, 0.12 * SIZE[1] / SIZE[0], 0.12))
+    axes.set_axis_off()
+    axes.set_xlim(-1, 1)
+    axes.set_ylim(-1, 1)
+    for name, direction in zip("xyz", np.eye(3), strict=True):
+        tip = np.array([direction @ view.right, direction @ view.up])
+        axes.annotate("", tip, (0, 0), arrowprops={"arrowstyle": "->", "shrinkA": 0, "shrinkB": 0})
+        axes.text(*(1.35 * tip), name, ha="center", va="center", fontsize=11)

@@ -1,0 +1,119 @@
+"""The case format described from its models: JSON schema for editors, and the input reference in Markdown."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from fsci.case import Case
+from fsci.expression import FUNCTIONS
+
+INTRODUCTION = """\
+# Input reference
+
+A case is a YAML 1.2 file. This page is generated from the program: every setting with its type, default, unit and
+meaning. Units are those of SI; with `units:` they are the corresponding ones of length, mass and time.
+
+- A *number* may be written as arithmetic: `2*pi/360`.
+- An *expression* may contain variables too, x, y, z being reference coordinates and t the time. There are the operators
+  `+ - * / ** ^`, comparisons, `and`, `or`, `not`, the constants `pi` and `e`, and the functions {functions}.
+  `where(condition, a, b)` is a where the condition holds, else b.
+- A *name* has letters, digits, `_` and `-`.
+- `<<: *other` takes over the settings of a section marked `&other`.
+"""
+
+#: settings of every mesh, listed after its own
+COMMON = ("order", "cell", "rotate", "translate")
+
+
+def json_schema() -> str:
+    """JSON schema of the case format."""
+    schema = Case.model_json_schema()
+    return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}, indent=2)
+
+
+def reference_markdown() -> str:
+    """The input reference: one chapter for each section."""
+    schema = Case.model_json_schema()
+    models = schema.pop("$defs")
+    functions = ", ".join(f"`{name}`" for name in FUNCTIONS)
+    chapters = [INTRODUCTION.replace("{functions}", functions), _chapter("case.yaml", "case", schema, models)]
+    written: set[str] = set()
+    for title, name in _sections("", schema, models):
+        if name not in written:
+            written.add(name)
+            chapters.append(_chapter(title, name, models[name], models))
+    return "\n".join(chapters)
+
+
+def _sections(path: str, model: dict[str, Any], models: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Path and model name of every section below this one, depth first."""
+    for key, schema in model["properties"].items():
+        for suffix, name in _references(schema):
+            title = f"{path}{key}{suffix}"
+            alternatives = models[name]["properties"]
+            kinds = [f"{k}: {_type(alternatives[k])}" for k in ("shape", "law") if k in alternatives]
+            yield f"`{title}`" + "".join(f" with {kind}" for kind in kinds), name
+            yield from _sections(f"{title}.", models[name], models)
+
+
+def _references(schema: dict[str, Any]) -> list[tuple[str, str]]:
+    """The models a setting can be, each with what stands between: .NAME for a mapping, [..] for a list."""
+    if "$ref" in schema:
+        return [("", schema["$ref"].rsplit("/", 1)[1])]
+    found: dict[str, str] = {}
+    for suffix, inner in (
+        *(("", option) for option in (*schema.get("anyOf", []), *schema.get("oneOf", []))),
+        *((".NAME", schema[k]) for k in ("additionalProperties",) if isinstance(schema.get(k), dict)),
+        *(("[..]", schema[k]) for k in ("items",) if k in schema),
+    ):
+        for more, name in _references(inner):
+            found.setdefault(name, suffix + more)
+    return [(suffix, name) for name, suffix in found.items()]
+
+
+def _chapter(title: str, name: str, model: dict[str, Any], models: dict[str, Any]) -> str:
+    required = model.get("required", [])
+    names = sorted(model["properties"], key=lambda key: (key not in required, key in COMMON))
+    rows = [
+        f"| `{key}` | {_type(schema)} | {_default(key, schema, required)} | {schema.get('unit', '')} "
+        f"| {schema.get('description', '').replace('|', chr(92) + '|')} |"
+        for key in names
+        for schema in [model["properties"][key]]
+    ]
+    head = ["| setting | type | default | unit | meaning |", "|---|---|---|---|---|"]
+    lines = [f"(input-{name.lower()})=", f"## {title}", "", model["description"], "", *head, *rows, ""]
+    return "\n".join(lines)
+
+
+def _type(schema: dict[str, Any]) -> str:
+    """What a setting can be, in words."""
+    if "$comment" in schema:
+        return str(schema["$comment"])
+    if "$ref" in schema:
+        name = schema["$ref"].rsplit("/", 1)[1]
+        return f"[{name}](#input-{name.lower()})"
+    if "const" in schema or "enum" in schema:
+        return " or ".join(f"`{word}`" for word in schema.get("enum", [schema.get("const")]))
+    if options := [*schema.get("anyOf", []), *schema.get("oneOf", [])]:
+        words = [_type(option) for option in options if option.get("type") != "null"]
+        return " or ".join(dict.fromkeys(words))
+    if schema["type"] == "array":
+        items = schema["items"]
+        free = " or null" if {"type": "null"} in items.get("anyOf", []) else ""
+        fewest, most = schema.get("minItems"), schema.get("maxItems")
+        count = "" if fewest is None or most is None else f"{fewest}, " if fewest == most else f"{fewest} or {most}, "
+        return f"list ({count}{_type(items)}{free})"
+    if schema["type"] == "object":
+        return f"NAME: {_type(schema['additionalProperties'])}"
+    return {"string": "text", "boolean": "true or false"}[schema["type"]]
+
+
+def _default(key: str, schema: dict[str, Any], required: list[str]) -> str:
+    if key in required:
+        return "required"
+    if "default" in schema:
+        value = schema["default"]
+        return "" if value is None else f"`{json.dumps(value)}`".replace('"', "")
+    return "" if "$ref" in schema else "none"

@@ -1,0 +1,131 @@
+// The integrals of one pair over its integration points, differentiated in the pair's own directions.
+//
+//     mass_kj = int N~_k N~_j,   coupling_kl = int N~_k N^m_l,   gap_k = int N~_k g,   g = n_h.(x_m - x_s)
+//
+// with N~ the slave's basis (transformed for tri6), n_h = sum_i N_i n_i normalised again, x_m and x_s the points of both
+// facets on one line of projection (Popp, Gitterle, Gee & Wall 2010). In 3D lengths are those of the plane's
+// coordinates; the factor |g_1 x g_2| comes in later (facet_assembly.hpp).
+#pragma once
+
+#include <cmath>
+
+#include "points_line.hpp"
+#include "points_plane.hpp"
+
+namespace mortar {
+
+template <typename Slave, typename Master>
+constexpr int pair_directions = [] {
+    if constexpr (Slave::dim == 3)
+        return plane_directions<Slave, Master>;
+    else
+        return line_directions<Slave, Master>;
+}();
+
+template <typename Slave, typename Master, typename T>
+using PairGeometry =
+    std::conditional_t<Slave::dim == 3, PlanePair<Slave, Master, T>, LinePair<Slave, Master, T>>;
+
+// Nodes of one facet: positions, and the nodal normals if it is a slave.
+template <typename Facet>
+struct FacetNodes {
+    double x[Facet::nodes][Facet::dim], normal[Facet::nodes][Facet::dim];
+};
+
+template <typename Slave, typename Master, typename T>
+struct PairIntegrals {
+    static constexpr int n = Slave::nodes, m = Master::nodes, dim = Slave::dim;
+    T mass[n][n] = {}, coupling[n][m] = {}, gap[n] = {};  // of mass the upper triangle
+    T cover = 0.0;                                        // share of the slave's reference domain
+    // 3D: the gap's derivative with respect to nodes and normals where they enter g directly, not through the points
+    static constexpr int direct = dim == 3 && is_dual<T> ? n : 0;
+    double gap_slave[direct + 1][3 * n] = {}, gap_normal[direct + 1][3 * n] = {}, gap_master[direct + 1][3 * m] = {};
+
+    const T& mass_at(int k, int j) const { return k <= j ? mass[k][j] : mass[j][k]; }
+
+    void add(const T* test, const T* master, const T& weight, const T& g) {
+        for (int k = 0; k < n; ++k) {
+            const T weighted = test[k] * weight;
+            for (int j = k; j < n; ++j) add_product(mass[k][j], weighted, test[j]);
+            for (int l = 0; l < m; ++l) add_product(coupling[k][l], weighted, master[l]);
+            add_product(gap[k], weighted, g);
+        }
+    }
+
+    void add(const PointOn<Slave, T>& on_slave, const PointOn<Master, T>& on_master, const T& weight,
+             const FacetNodes<Slave>& slave, const FacetNodes<Master>& master) {
+        const SurfacePoint<Slave> xs(on_slave.N, on_slave.dN, slave.x);
+        const SurfacePoint<Slave> field(on_slave.N, on_slave.dN, slave.normal);
+        const SurfacePoint<Master> xm(on_master.N, on_master.dN, master.x);
+        const double length = std::sqrt(dot(field.x, field.x));
+        const double normal[3] = {field.x[0] / length, field.x[1] / length, field.x[2] / length};
+        const double r[3] = {xm.x[0] - xs.x[0], xm.x[1] - xs.x[1], xm.x[2] - xs.x[2]};
+        const double g = dot(normal, r);
+        double turn[3];  // dg/dn_h
+        for (int c = 0; c < 3; ++c) turn[c] = (r[c] - g * normal[c]) / length;
+
+        T test[n], N_master[m], gap_point = g;
+        for (int k = 0; k < n; ++k)
+            test[k] = chain(on_slave.N[k], on_slave.dN[0][k], on_slave.dN[1][k], on_slave.xi);
+        transform_basis<Slave>(test);
+        for (int l = 0; l < m; ++l)
+            N_master[l] = chain(on_master.N[l], on_master.dN[0][l], on_master.dN[1][l], on_master.xi);
+        if constexpr (is_dual<T>)
+            for (int a = 0; a < 2; ++a) {
+                gap_point.gradient.add(dot(turn, field.tangent[a]) - dot(normal, xs.tangent[a]),
+                                       on_slave.xi[a].gradient);
+                gap_point.gradient.add(dot(normal, xm.tangent[a]), on_master.xi[a].gradient);
+            }
+        add(test, N_master, weight, gap_point);
+        cover += (1.0 / Slave::size) * weight;
+
+        if constexpr (is_dual<T>) {
+            double along_slave[3 * n], along_normal[3 * n], along_master[3 * m];
+            for (int i = 0; i < n; ++i)
+                for (int c = 0; c < 3; ++c) {
+                    along_slave[3 * i + c] = -on_slave.N[i] * normal[c];
+                    along_normal[3 * i + c] = on_slave.N[i] * turn[c];
+                }
+            for (int l = 0; l < m; ++l)
+                for (int c = 0; c < 3; ++c) along_master[3 * l + c] = on_master.N[l] * normal[c];
+            for (int k = 0; k < n; ++k) {
+                const double weighted = test[k].value * weight.value;
+                for (int i = 0; i < 3 * n; ++i) gap_slave[k][i] += weighted * along_slave[i];
+                for (int i = 0; i < 3 * n; ++i) gap_normal[k][i] += weighted * along_normal[i];
+                for (int l = 0; l < 3 * m; ++l) gap_master[k][l] += weighted * along_master[l];
+            }
+        }
+    }
+
+    void add(const LinePoint<T>& point, const LinePair<Slave, Master, T>& pair) {
+        T test[n], N_master[m], slope[1][n], slope_master[1][m];
+        Slave::shape(&point.slave, test, slope);
+        Master::shape(&point.master, N_master, slope_master);
+        const FieldPoint<Slave, T> xs(pair.slave, point.slave), normal(pair.normal, point.slave);
+        const FieldPoint<Master, T> xm(pair.master, point.master);
+        T g = 0.0, square = 0.0;
+        for (int c = 0; c < 2; ++c) {
+            add_product(g, normal.value[c], xm.value[c] - xs.value[c]);
+            add_product(square, normal.value[c], normal.value[c]);
+        }
+        add(test, N_master, point.weight, g / square_root(square));
+        cover += point.cover;
+    }
+};
+
+// How far apart the two facets are at a point, to choose among several masters.
+template <typename Slave, typename Master, typename T>
+double distance_at(const Point<Slave, Master, T>& point, const FacetNodes<Slave>& slave,
+                   const FacetNodes<Master>& master) {
+    const SurfacePoint<Slave> xs(point.slave.N, point.slave.dN, slave.x);
+    const SurfacePoint<Master> xm(point.master.N, point.master.dN, master.x);
+    return std::hypot(xm.x[0] - xs.x[0], xm.x[1] - xs.x[1], xm.x[2] - xs.x[2]);
+}
+template <typename Slave, typename Master, typename T>
+double distance_at(const LinePoint<T>& point, const FacetNodes<Slave>& slave, const FacetNodes<Master>& master) {
+    const FieldPoint<Slave, double> xs(slave.x, value_of(point.slave));
+    const FieldPoint<Master, double> xm(master.x, value_of(point.master));
+    return std::hypot(xm.value[0] - xs.value[0], xm.value[1] - xs.value[1]);
+}
+
+}  // namespace mortar

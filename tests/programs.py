@@ -1,0 +1,34 @@
+"""Running the program as a user does, on one process or several."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+ENVIRONMENT = {
+    **os.environ,
+    "OPENBLAS_NUM_THREADS": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "OMPI_MCA_btl_vader_single_copy_mechanism": "none",
+}
+
+
+def command(*arguments, processes: int = 1) -> list[str]:
+    launcher = ["mpirun", "-n", str(processes)] if processes > 1 else []
+    return [*launcher, sys.executable, "-m", "fsci", *map(str, arguments)]
+
+
+def fsci(*arguments, processes: int = 1) -> subprocess.CompletedProcess[str]:
+    """Run `fsci` to its end."""
+    return subprocess.run(
+        command(*arguments, processes=processes), capture_output=True, text=True, env=ENVIRONMENT, timeout=120
+    )
+
+
+def start_fsci(*arguments) -> subprocess.Popen[str]:
+    """Start `fsci` and go on."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(command(*arguments), text=True, env=ENVIRONMENT, **pipes)

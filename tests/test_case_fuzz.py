@@ -1,0 +1,181 @@
+"""Whatever happens to a valid case file, checking it ends with a summary or with located problems."""
+
+import io
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+
+from fsci.case import CaseError, load_case
+from fsci.check import summary
+
+CASES = [
+    """\
+title: two bodies # comment
+units: {length: mm, mass: t, time: s}
+time: {start: 0, step: "1/10", end: 1, retry: {halvings: 2, recover_after: 3}}
+structure:
+  dynamics: {alpha_m: 0.5, alpha_f: 0.5, beta: 0.25, gamma: 0.5, predictor: constant_velocity, damping: {mass: 0.1}}
+  bodies:
+    tube: &tube
+      mesh: {shape: tube, inner_radius: 1, outer_radius: 2, height: 3, cells: [8, 1, 2], order: 2, cell: tet,
+        rotate: [{axis: [0, 0, 1], angle: 90}, {axis: [1, 0, 0], angle: "180/2"}], translate: [1, 2, 3]}
+      material: {law: mooney_rivlin, c10: 1, c01: "2 + x", bulk: 1e3, density: 1e-9}
+      supports:
+        - {on: [bottom, top], displacement: [0, null, "sin(2*pi*t)"]}
+        - {on: inner, symmetry: true}
+      gravity: [0, 0, -9810]
+      body_force: [0, "where(z > 1, x, y)", 0]
+      pressures: [{on: outer, value: "t^2"}]
+      initial_displacement: [0, 0, 0]
+      initial_velocity: ["x", "y", "z"]
+    ball:
+      <<: *tube
+      mesh: {shape: hollow_sphere, inner_radius: 1, outer_radius: 2, cells: [4, 1]}
+      supports: []
+      pressures: []
+probes:
+  total: {quantity: momentum}
+  inside: {body: tube, quantity: area, on: inner}
+output: {fields_every: 2, checkpoint_every: 5, residuals: [1, 2]}
+verify: [{value: total.x, from: 0.5, reference: 0, absolute: 1e-9}]
+solver: {newton: {residual: 1e-9, increment: null, line_search: true}, linear: {method: iterative}}
+""",
+    """\
+time: {step: 0.1, end: 1}
+structure:
+  plane: stress
+  bodies:
+    disc:
+      mesh: {shape: disc, radius: 1, cells: [8, 2]}
+      material: {law: st_venant_kirchhoff, lambda: 1e6, mu: 1e6}
+      supports:
+        - on: outer
+          displacement: [0, 0.1]
+probes:
+  middle: {quantity: displacement, at: [0, 0]}
+""",
+]
+
+#: other values for settings, of all kinds
+VALUES = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(-3, 3) | st.sampled_from([10**20, -(10**400)]),
+    st.floats(),
+    st.sampled_from(
+        ["", "x", "left", "1/0", "min(", "disc", "tube.x", "2001-01-01", "\x00", "a\nb", "*", "{", "9**9**9"]
+    ),
+    st.text(max_size=5),
+    st.sampled_from([[], {}, [[]], {"": {}}, [None], {"a": [1]}, ["x", "y", "z"], {"file": "a" * 300}, {"shape": []}]),
+)
+MUTATIONS = st.lists(
+    st.tuples(st.sampled_from(["delete", "rename", "replace", "wrap", "copy"]), st.integers(0, 10**6), VALUES),
+    min_size=1,
+    max_size=3,
+)
+EDITS = st.lists(
+    st.tuples(st.integers(0, 10**6), st.integers(0, 8), st.text(alphabet="\t\n :-[]{}&*!'\"#|>%@?,.a0", max_size=4)),
+    min_size=1,
+    max_size=3,
+)
+LIMITS = settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def places(data, found=None):
+    """Every (container, key) in the data."""
+    found = [] if found is None else found
+    for key, value in data.items() if isinstance(data, dict) else enumerate(data):
+        found.append((data, key))
+        if isinstance(value, dict | list):
+            places(value, found)
+    return found
+
+
+def mutate(data, kind, where, value):
+    """Delete, rename, replace, wrap or copy one setting."""
+    all_places = places(data)
+    if not all_places:
+        return
+    container, key = all_places[where % len(all_places)]
+    if kind == "delete":
+        del container[key]
+    elif kind == "rename" and isinstance(container, dict):
+        container[f"{key}{value}"[:20]] = container.pop(key)
+    elif kind == "wrap":
+        container[key] = [container[key]]
+    elif kind == "copy":
+        other, name = all_places[(where // 7) % len(all_places)]
+        if not isinstance(other[name], dict | list):
+            container[key] = other[name]
+    else:
+        container[key] = value
+
+
+def check(path, overrides=()):
+    """What `fsci check` does; the text it prints."""
+    try:
+        case = load_case(path, overrides)
+    except CaseError as error:
+        problems = error.problems
+    else:
+        return "\n".join([summary(case), *case.warnings])
+    assert problems
+    assert all(problem.message and problem.place.source for problem in problems)
+    return "\n".join(str(problem) for problem in problems)
+
+
+def dump(data):
+    stream = io.StringIO()
+    YAML(typ="safe", pure=True).dump(data, stream)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("text", CASES)
+def test_the_cases_are_valid(text, tmp_path):
+    (tmp_path / "case.yaml").write_text(text, encoding="utf-8")
+    load_case(tmp_path)
+
+
+@LIMITS
+@given(st.sampled_from(CASES), MUTATIONS)
+def test_changed_settings(tmp_path, text, mutations):
+    data = YAML(typ="safe", pure=True).load(text)
+    for mutation in mutations:
+        mutate(data, *mutation)
+    path = tmp_path / "case.yaml"
+    path.write_text(dump(data), encoding="utf-8", errors="replace")
+    check(path)
+
+
+@LIMITS
+@given(st.sampled_from(CASES), EDITS)
+def test_changed_text(tmp_path, text, edits):
+    for where, length, new in edits:
+        at = where % (len(text) + 1)
+        text = text[:at] + new + text[at + length :]
+    path = tmp_path / "case.yaml"
+    path.write_text(text, encoding="utf-8")
+    check(path)
+
+
+@LIMITS
+@given(
+    st.sampled_from(
+        ["time.end", "structure.bodies.tube.supports.0", "solver.newton", "probes.new.quantity", "a.b", "..", ""]
+    ),
+    st.text(alphabet="\t\n :-[]{}&*!'\"#|>%@?,.a0", max_size=8),
+)
+def test_any_override(tmp_path, name, value):
+    path = tmp_path / "case.yaml"
+    path.write_text(CASES[0], encoding="utf-8")
+    check(path, [(name, value)])
+
+
+@LIMITS
+@given(st.binary(max_size=30))
+def test_any_bytes(tmp_path, data):
+    path = tmp_path / "case.yaml"
+    path.write_bytes(data)
+    check(path)

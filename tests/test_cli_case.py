@@ -1,0 +1,186 @@
+"""The commands that deal with case files: new, check, schema, and how run, resume and plot are called."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from fsci.case import load_case
+from fsci.cli import execute
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def beam():
+    assert execute(["new", "beam"]) == 0
+    return Path("beam")
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """What the commands hand to the run loop and to the pictures, which are replaced."""
+    made = []
+
+    def note(name, result):
+        def function(*arguments, **options):
+            made.append((name, arguments, options))
+            return result
+
+        return function
+
+    run = SimpleNamespace(run_case=note("run", 1), resume_run=note("resume", 3))
+    picture = SimpleNamespace(plot_run=note("plot", [Path("a.png"), Path("b.png")]))
+    monkeypatch.setitem(sys.modules, "fsci.run", run)
+    monkeypatch.setitem(sys.modules, "fsci.picture", picture)
+    return made
+
+
+def test_new_writes_a_valid_case_without_warnings(capsys):
+    assert execute(["new", "beam"]) == 0
+    beam = Path("beam")
+    case = load_case(beam)
+    assert case.warnings == ()
+    assert case.title == "beam"
+    assert "fsci run beam" in (beam / "README.md").read_text()
+    assert "next: fsci run beam" in capsys.readouterr().out
+
+
+def test_commented_settings_of_the_new_case_are_valid_too(beam):
+    text = (beam / "case.yaml").read_text()
+    before, after = text.split("expressions of x, y, z and t:\n")
+    loads, rest = after.split("\n\n", 1)
+    (beam / "case.yaml").write_text(before + "\n" + loads.replace("# ", "") + "\n\n" + rest)
+    body = load_case(beam).structure.bodies["beam"]
+    assert (len(body.tractions), len(body.pressures)) == (1, 1)
+
+
+def test_new_overwrites_nothing(beam, capsys):
+    (beam / "case.yaml").write_text("mine")
+    assert execute(["new", "beam"]) == 2
+    assert capsys.readouterr().err == "fsci new: cannot make the folder 'beam': File exists\n"
+    assert (beam / "case.yaml").read_text() == "mine"
+
+
+def test_check_describes_a_good_case(beam, capsys):
+    capsys.readouterr()
+    assert execute(["check", "beam"]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("beam/case.yaml\n")
+    assert "0 to 0.4 s, 100 steps of 0.004" in out
+    assert "dofs       410" in out  # (2*20 + 1)(2*2 + 1) nodes
+    assert out.endswith("\nok\n")
+    assert err == ""
+    assert execute(["check", "beam/case.yaml"]) == 0
+
+
+def test_check_warns(beam, capsys):
+    assert execute(["check", "beam", "--set", "time.step=1"]) == 0
+    out, err = capsys.readouterr()
+    assert err == "warning: --set time.step=1: the step 1 is longer than the run, 0.4\n"
+    assert out.endswith("ok\n")
+
+
+def test_check_refuses_a_bad_case(beam, capsys):
+    capsys.readouterr()
+    assert execute(["check", "beam", "--set", "time.end=0.2", "--set", "time.ende=1"]) == 2
+    assert capsys.readouterr() == ("", "--set time.ende=1: unknown setting 'ende'; did you mean 'end'?\n")
+    assert execute(["check", "nothing"]) == 2
+    assert capsys.readouterr().err == "nothing: cannot be read: No such file or directory\n"
+
+
+def test_schema(capsys):
+    assert execute(["schema"]) == 0
+    assert json.loads(capsys.readouterr().out)["title"] == "Case"
+    assert execute(["schema", "--markdown"]) == 0
+    assert capsys.readouterr().out.startswith("# Input reference\n")
+
+
+def test_run_takes_overrides_and_the_folder_for_results(beam, calls):
+    assert execute(["run", "beam", "-o", "out", "--set", "time.end=0.2"]) == 1
+    ((name, (case, out), _),) = calls
+    assert (name, case.time.end, out) == ("run", 0.2, Path("out"))
+
+
+@pytest.mark.parametrize("path", ["beam", "beam/", "beam/case.yaml", "beam/../beam"])
+def test_results_go_to_the_name_of_the_case(beam, calls, path):
+    execute(["run", path])
+    assert calls[0][1][1].resolve() == Path("results/beam").resolve()
+
+
+def test_run_refuses_a_bad_case_before_it_starts(beam, calls, capsys):
+    assert execute(["run", "beam", "--set", "time.step=0"]) == 2
+    assert calls == []
+    assert capsys.readouterr().err == "--set time.step=0: 'step' must be greater than 0, not 0\n"
+
+
+def test_resume_and_plot(calls, capsys):
+    assert execute(["resume", "out"]) == 3
+    Path("out").mkdir()
+    assert execute(["plot", "out", "--movie", "--field", "velocity"]) == 0
+    assert capsys.readouterr().out == "a.png\nb.png\n"
+    assert calls == [
+        ("resume", (Path("out"),), {}),
+        ("plot", (Path("out"),), {"movie": True, "field": "velocity"}),
+    ]
+
+
+def test_plot_without_results(calls, capsys):
+    assert execute(["plot", "out"]) == 2
+    assert (calls, capsys.readouterr().err) == ([], "fsci plot: there is no folder 'out'\n")
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["runn"], ["run"], ["check", "a", "--set", "x"], ["new"], ["check", "--sett=1", "a"]]
+)
+def test_wrong_commands_explain_themselves(arguments, capsys):
+    with pytest.raises(SystemExit) as caught:
+        execute(arguments)
+    assert caught.value.code == 2
+    assert capsys.readouterr().err.startswith("usage: fsci")
+
+
+def test_help_shows_the_first_steps(capsys):
+    with pytest.raises(SystemExit):
+        execute(["--help"])
+    assert "fsci new beam" in capsys.readouterr().out
+
+
+def test_check_and_schema_import_nothing_heavy(beam):
+    program = (
+        "import sys; from fsci.cli import execute; execute(['check', 'beam']); execute(['schema'])\n"
+        "heavy = {'dolfinx', 'mpi4py', 'petsc4py', 'ufl', 'gmsh', 'meshio', 'pyvista', 'h5py', 'scipy', 'rich'}\n"
+        "print('heavy:', sorted(heavy & {name.split('.')[0] for name in sys.modules}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, env={"PYTHONPATH": str(ROOT)}, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "heavy: []"
+
+
+def test_one_process_of_several_reports_a_bad_case(beam):
+    program = "from fsci.cli import main; main()"
+    command = ["mpirun", "-n", "2", sys.executable, "-c", program]
+    root = {
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    }
+    done = subprocess.run(
+        [*command, "run", "beam", "--set", "time.step=0"],
+        capture_output=True,
+        text=True,
+        env=os.environ | root | {"PYTHONPATH": str(ROOT)},
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.count("'step' must be greater than 0") == 1

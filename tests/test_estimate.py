@@ -1,0 +1,47 @@
+"""Sizes of built-in meshes estimated from their settings: those of the meshes themselves."""
+
+import itertools
+from typing import Any
+
+import pytest
+from pydantic import TypeAdapter
+
+from fsci.case.mesh import Shape
+from fsci.estimate import aspect, size
+from fsci.mesh import build_mesh
+
+SHAPES: list[dict[str, Any]] = [
+    {"shape": "rectangle", "size": [2, 1], "cells": [4, 3]},
+    {"shape": "disc", "radius": 1, "cells": [8, 2]},
+    {"shape": "ring", "inner_radius": 1, "outer_radius": 2, "cells": [6, 2]},
+    {"shape": "ring", "inner_radius": 1, "outer_radius": 2, "cells": [6, 2], "angle": 90},
+    {"shape": "box", "size": [1, 2, 3], "cells": [1, 2, 3]},
+    {"shape": "beam", "length": 3, "width": 1, "height": 1, "cells": [3, 1, 2]},
+    {"shape": "cylinder", "radius": 1, "height": 2, "cells": [8, 1, 3]},
+    {"shape": "tube", "inner_radius": 1, "outer_radius": 2, "height": 2, "cells": [5, 2, 3]},
+    {"shape": "solid_torus", "major_radius": 3, "minor_radius": 1, "cells": [5, 16]},
+    {"shape": "hollow_torus", "major_radius": 3, "inner_radius": 0.5, "outer_radius": 1, "cells": [6, 5, 2]},
+    {"shape": "hollow_sphere", "inner_radius": 1, "outer_radius": 2, "cells": [3, 2]},
+]
+
+
+def shape(settings):
+    return TypeAdapter(Shape).validate_python(settings)
+
+
+@pytest.mark.parametrize("settings", SHAPES, ids=[s["shape"] for s in SHAPES])
+def test_cells_nodes_and_surfaces(settings, tmp_path):
+    for order, simplex in itertools.product((1, 2), (False, True)):
+        cell = {2: ("quad", "tri"), 3: ("hex", "tet")}[shape(settings).dimension][simplex]
+        model = shape(settings | {"order": order, "cell": cell})
+        mesh = build_mesh(model, tmp_path)
+        assert size(model) == (len(mesh.cells), len(mesh.points))
+        assert set(model.surfaces) == set(mesh.surfaces)
+
+
+def test_aspect():
+    assert aspect(shape({"shape": "rectangle", "size": [2, 1], "cells": [2, 10]})) == pytest.approx(10)
+    assert aspect(shape({"shape": "box", "size": [1, 1, 1], "cells": [1, 2, 4]})) == pytest.approx(4)
+    # a sixth of the middle circle is 2 pi 1.5/6 = pi/2 long, the layers are 0.1 thick
+    ring = {"shape": "ring", "inner_radius": 1, "outer_radius": 2, "cells": [6, 10]}
+    assert aspect(shape(ring)) == pytest.approx(5 * 3.14159265)

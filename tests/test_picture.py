@@ -1,0 +1,163 @@
+"""Pictures against geometry known beforehand: what is where, in which colour, how curved, in which units."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fsci.curves import label, plot_history
+from fsci.history import HistoryWriter
+from fsci.output import FieldWriter, write_text, write_vtu
+from fsci.picture import plot_run
+from fsci.render import axes_of_view, frame, load_body, render
+from fsci.scene import compose
+from fsci.summary import write_summary
+from solvers.api import Snapshot
+
+SI = {"length": "m", "mass": "kg", "time": "s"}
+QUAD9 = [(0, 0), (2, 0), (2, 2), (0, 2), (1, 0), (2, 1), (1, 2), (0, 1), (1, 1)]
+
+
+def bent_beam(curvature: float, cells: int = 6) -> Snapshot:
+    """A cantilever of length 1 and height 0.1 bent to a circle, quad9."""
+    s, eta = np.meshgrid(np.linspace(0, 1, 2 * cells + 1), [-0.05, 0.0, 0.05], indexing="ij")
+    radius = 1 / curvature
+    x = np.stack([(radius - eta) * np.sin(curvature * s), radius - (radius - eta) * np.cos(curvature * s), 0 * s], -1)
+    index = np.arange(s.size).reshape(s.shape)
+    nodes = np.array([[index[2 * cell + i, j] for i, j in QUAD9] for cell in range(cells)])
+    displacement = (x - np.stack([s, eta, 0 * s], -1)).reshape(-1, 3)
+    return Snapshot("flag", x.reshape(-1, 3), nodes, "quad9", {"displacement": displacement, "level": eta.ravel()})
+
+
+def square(cell_type: str, bulge: float = 0.0) -> Snapshot:
+    """The unit square as one cell; its upper edge bulges to a parabola; u = (x, 0)."""
+    points = np.array([(i / 2, j / 2, 0.0) for i, j in QUAD9])
+    points[6, 1] += bulge
+    points = points if cell_type == "quad9" else points[:4]
+    u = points * [1, 0, 0]
+    return Snapshot("square", points, np.arange(len(points))[None], cell_type, {"u": u, "v": -u[:, 0]})
+
+
+@pytest.fixture
+def draw(tmp_path):
+    """Draws a snapshot onto 200 x 200 pixels; returns the picture and a function from position to pixel."""
+
+    def drawn(snapshot: Snapshot, field: str):
+        write_vtu(tmp_path / "body.vtu", snapshot)
+        body = load_body(tmp_path / "body.vtu", field)
+        view = frame(np.eye(3), np.array([-0.5, -0.5, 0.0]), np.array([1.5, 1.5, 0.0]), aspect=1.0)
+        pixels = render([body], view, size=(200, 200), limits=(0.0, 1.0), colours="gray")
+        scale = 200 / (1.08 * 2)
+        return lambda x, y: pixels[round(100 - (y - 0.5) * scale), round(100 + (x - 0.5) * scale)]
+
+    return drawn
+
+
+def test_values_have_their_colour_and_place(draw):
+    at = draw(square("quad"), "u")
+    assert np.all(at(-0.05, 0.5) == 255)
+    assert np.all(at(0.5, 1.05) == 255)
+    for x in (0.1, 0.25, 0.5, 0.9):
+        assert at(x, 0.4) == pytest.approx(np.full(3, 255 * x), abs=4)
+    assert np.all(at(0.5, 0.0) < 50), "the outline is black"
+
+
+def test_components_and_bodies_without_the_field(draw):
+    assert draw(square("quad"), "u.x")(0.5, 0.4) == pytest.approx(np.full(3, 127), abs=4)
+    assert draw(square("quad"), "u.y")(0.5, 0.4) == pytest.approx(np.zeros(3), abs=4)
+    assert draw(square("quad"), "temperature")(0.5, 0.4) == pytest.approx(np.full(3, 211), abs=4)
+
+
+def test_second_order_cells_are_curved(draw):
+    at = draw(square("quad9", bulge=0.3), "u")
+    parabola = 1 + 0.3 * 4 * 0.25 * 0.75
+    assert at(0.25, parabola - 0.03)[0] < 200
+    assert np.all(at(0.25, parabola + 0.03) == 255)
+
+
+def test_edges_are_those_of_the_cells(tmp_path):
+    lattice = np.stack(np.meshgrid([0.0, 1, 2], [0.0, 1, 2], [0.0, 1, 2], indexing="ij"), -1).reshape(-1, 3)
+    index = np.arange(27).reshape(3, 3, 3)
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    cells = np.array([[index[i + a, j + b, k + c] for a, b, c in corners] for i, j, k in np.ndindex(2, 2, 2)])
+    write_vtu(tmp_path / "cube.vtu", Snapshot("cube", lattice, cells, "hexahedron", {}))
+    cube = load_body(tmp_path / "cube.vtu", "u")
+    assert len(cube.edges) == 48
+    assert len(cube.outline) == 0
+
+    write_vtu(tmp_path / "square.vtu", square("quad9", bulge=0.3))
+    edges = load_body(tmp_path / "square.vtu", "u").outline
+    assert len(edges) == 4
+    assert min(np.linalg.norm(edge - [0.5, 1.3, 0.0], axis=1).min() for edge in edges) < 1e-6
+
+
+def test_the_view_frames_everything(tmp_path):
+    write_vtu(tmp_path / "square.vtu", square("quad"))
+    scene = compose([[load_body(tmp_path / "square.vtu", "v")]], "v", "", SI)
+    assert scene.flat
+    assert scene.view.half_height == pytest.approx(0.54)
+    assert scene.view.centre == pytest.approx([0.5, 0.5, 0])
+    assert scene.limits == (-1.0, 0.0)
+    axes = axes_of_view(False)
+    assert axes.T @ axes == pytest.approx(np.eye(3), abs=1e-15)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    assert axes[2, 1] > 0, "z points up"
+
+
+def test_an_unknown_field_is_an_error_that_names_the_known_ones(tmp_path):
+    write_vtu(tmp_path / "square.vtu", square("quad"))
+    with pytest.raises(ValueError, match=r"'pressure'; there are u, v"):
+        compose([[load_body(tmp_path / "square.vtu", "pressure")]], "pressure", "", SI)
+
+
+def test_units():
+    assert label("u", "displacement", SI) == "u [m]"
+    assert label("v", "velocity", {**SI, "length": "mm"}) == "v [mm/s]"
+    assert label("a", "acceleration", SI) == "a [m/s$^2$]"
+    assert label("f", "reaction", SI) == "f [N]"
+    assert label("f", "reaction", {"length": "mm", "mass": "kg", "time": "s"}) == "f [kg mm/s$^2$]"
+    assert label("p", "pressure", {"length": "mm", "mass": "t", "time": "s"}) == "p [MPa]"
+    assert label("my_level", "level", SI) == "my level"
+
+
+def test_a_run_is_drawn_from_its_folder(tmp_path):
+    from PIL import Image
+
+    fields = FieldWriter(tmp_path / "fields")
+    history = HistoryWriter(tmp_path / "history.csv")
+    for step in range(3):
+        fields.write(step, 0.1 * step, [bent_beam(0.5 * step + 0.01)])
+        motion = {"A.x": 0.0, "A.y": math.sin(step), "energy": 1.0}
+        history.write(step, 0.1 * step, 0.1, 3, 0.0, motion)
+    write_text(tmp_path / "case.yaml", "title: Flag\nprobes: {A: {quantity: displacement, at: [0.6, 0.2]}}\n")
+    write_summary(tmp_path / "summary.json", {"newton": {"residuals": {"1": [1.0, 1e-3, 1e-9]}}})
+    drawn = plot_run(tmp_path, movie=True)
+    names = ["final_displacement.png", "movie.gif", "history_A.png", "history_energy.png", "convergence.png"]
+    assert [path.relative_to(tmp_path / "pictures").as_posix() for path in drawn] == names
+    for path in drawn:
+        picture = Image.open(path)
+        if path.suffix == ".gif":
+            assert (picture.n_frames, picture.size) == (3, (960, 600))
+        else:
+            assert picture.size == (1600, 1000)
+        colours = np.asarray(picture.convert("RGB")).reshape(-1, 3)
+        assert np.all(colours[0] == 255), "the background is white"
+        assert np.mean(np.ptp(colours.astype(int), axis=1) > 60) > 1e-3, "something coloured is there"
+
+
+def test_a_broken_off_run_without_fields_or_summary_is_drawn(tmp_path):
+    HistoryWriter(tmp_path / "history.csv").write(1, 0.1, 0.1, 3, 0.0, {"A": 1.0})
+    assert [path.name for path in plot_run(tmp_path)] == ["history_A.png"]
+
+
+def test_components_of_very_different_range_get_their_own_axis(tmp_path):
+    from PIL import Image
+
+    time = np.linspace(0, 1, 50)
+    history = {"time": time, "A.x": 1e-3 * np.sin(9 * time), "A.y": np.sin(9 * time)}
+    (path,) = plot_history(tmp_path, history, {}, SI)
+    colours = np.asarray(Image.open(path).convert("RGB")).astype(int)
+    blue = np.flatnonzero((colours[..., 2] - colours[..., 0] > 120).sum(axis=1) > 0)
+    assert np.ptp(blue) > 300, "the small component fills its axis"

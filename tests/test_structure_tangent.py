@@ -1,0 +1,133 @@
+"""Every tangent is the finite difference of its residual; energies have the known small-strain limit."""
+
+import numpy as np
+import pytest
+from structure_setup import block, constant, distort, make_structure, vector
+
+from solvers.structure.body import Pressure, Support
+from solvers.structure.materials import (
+    CoupNeoHooke,
+    MooneyRivlin,
+    NeoHooke,
+    PlaneStressStVenantKirchhoff,
+    StVenantKirchhoff,
+    lame,
+    plane_stress_lambda,
+)
+from solvers.structure.time import Damping, Dynamics
+from solvers.time import GeneralisedAlpha
+
+MATERIALS = {
+    "st_venant_kirchhoff": StVenantKirchhoff(3.0, 5.0, 2.0),
+    "neo_hooke": NeoHooke(3.0, 5.0, 2.0),
+    "coup_neo_hooke": CoupNeoHooke(3.0, 5.0, 2.0),
+    "mooney_rivlin": MooneyRivlin(1.0, 0.5, 7.0, 2.0),
+    "varying": NeoHooke(lambda x, t: 3.0 + x[0], lambda x, t: 5.0 - x[1], 2.0),
+}
+
+
+def deformed(structure, seed=3):
+    """A random state in the middle of a step."""
+    rng = np.random.default_rng(seed)
+    structure.initialise(0.0, 0.1)
+    structure.begin_step(0.0, 0.1)
+    structure.now.u[:] = rng.uniform(-0.04, 0.04, structure.layout.size)
+    return rng
+
+
+def tangent_error(structure):
+    """Relative difference between the tangent and the central difference of the balance in a random direction."""
+    rng = deformed(structure)
+    u = structure.now.u.copy()
+    direction = rng.uniform(-1.0, 1.0, len(u))
+    step = 1e-6
+
+    def balance(displacement):
+        structure.now.u[:] = displacement
+        structure.residual()
+        return structure.residual_force.copy()
+
+    difference = (balance(u + step * direction) - balance(u - step * direction)) / (2 * step)
+    balance(u)
+    x, y = structure.layout.vector(), structure.layout.vector()
+    x.array[:] = direction
+    structure.tangent().mult(x, y)
+    return np.linalg.norm(y.array - difference) / np.linalg.norm(difference)
+
+
+@pytest.mark.parametrize("cell_type", ["quad", "tetra", "hexahedron"])
+@pytest.mark.parametrize("law", MATERIALS)
+def test_material(law, cell_type):
+    structure = make_structure(distort(block(cell_type, 2), 0.05), MATERIALS[law])
+    assert tangent_error(structure) < 1e-6
+
+
+@pytest.mark.parametrize("cell_type", ["triangle6", "quad", "hexahedron"])
+def test_follower_pressure(cell_type):
+    mesh = distort(block(cell_type, 2), 0.05)
+    pressures = [Pressure("top", lambda x, t: 2.0 + x[0]), Pressure("left", constant(-1.0))]
+    structure = make_structure(mesh, MATERIALS["neo_hooke"], pressures=pressures)
+    assert tangent_error(structure) < 1e-6
+
+
+def test_dynamics_with_damping():
+    time = Dynamics(GeneralisedAlpha.from_rho_inf(0.7), damping=Damping(mass=3.0, stiffness=0.2))
+    structure = make_structure(block("quad", 2), MATERIALS["neo_hooke"], time=time)
+    assert tangent_error(structure) < 1e-6
+
+
+def small_stress(material, gradient):
+    """Cauchy stress of a small homogeneous deformation."""
+    dim = len(gradient)
+    structure = make_structure(block("quad" if dim == 2 else "hexahedron", 1), material)
+    body = structure.bodies[0]
+    body.set_displacement((body.points[:dim, : body.owned].T @ np.asarray(gradient).T).ravel())
+    return body.stress()[0].reshape(3, 3)
+
+
+@pytest.mark.parametrize("law", ["st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke", "mooney_rivlin"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_small_strain_is_hookes_law(law, dim):
+    mu, lmbda = (3.0, 7.0 - 2.0) if law == "mooney_rivlin" else (3.0, 5.0)
+    gradient = 1e-6 * np.array([[1.0, 2.0, 0.5], [-0.5, 3.0, 1.0], [0.2, 0.1, -2.0]])[:dim, :dim]
+    strain = np.zeros((3, 3))
+    strain[:dim, :dim] = (gradient + gradient.T) / 2
+    hooke = 2 * mu * strain + lmbda * np.trace(strain) * np.eye(3)
+    assert small_stress(MATERIALS[law], gradient) == pytest.approx(hooke, abs=3e-5 * np.abs(hooke).max())
+
+
+def test_plane_stress_uniaxial():
+    """sigma_33 = 0, and Young's modulus and Poisson's ratio are those of a free strip."""
+    mu, lmbda = lame(E := 10.0, nu := 0.3)
+    material = PlaneStressStVenantKirchhoff(mu, plane_stress_lambda(mu, lmbda))
+    stress = small_stress(material, [[1e-6, 0.0], [0.0, -nu * 1e-6]])
+    assert stress == pytest.approx(np.diag([E * 1e-6, 0.0, 0.0]), abs=1e-10)
+
+
+def test_pressure_on_a_closed_surface_has_no_resultant():
+    """Follower pressure acts along the deformed normal: int p n da = 0 over a closed surface, however deformed."""
+    mesh = distort(block("hexahedron", 2), 0.05)
+    structure = make_structure(
+        mesh, MATERIALS["neo_hooke"], pressures=[Pressure(name, constant(3.0)) for name in mesh.surfaces]
+    )
+    deformed(structure)
+    structure.residual()
+    force = structure.now.external.reshape(-1, 3)
+    assert np.abs(force).max() > 0.1
+    assert np.abs(force.sum(axis=0)).max() < 1e-12
+
+
+def test_uniform_loads_are_exact():
+    """Dead traction and body force add up to value times reference area and volume."""
+    from solvers.structure.body import Traction
+
+    structure = make_structure(
+        block("tetra10", 2),
+        MATERIALS["neo_hooke"],
+        body_force=vector(1.0, 2.0, 3.0),
+        gravity=vector(0.0, 0.0, -9.0),
+        tractions=[Traction("top", vector(0.5, 0.0, -0.25))],
+        supports=[Support("bottom", vector(0, 0, 0))],
+    )
+    structure.initialise(0.0, 1.0)
+    assert structure.now.external.reshape(-1, 3).sum(axis=0) == pytest.approx([1.5, 2.0, 3.0 - 18.0 - 0.25])
