@@ -1,0 +1,8 @@
+"""Fluid-structure-contact interaction from one YAML case file."""
+
+import os
+
+# Read by libraries when they are first imported; what the user has set stays.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMPI_MCA_mpi_yield_when_idle", "1")
+os.environ.setdefault("OMPI_MCA_btl_vader_single_copy_mechanism", "none")

@@ -254,7 +254,7 @@ def _combine(function: Callable[..., Any], *parameters: Parameter) -> Parameter:
 # ---------------------------------------------------------------------------------------------------------- probes
 
 
-def _body_of(case: Case, probe) -> str | None:
+def _body_of(case: Case, probe) -> Any:
     if probe.body is None and len(case.structure.bodies) == 1:
         return next(iter(case.structure.bodies))
     return probe.body

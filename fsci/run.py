@@ -42,7 +42,7 @@ def resume_run(out: Path) -> int:
 
     comm = MPI.COMM_WORLD
     case = load_case(out / "case.yaml")
-    checkpoint = None
+    checkpoint: Any = None
     if comm.rank == 0:
         try:
             checkpoint = read_checkpoint(out / "checkpoint")
@@ -63,8 +63,8 @@ def prepare_folder(case: Case, out: Path) -> None:
         (out / old).unlink(missing_ok=True)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / "case.yaml", case.dump())
-    meshes = [body.mesh for body in case.structure.bodies.values()]
-    for file in (Path(mesh.file) for mesh in meshes if getattr(mesh, "file", None) is not None):
+    files = (getattr(body.mesh, "file", None) for body in case.structure.bodies.values())
+    for file in (Path(file) for file in files if file is not None):
         if not file.is_absolute() and (case.folder / file).resolve() != (out / file).resolve():
             (out / file).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(case.folder / file, out / file)

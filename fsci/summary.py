@@ -7,8 +7,7 @@ import math
 import platform
 import resource
 import time
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,21 +17,7 @@ import numpy as np
 from fsci.history import History
 from fsci.output import write_text
 from solvers.api import State, StepInfo
-
-
-@dataclass
-class Timer:
-    """Wall time [s] by name: `with timer("assembly"): ...`; a part inside another counts for both."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def __call__(self, name: str) -> Iterator[None]:
-        begin = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - begin
+from solvers.timing import Timer
 
 
 @dataclass

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from solvers.rows import RowChanges
 
 Array = NDArray[np.float64]
 
@@ -77,6 +80,57 @@ class Stateful(Protocol):
 
     def save(self) -> State: ...
     def restore(self, state: State) -> None: ...
+
+
+class Constraint(Stateful, Protocol):
+    """Something that couples nodes of a field through multipliers, which it eliminates: contact.
+
+    Arrays over its nodes have the shape (N, dim) and are the same on every process. Calls are collective.
+    """
+
+    @property
+    def near(self) -> bool:
+        """It has something to say at the latest `evaluate`."""
+        ...
+
+    @property
+    def settled(self) -> bool:
+        """The latest `evaluate` changed no active set."""
+        ...
+
+    def dofs(self) -> NDArray[np.int64]:
+        """Global dofs of its nodes, -1 where there are none, shape (N, dim)."""
+        ...
+
+    def start(self, u: Array, stiffness: Array, t: float) -> None:
+        """Take the displacements [m] at the start and the diagonal of the stiffness [N/m]."""
+        ...
+
+    def begin_step(self) -> None: ...
+
+    def evaluate(self, u: Array, t: float) -> None:
+        """Everything at the displacements of the present iterate."""
+        ...
+
+    def force(self) -> Array:
+        """Force [N] on its nodes for the present multipliers."""
+        ...
+
+    def violation(self, weight: float) -> float:
+        """Norm [N] of what the constraints miss."""
+        ...
+
+    def condense(self, weight: float, fetch: Callable[[NDArray[np.int64]], Any], R: Array) -> RowChanges:
+        """Change of the linearised balance; `fetch(rows)` gives rows of the tangent, R the balance without `force`."""
+        ...
+
+    def recover(self, du: Array) -> None:
+        """Multipliers from the increment of all unknowns."""
+        ...
+
+    def numbers(self) -> dict[str, float]:
+        """Columns for the history."""
+        ...
 
 
 class Scheme(Stateful, Protocol):

@@ -62,7 +62,8 @@ _VTK_POINTS: dict[str, list[tuple[float, ...]]] = {
     ],
 }
 
-COMPILE_OPTIONS = {"cffi_extra_compile_args": ["-O3", "-march=native"]}
+#: A process that waits for another one to compile the same form is patient.
+COMPILE_OPTIONS = {"cffi_extra_compile_args": ["-O3", "-march=native"], "timeout": 300}
 
 
 def vtk_from_basix(cell_type: str) -> NDArray[np.int64]:
@@ -154,17 +155,20 @@ def input_nodes(domain: Domain) -> NDArray[np.int64]:
 
 def vector_space(domain: Domain) -> fem.FunctionSpace:
     """Isoparametric vector Lagrange space: one dof block per node."""
-    return fem.VectorFunctionSpace(domain.mesh, ("Lagrange", domain.degree))
+    with _quiet():
+        return fem.VectorFunctionSpace(domain.mesh, ("Lagrange", domain.degree))
 
 
 def scalar_space(domain: Domain) -> fem.FunctionSpace:
     """Isoparametric scalar Lagrange space: one dof per node."""
-    return fem.FunctionSpace(domain.mesh, ("Lagrange", domain.degree))
+    with _quiet():
+        return fem.FunctionSpace(domain.mesh, ("Lagrange", domain.degree))
 
 
 def cellwise_space(domain: Domain) -> fem.FunctionSpace:
     """One number per cell."""
-    return fem.FunctionSpace(domain.mesh, ("Discontinuous Lagrange", 0))
+    with _quiet():
+        return fem.FunctionSpace(domain.mesh, ("Discontinuous Lagrange", 0))
 
 
 def function(space: fem.FunctionSpace) -> fem.Function:

@@ -1,5 +1,21 @@
 """Compiled kernels: numpy arrays in, numpy arrays out."""
 
-from ._kernels import KdopTree2, KdopTree3
+from ._kernels import (
+    KdopTree2,
+    KdopTree3,
+    MortarResult,
+    basis_transformation,
+    mortar,
+    nodal_normals,
+    nodal_tangents,
+)
 
-__all__ = ["KdopTree2", "KdopTree3"]
+__all__ = [
+    "KdopTree2",
+    "KdopTree3",
+    "MortarResult",
+    "basis_transformation",
+    "mortar",
+    "nodal_normals",
+    "nodal_tangents",
+]

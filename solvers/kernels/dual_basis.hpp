@@ -78,28 +78,10 @@ struct DualBasis {
             for (auto& row : inverse) std::fill(row, row + n, 0.0);
         }
         for (int j = 0; j < n; ++j)
-            for (int k = 0; k < n; ++k) full[j][k] = D[j] * inverse[j][k];
-        if (blend < 1.0) balance();
-        for (int j = 0; j < n; ++j)
-            for (int k = 0; k < n; ++k) A[j][k] = (1.0 - blend) * full[j][k] + blend * (j == k);
-    }
-
-  private:
-    // Removes what an ill-conditioned M leaves over in sum_j A_jk = 1 and sum_k A_jk D_k = D_j (partition of unity and
-    // momentum), so that both hold to rounding whatever M.
-    void balance() {
-        double total = 0.0;
-        for (double d : D) total += d;
-        for (int k = 0; k < n; ++k) {
-            double rest = 1.0;
-            for (int j = 0; j < n; ++j) rest -= full[j][k];
-            for (int j = 0; j < n; ++j) full[j][k] += rest * D[j] / total;
-        }
-        for (int j = 0; j < n; ++j) {
-            double rest = D[j];
-            for (int k = 0; k < n; ++k) rest -= full[j][k] * D[k];
-            for (int k = 0; k < n; ++k) full[j][k] += rest / total;
-        }
+            for (int k = 0; k < n; ++k) {
+                full[j][k] = D[j] * inverse[j][k];
+                A[j][k] = (1.0 - blend) * full[j][k] + blend * (j == k);
+            }
     }
 };
 

@@ -1,7 +1,7 @@
 // Forward-mode automatic differentiation with a fixed number of directions.
 //
 // A dual number a + a' e, e^2 = 0, carries a value and its derivatives in N directions; arithmetic on it is arithmetic
-// plus the chain rule. The derivatives are held in vector registers (padded to whole packs of 8 doubles).
+// plus the chain rule. The derivatives are held in whole vector registers.
 #pragma once
 
 #include <cmath>
@@ -9,9 +9,15 @@
 
 namespace mortar {
 
-// Lowered by the compiler to whatever the machine has (AVX-512, AVX, NEON, ...).
-using Pack = double __attribute__((vector_size(64)));
+// As many numbers as a vector register of the machine holds: wider ones would go through memory.
+#if defined(__AVX512F__)
 constexpr int pack_size = 8;
+#elif defined(__AVX__)
+constexpr int pack_size = 4;
+#else
+constexpr int pack_size = 2;
+#endif
+using Pack = double __attribute__((vector_size(pack_size * sizeof(double))));
 
 template <int N>
 struct Gradient {

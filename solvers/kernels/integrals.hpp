@@ -2,8 +2,8 @@
 //
 //     mass_kj = int N~_k N~_j,   coupling_kl = int N~_k N^m_l,   gap_k = int N~_k g,   g = n_h.(x_m - x_s)
 //
-// with N~ the slave's basis (transformed for tri6), n_h = sum_i N_i n_i normalised again, x_m and x_s the points of both
-// facets on one line of projection (Popp, Gitterle, Gee & Wall 2010). In 3D lengths are those of the plane's
+// with N~ the slave's basis (transformed for tri6), n_h = sum_i N_i n_i normalised again, x_m and x_s the points of
+// both facets on one line of projection (Popp, Gitterle, Gee & Wall 2010). In 3D lengths are those of the plane's
 // coordinates; the factor |g_1 x g_2| comes in later (facet_assembly.hpp).
 #pragma once
 

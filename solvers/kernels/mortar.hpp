@@ -1,7 +1,7 @@
 // The mortar integrals between two surfaces and their derivatives: from arrays to arrays.
 //
-// Dual mortar method: Popp, Gee & Wall (2009) in 2D, Popp, Gitterle, Gee & Wall (2010) in 3D; the exact derivatives they
-// derive by hand are obtained by automatic differentiation. Facets of the slave are independent of each other.
+// Dual mortar method: Popp, Gee & Wall (2009) in 2D, Popp, Gitterle, Gee & Wall (2010) in 3D; the exact derivatives
+// they derive by hand are obtained by automatic differentiation. Facets of the slave are independent of each other.
 #pragma once
 
 #include "facet_assembly.hpp"

@@ -1,9 +1,9 @@
 // The auxiliary plane of a slave facet and the coordinates in it.
 //
 // The plane passes through the facet's centre c with the facet's unit normal n there (Puso & Laursen 2004). Its frame
-// are the tangents g_a = x,a(c). A point x has the plane coordinates xi_c^a + g^a.(x - c), with g^a the dual tangents in
-// the plane: g^a.n = 0, so x is projected along n. In these coordinates an affine slave facet *is* its reference domain,
-// and a pair's integrals, but for the factor |g_1 x g_2|, depend on the shapes in the plane alone:
+// are the tangents g_a = x,a(c). A point x has the plane coordinates xi_c^a + g^a.(x - c), with g^a the dual tangents
+// in the plane: g^a.n = 0, so x is projected along n. In these coordinates an affine slave facet *is* its reference
+// domain, and a pair's integrals, but for the factor |g_1 x g_2|, depend on the shapes in the plane alone:
 //     2 numbers for each master node, 0 (tri3), 2 (quad4) or 2 for each node (tri6, quad9) for the slave.
 // These are the directions of differentiation; how they depend on the nodes is known in closed form:
 //     dg^a = -(g^a.dg_b) g^b + (g^a.g^b) (n.dg_b) n,    d|g_1 x g_2| = |g_1 x g_2| g^b.dg_b.

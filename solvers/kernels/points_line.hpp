@@ -161,6 +161,7 @@ void find_element_points(const LinePair<Slave, Master, T>& pair, const std::vect
                          LinePoint<T>* points, bool* found) {
     for (std::size_t q = 0; q < rule.size(); ++q) {
         points[q].slave = rule[q].x[0];
+        points[q].master = 0.0;
         found[q] = pair.project_to_master(points[q].slave, points[q].master);
         const double eta = value_of(points[q].master);
         found[q] = found[q] && Master::inside(&eta, 1e-10);

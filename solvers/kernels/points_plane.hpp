@@ -7,6 +7,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstring>
 #include <vector>
 
 #include "clipping.hpp"
@@ -30,8 +31,8 @@ struct Point {
     T weight;
 };
 
-// Finds the points of a facet that lie over given points of the plane. The roots are found in plain numbers, eight at
-// once by Newton's method; one more step, with derivatives, differentiates them (implicit function theorem).
+// Finds the points of a facet that lie over given points of the plane. The roots are found in plain numbers, one to a
+// lane of a vector register, by Newton's method; one more step, with derivatives, differentiates them (implicit function theorem).
 template <typename Facet, typename T>
 class MapBack {
     static constexpr int n = Facet::nodes;
@@ -50,13 +51,16 @@ class MapBack {
         invert(J, first_);
     }
 
-    // points[k] over x[k], k < count <= 8; found[k] is false where there is none.
+    // points[k] over x[k], k < count <= pack_size; found[k] is false where there is none.
     void find(const T (*x)[2], int count, PointOn<Facet, T>* points, bool* found) const {
-        Pack target[2] = {}, xi[2], step[2], N[n], dN[2][n], inverse[2][2];
+        Pack target[2], xi[2], step[2], N[n], dN[2][n], inverse[2][2];
+        double lanes[2][pack_size];
         for (int k = 0; k < pack_size; ++k)
-            for (int a = 0; a < 2; ++a) target[a][k] = value_of(x[k < count ? k : 0][a]);
+            for (int a = 0; a < 2; ++a) lanes[a][k] = value_of(x[k < count ? k : 0][a]);
+        std::memcpy(target, lanes, sizeof lanes);
         for (int a = 0; a < 2; ++a)  // first guess: the facet's affine part
-            xi[a] = Facet::centre[a] + first_[a][0] * (target[0] - centre_[0]) + first_[a][1] * (target[1] - centre_[1]);
+            xi[a] = Facet::centre[a] + first_[a][0] * (target[0] - centre_[0]) +
+                    first_[a][1] * (target[1] - centre_[1]);
         auto linearize = [&] {
             Facet::shape(xi, N, dN);
             Pack J[2][2] = {};

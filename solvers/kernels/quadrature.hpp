@@ -66,9 +66,11 @@ inline std::vector<RulePoint> triangle_rule(int points) {
 // Fixed points on a facet (element-based integration; Farah, Popp & Wall 2015).
 template <typename Facet>
 const std::vector<RulePoint>& element_rule() {
-    static const std::vector<RulePoint> rule = Facet::dim == 2                            ? line_rule(5)
-                                               : Facet::nodes == 3 || Facet::nodes == 6 ? triangle_rule(12)
-                                                                                          : square_rule(3 + Facet::order);
+    static const std::vector<RulePoint> rule = [] {
+        if (Facet::dim == 2) return line_rule(5);
+        if (Facet::nodes == 3 || Facet::nodes == 6) return triangle_rule(12);
+        return square_rule(3 + Facet::order);
+    }();
     return rule;
 }
 

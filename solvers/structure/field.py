@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,10 +11,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from solvers import linear
-from solvers.api import Array, State, StepFailed, StepInfo
+from solvers.api import Array, Constraint, State, StepFailed, StepInfo
 from solvers.blocks import Layout, block_diagonal
 from solvers.distributed import Nodal
 from solvers.newton import Tolerance, converge
+from solvers.rows import change_rows, fetch_rows, gather, gather_at
 from solvers.structure.body import Body
 from solvers.structure.energy import EnergyBalance
 from solvers.structure.supports import prescribe
@@ -40,6 +41,7 @@ class Instant:
     a: Array  #: acceleration [m/s^2]
     internal: Array  #: internal force [N]
     external: Array  #: loads [N]
+    constraint: Array  #: contact force [N]
 
     @classmethod
     def zeros(cls, size: int) -> Instant:
@@ -61,9 +63,10 @@ class Structure:
         time: TimeScheme,
         settings: SolverSettings = SolverSettings(),
         timer: Timer | None = None,
+        constraint: Constraint | None = None,
     ):
         self.comm, self.bodies, self.time, self.settings = comm, list(bodies), time, settings
-        self.timer = timer or Timer()
+        self.timer, self.constraint = timer or Timer(), constraint
         self.dim = bodies[0].dim
         self.layout = Layout(comm, [body.size for body in bodies])
         self.supports = [prescribe(body) for body in bodies]
@@ -81,11 +84,11 @@ class Structure:
         self._tangents = [body.create_tangent() for body in bodies]
         self._combined: PETSc.Mat | None = None
         self._b, self._x = self.layout.vector(), self.layout.vector()
-        self._ksp = self._linear_solver()
-
-    def _linear_solver(self) -> PETSc.KSP:
         # the tangent of a follower pressure has an unsymmetric boundary term
-        symmetric = not any(body.settings.pressures for body in self.bodies)
+        self._ksp = self._linear_solver(symmetric=not any(body.settings.pressures for body in self.bodies))
+        self._constrained_ksp = None if constraint is None else self._linear_solver(symmetric=False)
+
+    def _linear_solver(self, *, symmetric: bool) -> PETSc.KSP:
         if linear.choose(self.settings.linear, self.dim, self.dofs()) == "direct":
             return linear.direct_solver(self.comm, dim=self.dim, dofs=self.dofs(), symmetric=symmetric)
         return linear.elastic_solver(self.comm, symmetric=symmetric, tolerance=self.settings.linear_tolerance)
@@ -111,13 +114,24 @@ class Structure:
                 if value is not None:
                     target[:] = body.nodal(value, t)[: body.owned].ravel()
         self._set_time(t)
-        self._assemble_force()
+        self._assemble_bodies()
+        if self.constraint is not None:
+            self.constraint.start(self._at_constraint(self.now.u), self._at_constraint(self._stiffness()), t)
         self.time.start(self, t, dt)
         self.energy.start(self)
+
+    def _stiffness(self) -> Array:
+        """Diagonal of the static tangent [N/m]."""
+        for body, matrix in zip(self.bodies, self._tangents, strict=True):
+            body.assemble_tangent(matrix)
+        return np.concatenate([matrix.getDiagonal().array for matrix in self._tangents])
 
     def begin_step(self, t: float, dt: float) -> None:
         """Remember the state at t and predict the one at t + dt."""
         self.old = self.now.copy()
+        self._time = t + dt
+        if self.constraint is not None:
+            self.constraint.begin_step()
         self._set_time(t + dt)
         self._target = self.prescribed_displacement(t + dt)
         self.time.predict(self, dt)
@@ -130,7 +144,7 @@ class Structure:
             self._check_inversion(failure.iteration, failure.history)
             raise
         self._check_inversion(info.iterations, info.residuals)
-        return info
+        return info if self.constraint is None else replace(info, numbers=self.constraint.numbers())
 
     def _check_inversion(self, iteration: int, history: tuple[float, ...]) -> None:
         """Raise StepFailed if the material is turned inside out anywhere."""
@@ -158,7 +172,7 @@ class Structure:
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
-    def _assemble_force(self) -> None:
+    def _assemble_bodies(self) -> None:
         now = self.now
         parts = zip(self.bodies, *(self.split(a) for a in (now.u, now.internal, now.external)), strict=True)
         for body, u, internal, external in parts:
@@ -166,12 +180,30 @@ class Structure:
             internal[:] = body.internal_force()
             external[:] = body.external_force()
 
+    def _assemble_constraint(self) -> None:
+        if self.constraint is None:
+            return
+        self.constraint.evaluate(self._at_constraint(self.now.u), self._time)
+        dofs, force = self.constraint.dofs(), self.constraint.force()
+        local = dofs - self.layout.start
+        mine = (local >= 0) & (local < self.layout.size) & (dofs >= 0)
+        self.now.constraint[:] = 0.0
+        self.now.constraint[local[mine]] = force[mine]
+
+    def _at_constraint(self, owned: Array) -> Array:
+        """Values at the nodes of the constraint, shape (N, dim)."""
+        assert self.constraint is not None
+        return gather_at(self.comm, owned, self.layout.start, self.constraint.dofs())
+
     def residual(self) -> float:
-        """Norm [N] of the balance over the free dofs."""
+        """Norm [N] of the balance over the free dofs, and of what the constraint misses."""
         with self.timer("assembly"):
-            self._assemble_force()
-            self.residual_force = self.time.balance(self)
-        return self.norm(np.where(self.free, self.residual_force, 0.0))
+            self._assemble_bodies()
+        with self.timer("contact"):
+            self._assemble_constraint()
+        self.residual_force = self.time.balance(self)
+        missed = 0.0 if self.constraint is None else self.constraint.violation(self.time.constraint_weight)
+        return float(np.hypot(self.norm(np.where(self.free, self.residual_force, 0.0)), missed))
 
     def tangent(self) -> PETSc.Mat:
         """d(balance)/du, supports not yet imposed; the next call overwrites the matrix."""
@@ -188,26 +220,45 @@ class Structure:
         self._b.array[:] = -self.residual_force
         self._x.array[:] = 0.0
         self._x.array[self.prescribed] = self._target - self.now.u[self.prescribed]
+        constrained = self.constraint is not None and self.constraint.near
+        if constrained:
+            with self.timer("contact"):
+                matrix = self._condense(matrix)
         rows = (self.layout.start + self.prescribed).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, self._x, self._b)
         try:
             with self.timer("solve"):
-                linear.solve(self._ksp, matrix, self._b, self._x)
+                linear.solve(self._constrained_ksp if constrained else self._ksp, matrix, self._b, self._x)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         self._increment = self._x.array.copy()
+        if constrained:
+            with self.timer("contact"):
+                self.constraint.recover(gather(self.comm, self._increment))
         self.now.u += self._increment
         self.now.u[self.prescribed] = self._target
         size = self.norm(self.now.u)
         return self.norm(self._increment) / size if size > 0.0 else 0.0
+
+    def _condense(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """The linear system without the multipliers of the constraint."""
+        assert self.constraint is not None
+        weight = self.time.constraint_weight
+        without = self.residual_force + weight * self.now.constraint
+        self._b.array[:] = -without
+        changes = self.constraint.condense(
+            weight, lambda rows: fetch_rows(matrix, rows), self._at_constraint(without)
+        )
+        return change_rows(matrix, self._b, changes)
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""
         self.now.u -= fraction * self._increment
 
     def settled(self) -> bool:
-        """True once the prescribed displacements are reached."""
+        """True once the prescribed displacements are reached and the active set stays as it is."""
         reached = np.array_equal(self.now.u[self.prescribed], self._target)
+        reached = reached and (self.constraint is None or self.constraint.settled)
         return self.comm.allreduce(reached, op=MPI.LAND)
 
     def round_off(self) -> float:
@@ -243,7 +294,10 @@ class Structure:
     def save(self) -> State:
         """Everything a step starts from, per body."""
         state: State = {name: self.per_body(array) for name, array in vars(self.now).items()}
-        return {**state, "energy": self.energy.save()}
+        state["energy"] = self.energy.save()
+        if self.constraint is not None:
+            state["contact"] = self.constraint.save()
+        return state
 
     def per_body(self, array: Array) -> State:
         """Owned dofs as nodal values by body."""
@@ -260,3 +314,5 @@ class Structure:
         for body, u in zip(self.bodies, self.split(self.now.u), strict=True):
             body.set_displacement(u)
         self.energy.restore(state["energy"])
+        if self.constraint is not None:
+            self.constraint.restore(state["contact"])

@@ -52,7 +52,7 @@ def follower_pressure(p: Tensor, u: Tensor, v: Tensor, N: Tensor, ds: ufl.Measur
 
 
 def cauchy_stress(u: Tensor, material: Material, parameters: dict[str, Tensor]) -> Tensor:
-    """sigma = P F^T / J [Pa], 3x3 in 2D too: sigma_33 is zero in plane stress and follows from F_33 = 1 in plane strain."""
+    """sigma = P F^T / J [Pa], 3x3 in 2D too: sigma_33 is zero in plane stress, else it follows from F_33 = 1."""
     F = deformation_gradient(u)
     F = ufl.variable(F if material.plane_stress else in_space(F))
     P = ufl.diff(material.energy(F, **parameters), F)

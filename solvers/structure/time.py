@@ -19,6 +19,11 @@ if TYPE_CHECKING:
 class TimeScheme(Protocol):
     """What a time scheme adds to f_int - f_ext."""
 
+    @property
+    def constraint_weight(self) -> float:
+        """Weight of the new constraint force in the balance; the old one has the rest."""
+        ...
+
     def start(self, structure: Structure, t: float, dt: float) -> None:
         """Prepare; velocity and acceleration at the start."""
         ...
@@ -51,17 +56,19 @@ class TimeScheme(Protocol):
 class Statics:
     """f_int(u) = f_ext(t): every time step is a load step."""
 
+    constraint_weight = 1.0
+
     def start(self, structure: Structure, t: float, dt: float) -> None: ...
     def predict(self, structure: Structure, dt: float) -> None: ...
 
     def balance(self, structure: Structure) -> Array:
-        return structure.now.internal - structure.now.external
+        return self.reaction(structure)
 
     def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
         return stiffness
 
     def reaction(self, structure: Structure) -> Array:
-        return structure.now.internal - structure.now.external
+        return structure.now.internal - structure.now.external - structure.now.constraint
 
     def averaged_forces(self, structure: Structure) -> tuple[Array, Array]:
         external = 0.5 * (structure.now.external + structure.old.external)
@@ -80,7 +87,10 @@ class Damping:
 
 
 class Dynamics:
-    """Generalised-alpha: M a_{1-alpha_m} + C v_{1-alpha_f} + (1 - alpha_f) f_{n+1} + alpha_f f_n = 0, f = f_int - f_ext."""
+    """Generalised-alpha: M a_{1-alpha_m} + C v_{1-alpha_f} + (1 - alpha_f) f_{n+1} + alpha_f f_n = 0.
+
+    The forces f = f_int - f_ext - f_contact are averaged, not evaluated in the middle.
+    """
 
     def __init__(
         self,
@@ -88,8 +98,10 @@ class Dynamics:
         *,
         damping: Damping = Damping(),
         predictor: Literal["constant_displacement", "constant_velocity"] = "constant_displacement",
+        constraint_at: Literal["mid", "end"] = "mid",
     ):
         self.scheme, self.damping, self.predictor = scheme, damping, predictor
+        self.constraint_weight = 1.0 - scheme.alpha_f if constraint_at == "mid" else 1.0
         self._dt = 0.0
         self._damping_matrix: PETSc.Mat | None = None
         self._effective: PETSc.Mat | None = None
@@ -151,7 +163,9 @@ class Dynamics:
         inertia = self._times(structure.mass, (1.0 - scheme.alpha_m) * now.a + scheme.alpha_m * old.a)
         internal = (1.0 - scheme.alpha_f) * now.internal + scheme.alpha_f * old.internal
         external, damping = self.averaged_forces(structure)
-        return inertia + damping + internal - external
+        weight = self.constraint_weight
+        constraint = weight * now.constraint + (1.0 - weight) * old.constraint
+        return inertia + damping + internal - external - constraint
 
     def averaged_forces(self, structure: Structure) -> tuple[Array, Array]:
         alpha, now, old = self.scheme.alpha_f, structure.now, structure.old
@@ -174,7 +188,7 @@ class Dynamics:
         """M a + C v + f_int - f_ext at the present time."""
         now = structure.now
         dynamic = self._times(structure.mass, now.a) + self._damping_force(now.v)
-        return dynamic + now.internal - now.external
+        return dynamic + now.internal - now.external - now.constraint
 
     def kinetic_energy(self, structure: Structure) -> float:
         return 0.5 * structure.dot(structure.now.v, self._times(structure.mass, structure.now.v))

@@ -1,0 +1,121 @@
+"""Condensation of dual multipliers: rows of the linearised balance become rows without multipliers.
+
+With J the tangent and R the balance without the multipliers' part, the linear system of a Newton step reads
+
+    J_l du - w (M^T z)_l = -R_l                           rows of the master and all others
+    J_a du + w (D z - M^T z)_a = -R_a                     rows of active slave nodes a
+    dg_a du = -g_a                                        the weighted gap closes
+    (I - n n^T) z_a = z_n (dn_a du)                       the traction stays normal to the turning surface
+
+where w is the weight of the new contact force in the balance. D is diagonal, so that
+z_a = -(J_a du + R_a) / (w D_a) drops out. (M^T z)_a is there only if a slave node is also a master elsewhere.
+Source: Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010), sections 4.3 and 4.4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from solvers.api import Array
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """What contact adds to a Newton step, over the interface dofs (dim * node + component)."""
+
+    weight: float  #: of the new contact force in the balance
+    active: NDArray[np.int64]  #: active slave nodes, shape (m,)
+    normals: Array  #: of the active nodes, shape (m, dim)
+    pressure: Array  #: z_n of the active nodes [Pa], shape (m,)
+    D: Array  #: of the active nodes, shape (m,)
+    M: sp.csr_matrix  #: of the active nodes, shape (m, N)
+    gap: Array  #: weighted gap of the active nodes, shape (m,)
+    scale: Array  #: factor that makes forces of weighted gaps, shape (m,)
+    dgap: sp.csr_matrix  #: shape (m, dim * N)
+    dnormals: sp.csr_matrix  #: shape (dim * m, dim * N)
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """Rows for the active slave dofs, and what is added to all other interface rows; columns: all unknowns."""
+
+    slave_rows: sp.csr_matrix  #: replace the rows of the active dofs, shape (dim * m, unknowns)
+    slave_right: Array  #: their right-hand side, shape (dim * m,)
+    added_rows: sp.csr_matrix  #: added to the interface rows, shape (dim * N, unknowns)
+    added_right: Array  #: added to their right-hand side, shape (dim * N,)
+    inverse: sp.csr_matrix | None  #: of D - M^T among active nodes; None: only D
+
+
+def expand(matrix: sp.csr_matrix, dim: int) -> sp.csr_matrix:
+    """matrix (x) I: the same for every component of a vector."""
+    return sp.kron(matrix, sp.identity(dim), format="csr")
+
+
+def condense(terms: Linearised, J: sp.csr_matrix, R: Array, columns: NDArray[np.int64]) -> Condensed:
+    """Eliminate the multipliers.
+
+    J, R: rows of the active slave dofs, shape (dim * m, unknowns) and (dim * m,); `columns` places interface dofs
+    among the unknowns, -1 where they are none.
+    """
+    dim = terms.normals.shape[1]
+    unknowns = J.shape[1]
+    inverse = _inverse(terms, dim)
+    Y = sp.diags(np.repeat(1.0 / terms.D, dim)) @ J if inverse is None else inverse @ J
+    r = R / np.repeat(terms.D, dim) if inverse is None else inverse @ R
+
+    M_T = expand(terms.M, dim).T.tocsr()
+    tangential = _tangential(terms.normals)
+    D = sp.diags(np.repeat(terms.D, dim))
+    normal = _block_columns(terms.normals)
+    turning = sp.diags(terms.weight * np.repeat(terms.D * terms.pressure, dim)) @ terms.dnormals
+    closing = normal @ sp.diags(terms.scale) @ terms.dgap
+    rows = tangential @ (D @ Y) + place_columns(turning + closing, columns, unknowns)
+    right = -(tangential @ (np.repeat(terms.D, dim) * r)) - normal @ (terms.scale * terms.gap)
+    return Condensed(rows.tocsr(), right, (M_T @ Y).tocsr(), -(M_T @ r), inverse)
+
+
+def recover(terms: Linearised, condensed: Condensed, J_du_plus_R: Array) -> Array:
+    """The multipliers z [Pa] of the active nodes, shape (m, dim), from J_a du + R_a."""
+    dim = terms.normals.shape[1]
+    if condensed.inverse is None:
+        z = J_du_plus_R / np.repeat(terms.D, dim)
+    else:
+        z = condensed.inverse @ J_du_plus_R
+    return -z.reshape(-1, dim) / terms.weight
+
+
+def _inverse(terms: Linearised, dim: int) -> sp.csr_matrix | None:
+    """(D - M^T)^-1 among the active nodes, if any of them is a master node of another pair."""
+    among = terms.M[:, terms.active]
+    if among.nnz == 0 or not among.data.any():
+        return None
+    B = (sp.diags(terms.D) - among.T).tocsc()
+    return expand(sp.csr_matrix(splu(B).solve(np.eye(len(terms.D)))), dim)
+
+
+def _tangential(normals: Array) -> sp.csr_matrix:
+    """Block diagonal matrix of I - n n^T."""
+    m, dim = normals.shape
+    blocks = np.eye(dim) - normals[:, :, None] * normals[:, None, :]
+    return sp.bsr_matrix((blocks, np.arange(m), np.arange(m + 1)), shape=(m * dim, m * dim)).tocsr()
+
+
+def _block_columns(normals: Array) -> sp.csr_matrix:
+    """Block diagonal matrix of the columns n, shape (dim * m, m)."""
+    m, dim = normals.shape
+    return sp.csr_matrix((normals.ravel(), np.repeat(np.arange(m), dim), np.arange(m * dim + 1)), shape=(m * dim, m))
+
+
+def place_columns(matrix: sp.csr_matrix, columns: NDArray[np.int64], unknowns: int) -> sp.csr_matrix:
+    """Interface columns to their place among the unknowns; columns that are no unknowns drop out."""
+    entries = matrix.tocoo()
+    target = columns[entries.col]
+    keep = target >= 0
+    return sp.csr_matrix(
+        (entries.data[keep], (entries.row[keep], target[keep])), shape=(matrix.shape[0], unknowns)
+    )

@@ -1,0 +1,303 @@
+"""Frictionless contact between surfaces: multipliers, active set and the terms of one iterate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from solvers.api import Array, State
+from solvers.contact.active_set import ActiveSet
+from solvers.contact.condense import Linearised, condense, expand, place_columns, recover
+from solvers.contact.pair import Pair
+from solvers.contact.share import Shares
+from solvers.contact.surface import Nodes, Surface, number_nodes
+from solvers.rows import RowChanges
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Mortar integrals of all pairs at one iterate; columns are interface dofs (dim * node + component)."""
+
+    D: Array  #: shape (N,), zero for nodes that are no slaves or see no master
+    M: sp.csr_matrix  #: shape (N, N)
+    gap: Array  #: weighted gap [m^dim], shape (N,)
+    normals: Array  #: of slave nodes, shape (N, dim)
+    dgap: sp.csr_matrix  #: shape (N, dim * N)
+    dforce: sp.csr_matrix  #: derivative of the contact force at fixed multipliers, shape (dim * N,) * 2
+    dnormals: sp.csr_matrix  #: shape (dim * N, dim * N)
+
+
+class Contact:
+    """All pairs together. Positions and multipliers are arrays over `nodes`, the same on every process.
+
+    z are the multipliers [Pa]: the negative traction on the slave, z_n = n.z >= 0 the contact pressure.
+    """
+
+    def __init__(self, comm: MPI.Comm, pairs: Sequence[Pair], *, c_n: float = 1.0):
+        surfaces: list[Surface] = []
+        for pair in pairs:
+            surfaces += [s for s in (pair.slave, pair.master) if not any(s is known for known in surfaces)]
+        self.comm, self.pairs, self.surfaces = comm, list(pairs), surfaces
+        self.nodes: Nodes = number_nodes(surfaces)
+        self._sides = [
+            tuple(self.nodes.of_surface[_index(surfaces, side)] for side in (pair.slave, pair.master))
+            for pair in pairs
+        ]
+        self.size, self.dim = self.nodes.points.shape
+        self.z = np.zeros((self.size, self.dim))
+        self.x = self.nodes.points.copy()
+        self._x_old = self.x.copy()
+        self.active_set = ActiveSet(self.size, c_n)
+        self._areas = self._nodal_areas()
+        self._scale = np.zeros(self.size)
+        self._shares = Shares(comm)
+        self.terms: Terms | None = None
+        self._columns = [_columns(sides, self.dim) for sides in self._sides]
+        #: rows of slave nodes in the basis of the multipliers, if that is not the nodal one (tri6)
+        self.transformation = self._transformation()
+
+    def _nodal_areas(self) -> Array:
+        """Reference area of the slave surface around each node [m^(dim-1)], shape (N,); zero elsewhere."""
+        areas = np.zeros(self.size)
+        for pair, (slave, _) in zip(self.pairs, self._sides, strict=True):
+            facets = pair.slave.facets
+            measure = _facet_measures(pair.slave) / facets.shape[1]
+            np.add.at(areas, slave[facets], measure[:, None])
+        return areas
+
+    def _transformation(self) -> sp.csr_matrix | None:
+        if all(pair.slave.facet_type != "triangle6" for pair in self.pairs):
+            return None
+        total = sp.identity(self.size, format="lil")
+        for pair, (slave, _) in zip(self.pairs, self._sides, strict=True):
+            total[np.ix_(slave, slave)] = pair.transformation.toarray()
+        return expand(total.tocsr(), self.dim)
+
+    # ------------------------------------------------------------------------------------------------- steps
+
+    def start(self, u: Array, stiffness: Array, t: float) -> None:
+        """Take the positions at the start and the diagonal of the stiffness [N/m]; both of shape (N, dim)."""
+        slaves = self._areas > 0.0
+        self._scale[slaves] = stiffness.mean(axis=1)[slaves] / self._areas[slaves]
+        self.x = self.positions(u, t)
+        self._x_old = self.x.copy()
+
+    def positions(self, u: Array, t: float) -> Array:
+        """Current positions [m] of all nodes from the displacements of the deformable ones, shape (N, dim)."""
+        x = self.nodes.points + u
+        for surface, numbers in zip(self.surfaces, self.nodes.of_surface, strict=True):
+            if surface.motion is not None:
+                x[numbers] = surface.motion(t)
+        return x
+
+    def begin_step(self) -> None:
+        """Facets may have moved from here on."""
+        self._x_old = self.x.copy()
+        self.active_set.begin_step()
+
+    def evaluate(self, u: Array, t: float) -> None:
+        """Mortar terms and active set at the displacements u, shape (N, dim), of the present iterate."""
+        self.x = self.positions(u, t)
+        self.terms = self._evaluate_pairs()
+        if self.terms is None:
+            self.active_set.clear()
+        else:
+            covered = (self.terms.D > 1e-6 * self._areas) & ~self.nodes.held.all(axis=1)
+            mean_gap = np.divide(self.terms.gap, self.terms.D, out=np.ones(self.size), where=covered)
+            pressure = np.einsum("nd,nd->n", self.z, self.terms.normals)
+            self.active_set.update(pressure, mean_gap, self._scale, covered)
+        self.z[~self.active_set.active] = 0.0
+
+    def _evaluate_pairs(self) -> Terms | None:
+        """Terms of all pairs, each process doing its share of the slave facets; None if no facets are near."""
+        pieces = []
+        for index, (pair, (slave, master)) in enumerate(zip(self.pairs, self._sides, strict=True)):
+            facet_pairs, reach = pair.near(self.x[slave], self.x[master], self._x_old[slave], self._x_old[master])
+            if len(facet_pairs) == 0:
+                continue
+            mine = self._shares.mine(index, facet_pairs, len(pair.slave.facets))
+            found = pair.evaluate(self.x[slave], self.x[master], mine, reach, self.z[slave])
+            area = self._shares.combine(index, found.area)
+            if area.any():
+                pieces.append((index, found))
+        if not pieces:
+            return None
+        return self._sum(pieces)
+
+    def _sum(self, pieces) -> Terms:
+        """Pieces of all pairs and processes in the numbering of all nodes."""
+        N, n = self.size, self.size * self.dim
+        D, gap, normals = np.zeros(N), np.zeros(N), np.zeros((N, self.dim))
+        matrices: dict[str, list[sp.csr_matrix]] = {"M": [], "dgap": [], "dforce": []}
+        dnormals = []
+        for index, found in pieces:
+            slave, master = self._sides[index]
+            columns = self._columns[index]
+            D[slave] += self._shares.total(found.D)
+            gap[slave] += self._shares.total(found.gap)
+            normals[slave] = found.normals
+            dnormals.append(_renumber(found.dnormals, columns[: self.dim * len(slave)], columns, (n, n)))
+            matrices["M"].append(_renumber(found.M, slave, master, (N, N)))
+            matrices["dgap"].append(_renumber(found.dgap, slave, columns, (N, n)))
+            matrices["dforce"].append(_renumber(found.dforce, columns, columns, (n, n)))
+        summed = {name: self._shares.total(sum(parts[1:], parts[0])) for name, parts in matrices.items()}
+        return Terms(D=D, gap=gap, normals=normals, dnormals=sum(dnormals[1:], dnormals[0]), **summed)
+
+    # ------------------------------------------------------------------------------------- what the balance needs
+
+    def force(self) -> Array:
+        """Contact force [N] on all nodes for the present multipliers, shape (N, dim)."""
+        if self.terms is None:
+            return np.zeros_like(self.z)
+        on_slave = -self.terms.D[:, None] * self.z
+        if self.transformation is not None:
+            on_slave = sp.linalg.spsolve(self.transformation.T.tocsc(), on_slave.ravel()).reshape(on_slave.shape)
+        return on_slave + self.terms.M.T @ self.z
+
+    def violation(self, weight: float) -> float:
+        """Norm [N] of what the active nodes miss: the closed gap, and a traction along the normal."""
+        active = self.active_set.active
+        if self.terms is None or not active.any():
+            return 0.0
+        normals, z, D = self.terms.normals[active], self.z[active], self.terms.D[active]
+        oblique = z - np.einsum("nd,nd->n", z, normals)[:, None] * normals
+        closing = self._scale[active] * self.terms.gap[active]
+        return float(np.sqrt(np.sum(closing**2) + np.sum((weight * D[:, None] * oblique) ** 2)))
+
+    def condense(self, weight: float, fetch: Callable[[NDArray[np.int64]], sp.csr_matrix], R: Array) -> RowChanges:
+        """The linearised balance without multipliers.
+
+        `weight` is that of the new contact force in the balance, `fetch(rows)` gives rows of the tangent without
+        contact, R is the balance without the new contact force at all nodes, shape (N, dim).
+        """
+        assert self.terms is not None
+        columns = self.nodes.dofs.ravel()
+        slaves = self._condensed_nodes()
+        place = self._dofs_of(slaves)
+        J = fetch(columns[place])
+        stiffness = place_columns(-weight * self.terms.dforce, columns, J.shape[1])
+        J = J + stiffness[place]
+        right = R.ravel()[place]
+        if self.transformation is not None:
+            basis = self.transformation[place][:, place].T
+            J, right = basis @ J, basis @ right
+        active = self.active_set.active[slaves].repeat(self.dim)
+        self._linearised = self._linearise(weight)
+        self._rows, self._right = J[active], right[active]
+        self._condensed = condense(self._linearised, self._rows, self._right, columns)
+        others = np.flatnonzero(self.nodes.deformable.repeat(self.dim))
+        others = np.setdiff1d(others, place)
+        kept = place[~active]
+        return RowChanges(
+            replaced=np.concatenate([columns[place[active]], columns[kept]]),
+            replaced_rows=sp.vstack(
+                [self._condensed.slave_rows, J[~active] + self._condensed.added_rows[kept]], format="csr"
+            ),
+            replaced_right=np.concatenate(
+                [self._condensed.slave_right, self._condensed.added_right[kept] - right[~active]]
+            ),
+            added=columns[others],
+            added_rows=(stiffness + self._condensed.added_rows)[others],
+            added_right=self._condensed.added_right[others],
+        )
+
+    def _condensed_nodes(self) -> NDArray[np.int64]:
+        """Active nodes, and all slave nodes if their rows change basis."""
+        if self.transformation is None:
+            return np.flatnonzero(self.active_set.active)
+        return np.flatnonzero(self._areas > 0.0)
+
+    def _dofs_of(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        return (self.dim * nodes[:, None] + np.arange(self.dim)).ravel()
+
+    def recover(self, du: Array) -> None:
+        """Multipliers of the active nodes from the increment of all unknowns."""
+        self.z[self._linearised.active] = recover(self._linearised, self._condensed, self._rows @ du + self._right)
+
+    def _linearise(self, weight: float) -> Linearised:
+        assert self.terms is not None
+        active = np.flatnonzero(self.active_set.active)
+        normals = self.terms.normals[active]
+        rows = self._dofs_of(active)
+        return Linearised(
+            weight=weight,
+            active=active,
+            normals=normals,
+            pressure=np.einsum("nd,nd->n", self.z[active], normals),
+            D=self.terms.D[active],
+            M=self.terms.M[active],
+            gap=self.terms.gap[active],
+            scale=self._scale[active],
+            dgap=self.terms.dgap[active],
+            dnormals=self.terms.dnormals[rows],
+        )
+
+    def dofs(self) -> NDArray[np.int64]:
+        """Global dofs of all nodes, -1 where rigid, shape (N, dim)."""
+        return self.nodes.dofs
+
+    @property
+    def near(self) -> bool:
+        """Any facets within reach of each other at the latest `evaluate`."""
+        return self.terms is not None
+
+    @property
+    def settled(self) -> bool:
+        """The latest `evaluate` left the active set as it was."""
+        return not self.active_set.changed
+
+    # ------------------------------------------------------------------------------------------- results and state
+
+    def numbers(self) -> dict[str, float]:
+        """Columns for the history."""
+        return {"contact.active": float(self.active_set.active.sum()), "contact.changes": float(self.active_set.changes)}
+
+    def resultant(self, index: int) -> Array:
+        """Contact force [N] of a pair on its slave side, shape (dim,)."""
+        slave, _ = self._sides[index]
+        if self.terms is None:
+            return np.zeros(self.dim)
+        return -(self.terms.D[slave, None] * self.z[slave]).sum(axis=0)
+
+    def mean_gap(self) -> Array:
+        """Mean gap [m] around each slave node, NaN where no master is near, shape (N,)."""
+        if self.terms is None:
+            return np.full(self.size, np.nan)
+        covered = self.terms.D > 1e-6 * np.maximum(self._areas, np.finfo(float).tiny)
+        return np.divide(self.terms.gap, self.terms.D, out=np.full(self.size, np.nan), where=covered)
+
+    def save(self) -> State:
+        return {"z": self.z.copy(), "x": self.x.copy(), "active": self.active_set.active.copy()}
+
+    def restore(self, state: State) -> None:
+        self.z[:] = state["z"]
+        self.x[:] = state["x"]
+        self.active_set.active[:] = state["active"]
+
+
+def _index(surfaces: Sequence[Surface], wanted: Surface) -> int:
+    return next(i for i, surface in enumerate(surfaces) if surface is wanted)
+
+
+def _columns(sides: tuple[NDArray[np.int64], ...], dim: int) -> NDArray[np.int64]:
+    """Interface dof of each slave dof, then of each master dof of a pair."""
+    return (dim * np.concatenate(sides)[:, None] + np.arange(dim)).ravel()
+
+
+def _renumber(matrix: sp.csr_matrix, rows: NDArray, columns: NDArray, shape: tuple[int, int]) -> sp.csr_matrix:
+    entries = matrix.tocoo()
+    return sp.csr_matrix((entries.data, (rows[entries.row], columns[entries.col])), shape=shape)
+
+
+def _facet_measures(surface: Surface) -> Array:
+    """Area (2D: length) [m^(dim-1)] of each facet between its corners, shape (k,)."""
+    corners = surface.points[surface.facets[:, : {"line": 2, "tria": 3, "quad": 4}[surface.facet_type[:4]]]]
+    if corners.shape[1] == 2:
+        return np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
+    diagonals = corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1]
+    return 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)

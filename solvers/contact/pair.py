@@ -1,0 +1,106 @@
+"""One slave surface against one master surface: search, mortar integrals, and their full derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.contact.search import Search
+from solvers.contact.surface import KERNEL_TYPES, Surface
+from solvers.kernels import basis_transformation, mortar, nodal_normals
+
+Integration = Literal["segments", "elements"]
+
+
+@dataclass(frozen=True)
+class PairTerms:
+    """Mortar integrals of a pair; columns are slave dofs, then master dofs (dim * node + component)."""
+
+    D: Array  #: diagonal of D [m^(dim-1)], shape (ns,)
+    M: sp.csr_matrix  #: coupling [m^(dim-1)], shape (ns, nm)
+    gap: Array  #: weighted gap [m^dim], positive where open, shape (ns,)
+    normals: Array  #: averaged unit normals of the slave, shape (ns, dim)
+    dgap: sp.csr_matrix  #: shape (ns, dim * (ns + nm))
+    dforce: sp.csr_matrix  #: derivative of the contact force at fixed multipliers, shape (dim * (ns + nm),) * 2
+    dnormals: sp.csr_matrix  #: shape (dim * ns, dim * (ns + nm))
+    area: Array  #: covered area of each slave facet [m^(dim-1)], shape (k,)
+
+
+class Pair:
+    """A slave and a master surface that may touch."""
+
+    def __init__(self, slave: Surface, master: Surface, integration: Integration = "segments"):
+        self.slave, self.master, self.integration = slave, master, integration
+        self._search = Search(slave.facets, master.facets)
+        self._types = KERNEL_TYPES[slave.facet_type], KERNEL_TYPES[master.facet_type]
+        self._facets = tuple(np.ascontiguousarray(s.facets, dtype=np.int64) for s in (slave, master))
+        self._mask = None if slave.held is None else np.where(slave.held, 0.0, 1.0)
+        T, inverse = basis_transformation(self._facets[0], self._types[0], len(slave.points))
+        shape = (len(slave.points),) * 2
+        #: slave basis N~ = N T, and its inverse
+        self.transformation = sp.csr_matrix(T, shape=shape)
+        self.inverse_transformation = sp.csr_matrix(inverse, shape=shape)
+        self._edge = _longest_edge(slave)
+
+    def near(self, xs: Array, xm: Array, xs_previous: Array, xm_previous: Array) -> tuple[NDArray[np.int32], float]:
+        """Facet pairs that may meet, and how far apart [m] facets may be: an edge, and this step's motion."""
+        motion = max(float(np.abs(a - b).max(initial=0.0)) for a, b in ((xs, xs_previous), (xm, xm_previous)))
+        reach = self._edge + motion
+        return self._search.pairs(xs, xm, reach, xs_previous, xm_previous), reach
+
+    def evaluate(
+        self, xs: Array, xm: Array, facet_pairs: NDArray[np.int32], reach: float, z: Array
+    ) -> PairTerms:
+        """All terms at the positions xs, xm [m] for the multipliers z [Pa] of the slave nodes."""
+        ns, nm, dim = len(xs), len(xm), xs.shape[1]
+        xs, xm, z = (np.ascontiguousarray(a) for a in (xs, xm, z))
+        normals, slopes = nodal_normals(xs, self._facets[0], self._types[0], self._mask)
+        result = mortar(
+            xs,
+            self._facets[0],
+            self._types[0],
+            xm,
+            self._facets[1],
+            self._types[1],
+            normals,
+            facet_pairs,
+            z,
+            method=self.integration,
+            reach=reach,
+        )
+        columns = dim * (ns + nm)
+        dn = sp.csr_matrix(slopes, shape=(dim * ns, dim * ns))
+
+        def total(direct, by_normals, rows) -> sp.csr_matrix:
+            derivative = sp.csr_matrix(direct, shape=(rows, columns))
+            through = sp.csr_matrix(by_normals, shape=(rows, dim * ns)) @ dn
+            return derivative + _widen(through, columns) if through.nnz else derivative
+
+        dforce = total(result.dforce, result.dforce_dn, columns)
+        if self._types[0] == "tri6":
+            back = sp.kron(self.inverse_transformation.T, sp.identity(dim))
+            dforce = (sp.block_diag([back, sp.identity(dim * nm)]) @ dforce).tocsr()
+        return PairTerms(
+            result.D,
+            sp.csr_matrix(result.M, shape=(ns, nm)),
+            result.gap,
+            normals,
+            total(result.dgap, result.dgap_dn, ns),
+            dforce,
+            _widen(dn, columns),
+            result.area,
+        )
+
+
+def _widen(matrix: sp.csr_matrix, columns: int) -> sp.csr_matrix:
+    return sp.csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape=(matrix.shape[0], columns))
+
+
+def _longest_edge(surface: Surface) -> float:
+    corners = surface.points[surface.facets[:, : {"line": 2, "tria": 3, "quad": 4}[surface.facet_type[:4]]]]
+    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())

@@ -1,0 +1,83 @@
+"""Surfaces that may touch, and the numbering of all their nodes together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+
+#: Meshio facet type -> name in the kernels
+KERNEL_TYPES = {
+    "line": "line2",
+    "line3": "line3",
+    "triangle": "tri3",
+    "triangle6": "tri6",
+    "quad": "quad4",
+    "quad9": "quad9",
+}
+
+
+@dataclass(frozen=True)
+class Surface:
+    """One side of a contact pair, whole on every process.
+
+    A rigid surface has no dofs; it stands still or follows `motion`.
+    """
+
+    name: str
+    points: Array  #: reference positions [m], shape (n, dim)
+    facets: NDArray[np.int64]  #: nodes of each facet in VTK order, outward oriented, shape (k, nodes per facet)
+    facet_type: str  #: line, line3, triangle, triangle6, quad, quad9
+    dofs: NDArray[np.int64] | None  #: global dofs of each node, shape (n, dim); None if rigid
+    held: NDArray[np.bool_] | None = None  #: which of them are prescribed, shape (n, dim)
+    motion: Callable[[float], Array] | None = None  #: rigid: positions [m] at a time, shape (n, dim)
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """All nodes of all surfaces, each deformable node once."""
+
+    points: Array  #: reference positions [m], shape (N, dim)
+    dofs: NDArray[np.int64]  #: global dofs, -1 where rigid, shape (N, dim)
+    held: NDArray[np.bool_]  #: prescribed dofs (all of a rigid node), shape (N, dim)
+    of_surface: tuple[NDArray[np.int64], ...]  #: node numbers of each surface
+
+    @property
+    def dim(self) -> int:
+        return self.points.shape[1]
+
+    @property
+    def deformable(self) -> NDArray[np.bool_]:
+        """Shape (N,)."""
+        return self.dofs[:, 0] >= 0
+
+
+def number_nodes(surfaces: Sequence[Surface]) -> Nodes:
+    """Number the nodes of the surfaces together: nodes with the same dofs are the same node."""
+    points, dofs, held, numbers = [], [], [], []
+    known: dict[int, int] = {}
+    count = 0
+    for surface in surfaces:
+        n, dim = surface.points.shape
+        own = np.full((n, dim), -1) if surface.dofs is None else surface.dofs
+        fixed = np.ones((n, dim), dtype=bool) if surface.dofs is None else surface.held
+        number = np.empty(n, dtype=np.int64)
+        new = []
+        for i, first in enumerate(own[:, 0].tolist()):
+            if first >= 0 and first in known:
+                number[i] = known[first]
+                continue
+            number[i] = count
+            if first >= 0:
+                known[first] = count
+            new.append(i)
+            count += 1
+        points.append(surface.points[new])
+        dofs.append(own[new])
+        held.append(np.zeros((len(new), dim), dtype=bool) if fixed is None else fixed[new])
+        numbers.append(number)
+    return Nodes(np.concatenate(points), np.concatenate(dofs), np.concatenate(held), tuple(numbers))

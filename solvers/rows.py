@@ -1,0 +1,97 @@
+"""Rows of a distributed matrix in the hands of every process: read some, replace some, add to some."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from solvers.api import Array
+
+
+@dataclass(frozen=True)
+class RowChanges:
+    """A change of a linear system, the same on every process; columns are all unknowns."""
+
+    replaced: NDArray[np.int64]  #: global rows to replace, each once
+    replaced_rows: sp.csr_matrix
+    replaced_right: Array
+    added: NDArray[np.int64]  #: global rows to add to, each once
+    added_rows: sp.csr_matrix
+    added_right: Array
+
+
+def fetch_rows(matrix: PETSc.Mat, rows: NDArray[np.int64]) -> sp.csr_matrix:
+    """Whole rows of a distributed matrix on every process, shape (len(rows), unknowns). Collective."""
+    comm, unknowns = matrix.comm.tompi4py(), matrix.size[1]
+    start, end = matrix.getOwnershipRange()
+    if comm.size == 1:
+        indptr, indices, data = matrix.getValuesCSR()
+        return sp.csr_matrix((data, indices, indptr), shape=(unknowns, unknowns))[rows]
+    wanted = rows[(rows >= start) & (rows < end)] - start
+    indptr, indices, data = matrix.getValuesCSR()
+    owned = sp.csr_matrix((data, indices, indptr), shape=(end - start, unknowns))[wanted]
+    parts = comm.allgather((wanted + start, owned))
+    order = np.argsort(np.concatenate([numbers for numbers, _ in parts]))
+    found = sp.vstack([part for _, part in parts], format="csr")[order]
+    return found[np.argsort(np.argsort(rows))]
+
+
+def change_rows(matrix: PETSc.Mat, b: PETSc.Vec, changes: RowChanges) -> PETSc.Mat:
+    """The changed matrix; `b` is changed in place and `matrix` is used up. Collective."""
+    start, end = matrix.getOwnershipRange()
+    unknowns = matrix.size[1]
+
+    def owned(rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+        return (rows >= start) & (rows < end)
+
+    replace, add = owned(changes.replaced), owned(changes.added)
+    place = np.concatenate([changes.replaced[replace], changes.added[add]]) - start
+    values = sp.vstack([changes.replaced_rows[replace], changes.added_rows[add]], format="csr")
+    into = sp.csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), shape=(end - start, len(place)))
+    local = (into @ values).tocsr()
+    if matrix.comm.size == 1:
+        changed = _change_local(matrix, changes.replaced, local)
+    else:
+        matrix.zeroRows(changes.replaced[replace].astype(PETSc.IntType), 0.0)
+        changed = PETSc.Mat().createAIJ(
+            ((end - start, None), (end - start, unknowns)),
+            csr=(local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data),
+            comm=matrix.comm,
+        )
+        changed.axpy(1.0, matrix, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    right = b.array
+    right[changes.replaced[replace] - start] = changes.replaced_right[replace]
+    right[changes.added[add] - start] += changes.added_right[add]
+    return changed
+
+
+def _change_local(matrix: PETSc.Mat, replaced: NDArray[np.int64], local: sp.csr_matrix) -> PETSc.Mat:
+    indptr, indices, data = matrix.getValuesCSR()
+    keep = np.ones(local.shape[0], dtype=bool)
+    keep[replaced] = False
+    data = data * np.repeat(keep, np.diff(indptr))
+    total = sp.csr_matrix((data, indices, indptr), shape=local.shape) + local
+    total.sort_indices()
+    csr = (total.indptr.astype(PETSc.IntType), total.indices.astype(PETSc.IntType), total.data)
+    return PETSc.Mat().createAIJ(total.shape, csr=csr, comm=matrix.comm)
+
+
+def gather(comm: MPI.Comm, owned: Array) -> Array:
+    """The whole of a distributed array on every process. Collective."""
+    if comm.size == 1:
+        return owned
+    return np.concatenate(comm.allgather(owned))
+
+
+def gather_at(comm: MPI.Comm, owned: Array, start: int, dofs: NDArray[np.int64]) -> Array:
+    """Values at global dofs on every process, zero where the dof is -1; same shape as `dofs`. Collective."""
+    local = dofs - start
+    mine = (local >= 0) & (local < len(owned)) & (dofs >= 0)
+    values = np.zeros(dofs.shape)
+    values[mine] = owned[local[mine]]
+    return values if comm.size == 1 else comm.allreduce(values)
