@@ -12,7 +12,7 @@ from mpi4py import MPI
 from fsci.case import Case
 from fsci.mesh import MeshError, build_mesh, extract_region, require_surface
 from solvers import fem
-from solvers.api import Scheme, Snapshot, State, StepInfo
+from solvers.api import Constraint, Scheme, Snapshot, State, StepInfo
 from solvers.newton import Tolerance
 from solvers.structure import materials, probes
 from solvers.structure.body import Body, BodySettings, Pressure, Support, Symmetry, Traction
@@ -70,7 +70,13 @@ class Simulation:
 
 def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     """All objects of a case. Raises CaseError for what only the meshes can tell (collective)."""
-    structure = _structure(case, comm, timer)
+    bodies = [_body(case, name, comm) for name in case.structure.bodies]
+    contact = None
+    if case.contact is not None:
+        from fsci.build_contact import build_contact
+
+        contact = build_contact(case, comm, bodies)
+    structure = _structure(case, comm, bodies, contact, timer)
     measured = _probes(case, structure)
     return Simulation(
         scheme=Alone(structure),
@@ -89,8 +95,9 @@ def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 # ------------------------------------------------------------------------------------------------------- structure
 
 
-def _structure(case: Case, comm: MPI.Comm, timer: Timer) -> Structure:
-    bodies = [_body(case, name, comm) for name in case.structure.bodies]
+def _structure(
+    case: Case, comm: MPI.Comm, bodies: list[Body], contact: Constraint | None, timer: Timer
+) -> Structure:
     newton, linear = case.solver.newton, case.solver.linear
     settings = SolverSettings(
         Tolerance(
@@ -104,7 +111,7 @@ def _structure(case: Case, comm: MPI.Comm, timer: Timer) -> Structure:
         linear.tolerance,
     )
     try:
-        return Structure(comm, bodies, _time_scheme(case), settings, timer)
+        return Structure(comm, bodies, _time_scheme(case), settings, timer, contact)
     except SupportError as error:
         supports = case.structure.bodies[error.body].supports
         index = next(i for i, support in enumerate(supports) if error.surface in support.on)
@@ -121,7 +128,8 @@ def _time_scheme(case: Case) -> TimeScheme:
     else:
         scheme = GeneralisedAlpha(dynamics.alpha_m, dynamics.alpha_f, dynamics.beta, dynamics.gamma)
     damping = Damping(dynamics.damping.mass, dynamics.damping.stiffness)
-    return Dynamics(scheme, damping=damping, predictor=dynamics.predictor)
+    constraint_at = "mid" if case.contact is None else case.contact.force_at
+    return Dynamics(scheme, damping=damping, predictor=dynamics.predictor, constraint_at=constraint_at)
 
 
 def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
@@ -181,6 +189,10 @@ def _named_surfaces(case: Case, name: str):
         for index, entry in enumerate(getattr(body, section)):
             for surface in entry.on:
                 yield ("structure", "bodies", name, section, index, "on"), surface
+    for pair_name, pair in ({} if case.contact is None else case.contact.pairs).items():
+        for role, side in (("slave", pair.slave), ("master", pair.master)):
+            if side.body == name:
+                yield ("contact", "pairs", pair_name, role, "on"), side.on
     for probe_name, probe in case.probes.items():
         if probe.on is not None and _body_of(case, probe) == name:
             yield ("probes", probe_name, "on"), probe.on

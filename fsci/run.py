@@ -62,12 +62,19 @@ def prepare_folder(case: Case, out: Path) -> None:
     for old in ("summary.json", "history.csv", "log.txt", "STOP"):
         (out / old).unlink(missing_ok=True)
     out.mkdir(parents=True, exist_ok=True)
-    write_text(out / "case.yaml", case.dump())
-    files = (getattr(body.mesh, "file", None) for body in case.structure.bodies.values())
-    for file in (Path(file) for file in files if file is not None):
-        if not file.is_absolute() and (case.folder / file).resolve() != (out / file).resolve():
-            (out / file).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(case.folder / file, out / file)
+    changes = []
+    for name, body in case.structure.bodies.items():
+        given = getattr(body.mesh, "file", None)
+        if given is None or Path(given).is_absolute():
+            continue
+        kept = Path(given)
+        if ".." in kept.parts:  # no results folder writes outside itself
+            kept = Path("meshes") / name / kept.name
+            changes.append((f"structure.bodies.{name}.mesh.file", json.dumps(kept.as_posix())))
+        if (case.folder / given).resolve() != (out / kept).resolve():
+            (out / kept).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(case.folder / given, out / kept)
+    write_text(out / "case.yaml", case.dump(changes))
 
 
 @dataclass

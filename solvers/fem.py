@@ -86,8 +86,7 @@ class Domain:
     degree: int
     nodes: int  #: nodes of the whole mesh
     surfaces: dict[str, NDArray[np.int32]] = field(default_factory=dict)  #: name -> local exterior facets, sorted
-    points: Array | None = None  #: rank 0 only: node positions of the mesh file, shape (nodes, dim)
-    cells: NDArray[np.int64] | None = None  #: rank 0 only: cells in VTK order
+    source: Mesh | None = None  #: rank 0 only: the whole mesh
 
     @property
     def comm(self) -> MPI.Comm:
@@ -110,14 +109,7 @@ def distribute(comm: MPI.Comm, mesh: Mesh | None) -> Domain:
         cells, points = np.empty((0, len(vtk)), dtype=np.int64), np.empty((0, dim))
     element = ufl.VectorElement("Lagrange", ufl.Cell(name, geometric_dimension=dim), degree)
     distributed = dolfinx_mesh.create_mesh(comm, cells, points, ufl.Mesh(element))
-    domain = Domain(
-        distributed,
-        cell_type,
-        degree,
-        nodes,
-        points=None if mesh is None else mesh.points,
-        cells=None if mesh is None else mesh.cells,
-    )
+    domain = Domain(distributed, cell_type, degree, nodes, source=mesh)
     return Domain(**{**vars(domain), "surfaces": _find_surfaces(domain, named)})
 
 

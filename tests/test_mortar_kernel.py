@@ -191,6 +191,7 @@ def test_gap_is_negative_where_bodies_overlap():
     xm, fm = patch("quad4", 2, turned=True)
     result, _ = integrate(xs, fs, "quad4", xm - [0, 0, 0.01], fm, "quad4")
     np.testing.assert_allclose(result.gap, -0.01 * result.D, atol=1e-15)
+    np.testing.assert_allclose(result.plain_gap, -0.01 * result.D, atol=1e-15)
 
 
 @pytest.mark.parametrize("shift", [0.0, 1e-16, 1e-14, 1e-13, 1e-12, 3e-12, 1e-10, 1e-8])
@@ -260,7 +261,7 @@ def test_facets_that_do_not_meet_give_nothing(method):
     assert nothing(*integrate(xs, fs, "quad4", far, fm, "tri3", method=method))
     assert nothing(*integrate(xs, fs, "quad4", xm, patch("tri3", 2)[1], "tri3", method=method))  # same way round
     assert nothing(*integrate(xs, fs, "quad4", high, fm, "tri3", method=method, reach=1.0))
-    assert not nothing(*integrate(xs, fs, "quad4", xm, fm, "tri3", method=method, reach=0.0))
+    assert not nothing(*integrate(xs, fs, "quad4", xm, fm, "tri3", method=method, reach=0.3))
     normals, _ = nodal_normals(xs, fs, "quad4")
     assert nothing(mortar(xs, fs, "quad4", xm, fm, "tri3", normals, np.zeros((0, 2), np.int32)), None)
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from pydantic import PrivateAttr
 
-from fsci.case.document import Document
+from fsci.case.contact import Contact
+from fsci.case.document import Document, override
 from fsci.case.errors import CaseError, Place
 from fsci.case.mesh import Shape
 from fsci.case.output import Output
@@ -27,6 +30,7 @@ class Case(Section):
     units: Units = setting(Units, "units of all numbers")
     time: Time = setting(..., "time interval and steps")
     structure: Structure = setting(..., "elastic bodies")
+    contact: Contact | None = setting(None, "surfaces that may touch")
     probes: dict[Name, Probe] = setting(dict, "quantities that every step records, by name")
     output: Output = setting(Output, "what is written, and how often")
     verify: tuple[Check, ...] = setting(tuple, "results that the run must reach")
@@ -53,7 +57,7 @@ class Case(Section):
     @property
     def dimension(self) -> int | None:
         """2 or 3 if a built-in mesh tells, else None: mesh files are not read here."""
-        meshes = [body.mesh for body in self.structure.bodies.values()]
+        meshes: list[Any] = [body.mesh for body in self.structure.bodies.values()]
         return next((mesh.dimension for mesh in meshes if isinstance(mesh, Shape)), None)
 
     def place(self, *keys: str | int) -> Place:
@@ -67,6 +71,9 @@ class Case(Section):
         """An error to raise about a setting, with its place and line."""
         return CaseError([self._document.problem(self.place(*keys), message)])
 
-    def dump(self) -> str:
-        """The YAML text of the case with overrides applied; comments stay."""
-        return self._document.dump()
+    def dump(self, changes: Iterable[tuple[str, str]] = ()) -> str:
+        """The YAML text of the case with overrides applied, then `changes` of the same form; comments stay."""
+        document = self._document
+        for dotted, text in changes:
+            document = override(document, dotted, text)
+        return document.dump()

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from fsci.case.case import Case
+from fsci.case.contact import Contact, Side
 from fsci.case.errors import did_you_mean
-from fsci.case.mesh import FileMesh, Shape
+from fsci.case.mesh import FileMesh, Mesh, Shape
 from fsci.case.probes import RESERVED
 from fsci.case.structure import Body
-from fsci.case.verify import RUN_COLUMNS
+from fsci.case.verify import CONTACT_COLUMNS, RUN_COLUMNS
 from fsci.case.yaml_text import Keys
 
 Mistake = tuple[Keys, str]  #: path of the setting, message
@@ -28,6 +29,8 @@ def mistakes(case: Case) -> Iterator[Mistake]:
         yield from _surfaces(body, keys)
         yield from _vectors(case, body, keys)
         yield from _needs(case, body, keys)
+    if case.contact is not None:
+        yield from _contact(case, case.contact)
     yield from _probes(case)
     yield from _verify(case)
 
@@ -82,15 +85,15 @@ def _surfaces(body: Body, keys: Keys) -> Iterator[Mistake]:
     for kind in ("supports", "tractions", "pressures"):
         for i, item in enumerate(getattr(body, kind)):
             for j, name in enumerate(item.on):
-                yield from _surface(body, name, (*keys, kind, i, "on", j))
+                yield from _surface(body.mesh, name, (*keys, kind, i, "on", j))
 
 
-def _surface(body: Body, name: str, keys: Keys) -> Iterator[Mistake]:
-    if isinstance(body.mesh, Shape) and name not in body.mesh.surfaces:
-        there = ", ".join(body.mesh.surfaces)
-        hint = did_you_mean(name, body.mesh.surfaces)
+def _surface(mesh: Mesh, name: str, keys: Keys) -> Iterator[Mistake]:
+    if isinstance(mesh, Shape) and name not in mesh.surfaces:
+        there = ", ".join(mesh.surfaces)
+        hint = did_you_mean(name, mesh.surfaces)
         hint = f"{hint} (available: {there})" if hint.startswith(";") else hint
-        yield keys, f"'{body.mesh.shape}' has no surface '{name}'{hint}"
+        yield keys, f"'{mesh.shape}' has no surface '{name}'{hint}"  # type: ignore[attr-defined]
 
 
 def _vectors(case: Case, body: Body, keys: Keys) -> Iterator[Mistake]:
@@ -116,6 +119,32 @@ def _needs(case: Case, body: Body, keys: Keys) -> Iterator[Mistake]:
         yield (*keys, "initial_velocity"), "'initial_velocity' needs 'dynamics' in 'structure'"
 
 
+def _contact(case: Case, contact: Contact) -> Iterator[Mistake]:
+    if not contact.pairs:
+        yield ("contact", "pairs"), "'pairs' needs at least one pair"
+    for name, obstacle in contact.obstacles.items():
+        keys: Keys = ("contact", "obstacles", name)
+        yield from _length(obstacle.motion, case.dimension, (*keys, "motion"))
+        yield from _surface(obstacle.mesh, obstacle.on, (*keys, "on"))
+    for name, pair in contact.pairs.items():
+        for side in ("slave", "master"):
+            yield from _side(case, contact, getattr(pair, side), ("contact", "pairs", name, side))
+        if pair.slave == pair.master:
+            yield ("contact", "pairs", name, "master"), "a surface cannot touch itself: name another master"
+
+
+def _side(case: Case, contact: Contact, side: Side, keys: Keys) -> Iterator[Mistake]:
+    bodies = case.structure.bodies
+    if side.body is None:
+        if side.obstacle not in contact.obstacles:
+            hint = did_you_mean(side.obstacle or "", contact.obstacles)
+            yield (*keys, "obstacle"), f"unknown obstacle '{side.obstacle}'{hint}"
+    elif side.body not in bodies:
+        yield (*keys, "body"), f"unknown body '{side.body}'{did_you_mean(side.body, bodies)}"
+    elif side.on is not None:
+        yield from _surface(bodies[side.body].mesh, side.on, (*keys, "on"))
+
+
 def _probes(case: Case) -> Iterator[Mistake]:
     bodies = case.structure.bodies
     for name, probe in case.probes.items():
@@ -132,7 +161,7 @@ def _probes(case: Case) -> Iterator[Mistake]:
         if probe.at is not None:
             yield from _length(probe.at, case.dimension, (*keys, "at"))
         if probe.on is not None:
-            yield from _surface(measured[0], probe.on, (*keys, "on"))
+            yield from _surface(measured[0].mesh, probe.on, (*keys, "on"))
         if probe.quantity in ("velocity", "acceleration") and case.structure.dynamics is None:
             yield (*keys, "quantity"), f"quantity '{probe.quantity}' needs 'dynamics' in 'structure'"
         if probe.quantity in NEEDS_MASS and any(body.material.density is None for body in measured):
@@ -141,10 +170,14 @@ def _probes(case: Case) -> Iterator[Mistake]:
 
 def _verify(case: Case) -> Iterator[Mistake]:
     columns = [column for name, probe in case.probes.items() for column in probe.columns(name, case.dimension or 3)]
+    columns += RUN_COLUMNS
+    if case.contact is not None:
+        columns += [f"contact.{name}.{axis}" for name in case.contact.pairs for axis in "xyz"[: case.dimension or 3]]
+        columns += CONTACT_COLUMNS
     for i, check in enumerate(case.verify):
         keys: Keys = ("verify", i)
-        if check.value not in columns and check.value not in RUN_COLUMNS:
-            hint = did_you_mean(check.value, [*columns, *RUN_COLUMNS])
+        if check.value not in columns:
+            hint = did_you_mean(check.value, columns)
             yield (*keys, "value"), f"there is no value '{check.value}'{hint}"
         if check.start is not None and not case.time.start <= check.start < case.time.end:
             span = f"{case.time.start:g} to {case.time.end:g}"

@@ -12,6 +12,9 @@ from fsci.case.values import NotNegative, Number, Text
 #: columns of history.csv that every run has; structure.energy is the error of the energy balance
 RUN_COLUMNS = ("iterations", "residual", "structure.energy")
 
+#: and those of a run with contact, besides the resultants contact.PAIR.x, .y, .z on the slave
+CONTACT_COLUMNS = ("contact.active", "contact.changes")
+
 
 class Check(Section):
     """A result that the run must reach; exactly one of `relative` and `absolute` says how closely.

@@ -19,6 +19,10 @@ from solvers.contact.surface import Nodes, Surface, number_nodes
 from solvers.rows import RowChanges
 
 
+#: Share of a slave node's area that must see a master.
+LEAST_COVERED = 0.02
+
+
 @dataclass(frozen=True)
 class Terms:
     """Mortar integrals of all pairs at one iterate; columns are interface dofs (dim * node + component)."""
@@ -38,11 +42,12 @@ class Contact:
     z are the multipliers [Pa]: the negative traction on the slave, z_n = n.z >= 0 the contact pressure.
     """
 
-    def __init__(self, comm: MPI.Comm, pairs: Sequence[Pair], *, c_n: float = 1.0):
+    def __init__(self, comm: MPI.Comm, pairs: Sequence[Pair], *, names: Sequence[str] = (), c_n: float = 1.0):
         surfaces: list[Surface] = []
         for pair in pairs:
             surfaces += [s for s in (pair.slave, pair.master) if not any(s is known for known in surfaces)]
         self.comm, self.pairs, self.surfaces = comm, list(pairs), surfaces
+        self.names = tuple(names) or tuple(f"pair{i}" for i in range(len(pairs)))
         self.nodes: Nodes = number_nodes(surfaces)
         self._sides = [
             tuple(self.nodes.of_surface[_index(surfaces, side)] for side in (pair.slave, pair.master))
@@ -107,21 +112,25 @@ class Contact:
         if self.terms is None:
             self.active_set.clear()
         else:
-            covered = (self.terms.D > 1e-6 * self._areas) & ~self.nodes.held.all(axis=1)
+            covered = self._covered(self.terms) & ~self.nodes.held.all(axis=1)
             mean_gap = np.divide(self.terms.gap, self.terms.D, out=np.ones(self.size), where=covered)
             pressure = np.einsum("nd,nd->n", self.z, self.terms.normals)
             self.active_set.update(pressure, mean_gap, self._scale, covered)
         self.z[~self.active_set.active] = 0.0
 
+    def _covered(self, terms: Terms) -> NDArray[np.bool_]:
+        """Nodes that see enough of a master for a constraint: less is a sliver that comes and goes."""
+        return terms.D > LEAST_COVERED * np.maximum(self._areas, np.finfo(float).tiny)
+
     def _evaluate_pairs(self) -> Terms | None:
         """Terms of all pairs, each process doing its share of the slave facets; None if no facets are near."""
         pieces = []
         for index, (pair, (slave, master)) in enumerate(zip(self.pairs, self._sides, strict=True)):
-            facet_pairs, reach = pair.near(self.x[slave], self.x[master], self._x_old[slave], self._x_old[master])
+            facet_pairs, motion = pair.near(self.x[slave], self.x[master], self._x_old[slave], self._x_old[master])
             if len(facet_pairs) == 0:
                 continue
             mine = self._shares.mine(index, facet_pairs, len(pair.slave.facets))
-            found = pair.evaluate(self.x[slave], self.x[master], mine, reach, self.z[slave])
+            found = pair.evaluate(self.x[slave], self.x[master], mine, motion, self.z[slave])
             area = self._shares.combine(index, found.area)
             if area.any():
                 pieces.append((index, found))
@@ -255,7 +264,14 @@ class Contact:
 
     def numbers(self) -> dict[str, float]:
         """Columns for the history."""
-        return {"contact.active": float(self.active_set.active.sum()), "contact.changes": float(self.active_set.changes)}
+        found = {
+            "contact.active": float(self.active_set.active.sum()),
+            "contact.changes": float(self.active_set.changes),
+        }
+        for index, name in enumerate(self.names):
+            for axis, force in zip("xyz", self.resultant(index), strict=False):
+                found[f"contact.{name}.{axis}"] = float(force)
+        return found
 
     def resultant(self, index: int) -> Array:
         """Contact force [N] of a pair on its slave side, shape (dim,)."""
@@ -268,7 +284,7 @@ class Contact:
         """Mean gap [m] around each slave node, NaN where no master is near, shape (N,)."""
         if self.terms is None:
             return np.full(self.size, np.nan)
-        covered = self.terms.D > 1e-6 * np.maximum(self._areas, np.finfo(float).tiny)
+        covered = self._covered(self.terms)
         return np.divide(self.terms.gap, self.terms.D, out=np.full(self.size, np.nan), where=covered)
 
     def save(self) -> State:

@@ -14,6 +14,9 @@ from solvers.contact.search import Search
 from solvers.contact.surface import KERNEL_TYPES, Surface
 from solvers.kernels import basis_transformation, mortar, nodal_normals
 
+#: Slave facets take part when a master is nearer than this share of the longest edge (and the motion of the step).
+NEAR = 0.3
+
 Integration = Literal["segments", "elements"]
 
 
@@ -48,13 +51,12 @@ class Pair:
         self._edge = _longest_edge(slave)
 
     def near(self, xs: Array, xm: Array, xs_previous: Array, xm_previous: Array) -> tuple[NDArray[np.int32], float]:
-        """Facet pairs that may meet, and how far apart [m] facets may be: an edge, and this step's motion."""
+        """Facet pairs that may meet, and the largest motion [m] of a node in this step."""
         motion = max(float(np.abs(a - b).max(initial=0.0)) for a, b in ((xs, xs_previous), (xm, xm_previous)))
-        reach = self._edge + motion
-        return self._search.pairs(xs, xm, reach, xs_previous, xm_previous), reach
+        return self._search.pairs(xs, xm, self._edge + motion, xs_previous, xm_previous), motion
 
     def evaluate(
-        self, xs: Array, xm: Array, facet_pairs: NDArray[np.int32], reach: float, z: Array
+        self, xs: Array, xm: Array, facet_pairs: NDArray[np.int32], motion: float, z: Array
     ) -> PairTerms:
         """All terms at the positions xs, xm [m] for the multipliers z [Pa] of the slave nodes."""
         ns, nm, dim = len(xs), len(xm), xs.shape[1]
@@ -71,7 +73,8 @@ class Pair:
             facet_pairs,
             z,
             method=self.integration,
-            reach=reach,
+            reach=self._edge + motion,
+            near=NEAR * self._edge + motion,
         )
         columns = dim * (ns + nm)
         dn = sp.csr_matrix(slopes, shape=(dim * ns, dim * ns))

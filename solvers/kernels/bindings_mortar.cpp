@@ -137,7 +137,7 @@ MortarResult to_result(MortarSums<dim> sums, int n_slave, int n_master, bool der
 
 MortarResult py_mortar(const Reals& xs, const Facets& fs, const std::string& type_s, const Reals& xm, const Facets& fm,
                        const std::string& type_m, const Reals& normals, const Pairs& pairs,
-                       const std::optional<Reals>& z, const std::string& method, bool derivatives, double reach) {
+                       const std::optional<Reals>& z, const std::string& method, bool derivatives, double reach, double near) {
     require(method == "segments" || method == "elements", "method must be 'segments' or 'elements'");
     require(xs.shape(1) == xm.shape(1), "slave and master must have the same dimension");
     require(pairs.shape(1) == 2, "pairs must have shape (p, 2)");
@@ -153,7 +153,7 @@ MortarResult py_mortar(const Reals& xs, const Facets& fs, const std::string& typ
         require(p == 0 || pair[-2] <= pair[0], "pairs must be sorted by slave facet");
     }
     const MortarInput input{xs.data(), xm.data(), normals.data(), z ? z->data() : nullptr, fs.data(), fm.data(),
-                            n_slave,   n_master,  pairs.data(),   pairs.shape(0),          method == "elements", reach};
+                            n_slave,   n_master,  pairs.data(),   pairs.shape(0),          method == "elements", reach, near};
     MortarResult result;
     dispatch(type_s, dim, [&](auto slave) {
         using Slave = decltype(slave);
@@ -241,11 +241,12 @@ void bind_mortar(nb::module_& module) {
                "T^-T times the rows here.");
     module.def("mortar", &py_mortar, "xs"_a, "fs"_a, "facet_type_s"_a, "xm"_a, "fm"_a, "facet_type_m"_a, "normals"_a,
                "pairs"_a, "z"_a = nb::none(), nb::kw_only(), "method"_a = "segments", "derivatives"_a = true,
-               "reach"_a = std::numeric_limits<double>::infinity(),
+               "reach"_a = std::numeric_limits<double>::infinity(), "near"_a = std::numeric_limits<double>::infinity(),
                "Mortar integrals between a slave and a master surface.\n\n"
                "xs (ns, dim), xm (nm, dim): current positions; fs, fm: facets, oriented outward, of types line2, line3 "
                "(2D), tri3, tri6, quad4, quad9 (3D), VTK node order; normals (ns, dim) of the slave; pairs (p, 2): "
                "slave and master facets that may meet, sorted by slave facet, all pairs of a slave facet in one call; "
                "z (ns, dim): multipliers for the force; method: 'segments' or 'elements' (fixed points on the slave "
-               "facet); reach: facets farther apart than this do not see each other.");
+               "facet); reach: facets farther apart than this do not see each other; near: slave facets to which no master is as near as "
+               "this are left out.");
 }

@@ -29,6 +29,7 @@ struct MortarInput {
     std::size_t n_pairs;
     bool elements;  // fixed points on the slave facet instead of segments
     double reach;   // facets farther apart than this do not see each other
+    double near;    // slave facets with no master as near as this are left out
 };
 
 // Sums over facets. Column nodes: the slave's, then the master's; those of d*_normal: the slave's.
@@ -158,6 +159,7 @@ class FacetAssembly {
             });
         }
         if (in_.elements) add_element_points(element_rule<Slave>());
+        if (!is_near()) pairs_.clear();
     }
 
     template <typename Visit>
@@ -170,9 +172,26 @@ class FacetAssembly {
         }
     }
 
-    // Drops the last pair if it has no points (segments), else gives its nodes their places.
+    static double mean_gap(const Pair& pair) {
+        double gap = 0.0, measure = 0.0;
+        for (int k = 0; k < n; ++k) {
+            gap += value_of(pair.integrals.gap[k]);
+            for (int j = 0; j < n; ++j) measure += value_of(pair.integrals.mass_at(k, j));
+        }
+        return gap / measure;
+    }
+
+    // A slave facet counts as a whole or not at all: dual functions are negative in places, so that a facet of which
+    // only a far part sees a master would weigh an open gap as a closed one.
+    bool is_near() const {
+        return std::any_of(pairs_.begin(), pairs_.end(), [&](const Pair& pair) { return mean_gap(pair) <= in_.near; });
+    }
+
+    // Drops the last pair if it has no points, or lies behind the slave by more than the reach (segments); else gives
+    // its nodes their places.
     void keep_if_met(const int* nodes) {
-        if (!in_.elements && value_of(pairs_.back().integrals.cover) == 0.0) {
+        if (!in_.elements &&
+            (value_of(pairs_.back().integrals.cover) == 0.0 || mean_gap(pairs_.back()) < -in_.reach)) {
             pairs_.pop_back();
             return;
         }

@@ -31,8 +31,9 @@ struct Point {
     T weight;
 };
 
-// Finds the points of a facet that lie over given points of the plane. The roots are found in plain numbers, one to a
-// lane of a vector register, by Newton's method; one more step, with derivatives, differentiates them (implicit function theorem).
+// Finds the points of a facet that lie over given points of the plane. The roots are found in plain numbers by Newton's
+// method, one to a lane of a vector register; one more step, with derivatives, differentiates them (implicit function
+// theorem).
 template <typename Facet, typename T>
 class MapBack {
     static constexpr int n = Facet::nodes;
@@ -41,14 +42,26 @@ class MapBack {
     explicit MapBack(const T (*nodes)[2]) : nodes_(nodes) {
         for (int i = 0; i < n; ++i)
             for (int a = 0; a < 2; ++a) plain_[i][a] = value_of(nodes[i][a]);
-        double N[n], dN[2][n], J[2][2] = {};
+        double N[n], dN[2][n];
         Facet::shape(Facet::centre, N, dN);
-        for (int i = 0; i < n; ++i)
-            for (int a = 0; a < 2; ++a) {
-                centre_[a] += N[i] * plain_[i][a];
-                for (int b = 0; b < 2; ++b) J[a][b] += dN[b][i] * plain_[i][a];
-            }
-        invert(J, first_);
+        guess_by(plain_, N, dN, Facet::centre);
+    }
+
+    // From now on, points are expected in this linear part of the facet.
+    void expect_in(const int* part) {
+        if constexpr (Facet::order == 2) {
+            using Part = std::conditional_t<Facet::corners == 3, Tri3, Quad4>;
+            double corner[Part::nodes][2], N[Part::nodes], dN[2][Part::nodes];
+            Part::shape(Part::centre, N, dN);
+            double centre[2] = {}, slope[2][2] = {};  // of the parent's reference coordinates in the part's
+            for (int i = 0; i < Part::nodes; ++i)
+                for (int a = 0; a < 2; ++a) {
+                    corner[i][a] = plain_[part[i]][a];
+                    centre[a] += N[i] * Facet::reference[part[i]][a];
+                    for (int b = 0; b < 2; ++b) slope[a][b] += dN[b][i] * Facet::reference[part[i]][a];
+                }
+            guess_by(corner, N, dN, centre, slope);
+        }
     }
 
     // points[k] over x[k], k < count <= pack_size; found[k] is false where there is none.
@@ -58,9 +71,9 @@ class MapBack {
         for (int k = 0; k < pack_size; ++k)
             for (int a = 0; a < 2; ++a) lanes[a][k] = value_of(x[k < count ? k : 0][a]);
         std::memcpy(target, lanes, sizeof lanes);
-        for (int a = 0; a < 2; ++a)  // first guess: the facet's affine part
-            xi[a] = Facet::centre[a] + first_[a][0] * (target[0] - centre_[0]) +
-                    first_[a][1] * (target[1] - centre_[1]);
+        for (int a = 0; a < 2; ++a)
+            xi[a] = guess_[a] + guess_slope_[a][0] * (target[0] - centre_[0]) +
+                    guess_slope_[a][1] * (target[1] - centre_[1]);
         auto linearize = [&] {
             Facet::shape(xi, N, dN);
             Pack J[2][2] = {};
@@ -117,8 +130,27 @@ class MapBack {
         inverse[1][1] = factor * J[0][0];
     }
 
+    // First guess: the affine part of a shape with nodes x; shape functions at its centre, whose reference coordinates
+    // are `at` and change by `slope` with those of the shape functions.
+    template <int count>
+    void guess_by(const double (*x)[2], const double* N, const double (*dN)[count], const double* at,
+                  const double (&slope)[2][2] = {{1.0, 0.0}, {0.0, 1.0}}) {
+        double J[2][2] = {}, inverse[2][2];
+        centre_[0] = centre_[1] = 0.0;
+        for (int i = 0; i < count; ++i)
+            for (int a = 0; a < 2; ++a) {
+                centre_[a] += N[i] * x[i][a];
+                for (int b = 0; b < 2; ++b) J[a][b] += dN[b][i] * x[i][a];
+            }
+        invert(J, inverse);
+        for (int a = 0; a < 2; ++a) {
+            guess_[a] = at[a];
+            for (int b = 0; b < 2; ++b) guess_slope_[a][b] = slope[a][0] * inverse[0][b] + slope[a][1] * inverse[1][b];
+        }
+    }
+
     const T (*nodes_)[2];
-    double plain_[n][2], centre_[2] = {}, first_[2][2];
+    double plain_[n][2], centre_[2], guess_[2], guess_slope_[2][2];
 };
 
 // Calls visit(point on slave, point on master, weight) for the integration points of the cells of a pair.
@@ -126,8 +158,8 @@ template <typename Slave, typename Master, typename T, typename Visit>
 void visit_cells(const PlanePair<Slave, Master, T>& pair, Visit&& visit) {
     constexpr int ns = Slave::corners, nm = Master::corners;
     static const std::vector<RulePoint> rule = triangle_rule(Slave::order == 1 && Master::order == 1 ? 7 : 12);
-    const MapBack<Slave, T> to_slave(pair.slave);
-    const MapBack<Master, T> to_master(pair.master);
+    MapBack<Slave, T> to_slave(pair.slave);
+    MapBack<Master, T> to_master(pair.master);
 
     for (const auto& slave_part : Slave::part)
         for (const auto& master_part : Master::part) {
@@ -149,6 +181,8 @@ void visit_cells(const PlanePair<Slave, Master, T>& pair, Visit&& visit) {
             const Polygon polygon = clip<ns, nm>(slave_plain, master_plain);
             if (polygon.size < 3 || !(polygon.area() > slack * Slave::size)) continue;
 
+            to_slave.expect_in(slave_part);
+            to_master.expect_in(master_part);
             auto line = [&](int edge) -> Line<T> {
                 return edge < master_edge ? Line<T>{slave[edge], slave[(edge + 1) % ns]}
                                           : Line<T>{master[edge - master_edge], master[(edge - master_edge + 1) % nm]};

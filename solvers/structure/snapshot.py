@@ -19,11 +19,10 @@ def snapshots(structure: Structure) -> list[Snapshot]:
         von_mises = gather_nodal(structure.comm, Nodal(_von_mises(body.stress())[:, None], body.nodes[: body.owned]))
         if displacement is None or velocity is None or von_mises is None:
             continue
-        assert body.domain.points is not None
-        assert body.domain.cells is not None
+        mesh = body.domain.source
+        assert mesh is not None
         fields = {"displacement": displacement, "velocity": velocity, "von_mises": von_mises[:, 0]}
-        points = _in_space(body.domain.points) + displacement
-        found.append(Snapshot(body.name, points, body.domain.cells, body.domain.cell_type, fields))
+        found.append(Snapshot(body.name, _in_space(mesh.points) + displacement, mesh.cells, mesh.cell_type, fields))
     return found
 
 

@@ -1,0 +1,104 @@
+"""From the `contact` section of a case to surfaces, pairs and the contact constraint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fsci.case import Case
+from fsci.mesh import MeshError, build_mesh, require_surface
+from solvers.blocks import Layout
+from solvers.contact.contact import Contact
+from solvers.contact.pair import Pair
+from solvers.contact.surface import Surface
+from solvers.mesh import Mesh
+from solvers.mesh_topology import FACET_TYPE, surface_facets
+from solvers.structure.body import Body
+from solvers.structure.supports import prescribe
+
+
+def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact:
+    """All pairs of a case. Raises CaseError (collective)."""
+    assert case.contact is not None
+    layout = Layout(comm, [body.size for body in bodies])
+    found: dict[tuple[str, str], Surface] = {}
+    pairs = []
+    for settings in case.contact.pairs.values():
+        sides = []
+        for side in (settings.slave, settings.master):
+            key = ("obstacle", side.obstacle) if side.body is None else (side.body, side.on)
+            if key not in found:
+                found[key] = (
+                    _obstacle(case, comm, side.obstacle)
+                    if side.body is None
+                    else _surface(comm, layout, bodies, side.body, side.on)
+                )
+            sides.append(found[key])
+        pairs.append(Pair(sides[0], sides[1], settings.integration))
+    return Contact(comm, pairs, names=tuple(case.contact.pairs), c_n=case.contact.c_n)
+
+
+def _surface(comm: MPI.Comm, layout: Layout, bodies: Sequence[Body], body_name: str, name: str) -> Surface:
+    """A named surface of a body, whole on every process."""
+    index = next(i for i, body in enumerate(bodies) if body.name == body_name)
+    body = bodies[index]
+    mesh = body.domain.source
+    points, facets, nodes = comm.bcast(None if mesh is None else _cut_out(mesh, name), root=0)
+    dofs = _global_dofs(comm, layout, index, body, nodes)
+    held = np.zeros(len(nodes) * body.dim, dtype=bool)
+    prescribed = prescribe(body).dofs + layout.start + layout.offsets[index]
+    for part in comm.allgather(prescribed):
+        held |= np.isin(dofs.ravel(), part)
+    facet_type = FACET_TYPE[body.domain.cell_type]
+    return Surface(f"{body_name}.{name}", points, facets, facet_type, dofs, held.reshape(dofs.shape))
+
+
+def _cut_out(mesh: Mesh, name: str) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """(points, facets, node numbers in the mesh) of a named surface."""
+    facets = surface_facets(mesh, name)
+    nodes, local = np.unique(facets, return_inverse=True)
+    return mesh.points[nodes], local.reshape(facets.shape).astype(np.int64), nodes
+
+
+def _global_dofs(
+    comm: MPI.Comm, layout: Layout, index: int, body: Body, nodes: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Global dofs of nodes of the mesh file, shape (n, dim) (collective)."""
+    order = np.argsort(body.nodes[: body.owned])
+    owned = body.nodes[: body.owned][order]
+    at = np.minimum(np.searchsorted(owned, nodes), max(len(owned) - 1, 0))
+    mine = owned[at] == nodes if len(owned) else np.zeros(len(nodes), dtype=bool)
+    first = np.zeros(len(nodes), dtype=np.int64)
+    first[mine] = layout.start + layout.offsets[index] + body.dim * order[at[mine]]
+    return comm.allreduce(first)[:, None] + np.arange(body.dim)
+
+
+def _obstacle(case: Case, comm: MPI.Comm, name: str) -> Surface:
+    """A rigid surface, whole on every process."""
+    assert case.contact is not None
+    settings = case.contact.obstacles[name]
+    found, error = None, None
+    if comm.rank == 0:
+        keys: tuple[str | int, ...] = ("contact", "obstacles", name, "mesh")
+        try:
+            mesh = build_mesh(settings.mesh, case.folder)
+            keys = ("contact", "obstacles", name, "on")
+            require_surface(mesh, settings.on)
+            found = (*_cut_out(mesh, settings.on)[:2], FACET_TYPE[mesh.cell_type])
+        except MeshError as problem:
+            error = case.error(keys, str(problem))
+    error = comm.bcast(error, root=0)
+    if error is not None:
+        raise error
+    points, facets, facet_type = comm.bcast(found, root=0)
+    motion = None
+    if settings.motion is not None:
+        displacement = settings.motion
+
+        def motion(t: float) -> NDArray[np.float64]:
+            return points + np.stack([component(points.T, t) for component in displacement], axis=1)
+
+    return Surface(name, points, facets, facet_type, None, None, motion)
