@@ -81,7 +81,7 @@ def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     return Simulation(
         scheme=Alone(structure),
         initialise=structure.initialise,
-        snapshots=lambda: snapshots(structure),
+        snapshots=lambda: snapshots(structure, None if contact is None else contact.fields()),
         probes=lambda: {
             f"{name}.{part}" if part else name: value
             for name, probe in measured.items()
@@ -95,9 +95,7 @@ def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 # ------------------------------------------------------------------------------------------------------- structure
 
 
-def _structure(
-    case: Case, comm: MPI.Comm, bodies: list[Body], contact: Constraint | None, timer: Timer
-) -> Structure:
+def _structure(case: Case, comm: MPI.Comm, bodies: list[Body], contact: Constraint | None, timer: Timer) -> Structure:
     newton, linear = case.solver.newton, case.solver.linear
     settings = SolverSettings(
         Tolerance(

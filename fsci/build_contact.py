@@ -53,7 +53,7 @@ def _surface(comm: MPI.Comm, layout: Layout, bodies: Sequence[Body], body_name: 
     for part in comm.allgather(prescribed):
         held |= np.isin(dofs.ravel(), part)
     facet_type = FACET_TYPE[body.domain.cell_type]
-    return Surface(f"{body_name}.{name}", points, facets, facet_type, dofs, held.reshape(dofs.shape))
+    return Surface(f"{body_name}.{name}", points, facets, facet_type, dofs, held.reshape(dofs.shape), body_name, nodes)
 
 
 def _cut_out(mesh: Mesh, name: str) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
@@ -63,9 +63,7 @@ def _cut_out(mesh: Mesh, name: str) -> tuple[NDArray[np.float64], NDArray[np.int
     return mesh.points[nodes], local.reshape(facets.shape).astype(np.int64), nodes
 
 
-def _global_dofs(
-    comm: MPI.Comm, layout: Layout, index: int, body: Body, nodes: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _global_dofs(comm: MPI.Comm, layout: Layout, index: int, body: Body, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
     """Global dofs of nodes of the mesh file, shape (n, dim) (collective)."""
     order = np.argsort(body.nodes[: body.owned])
     owned = body.nodes[: body.owned][order]
@@ -101,4 +99,4 @@ def _obstacle(case: Case, comm: MPI.Comm, name: str) -> Surface:
         def motion(t: float) -> NDArray[np.float64]:
             return points + np.stack([component(points.T, t) for component in displacement], axis=1)
 
-    return Surface(name, points, facets, facet_type, None, None, motion)
+    return Surface(name, points, facets, facet_type, None, motion=motion)

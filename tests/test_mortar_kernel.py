@@ -191,7 +191,6 @@ def test_gap_is_negative_where_bodies_overlap():
     xm, fm = patch("quad4", 2, turned=True)
     result, _ = integrate(xs, fs, "quad4", xm - [0, 0, 0.01], fm, "quad4")
     np.testing.assert_allclose(result.gap, -0.01 * result.D, atol=1e-15)
-    np.testing.assert_allclose(result.plain_gap, -0.01 * result.D, atol=1e-15)
 
 
 @pytest.mark.parametrize("shift", [0.0, 1e-16, 1e-14, 1e-13, 1e-12, 3e-12, 1e-10, 1e-8])

@@ -58,9 +58,7 @@ class Contact(Section):
 
     pairs: dict[Name, Pair] = setting(..., "pairs of surfaces by name")
     obstacles: dict[Name, Obstacle] = setting(dict, "rigid surfaces by name")
-    c_n: Positive = setting(
-        1.0, "factor of the complementarity parameter; the result does not depend on it", unit="1"
-    )
+    c_n: Positive = setting(1.0, "factor of the complementarity parameter; the result does not depend on it", unit="1")
     force_at: Literal["mid", "end"] = setting(
         "mid", "dynamics: contact force averaged over the step like all forces, or that at its end"
     )

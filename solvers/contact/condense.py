@@ -116,6 +116,4 @@ def place_columns(matrix: sp.csr_matrix, columns: NDArray[np.int64], unknowns: i
     entries = matrix.tocoo()
     target = columns[entries.col]
     keep = target >= 0
-    return sp.csr_matrix(
-        (entries.data[keep], (entries.row[keep], target[keep])), shape=(matrix.shape[0], unknowns)
-    )
+    return sp.csr_matrix((entries.data[keep], (entries.row[keep], target[keep])), shape=(matrix.shape[0], unknowns))

@@ -50,8 +50,7 @@ class Contact:
         self.names = tuple(names) or tuple(f"pair{i}" for i in range(len(pairs)))
         self.nodes: Nodes = number_nodes(surfaces)
         self._sides = [
-            tuple(self.nodes.of_surface[_index(surfaces, side)] for side in (pair.slave, pair.master))
-            for pair in pairs
+            tuple(self.nodes.of_surface[_index(surfaces, side)] for side in (pair.slave, pair.master)) for pair in pairs
         ]
         self.size, self.dim = self.nodes.points.shape
         self.z = np.zeros((self.size, self.dim))
@@ -104,6 +103,8 @@ class Contact:
         """Facets may have moved from here on."""
         self._x_old = self.x.copy()
         self.active_set.begin_step()
+        for pair in self.pairs:
+            pair.begin_step()
 
     def evaluate(self, u: Array, t: float) -> None:
         """Mortar terms and active set at the displacements u, shape (N, dim), of the present iterate."""
@@ -127,9 +128,9 @@ class Contact:
         pieces = []
         for index, (pair, (slave, master)) in enumerate(zip(self.pairs, self._sides, strict=True)):
             facet_pairs, motion = pair.near(self.x[slave], self.x[master], self._x_old[slave], self._x_old[master])
-            if len(facet_pairs) == 0:
+            mine = facet_pairs if pair.frozen else self._shares.mine(index, facet_pairs, len(pair.slave.facets))
+            if not pair.frozen and len(facet_pairs) == 0:
                 continue
-            mine = self._shares.mine(index, facet_pairs, len(pair.slave.facets))
             found = pair.evaluate(self.x[slave], self.x[master], mine, motion, self.z[slave])
             area = self._shares.combine(index, found.area)
             if area.any():
@@ -286,6 +287,29 @@ class Contact:
             return np.full(self.size, np.nan)
         covered = self._covered(self.terms)
         return np.divide(self.terms.gap, self.terms.D, out=np.full(self.size, np.nan), where=covered)
+
+    def fields(self) -> dict[str, dict[str, tuple[NDArray[np.int64], Array]]]:
+        """Nodal results on slave surfaces: body -> name -> (nodes in its mesh, values).
+
+        contact_traction [Pa] acts on the slave, contact_pressure is its normal part, contact_gap [m] the mean gap.
+        """
+        gap, active = self.mean_gap(), self.active_set.active
+        normals = np.zeros_like(self.z) if self.terms is None else self.terms.normals
+        found: dict[str, dict[str, tuple[NDArray[np.int64], Array]]] = {}
+        for pair, (slave, _) in zip(self.pairs, self._sides, strict=True):
+            if pair.slave.mesh_nodes is None:
+                continue
+            values = {
+                "contact_pressure": np.einsum("nd,nd->n", self.z[slave], normals[slave]),
+                "contact_traction": -self.z[slave],
+                "contact_gap": gap[slave],
+                "contact_active": active[slave].astype(float),
+            }
+            of_body = found.setdefault(pair.slave.body, {})
+            for name, array in values.items():
+                nodes, before = of_body.get(name, (np.empty(0, dtype=np.int64), array[:0]))
+                of_body[name] = np.concatenate([nodes, pair.slave.mesh_nodes]), np.concatenate([before, array])
+        return found
 
     def save(self) -> State:
         return {"z": self.z.copy(), "x": self.x.copy(), "active": self.active_set.active.copy()}

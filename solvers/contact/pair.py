@@ -17,6 +17,9 @@ from solvers.kernels import basis_transformation, mortar, nodal_normals
 #: Slave facets take part when a master is nearer than this share of the longest edge (and the motion of the step).
 NEAR = 0.3
 
+#: Evaluations of a step after which the facet pairs stay what they are.
+FREEZE_AFTER = 4
+
 Integration = Literal["segments", "elements"]
 
 
@@ -49,15 +52,32 @@ class Pair:
         self.transformation = sp.csr_matrix(T, shape=shape)
         self.inverse_transformation = sp.csr_matrix(inverse, shape=shape)
         self._edge = _longest_edge(slave)
+        self.begin_step()
+
+    @property
+    def frozen(self) -> bool:
+        """The facet pairs stay what they are until the next step; each process has its share of them."""
+        return self._frozen is not None
+
+    def begin_step(self) -> None:
+        """Facet pairs are chosen anew."""
+        self._evaluations = 0
+        self._frozen: NDArray[np.int32] | None = None
+
+    def _admission(self, motion: float) -> dict[str, float]:
+        """Which facets see each other: hard decisions, which must not change under Newton's last iterates."""
+        if self._frozen is not None:
+            return {"facing": np.inf}
+        return {"reach": self._edge + motion, "near": NEAR * self._edge + motion}
 
     def near(self, xs: Array, xm: Array, xs_previous: Array, xm_previous: Array) -> tuple[NDArray[np.int32], float]:
         """Facet pairs that may meet, and the largest motion [m] of a node in this step."""
+        if self._frozen is not None:
+            return self._frozen, 0.0
         motion = max(float(np.abs(a - b).max(initial=0.0)) for a, b in ((xs, xs_previous), (xm, xm_previous)))
         return self._search.pairs(xs, xm, self._edge + motion, xs_previous, xm_previous), motion
 
-    def evaluate(
-        self, xs: Array, xm: Array, facet_pairs: NDArray[np.int32], motion: float, z: Array
-    ) -> PairTerms:
+    def evaluate(self, xs: Array, xm: Array, facet_pairs: NDArray[np.int32], motion: float, z: Array) -> PairTerms:
         """All terms at the positions xs, xm [m] for the multipliers z [Pa] of the slave nodes."""
         ns, nm, dim = len(xs), len(xm), xs.shape[1]
         xs, xm, z = (np.ascontiguousarray(a) for a in (xs, xm, z))
@@ -73,9 +93,11 @@ class Pair:
             facet_pairs,
             z,
             method=self.integration,
-            reach=self._edge + motion,
-            near=NEAR * self._edge + motion,
+            **self._admission(motion),
         )
+        self._evaluations += 1
+        if self._evaluations == FREEZE_AFTER:
+            self._frozen = np.ascontiguousarray(facet_pairs[result.used.astype(bool)])
         columns = dim * (ns + nm)
         dn = sp.csr_matrix(slopes, shape=(dim * ns, dim * ns))
 

@@ -34,6 +34,8 @@ class Surface:
     facet_type: str  #: line, line3, triangle, triangle6, quad, quad9
     dofs: NDArray[np.int64] | None  #: global dofs of each node, shape (n, dim); None if rigid
     held: NDArray[np.bool_] | None = None  #: which of them are prescribed, shape (n, dim)
+    body: str = ""  #: whose surface it is
+    mesh_nodes: NDArray[np.int64] | None = None  #: number of each node in the mesh of the body
     motion: Callable[[float], Array] | None = None  #: rigid: positions [m] at a time, shape (n, dim)
 
 

@@ -106,12 +106,12 @@ nb::object py_nodal_tangents(const Reals& normals) {
 }
 
 struct MortarResult {
-    nb::object D, gap, area, force, M, dD, dD_dn, dgap, dgap_dn, dforce, dforce_dn;
+    nb::object D, gap, area, used, force, M, dD, dD_dn, dgap, dgap_dn, dforce, dforce_dn;
 };
 
 template <int dim>
 MortarResult to_result(MortarSums<dim> sums, int n_slave, int n_master, bool derivatives, bool forces) {
-    const std::size_t nodes = sums.gap.size(), facets = sums.area.size(), dofs = sums.force.size();
+    const std::size_t pairs = sums.used.size(), nodes = sums.gap.size(), facets = sums.area.size(), dofs = sums.force.size();
     const int all = n_slave + n_master;
     auto sparse = [](const auto& blocks, int rows, int columns, bool wanted) -> nb::object {
         if (!wanted) return nb::none();
@@ -125,6 +125,7 @@ MortarResult to_result(MortarSums<dim> sums, int n_slave, int n_master, bool der
     return {.D = to_numpy(std::move(sums.diagonal), {nodes}),
             .gap = to_numpy(std::move(sums.gap), {nodes}),
             .area = to_numpy(std::move(sums.area), {facets}),
+            .used = to_numpy(std::move(sums.used), {pairs}),
             .force = to_numpy(std::move(sums.force), {dofs}),
             .M = sparse(sums.coupling, n_slave, n_master, true),
             .dD = sparse(sums.d_diagonal, n_slave, all, derivatives),
@@ -137,7 +138,7 @@ MortarResult to_result(MortarSums<dim> sums, int n_slave, int n_master, bool der
 
 MortarResult py_mortar(const Reals& xs, const Facets& fs, const std::string& type_s, const Reals& xm, const Facets& fm,
                        const std::string& type_m, const Reals& normals, const Pairs& pairs,
-                       const std::optional<Reals>& z, const std::string& method, bool derivatives, double reach, double near) {
+                       const std::optional<Reals>& z, const std::string& method, bool derivatives, double reach, double near, double facing) {
     require(method == "segments" || method == "elements", "method must be 'segments' or 'elements'");
     require(xs.shape(1) == xm.shape(1), "slave and master must have the same dimension");
     require(pairs.shape(1) == 2, "pairs must have shape (p, 2)");
@@ -153,7 +154,7 @@ MortarResult py_mortar(const Reals& xs, const Facets& fs, const std::string& typ
         require(p == 0 || pair[-2] <= pair[0], "pairs must be sorted by slave facet");
     }
     const MortarInput input{xs.data(), xm.data(), normals.data(), z ? z->data() : nullptr, fs.data(), fm.data(),
-                            n_slave,   n_master,  pairs.data(),   pairs.shape(0),          method == "elements", reach, near};
+                            n_slave,   n_master,  pairs.data(),   pairs.shape(0),          method == "elements", reach, near, facing};
     MortarResult result;
     dispatch(type_s, dim, [&](auto slave) {
         using Slave = decltype(slave);
@@ -162,7 +163,7 @@ MortarResult py_mortar(const Reals& xs, const Facets& fs, const std::string& typ
             if constexpr (Slave::dim == Master::dim) {
                 check_surface("slave", xs, fs, Slave::nodes);
                 check_surface("master", xm, fm, Master::nodes);
-                MortarSums<Slave::dim> sums(n_slave, n_master, fs.shape(0));
+                MortarSums<Slave::dim> sums(n_slave, n_master, fs.shape(0), pairs.shape(0));
                 {
                     nb::gil_scoped_release release;
                     if (derivatives)
@@ -219,6 +220,7 @@ void bind_mortar(nb::module_& module) {
         .def_ro("D", &MortarResult::D, "diagonal of D: integral of the slave's basis over what is covered, (ns,)")
         .def_ro("gap", &MortarResult::gap, "weighted gap, positive where open, (ns,)")
         .def_ro("area", &MortarResult::area, "covered area (2D: length) of each slave facet, (k,)")
+        .def_ro("used", &MortarResult::used, "which pairs took part, (p,) of 0 and 1")
         .def_ro("force", &MortarResult::force, "slave -D z, master M^T z, (dim*(ns + nm),); zero without z")
         .def_ro("M", &MortarResult::M, "coupling matrix, (ns, nm)")
         .def_ro("dD", &MortarResult::dD, "derivative of D, (ns, dim*(ns + nm))")
@@ -241,12 +243,12 @@ void bind_mortar(nb::module_& module) {
                "T^-T times the rows here.");
     module.def("mortar", &py_mortar, "xs"_a, "fs"_a, "facet_type_s"_a, "xm"_a, "fm"_a, "facet_type_m"_a, "normals"_a,
                "pairs"_a, "z"_a = nb::none(), nb::kw_only(), "method"_a = "segments", "derivatives"_a = true,
-               "reach"_a = std::numeric_limits<double>::infinity(), "near"_a = std::numeric_limits<double>::infinity(),
+               "reach"_a = std::numeric_limits<double>::infinity(), "near"_a = std::numeric_limits<double>::infinity(), "facing"_a = -0.2,
                "Mortar integrals between a slave and a master surface.\n\n"
                "xs (ns, dim), xm (nm, dim): current positions; fs, fm: facets, oriented outward, of types line2, line3 "
                "(2D), tri3, tri6, quad4, quad9 (3D), VTK node order; normals (ns, dim) of the slave; pairs (p, 2): "
                "slave and master facets that may meet, sorted by slave facet, all pairs of a slave facet in one call; "
                "z (ns, dim): multipliers for the force; method: 'segments' or 'elements' (fixed points on the slave "
                "facet); reach: facets farther apart than this do not see each other; near: slave facets to which no master is as near as "
-               "this are left out.");
+               "this are left out; facing: facets see each other if the product of their unit normals is below.");
 }

@@ -30,21 +30,21 @@ struct MortarInput {
     bool elements;  // fixed points on the slave facet instead of segments
     double reach;   // facets farther apart than this do not see each other
     double near;    // slave facets with no master as near as this are left out
+    double facing;  // facets see each other if the product of their normals is below
 };
 
 // Sums over facets. Column nodes: the slave's, then the master's; those of d*_normal: the slave's.
 template <int dim>
 struct MortarSums {
     std::vector<double> diagonal, gap, area, force;
+    std::vector<std::uint8_t> used;  // of the pairs: it took part
     BlockRows<1, 1> coupling;
     BlockRows<1, dim> d_diagonal, d_diagonal_normal, d_gap, d_gap_normal;
     BlockRows<dim, dim> d_force, d_force_normal;
 
-    MortarSums(int n_slave, int n_master, std::size_t n_facets)
-        : diagonal(n_slave), gap(n_slave), area(n_facets), force(dim * (n_slave + n_master)) {}
+    MortarSums(int n_slave, int n_master, std::size_t n_facets, std::size_t n_pairs)
+        : diagonal(n_slave), gap(n_slave), area(n_facets), force(dim * (n_slave + n_master)), used(n_pairs) {}
 };
-
-constexpr double facing = -0.2;  // facets see each other if their normals' product is below
 
 // Centre, unit normal there and radius of a facet.
 template <typename Facet>
@@ -73,7 +73,7 @@ struct FacetBall {
         }
     }
     template <typename Other>
-    bool sees(const FacetBall<Other>& other, double reach) const {
+    bool sees(const FacetBall<Other>& other, double reach, double facing) const {
         const double r[3] = {other.centre[0] - centre[0], other.centre[1] - centre[1], other.centre[2] - centre[2]};
         return dot(normal, other.normal) < facing && std::sqrt(dot(r, r)) <= radius + other.radius + reach;
     }
@@ -92,7 +92,8 @@ class FacetAssembly {
         Geometry geometry;
         FacetNodes<Master> nodes;
         PairIntegrals<Slave, Master, T> integrals{};
-        int place[m] = {};  // of its nodes among the facet's masters
+        int place[m] = {};       // of its nodes among the facet's masters
+        std::size_t number = 0;  // in the input
 
         template <typename... Shape>
         explicit Pair(const FacetNodes<Master>& nodes, const Shape&... shape) : geometry(shape...), nodes(nodes) {}
@@ -118,6 +119,7 @@ class FacetAssembly {
             }
             cover += value_of(pair.integrals.cover);
         }
+        for (const Pair& pair : pairs_) sums_.used[pair.number] = 1;
         const DualBasis<Slave> basis(mass, cover);
         sum_values(facet, basis);
         if constexpr (derivatives) sum_derivatives(basis);
@@ -168,7 +170,10 @@ class FacetAssembly {
             FacetNodes<Master> master;
             int nodes[m];
             gather(in_.master_facets + std::size_t(in_.pairs[2 * p + 1]) * m, in_.master_x, nodes, master.x);
-            if (ball.sees(FacetBall<Master>(master.x), in_.reach)) visit(master, nodes);
+            if (!ball.sees(FacetBall<Master>(master.x), in_.reach, in_.facing)) continue;
+            const std::size_t before = pairs_.size();
+            visit(master, nodes);
+            if (pairs_.size() > before) pairs_.back().number = p;
         }
     }
 

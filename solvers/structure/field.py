@@ -18,6 +18,7 @@ from solvers.newton import Tolerance, converge
 from solvers.rows import change_rows, fetch_rows, gather, gather_at
 from solvers.structure.body import Body
 from solvers.structure.energy import EnergyBalance
+from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.supports import prescribe
 from solvers.structure.time import TimeScheme
 from solvers.timing import Timer
@@ -84,14 +85,15 @@ class Structure:
         self._tangents = [body.create_tangent() for body in bodies]
         self._combined: PETSc.Mat | None = None
         self._b, self._x = self.layout.vector(), self.layout.vector()
+        self._iterative = linear.choose(settings.linear, self.dim, self.dofs()) == "iterative"
         # the tangent of a follower pressure has an unsymmetric boundary term
         self._ksp = self._linear_solver(symmetric=not any(body.settings.pressures for body in self.bodies))
         self._constrained_ksp = None if constraint is None else self._linear_solver(symmetric=False)
 
     def _linear_solver(self, *, symmetric: bool) -> PETSc.KSP:
-        if linear.choose(self.settings.linear, self.dim, self.dofs()) == "direct":
-            return linear.direct_solver(self.comm, dim=self.dim, dofs=self.dofs(), symmetric=symmetric)
-        return linear.elastic_solver(self.comm, symmetric=symmetric, tolerance=self.settings.linear_tolerance)
+        if self._iterative:
+            return linear.elastic_solver(self.comm, symmetric=symmetric, tolerance=self.settings.linear_tolerance)
+        return linear.direct_solver(self.comm, dim=self.dim, dofs=self.dofs(), symmetric=symmetric)
 
     def dofs(self) -> int:
         """Unknowns of all bodies on all processes, prescribed ones included."""
@@ -226,6 +228,8 @@ class Structure:
                 matrix = self._condense(matrix)
         rows = (self.layout.start + self.prescribed).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, self._x, self._b)
+        if self._iterative:
+            attach_rigid_modes(matrix, self.bodies, self.now.u)
         try:
             with self.timer("solve"):
                 linear.solve(self._constrained_ksp if constrained else self._ksp, matrix, self._b, self._x)
@@ -246,9 +250,7 @@ class Structure:
         weight = self.time.constraint_weight
         without = self.residual_force + weight * self.now.constraint
         self._b.array[:] = -without
-        changes = self.constraint.condense(
-            weight, lambda rows: fetch_rows(matrix, rows), self._at_constraint(without)
-        )
+        changes = self.constraint.condense(weight, lambda rows: fetch_rows(matrix, rows), self._at_constraint(without))
         return change_rows(matrix, self._b, changes)
 
     def retreat(self, fraction: float) -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
+from numpy.typing import NDArray
 
 from solvers.api import Array, Snapshot
 from solvers.distributed import Nodal, gather_nodal
@@ -10,8 +13,12 @@ from solvers.structure.body import Body
 from solvers.structure.field import Structure
 
 
-def snapshots(structure: Structure) -> list[Snapshot]:
-    """One snapshot per body on rank 0, an empty list elsewhere (collective)."""
+#: Body -> field name -> (node numbers in the mesh, values there)
+PartFields = Mapping[str, Mapping[str, tuple[NDArray[np.int64], Array]]]
+
+
+def snapshots(structure: Structure, on_surfaces: PartFields | None = None) -> list[Snapshot]:
+    """One snapshot per body on rank 0, an empty list elsewhere (collective); zero where a surface field is not."""
     found = []
     now = structure.now
     for body, u, v in zip(structure.bodies, structure.split(now.u), structure.split(now.v), strict=True):
@@ -22,6 +29,10 @@ def snapshots(structure: Structure) -> list[Snapshot]:
         mesh = body.domain.source
         assert mesh is not None
         fields = {"displacement": displacement, "velocity": velocity, "von_mises": von_mises[:, 0]}
+        for name, (nodes, values) in (on_surfaces or {}).get(body.name, {}).items():
+            fields[name] = np.zeros((len(mesh.points), *values.shape[1:]))
+            fields[name][nodes] = np.nan_to_num(values)
+            fields[name] = fields[name] if fields[name].ndim == 1 else _in_space(fields[name])
         found.append(Snapshot(body.name, _in_space(mesh.points) + displacement, mesh.cells, mesh.cell_type, fields))
     return found
 
