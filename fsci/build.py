@@ -121,10 +121,11 @@ def _time_scheme(case: Case) -> TimeScheme:
     dynamics = case.structure.dynamics
     if dynamics is None:
         return Statics()
-    if dynamics.alpha_m is None:
+    if dynamics.rho_inf is not None:
         scheme = GeneralisedAlpha.from_rho_inf(dynamics.rho_inf)
     else:
-        scheme = GeneralisedAlpha(dynamics.alpha_m, dynamics.alpha_f, dynamics.beta, dynamics.gamma)
+        alphas: list[Any] = [dynamics.alpha_m, dynamics.alpha_f, dynamics.beta, dynamics.gamma]
+        scheme = GeneralisedAlpha(*alphas)
     damping = Damping(dynamics.damping.mass, dynamics.damping.stiffness)
     constraint_at = "mid" if case.contact is None else case.contact.force_at
     return Dynamics(scheme, damping=damping, predictor=dynamics.predictor, constraint_at=constraint_at)
@@ -200,7 +201,7 @@ def _check_lengths(case: Case, name: str, dim: int) -> None:
     """Vectors have as many entries as the mesh has dimensions; for files only the mesh tells."""
     body = case.structure.bodies[name]
     base = ("structure", "bodies", name)
-    vectors = [((*base, key), getattr(body, key)) for key in _VECTORS]
+    vectors: list[tuple[tuple[str | int, ...], Any]] = [((*base, key), getattr(body, key)) for key in _VECTORS]
     vectors += [((*base, "tractions", i, "value"), load.value) for i, load in enumerate(body.tractions)]
     vectors += [((*base, "supports", i, "displacement"), s.displacement) for i, s in enumerate(body.supports)]
     vectors += [(("probes", key, "at"), p.at) for key, p in case.probes.items() if _body_of(case, p) == name]
@@ -224,7 +225,7 @@ def _material(settings, plane: str) -> materials.Material:
     if settings.law == "st_venant_kirchhoff" and plane == "stress":
         lmbda = _combine(materials.plane_stress_lambda, mu, lmbda)
         return materials.PlaneStressStVenantKirchhoff(mu, lmbda, density)
-    law = {
+    law: Any = {
         "st_venant_kirchhoff": materials.StVenantKirchhoff,
         "neo_hooke": materials.NeoHooke,
         "coup_neo_hooke": materials.CoupNeoHooke,

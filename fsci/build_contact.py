@@ -29,13 +29,9 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
     for settings in case.contact.pairs.values():
         sides = []
         for side in (settings.slave, settings.master):
-            key = ("obstacle", side.obstacle) if side.body is None else (side.body, side.on)
+            key = (side.body or "", side.on or side.obstacle or "")
             if key not in found:
-                found[key] = (
-                    _obstacle(case, comm, side.obstacle)
-                    if side.body is None
-                    else _surface(comm, layout, bodies, side.body, side.on)
-                )
+                found[key] = _surface(comm, layout, bodies, *key) if side.body else _obstacle(case, comm, key[1])
             sides.append(found[key])
         pairs.append(Pair(sides[0], sides[1], settings.integration))
     return Contact(comm, pairs, names=tuple(case.contact.pairs), c_n=case.contact.c_n)

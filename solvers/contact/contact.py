@@ -18,7 +18,6 @@ from solvers.contact.share import Shares
 from solvers.contact.surface import Nodes, Surface, number_nodes
 from solvers.rows import RowChanges
 
-
 #: Share of a slave node's area that must see a master.
 LEAST_COVERED = 0.02
 

@@ -236,7 +236,7 @@ class Structure:
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         self._increment = self._x.array.copy()
-        if constrained:
+        if self.constraint is not None and constrained:
             with self.timer("contact"):
                 self.constraint.recover(gather(self.comm, self._increment))
         self.now.u += self._increment

@@ -31,8 +31,9 @@ class Material(Protocol):
         """Reference density [kg/m^3]."""
         ...
 
-    def energy(self, F: Tensor, **parameters: Tensor) -> Tensor:
-        """Stored energy W(F)."""
+    @property
+    def energy(self) -> Callable[..., Tensor]:
+        """Stored energy W(F, parameters by name)."""
         ...
 
 

@@ -12,7 +12,6 @@ from solvers.distributed import Nodal, gather_nodal
 from solvers.structure.body import Body
 from solvers.structure.field import Structure
 
-
 #: Body -> field name -> (node numbers in the mesh, values there)
 PartFields = Mapping[str, Mapping[str, tuple[NDArray[np.int64], Array]]]
 
