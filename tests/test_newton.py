@@ -1,0 +1,108 @@
+"""Newton as a generator, and the caller that judges its iterates: on scalar equations with known answers."""
+
+import math
+
+import pytest
+
+from solvers.api import StepFailed
+from solvers.newton import Tolerance, converge, iterates
+
+
+class Scalar:
+    """f(x) = 0 with one unknown."""
+
+    name = "scalar"
+
+    def __init__(self, f, slope, x, *, round_off=0.0, settled_after=0):
+        self.f, self.slope, self.x = f, slope, x
+        self.increment, self.solves = 0.0, 0
+        self._round_off, self.settled_after = round_off, settled_after
+
+    def residual(self):
+        return abs(self.f(self.x))
+
+    def advance(self):
+        self.increment = -self.f(self.x) / self.slope(self.x)
+        self.x += self.increment
+        self.solves += 1
+        return abs(self.increment / self.x)
+
+    def retreat(self, fraction):
+        self.x -= fraction * self.increment
+
+    def round_off(self):
+        return self._round_off
+
+    def settled(self):
+        return self.solves >= self.settled_after
+
+    def worst(self):
+        return (self.x,)
+
+
+def root_of_two(**options):
+    return Scalar(lambda x: x * x - 2, lambda x: 2 * x, 2.0, **options)
+
+
+def arctangent():
+    """Newton diverges from 2: the classical example for a line search."""
+    return Scalar(math.atan, lambda x: 1 / (1 + x * x), 2.0)
+
+
+def test_iterates_are_quadratic():
+    errors = []
+    system = root_of_two()
+    for iterate in iterates(system):
+        errors.append(abs(system.x - math.sqrt(2)))
+        if iterate.number == 4:
+            break
+    for before, after in zip(errors, errors[1:], strict=False):
+        assert after == pytest.approx(before**2 / (2 * (before + math.sqrt(2))), rel=1e-2, abs=1e-15)
+
+
+def test_converge_counts_linear_solves():
+    system = root_of_two()
+    info = converge(system, Tolerance(residual=1e-10))
+    assert system.x == pytest.approx(math.sqrt(2), abs=1e-9)
+    assert info.iterations == system.solves == len(info.residuals) - 1
+    assert info.residuals[0] == 2.0
+
+
+def test_line_search():
+    with pytest.raises(StepFailed):
+        converge(arctangent(), Tolerance(max_iterations=5))
+    system = arctangent()
+    converge(system, Tolerance(residual=1e-10, line_search=True))
+    assert abs(system.x) < 1e-9
+
+
+def test_diverged_is_named():
+    with pytest.raises(StepFailed, match=r"scalar: Newton did not converge in 3 iterations \(residual .*\) at iter") as e:
+        converge(Scalar(lambda x: x * x + 1, lambda x: 2 * x, 0.5), Tolerance(max_iterations=3))
+    assert e.value.iteration == 3
+    assert len(e.value.history) == 4
+    assert e.value.where is not None
+
+
+def test_not_a_number_is_named():
+    with pytest.raises(StepFailed, match="the residual is not a number at iteration 1"):
+        converge(Scalar(lambda x: x if x == 1 else math.nan, lambda x: 2.0, 1.0), Tolerance())
+
+
+def test_round_off_is_good_enough():
+    """A residual that is only rounding error is accepted, however small the relative tolerance."""
+    info = converge(root_of_two(round_off=1e-5), Tolerance(residual=1e-30))
+    assert info.residuals[-1] <= 1e-5 < info.residuals[-2]
+
+
+def test_absolute_tolerance_and_increment():
+    assert len(converge(root_of_two(), Tolerance(residual=1e-30, residual_absolute=0.3)).residuals) == 2  # f(1.5) = 1/4
+    loose = converge(root_of_two(), Tolerance(residual=0.2))
+    tight = converge(root_of_two(), Tolerance(residual=0.2, increment=1e-6))
+    assert tight.iterations > loose.iterations
+
+
+def test_unsettled_is_not_accepted():
+    """What is imposed (a support, an active set) must be reached even if the residual is zero from the start."""
+    system = Scalar(lambda x: 0.0 * x, lambda x: 1.0, 1.0, settled_after=2)
+    assert converge(system, Tolerance()).iterations == 2
