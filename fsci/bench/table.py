@@ -10,10 +10,9 @@ Row = dict[str, float | int | str]  #: column -> value; the rows of one table ha
 def show(rows: Sequence[Row]) -> str:
     """Rows under their column names; numbers with three digits, to the right."""
     table = [list(rows[0]), *([text(value) for value in row.values()] for row in rows)]
-    widths = [max(len(line[column]) for line in table) for column in range(len(table[0]))]
-    return "\n".join(
-        "  " + "  ".join(word.rjust(width) for word, width in zip(line, widths, strict=True)) for line in table
-    )
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    lines = ("  ".join(word.rjust(width) for word, width in zip(line, widths, strict=True)) for line in table)
+    return "\n".join(f"  {line}" for line in lines)
 
 
 def text(value: float | int | str) -> str:

@@ -36,15 +36,14 @@ def at_point(structure: Structure, body: Body, quantity: str, point: Sequence[fl
     index = structure.bodies.index(body)
     function = fem.function(body.space)
     name = {"displacement": "u", "velocity": "v", "acceleration": "a"}[quantity]
+    if found is not None:
+        cell, reference = found
+        blocks, weights = body.space.dofmap.cell_dofs(cell), fem.tabulate(body.domain, reference)
 
     def probe() -> dict[str, float]:
         function.x.array[: body.size] = structure.split(getattr(structure.now, name))[index]
         function.x.scatter_forward()
-        value = None
-        if found is not None:
-            cell, reference = found
-            nodal = function.x.array.reshape(-1, body.dim)[body.space.dofmap.cell_dofs(cell)]
-            value = fem.tabulate(body.domain, reference) @ nodal
+        value = None if found is None else weights @ function.x.array.reshape(-1, body.dim)[blocks]
         return _components(comm.bcast(value, root=owner))
 
     return probe

@@ -1,0 +1,146 @@
+"""Patch tests of contact: a homogeneous state passes through meshes that do not match.
+
+The states are finite (5 % shortening), so that every nonlinearity takes part; they are exact for any mesh of
+which the facets of the interface are integrated exactly, i.e. triangles, parallelograms and lines.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from contact_setup import brick, displacement_error, press_blocks, pressed, pressures, turned
+from mortar_surfaces import rotation
+from structure_setup import CELL_TYPES, distort
+
+STRETCH = 0.95
+MIXED = [
+    ("quad", "triangle"),
+    ("triangle6", "quad"),
+    ("quad9", "triangle"),
+    ("hexahedron", "tetra"),
+    ("tetra", "hexahedron"),
+    ("tetra10", "hexahedron"),
+    ("hexahedron27", "tetra10"),
+]
+SIDES = [("left", 0), ("front", 1)]
+ALL_SIDES = [("left", 0), ("right", 0), ("front", 1), ("back", 1)]
+
+
+def dimension(cell_type):
+    return 2 if cell_type in ("triangle", "triangle6", "quad", "quad9") else 3
+
+
+def deformation(F, turn=None):
+    """Displacement t (F - 1) x in a frame that is turned."""
+    dim = len(F)
+    turn = np.eye(dim) if turn is None else turn
+    gradient = turn @ np.diag(F) @ turn.T - np.eye(dim)
+    return tuple(lambda x, t, row=row: t * (row @ x[:dim]) for row in gradient)
+
+
+def bricks(lower, upper, *, irregular=0.0, width=1.0, cells=(3, 2)):
+    """Two blocks one upon the other, `irregular` also within the interface; the upper one may be narrower."""
+    dim = dimension(lower)
+    found = []
+    for cell_type, n, size, height in ((lower, cells[0], 1.0, 0.0), (upper, cells[1], width, 0.5)):
+        shape, origin = [size] * (dim - 1) + [0.5], [0.0] * (dim - 1) + [height]
+        unit = brick(cell_type, n, [1] * dim, [0] * dim, irregular)
+        if not irregular:
+            unit = distort(unit, 0.1 / n)
+        found.append(replace(unit, points=unit.points * shape + origin))
+    return found
+
+
+def check(structure, contact, exact, pressure, *, nodes, tolerance=1e-8):
+    found = pressures(contact)
+    u_error, p_error = displacement_error(structure, exact), np.abs(found / pressure - 1).max()
+    tangential = np.linalg.norm(contact.z[contact.active_set.active], axis=1) - np.abs(found)
+    assert len(found) == nodes
+    assert u_error < tolerance, f"displacement {u_error:.2e}, pressure {p_error:.2e}"
+    assert p_error < tolerance, f"displacement {u_error:.2e}, pressure {p_error:.2e}"
+    assert np.abs(tangential).max() < tolerance * pressure
+
+
+def slave_nodes(contact):
+    return len(contact.nodes.of_surface[0])
+
+
+@pytest.mark.parametrize("slave", ["upper", "lower"])
+@pytest.mark.parametrize(("lower", "upper"), [*zip(CELL_TYPES, CELL_TYPES, strict=True), *MIXED])
+def test_free_sides(lower, upper, slave):
+    dim = dimension(lower)
+    F, pressure, _ = pressed(dim, STRETCH)
+    exact = deformation(F)
+    meshes = bricks(lower, upper)
+    structure, contact, info = press_blocks(*meshes, exact, far="normal", slave=slave, sides=SIDES[: dim - 1])
+    check(structure, contact, exact, pressure, nodes=slave_nodes(contact))
+    assert info.iterations <= 6, info.residuals
+
+
+@pytest.mark.parametrize("cell_type", CELL_TYPES)
+@pytest.mark.parametrize("slave", ["upper", "lower"])
+def test_supports_with_reactions_touch_the_interface(cell_type, slave):
+    """The sides press on their supports: what the supports carry at slave nodes is no contact traction."""
+    dim = dimension(cell_type)
+    F, pressure, _ = pressed(dim, STRETCH, sides_free=False)
+    exact = deformation(F)
+    meshes = bricks(cell_type, cell_type)
+    structure, contact, _ = press_blocks(
+        *meshes, exact, far="normal", slave=slave, sides=ALL_SIDES[: 2 * (dim - 1)]
+    )
+    check(structure, contact, exact, pressure, nodes=slave_nodes(contact))
+
+
+@pytest.mark.parametrize("slave", ["upper", "lower"])
+@pytest.mark.parametrize(("lower", "upper"), [*zip(CELL_TYPES, CELL_TYPES, strict=True), *MIXED])
+def test_turned_anyhow(lower, upper, slave):
+    dim = dimension(lower)
+    turn = rotation(np.random.default_rng(len(lower) + len(upper)), dim)
+    F, pressure, _ = pressed(dim, STRETCH)
+    exact = deformation(F, turn)
+    meshes = [turned(mesh, turn) for mesh in bricks(lower, upper)]
+    structure, contact, _ = press_blocks(*meshes, exact, far="all", slave=slave)
+    check(structure, contact, exact, pressure, nodes=slave_nodes(contact))
+
+
+@pytest.mark.parametrize("cell_type", ["tetra", "tetra10"])
+def test_irregular_triangles(cell_type):
+    F, pressure, _ = pressed(3, STRETCH)
+    exact = deformation(F)
+    structure, contact, _ = press_blocks(
+        *bricks(cell_type, cell_type, irregular=0.15), exact, far="normal", slave="upper", sides=SIDES
+    )
+    check(structure, contact, exact, pressure, nodes=slave_nodes(contact))
+
+
+@pytest.mark.parametrize("cell_type", ["hexahedron", "hexahedron27"])
+def test_irregular_quadrilaterals(cell_type):
+    """The inverse of a bilinear map is no polynomial: no quadrature of finite order is exact on such facets."""
+    F, pressure, _ = pressed(3, STRETCH)
+    exact = deformation(F)
+    structure, contact, _ = press_blocks(
+        *bricks(cell_type, cell_type, irregular=0.15), exact, far="normal", slave="upper", sides=SIDES
+    )
+    check(structure, contact, exact, pressure, nodes=slave_nodes(contact), tolerance=1e-6)
+
+
+@pytest.mark.parametrize("cell_type", ["quad", "triangle", "hexahedron", "quad9", "hexahedron27"])
+@pytest.mark.parametrize("slave", ["upper", "lower"])
+def test_partly_covered_facets(cell_type, slave):
+    """The upper body is narrower; the rest of the interface carries the same load."""
+    dim = dimension(cell_type)
+    F, pressure, load = pressed(dim, STRETCH)
+    exact = deformation(F)
+    width = 0.62
+    structure, contact, _ = press_blocks(
+        *bricks(cell_type, cell_type, width=width, cells=(4, 3)),
+        exact,
+        far="normal",
+        slave=slave,
+        sides=SIDES[: dim - 1],
+        masters_edge=width,
+        load=load,
+    )
+    order = 2 if cell_type[-1] in "79" else 1
+    along = 3 * order + 1 if slave == "upper" else 3 * order + 1
+    check(structure, contact, exact, pressure, nodes=along ** (dim - 1))
