@@ -24,7 +24,7 @@ def choose(method: Method, dim: int, dofs: int) -> Literal["direct", "iterative"
     return method
 
 
-#: Unknowns of a plane problem below which PETSc's own factorisation is as fast as MUMPS or faster, up to 8 times, on one
+#: Unknowns of a plane problem below which PETSc's own factorisation is as fast as MUMPS or up to 8 times faster, on one
 #: process. Nested dissection: by bandwidth a slender body is 1.5 times faster, but a square one 5 times slower.
 SMALL_PLANE = 4_000
 
@@ -42,9 +42,9 @@ def direct_solver(comm, *, dim: int, dofs: int, symmetric: bool) -> PETSc.KSP:
     return ksp
 
 
-#: Smoothed aggregation with a polynomial smoother (SOR breaks down on coarse blocks with more modes than equations). The
-#: hierarchy is built anew for each matrix: a reused one takes 3 times the iterations once bodies have turned, and a resumed
-#: run, which cannot have it, would differ from an uninterrupted one.
+#: Smoothed aggregation with a polynomial smoother; SOR breaks down on coarse blocks with more modes than equations. The
+#: hierarchy is new for each matrix: an old one takes 3 times the iterations once bodies have turned, and a resumed run,
+#: which cannot have it, would differ from an uninterrupted one.
 MULTIGRID = {
     "pc_type": "gamg",
     "pc_gamg_type": "agg",

@@ -31,7 +31,7 @@ solver:
     max_iterations: 20
 """
 MESH = "mesh: {shape: rectangle, size: [2, 1], cells: [4, 2]}"
-SECTIONS = "title, units, time, structure, probes, output, verify, solver"
+SECTIONS = "title, units, time, structure, contact, probes, output, verify, solver"
 SHAPES = "rectangle, disc, ring, box, beam, cylinder, tube, annulus, solid_torus, hollow_torus, hollow_sphere"
 CONSTANTS = "needs two constants, either E and nu, or lambda and mu, or mu and nu"
 

@@ -1,5 +1,6 @@
 """Newton as a generator, and the caller that judges its iterates: on scalar equations with known answers."""
 
+import itertools
 import math
 
 import pytest
@@ -56,7 +57,7 @@ def test_iterates_are_quadratic():
         errors.append(abs(system.x - math.sqrt(2)))
         if iterate.number == 4:
             break
-    for before, after in zip(errors, errors[1:], strict=False):
+    for before, after in itertools.pairwise(errors):
         assert after == pytest.approx(before**2 / (2 * (before + math.sqrt(2))), rel=1e-2, abs=1e-15)
 
 
@@ -77,7 +78,9 @@ def test_line_search():
 
 
 def test_diverged_is_named():
-    with pytest.raises(StepFailed, match=r"scalar: Newton did not converge in 3 iterations \(residual .*\) at iter") as e:
+    with pytest.raises(
+        StepFailed, match=r"scalar: Newton did not converge in 3 iterations \(residual .*\) at iter"
+    ) as e:
         converge(Scalar(lambda x: x * x + 1, lambda x: 2 * x, 0.5), Tolerance(max_iterations=3))
     assert e.value.iteration == 3
     assert len(e.value.history) == 4

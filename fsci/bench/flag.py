@@ -17,7 +17,7 @@ CASE = Path(__file__).parents[2] / "cases" / "csm3"
 REFINE = "structure.bodies.flag.mesh.parameters.refine"
 
 #: (mesh, step [s]) of the accuracy table, the most accurate last
-RUNS = ((1, 0.02), (1, 0.01), (1, 0.005), (1, 0.0025), (2, 0.01), (2, 0.005), (2, 0.0025), (4, 0.0025))
+RUNS = ((1, 0.02), (1, 0.01), (1, 0.005), (1, 0.0025), (2, 0.01), (2, 0.005), (2, 0.0025), (4, 0.005), (4, 0.0025))
 
 
 def run_steps() -> list[Row]:
@@ -44,7 +44,7 @@ def step(refine: int, out: Path) -> Row:
 
 
 def run_accuracy() -> list[Row]:
-    """Deviation of A.y from the most accurate run over the first 2 s, relative to the amplitude, against wall time."""
+    """Two seconds: deviation of A.y from the most accurate run, relative to the amplitude, against wall time."""
     with TemporaryDirectory() as folder:
         found = [(refine, dt, *swing(refine, dt, Path(folder))) for refine, dt in RUNS]
     finest = found[-1][3]
@@ -52,20 +52,19 @@ def run_accuracy() -> list[Row]:
 
 
 def swing(refine: int, dt: float, out: Path) -> tuple[dict[str, Any], dict[str, Any]]:
-    settings = {REFINE: refine, "time.step": dt, "output.fields_every": 0, "output.checkpoint_every": 0}
+    settings = {REFINE: refine, "time.step": dt, "time.end": 2.0, "output.fields_every": 0}
     return run_case(CASE, out, settings), read_history(out / "history.csv")
 
 
 def row(refine: int, dt: float, summary: dict[str, Any], history: dict[str, Any], finest: dict[str, Any]) -> Row:
     time, tip = history["time"], history["A.y"]
-    early = time <= 2.0 + 1e-9
-    reference = finest["A.y"][np.searchsorted(finest["time"], time[early] - 1e-9)]
+    reference = finest["A.y"][np.searchsorted(finest["time"], time - 1e-9)]
     return {
         "cells": f"{35 * refine} x {2 * refine}",
         "step [s]": dt,
         "wall [s]": summary["wall"]["total"],
         "newton": summary["newton"]["total"],
-        "deviation [%]": 100.0 * float(np.abs(tip[early] - reference).max()) / amplitude(time, tip),
+        "deviation [%]": 100.0 * float(np.abs(tip - reference).max()) / amplitude(time, tip),
         "frequency [Hz]": f"{frequency(time, tip):.4f}",
         "amplitude [mm]": f"{1e3 * amplitude(time, tip):.3f}",
         "energy error": float(np.abs(history["structure.energy"]).max() / history["energy.internal"].max()),

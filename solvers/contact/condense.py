@@ -9,6 +9,7 @@ With J the tangent and R the balance without the multipliers' part, the linear s
 
 where w is the weight of the new contact force in the balance. D is diagonal, so that
 z_a = -(J_a du + R_a) / (w D_a) drops out. (M^T z)_a is there only if a slave node is also a master elsewhere.
+Where a support holds a component of a slave node, z has none: the balance there is the support's.
 Source: Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010), sections 4.3 and 4.4.
 """
 
@@ -19,7 +20,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.linalg import splu
 
 from solvers.api import Array
 
@@ -33,7 +33,8 @@ class Linearised:
     normals: Array  #: of the active nodes, shape (m, dim)
     pressure: Array  #: z_n of the active nodes [Pa], shape (m,)
     D: Array  #: of the active nodes, shape (m,)
-    M: sp.csr_matrix  #: of the active nodes, shape (m, N)
+    free: NDArray[np.bool_]  #: components of the active nodes that no support holds, shape (dim * m,)
+    on_master: sp.csr_matrix  #: force on all nodes of unit multipliers, as master (M^T), shape (dim * N, dim * m)
     gap: Array  #: weighted gap of the active nodes, shape (m,)
     scale: Array  #: factor that makes forces of weighted gaps, shape (m,)
     dgap: sp.csr_matrix  #: shape (m, dim * N)
@@ -48,7 +49,7 @@ class Condensed:
     slave_right: Array  #: their right-hand side, shape (dim * m,)
     added_rows: sp.csr_matrix  #: added to the interface rows, shape (dim * N, unknowns)
     added_right: Array  #: added to their right-hand side, shape (dim * N,)
-    inverse: sp.csr_matrix | None  #: of D - M^T among active nodes; None: only D
+    inverse: sp.csr_matrix  #: of D - M^T among the active dofs, shape (dim * m, dim * m)
 
 
 def expand(matrix: sp.csr_matrix, dim: int) -> sp.csr_matrix:
@@ -65,37 +66,49 @@ def condense(terms: Linearised, J: sp.csr_matrix, R: Array, columns: NDArray[np.
     dim = terms.normals.shape[1]
     unknowns = J.shape[1]
     inverse = _inverse(terms, dim)
-    Y = sp.diags(np.repeat(1.0 / terms.D, dim)) @ J if inverse is None else inverse @ J
-    r = R / np.repeat(terms.D, dim) if inverse is None else inverse @ R
+    Y, r = inverse @ J, inverse @ R
 
-    M_T = expand(terms.M, dim).T.tocsr()
     tangential = _tangential(terms.normals)
-    D = sp.diags(np.repeat(terms.D, dim))
+    D = np.repeat(terms.D, dim)
     normal = _block_columns(terms.normals)
-    turning = sp.diags(terms.weight * np.repeat(terms.D * terms.pressure, dim)) @ terms.dnormals
+    turning = sp.diags(terms.weight * D * np.repeat(terms.pressure, dim)) @ terms.dnormals
     closing = normal @ sp.diags(terms.scale) @ terms.dgap
-    rows = tangential @ (D @ Y) + place_columns(turning + closing, columns, unknowns)
-    right = -(tangential @ (np.repeat(terms.D, dim) * r)) - normal @ (terms.scale * terms.gap)
-    return Condensed(rows.tocsr(), right, (M_T @ Y).tocsr(), -(M_T @ r), inverse)
+    rows = tangential @ (sp.diags(D) @ Y) + place_columns(turning + closing, columns, unknowns)
+    right = -(tangential @ (D * r)) - normal @ (terms.scale * terms.gap)
+    rows = rows + _diagonal_of_held(terms, columns, dim, unknowns)
+    return Condensed(rows.tocsr(), right, (terms.on_master @ Y).tocsr(), -(terms.on_master @ r), inverse)
 
 
 def recover(terms: Linearised, condensed: Condensed, J_du_plus_R: Array) -> Array:
     """The multipliers z [Pa] of the active nodes, shape (m, dim), from J_a du + R_a."""
-    dim = terms.normals.shape[1]
-    if condensed.inverse is None:
-        z = J_du_plus_R / np.repeat(terms.D, dim)
-    else:
-        z = condensed.inverse @ J_du_plus_R
-    return -z.reshape(-1, dim) / terms.weight
+    return -(condensed.inverse @ J_du_plus_R).reshape(terms.normals.shape) / terms.weight
 
 
-def _inverse(terms: Linearised, dim: int) -> sp.csr_matrix | None:
-    """(D - M^T)^-1 among the active nodes, if any of them is a master node of another pair."""
-    among = terms.M[:, terms.active]
-    if among.nnz == 0 or not among.data.any():
-        return None
-    B = (sp.diags(terms.D) - among.T).tocsc()
-    return expand(sp.csr_matrix(splu(B).solve(np.eye(len(terms.D)))), dim)
+def _inverse(terms: Linearised, dim: int) -> sp.csr_matrix:
+    """(D - M^T)^-1 among the active dofs, zero for held ones: diagonal but for master nodes of another pair."""
+    D, free = np.repeat(terms.D, dim), terms.free.astype(float)
+    among = (sp.diags(free) @ terms.on_master[_dofs(terms.active, dim)]).tocoo()
+    among.eliminate_zeros()
+    inverse = sp.diags(free / D, format="csr")
+    if among.nnz == 0:
+        return inverse
+    mixed = np.unique(np.concatenate([among.row, among.col]))
+    into = sp.csr_matrix((np.ones(len(mixed)), (mixed, np.arange(len(mixed)))), shape=(len(D), len(mixed)))
+    block = np.linalg.inv(np.diag(D[mixed]) - (into.T @ among @ into).toarray()) * free[mixed]
+    apart = np.ones(len(D))
+    apart[mixed] = 0.0
+    return (sp.diags(apart) @ inverse + into @ sp.csr_matrix(block) @ into.T).tocsr()
+
+
+def _diagonal_of_held(terms: Linearised, columns: NDArray[np.int64], dim: int, unknowns: int) -> sp.csr_matrix:
+    """Entries that the supports overwrite, in rows that are theirs."""
+    dofs = columns[_dofs(terms.active, dim)]
+    held = np.flatnonzero(~terms.free)
+    return sp.csr_matrix((np.ones(len(held)), (held, dofs[held])), shape=(len(dofs), unknowns))
+
+
+def _dofs(nodes: NDArray[np.int64], dim: int) -> NDArray[np.int64]:
+    return (dim * nodes[:, None] + np.arange(dim)).ravel()
 
 
 def _tangential(normals: Array) -> sp.csr_matrix:

@@ -197,19 +197,15 @@ class Contact:
             J, right = basis @ J, basis @ right
         active = self.active_set.active[slaves].repeat(self.dim)
         self._linearised = self._linearise(weight)
-        # where a support holds a slave node, the rest of its balance is the support's reaction, not contact
-        free = ~self.nodes.held.ravel()[place[active]]
-        self._rows, self._right = sp.diags(free.astype(float)) @ J[active], free * right[active]
+        self._rows, self._right = J[active], right[active]
         self._condensed = condense(self._linearised, self._rows, self._right, columns)
-        held = place_columns(sp.identity(len(columns), format="csr")[place[active]], columns, J.shape[1])
-        slave_rows = self._condensed.slave_rows + sp.diags((~free).astype(float)) @ held
         others = np.flatnonzero(self.nodes.deformable.repeat(self.dim))
         others = np.setdiff1d(others, place)
         kept = place[~active]
         return RowChanges(
             replaced=np.concatenate([columns[place[active]], columns[kept]]),
             replaced_rows=sp.vstack(
-                [slave_rows, J[~active] + self._condensed.added_rows[kept]], format="csr"
+                [self._condensed.slave_rows, J[~active] + self._condensed.added_rows[kept]], format="csr"
             ),
             replaced_right=np.concatenate(
                 [self._condensed.slave_right, self._condensed.added_right[kept] - right[~active]]
@@ -237,13 +233,17 @@ class Contact:
         active = np.flatnonzero(self.active_set.active)
         normals = self.terms.normals[active]
         rows = self._dofs_of(active)
+        on_master = expand(self.terms.M[active], self.dim).T.tocsr()
+        if self.transformation is not None:
+            on_master = (self.transformation.T @ on_master).tocsr()
         return Linearised(
             weight=weight,
             active=active,
             normals=normals,
             pressure=np.einsum("nd,nd->n", self.z[active], normals),
             D=self.terms.D[active],
-            M=self.terms.M[active],
+            free=~self.nodes.held[active].ravel(),
+            on_master=on_master,
             gap=self.terms.gap[active],
             scale=self._scale[active],
             dgap=self.terms.dgap[active],

@@ -1,0 +1,158 @@
+"""The active set, and Newton with it: quadratic convergence, and a result that does not depend on c_n."""
+
+import numpy as np
+import pytest
+from contact_setup import make_body, make_contact, solve_step
+
+from fsci import shapes
+from solvers.api import StepFailed
+from solvers.contact.active_set import MAX_RETURNS, ActiveSet
+from solvers.contact.surface import Surface
+from solvers.newton import Tolerance
+from solvers.structure.body import Support
+from solvers.structure.field import SolverSettings
+
+ONE = np.ones(3)
+ALL = np.ones(3, dtype=bool)
+C_N = (1e-2, 1e-1, 1.0, 1e1, 1e2)
+
+
+def update(active_set, pressure, gap, covered=ALL):
+    active_set.update(np.array(pressure, dtype=float), np.array(gap, dtype=float), ONE, covered)
+    return active_set.active.tolist()
+
+
+def test_pressed_or_overlapping_nodes_are_active():
+    active_set = ActiveSet(3)
+    assert update(active_set, [1, 0, -1], [0, -1, 0]) == [True, True, False]
+    assert update(active_set, [1, 1, -1], [2, 0.5, -2]) == [False, True, True]
+
+
+def test_c_n_and_stiffness_weigh_gap_against_pressure():
+    assert update(ActiveSet(3, c_n=10.0), [1, 1, 1], [0.05, 0.11, 0.2]) == [True, False, False]
+    active_set = ActiveSet(3)
+    active_set.update(ONE, 0.5 * ONE, np.array([1.0, 1.9, 2.1]), ALL)
+    assert active_set.active.tolist() == [True, True, False]
+
+
+def test_nodes_that_see_no_master_are_never_active():
+    assert update(ActiveSet(3), [1, 1, 1], [-1, -1, -1], np.array([True, False, True])) == [True, False, True]
+
+
+def test_changes_are_counted_within_a_step():
+    active_set = ActiveSet(3)
+    active_set.begin_step()
+    for pressure, changed, changes in (([1, 0, 0], True, 1), ([1, 0, 0], False, 1), ([1, 1, 0], True, 2)):
+        update(active_set, pressure, [0, 0, 0])
+        assert (active_set.changed, active_set.changes) == (changed, changes)
+    active_set.begin_step()
+    assert (active_set.changed, active_set.changes) == (False, 0)
+    assert active_set.active.tolist() == [True, True, False]
+    active_set.clear()
+    assert active_set.changed
+    assert not active_set.active.any()
+
+
+def flip(active_set, times):
+    for i in range(times):
+        update(active_set, [1, i % 2, i % 2], [0, 0, 0])
+
+
+def test_going_in_circles_is_reported():
+    active_set = ActiveSet(3)
+    active_set.begin_step()
+    with pytest.raises(StepFailed) as caught:
+        flip(active_set, 100)
+    assert "contact: the active set goes in circles: 2 nodes cannot decide" in str(caught.value)
+    assert caught.value.field == "contact"
+
+
+def test_a_new_step_forgets_the_circles():
+    active_set = ActiveSet(3)
+    for _ in range(5):
+        active_set.begin_step()
+        flip(active_set, MAX_RETURNS)
+
+
+def test_growing_is_no_circle():
+    active_set = ActiveSet(100)
+    active_set.begin_step()
+    none = np.zeros(100)
+    for n in range(100):
+        active_set.update(np.where(np.arange(100) <= n, 1.0, -1.0), none, none, np.ones(100, dtype=bool))
+    assert active_set.changes == 100
+
+
+# ------------------------------------------------------------------------------------------ Newton with the active set
+
+SHAPES = {
+    "ring": lambda: shapes.ring(0.5, 1, [32, 3]),
+    "ring, second order": lambda: shapes.ring(0.5, 1, [24, 2], order=2, cell="tri"),
+    "sphere": lambda: shapes.hollow_sphere(0.5, 1, [6, 2]),
+    "sphere, second order": lambda: shapes.hollow_sphere(0.5, 1, [4, 1], order=2, cell="tet"),
+}
+
+
+def lowered(dim, depth):
+    still = (lambda x, t: np.zeros(x.shape[1]),) * (dim - 1)
+    return Support("inner", (*still, lambda x, t: np.full(x.shape[1], -depth * t)))
+
+
+def plane(dim, height):
+    """A rigid plane that looks up."""
+    if dim == 2:
+        return Surface("plane", np.array([[3.0, height], [-3.0, height]]), np.array([[0, 1]]), "line", None)
+    points = np.array([[-3.0, -3, height], [3, -3, height], [3, 3, height], [-3, 3, height]])
+    return Surface("plane", points, np.array([[0, 1, 2, 3]]), "quad", None)
+
+
+def press(mesh, target, *, depth=0.1, c_n=1.0):
+    """From a gap of 0.02 to an indentation of 0.08 in one step; `target` is a rigid surface or a block."""
+    settings = SolverSettings(Tolerance(residual=1e-13), linear="direct")
+    bodies, master = [make_body("ball", mesh, supports=[lowered(mesh.points.shape[1], depth)])], target
+    if not isinstance(target, Surface):
+        still = (lambda x, t: np.zeros(x.shape[1]),) * mesh.points.shape[1]
+        bodies.append(make_body("block", target, supports=[Support("bottom", still)]))
+        master = ("block", "top")
+    structure, contact = make_contact(bodies, [(("ball", "outer"), master)], settings=settings, c_n=c_n)
+    info = solve_step(structure)
+    return structure, contact, info
+
+
+def assert_quadratic(residuals):
+    """r'/r^2 does not grow over the last residuals that rounding does not blur; linear convergence by q has 1/q."""
+    *_, first, second, third = (r for r in residuals[1:] if r > 1e-13 * max(residuals))
+    growth = (third / second**2) / (second / first**2)
+    assert third < 1e-3 * second
+    assert growth < 10, f"{growth:.2g} of {residuals}"
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_quadratic_convergence_on_a_rigid_plane(name):
+    mesh = SHAPES[name]()
+    _, contact, info = press(mesh, plane(mesh.points.shape[1], -1.02))
+    assert contact.active_set.active.sum() >= 3
+    assert info.iterations <= 7, info.residuals
+    assert_quadratic(info.residuals)
+
+
+@pytest.mark.parametrize("cell", ["hex", "tet"])
+def test_quadratic_convergence_on_a_block(cell):
+    block = shapes.box([2, 2, 1], [5, 5, 2], [-1, -1, -2.02], cell=cell)
+    _, contact, info = press(SHAPES["sphere"](), block, depth=0.2)
+    assert contact.active_set.active.sum() >= 3
+    assert info.iterations <= 7, info.residuals
+    assert_quadratic(info.residuals)
+
+
+@pytest.mark.parametrize("name", ["ring", "sphere, second order"])
+def test_result_does_not_depend_on_c_n(name):
+    mesh = SHAPES[name]()
+    found = {c_n: press(mesh, plane(mesh.points.shape[1], -1.02), c_n=c_n) for c_n in C_N}
+    counts = {c_n: info.iterations for c_n, (_, _, info) in found.items()}
+    (reference, contact, _) = found[1.0]
+    for c_n, (structure, other, _) in found.items():
+        error = np.abs(structure.now.u - reference.now.u).max() / np.abs(reference.now.u).max()
+        assert error < 1e-9, f"c_n = {c_n}: {error:.1e}; Newton steps {counts}"
+        assert np.abs(other.z - contact.z).max() < 1e-9 * np.abs(contact.z).max(), f"Newton steps {counts}"
+    assert max(counts.values()) <= 8, f"Newton steps {counts}"

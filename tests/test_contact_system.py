@@ -1,0 +1,218 @@
+"""The condensed Newton step is that of the saddle-point system, and that one is the derivative of the residual."""
+
+import numpy as np
+import pytest
+from contact_setup import brick, make_body, make_contact
+
+from solvers.contact.surface import Surface
+from solvers.structure.body import Support
+from solvers.structure.time import Dynamics, Statics
+from solvers.time import GeneralisedAlpha
+
+OVERLAP = 0.03
+MIXED = [
+    ("quad", "triangle"),
+    ("quad9", "triangle6"),
+    ("hexahedron", "hexahedron"),
+    ("tetra", "hexahedron"),
+    ("tetra10", "tetra10"),
+    ("hexahedron27", "tetra10"),
+]
+
+
+def zero(x, t):
+    return np.zeros(x.shape[1])
+
+
+def box(cell_type, cells, size, origin):
+    return brick(cell_type, cells, size, origin, irregular=0.15)
+
+
+def dynamics():
+    return Dynamics(GeneralisedAlpha.from_rho_inf(0.6))
+
+
+def two_bodies(lower, upper, *, slave="upper", time=None, held=False):
+    """A smaller block pressed into a larger one, which may be held also where they touch."""
+    dim = 2 if lower[:4] in ("quad", "tria") else 3
+    one, half = [1.0] * (dim - 1), [0.7] * (dim - 1)
+    supports = [Support("left", (zero, *[None] * (dim - 1)))] if held else []
+    bodies = [
+        make_body("lower", box(lower, 2, [*one, 0.5], [0.0] * dim), supports=supports),
+        make_body("upper", box(upper, 2, [*half, 0.5], [0.0] * (dim - 1) + [0.5 - OVERLAP]), supports=supports),
+    ]
+    near = [("upper", "bottom"), ("lower", "top")]
+    return make_contact(bodies, [tuple(near if slave == "upper" else near[::-1])], time=time or dynamics())
+
+
+def stack(middle_is):
+    """Three blocks; the middle one is slave below and master above, or the other way round."""
+    names = ("lower", "middle", "upper")
+    bodies = [
+        make_body(name, box("hexahedron", n, [1, 1, 0.5], [0, 0, i * (0.5 - OVERLAP)]))
+        for i, (name, n) in enumerate(zip(names, (2, 3, 2), strict=True))
+    ]
+    below, above = (("middle", "bottom"), ("lower", "top")), (("upper", "bottom"), ("middle", "top"))
+    if middle_is == "master below":
+        below, above = below[::-1], above[::-1]
+    return make_contact(bodies, [below, above], time=dynamics())
+
+
+def bridge(left="hexahedron", upper="hexahedron", *, held=False):
+    """One block on two others: its lower side is master of the left one and slave on the right one."""
+    supports = [Support("front", (None, zero, None))] if held else []
+    bodies = [
+        make_body("left", box(left, 2, [0.6, 1, 0.5], [-0.1, 0, 0]), supports=supports),
+        make_body("right", box("hexahedron", 2, [0.6, 1, 0.5], [0.5, 0, 0]), supports=supports),
+        make_body("upper", box(upper, 3, [1, 1, 0.5], [0, 0, 0.5 - OVERLAP]), supports=supports),
+    ]
+    pairs = [(("left", "top"), ("upper", "bottom")), (("upper", "bottom"), ("right", "top"))]
+    return make_contact(bodies, pairs, time=dynamics())
+
+
+def on_obstacle(cell_type):
+    """A block on a rigid moving plane, static: only contact and the support on top hold it."""
+    mesh = box(cell_type, 2, [1, 1, 0.5], [0, 0, -OVERLAP])
+    body = make_body("block", mesh, supports=[Support("top", (zero, zero, zero))])
+    points = np.array([[-0.3, -0.3, 0], [1.3, -0.3, 0], [1.3, 1.3, 0], [-0.3, 1.3, 0]])
+    plane = Surface(
+        "plane", points, np.array([[0, 1, 2, 3]]), "quad", None, motion=lambda t: points + 0.1 * t * np.eye(3)[2]
+    )
+    return make_contact([body], [(("block", "bottom"), plane)], time=Statics())
+
+
+STATES = {
+    **{f"{a}-{b}-{s}": (lambda a=a, b=b, s=s: two_bodies(a, b, slave=s)) for a, b in MIXED for s in ("upper", "lower")},
+    "held": lambda: two_bodies("hexahedron", "hexahedron", held=True),
+    "held-tri6": lambda: two_bodies("hexahedron27", "tetra10", held=True),
+    "middle slave below": lambda: stack("slave below"),
+    "middle master below": lambda: stack("master below"),
+    "slave and master at once": bridge,
+    "slave and master at once, held": lambda: bridge(held=True),
+    "slave and master at once, tri6": lambda: bridge(left="tetra10"),
+    "slave and master at once, tri6 master": lambda: bridge(upper="tetra10"),
+    "obstacle": lambda: on_obstacle("hexahedron"),
+    "obstacle-tri6": lambda: on_obstacle("tetra10"),
+}
+
+
+def prepare(make, seed=5):
+    """A random state in the middle of a step, with oblique multipliers. (structure, contact, random numbers)"""
+    structure, contact = make()
+    rng = np.random.default_rng(seed)
+    structure.initialise(0.0, 0.1)
+    structure.begin_step(0.0, 0.1)
+    structure.now.u[:] = rng.uniform(-0.01, 0.01, structure.layout.size)
+    structure.now.u[structure.prescribed] = structure._target
+    structure.residual()
+    contact.z[:] = 30.0 * contact.terms.normals + rng.uniform(-5.0, 5.0, contact.z.shape)
+    contact.z[contact.nodes.held] = 0.0
+    for _ in range(2):  # the first one takes the multipliers of inactive nodes away
+        structure.residual()
+    assert contact.active_set.active.sum() >= 3
+    return structure, contact, rng
+
+
+class Linearisation:
+    """Dense derivatives of balance, gap and tangential rows with respect to displacements and active multipliers."""
+
+    def __init__(self, structure, contact):
+        terms, dim = contact.terms, contact.dim
+        self.active = np.flatnonzero(contact.active_set.active)
+        weight, n = structure.time.constraint_weight, contact.size * dim
+        rows = (dim * self.active[:, None] + np.arange(dim)).ravel()
+        indptr, indices, data = structure.tangent().getValuesCSR()
+        size = len(indptr) - 1
+        tangent = np.zeros((size, size))
+        np.add.at(tangent, (np.repeat(np.arange(size), np.diff(indptr)), indices), data)
+
+        dofs = contact.nodes.dofs.ravel()
+        place = np.zeros((n, size))
+        place[np.flatnonzero(dofs >= 0), dofs[dofs >= 0]] = 1.0
+        slave_force = -np.diag(np.repeat(terms.D, dim))
+        if contact.transformation is not None:
+            slave_force = np.linalg.solve(contact.transformation.toarray().T, slave_force)
+        force = slave_force + np.kron(terms.M.toarray().T, np.eye(dim))
+
+        normals = terms.normals[self.active]
+        self.tangents = np.array([np.linalg.svd(normal[None])[2][1:] for normal in normals])  # (m, dim - 1, dim)
+        m = len(self.active)
+        along = np.zeros((m * (dim - 1), m * dim))
+        for i in range(m):
+            along[i * (dim - 1) : (i + 1) * (dim - 1), i * dim : (i + 1) * dim] = self.tangents[i]
+        z_n = np.einsum("nd,nd->n", contact.z[self.active], normals)
+
+        self.balance_u = tangent - weight * place.T @ terms.dforce.toarray() @ place
+        self.balance_z = -weight * place.T @ force[:, rows]
+        self.gap_u = terms.dgap.toarray()[self.active] @ place
+        self.oblique_u = -along @ (np.repeat(z_n, dim)[:, None] * terms.dnormals.toarray()[rows]) @ place
+        self.oblique_z = along
+
+
+def compare(found, wanted, tolerance):
+    error = np.abs(found - wanted).max() / np.abs(wanted).max()
+    assert error < tolerance, f"{error:.2e}"
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_condensed_step_is_that_of_the_saddle_point_system(name):
+    structure, contact, _ = prepare(STATES[name])
+    if name.startswith("slave and master"):
+        active = np.flatnonzero(contact.active_set.active)
+        assert contact.terms.M[active][:, active].nnz > 0
+    L = Linearisation(structure, contact)
+    m, size = len(L.active), structure.layout.size
+    force = np.zeros(size)
+    dofs = contact.nodes.dofs.ravel()
+    np.add.at(force, dofs[dofs >= 0], contact.force().ravel()[dofs >= 0])
+    without = structure.residual_force + structure.time.constraint_weight * force
+
+    matrix = np.block(
+        [
+            [L.balance_u, L.balance_z],
+            [L.gap_u, np.zeros((m, m * contact.dim))],
+            [L.oblique_u, L.oblique_z],
+        ]
+    )
+    right = np.concatenate([-without, -contact.terms.gap[L.active], np.zeros(len(L.oblique_u))])
+    held = structure.prescribed
+    matrix[held] = 0.0
+    matrix[held, held] = 1.0
+    right[held] = structure._target - structure.now.u[held]
+    # rows and columns of equal size, so that the dense solution is accurate
+    columns = 1.0 / np.abs(matrix).max(axis=0)
+    rows = 1.0 / np.abs(matrix * columns).max(axis=1)
+    solution = columns * np.linalg.solve(rows[:, None] * matrix * columns, rows * right)
+
+    structure.advance()
+    compare(structure._increment, solution[:size], 1e-10)
+    compare(contact.z[L.active].ravel(), solution[size:], 1e-10)
+
+
+@pytest.mark.parametrize("name", STATES)
+def test_linearisation_is_the_derivative_of_the_residual(name):
+    structure, contact, rng = prepare(STATES[name])
+    L = Linearisation(structure, contact)
+    u, z = structure.now.u.copy(), contact.z.copy()
+    du, dz = rng.uniform(-1, 1, u.shape), 1e3 * rng.uniform(-1, 1, (len(L.active), contact.dim))
+
+    def residual(step):
+        structure.now.u[:] = u + step * du
+        contact.z[:] = z
+        contact.z[L.active] += step * dz
+        structure.residual()
+        assert np.array_equal(np.flatnonzero(contact.active_set.active), L.active)
+        now, normals = contact.z[L.active], contact.terms.normals[L.active]
+        oblique = now - np.einsum("nd,nd->n", now, normals)[:, None] * normals
+        along = np.einsum("mtd,md->mt", L.tangents, oblique).ravel()
+        return structure.residual_force.copy(), contact.terms.gap[L.active].copy(), along
+
+    step = 1e-6
+    ahead, behind = residual(step), residual(-step)
+    difference = [(a - b) / (2 * step) for a, b in zip(ahead, behind, strict=True)]
+    compare(L.balance_u @ du + L.balance_z @ dz.ravel(), difference[0], 1e-6)
+    compare(L.gap_u @ du, difference[1], 1e-6)
+    compare(L.oblique_u @ du + L.oblique_z @ dz.ravel(), difference[2], 1e-6)
+    # the contact part alone: it must not hide behind the stiffness of the bodies
+    contact_part = L.balance_z @ dz.ravel()
+    assert np.abs(contact_part).max() > 1e-4 * np.abs(difference[0]).max()
