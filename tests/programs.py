@@ -21,10 +21,10 @@ def command(*arguments, processes: int = 1) -> list[str]:
     return [*launcher, sys.executable, "-m", "fsci", *map(str, arguments)]
 
 
-def fsci(*arguments, processes: int = 1) -> subprocess.CompletedProcess[str]:
+def fsci(*arguments, processes: int = 1, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
     """Run `fsci` to its end."""
     return subprocess.run(
-        command(*arguments, processes=processes), capture_output=True, text=True, env=ENVIRONMENT, timeout=120
+        command(*arguments, processes=processes), capture_output=True, text=True, env=ENVIRONMENT, timeout=timeout
     )
 
 
