@@ -204,7 +204,7 @@ def draw_balances(folder: Path) -> None:
         for axis, colour in zip("xyz", COLOURS, strict=False):
             change = np.abs(history[f"momentum.{axis}"] - history[f"momentum.{axis}"][0]) / np.abs(momentum[0])
             right.semilogy(time, np.maximum(change, 1e-18), color=colour, label=axis)
-        right.set(title="relative change of momentum", xlabel="t [s]")
+        right.set(title="change of momentum", xlabel="t [s]")
         right.legend()
         save(figure, "two_tori_energy")
 

@@ -58,12 +58,14 @@ class Clock:
             self.accepted = 0
 
     def halve(self) -> bool:
-        """Halve the present step; False if that has been done often enough."""
-        if self.level == self.halvings:
-            return False
-        self.level += 1
-        self.accepted = 0
-        return True
+        """Halve the present step, more than once if little is left to the end; False if it cannot be made shorter."""
+        before = self.dt
+        while self.level < self.halvings:
+            self.level += 1
+            self.accepted = 0
+            if self.dt < before:
+                return True
+        return False
 
     def save(self) -> State:
         return {"tick": self.tick, "level": self.level, "accepted": self.accepted, "step": self.step}

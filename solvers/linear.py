@@ -42,41 +42,49 @@ def direct_solver(comm, *, dim: int, dofs: int, symmetric: bool) -> PETSc.KSP:
     return ksp
 
 
-#: Smoothed aggregation with a polynomial smoother; SOR breaks down on coarse blocks with more modes than equations. The
-#: hierarchy is new for each matrix: an old one takes 3 times the iterations once bodies have turned, and a resumed run,
-#: which cannot have it, would differ from an uninterrupted one.
+#: Smoothed aggregation with a polynomial smoother; SOR breaks down on coarse blocks with more modes than equations.
 MULTIGRID = {
     "pc_type": "gamg",
     "pc_gamg_type": "agg",
     "pc_gamg_threshold": 0.04,
-    "pc_gamg_reuse_interpolation": False,
     "mg_levels_ksp_type": "chebyshev",
     "mg_levels_ksp_max_it": 2,
     "mg_levels_pc_type": "jacobi",
 }
 
 
-def elastic_solver(comm, *, symmetric: bool, tolerance: float) -> PETSc.KSP:
-    """CG (GMRES if not symmetric) with algebraic multigrid until |b - A x| < tolerance |b|.
+def elastic_solver(comm, *, tolerance: float) -> PETSc.KSP:
+    """GMRES with algebraic multigrid until |b - A x| < tolerance |b|; the matrix carries the rigid-body modes.
 
-    The matrix carries the rigid-body modes (`solvers.structure.rigid_modes`).
+    Not CG: an iterate of Newton's method that went too far may have an indefinite tangent.
     """
     ksp = PETSc.KSP().create(comm)
-    ksp.setOptionsPrefix("elastic_")
-    options = PETSc.Options("elastic_")
-    for name, value in MULTIGRID.items():
-        options[name] = value
-    ksp.setFromOptions()
-    ksp.setType(PETSc.KSP.Type.CG if symmetric else PETSc.KSP.Type.GMRES)
-    ksp.setPCSide(PETSc.PC.Side.LEFT if symmetric else PETSc.PC.Side.RIGHT)
-    ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
+    ksp.setType(PETSc.KSP.Type.GMRES)
+    ksp.setPCSide(PETSc.PC.Side.RIGHT)
     ksp.setGMRESRestart(100)
     ksp.setTolerances(rtol=tolerance, max_it=500)
     return ksp
 
 
+def _multigrid(comm) -> PETSc.PC:
+    """A hierarchy for one matrix.
+
+    An old one takes 3 times the iterations once bodies have turned (PETSc keeps the modes that it saw first), and a
+    resumed run does not have it.
+    """
+    options = PETSc.Options("elastic_")
+    for name, value in MULTIGRID.items():
+        options[name] = value
+    preconditioner = PETSc.PC().create(comm)
+    preconditioner.setOptionsPrefix("elastic_")
+    preconditioner.setFromOptions()
+    return preconditioner
+
+
 def solve(ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
     """Solve matrix x = b with a freshly assembled matrix. Raises LinearSolveFailed."""
+    if ksp.getType() != PETSc.KSP.Type.PREONLY:
+        ksp.setPC(_multigrid(ksp.comm))
     ksp.setOperators(matrix)
     ksp.solve(b, x)
     reason = ksp.getConvergedReason()

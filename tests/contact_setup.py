@@ -23,7 +23,7 @@ from solvers.structure.field import SolverSettings, Structure
 from solvers.structure.materials import NeoHooke
 from solvers.structure.time import Statics
 
-SETTINGS = SolverSettings(Tolerance(residual=1e-12, max_iterations=15), linear="direct")
+SETTINGS = SolverSettings(Tolerance(residual=1e-11, residual_absolute=1e-11, max_iterations=15), linear="direct")
 MATERIAL = NeoHooke(mu=400.0, lmbda=600.0, density=1.0)
 
 

@@ -21,6 +21,9 @@ from solvers.rows import RowChanges
 #: Share of a slave node's area that must see a master.
 LEAST_COVERED = 0.02
 
+#: Gap, as a share of the extent of all surfaces, up to which nodes without pressure touch: rounding of positions.
+TOUCHING = 1e-12
+
 
 @dataclass(frozen=True)
 class Terms:
@@ -58,6 +61,7 @@ class Contact:
         self.active_set = ActiveSet(self.size, c_n)
         self._areas = self._nodal_areas()
         self._scale = np.zeros(self.size)
+        self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
         self._shares = Shares(comm)
         self.terms: Terms | None = None
         self._columns = [_columns(sides, self.dim) for sides in self._sides]
@@ -115,8 +119,10 @@ class Contact:
             covered = self._covered(self.terms) & ~self.nodes.held.all(axis=1)
             mean_gap = np.divide(self.terms.gap, self.terms.D, out=np.ones(self.size), where=covered)
             pressure = np.einsum("nd,nd->n", self.z, self.terms.normals)
-            self.active_set.update(pressure, mean_gap, self._scale, covered)
+            self.active_set.update(pressure, mean_gap - self._touching, self._scale, covered)
         self.z[~self.active_set.active] = 0.0
+        for pair in self.pairs:
+            pair.freeze(self.settled)
 
     def _covered(self, terms: Terms) -> NDArray[np.bool_]:
         """Nodes that see enough of a master for a constraint: less is a sliver that comes and goes."""

@@ -17,8 +17,8 @@ from solvers.kernels import basis_transformation, mortar, nodal_normals
 #: Slave facets take part when a master is nearer than this share of the longest edge (and the motion of the step).
 NEAR = 0.3
 
-#: Evaluations of a step after which the facet pairs stay what they are.
-FREEZE_AFTER = 4
+#: Evaluations of a step after which the facet pairs may stay what they are: the last number even if the active set moves.
+FREEZE_AFTER, FREEZE_AT_LAST = 4, 9
 
 Integration = Literal["segments", "elements"]
 
@@ -54,6 +54,11 @@ class Pair:
         self._edge = _longest_edge(slave)
         self.begin_step()
 
+    def freeze(self, settled: bool) -> None:
+        """From some evaluation on, when the active set has settled, the facet pairs in use stay the ones in use."""
+        if self._frozen is None and self._evaluations >= (FREEZE_AFTER if settled else FREEZE_AT_LAST):
+            self._frozen = self._used
+
     @property
     def frozen(self) -> bool:
         """The facet pairs stay what they are until the next step; each process has its share of them."""
@@ -63,6 +68,7 @@ class Pair:
         """Facet pairs are chosen anew."""
         self._evaluations = 0
         self._frozen: NDArray[np.int32] | None = None
+        self._used = np.empty((0, 2), dtype=np.int32)
 
     def _admission(self, motion: float) -> dict[str, float]:
         """Which facets see each other: hard decisions, which must not change under Newton's last iterates."""
@@ -96,8 +102,7 @@ class Pair:
             **self._admission(motion),
         )
         self._evaluations += 1
-        if self._evaluations == FREEZE_AFTER:
-            self._frozen = np.ascontiguousarray(facet_pairs[result.used.astype(bool)])
+        self._used = np.ascontiguousarray(facet_pairs[result.used.astype(bool)])
         columns = dim * (ns + nm)
         dn = sp.csr_matrix(slopes, shape=(dim * ns, dim * ns))
 

@@ -23,7 +23,7 @@ class Shares:
 
     def mine(self, pair: int, facet_pairs: NDArray[np.int32], facets: int) -> NDArray[np.int32]:
         """The facet pairs that this process integrates; all pairs of a slave facet stay together."""
-        if self.comm.size == 1:
+        if self.comm.size == 1 or len(facet_pairs) == 0:
             return facet_pairs
         met = self._met.get(pair, np.ones(facets, dtype=bool))
         cost = np.cumsum(np.where(met[facet_pairs[:, 0]], OVERLAP_COST, 1.0))

@@ -92,7 +92,7 @@ class Structure:
 
     def _linear_solver(self, *, symmetric: bool) -> PETSc.KSP:
         if self._iterative:
-            return linear.elastic_solver(self.comm, symmetric=symmetric, tolerance=self.settings.linear_tolerance)
+            return linear.elastic_solver(self.comm, tolerance=self.settings.linear_tolerance)
         return linear.direct_solver(self.comm, dim=self.dim, dofs=self.dofs(), symmetric=symmetric)
 
     def dofs(self) -> int:

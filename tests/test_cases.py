@@ -1,0 +1,49 @@
+"""Every case in cases/: the first steps on 1 and 2 processes, and whole runs of those with published numbers."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from programs import fsci
+
+from fsci.case import load_case
+from fsci.history import read_history
+
+CASES = sorted(path.parent for path in Path("cases").glob("*/case.yaml"))
+
+
+@pytest.mark.parametrize("folder", CASES, ids=lambda folder: folder.name)
+def test_first_steps(folder, tmp_path):
+    """Three steps; probes, forces and balances of 1 and 2 processes agree."""
+    time = load_case(folder / "case.yaml").time
+    end = min(time.end, time.start + 3 * time.step)
+    short = ["--set", f"time.end={end!r}", "--set", "verify=[]"]
+    histories = []
+    for processes in (1, 2):
+        out = tmp_path / str(processes)
+        run = fsci("run", folder, "-o", out, *short, processes=processes, timeout=600)
+        assert run.returncode == 0, run.stdout + run.stderr
+        histories.append(read_history(out / "history.csv"))
+    one, two = histories
+    assert len(one["step"]) == min(3, round((time.end - time.start) / time.step))
+    sizes = {name: np.abs(values).max() for name, values in one.items()}
+    for name in one.keys() - {"wall", "residual", "structure.energy", "iterations"}:
+        # components of one vector are measured against the largest of them
+        size = max(s for other, s in sizes.items() if other.partition(".")[0] == name.partition(".")[0])
+        assert np.abs(one[name] - two[name]).max() <= 1e-8 * size + 1e-12, name
+
+
+@pytest.mark.parametrize("name", ["csm1", "csm2", "csm3"])
+def test_turek_hron(name, tmp_path):
+    """The published numbers, as the case itself verifies them."""
+    run = fsci("run", f"cases/{name}", "-o", tmp_path, "--set", "output.fields_every=0", timeout=600)
+    assert run.returncode == 0, run.stdout[-3000:]
+    assert "verify ok" in run.stdout
+    assert "MISSED" not in run.stdout
+
+
+def test_every_case_is_documented():
+    for folder in CASES:
+        text = (folder / "README.md").read_text()
+        assert text.startswith("# "), folder
+        assert f"fsci run cases/{folder.name}" in text, folder

@@ -1,0 +1,214 @@
+"""Linear solvers: multigrid with rigid-body modes gives what the factorisation gives, at a cost that hardly grows."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
+from programs import fsci
+from structure_setup import constant, load_step, make_structure, vector
+
+from fsci import shapes
+from fsci.history import read_history
+from solvers import fem, linear
+from solvers.newton import Tolerance
+from solvers.structure.body import Body, BodySettings, Pressure, Support, Traction
+from solvers.structure.field import SolverSettings, Structure
+from solvers.structure.materials import NeoHooke
+from solvers.structure.rigid_modes import attach_rigid_modes
+from solvers.structure.time import Statics
+
+LIMIT = 60  #: iterations to a residual of 1e-8
+
+
+def held(on="left", *, dim=3):
+    return Support(on, vector(*[0] * dim))
+
+
+def cantilever(mesh, method, **loads):
+    settings = SolverSettings(Tolerance(residual=1e-10), linear=method)
+    loads = loads or {"tractions": [Traction("right", vector(0, 0, -4))]}
+    return make_structure(mesh, NeoHooke(400.0, 600.0), settings=settings, supports=[held()], **loads)
+
+
+def iterations(structure):
+    return structure._ksp.getIterationNumber()
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        shapes.box((4, 1, 1), (12, 3, 3)),
+        shapes.box((4, 1, 1), (8, 2, 2), order=2),
+        shapes.box((4, 1, 1), (12, 3, 3), cell="tet"),
+        shapes.box((4, 1, 1), (8, 2, 2), order=2, cell="tet"),
+    ],
+    ids=["hex8", "hex27", "tet4", "tet10"],
+)
+def test_iterative_equals_direct(mesh):
+    direct, iterative = (cantilever(mesh, method) for method in ("direct", "iterative"))
+    steps = [load_step(structure).iterations for structure in (direct, iterative)]
+    assert steps[0] == steps[1]
+    assert direct._ksp.getPC().getType() != iterative._ksp.getPC().getType() == "gamg"
+    size = np.abs(direct.now.u).max()
+    assert size > 0.3
+    assert np.abs(iterative.now.u - direct.now.u).max() < 1e-6 * size
+    assert iterations(iterative) < LIMIT
+
+
+def test_unsymmetric_system():
+    """A follower pressure."""
+    loads = {"pressures": [Pressure("top", constant(3.0))]}
+    direct, iterative = (
+        cantilever(shapes.box((4, 1, 1), (12, 3, 3)), method, **loads) for method in ("direct", "iterative")
+    )
+    for structure in (direct, iterative):
+        load_step(structure)
+    assert np.abs(iterative.now.u - direct.now.u).max() < 1e-6 * np.abs(direct.now.u).max()
+    assert iterations(iterative) < LIMIT
+
+
+def solve_once(structure):
+    """The first Newton step of a load."""
+    structure.initialise(0.0, 1.0)
+    structure.begin_step(0.0, 1.0)
+    structure.residual()
+    structure.advance()
+    return iterations(structure)
+
+
+def test_iterations_hardly_grow():
+    """From 3,000 to 50,000 unknowns."""
+    counts = [solve_once(cantilever(shapes.box((4, 1, 1), (4 * n, n, n)), "iterative")) for n in (6, 10, 15)]
+    assert max(counts) < 30
+    assert max(counts) <= 1.5 * min(counts)
+
+
+def test_rigid_modes_are_needed():
+    """With translations only, as constant vectors, it takes more: rotations make the difference."""
+    structure = cantilever(shapes.box((4, 1, 1), (24, 6, 6)), "iterative")
+    with_rotations = solve_once(structure)
+    structure = cantilever(shapes.box((4, 1, 1), (24, 6, 6)), "iterative")
+    structure.initialise(0.0, 1.0)
+    structure.begin_step(0.0, 1.0)
+    structure.residual()
+    matrix, x = structure.tangent(), structure.layout.vector()
+    structure._b.array[:] = -structure.residual_force
+    matrix.zeroRowsColumns(structure.prescribed.astype(PETSc.IntType), 1.0, x, structure._b)
+    matrix.setNearNullSpace(PETSc.NullSpace().create(vectors=translations(structure)))
+    linear.solve(structure._ksp, matrix, structure._b, x)
+    assert iterations(structure) > 1.5 * with_rotations
+
+
+def test_indefinite_tangent():
+    """A load step so large that Newton overshoots into unstable states, where the tangent has negative eigenvalues."""
+    loads = {"tractions": [Traction("right", vector(0, 0, -8))]}
+    direct, iterative = (
+        cantilever(shapes.box((4, 1, 1), (8, 2, 2)), method, **loads) for method in ("direct", "iterative")
+    )
+    assert load_step(direct).iterations == load_step(iterative).iterations
+    assert np.abs(iterative.now.u - direct.now.u).max() < 1e-6 * np.abs(direct.now.u).max()
+
+
+def translations(structure):
+    vectors = []
+    for axis in range(structure.dim):
+        vectors.append(structure.layout.vector())
+        vectors[-1].array[axis :: structure.dim] = 1.0
+        vectors[-1].normalize()
+    return vectors
+
+
+def test_modes_are_rigid_motions():
+    """The stiffness of a free body at rest does no work on them."""
+    mesh = shapes.box((2, 1, 1), (3, 2, 2), origin=(5, -3, 2))
+    structure = make_structure(mesh, NeoHooke(400.0, 600.0))
+    load_step(structure)
+    matrix = structure.tangent()
+    attach_rigid_modes(matrix, structure.bodies, structure.now.u)
+    modes = matrix.getNearNullSpace().getVecs()
+    assert len(modes) == 6
+    y = structure.layout.vector()
+    for mode in modes:
+        matrix.mult(mode, y)
+        assert y.norm() < 1e-10 * matrix.norm() * mode.norm()
+    assert np.array([[a.dot(b) for a in modes] for b in modes]) == pytest.approx(np.eye(6), abs=1e-12)
+
+
+def test_turned_body():
+    """Modes are those of the present configuration: a beam turned by 90 degrees is as easy as before."""
+    structure = cantilever(shapes.box((4, 1, 1), (32, 8, 8)), "iterative")
+    first = solve_once(structure)
+    x = structure.bodies[0].points[:, : structure.bodies[0].owned].T
+    quarter = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    structure.now.u[:] = (x @ quarter.T - x).ravel()
+    structure.residual()
+    structure._target = structure.now.u[structure.prescribed]
+    structure.advance()
+    assert iterations(structure) <= first + 5
+
+
+def test_two_bodies():
+    """Modes of all bodies as one serve each of them: together they take as long as the slower one."""
+    meshes = [shapes.box((4, 1, 1), (16, 4, 4)), shapes.box((2, 1, 1), (6, 3, 3), origin=(20, 5, 0), cell="tet")]
+
+    def structure(chosen, method):
+        bodies = [
+            Body(
+                fem.distribute(MPI.COMM_SELF, meshes[i]),
+                BodySettings(
+                    f"body{i}",
+                    NeoHooke(400.0, 600.0),
+                    supports=[held()],
+                    tractions=[Traction("right", vector(0, 0, -4))],
+                ),
+            )
+            for i in chosen
+        ]
+        return Structure(MPI.COMM_SELF, bodies, Statics(), SolverSettings(Tolerance(residual=1e-10), linear=method))
+
+    alone = [solve_once(structure([i], "iterative")) for i in (0, 1)]
+    assert solve_once(structure([0, 1], "iterative")) <= max(alone) + 3
+    direct, iterative = (structure([0, 1], method) for method in ("direct", "iterative"))
+    for s in (direct, iterative):
+        load_step(s)
+    assert np.abs(iterative.now.u - direct.now.u).max() < 1e-6 * np.abs(direct.now.u).max()
+
+
+def test_method_is_chosen_by_size_and_dimension():
+    assert linear.choose("auto", 3, linear.DIRECT_LIMIT[3]) == "direct"
+    assert linear.choose("auto", 3, linear.DIRECT_LIMIT[3] + 1) == "iterative"
+    assert linear.choose("auto", 2, linear.DIRECT_LIMIT[3] + 1) == "direct"
+    assert linear.choose("direct", 3, 10**7) == "direct"
+    assert linear.choose("iterative", 2, 10) == "iterative"
+
+
+CASE = """
+time: {step: 0.5, end: 1.0}
+structure:
+  bodies:
+    one:
+      mesh: {shape: box, size: [3, 1, 1], cells: [9, 3, 3]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3}
+      supports: [{on: left, displacement: [0, 0, 0]}]
+      tractions: [{on: right, value: [0, 0, "-4*t"]}]
+    two:
+      mesh: {shape: box, size: [2, 1, 1], cells: [6, 3, 3], cell: tet, translate: [0, 5, 0]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3}
+      supports: [{on: left, displacement: [0, 0, 0]}]
+      tractions: [{on: right, value: [0, "3*t", 0]}]
+probes:
+  a: {body: one, quantity: displacement, at: [3, 1, 1]}
+  b: {body: two, quantity: displacement, at: [2, 6, 1]}
+"""
+
+
+def test_two_processes(tmp_path):
+    """Multigrid on two processes, two bodies, as the program runs it."""
+    (tmp_path / "case.yaml").write_text(CASE)
+    for name, method, processes in (("direct", "direct", 1), ("pair", "iterative", 2)):
+        out = tmp_path / name
+        run = fsci("run", tmp_path, "-o", out, "--set", f"solver.linear.method={method}", processes=processes)
+        assert run.returncode == 0, run.stdout + run.stderr
+    direct, pair = (read_history(tmp_path / name / "history.csv") for name in ("direct", "pair"))
+    for column in ("a.x", "a.y", "a.z", "b.x", "b.y", "b.z"):
+        assert pair[column] == pytest.approx(direct[column], rel=1e-6, abs=1e-9), column

@@ -1,0 +1,67 @@
+"""Mistakes that only the meshes can tell: located messages and exit code 2, on one process and on two."""
+
+import pytest
+from programs import fsci
+
+CASE = """\
+time: {step: 1, end: 1}
+structure:
+  bodies:
+    flag:
+      mesh: {file: flag.geo, order: 1}
+      region: flag
+      material: {law: neo_hooke, E: 1e6, nu: 0.3}
+      supports:
+        - {on: clamp, displacement: [0, 0]}
+      body_force: [0, -1]
+probes:
+  A: {quantity: displacement, at: [0.6, 0.2]}
+"""
+
+MISTAKES = {
+    "surface": ("on: clamp", "on: clmp", "case.yaml:9:16: unknown surface 'clmp'; did you mean 'clamp'?"),
+    "region": ("region: flag", "region: flog", "case.yaml:6:15: unknown region 'flog'; did you mean 'flag'?"),
+    "length": ("body_force: [0, -1]", "body_force: [0, 0, -1]", "case.yaml:10:19: 'body_force' has 3 entries, but the"),
+    "point": ("at: [0.6, 0.2]", "at: [0.7, 0.2]", "case.yaml:12:35: the point (0.7, 0.2) is not in body 'flag'"),
+    "symmetry": ("displacement: [0, 0]", "symmetry: true", "case.yaml:9:11: symmetry needs a plane normal to x, y"),
+}
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_located(mistake, processes, tmp_path):
+    right, wrong, message = MISTAKES[mistake]
+    with open("cases/csm3/flag.geo") as file:
+        (tmp_path / "flag.geo").write_text(file.read())
+    (tmp_path / "case.yaml").write_text(CASE.replace(right, wrong))
+    run = fsci("run", tmp_path, "-o", tmp_path / "out", processes=processes, timeout=60)
+    assert run.returncode == 2, run.stdout + run.stderr
+    assert message in run.stderr
+    assert run.stderr.count(message) == 1
+    assert "Traceback" not in run.stderr
+
+
+def test_several_bodies_of_different_cells(tmp_path):
+    """Two bodies in one case, quads and triangles, give what each gives alone; on two processes, too."""
+    from fsci.history import read_history
+
+    body = "{{mesh: {{shape: rectangle, size: [2, 1], cells: [4, 2], cell: {cell}, order: {order}}}, \
+material: {{law: neo_hooke, E: {E}, nu: 0.3}}, supports: [{{on: left, displacement: [0, 0]}}], \
+tractions: [{{on: right, value: [0, {load}]}}]}}"
+    one, two = body.format(cell="quad", order=2, E=100, load=-1), body.format(cell="tri", order=1, E=50, load="0.5*t")
+
+    def history(bodies, processes=1):
+        text = "time: {step: 0.5, end: 1}\nstructure:\n  bodies:\n"
+        text += "".join(f"    {name}: {settings}\n" for name, settings in bodies.items())
+        text += "probes:\n"
+        text += "".join(f"  at_{name}: {{body: {name}, quantity: displacement, at: [2, 1]}}\n" for name in bodies)
+        (tmp_path / "case.yaml").write_text(text)
+        run = fsci("run", tmp_path, "-o", tmp_path / "out", processes=processes, timeout=60)
+        assert run.returncode == 0, run.stdout + run.stderr
+        return read_history(tmp_path / "out" / "history.csv")
+
+    alone = {**history({"a": one}), **history({"b": two})}
+    for processes in (1, 2):
+        both = history({"a": one, "b": two}, processes)
+        for name in ("at_a.x", "at_a.y", "at_b.x", "at_b.y"):
+            assert both[name] == pytest.approx(alone[name], rel=1e-7), name
