@@ -106,6 +106,7 @@ class Contact:
         """Facets may have moved from here on."""
         self._x_old = self.x.copy()
         self.active_set.begin_step()
+        self._shares.begin_step()
         for pair in self.pairs:
             pair.begin_step()
 
@@ -121,8 +122,6 @@ class Contact:
             pressure = np.einsum("nd,nd->n", self.z, self.terms.normals)
             self.active_set.update(pressure, mean_gap - self._touching, self._scale, covered)
         self.z[~self.active_set.active] = 0.0
-        for pair in self.pairs:
-            pair.freeze(self.settled)
 
     def _covered(self, terms: Terms) -> NDArray[np.bool_]:
         """Nodes that see enough of a master for a constraint: less is a sliver that comes and goes."""
@@ -133,10 +132,11 @@ class Contact:
         pieces = []
         for index, (pair, (slave, master)) in enumerate(zip(self.pairs, self._sides, strict=True)):
             facet_pairs, motion = pair.near(self.x[slave], self.x[master], self._x_old[slave], self._x_old[master])
-            mine = facet_pairs if pair.frozen else self._shares.mine(index, facet_pairs, len(pair.slave.facets))
-            if not pair.frozen and len(facet_pairs) == 0:
+            if len(facet_pairs) == 0:
                 continue
+            mine = self._shares.mine(index, facet_pairs, len(pair.slave.facets))
             found = pair.evaluate(self.x[slave], self.x[master], mine, motion, self.z[slave])
+            pair.keep(self._shares.together(found.used))
             area = self._shares.combine(index, found.area)
             if area.any():
                 pieces.append((index, found))

@@ -17,8 +17,8 @@ from solvers.kernels import basis_transformation, mortar, nodal_normals
 #: Slave facets take part when a master is nearer than this share of the longest edge (and the motion of the step).
 NEAR = 0.3
 
-#: Evaluations of a step after which the facet pairs may stay what they are: the last number even if the active set moves.
-FREEZE_AFTER, FREEZE_AT_LAST = 4, 9
+#: Evaluations of a step after which facet pairs that are in use stay in use.
+KEEP_AFTER = 3
 
 Integration = Literal["segments", "elements"]
 
@@ -35,6 +35,7 @@ class PairTerms:
     dforce: sp.csr_matrix  #: derivative of the contact force at fixed multipliers, shape (dim * (ns + nm),) * 2
     dnormals: sp.csr_matrix  #: shape (dim * ns, dim * (ns + nm))
     area: Array  #: covered area of each slave facet [m^(dim-1)], shape (k,)
+    used: NDArray[np.int32]  #: facet pairs that took part, shape (p, 2)
 
 
 class Pair:
@@ -54,34 +55,35 @@ class Pair:
         self._edge = _longest_edge(slave)
         self.begin_step()
 
-    def freeze(self, settled: bool) -> None:
-        """From some evaluation on, when the active set has settled, the facet pairs in use stay the ones in use."""
-        if self._frozen is None and self._evaluations >= (FREEZE_AFTER if settled else FREEZE_AT_LAST):
-            self._frozen = self._used
-
-    @property
-    def frozen(self) -> bool:
-        """The facet pairs stay what they are until the next step; each process has its share of them."""
-        return self._frozen is not None
-
     def begin_step(self) -> None:
         """Facet pairs are chosen anew."""
         self._evaluations = 0
-        self._frozen: NDArray[np.int32] | None = None
-        self._used = np.empty((0, 2), dtype=np.int32)
+        self._kept = np.empty(0, dtype=np.int64)
 
-    def _admission(self, motion: float) -> dict[str, float]:
-        """Which facets see each other: hard decisions, which must not change under Newton's last iterates."""
-        if self._frozen is not None:
-            return {"facing": np.inf}
-        return {"reach": self._edge + motion, "near": NEAR * self._edge + motion}
+    def _codes(self, facet_pairs: NDArray[np.int32]) -> NDArray[np.int64]:
+        """One number for each facet pair, in the same order."""
+        return facet_pairs[:, 0].astype(np.int64) * len(self.master.facets) + facet_pairs[:, 1]
+
+    def keep(self, used: NDArray[np.int32]) -> None:
+        """Facet pairs in use (of all processes) stay in use until the next step, from some evaluation on.
+
+        Whether facets see each other is a hard decision: were it taken anew each time, Newton's last iterates could
+        jump to and fro between two sets of pairs. Pairs still come in, but none goes.
+        """
+        self._evaluations += 1
+        if self._evaluations >= KEEP_AFTER:
+            self._kept = np.union1d(self._kept, self._codes(used))
 
     def near(self, xs: Array, xm: Array, xs_previous: Array, xm_previous: Array) -> tuple[NDArray[np.int32], float]:
         """Facet pairs that may meet, and the largest motion [m] of a node in this step."""
-        if self._frozen is not None:
-            return self._frozen, 0.0
         motion = max(float(np.abs(a - b).max(initial=0.0)) for a, b in ((xs, xs_previous), (xm, xm_previous)))
-        return self._search.pairs(xs, xm, self._edge + motion, xs_previous, xm_previous), motion
+        found = self._search.pairs(xs, xm, self._edge + motion, xs_previous, xm_previous)
+        codes = self._codes(found)
+        if np.isin(self._kept, codes).all():
+            return found, motion
+        together = np.union1d(codes, self._kept)
+        count = len(self.master.facets)
+        return np.stack([together // count, together % count], axis=1).astype(np.int32), motion
 
     def evaluate(self, xs: Array, xm: Array, facet_pairs: NDArray[np.int32], motion: float, z: Array) -> PairTerms:
         """All terms at the positions xs, xm [m] for the multipliers z [Pa] of the slave nodes."""
@@ -99,10 +101,10 @@ class Pair:
             facet_pairs,
             z,
             method=self.integration,
-            **self._admission(motion),
+            reach=self._edge + motion,
+            near=NEAR * self._edge + motion,
+            kept=np.isin(self._codes(facet_pairs), self._kept).astype(np.uint8),
         )
-        self._evaluations += 1
-        self._used = np.ascontiguousarray(facet_pairs[result.used.astype(bool)])
         columns = dim * (ns + nm)
         dn = sp.csr_matrix(slopes, shape=(dim * ns, dim * ns))
 
@@ -124,6 +126,7 @@ class Pair:
             dforce,
             _widen(dn, columns),
             result.area,
+            facet_pairs[result.used.astype(bool)],
         )
 
 

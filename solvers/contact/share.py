@@ -21,6 +21,10 @@ class Shares:
         self.comm = comm
         self._met: dict[int, NDArray[np.bool_]] = {}
 
+    def begin_step(self) -> None:
+        """A step begins like that of a resumed run, which does not know what facets met."""
+        self._met.clear()
+
     def mine(self, pair: int, facet_pairs: NDArray[np.int32], facets: int) -> NDArray[np.int32]:
         """The facet pairs that this process integrates; all pairs of a slave facet stay together."""
         if self.comm.size == 1 or len(facet_pairs) == 0:
@@ -36,6 +40,10 @@ class Shares:
         total = self.total(area)
         self._met[pair] = total > 0.0
         return total
+
+    def together(self, part: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Rows of all processes."""
+        return part if self.comm.size == 1 else np.concatenate(self.comm.allgather(part))
 
     def total(self, part: Any) -> Any:
         """Sum of arrays or sparse matrices over the processes, in the order of ranks: the same on all of them."""

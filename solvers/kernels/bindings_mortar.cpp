@@ -23,6 +23,7 @@ namespace {
 
 using Reals = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Facets = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Flags = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Pairs = nb::ndarray<const std::int32_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 void require(bool condition, const std::string& message) {
@@ -138,10 +139,12 @@ MortarResult to_result(MortarSums<dim> sums, int n_slave, int n_master, bool der
 
 MortarResult py_mortar(const Reals& xs, const Facets& fs, const std::string& type_s, const Reals& xm, const Facets& fm,
                        const std::string& type_m, const Reals& normals, const Pairs& pairs,
-                       const std::optional<Reals>& z, const std::string& method, bool derivatives, double reach, double near, double facing) {
+                       const std::optional<Reals>& z, const std::string& method, bool derivatives, double reach, double near, double facing,
+                       const std::optional<Flags>& kept) {
     require(method == "segments" || method == "elements", "method must be 'segments' or 'elements'");
     require(xs.shape(1) == xm.shape(1), "slave and master must have the same dimension");
     require(pairs.shape(1) == 2, "pairs must have shape (p, 2)");
+    require(!kept || kept->shape(0) == pairs.shape(0), "kept must have one entry for each pair");
     check_nodal("normals", normals, xs);
     if (z) check_nodal("z", *z, xs);
     const int dim = static_cast<int>(xs.shape(1));
@@ -154,7 +157,8 @@ MortarResult py_mortar(const Reals& xs, const Facets& fs, const std::string& typ
         require(p == 0 || pair[-2] <= pair[0], "pairs must be sorted by slave facet");
     }
     const MortarInput input{xs.data(), xm.data(), normals.data(), z ? z->data() : nullptr, fs.data(), fm.data(),
-                            n_slave,   n_master,  pairs.data(),   pairs.shape(0),          method == "elements", reach, near, facing};
+                            n_slave,   n_master,  pairs.data(),   pairs.shape(0),          method == "elements", reach, near, facing,
+                            kept ? kept->data() : nullptr};
     MortarResult result;
     dispatch(type_s, dim, [&](auto slave) {
         using Slave = decltype(slave);
@@ -244,11 +248,13 @@ void bind_mortar(nb::module_& module) {
     module.def("mortar", &py_mortar, "xs"_a, "fs"_a, "facet_type_s"_a, "xm"_a, "fm"_a, "facet_type_m"_a, "normals"_a,
                "pairs"_a, "z"_a = nb::none(), nb::kw_only(), "method"_a = "segments", "derivatives"_a = true,
                "reach"_a = std::numeric_limits<double>::infinity(), "near"_a = std::numeric_limits<double>::infinity(), "facing"_a = -0.2,
+               "kept"_a = nb::none(),
                "Mortar integrals between a slave and a master surface.\n\n"
                "xs (ns, dim), xm (nm, dim): current positions; fs, fm: facets, oriented outward, of types line2, line3 "
                "(2D), tri3, tri6, quad4, quad9 (3D), VTK node order; normals (ns, dim) of the slave; pairs (p, 2): "
                "slave and master facets that may meet, sorted by slave facet, all pairs of a slave facet in one call; "
                "z (ns, dim): multipliers for the force; method: 'segments' or 'elements' (fixed points on the slave "
                "facet); reach: facets farther apart than this do not see each other; near: slave facets to which no master is as near as "
-               "this are left out; facing: facets see each other if the product of their unit normals is below.");
+               "this are left out; facing: facets see each other if the product of their unit normals is below; kept "
+               "(p,) of 0 and 1: pairs for which none of these three is asked.");
 }

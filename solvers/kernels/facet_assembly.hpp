@@ -31,6 +31,9 @@ struct MortarInput {
     double reach;   // facets farther apart than this do not see each other
     double near;    // slave facets with no master as near as this are left out
     double facing;  // facets see each other if the product of their normals is below
+    const std::uint8_t* kept;  // pairs for which none of the three is asked; may be null
+
+    bool is_kept(std::size_t pair) const { return kept && kept[pair]; }
 };
 
 // Sums over facets. Column nodes: the slave's, then the master's; those of d*_normal: the slave's.
@@ -143,21 +146,21 @@ class FacetAssembly {
             const PlaneFrame<Slave> frame(slave_.x);
             scale_ = frame.area;
             if constexpr (derivatives) frame.area_slopes(scale_slopes_);
-            collect(first, last, ball, [&](const FacetNodes<Master>& master, const int* nodes) {
+            collect(first, last, ball, [&](const FacetNodes<Master>& master, const int* nodes, std::size_t number) {
                 if (frame.template apart<n, m>(slave_.x, master.x)) return;
                 Pair& pair = pairs_.emplace_back(master, frame, slave_.x, master.x);
                 if (!in_.elements)
                     visit_cells(pair.geometry, [&](const auto& on_slave, const auto& on_master, const T& weight) {
                         pair.integrals.add(on_slave, on_master, weight, slave_, pair.nodes);
                     });
-                keep_if_met(nodes);
+                keep_if_met(nodes, number);
             });
         } else {
-            collect(first, last, ball, [&](const FacetNodes<Master>& master, const int* nodes) {
+            collect(first, last, ball, [&](const FacetNodes<Master>& master, const int* nodes, std::size_t number) {
                 Pair& pair = pairs_.emplace_back(master, slave_.normal, slave_.x, master.x);
                 if (!in_.elements)
                     visit_segment(pair.geometry, [&](const auto& point) { pair.integrals.add(point, pair.geometry); });
-                keep_if_met(nodes);
+                keep_if_met(nodes, number);
             });
         }
         if (in_.elements) add_element_points(element_rule<Slave>());
@@ -170,10 +173,8 @@ class FacetAssembly {
             FacetNodes<Master> master;
             int nodes[m];
             gather(in_.master_facets + std::size_t(in_.pairs[2 * p + 1]) * m, in_.master_x, nodes, master.x);
-            if (!ball.sees(FacetBall<Master>(master.x), in_.reach, in_.facing)) continue;
-            const std::size_t before = pairs_.size();
-            visit(master, nodes);
-            if (pairs_.size() > before) pairs_.back().number = p;
+            if (!in_.is_kept(p) && !ball.sees(FacetBall<Master>(master.x), in_.reach, in_.facing)) continue;
+            visit(master, nodes, p);
         }
     }
 
@@ -189,14 +190,17 @@ class FacetAssembly {
     // A slave facet counts as a whole or not at all: dual functions are negative in places, so that a facet of which
     // only a far part sees a master would weigh an open gap as a closed one.
     bool is_near() const {
-        return std::any_of(pairs_.begin(), pairs_.end(), [&](const Pair& pair) { return mean_gap(pair) <= in_.near; });
+        return std::any_of(pairs_.begin(), pairs_.end(), [&](const Pair& pair) {
+            return in_.is_kept(pair.number) || mean_gap(pair) <= in_.near;
+        });
     }
 
     // Drops the last pair if it has no points, or lies behind the slave by more than the reach (segments); else gives
     // its nodes their places.
-    void keep_if_met(const int* nodes) {
-        if (!in_.elements &&
-            (value_of(pairs_.back().integrals.cover) == 0.0 || mean_gap(pairs_.back()) < -in_.reach)) {
+    void keep_if_met(const int* nodes, std::size_t number) {
+        pairs_.back().number = number;
+        if (!in_.elements && (value_of(pairs_.back().integrals.cover) == 0.0 ||
+                              (!in_.is_kept(number) && mean_gap(pairs_.back()) < -in_.reach))) {
             pairs_.pop_back();
             return;
         }

@@ -80,15 +80,16 @@ struct LinePair {
         const double* p = plain_master[l];
         const auto [at_low, slope_low] = miss(p, -1.0);
         const auto [at_high, slope_high] = miss(p, 1.0);
-        if (!(at_low > at_high)) return false;  // beyond the normals' focus
-        if (at_low <= 1e-12 * std::abs(slope_low)) {
+        const bool before = at_low <= 1e-12 * std::abs(slope_low), behind = at_high >= -1e-12 * std::abs(slope_high);
+        if (before && at_high <= 0.0) {
             xi = -1.0;
             return true;
         }
-        if (at_high >= -1e-12 * std::abs(slope_high)) {
+        if (behind && at_low >= 0.0) {
             xi = 1.0;
             return true;
         }
+        if (before || behind || !(at_low > at_high)) return false;  // beyond the normals' focus
         double low = -1.0, high = 1.0, at = (at_low + at_high) / (at_low - at_high);
         for (int iteration = 0; iteration < 60; ++iteration) {  // Newton, kept inside by bisection
             const auto [r, slope] = miss(p, at);
