@@ -48,7 +48,7 @@ $(DOCS_STAMP): pyproject.toml | $(PROJECT_STAMP)
 
 demo: setup
 	$(BIN)/fsci run cases/csm3 -o results/csm3
-	$(BIN)/fsci plot results/csm3
+	$(BIN)/fsci plot results/csm3 --movie
 	@echo "Pictures are in results/csm3/pictures/, fields for ParaView in results/csm3/fields/."
 
 test: setup lint

@@ -1,7 +1,7 @@
 """Pictures and tables of the structure's verification: python docs/make_pictures.py [RESULTS_FOLDER]
 
-Runs what is not yet in RESULTS_FOLDER (default: results/verification; about ten minutes in all), draws into docs/pictures and
-writes the tables of docs/verification_structure.md.
+Runs what is not yet in RESULTS_FOLDER (default: results/verification; some minutes in all), draws into docs/pictures
+and writes the tables of docs/verification_structure.md.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ STATIC_MESHES = (1, 2, 4, 8)
 #: (mesh, step [s]) of CSM3; the first three are the mesh family of the benchmark's step
 SWINGS = ((1, 0.005), (2, 0.005), (4, 0.005), (1, 0.01), (1, 0.0025), (1, 0.00125))
 #: u(A) [mm]: Turek and Hron 2006
-STATIC_REFERENCE = {"csm1": (-7.187, -66.10), "csm2": (-0.4690, -16.97)}
+STATIC_REFERENCE = {"csm1": ("-7.187", "-66.10"), "csm2": ("-0.4690", "-16.97")}
 
 Array = NDArray[np.float64]
 History = dict[str, Array]
@@ -93,17 +93,16 @@ def cells(refine: int) -> str:
 
 
 def static_rows(runs: dict[tuple[str, int], History]) -> list[list[str]]:
-    rows = [["cells", *(f"{name.upper()} {u}" for name in STATIC_REFERENCE for u in ("u_x", "u_y", "error of u_y"))]]
-    for refine in STATIC_MESHES:
-        row = [cells(refine)]
-        for name, (_, reference) in STATIC_REFERENCE.items():
-            x, y = (1e3 * runs[name, refine][column][-1] for column in ("A.x", "A.y"))
-            row += [f"{x:.5g}", f"{y:.5g}", f"{100 * abs(y / reference - 1):.2g} %"]
-        rows.append(row)
-    reference_row = ["Turek and Hron"]
-    for x, y in STATIC_REFERENCE.values():
-        reference_row += [f"{x:.4g}", f"{y:.4g}", ""]
-    return [*rows, reference_row]
+    words = ("u_x [mm]", "u_y [mm]", "error of u_y")
+    rows = [["cells", *(f"{name.upper()} {word}" for name in STATIC_REFERENCE for word in words)]]
+    rows += [[cells(refine)] for refine in STATIC_MESHES] + [["extrapolated"], ["Turek and Hron"]]
+    for name, reference in STATIC_REFERENCE.items():
+        found = [[1e3 * runs[name, refine][column][-1] for refine in STATIC_MESHES] for column in ("A.x", "A.y")]
+        x, y = ([*values, extrapolated(np.array(values))] for values in found)
+        for row, ux, uy in zip(rows[1:-1], x, y, strict=True):
+            row += [f"{ux:#.5g}", f"{uy:#.5g}", f"{100 * abs(uy / float(reference[1]) - 1):.2g} %"]
+        rows[-1] += [*reference, ""]
+    return rows
 
 
 def swing_rows(runs: dict[tuple[int, float], History]) -> list[list[str]]:
@@ -134,8 +133,8 @@ def tones(time: Array, values: Array) -> tuple[Array, list[float]]:
 
     def columns(f: float, g: float) -> Array:
         found = [np.ones_like(time)]
-        for frequency in (f, g, 2 * f, 3 * f, 4 * f, g - f, g + f):
-            found += [np.cos(2 * np.pi * frequency * time), np.sin(2 * np.pi * frequency * time)]
+        for tone in (f, g, 2 * f, 3 * f, 4 * f, g - f, g + f):
+            found += [np.cos(2 * np.pi * tone * time), np.sin(2 * np.pi * tone * time)]
         return np.stack(found, axis=1)
 
     def fit(f: float, g: float) -> Array:
@@ -175,7 +174,7 @@ def orders(picture: str) -> list[list[str]]:
     }
     plane = ("triangle", "triangle6", "quad", "quad9")
     linear = ("triangle", "quad", "tetra", "hexahedron")
-    rows = [["cell", "cells along an edge", "L2 error", "order", "H1 error", "order"]]
+    rows = [["cell", "cells along an edge", "L2 error", "order in L2", "H1 error", "order in H1"]]
     curves: dict[str, tuple[Array, Array]] = {}
     for cell_type in CELL_TYPES:
         counts = ((4, 8, 16, 32) if cell_type in plane else (2, 4, 8, 12)) if cell_type in linear else (2, 4, 8)
@@ -183,11 +182,9 @@ def orders(picture: str) -> list[list[str]]:
         found = np.array([errors(cell_type, count) for count in counts])
         rates = np.diff(np.log(found), axis=0) / -np.diff(np.log(counts))[:, None]
         for index, count in enumerate(counts):
-            rate = ["", ""] if index == 0 else [f"{r:.2f}" for r in rates[index - 1]]
-            l2, h1 = found[index]
-            rows.append(
-                [names[cell_type] if index == 0 else "", str(count), f"{l2:.2e}", rate[0], f"{h1:.2e}", rate[1]]
-            )
+            l2, h1 = (f"{error:.2e}" for error in found[index])
+            order_l2, order_h1 = ("", "") if index == 0 else (f"{rate:.2f}" for rate in rates[index - 1])
+            rows.append([names[cell_type] if index == 0 else "", str(count), l2, order_l2, h1, order_h1])
         curves[names[cell_type]] = 1.0 / np.array(counts), found
     draw(picture, lambda figure: draw_orders(figure, curves), (8, 3.6))
     return rows
@@ -202,20 +199,17 @@ def draw_orders(figure: Any, curves: dict[str, tuple[Array, Array]]) -> None:
             axes.loglog(h, errors[:, column], style, marker="o", color=colour, label=name)
         axes.set_xlabel("length of an edge")
         axes.set_ylabel(f"error in {norm}")
-        for order in (1 + (1 - column), 2 + (1 - column)):
-            slope(axes, order)
+        for order, start, below in ((1, 0.045, "quad4"), (2, 0.17, "quad9")):
+            h, errors = curves[below]
+            error = np.exp(np.interp(np.log(start), np.log(h[::-1]), np.log(errors[::-1, column])))
+            slope(axes, order + 1 - column, start, 0.5 * error)
     panels[1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def slope(axes: Any, order: int) -> None:
-    """A short line of the given order in the lower right part of a panel with logarithmic axes."""
-    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
-    x = np.array([right / 3.2, right / 1.6])
-    start = low * (high / low) ** (0.42 if order % 2 else 0.08)
-    axes.loglog(x, start * (x / x[0]) ** order, color="0.5", linewidth=1)
-    axes.annotate(f"{order}", (x[1], start * 2.0**order), color="0.4", fontsize=9, ha="left", va="center")
-    axes.set_xlim(left, right)
-    axes.set_ylim(low, high)
+def slope(axes: Any, order: int, x: float, y: float) -> None:
+    """A short line of the given order in a panel with logarithmic axes, and the number beside it."""
+    axes.loglog((x, 2 * x), (y, y * 2.0**order), color="0.5", linewidth=1)
+    axes.annotate(f" {order}", (1.5 * x, 0.8 * y * 1.5**order), color="0.4", fontsize=9, ha="left", va="top")
 
 
 # ------------------------------------------------------------------------------------------------- orders in time
@@ -246,7 +240,7 @@ def time_orders(picture: str) -> list[list[str]]:
             axes.loglog(steps, error, marker="o", color=colour, label=f"rho_inf = {rho:g}")
         axes.set_xlabel("step [s]")
         axes.set_ylabel("error of the position at 0.4 s")
-        slope(axes, 2)
+        slope(axes, 2, 2e-3, 8e-5)
         axes.legend()
 
     draw(picture, picture_of, (5, 3.4))
@@ -283,6 +277,8 @@ def draw_static(name: str, runs: dict[tuple[str, int], History]) -> None:
                     label=f"{case.upper()} u_{column[-1]}",
                 )
         axes.axhline(1e-3, color="0.5", linewidth=1)
+        axes.annotate("0.1 %", (1.0, 1.05e-3), color="0.4", fontsize=9, va="bottom")
+        axes.set_ylim(2e-4, 1e-2)
         axes.set_xticks(STATIC_MESHES[:-1], [cells(refine) for refine in STATIC_MESHES[:-1]])
         axes.minorticks_off()
         axes.set_xlabel("cells")
@@ -331,12 +327,17 @@ def draw_bent(name: str, path: Path) -> None:
 
 
 def draw_swing(name: str, folder: Path) -> None:
-    """Ten positions of the flag on its first way down."""
-    states = [path for time, path in read_collection(folder / "fields" / "flag.pvd") if time < 0.46]
+    """The flag at four times of its first way down, and the way of its tip."""
+    series = read_collection(folder / "fields" / "flag.pvd")
+    states = [path for time, path in series if min(abs(time - chosen) for chosen in (0.0, 0.15, 0.25, 0.45)) < 1e-6]
+    history = read_history(folder / "history.csv")
 
     def content(figure: Any) -> None:
         axes = figure.subplots()
         colours = paint(axes, states)
+        axes.plot(0.6 + history["A.x"], 0.2 + history["A.y"], color=COLOURS[0], linewidth=1.0, zorder=-1)
+        axes.plot(0.6 + history["A.x"][0], 0.2, "o", color=COLOURS[0], markersize=4)
+        axes.annotate("A", (0.605, 0.2), color=COLOURS[0], va="center")
         dress(figure, axes, colours, low=0.045)
 
     draw(name, content, (8, 3.8))
@@ -355,7 +356,7 @@ def dress(figure: Any, axes: Any, colours: Any, *, low: float) -> None:
 
 
 def paint(axes: Any, states: Sequence[Path]) -> Any:
-    """Flags coloured by their stress, on one scale; earlier ones fainter, outlined."""
+    """Flags coloured by their stress on one scale, and their outlines."""
     import meshio
 
     meshes = [meshio.read(path) for path in states]
@@ -367,7 +368,7 @@ def paint(axes: Any, states: Sequence[Path]) -> Any:
         ring = nine[:, [0, 4, 1, 5, 2, 6, 3, 7]]
         triangles = np.concatenate([np.stack([ring[:, i], ring[:, (i + 1) % 8], nine[:, 8]], axis=1) for i in range(8)])
         colours = axes.tripcolor(
-            points[:, 0], points[:, 1], triangles, stress, shading="gouraud", cmap="viridis", vmin=0, vmax=high
+            points[:, 0], points[:, 1], triangles, stress, shading="gouraud", cmap="YlOrRd", vmin=0, vmax=high
         )
         for line in edge_lines(mesh):
             axes.plot(*points[line].T, color="black", linewidth=0.5)
