@@ -24,7 +24,7 @@ def choose(method: Method, dim: int, dofs: int) -> Literal["direct", "iterative"
     return method
 
 
-#: Unknowns of a plane problem below which PETSc's own factorisation is as fast as MUMPS or up to 8 times faster, on one
+#: Unknowns of a plane problem below which PETSc's own factorisation is as fast as MUMPS or up to 6 times faster, on one
 #: process. Nested dissection: by bandwidth a slender body is 1.5 times faster, but a square one 5 times slower.
 SMALL_PLANE = 4_000
 
