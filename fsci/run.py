@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import signal
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,20 +62,33 @@ def prepare_folder(case: Case, out: Path) -> None:
         shutil.rmtree(out / old, ignore_errors=True)
     for old in ("summary.json", "history.csv", "log.txt", "STOP"):
         (out / old).unlink(missing_ok=True)
-    out.mkdir(parents=True, exist_ok=True)
+    keep_case(case, out)
+
+
+def keep_case(case: Case, folder: Path) -> None:
+    """Write case.yaml and the mesh files it names, such that the folder can be moved and run again."""
+    folder.mkdir(parents=True, exist_ok=True)
     changes = []
-    for name, body in case.structure.bodies.items():
-        given = getattr(body.mesh, "file", None)
+    for setting, name, mesh in _meshes(case):
+        given = getattr(mesh, "file", None)
         if given is None or Path(given).is_absolute():
             continue
         kept = Path(given)
         if ".." in kept.parts:  # no results folder writes outside itself
             kept = Path("meshes") / name / kept.name
-            changes.append((f"structure.bodies.{name}.mesh.file", json.dumps(kept.as_posix())))
-        if (case.folder / given).resolve() != (out / kept).resolve():
-            (out / kept).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(case.folder / given, out / kept)
-    write_text(out / "case.yaml", case.dump(changes))
+            changes.append((f"{setting}.mesh.file", json.dumps(kept.as_posix())))
+        if (case.folder / given).resolve() != (folder / kept).resolve():
+            (folder / kept).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(case.folder / given, folder / kept)
+    write_text(folder / "case.yaml", case.dump(changes))
+
+
+def _meshes(case: Case) -> Iterator[tuple[str, str, Any]]:
+    """(setting, name, mesh) of all bodies and obstacles."""
+    for name, body in case.structure.bodies.items():
+        yield f"structure.bodies.{name}", name, body.mesh
+    for name, obstacle in ({} if case.contact is None else case.contact.obstacles).items():
+        yield f"contact.obstacles.{name}", name, obstacle.mesh
 
 
 @dataclass
@@ -236,7 +250,7 @@ class Run:
             return
         folder = self.out / "failure"
         FieldWriter(folder / "fields").write(self.clock.step + 1, self.clock.time + self.clock.dt, snapshots)
-        write_text(folder / "case.yaml", self.case.dump())
+        keep_case(self.case, folder)
         what = {
             "field": failure.field,
             "reason": failure.reason,

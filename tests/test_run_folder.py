@@ -8,7 +8,7 @@ from programs import fsci
 
 from fsci.case import load_case
 from fsci.history import read_history
-from fsci.run import FINISHED, prepare_folder, run_case
+from fsci.run import FAILED, FINISHED, prepare_folder, run_case
 
 CASE = """
 time: {step: 0.5, end: 1}  # a comment
@@ -71,3 +71,23 @@ def test_results_can_move(case, tmp_path):
     one, two = (read_history(folder / "history.csv") for folder in (moved, again))
     assert len(one["time"]) == 2
     assert np.array_equal(one["A.y"], two["A.y"])
+
+
+def test_a_failure_takes_its_meshes_along(case, tmp_path):
+    out = tmp_path / "out"
+    crash = [("structure.bodies.here.body_force", "[0, -1e12]"), ("time.retry.halvings", "0")]
+    assert run_case(load_case(case, crash), out) == FAILED
+    kept = load_case(out / "failure")
+    for body in kept.structure.bodies.values():
+        assert (out / "failure" / body.mesh.file).is_file()
+
+
+def test_meshes_of_obstacles_are_kept(case, tmp_path):
+    contact = (
+        "{obstacles: {wall: {mesh: {file: ../shared/flag.geo}, on: tip}},"
+        " pairs: {touch: {slave: {body: here, on: tip}, master: {obstacle: wall}}}}"
+    )
+    prepare_folder(load_case(case, [("contact", contact)]), tmp_path / "out")
+    kept = load_case(tmp_path / "out").contact
+    assert kept is not None
+    assert (tmp_path / "out" / kept.obstacles["wall"].mesh.file).is_file()
