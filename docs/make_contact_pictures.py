@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from fsci.curves import COLOURS, STYLE
 from fsci.history import read_history
 from fsci.output import read_collection
-from fsci.render import ROUND, SUPERSAMPLING, View, face_edges, frame, import_pyvista, polylines
+from fsci.render import ROUND, SUPERSAMPLING, View, face_edges, frame, import_pyvista, photograph, polylines
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "verification_contact.md"
@@ -143,7 +143,6 @@ def norms(mesh: Any) -> Array:
 def render(grid: dict[str, Any], view: View, size: tuple[int, int], arrows: str | None, largest: float) -> Any:
     """The picture of one time, shape (height, width, 3)."""
     pyvista = import_pyvista()
-    from PIL import Image
 
     plotter = pyvista.Plotter(
         off_screen=True, window_size=[SUPERSAMPLING * length for length in size], lighting="light kit"
@@ -173,15 +172,7 @@ def render(grid: dict[str, Any], view: View, size: tuple[int, int], arrows: str 
                     color=COLOURS[1],
                     lighting=False,
                 )
-    plotter.camera.focal_point = view.centre
-    plotter.camera.position = view.centre + 10 * np.hypot(view.half_width, view.half_height) * away
-    plotter.camera.up = view.up
-    plotter.camera.parallel_projection = True
-    plotter.camera.parallel_scale = view.half_height
-    plotter.reset_camera_clipping_range()
-    image = plotter.screenshot(return_img=True)
-    plotter.close()
-    return np.asarray(Image.fromarray(image).resize(size, Image.Resampling.LANCZOS))
+    return photograph(plotter, view, away, size)
 
 
 def draw_balances(folder: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -12,7 +12,7 @@ from mpi4py import MPI
 from fsci.case import Case
 from fsci.mesh import MeshError, build_mesh, extract_region, require_surface
 from solvers import fem
-from solvers.api import Constraint, Scheme, Snapshot, State, StepInfo
+from solvers.api import Constraint, Field, Scheme, Snapshot, State, StepInfo
 from solvers.newton import Tolerance
 from solvers.structure import materials, probes
 from solvers.structure.body import Body, BodySettings, Pressure, Support, Symmetry, Traction
@@ -25,16 +25,6 @@ from solvers.time import GeneralisedAlpha
 from solvers.timing import Timer
 
 Numbers = dict[str, float]
-
-
-class Field(Protocol):
-    """A field that is computed alone."""
-
-    def begin_step(self, t: float, dt: float) -> None: ...
-    def solve(self) -> StepInfo: ...
-    def end_step(self) -> None: ...
-    def save(self) -> State: ...
-    def restore(self, state: State) -> None: ...
 
 
 @dataclass(frozen=True)

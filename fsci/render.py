@@ -134,7 +134,6 @@ def render(
 ) -> Pixels:
     """The picture of the bodies without any text; `size` is (width, height)."""
     pyvista = import_pyvista()
-    from PIL import Image
 
     pixels = [SUPERSAMPLING * length for length in size]
     plotter = pyvista.Plotter(off_screen=True, window_size=pixels, lighting="light kit")
@@ -156,6 +155,13 @@ def render(
         if flat:
             lines = polylines(body.outline + lift)
             plotter.add_mesh(lines, color="black", line_width=2 * SUPERSAMPLING, lighting=False)
+    return photograph(plotter, view, away, size)
+
+
+def photograph(plotter: Any, view: View, away: Array, size: tuple[int, int]) -> Any:
+    """The scene of a plotter as an image, seen along `away` onto the centre of the view; closes the plotter."""
+    from PIL import Image
+
     distance = 10 * np.hypot(view.half_width, view.half_height)
     plotter.camera.focal_point = view.centre
     plotter.camera.position = view.centre + distance * away

@@ -19,14 +19,6 @@ State = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Motion:
-    """Where a surface is and how it moves: the primal interface data."""
-
-    x: Array  #: current positions [m], shape (n, dim)
-    v: Array  #: velocities [m/s], shape (n, dim)
-
-
-@dataclass(frozen=True)
 class StepInfo:
     """What one accepted time step took."""
 
@@ -140,12 +132,8 @@ class Scheme(Stateful, Protocol):
 
 
 class Field(Stateful, Protocol):
-    """One physical field."""
-
-    name: str
+    """One physical field, computed alone; `solve` raises StepFailed."""
 
     def begin_step(self, t: float, dt: float) -> None: ...
     def solve(self) -> StepInfo: ...
     def end_step(self) -> None: ...
-    def output(self) -> list[Snapshot]: ...
-    def dofs(self) -> int: ...

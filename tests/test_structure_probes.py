@@ -5,6 +5,7 @@ import pytest
 from structure_setup import TIGHT, block, constant, load_step, make_structure, vector
 
 from fsci import shapes
+from solvers.api import StepFailed
 from solvers.structure import probes
 from solvers.structure.body import Pressure, Support, Symmetry, Traction
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
@@ -198,3 +199,14 @@ def test_hole_is_outside():
     structure = make_structure(shapes.tube(1.0, 2.0, 1.0, [12, 1, 1]), MATERIAL)
     with pytest.raises(probes.PointOutside):
         probes.at_point(structure, structure.bodies[0], "displacement", (0.1, 0.0, 0.5))
+
+
+@pytest.mark.parametrize("cell_type", ["quad", "hexahedron"])
+@pytest.mark.parametrize("law", [MATERIAL, StVenantKirchhoff(30.0, 50.0, 2.0)])
+def test_a_body_that_nothing_holds(cell_type, law):
+    """A static problem without supports has no solution: the message asks for them, whatever rounding makes of it."""
+    mesh = block(cell_type, 2)
+    load = vector(*[0.1] * mesh.points.shape[1])
+    structure = make_structure(mesh, law, tractions=[Traction("top", load)])
+    with pytest.raises(StepFailed, match="is a body not held"):
+        load_step(structure)

@@ -23,6 +23,9 @@ from solvers.structure.supports import prescribe
 from solvers.structure.time import TimeScheme
 from solvers.timing import Timer
 
+#: Displacement, in sizes of the largest body, that only a singular system gives.
+FLOWN_OFF = 1e6
+
 
 @dataclass(frozen=True)
 class SolverSettings:
@@ -100,6 +103,12 @@ class Structure:
         return self.comm.allreduce(self.layout.size)
 
     @cached_property
+    def _extent(self) -> float:
+        """Size [m] of the largest body (collective)."""
+        sizes = (np.ptp(body.points, axis=1).max() for body in self.bodies if body.points.size)
+        return self.comm.allreduce(max(sizes, default=0.0), op=MPI.MAX)
+
+    @cached_property
     def mass(self) -> PETSc.Mat:
         """Consistent mass matrix of all bodies [kg]."""
         return block_diagonal([body.mass() for body in self.bodies])
@@ -143,13 +152,17 @@ class Structure:
         try:
             info = converge(self, self.settings.newton)
         except StepFailed as failure:
-            self._check_inversion(failure.iteration, failure.history)
+            self._check_deformation(failure.iteration, failure.history)
             raise
-        self._check_inversion(info.iterations, info.residuals)
+        self._check_deformation(info.iterations, info.residuals)
         return info if self.constraint is None else replace(info, numbers=self.constraint.numbers())
 
-    def _check_inversion(self, iteration: int, history: tuple[float, ...]) -> None:
-        """Raise StepFailed if the material is turned inside out anywhere."""
+    def _check_deformation(self, iteration: int, history: tuple[float, ...]) -> None:
+        """Raise StepFailed if a body flies off, as one does that nothing holds, or is turned inside out anywhere."""
+        farthest = self.comm.allreduce(float(np.abs(self.now.u).max(initial=0.0)), op=MPI.MAX)
+        if farthest > FLOWN_OFF * self._extent:
+            reason = f"a displacement of {farthest:.3g} m is out of all proportion: is a body not held?"
+            raise StepFailed(self.name, reason, iteration=iteration, where=self.worst(), history=history)
         worst = min((body.smallest_jacobian() for body in self.bodies), key=lambda jacobian: jacobian[0])
         volume_ratio, name, place = worst
         if not volume_ratio > 0.0:
