@@ -10,11 +10,12 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 import basix
 import numpy as np
 import ufl
-from dolfinx import cpp, fem
+from dolfinx import cpp, fem, jit, la
 from dolfinx import mesh as dolfinx_mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -142,6 +143,46 @@ def input_nodes(domain: Domain) -> NDArray[np.int64]:
     return np.asarray(domain.mesh.geometry.input_global_indices, dtype=np.int64)
 
 
+def input_cells(domain: Domain) -> NDArray[np.int64]:
+    """Number in the mesh file of each local cell (ghosts last)."""
+    return np.asarray(domain.mesh.topology.original_cell_index, dtype=np.int64)
+
+
+def owned_cells(domain: Domain) -> int:
+    """How many of the local cells this process owns; they come first."""
+    return int(domain.mesh.topology.index_map(domain.dim).size_local)
+
+
+def _facet_cells(domain: Domain) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """(offsets, cells) of the cells at each local facet."""
+    topology = domain.mesh.topology
+    topology.create_entities(domain.dim - 1)
+    topology.create_connectivity(domain.dim - 1, domain.dim)
+    links = topology.connectivity(domain.dim - 1, domain.dim)
+    return np.asarray(links.offsets, dtype=np.int32), np.asarray(links.array, dtype=np.int32)
+
+
+def interior_facets(domain: Domain) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """(local facets with two local cells, those cells of shape (facets, 2))."""
+    offsets, cells = _facet_cells(domain)
+    facets = np.flatnonzero(np.diff(offsets) == 2).astype(np.int32)
+    return facets, np.stack([cells[offsets[facets]], cells[offsets[facets] + 1]], axis=1)
+
+
+def boundary_facets(domain: Domain) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """(local facets on the boundary of the mesh that this process integrates over, the cell of each)."""
+    facets = np.sort(exterior_facets(domain))
+    offsets, cells = _facet_cells(domain)
+    return facets, cells[offsets[facets]]
+
+
+def facet_midpoints(domain: Domain, facets: NDArray[np.int32]) -> Array:
+    """Midpoints [m] of facets, shape (facets, dim)."""
+    if len(facets) == 0:
+        return np.empty((0, domain.dim))
+    return dolfinx_mesh.compute_midpoints(domain.mesh, domain.dim - 1, facets)[:, : domain.dim]
+
+
 # ---------------------------------------------------------------------------------------------------------- spaces
 
 
@@ -161,6 +202,60 @@ def cellwise_space(domain: Domain) -> fem.FunctionSpace:
     """One number per cell."""
     with _quiet():
         return fem.FunctionSpace(domain.mesh, ("Discontinuous Lagrange", 0))
+
+
+def flow_space(domain: Domain, velocity_degree: int) -> fem.FunctionSpace:
+    """Velocity and pressure as one function with dim + 1 components, pressure last and of first degree.
+
+    Equal order: one block of dim + 1 unknowns per node, side by side in the matrix; otherwise a mixed element.
+    """
+    cell = domain.mesh.ufl_cell()
+    if velocity_degree == 1:
+        element = ufl.VectorElement("Lagrange", cell, 1, dim=domain.dim + 1)
+    else:
+        velocity = ufl.VectorElement("Lagrange", cell, velocity_degree)
+        element = ufl.MixedElement([velocity, ufl.FiniteElement("Lagrange", cell, 1)])
+    with _quiet():
+        return fem.FunctionSpace(domain.mesh, element)
+
+
+def component_dofs(space: fem.FunctionSpace, component: int) -> tuple[NDArray[np.int32], Array]:
+    """(local unrolled dofs, their points of shape (dofs, 3)) of one component of a `flow_space` (collective)."""
+    if space.dofmap.index_map_bs > 1:
+        blocks = np.arange(len(space.tabulate_dof_coordinates()), dtype=np.int32)
+        return blocks * space.dofmap.index_map_bs + component, space.tabulate_dof_coordinates()
+    with _quiet():
+        part = space.sub(0).sub(component) if component < space.mesh.geometry.dim else space.sub(1)
+        collapsed, dofs = part.collapse()
+    return np.asarray(dofs, dtype=np.int32), collapsed.tabulate_dof_coordinates()
+
+
+def facet_dofs(space: fem.FunctionSpace, component: int, facets: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Local dofs of one component of a `flow_space` on facets, on every process that knows them (collective)."""
+    dim = space.mesh.topology.dim
+    if space.dofmap.index_map_bs > 1:
+        blocks = fem.locate_dofs_topological(space, dim - 1, facets)
+        return np.asarray(blocks, dtype=np.int32) * space.dofmap.index_map_bs + component
+    part = space.sub(0).sub(component) if component < dim else space.sub(1)
+    return np.asarray(fem.locate_dofs_topological(part, dim - 1, facets), dtype=np.int32)
+
+
+def quadrature_space(domain: Domain, degree: int, shape: tuple[int, ...] = ()) -> fem.FunctionSpace:
+    """Values at the points of the quadrature rule of a degree; shape () for scalars, (n,) vectors, (n, m) tensors."""
+    cell = domain.mesh.ufl_cell()
+    if not shape:
+        element = ufl.FiniteElement("Quadrature", cell, degree, quad_scheme="default")
+    elif len(shape) == 1:
+        element = ufl.VectorElement("Quadrature", cell, degree, dim=shape[0], quad_scheme="default")
+    else:
+        element = ufl.TensorElement("Quadrature", cell, degree, shape=shape, quad_scheme="default")
+    with _quiet():
+        return fem.FunctionSpace(domain.mesh, element)
+
+
+def quadrature_points(domain: Domain, degree: int) -> tuple[Array, Array]:
+    """(points of shape (n, dim), weights) on the reference cell that a measure of this degree uses."""
+    return basix.make_quadrature(getattr(basix.CellType, CELLS[domain.cell_type][0]), degree)
 
 
 def function(space: fem.FunctionSpace) -> fem.Function:
@@ -207,6 +302,43 @@ def _quiet() -> Iterator[None]:
         yield
     finally:
         logging.disable(before)
+
+
+class Integral:
+    """A compiled form whose integration domain may change without looking at the form again.
+
+    `on` takes the local cells or facets of every integral type that the form has: cell, exterior_facet, interior_facet.
+    """
+
+    def __init__(self, domain: Domain, form: ufl.Form):
+        self.domain = domain
+        with _quiet():
+            self._compiled, self._module, _ = jit.ffcx_jit(domain.comm, form, jit_params=COMPILE_OPTIONS)
+        coefficients = form.coefficients()
+        order = [self._compiled.original_coefficient_position[i] for i in range(self._compiled.num_coefficients)]
+        self._coefficients = [coefficients[i]._cpp_object for i in order]
+        self._constants = [constant._cpp_object for constant in form.constants()]
+        self._spaces = [argument.ufl_function_space()._cpp_object for argument in form.arguments()]
+
+    def on(self, **entities: NDArray[np.int32]) -> cpp.fem.Form_float64:
+        """The form over sorted local entities; measures must carry the subdomain number 1."""
+        mesh = self.domain.mesh
+        types = {"cell": self.domain.dim, "exterior_facet": self.domain.dim - 1, "interior_facet": self.domain.dim - 1}
+        tags = {
+            getattr(cpp.fem.IntegralType, name): cpp.mesh.MeshTags_int32(
+                mesh._mesh, types[name], np.asarray(local, dtype=np.int32), np.ones(len(local), dtype=np.int32)
+            )
+            for name, local in entities.items()
+        }
+        pointer = self._module.ffi.cast("uintptr_t", self._module.ffi.addressof(self._compiled))
+        return cpp.fem.create_form_float64(
+            int(pointer), self._spaces, self._coefficients, self._constants, tags, mesh._mesh
+        )
+
+
+def measure(domain: Domain, kind: str, degree: int) -> ufl.Measure:
+    """dx, ds or dS over entities that `Integral.on` chooses."""
+    return ufl.Measure(kind, domain=domain.mesh, subdomain_id=1, metadata={"quadrature_degree": degree})
 
 
 def surface_measure(domain: Domain, name: str, degree: int) -> ufl.Measure:
@@ -293,6 +425,31 @@ def tabulate(domain: Domain, reference: Array) -> Array:
         basix.ElementFamily.P, getattr(basix.CellType, name), degree, basix.LagrangeVariant.gll_warped
     )
     return element.tabulate(0, reference[None, :])[0, 0, :, 0]
+
+
+def sum_ghosts(space: fem.FunctionSpace, values: Array) -> Array:
+    """Values per local block with those of all processes added up, the same wherever a block is known (collective)."""
+    total: Any = la.vector(space.dofmap.index_map, 1)
+    total.array[:] = values
+    total.scatter_reverse(cpp.la.ScatterMode.add)
+    total.scatter_forward()
+    return total.array.copy()
+
+
+def add_ghosts(space: fem.FunctionSpace, local: Array) -> None:
+    """Add what processes hold at ghost dofs to the owners' entries of a local array (collective)."""
+    vector: Any = la.vector(space.dofmap.index_map, space.dofmap.index_map_bs)
+    vector.array[:] = local
+    vector.scatter_reverse(cpp.la.ScatterMode.add)
+    local[:] = vector.array
+
+
+def share_owned(space: fem.FunctionSpace, local: Array) -> Array:
+    """A local array with the owners' values at ghost dofs (collective)."""
+    vector: Any = la.vector(space.dofmap.index_map, space.dofmap.index_map_bs)
+    vector.array[:] = local
+    vector.scatter_forward()
+    return vector.array.copy()
 
 
 def accumulate(function: fem.Function) -> None:

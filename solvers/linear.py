@@ -59,6 +59,7 @@ def elastic_solver(comm, *, tolerance: float) -> PETSc.KSP:
     Not CG: an iterate of Newton's method that went too far may have an indefinite tangent.
     """
     ksp = PETSc.KSP().create(comm)
+    ksp.setOptionsPrefix("elastic_")
     ksp.setType(PETSc.KSP.Type.GMRES)
     ksp.setPCSide(PETSc.PC.Side.RIGHT)
     ksp.setGMRESRestart(100)
@@ -81,9 +82,44 @@ def _multigrid(comm) -> PETSc.PC:
     return preconditioner
 
 
+def choose_flow(method: Method, dim: int, dofs: int) -> Literal["direct", "iterative"]:
+    """The method for a flow of this size."""
+    if method == "auto":
+        return "direct" if dofs <= FLOW_DIRECT_LIMIT[dim] else "iterative"
+    return method
+
+
+#: Unknowns of a flow above which the iterative solver is taken.
+FLOW_DIRECT_LIMIT = {2: 400_000, 3: 10_000}
+
+
+def flow_direct_solver(comm, *, tolerance: float) -> PETSc.KSP:
+    """LU by MUMPS: velocity and pressure need pivoting."""
+    ksp = PETSc.KSP().create(comm)
+    ksp.setType(PETSc.KSP.Type.PREONLY)
+    ksp.getPC().setType(PETSc.PC.Type.LU)
+    ksp.getPC().setFactorSolverType("mumps")
+    return ksp
+
+
+def flow_solver(comm, *, tolerance: float) -> PETSc.KSP:
+    """GMRES with overlapping subdomains and incomplete factors, velocity and pressure of a node side by side."""
+    options = PETSc.Options("flow_")
+    for name, value in {"pc_type": "asm", "pc_asm_overlap": 1, "sub_pc_type": "ilu", "sub_pc_factor_levels": 0}.items():
+        options[name] = value
+    ksp = PETSc.KSP().create(comm)
+    ksp.setOptionsPrefix("flow_")
+    ksp.setType(PETSc.KSP.Type.GMRES)
+    ksp.setPCSide(PETSc.PC.Side.RIGHT)
+    ksp.setGMRESRestart(150)
+    ksp.setTolerances(rtol=tolerance, max_it=600)
+    ksp.setFromOptions()
+    return ksp
+
+
 def solve(ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
     """Solve matrix x = b with a freshly assembled matrix. Raises LinearSolveFailed."""
-    if ksp.getType() != PETSc.KSP.Type.PREONLY:
+    if ksp.getOptionsPrefix() == "elastic_":
         ksp.setPC(_multigrid(ksp.comm))
     ksp.setOperators(matrix)
     ksp.solve(b, x)

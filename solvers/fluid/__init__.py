@@ -1,0 +1,1 @@
+"""Incompressible flow on a fixed grid that moving surfaces cut (CutFEM)."""

@@ -1,0 +1,145 @@
+"""Where surfaces cut the grid: active cells, and the moments that turn integrals on cut cells into weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from solvers import kernels
+from solvers.api import Array
+from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.surface import Motion, normals
+
+#: Share of a cell (of its face) below which fluid (surface) in it is rounding error of the geometry.
+NOTHING = 1e-10
+
+Cells = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """The surface by pieces, each in one cut cell that this process owns or knows; sorted by cell."""
+
+    cell: NDArray[np.int64]  #: index into the cut cells
+    facet: NDArray[np.int64]
+    moments: Array  #: int L_q lambda_v ds [m^(dim-1)], shape (pieces, points, dim)
+    mass: Array  #: int lambda_v lambda_w ds, shape (pieces, dim, dim)
+    normal: Array  #: unit normal out of the fluid, shape (pieces, dim)
+
+
+@dataclass(frozen=True)
+class Cut:
+    """The grid as the surfaces at one time leave it; cells are local and sorted."""
+
+    uncut: Cells  #: cells full of fluid
+    cut: Cells  #: cells with a piece of surface, or partly solid
+    strip: Cells  #: solid cells that the flow is extended to
+    ghost_faces: NDArray[np.int32]  #: faces between active cells, one of them cut or of the strip
+    fluid: Array  #: int_fluid L_q dx / (w_q |K|) on cut cells, shape (cut, points)
+    fraction: Array  #: share of fluid in each local cell
+    pieces: Pieces
+    facets: NDArray[np.int64]
+    motion: Motion
+
+    @property
+    def active(self) -> Cells:
+        """All cells with unknowns."""
+        return np.sort(np.concatenate([self.uncut, self.cut, self.strip]))
+
+
+class Cutter:
+    """Cuts one grid again and again; `points` (n,) are the 1D points of the rule on cut cells."""
+
+    def __init__(self, grid: DistributedGrid, points: Array):
+        self.grid, self.points = grid, points
+        own = np.zeros(grid.grid.size, dtype=bool)
+        own[grid.numbers] = True
+        self._own = grid.grid.as_box(own)
+
+    def __call__(self, facets: NDArray[np.int64], motion: Motion, layers: int) -> Cut:
+        """Cells and weights for the surfaces, with this many layers of cells behind them kept active."""
+        grid, box = self.grid, self.grid.grid
+        if not len(facets):
+            return self._whole(facets, motion)
+        wanted = _grow(self._own, layers + 1)
+        moments = kernels.moments(box.edges, self.points, motion.x, facets, wanted.ravel(order="F"))
+        normal = -normals(motion.x, facets)
+        is_cut, in_use = self._cut_cells(moments)
+        solid = (moments.fraction >= 1.0 - NOTHING) & ~is_cut
+        near = _grow(box.as_box(is_cut), layers).ravel(order="F") if layers else is_cut
+        strip = solid & near
+        local_cut, local_strip = is_cut[grid.numbers], strip[grid.numbers]
+        active = ~solid[grid.numbers] | local_strip
+        faces, sides = grid.interior_faces
+        special = (local_cut | local_strip)[sides].any(axis=1) & active[sides].all(axis=1)
+        cut = np.flatnonzero(local_cut).astype(np.int32)
+        fluid, pieces = self._on_local_cells(moments, in_use, cut, normal)
+        return Cut(
+            uncut=np.flatnonzero(active & ~local_cut & ~local_strip).astype(np.int32),
+            cut=cut,
+            strip=np.flatnonzero(local_strip).astype(np.int32),
+            ghost_faces=faces[special],
+            fluid=fluid,
+            fraction=1.0 - moments.fraction[grid.numbers],
+            pieces=pieces,
+            facets=facets,
+            motion=motion,
+        )
+
+    def _whole(self, facets: NDArray[np.int64], motion: Motion) -> Cut:
+        """No surface at all."""
+        dim, points = self.grid.dim, len(self.points) ** self.grid.dim
+        none, nothing = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.int64)
+        pieces = Pieces(nothing, nothing, np.empty((0, points, dim)), np.empty((0, dim, dim)), np.empty((0, dim)))
+        everything = np.arange(len(self.grid.numbers), dtype=np.int32)
+        return Cut(
+            everything, none, none, none, np.empty((0, points)), np.ones(len(everything)), pieces, facets, motion
+        )
+
+    def _cut_cells(self, moments) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """(cut or not for each box cell, kept or not for each cell of `moments`): slivers of surface do not cut."""
+        sizes = self.grid.grid.cell_sizes()
+        is_cut = (moments.fraction > NOTHING) & (moments.fraction < 1.0 - NOTHING)
+        area = np.bincount(
+            moments.piece_cell, weights=moments.piece_mass.sum(axis=(1, 2)), minlength=len(moments.cells)
+        )
+        volume = sizes[moments.cells].prod(axis=1)
+        in_use = area > NOTHING * volume / sizes[moments.cells].max(axis=1, initial=0.0)
+        is_cut[moments.cells[in_use]] = True
+        return is_cut, in_use
+
+    def _on_local_cells(self, moments, in_use, cut: Cells, normal: Array) -> tuple[Array, Pieces]:
+        grid = self.grid
+        weights = _tensor_weights(self.points, grid.dim)
+        row_of = np.full(grid.grid.size, -1, dtype=np.int64)
+        row_of[grid.numbers[cut]] = np.arange(len(cut))
+        rows = row_of[moments.cells]
+        fluid = np.tile(1.0 - np.round(moments.fraction[grid.numbers[cut]])[:, None], (1, len(weights)))
+        known = rows >= 0
+        fluid[rows[known]] = 1.0 - moments.solid[known] / weights
+        mine = (known & in_use)[moments.piece_cell]
+        cell = rows[moments.piece_cell[mine]]
+        order = np.argsort(cell, kind="stable")
+        facet = moments.piece_facet[mine][order]
+        return fluid, Pieces(
+            cell[order], facet, moments.piece_moments[mine][order], moments.piece_mass[mine][order], normal[facet]
+        )
+
+
+def _tensor_weights(points: Array, dim: int) -> Array:
+    """Weights of the tensor Gauss rule on [0, 1]^dim with these 1D points."""
+    weights = np.polynomial.legendre.leggauss(len(points))[1] / 2.0
+    product = weights
+    for _ in range(dim - 1):
+        product = np.multiply.outer(weights, product)
+    return product.ravel()
+
+
+def _grow(marked: NDArray[np.bool_], layers: int) -> NDArray[np.bool_]:
+    """Marked cells and their neighbours across vertices, as many layers as wanted."""
+    if layers == 0:
+        return marked
+    return ndimage.binary_dilation(marked, np.ones((3,) * marked.ndim, dtype=bool), iterations=layers)

@@ -1,0 +1,350 @@
+"""The fluid: incompressible flow on the fixed grid around surfaces that stand still or move."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from solvers import linear
+from solvers.api import Array, State, StepFailed, StepInfo
+from solvers.distributed import Nodal
+from solvers.fluid import time
+from solvers.fluid.cut import Cut, Cutter
+from solvers.fluid.grid import DistributedGrid, Grid
+from solvers.fluid.patches import Boundary, Patch
+from solvers.fluid.space import Unknowns
+from solvers.fluid.surface import Motion, Surface, offsets, together
+from solvers.fluid.system import FlowSettings, FlowSystem
+from solvers.newton import Tolerance, converge
+from solvers.timing import Timer
+
+#: Share of the largest residual of a steady flow below which Newton's method takes over from Picard's.
+NEWTON_FROM = 0.02
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """How the nonlinear and the linear systems are solved."""
+
+    newton: Tolerance = Tolerance()
+    linear: linear.Method = "auto"
+    linear_tolerance: float = 1e-8
+
+
+@dataclass(frozen=True)
+class Body:
+    """A surface in the flow; `motion` gives its vertices at a time, None if another field moves it."""
+
+    surface: Surface
+    motion: Callable[[float], Motion] | None
+    rests: bool = False  #: it never moves
+
+
+@dataclass
+class Past:
+    """Velocities of a time behind, local dofs, and where they are known."""
+
+    velocity: Array
+    known: np.ndarray
+
+    def copy(self) -> Past:
+        return Past(self.velocity.copy(), self.known.copy())
+
+
+class Fluid:
+    """Velocity and pressure by Newton's method, step by step."""
+
+    name = "fluid"
+
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        grid: Grid,
+        settings: FlowSettings,
+        patches: Sequence[Patch],
+        bodies: Sequence[Body] = (),
+        solver: SolverSettings = SolverSettings(),
+        timer: Timer | None = None,
+    ):
+        self.comm, self.settings, self.solver, self.timer = comm, settings, solver, timer or Timer()
+        self.bodies = list(bodies)
+        self.grid = DistributedGrid(comm, grid)
+        self.dim = grid.dim
+        self.unknowns = Unknowns(self.grid, settings.degree)
+        self.boundary = Boundary(self.grid, self.unknowns, patches)
+        self.system = FlowSystem(self.grid, settings, self.boundary, self.unknowns, with_bodies=bool(self.bodies))
+        self.cutter = Cutter(self.grid, self.system.weights.points)
+        self._velocity_mask = np.zeros(self.unknowns.local, dtype=bool)
+        self._velocity_mask[self.unknowns.velocity.dofs] = True
+        everywhere = np.ones(self.unknowns.local, dtype=bool)
+        self.old, self.older = (Past(np.zeros(self.unknowns.local), everywhere.copy()) for _ in range(2))
+        self._dt_before: float | None = None
+        self._motions: list[Motion] = []
+        self._ksp: PETSc.KSP | None = None
+        self._iterative = linear.choose_flow(solver.linear, self.dim, self.dofs()) == "iterative"
+
+    # ------------------------------------------------------------------------------------------------- the state
+
+    def dofs(self) -> int:
+        """Unknowns on all processes, inactive ones included."""
+        return self.unknowns.size()
+
+    @property
+    def flow(self) -> Array:
+        """Velocity [m/s] and pressure [Pa] at local dofs (a view)."""
+        return self.system.flow.x.array
+
+    @property
+    def cut(self) -> Cut:
+        assert self.system.cut is not None
+        return self.system.cut
+
+    def initialise(self, t: float, dt: float) -> None:
+        """The initial velocity, known everywhere."""
+        if self.settings.initial_velocity is not None:
+            points = np.zeros((3, len(self.unknowns.velocity.points)))
+            points[: self.dim] = self.unknowns.velocity.points.T
+            for axis, component in enumerate(self.settings.initial_velocity):
+                self.flow[self.unknowns.velocity.dofs[:, axis]] = component(points, t)
+        self._t, self._dt = t, dt
+        self._difference = time.STEADY if self.settings.steady else time.backward_euler(dt)
+        self.move([self._motion(body, t) for body in self.bodies])
+
+    def _motion(self, body: Body, t: float) -> Motion:
+        assert body.motion is not None, "a coupled body is moved from outside"
+        return body.motion(t)
+
+    # ------------------------------------------------------------------------------------------------- steps
+
+    def begin_step(self, t: float, dt: float) -> None:
+        """Remember the state at t; boundary, loads and moving bodies at t + dt."""
+        self._t, self._dt = t + dt, dt
+        velocity = np.where(self._velocity_mask, self.flow, 0.0)
+        self.older, self.old = self.old, Past(velocity, self.system.active_dofs | self._first)
+        self._difference = self._choose_difference(dt)
+        difference = self._difference
+        history = difference.beta_0 * self.old.velocity + difference.beta_1 * self.older.velocity
+        self.system.set_time(t + dt, difference, history)
+        self.flow[self.boundary.dofs] = self.boundary.velocity(t + dt)
+        self.system.set_scales(velocity)
+        if all(body.motion is not None for body in self.bodies):
+            self.move([self._motion(body, t + dt) for body in self.bodies])
+
+    @property
+    def _first(self) -> bool:
+        """No step was taken: the initial velocity is known everywhere."""
+        return self._dt_before is None
+
+    def _choose_difference(self, dt: float) -> time.Difference:
+        if self.settings.steady:
+            return time.STEADY
+        if self.settings.scheme == "backward_euler" or self._dt_before is None:
+            return time.backward_euler(dt)
+        return time.bdf2(dt, self._dt_before)
+
+    def move(self, motions: Sequence[Motion]) -> None:
+        """Cut the grid by the surfaces where they are now. Raises StepFailed if they ran out of the strip."""
+        self._motions = list(motions)
+        with self.timer("cut"):
+            facets, motion = together([body.surface for body in self.bodies], motions, self.dim)
+            cut = self.cutter(facets, motion, self._layers(motion))
+        with self.timer("weights"):
+            self.system.set_cut(cut)
+            self._check_strip(cut)
+            self.flow[~self.system.active_dofs] = 0.0
+            self._held = np.zeros(self.unknowns.owned, dtype=bool)
+            prescribed = self.boundary.dofs[self.boundary.dofs < self.unknowns.owned]
+            self._held[prescribed] = True
+            self._held |= ~self.system.active_dofs[: self.unknowns.owned]
+            self._hold_pressure()
+
+    def _layers(self, motion: Motion) -> int:
+        """Cells behind the surface that the next two steps may uncover."""
+        if self.settings.steady or all(body.rests for body in self.bodies):
+            return 0
+        fastest = float(np.linalg.norm(motion.v, axis=1).max(initial=0.0))
+        steps = 2.0 if self.settings.scheme == "bdf2" else 1.0
+        smallest = min(float(np.diff(edge).min()) for edge in self.grid.grid.edges)
+        return max(1, math.ceil(1.25 * steps * fastest * self._dt / smallest))
+
+    def _check_strip(self, cut: Cut) -> None:
+        used = np.zeros(self.unknowns.local, dtype=bool)
+        blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)
+        blocks[self.unknowns.cell_blocks[np.concatenate([cut.uncut, cut.cut])]] = True
+        used = self.unknowns.expand(blocks) & self._velocity_mask
+        unknown = np.zeros(self.unknowns.local, dtype=bool)
+        if self._difference.beta_0:
+            unknown |= used & ~self.old.known
+        if self._difference.beta_1:
+            unknown |= used & ~self.older.known
+        if self.comm.allreduce(bool(unknown.any()), op=MPI.LOR):
+            reason = "a body moved farther in one step than the flow behind it is known: take a smaller time step"
+            raise StepFailed(self.name, reason)
+
+    def _hold_pressure(self) -> None:
+        """Fix the pressure at one node if nothing else does: the first active one of the box's lattice."""
+        self._pinned = -1
+        if not self.boundary.closed():
+            return
+        nodes = self.unknowns.pressure
+        dofs = nodes.dofs[: nodes.owned, 0]
+        active = self.system.active_dofs[dofs]
+        numbers = np.where(active, nodes.numbers[: nodes.owned], np.iinfo(np.int64).max)
+        best = int(numbers.min(initial=np.iinfo(np.int64).max))
+        if best == self.comm.allreduce(best, op=MPI.MIN) and len(numbers):
+            self._pinned = int(dofs[np.argmin(numbers)])
+            self._held[self._pinned] = True
+            self.flow[self._pinned] = 0.0
+
+    def solve(self) -> StepInfo:
+        """Newton to the tolerance. Raises StepFailed."""
+        self._fresh, self._largest = True, 0.0
+        return converge(self, self.solver.newton)
+
+    def end_step(self) -> None:
+        """Accept the step."""
+        self._dt_before = self._dt
+
+    # ---------------------------------------------------------------------------- the system that Newton solves
+
+    def residual(self) -> float:
+        """Norm [N] of the momentum rows and of the continuity rows times the impedance of a cell."""
+        with self.timer("assembly"):
+            if self._fresh or self.settings.steady:
+                if self.settings.steady:
+                    self.system.set_scales(np.where(self._velocity_mask, self.flow, 0.0))
+                self.system.set_penalties()
+                self._fresh = False
+            self.residual_rows = self.system.residual()
+        self.residual_rows[self._held] = 0.0
+        self._size = self._norm(self.residual_rows)
+        self._largest = max(self._largest, self._size)
+        return self._size
+
+    def _norm(self, rows: Array) -> float:
+        settings, h = self.settings, self.grid.sizes.min(axis=1)
+        h_min, fastest = float(h.min()), float(self.system.speed.max(initial=0.0))
+        h_min, fastest = self.comm.allreduce(h_min, op=MPI.MIN), self.comm.allreduce(fastest, op=MPI.MAX)
+        impedance = settings.viscosity / h_min + settings.density * (fastest + h_min * self._difference.alpha)
+        scaled = np.where(self._velocity_mask[: len(rows)], rows, impedance * rows)
+        return math.sqrt(self.comm.allreduce(float(scaled @ scaled)))
+
+    def advance(self) -> float:
+        """One Newton step; the increment relative to the solution."""
+        with self.timer("assembly"):
+            matrix = self.system.tangent(self._held, picard=self._far())
+        b, x = matrix.createVecs()
+        b.array[:] = -self.residual_rows
+        self._diagonal = np.abs(matrix.getDiagonal().array)
+        try:
+            with self.timer("solve"):
+                self._solve(matrix, b, x)
+        except linear.LinearSolveFailed as failure:
+            raise StepFailed(self.name, str(failure), where=self.worst()) from failure
+        self._increment = x.array.copy()
+        self._add(self._increment)
+        owned = self.unknowns.owned
+        size = self._norm(self._diagonal * self.flow[:owned])
+        return self._norm(self._diagonal * self._increment) / size if size > 0.0 else 0.0
+
+    def _far(self) -> bool:
+        """The iterate of a steady flow is not yet where Newton's method converges."""
+        return self.settings.steady and self.settings.convection and self._size > NEWTON_FROM * self._largest
+
+    def _solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
+        if self._ksp is None:
+            make = linear.flow_solver if self._iterative else linear.flow_direct_solver
+            self._ksp = make(self.comm, tolerance=self.solver.linear_tolerance)
+        linear.solve(self._ksp, matrix, b, x)
+
+    def _add(self, owned: Array) -> None:
+        self.flow[: self.unknowns.owned] += owned
+        self.system.flow.x.scatter_forward()
+
+    def retreat(self, fraction: float) -> None:
+        """Take back a fraction of the last increment."""
+        self._add(-fraction * self._increment)
+
+    def settled(self) -> bool:
+        """Nothing is imposed that an iterate does not fulfil."""
+        return True
+
+    def round_off(self) -> float:
+        """Rounding error of the residual, eps |u| and eps |p| seen through the diagonal of the tangent."""
+        if not hasattr(self, "_diagonal"):
+            return 0.0
+        size = np.where(self._held, 0.0, self._diagonal * np.abs(self.flow[: self.unknowns.owned]))
+        return float(np.finfo(float).eps) * self._norm(size)
+
+    def worst(self) -> tuple[float, ...] | None:
+        """Position [m] of the node with the largest momentum residual (collective)."""
+        nodes = self.unknowns.velocity
+        size = np.abs(np.nan_to_num(self.residual_rows[nodes.dofs[: nodes.owned]], nan=np.inf)).max(axis=1)
+        index = int(np.argmax(size)) if len(size) else 0
+        largest = float(size[index]) if len(size) else -1.0
+        _, rank = self.comm.allreduce((largest, self.comm.rank), op=MPI.MAXLOC)
+        place = tuple(nodes.points[index].tolist()) if rank == self.comm.rank else None
+        return self.comm.bcast(place, root=rank)
+
+    # ---------------------------------------------------------------------------------------------- reactions
+
+    def force(self) -> dict[str, Array]:
+        """Force [N] (per depth in 2D) of the fluid on the vertices of each body, shape (n, dim) (collective)."""
+        total = self.system.surface_force()
+        starts = offsets([body.surface for body in self.bodies])
+        return {body.surface.name: total[a:b] for body, a, b in zip(self.bodies, starts, starts[1:], strict=False)}
+
+    # ---------------------------------------------------------------------------------------- save and restore
+
+    def save(self) -> State:
+        """Everything a step starts from."""
+        velocity, pressure = self.unknowns.velocity, self.unknowns.pressure
+
+        def nodal(values: Array, nodes) -> Nodal:
+            return Nodal(values[nodes.dofs[: nodes.owned]].astype(float), nodes.numbers[: nodes.owned])
+
+        known = np.stack([self.system.active_dofs | self._first, self.old.known], axis=1)[velocity.dofs[:, 0]]
+        return {
+            "velocity": nodal(self.flow, velocity),
+            "pressure": nodal(self.flow, pressure),
+            "old_velocity": nodal(self.old.velocity, velocity),
+            "known": Nodal(known[: velocity.owned].astype(float), velocity.numbers[: velocity.owned]),
+            "dt_before": self._dt_before,
+            "time": self._t,
+            "motion": {body.surface.name: {"x": m.x, "v": m.v} for body, m in self._moved()},
+        }
+
+    def _moved(self):
+        return zip(self.bodies, self._motions, strict=True)
+
+    def restore(self, state: State) -> None:
+        """Back to a saved state."""
+        velocity, pressure = self.unknowns.velocity, self.unknowns.pressure
+        owned = np.zeros(self.unknowns.local)
+        owned[velocity.dofs[: velocity.owned]] = state["velocity"].values
+        owned[pressure.dofs[: pressure.owned]] = state["pressure"].values
+        self.flow[:] = self._shared(owned)
+        owned[:] = 0.0
+        owned[velocity.dofs[: velocity.owned]] = state["old_velocity"].values
+        self.old.velocity = self._shared(owned)
+        for column, past in ((1, self.old),):
+            owned[:] = 0.0
+            owned[velocity.dofs[: velocity.owned]] = state["known"].values[:, [column]]
+            past.known = self._shared(owned) > 0.5
+        self._dt_before, self._t = state["dt_before"], state["time"]
+        self._difference = time.STEADY
+        motions = [Motion(m["x"], m["v"]) for m in (state["motion"][b.surface.name] for b in self.bodies)]
+        kept = self.flow.copy()
+        self.move(motions)
+        self.flow[:] = kept
+
+    def _shared(self, owned: Array) -> Array:
+        """Local dofs from owned ones."""
+        from solvers import fem
+
+        return fem.share_owned(self.unknowns.space, owned)

@@ -1,0 +1,162 @@
+"""The equations of the flow on a cut grid: bulk, stabilisation, interface, ghost penalty, outer faces.
+
+sigma(u, p) = 2 mu eps(u) - p I, n outward normal of the fluid, g velocity of the interface, h edge length of the cell.
+The time derivative is alpha u - history, alpha = 0 if the flow is steady; `a` is the velocity that scales
+the stabilisation, known before the iterate.
+Sources: Massing, Schott, Wall, Comput. Methods Appl. Mech. Engrg. 328 (2018) 262-300; Schott, Wall, ibid. 276 (2014)
+233-265; Burman, Fernandez, ibid. 279 (2014) 497-514; Tezduyar, Osawa, ibid. 190 (2000) 411-430 (tau).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import ufl
+from ufl import avg, div, dot, grad, inner, outer, sqrt, sym, tr
+
+Expr = Any
+
+#: Trace constant C_T of a cell, by dimension and degree of the velocity (4C's values).
+TRACE = {(2, 1): 1.43426, (2, 2): 4.19708, (3, 1): 1.59307, (3, 2): 4.27784}
+
+
+@dataclass(frozen=True)
+class Penalties:
+    """Factors of the stabilisation; all without unit. The values are those of design and verification."""
+
+    nitsche: float = 35.0  #: gamma of the viscous Nitsche penalty, times C_T
+    mass: float = 35.0 / 40.0  #: normal Nitsche penalty rho h alpha
+    convection: float = 35.0 / 6.0  #: normal Nitsche penalty rho |a|
+    ghost_viscous: float = 0.1
+    ghost_mass: float = 1e-3
+    ghost_convection: float = 0.05
+    ghost_pressure: float = 0.05
+
+
+@dataclass(frozen=True)
+class Flow:
+    """What the terms share: functions, numbers and what the case leaves out."""
+
+    rho: Expr  #: density [kg/m^3]
+    mu: Expr  #: viscosity [Pa s]
+    alpha: Expr  #: d(u_t)/du [1/s]
+    a: Expr  #: velocity [m/s] for the scales of the stabilisation
+    newton: Expr  #: 1, or 0 to linearise u . grad u about u = a without its second term (Picard)
+    history: Expr  #: u_t = alpha u - history [m/s^2]
+    force: Expr  #: body force [N/m^3]
+    convection: bool  #: False: Stokes
+    steady: bool
+    degree: int  #: of the velocity
+    mesh: Any
+
+    @property
+    def sizes(self) -> list[Expr]:
+        """Edge lengths [m] of an axis-aligned cell."""
+        jacobian = ufl.Jacobian(self.mesh)
+        return [jacobian[i, i] for i in range(self.mesh.geometric_dimension())]
+
+
+def eps(u: Expr) -> Expr:
+    return sym(grad(u))
+
+
+def sigma(flow: Flow, u: Expr, p: Expr) -> Expr:
+    return 2.0 * flow.mu * eps(u) - p * ufl.Identity(len(u))
+
+
+def inertia(flow: Flow, u: Expr) -> Expr:
+    """rho (u_t + u . grad u) - f."""
+    terms = -flow.force
+    if not flow.steady:
+        terms += flow.rho * (flow.alpha * u - flow.history)
+    if flow.convection:
+        terms += flow.rho * dot(grad(u), flow.newton * u + (1.0 - flow.newton) * flow.a)
+    return terms
+
+
+def bulk(flow: Flow, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+    """Integrand of rho (u_t + u . grad u, v) + (2 mu eps(u), eps(v)) - (p, div v) + (q, div u) - (f, v)."""
+    return dot(inertia(flow, u), v) + inner(2.0 * flow.mu * eps(u), eps(v)) - p * div(v) + q * div(u)
+
+
+def residual_based(flow: Flow, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+    """Integrand of the SUPG, PSPG and grad-div terms, (tau_M (rho a . grad v + grad q), R) + (tau_C div u, div v).
+
+    tau_M = (4 rho^2 alpha^2 + rho^2 a . G a + 36 mu^2 G : G)^(-1/2), 144 for second degree, tau_C = 1 / (tau_M tr G),
+    G = diag(4 / h_i^2). The viscous part of R is that of a field without divergence, mu lap u, zero for first degree.
+    """
+    metric = [4.0 / h**2 for h in flow.sizes]
+    trace = sum(metric)
+    square = (36.0 if flow.degree == 1 else 144.0) * flow.mu**2 * sum(g**2 for g in metric)
+    if not flow.steady:
+        square += 4.0 * flow.rho**2 * flow.alpha**2
+    test = grad(q)
+    if flow.convection:
+        square += flow.rho**2 * sum(g * flow.a[i] ** 2 for i, g in enumerate(metric))
+        test += flow.rho * dot(grad(v), flow.a)
+    tau = 1.0 / sqrt(square)
+    strong = inertia(flow, u) + grad(p)
+    if flow.degree > 1:
+        strong -= flow.mu * div(grad(u))
+    return tau * dot(test, strong) + div(u) * div(v) / (tau * trace)
+
+
+def interface(flow: Flow, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+    """Integrand over cut cells of Nitsche's method on the interface, by its weights.
+
+    -<sigma(u, p) n, v> - <u - g, 2 mu eps(v) n + q n> + <s (u - g), v> + <s_n (u - g) . n, v . n>
+    """
+    mismatch = outer(u, weights.n) - weights.gn
+    return (
+        -dot(dot(sigma(flow, u, p), weights.n), v)
+        - inner(2.0 * flow.mu * eps(v), mismatch)
+        - q * tr(mismatch)
+        + dot(dot(weights.penalty, u) - weights.penalty_g, v)
+    )
+
+
+def ghost_penalty(flow: Flow, factors: Penalties, phi: Expr, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+    """Integrand over faces of sum_j h^(2j-1) (gamma_v mu + gamma_t rho alpha h^2 + gamma_b rho phi) [d_n^j u] [d_n^j v]
+    and gamma_p h^3 / (rho phi) [d_n p] [d_n q]; phi [m^2/s] per cell is the scale of `cell_scale`."""
+    n = ufl.FacetNormal(flow.mesh)
+    h = avg(abs(sum(n[i] ** 2 * size for i, size in enumerate(flow.sizes))))
+    phi = avg(phi)
+    factor = factors.ghost_viscous * flow.mu
+    if not flow.steady:
+        factor += factors.ghost_mass * flow.rho * flow.alpha * h**2
+    if flow.convection or not flow.steady:
+        factor += factors.ghost_convection * flow.rho * phi
+    terms = factors.ghost_pressure * h**3 / (flow.rho * phi) * _jump(p, n, 1) * _jump(q, n, 1)
+    for order in range(1, flow.degree + 1):
+        terms += h ** (2 * order - 1) * factor * dot(_jump(u, n, order), _jump(v, n, order))
+    return terms
+
+
+def _jump(field: Expr, n: Expr, order: int) -> Expr:
+    """Jump of the order-th normal derivative across a face, counted along the normal of its '+' side."""
+    derivative = field
+    for _ in range(order):
+        derivative = grad(derivative)
+    jumped = derivative("+") - derivative("-")
+    for _ in range(order):
+        jumped = dot(jumped, n("+"))
+    return jumped
+
+
+def traction(t: Expr, v: Expr) -> Expr:
+    """Integrand of -<t, v> on an outer face with the given traction [Pa]."""
+    return -dot(t, v)
+
+
+def outflow(flow: Flow, u: Expr, v: Expr) -> Expr:
+    """Integrand on an outer face that a parallel flow leaves unharmed: mu d_n u - p n = 0, and no energy comes back.
+
+    -<mu (grad u)^T n, v> - rho/2 <min(0, u . n) u, v>. Source: Braack, Mucha, J. Comput. Math. 32 (2014) 507-521.
+    """
+    n = ufl.FacetNormal(flow.mesh)
+    terms = -flow.mu * dot(dot(n, grad(u)), v)
+    if flow.convection:
+        back = 0.5 * (dot(flow.a, n) - abs(dot(flow.a, n)))
+        terms -= 0.5 * flow.rho * back * dot(u, v)
+    return terms

@@ -1,0 +1,111 @@
+"""Conditions on the faces of the box, patch by patch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers import fem
+from solvers.api import Array
+from solvers.fluid.grid import FACES, DistributedGrid
+from solvers.fluid.space import Unknowns
+
+#: A component as function of positions (dim, n) [m] and time [s].
+Value = Callable[[Array, float], Array]
+
+Kind = Literal["velocity", "no_slip", "slip", "traction", "outflow"]
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Part of the box's boundary with one condition.
+
+    velocity: all components; no_slip: zero; slip: no flow through, no shear; traction [Pa]: sigma n;
+    outflow: what a parallel flow does, without energy coming back in.
+    """
+
+    name: str
+    faces: tuple[str, ...]
+    kind: Kind
+    value: tuple[Value, ...] | None = None  #: velocity or traction
+    where: Value | None = None  #: positive on the part of the faces that belongs to it; default: all
+
+    def __post_init__(self) -> None:
+        assert set(self.faces) <= set(FACES)
+
+
+class UncoveredFaces(ValueError):
+    """Part of the boundary has no condition; `faces` names where."""
+
+    def __init__(self, faces: Sequence[str]):
+        super().__init__("no condition is given on part of the box: " + ", ".join(faces))
+        self.faces = tuple(faces)
+
+
+class Boundary:
+    """All patches on one grid. Where patches meet, the one named last decides. Raises UncoveredFaces (collective)."""
+
+    def __init__(self, grid: DistributedGrid, unknowns: Unknowns, patches: Sequence[Patch]):
+        self.patches = list(patches)
+        self._unknowns = unknowns
+        facets, self._cells, midpoints = grid.outer_faces
+        patch_of = np.full(len(facets), -1)
+        for number, patch in enumerate(patches):
+            on = np.zeros(len(facets), dtype=bool)
+            for face in patch.faces:
+                on |= grid.on_face(midpoints, face)
+            if patch.where is not None:
+                on &= np.broadcast_to(patch.where(midpoints.T, 0.0), len(facets)) > 0.0
+            patch_of[on] = number
+        self._check(grid, midpoints[patch_of < 0])
+        #: local faces and their cells, by patch
+        self.facets = [facets[patch_of == number] for number in range(len(patches))]
+        self.cells = [self._cells[patch_of == number] for number in range(len(patches))]
+        self._imposed = np.full(unknowns.local, -1)
+        for number, patch in enumerate(patches):
+            for component in self._held(grid, patch, midpoints[patch_of == number]):
+                on_patch, axes = component
+                dofs = fem.facet_dofs(unknowns.space, axes, np.sort(self.facets[number][on_patch]))
+                self._imposed[dofs] = number
+        #: local dofs with a prescribed velocity
+        self.dofs: NDArray[np.int64] = np.flatnonzero(self._imposed >= 0)
+        self._place = np.full((unknowns.local, 2), -1)
+        for axis in range(unknowns.dim):
+            dofs = unknowns.velocity.dofs[:, axis]
+            self._place[dofs] = np.stack([np.arange(len(dofs)), np.full(len(dofs), axis)], axis=1)
+
+    def _check(self, grid: DistributedGrid, bare: Array) -> None:
+        found = {face for face in FACES[: 2 * grid.dim] if grid.on_face(bare, face).any()}
+        together = set().union(*grid.comm.allgather(found))
+        if together:
+            raise UncoveredFaces([face for face in FACES if face in together])
+
+    def _held(self, grid: DistributedGrid, patch: Patch, midpoints: Array):
+        """(which facets of the patch, component that they hold)."""
+        if patch.kind in ("velocity", "no_slip"):
+            return [(np.ones(len(midpoints), dtype=bool), axis) for axis in range(grid.dim)]
+        if patch.kind == "slip":
+            return [(grid.on_face(midpoints, face), "xyz".index(face[0])) for face in patch.faces]
+        return []
+
+    def closed(self) -> bool:
+        """The velocity is prescribed all round, so that the pressure has no level."""
+        return all(patch.kind not in ("traction", "outflow") for patch in self.patches)
+
+    def velocity(self, t: float) -> Array:
+        """Prescribed velocities [m/s] of `dofs` at a time."""
+        values = np.zeros(len(self.dofs))
+        owner = self._imposed[self.dofs]
+        node, axis = self._place[self.dofs].T
+        for number, patch in enumerate(self.patches):
+            if patch.kind != "velocity":
+                continue
+            assert patch.value is not None
+            for component, value in enumerate(patch.value):
+                on = (owner == number) & (axis == component)
+                values[on] = value(self._unknowns.velocity.points[node[on]].T, t)
+        return values

@@ -1,0 +1,53 @@
+"""Surfaces in the flow: closed, of segments or triangles, with the solid inside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+
+
+@dataclass(frozen=True)
+class Surface:
+    """One body's surface; the right-hand normal of each facet points out of the solid."""
+
+    name: str
+    facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
+    vertices: int
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Where the vertices of a surface are and how they move."""
+
+    x: Array  #: positions [m], shape (n, dim)
+    v: Array  #: velocities [m/s], shape (n, dim)
+
+
+def together(surfaces: Sequence[Surface], motions: Sequence[Motion], dim: int) -> tuple[NDArray[np.int64], Motion]:
+    """All surfaces as one: (facets, motion), vertices of one surface after those of the other."""
+    if not surfaces:
+        return np.empty((0, dim), dtype=np.int64), Motion(np.empty((0, dim)), np.empty((0, dim)))
+    starts = offsets(surfaces)[:-1]
+    facets = np.concatenate([s.facets + start for s, start in zip(surfaces, starts, strict=True)])
+    return facets, Motion(np.concatenate([m.x for m in motions]), np.concatenate([m.v for m in motions]))
+
+
+def offsets(surfaces: Sequence[Surface]) -> NDArray[np.int64]:
+    """First vertex of each surface among all, and their number."""
+    return np.concatenate([[0], np.cumsum([s.vertices for s in surfaces])]).astype(np.int64)
+
+
+def normals(x: Array, facets: NDArray[np.int64]) -> Array:
+    """Unit normals of segments or triangles out of the solid, shape (m, dim); zero for a facet without extent."""
+    edges = x[facets[:, 1:]] - x[facets[:, :1]]
+    if x.shape[1] == 2:
+        normal = np.stack([edges[:, 0, 1], -edges[:, 0, 0]], axis=1)
+    else:
+        normal = np.cross(edges[:, 0], edges[:, 1])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0.0)

@@ -1,0 +1,297 @@
+"""The discrete equations of the flow on one cut: residual, tangent, and the stress that bodies feel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from solvers import fem
+from solvers.api import Array
+from solvers.fluid import forms
+from solvers.fluid.cut import Cut
+from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.matrix import create_matrix
+from solvers.fluid.patches import Boundary, Value
+from solvers.fluid.space import Unknowns
+from solvers.fluid.time import Difference
+from solvers.fluid.weights import Weights, nodal_force, penalty_tensors
+
+
+@dataclass(frozen=True)
+class FlowSettings:
+    """What the user says of the flow, besides grid, patches and bodies."""
+
+    density: float  #: [kg/m^3]
+    viscosity: float  #: [Pa s]
+    element: Literal["q1q1", "q2q1"] = "q1q1"
+    convection: bool = True  #: False: Stokes
+    scheme: Literal["steady", "backward_euler", "bdf2"] = "bdf2"
+    body_force: tuple[Value, ...] | None = None  #: [N/m^3]
+    initial_velocity: tuple[Value, ...] | None = None  #: [m/s]
+    penalties: forms.Penalties = forms.Penalties()
+
+    @property
+    def degree(self) -> int:
+        return 1 if self.element == "q1q1" else 2
+
+    @property
+    def steady(self) -> bool:
+        return self.scheme == "steady"
+
+
+class FlowSystem:
+    """Assembles the flow at the function `flow` (velocity and pressure) for the cut that `set_cut` took last."""
+
+    def __init__(
+        self,
+        grid: DistributedGrid,
+        settings: FlowSettings,
+        boundary: Boundary,
+        unknowns: Unknowns,
+        *,
+        with_bodies: bool,
+    ):
+        self.with_bodies = with_bodies
+        self.grid, self.settings, self.boundary, self.unknowns = grid, settings, boundary, unknowns
+        domain, space = grid.domain, unknowns.space
+        self.flow, self._history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
+        self._alpha = fem.constant(domain, 0.0)
+        self._newton = fem.constant(domain, 1.0)
+        self._phi = fem.function(fem.cellwise_space(domain))
+        self.weights = Weights(grid, points_per_direction=2 * settings.degree + 1)
+        self._compile()
+        self._out = np.zeros(unknowns.local)
+        self._matrix: PETSc.Mat | None = None
+        self._ghost: PETSc.Mat | None = None
+        self.cut: Cut | None = None
+
+    # ------------------------------------------------------------------------------------------------- the forms
+
+    def _compile(self) -> None:
+        settings, unknowns, domain = self.settings, self.unknowns, self.grid.domain
+        (u, p), (a, _), (history, _), (force, _) = (
+            unknowns.parts(f) for f in (self.flow, self._scale_velocity, self._history, self._force)
+        )
+        test, trial = ufl.TestFunction(unknowns.space), ufl.TrialFunction(unknowns.space)
+        v, q = unknowns.parts(test)
+        rho, mu = fem.constant(domain, settings.density), fem.constant(domain, settings.viscosity)
+        if settings.body_force is None:
+            force = ufl.as_vector([fem.constant(domain, 0.0)] * self.grid.dim)
+        self._terms = forms.Flow(
+            rho=rho,
+            mu=mu,
+            alpha=self._alpha,
+            a=a,
+            newton=self._newton,
+            history=history,
+            force=force,
+            convection=settings.convection,
+            steady=settings.steady,
+            degree=settings.degree,
+            mesh=domain.mesh.ufl_domain(),
+        )
+        flow = self._terms
+        everywhere = forms.bulk(flow, u, p, v, q) + forms.residual_based(flow, u, p, v, q)
+        dx = fem.measure(domain, "dx", 2 * settings.degree + 1)
+        dx_cut = fem.measure(domain, "dx", self.weights.degree)
+        cell_forms = [everywhere * dx]
+        if self.with_bodies:
+            on_interface = forms.interface(flow, self.weights, u, p, v, q)
+            cell_forms.append(self.weights.fluid * everywhere * dx_cut + on_interface * dx_cut)
+            dS = fem.measure(domain, "dS", 2 * settings.degree)
+            du, dp = unknowns.parts(trial)
+            ghost = forms.ghost_penalty(flow, settings.penalties, self._phi, du, dp, v, q) * dS
+            self._ghost_penalty = fem.Integral(domain, ghost)
+        self._residuals = [fem.Integral(domain, form) for form in cell_forms]
+        self._tangents = [fem.Integral(domain, ufl.derivative(form, self.flow, trial)) for form in cell_forms]
+        self._compile_outer_faces(v, u, trial)
+
+    def _compile_outer_faces(self, v, u, trial) -> None:
+        domain, ds = self.grid.domain, fem.measure(self.grid.domain, "ds", 2 * self.settings.degree + 1)
+        patches = self.boundary.patches
+        self._tractions = []
+        for number, patch in enumerate(patches):
+            if patch.kind == "traction":
+                t = fem.function(self.unknowns.space)
+                form = fem.Integral(domain, forms.traction(self.unknowns.parts(t)[0], v) * ds)
+                self._tractions.append((number, t, form))
+        self._outflow = [number for number, patch in enumerate(patches) if patch.kind == "outflow"]
+        if self._outflow:
+            form = forms.outflow(self._terms, u, v) * ds
+            self._outflow_form = fem.Integral(domain, form)
+            self._outflow_tangent = fem.Integral(domain, ufl.derivative(form, self.flow, trial))
+
+    # ------------------------------------------------------------------------------------------------- a new step
+
+    def set_time(self, t: float, difference: Difference, history: Array) -> None:
+        """Loads at time t; u_t = alpha u - history, local velocity dofs [m/s^2]."""
+        self._alpha.value = difference.alpha
+        self._history.x.array[:] = history
+        nodes = self.unknowns.velocity
+        if self.settings.body_force is not None:
+            _set_velocity(self._force, nodes, self.settings.body_force, t)
+        for number, function, _ in self._tractions:
+            value = self.boundary.patches[number].value
+            assert value is not None
+            _set_velocity(function, nodes, value, t)
+
+    def set_scales(self, velocity: Array) -> None:
+        """Take local velocity dofs [m/s] that scale stabilisation and penalties from now on."""
+        settings, unknowns = self.settings, self.unknowns
+        self._scale_velocity.x.array[:] = velocity
+        h = self.grid.sizes.min(axis=1)
+        speed = np.linalg.norm(velocity[unknowns.velocity.dofs], axis=1)
+        by_dof = np.zeros(unknowns.local)
+        by_dof[unknowns.velocity.dofs[:, 0]] = speed
+        dofs = unknowns.cell_blocks if unknowns.block_size == 1 else unknowns.cell_blocks * unknowns.block_size
+        self.speed = by_dof[dofs].max(axis=1) if settings.convection else np.zeros(len(h))
+        alpha = float(self._alpha.value)
+        self._phi.x.array[:] = settings.viscosity / settings.density + self.speed * h + alpha * h**2
+
+    def set_cut(self, cut: Cut) -> None:
+        """Take a cut; cells, faces and the matrix follow."""
+        before, self.cut = self.cut, cut
+        grid = self.grid
+        faces, sides = grid.interior_faces
+        where = np.searchsorted(faces, cut.ghost_faces)
+        active = np.zeros(len(grid.numbers), dtype=bool)
+        active[cut.active] = True
+        blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)
+        blocks[self.unknowns.cell_blocks[cut.active]] = True
+        blocks = fem.sum_ghosts(self.unknowns.space, blocks.astype(float)) > 0.0
+        self.active_dofs = self.unknowns.expand(blocks)
+        cells = [some[some < grid.owned] for some in (cut.uncut, cut.cut)]
+        self._residual_forms, self._tangent_forms = (
+            [form.on(cell=some) for form, some in zip(integrals, cells, strict=False)]
+            for integrals in (self._residuals, self._tangents)
+        )
+        self._add_outer_faces(active)
+        same = before is not None and all(
+            np.array_equal(getattr(before, name), getattr(cut, name)) for name in ("uncut", "cut", "strip")
+        )
+        if self._matrix is None or not grid.comm.allreduce(same, op=MPI.LAND):
+            self._matrix = create_matrix(self.unknowns, cut, sides[where])
+            self._ghost = None
+
+    def _add_outer_faces(self, active) -> None:
+        boundary = self.boundary
+        kept = [np.sort(f[active[c]]) for f, c in zip(boundary.facets, boundary.cells, strict=True)]
+        for number, _, form in self._tractions:
+            self._residual_forms.append(form.on(exterior_facet=kept[number]))
+        if self._outflow:
+            faces = np.sort(np.concatenate([kept[number] for number in self._outflow]))
+            self._residual_forms.append(self._outflow_form.on(exterior_facet=faces))
+            self._tangent_forms.append(self._outflow_tangent.on(exterior_facet=faces))
+
+    def set_penalties(self) -> None:
+        """Weights of the interface and the ghost penalty, after the cut or the scales changed."""
+        assert self.cut is not None
+        assert self._matrix is not None
+        pieces, cut = self.cut.pieces, self.cut
+        self.penalty, self.normal_penalty = self._interface_penalties(pieces, cut)
+        self.weights.set(cut, self.penalty, self.normal_penalty)
+        if self._ghost is None:
+            self._ghost = self._matrix
+            self._ghost.zeroEntries()
+            for form in self._tangent_forms:
+                fem.assemble_matrix(self._ghost, form)
+            self._add_ghost_penalty()
+            self._ghost.setDiagonal(self._inactive_diagonal(), addv=PETSc.InsertMode.ADD_VALUES)
+            self._ghost.assemble()
+            self._matrix = self._ghost.duplicate(copy=False)
+            self._matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
+        self._ghost.zeroEntries()
+        self._add_ghost_penalty()
+        self._ghost.assemble()
+        self._in, self._through = self._ghost.createVecs()
+
+    def _add_ghost_penalty(self) -> None:
+        assert self._ghost is not None
+        assert self.cut is not None
+        if self.with_bodies:
+            fem.assemble_matrix(self._ghost, self._ghost_penalty.on(interior_facet=self.cut.ghost_faces))
+
+    def _inactive_diagonal(self) -> PETSc.Vec:
+        assert self._matrix is not None
+        diagonal = self._matrix.createVecLeft()
+        diagonal.array[:] = ~self.active_dofs[: self.unknowns.owned]
+        return diagonal
+
+    def _interface_penalties(self, pieces, cut: Cut) -> tuple[Array, Array]:
+        """s = gamma mu C_T / h + rho max(0, -g . n), s_n = rho (gamma_b |a| + gamma_t h alpha) of pieces [Pa s/m]."""
+        settings, factors = self.settings, self.settings.penalties
+        cells = cut.cut[pieces.cell]
+        h, rho = self.grid.sizes[cells].min(axis=1), settings.density
+        trace = forms.TRACE[self.grid.dim, settings.degree]
+        s = factors.nitsche * settings.viscosity * trace / h
+        if settings.convection:
+            g = cut.motion.v[cut.facets[pieces.facet]].mean(axis=1)
+            s = s + rho * np.maximum(0.0, -np.einsum("pi,pi->p", g, pieces.normal))
+        alpha = float(self._alpha.value)
+        return s, rho * (factors.convection * self.speed[cells] + factors.mass * h * alpha)
+
+    # --------------------------------------------------------------------------------------- residual and tangent
+
+    def residual(self) -> Array:
+        """Left-hand side of the equations at owned dofs: forces [N] of velocity rows, volume rates of pressure rows."""
+        assert self._ghost is not None
+        self._out[:] = 0.0
+        for form in self._residual_forms:
+            fem.assemble_vector(form, self._out)
+        fem.add_ghosts(self.unknowns.space, self._out)
+        owned = self.unknowns.owned
+        self._in.array[:] = self.flow.x.array[:owned]
+        self._ghost.mult(self._in, self._through)
+        return self._out[:owned] + self._through.array
+
+    def tangent(self, identity: Array, *, picard: bool) -> PETSc.Mat:
+        """d(residual)/d(flow), with rows of the identity at the marked owned dofs; the next call overwrites it.
+
+        Picard: the velocity that carries momentum is taken as known; right if it is that of `set_scales`.
+        """
+        assert self._matrix is not None
+        assert self._ghost is not None
+        self._newton.value = 0.0 if picard else 1.0
+        matrix = self._matrix
+        self._ghost.copy(matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        for form in self._tangent_forms:
+            fem.assemble_matrix(matrix, form)
+        self._newton.value = 1.0
+        matrix.assemble()
+        start = matrix.getOwnershipRange()[0]
+        matrix.zeroRows((start + np.flatnonzero(identity)).astype(PETSc.IntType), 1.0)
+        return matrix
+
+    # -------------------------------------------------------------------------------------------------- reactions
+
+    def surface_force(self) -> Array:
+        """Force [N] of the fluid on the vertices of all surfaces, shape (n, dim) (collective)."""
+        assert self.cut is not None
+        stress, velocity = self._at_cut_points()
+        tensors = penalty_tensors(self.penalty, self.normal_penalty, self.cut.pieces.normal)
+        force = nodal_force(self.cut, self.weights, stress, velocity, tensors, self.grid.owned)
+        return self.grid.comm.allreduce(force)
+
+    def _at_cut_points(self) -> tuple[Array, Array]:
+        """sigma (cells, points, dim, dim) and u (cells, points, dim) at the points of cut cells."""
+        assert self.cut is not None
+        if not hasattr(self, "_expressions"):
+            u, p = self.unknowns.parts(self.flow)
+            sigma = forms.sigma(self._terms, u, p)
+            self._expressions = [fem.compile_expression(e, self.weights.reference) for e in (sigma, u)]
+        dim, points = self.grid.dim, len(self.weights.rule)
+        stress, velocity = (e.eval(self.cut.cut) for e in self._expressions)
+        return stress.reshape(-1, points, dim, dim), velocity.reshape(-1, points, dim)
+
+
+def _set_velocity(function, nodes, value: Sequence[Value], t: float) -> None:
+    points = np.zeros((3, len(nodes.points)))
+    points[: nodes.points.shape[1]] = nodes.points.T
+    for axis, component in enumerate(value):
+        function.x.array[nodes.dofs[:, axis]] = component(points, t)
