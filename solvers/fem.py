@@ -230,6 +230,28 @@ def component_dofs(space: fem.FunctionSpace, component: int) -> tuple[NDArray[np
     return np.asarray(dofs, dtype=np.int32), collapsed.tabulate_dof_coordinates()
 
 
+def component_cell_dofs(space: fem.FunctionSpace, component: int) -> NDArray[np.int32]:
+    """Local dofs of one component of a `flow_space` in each local cell, in the order of the scalar element."""
+    if space.dofmap.index_map_bs > 1:
+        part = space.sub(component)
+    else:
+        part = space.sub(0).sub(component) if component < space.mesh.geometry.dim else space.sub(1)
+    cells = space.mesh.topology.index_map(space.mesh.topology.dim)
+    return np.asarray(part.dofmap.list.array).reshape(cells.size_local + cells.num_ghosts, -1)
+
+
+def tabulate_lagrange(domain: Domain, degree: int, points: Array) -> tuple[Array, Array]:
+    """Scalar shape functions (points, functions) and their reference gradients (points, functions, dim)."""
+    element = basix.create_element(
+        basix.ElementFamily.P,
+        getattr(basix.CellType, CELLS[domain.cell_type][0]),
+        degree,
+        basix.LagrangeVariant.gll_warped,
+    )
+    table = element.tabulate(1, points)[..., 0]
+    return table[0], np.moveaxis(table[1:], 0, -1)
+
+
 def facet_dofs(space: fem.FunctionSpace, component: int, facets: NDArray[np.int32]) -> NDArray[np.int32]:
     """Local dofs of one component of a `flow_space` on facets, on every process that knows them (collective)."""
     dim = space.mesh.topology.dim

@@ -279,7 +279,7 @@ class Fluid:
         if not hasattr(self, "_diagonal"):
             return 0.0
         size = np.where(self._held, 0.0, self._diagonal * np.abs(self.flow[: self.unknowns.owned]))
-        return float(np.finfo(float).eps) * self._norm(size)
+        return 8.0 * float(np.finfo(float).eps) * self._norm(size)
 
     def worst(self) -> tuple[float, ...] | None:
         """Position [m] of the node with the largest momentum residual (collective)."""

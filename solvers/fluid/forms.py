@@ -103,16 +103,18 @@ def residual_based(flow: Flow, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
 
 
 def interface(flow: Flow, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
-    """Integrand over cut cells of Nitsche's method on the interface, by its weights.
+    """Integrand over cut cells of Nitsche's method on an interface at rest, by its weights.
 
-    -<sigma(u, p) n, v> - <u - g, 2 mu eps(v) n + q n> + <s (u - g), v> + <s_n (u - g) . n, v . n>
+    -<sigma(u, p) n, v> - <u, 2 mu eps(v) n + q n> + <P u, v>,  P = s I + s_n n n^T
+
+    The same terms tested with -v, and with the interface velocity g in the place of u, are in `Interface`.
     """
-    mismatch = outer(u, weights.n) - weights.gn
+    carried = outer(u, weights.n)
     return (
         -dot(dot(sigma(flow, u, p), weights.n), v)
-        - inner(2.0 * flow.mu * eps(v), mismatch)
-        - q * tr(mismatch)
-        + dot(dot(weights.penalty, u) - weights.penalty_g, v)
+        - inner(2.0 * flow.mu * eps(v), carried)
+        - q * tr(carried)
+        + dot(dot(weights.penalty, u), v)
     )
 
 

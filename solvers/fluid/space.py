@@ -38,6 +38,10 @@ class Unknowns:
         self.index_map = self.space.dofmap.index_map
         self.owned = int(self.index_map.size_local) * self.block_size  #: owned dofs
         self.local = (int(self.index_map.size_local) + int(self.index_map.num_ghosts)) * self.block_size
+        by_component = [fem.component_cell_dofs(self.space, component) for component in range(self.dim + 1)]
+        #: velocity dofs of each local cell, shape (cells, functions, dim), and pressure dofs, (cells, functions)
+        self.cell_velocity: Dofs = np.stack(by_component[: self.dim], axis=2)
+        self.cell_pressure: Dofs = by_component[self.dim]
         self.velocity = self._nodes(range(self.dim), degree)
         self.pressure = self._nodes([self.dim], 1)
 

@@ -14,13 +14,14 @@ from petsc4py import PETSc
 from solvers import fem
 from solvers.api import Array
 from solvers.fluid import forms
-from solvers.fluid.cut import Cut
+from solvers.fluid.cut import Cut, Pieces
 from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.interface import Interface
 from solvers.fluid.matrix import create_matrix
 from solvers.fluid.patches import Boundary, Value
 from solvers.fluid.space import Unknowns
 from solvers.fluid.time import Difference
-from solvers.fluid.weights import Weights, nodal_force, penalty_tensors
+from solvers.fluid.weights import Weights
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class FlowSystem:
         self._alpha = fem.constant(domain, 0.0)
         self._newton = fem.constant(domain, 1.0)
         self._phi = fem.function(fem.cellwise_space(domain))
-        self.weights = Weights(grid, points_per_direction=2 * settings.degree + 1)
+        self.weights = Weights(grid, settings.degree)
         self._compile()
         self._out = np.zeros(unknowns.local)
         self._matrix: PETSc.Mat | None = None
@@ -194,8 +195,10 @@ class FlowSystem:
         assert self.cut is not None
         assert self._matrix is not None
         pieces, cut = self.cut.pieces, self.cut
-        self.penalty, self.normal_penalty = self._interface_penalties(pieces, cut)
-        self.weights.set(cut, self.penalty, self.normal_penalty)
+        if self.with_bodies:
+            penalty = self._interface_penalties(pieces, cut)
+            self.weights.set(cut, penalty)
+            self.interface = Interface(self.grid, self.unknowns, self.weights, cut, self.settings.viscosity, penalty)
         if self._ghost is None:
             self._ghost = self._matrix
             self._ghost.zeroEntries()
@@ -223,27 +226,32 @@ class FlowSystem:
         diagonal.array[:] = ~self.active_dofs[: self.unknowns.owned]
         return diagonal
 
-    def _interface_penalties(self, pieces, cut: Cut) -> tuple[Array, Array]:
-        """s = gamma mu C_T / h + rho max(0, -g . n), s_n = rho (gamma_b |a| + gamma_t h alpha) of pieces [Pa s/m]."""
-        settings, factors = self.settings, self.settings.penalties
+    def _interface_penalties(self, pieces: Pieces, cut: Cut) -> Array:
+        """P = s I + s_n n n^T of pieces [Pa s/m], shape (pieces, dim, dim).
+
+        s = gamma mu C_T / h + rho max(0, -g . n), s_n = rho (gamma_b |a| + gamma_t h alpha).
+        """
+        settings, factors, n = self.settings, self.settings.penalties, pieces.normal
         cells = cut.cut[pieces.cell]
         h, rho = self.grid.sizes[cells].min(axis=1), settings.density
-        trace = forms.TRACE[self.grid.dim, settings.degree]
-        s = factors.nitsche * settings.viscosity * trace / h
+        s = factors.nitsche * settings.viscosity * forms.TRACE[self.grid.dim, settings.degree] / h
         if settings.convection:
             g = cut.motion.v[cut.facets[pieces.facet]].mean(axis=1)
-            s = s + rho * np.maximum(0.0, -np.einsum("pi,pi->p", g, pieces.normal))
-        alpha = float(self._alpha.value)
-        return s, rho * (factors.convection * self.speed[cells] + factors.mass * h * alpha)
+            s = s + rho * np.maximum(0.0, -np.einsum("pi,pi->p", g, n))
+        normal = rho * (factors.convection * self.speed[cells] + factors.mass * h * float(self._alpha.value))
+        return s[:, None, None] * np.eye(self.grid.dim) + normal[:, None, None] * n[:, :, None] * n[:, None, :]
 
     # --------------------------------------------------------------------------------------- residual and tangent
 
     def residual(self) -> Array:
         """Left-hand side of the equations at owned dofs: forces [N] of velocity rows, volume rates of pressure rows."""
         assert self._ghost is not None
+        assert self.cut is not None
         self._out[:] = 0.0
         for form in self._residual_forms:
             fem.assemble_vector(form, self._out)
+        if self.with_bodies:
+            self._out += self.interface.velocity_terms(self.cut.motion.v)
         fem.add_ghosts(self.unknowns.space, self._out)
         owned = self.unknowns.owned
         self._in.array[:] = self.flow.x.array[:owned]
@@ -273,21 +281,7 @@ class FlowSystem:
     def surface_force(self) -> Array:
         """Force [N] of the fluid on the vertices of all surfaces, shape (n, dim) (collective)."""
         assert self.cut is not None
-        stress, velocity = self._at_cut_points()
-        tensors = penalty_tensors(self.penalty, self.normal_penalty, self.cut.pieces.normal)
-        force = nodal_force(self.cut, self.weights, stress, velocity, tensors, self.grid.owned)
-        return self.grid.comm.allreduce(force)
-
-    def _at_cut_points(self) -> tuple[Array, Array]:
-        """sigma (cells, points, dim, dim) and u (cells, points, dim) at the points of cut cells."""
-        assert self.cut is not None
-        if not hasattr(self, "_expressions"):
-            u, p = self.unknowns.parts(self.flow)
-            sigma = forms.sigma(self._terms, u, p)
-            self._expressions = [fem.compile_expression(e, self.weights.reference) for e in (sigma, u)]
-        dim, points = self.grid.dim, len(self.weights.rule)
-        stress, velocity = (e.eval(self.cut.cut) for e in self._expressions)
-        return stress.reshape(-1, points, dim, dim), velocity.reshape(-1, points, dim)
+        return self.grid.comm.allreduce(self.interface.force(self.flow.x.array, self.cut.motion.v))
 
 
 def _set_velocity(function, nodes, value: Sequence[Value], t: float) -> None:
