@@ -94,6 +94,10 @@ class Constraint(Stateful, Protocol):
         """Global dofs of its nodes, -1 where there are none, shape (N, dim)."""
         ...
 
+    def multiplier_dofs(self) -> NDArray[np.int64]:
+        """Global dofs of the nodes that carry multipliers, each once."""
+        ...
+
     def start(self, u: Array, stiffness: Array, t: float) -> None:
         """Take the displacements [m] at the start and the diagonal of the stiffness [N/m]."""
         ...
@@ -118,6 +122,10 @@ class Constraint(Stateful, Protocol):
 
     def recover(self, du: Array) -> None:
         """Multipliers from the increment of all unknowns."""
+        ...
+
+    def active(self) -> NDArray[np.bool_]:
+        """Which nodes touch."""
         ...
 
     def numbers(self) -> dict[str, float]:

@@ -81,6 +81,68 @@ def _change_local(matrix: PETSc.Mat, replaced: NDArray[np.int64], local: sp.csr_
     return PETSc.Mat().createAIJ(total.shape, csr=csr, comm=matrix.comm)
 
 
+def from_entries(
+    comm: MPI.Comm, owned: tuple[int, int], rows: NDArray[np.int64], columns: NDArray[np.int64], data: Array
+) -> PETSc.Mat:
+    """A distributed matrix with `owned` rows and columns from entries of any process; equal places add up. Collective."""
+    end = comm.scan(owned[0])  # type: ignore[attr-defined]
+    start = end - owned[0]
+    if comm.size > 1:
+        mine = (rows >= start) & (rows < end)
+        foreign = comm.allgather((rows[~mine], columns[~mine], data[~mine]))
+        rows, columns, data = (
+            np.concatenate([own[mine], *(part[i] for part in foreign)]) for i, own in enumerate((rows, columns, data))
+        )
+        mine = (rows >= start) & (rows < end)
+        rows, columns, data = rows[mine], columns[mine], data[mine]
+    local = sp.csr_matrix((data, (rows - start, columns)), shape=(owned[0], comm.allreduce(owned[1])))
+    csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
+    return PETSc.Mat().createAIJ(((owned[0], None), (owned[1], None)), csr=csr, comm=comm)
+
+
+class Numbering:
+    """A system of two blocks, on each process the rows of the first and then of the second.
+
+    Outside, the unknowns are numbered as those of the first block alone, then those of the second.
+    """
+
+    def __init__(self, comm: MPI.Comm, first: int, second: int):
+        """Owned unknowns of the blocks (collective)."""
+        sizes = np.array(comm.allgather((first, second)), dtype=np.int64)
+        starts = np.concatenate([[0], np.cumsum(sizes.sum(axis=1))])[:-1]
+        #: row in the system of each unknown
+        self.placed = np.concatenate(
+            [start + np.arange(own) for start, own in zip(starts, sizes[:, 0], strict=True)]
+            + [start + own[0] + np.arange(own[1]) for start, own in zip(starts, sizes, strict=True)]
+        ).astype(np.int64)
+        self._unknown = np.argsort(self.placed)
+
+    def fetch_rows(self, matrix: PETSc.Mat, rows: NDArray[np.int64]) -> sp.csr_matrix:
+        """Rows of unknowns, columns in the order of the unknowns (collective)."""
+        found = fetch_rows(matrix, self.placed[rows]).tocoo()
+        return sp.csr_matrix((found.data, (found.row, self._unknown[found.col])), shape=found.shape)
+
+    def place(self, changes: RowChanges) -> RowChanges:
+        """Changes by unknowns as changes of the system."""
+
+        def columns(rows: sp.csr_matrix) -> sp.csr_matrix:
+            entries = rows.tocoo()
+            return sp.csr_matrix((entries.data, (entries.row, self.placed[entries.col])), shape=rows.shape)
+
+        return RowChanges(
+            self.placed[changes.replaced],
+            columns(changes.replaced_rows),
+            changes.replaced_right,
+            self.placed[changes.added],
+            columns(changes.added_rows),
+            changes.added_right,
+        )
+
+    def gather(self, comm: MPI.Comm, system: Array) -> Array:
+        """Values of all unknowns from the owned ones of the system (collective)."""
+        return gather(comm, system)[self.placed]
+
+
 def gather(comm: MPI.Comm, owned: Array) -> Array:
     """The whole of a distributed array on every process. Collective."""
     if comm.size == 1:

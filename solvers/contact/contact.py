@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.condense import Linearised, condense, expand, place_columns, recover
-from solvers.contact.pair import Pair
+from solvers.contact.pair import KEEP_AFTER, Pair
 from solvers.contact.share import Shares
 from solvers.contact.surface import Nodes, Surface, number_nodes
 from solvers.rows import RowChanges
 
-#: Share of a slave node's area that must see a master.
-LEAST_COVERED = 0.02
+#: Share of a slave node's area that must see a master, and the share with which a node that did in this step still may.
+LEAST_COVERED, LEAST_KEPT = 0.02, 0.01
 
 #: Gap, as a share of the extent of all surfaces, up to which nodes without pressure touch: rounding of positions.
 TOUCHING = 1e-12
@@ -42,9 +42,21 @@ class Contact:
     """All pairs together. Positions and multipliers are arrays over `nodes`, the same on every process.
 
     z are the multipliers [Pa]: the negative traction on the slave, z_n = n.z >= 0 the contact pressure.
+
+    keep_overlap: a node whose gap is negative at the start of a step need not close it in the step, only not deepen it.
+    That happens where a slave slides onto a master: a node bends into it unseen. Closed at once it would be shot away;
+    kept, contact does no work: z_n (g_{n+1} - g_n) <= 0 always. For dynamics; the first step closes all there is.
     """
 
-    def __init__(self, comm: MPI.Comm, pairs: Sequence[Pair], *, names: Sequence[str] = (), c_n: float = 1.0):
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        pairs: Sequence[Pair],
+        *,
+        names: Sequence[str] = (),
+        c_n: float = 1.0,
+        keep_overlap: bool = False,
+    ):
         surfaces: list[Surface] = []
         for pair in pairs:
             surfaces += [s for s in (pair.slave, pair.master) if not any(s is known for known in surfaces)]
@@ -59,6 +71,11 @@ class Contact:
         self.x = self.nodes.points.copy()
         self._x_old = self.x.copy()
         self.active_set = ActiveSet(self.size, c_n)
+        self._keep_overlap = keep_overlap
+        self._gap = np.zeros(self.size)  # weighted gap at the latest evaluation
+        self._overlap = np.zeros(self.size)  # how much of it may stay negative, <= 0
+        self._seen = np.zeros(self.size, dtype=bool)  # nodes that could have a constraint in this step
+        self._evaluations = 0
         self._areas = self._nodal_areas()
         self._scale = np.zeros(self.size)
         self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
@@ -105,6 +122,10 @@ class Contact:
     def begin_step(self) -> None:
         """Facets may have moved from here on."""
         self._x_old = self.x.copy()
+        if self._keep_overlap:
+            self._overlap = np.minimum(0.0, self._gap)
+        self._seen[:] = False
+        self._evaluations = 0
         self.active_set.begin_step()
         self._shares.begin_step()
         for pair in self.pairs:
@@ -114,18 +135,28 @@ class Contact:
         """Mortar terms and active set at the displacements u, shape (N, dim), of the present iterate."""
         self.x = self.positions(u, t)
         self.terms = self._evaluate_pairs()
+        self._gap = np.zeros(self.size) if self.terms is None else self.terms.gap
         if self.terms is None:
             self.active_set.clear()
         else:
-            covered = self._covered(self.terms) & ~self.nodes.held.all(axis=1)
-            mean_gap = np.divide(self.terms.gap, self.terms.D, out=np.ones(self.size), where=covered)
+            covered = self._may_touch(self.terms)
+            mean_gap = np.divide(self._gap - self._overlap, self.terms.D, out=np.ones(self.size), where=covered)
             pressure = np.einsum("nd,nd->n", self.z, self.terms.normals)
             self.active_set.update(pressure, mean_gap - self._touching, self._scale, covered)
         self.z[~self.active_set.active] = 0.0
 
-    def _covered(self, terms: Terms) -> NDArray[np.bool_]:
+    def _may_touch(self, terms: Terms) -> NDArray[np.bool_]:
+        """Nodes that can have a constraint. As for facet pairs: from some evaluation on none of them goes again."""
+        found = self._covered(terms)
+        found |= self._seen & self._covered(terms, LEAST_KEPT)
+        self._evaluations += 1
+        if self._evaluations >= KEEP_AFTER:
+            self._seen |= found
+        return found & ~self.nodes.held.all(axis=1)
+
+    def _covered(self, terms: Terms, least: float = LEAST_COVERED) -> NDArray[np.bool_]:
         """Nodes that see enough of a master for a constraint: less is a sliver that comes and goes."""
-        return terms.D > LEAST_COVERED * np.maximum(self._areas, np.finfo(float).tiny)
+        return terms.D > least * np.maximum(self._areas, np.finfo(float).tiny)
 
     def _evaluate_pairs(self) -> Terms | None:
         """Terms of all pairs, each process doing its share of the slave facets; None if no facets are near."""
@@ -181,7 +212,7 @@ class Contact:
             return 0.0
         normals, z, D = self.terms.normals[active], self.z[active], self.terms.D[active]
         oblique = z - np.einsum("nd,nd->n", z, normals)[:, None] * normals
-        closing = self._scale[active] * self.terms.gap[active]
+        closing = self._scale[active] * (self._gap - self._overlap)[active]
         return float(np.sqrt(np.sum(closing**2) + np.sum((weight * D[:, None] * oblique) ** 2)))
 
     def condense(self, weight: float, fetch: Callable[[NDArray[np.int64]], sp.csr_matrix], R: Array) -> RowChanges:
@@ -250,7 +281,7 @@ class Contact:
             D=self.terms.D[active],
             free=~self.nodes.held[active].ravel(),
             on_master=on_master,
-            gap=self.terms.gap[active],
+            gap=(self._gap - self._overlap)[active],
             scale=self._scale[active],
             dgap=self.terms.dgap[active],
             dnormals=self.terms.dnormals[rows],
@@ -259,6 +290,10 @@ class Contact:
     def dofs(self) -> NDArray[np.int64]:
         """Global dofs of all nodes, -1 where rigid, shape (N, dim)."""
         return self.nodes.dofs
+
+    def multiplier_dofs(self) -> NDArray[np.int64]:
+        """Global dofs of the slave nodes, each once."""
+        return self.nodes.dofs[self._areas > 0.0].ravel()
 
     @property
     def near(self) -> bool:
@@ -271,6 +306,10 @@ class Contact:
         return not self.active_set.changed
 
     # ------------------------------------------------------------------------------------------- results and state
+
+    def active(self) -> NDArray[np.bool_]:
+        """Which nodes touch, shape (N,)."""
+        return self.active_set.active.copy()
 
     def numbers(self) -> dict[str, float]:
         """Columns for the history."""
@@ -321,11 +360,13 @@ class Contact:
         return found
 
     def save(self) -> State:
-        return {"z": self.z.copy(), "x": self.x.copy(), "active": self.active_set.active.copy()}
+        arrays = {"z": self.z, "x": self.x, "gap": self._gap, "active": self.active_set.active}
+        return {name: array.copy() for name, array in arrays.items()}
 
     def restore(self, state: State) -> None:
         self.z[:] = state["z"]
         self.x[:] = state["x"]
+        self._gap = state["gap"].copy()
         self.active_set.active[:] = state["active"]
 
 

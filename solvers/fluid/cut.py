@@ -59,15 +59,22 @@ class Cutter:
         own[grid.numbers] = True
         self._own = grid.grid.as_box(own)
 
-    def __call__(self, facets: NDArray[np.int64], motion: Motion, layers: int) -> Cut:
-        """Cells and weights for the surfaces, with this many layers of cells behind them kept active."""
+    def __call__(
+        self, facets: NDArray[np.int64], motion: Motion, layers: int, wet: NDArray[np.bool_] | None = None
+    ) -> Cut:
+        """Cells and weights for the surfaces, with this many layers of cells behind them kept active.
+
+        Facets that are not `wet` only close the solid.
+        """
         grid, box = self.grid, self.grid.grid
         if not len(facets):
             return self._whole(facets, motion)
         wanted = _grow(self._own, layers + 1)
         moments = kernels.moments(box.edges, self.points, motion.x, facets, wanted.ravel(order="F"))
         normal = -normals(motion.x, facets)
-        is_cut, in_use = self._cut_cells(moments)
+        counts = np.ones(len(facets), dtype=bool) if wet is None else wet
+        touched = counts[moments.piece_facet]
+        is_cut, in_use = self._cut_cells(moments, touched)
         solid = (moments.fraction >= 1.0 - NOTHING) & ~is_cut
         near = _grow(box.as_box(is_cut), layers).ravel(order="F") if layers else is_cut
         strip = solid & near
@@ -76,7 +83,7 @@ class Cutter:
         faces, sides = grid.interior_faces
         special = (local_cut | local_strip)[sides].any(axis=1) & active[sides].all(axis=1)
         cut = np.flatnonzero(local_cut).astype(np.int32)
-        fluid, pieces = self._on_local_cells(moments, in_use, cut, normal)
+        fluid, pieces = self._on_local_cells(moments, in_use, touched, cut, normal)
         return Cut(
             uncut=np.flatnonzero(active & ~local_cut & ~local_strip).astype(np.int32),
             cut=cut,
@@ -99,19 +106,19 @@ class Cutter:
             everything, none, none, none, np.empty((0, points)), np.ones(len(everything)), pieces, facets, motion
         )
 
-    def _cut_cells(self, moments) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    def _cut_cells(self, moments, touched) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """(cut or not for each box cell, kept or not for each cell of `moments`): slivers of surface do not cut."""
         sizes = self.grid.grid.cell_sizes()
         is_cut = (moments.fraction > NOTHING) & (moments.fraction < 1.0 - NOTHING)
         area = np.bincount(
-            moments.piece_cell, weights=moments.piece_mass.sum(axis=(1, 2)), minlength=len(moments.cells)
+            moments.piece_cell, weights=touched * moments.piece_mass.sum(axis=(1, 2)), minlength=len(moments.cells)
         )
         volume = sizes[moments.cells].prod(axis=1)
         in_use = area > NOTHING * volume / sizes[moments.cells].max(axis=1, initial=0.0)
         is_cut[moments.cells[in_use]] = True
         return is_cut, in_use
 
-    def _on_local_cells(self, moments, in_use, cut: Cells, normal: Array) -> tuple[Array, Pieces]:
+    def _on_local_cells(self, moments, in_use, touched, cut: Cells, normal: Array) -> tuple[Array, Pieces]:
         grid = self.grid
         weights = _tensor_weights(self.points, grid.dim)
         row_of = np.full(grid.grid.size, -1, dtype=np.int64)
@@ -120,7 +127,7 @@ class Cutter:
         fluid = np.tile(1.0 - np.round(moments.fraction[grid.numbers[cut]])[:, None], (1, len(weights)))
         known = rows >= 0
         fluid[rows[known]] = 1.0 - moments.solid[known] / weights
-        mine = (known & in_use)[moments.piece_cell]
+        mine = (known & in_use)[moments.piece_cell] & touched
         cell = rows[moments.piece_cell[mine]]
         order = np.argsort(cell, kind="stable")
         facet = moments.piece_facet[mine][order]

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from solvers import linear
+from solvers import fem, linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.distributed import Nodal
 from solvers.fluid import time
@@ -18,7 +19,7 @@ from solvers.fluid.cut import Cut, Cutter
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.patches import Boundary, Patch
 from solvers.fluid.space import Unknowns
-from solvers.fluid.surface import Motion, Surface, offsets, together
+from solvers.fluid.surface import Motion, Surface, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
 from solvers.newton import Tolerance, converge
 from solvers.timing import Timer
@@ -79,12 +80,13 @@ class Fluid:
         self.boundary = Boundary(self.grid, self.unknowns, patches)
         self.system = FlowSystem(self.grid, settings, self.boundary, self.unknowns, with_bodies=bool(self.bodies))
         self.cutter = Cutter(self.grid, self.system.weights.points)
-        self._velocity_mask = np.zeros(self.unknowns.local, dtype=bool)
-        self._velocity_mask[self.unknowns.velocity.dofs] = True
+        self.velocity_mask = np.zeros(self.unknowns.local, dtype=bool)
+        self.velocity_mask[self.unknowns.velocity.dofs] = True
         everywhere = np.ones(self.unknowns.local, dtype=bool)
         self.old, self.older = (Past(np.zeros(self.unknowns.local), everywhere.copy()) for _ in range(2))
         self._dt_before: float | None = None
         self._motions: list[Motion] = []
+        self._wet = wetness([body.surface for body in self.bodies])
         self._ksp: PETSc.KSP | None = None
         self._iterative = linear.choose_flow(solver.linear, self.dim, self.dofs()) == "iterative"
 
@@ -93,6 +95,11 @@ class Fluid:
     def dofs(self) -> int:
         """Unknowns on all processes, inactive ones included."""
         return self.unknowns.size()
+
+    @property
+    def started(self) -> bool:
+        """A step was computed, so that there are forces."""
+        return hasattr(self, "residual_rows")
 
     @property
     def flow(self) -> Array:
@@ -111,29 +118,32 @@ class Fluid:
             points[: self.dim] = self.unknowns.velocity.points.T
             for axis, component in enumerate(self.settings.initial_velocity):
                 self.flow[self.unknowns.velocity.dofs[:, axis]] = component(points, t)
-        self._t, self._dt = t, dt
-        self._difference = time.STEADY if self.settings.steady else time.backward_euler(dt)
-        self.move([self._motion(body, t) for body in self.bodies])
+        self._t, self.dt = t, dt
+        self.difference = time.STEADY if self.settings.steady else time.backward_euler(dt)
+        if not self._coupled:
+            self.move({})
 
-    def _motion(self, body: Body, t: float) -> Motion:
-        assert body.motion is not None, "a coupled body is moved from outside"
-        return body.motion(t)
+    @property
+    def _coupled(self) -> bool:
+        """Another field moves some of the bodies."""
+        return any(body.motion is None for body in self.bodies)
 
     # ------------------------------------------------------------------------------------------------- steps
 
     def begin_step(self, t: float, dt: float) -> None:
         """Remember the state at t; boundary, loads and moving bodies at t + dt."""
-        self._t, self._dt = t + dt, dt
-        velocity = np.where(self._velocity_mask, self.flow, 0.0)
+        self._t, self.dt = t + dt, dt
+        velocity = np.where(self.velocity_mask, self.flow, 0.0)
         self.older, self.old = self.old, Past(velocity, self.system.active_dofs | self._first)
-        self._difference = self._choose_difference(dt)
-        difference = self._difference
+        self.difference = self._choose_difference(dt)
+        difference = self.difference
         history = difference.beta_0 * self.old.velocity + difference.beta_1 * self.older.velocity
         self.system.set_time(t + dt, difference, history)
         self.flow[self.boundary.dofs] = self.boundary.velocity(t + dt)
         self.system.set_scales(velocity)
-        if all(body.motion is not None for body in self.bodies):
-            self.move([self._motion(body, t + dt) for body in self.bodies])
+        self._fresh, self._largest = True, 0.0
+        if not self._coupled:
+            self.move({})
 
     @property
     def _first(self) -> bool:
@@ -147,20 +157,24 @@ class Fluid:
             return time.backward_euler(dt)
         return time.bdf2(dt, self._dt_before)
 
-    def move(self, motions: Sequence[Motion]) -> None:
-        """Cut the grid by the surfaces where they are now. Raises StepFailed if they ran out of the strip."""
-        self._motions = list(motions)
+    def move(self, coupled: Mapping[str, Motion]) -> None:
+        """Cut the grid by the surfaces where they are now: `coupled` bodies by name, all others as prescribed.
+
+        Raises StepFailed if they ran out of the strip.
+        """
+        motions = [coupled[b.surface.name] if b.motion is None else b.motion(self._t) for b in self.bodies]
+        self._motions, self._fresh = motions, True
         with self.timer("cut"):
             facets, motion = together([body.surface for body in self.bodies], motions, self.dim)
-            cut = self.cutter(facets, motion, self._layers(motion))
+            cut = self.cutter(facets, motion, self._layers(motion), self._wet)
         with self.timer("weights"):
             self.system.set_cut(cut)
             self._check_strip(cut)
             self.flow[~self.system.active_dofs] = 0.0
-            self._held = np.zeros(self.unknowns.owned, dtype=bool)
+            self.held = np.zeros(self.unknowns.owned, dtype=bool)
             prescribed = self.boundary.dofs[self.boundary.dofs < self.unknowns.owned]
-            self._held[prescribed] = True
-            self._held |= ~self.system.active_dofs[: self.unknowns.owned]
+            self.held[prescribed] = True
+            self.held |= ~self.system.active_dofs[: self.unknowns.owned]
             self._hold_pressure()
 
     def _layers(self, motion: Motion) -> int:
@@ -170,17 +184,17 @@ class Fluid:
         fastest = float(np.linalg.norm(motion.v, axis=1).max(initial=0.0))
         steps = 2.0 if self.settings.scheme == "bdf2" else 1.0
         smallest = min(float(np.diff(edge).min()) for edge in self.grid.grid.edges)
-        return max(1, math.ceil(1.25 * steps * fastest * self._dt / smallest))
+        return max(1, math.ceil(1.25 * steps * fastest * self.dt / smallest))
 
     def _check_strip(self, cut: Cut) -> None:
         used = np.zeros(self.unknowns.local, dtype=bool)
         blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)
         blocks[self.unknowns.cell_blocks[np.concatenate([cut.uncut, cut.cut])]] = True
-        used = self.unknowns.expand(blocks) & self._velocity_mask
+        used = self.unknowns.expand(blocks) & self.velocity_mask
         unknown = np.zeros(self.unknowns.local, dtype=bool)
-        if self._difference.beta_0:
+        if self.difference.beta_0:
             unknown |= used & ~self.old.known
-        if self._difference.beta_1:
+        if self.difference.beta_1:
             unknown |= used & ~self.older.known
         if self.comm.allreduce(bool(unknown.any()), op=MPI.LOR):
             reason = "a body moved farther in one step than the flow behind it is known: take a smaller time step"
@@ -198,17 +212,17 @@ class Fluid:
         best = int(numbers.min(initial=np.iinfo(np.int64).max))
         if best == self.comm.allreduce(best, op=MPI.MIN) and len(numbers):
             self._pinned = int(dofs[np.argmin(numbers)])
-            self._held[self._pinned] = True
+            self.held[self._pinned] = True
             self.flow[self._pinned] = 0.0
 
     def solve(self) -> StepInfo:
         """Newton to the tolerance. Raises StepFailed."""
-        self._fresh, self._largest = True, 0.0
+        self._largest = 0.0
         return converge(self, self.solver.newton)
 
     def end_step(self) -> None:
         """Accept the step."""
-        self._dt_before = self._dt
+        self._dt_before = self.dt
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
@@ -217,11 +231,11 @@ class Fluid:
         with self.timer("assembly"):
             if self._fresh or self.settings.steady:
                 if self.settings.steady:
-                    self.system.set_scales(np.where(self._velocity_mask, self.flow, 0.0))
+                    self.system.set_scales(np.where(self.velocity_mask, self.flow, 0.0))
                 self.system.set_penalties()
                 self._fresh = False
             self.residual_rows = self.system.residual()
-        self.residual_rows[self._held] = 0.0
+        self.residual_rows[self.held] = 0.0
         self._size = self._norm(self.residual_rows)
         self._largest = max(self._largest, self._size)
         return self._size
@@ -230,26 +244,34 @@ class Fluid:
         settings, h = self.settings, self.grid.sizes.min(axis=1)
         h_min, fastest = float(h.min()), float(self.system.speed.max(initial=0.0))
         h_min, fastest = self.comm.allreduce(h_min, op=MPI.MIN), self.comm.allreduce(fastest, op=MPI.MAX)
-        impedance = settings.viscosity / h_min + settings.density * (fastest + h_min * self._difference.alpha)
-        scaled = np.where(self._velocity_mask[: len(rows)], rows, impedance * rows)
+        impedance = settings.viscosity / h_min + settings.density * (fastest + h_min * self.difference.alpha)
+        scaled = np.where(self.velocity_mask[: len(rows)], rows, impedance * rows)
         return math.sqrt(self.comm.allreduce(float(scaled @ scaled)))
 
     def advance(self) -> float:
         """One Newton step; the increment relative to the solution."""
-        with self.timer("assembly"):
-            matrix = self.system.tangent(self._held, picard=self._far())
+        matrix = self.linearise()
         b, x = matrix.createVecs()
         b.array[:] = -self.residual_rows
-        self._diagonal = np.abs(matrix.getDiagonal().array)
         try:
             with self.timer("solve"):
                 self._solve(matrix, b, x)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
-        self._increment = x.array.copy()
+        return self.update(x.array)
+
+    def linearise(self) -> PETSc.Mat:
+        """The tangent at the present iterate; held rows are those of the identity. The next call overwrites it."""
+        with self.timer("assembly"):
+            matrix = self.system.tangent(self.held, picard=self._far())
+        self._diagonal = np.abs(matrix.getDiagonal().array)
+        return matrix
+
+    def update(self, increment: Array) -> float:
+        """Add an increment of the owned dofs; its size relative to the flow."""
+        self._increment = increment.copy()
         self._add(self._increment)
-        owned = self.unknowns.owned
-        size = self._norm(self._diagonal * self.flow[:owned])
+        size = self._norm(self._diagonal * self.flow[: self.unknowns.owned])
         return self._norm(self._diagonal * self._increment) / size if size > 0.0 else 0.0
 
     def _far(self) -> bool:
@@ -278,7 +300,7 @@ class Fluid:
         """Rounding error of the residual, eps |u| and eps |p| seen through the diagonal of the tangent."""
         if not hasattr(self, "_diagonal"):
             return 0.0
-        size = np.where(self._held, 0.0, self._diagonal * np.abs(self.flow[: self.unknowns.owned]))
+        size = np.where(self.held, 0.0, self._diagonal * np.abs(self.flow[: self.unknowns.owned]))
         return 8.0 * float(np.finfo(float).eps) * self._norm(size)
 
     def worst(self) -> tuple[float, ...] | None:
@@ -291,7 +313,19 @@ class Fluid:
         place = tuple(nodes.points[index].tolist()) if rank == self.comm.rank else None
         return self.comm.bcast(place, root=rank)
 
+    def held_everywhere(self) -> NDArray[np.bool_]:
+        """`held` for all local dofs, ghosts too (collective)."""
+        mark = np.zeros(self.unknowns.local)
+        mark[: self.unknowns.owned] = self.held
+        return self._shared(mark) > 0.5
+
     # ---------------------------------------------------------------------------------------------- reactions
+
+    def vertices_of(self, names: Sequence[str]) -> NDArray[np.int64]:
+        """Numbers among all vertices of those of some bodies, in the order of the names."""
+        starts = offsets([body.surface for body in self.bodies])
+        place = {body.surface.name: range(a, b) for body, a, b in zip(self.bodies, starts, starts[1:], strict=False)}
+        return np.concatenate([np.asarray(place[name], dtype=np.int64) for name in names])
 
     def force(self) -> dict[str, Array]:
         """Force [N] (per depth in 2D) of the fluid on the vertices of each body, shape (n, dim) (collective)."""
@@ -337,14 +371,11 @@ class Fluid:
             owned[velocity.dofs[: velocity.owned]] = state["known"].values[:, [column]]
             past.known = self._shared(owned) > 0.5
         self._dt_before, self._t = state["dt_before"], state["time"]
-        self._difference = time.STEADY
-        motions = [Motion(m["x"], m["v"]) for m in (state["motion"][b.surface.name] for b in self.bodies)]
+        self.difference = time.STEADY
         kept = self.flow.copy()
-        self.move(motions)
+        self.move({name: Motion(m["x"], m["v"]) for name, m in state["motion"].items()})
         self.flow[:] = kept
 
     def _shared(self, owned: Array) -> Array:
         """Local dofs from owned ones."""
-        from solvers import fem
-
         return fem.share_owned(self.unknowns.space, owned)

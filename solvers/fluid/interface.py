@@ -53,7 +53,8 @@ class Interface:
         against -= np.einsum("pij,pav,pvj->pai", self._penalty, self._phi, g, optimize=True)
         leak = np.einsum("pav,pvi,pi->pa", self._psi, g, n, optimize=True)
         size = self._unknowns.local
-        return np.bincount(self._u.ravel(), against.ravel(), size) + np.bincount(self._p.ravel(), leak.ravel(), size)
+        total: Array = np.bincount(self._u.ravel(), against.ravel(), size).astype(float)
+        return total + np.bincount(self._p.ravel(), leak.ravel(), size)
 
     def force(self, flow: Array, g: Array) -> Array:
         """This process' share of the force [N] on the vertices, shape (vertices, dim); `flow` at local dofs."""

@@ -38,6 +38,12 @@ class Unknowns:
         self.index_map = self.space.dofmap.index_map
         self.owned = int(self.index_map.size_local) * self.block_size  #: owned dofs
         self.local = (int(self.index_map.size_local) + int(self.index_map.num_ghosts)) * self.block_size
+        start = int(self.index_map.local_range[0])
+        blocks = np.concatenate([start + np.arange(self.index_map.size_local), np.asarray(self.index_map.ghosts)])
+        #: global number of each local dof
+        self.global_dofs: NDArray[np.int64] = (
+            blocks.astype(np.int64)[:, None] * self.block_size + np.arange(self.block_size)
+        ).ravel()
         by_component = [fem.component_cell_dofs(self.space, component) for component in range(self.dim + 1)]
         #: velocity dofs of each local cell, shape (cells, functions, dim), and pressure dofs, (cells, functions)
         self.cell_velocity: Dofs = np.stack(by_component[: self.dim], axis=2)

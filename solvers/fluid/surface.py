@@ -18,6 +18,7 @@ class Surface:
     name: str
     facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
     vertices: int
+    wet: NDArray[np.bool_] | None = None  #: facets that the fluid touches; the others only close the solid; None: all
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,12 @@ def together(surfaces: Sequence[Surface], motions: Sequence[Motion], dim: int) -
     starts = offsets(surfaces)[:-1]
     facets = np.concatenate([s.facets + start for s, start in zip(surfaces, starts, strict=True)])
     return facets, Motion(np.concatenate([m.x for m in motions]), np.concatenate([m.v for m in motions]))
+
+
+def wetness(surfaces: Sequence[Surface]) -> NDArray[np.bool_]:
+    """Which facets of all surfaces the fluid touches."""
+    parts = [np.ones(len(s.facets), dtype=bool) if s.wet is None else s.wet for s in surfaces]
+    return np.concatenate([*parts, np.empty(0, dtype=bool)])
 
 
 def offsets(surfaces: Sequence[Surface]) -> NDArray[np.int64]:

@@ -15,7 +15,7 @@ from solvers.api import Array, Constraint, State, StepFailed, StepInfo
 from solvers.blocks import Layout, block_diagonal
 from solvers.distributed import Nodal
 from solvers.newton import Tolerance, converge
-from solvers.rows import change_rows, fetch_rows, gather, gather_at
+from solvers.rows import Numbering, change_rows, fetch_rows, gather, gather_at
 from solvers.structure.body import Body
 from solvers.structure.energy import EnergyBalance
 from solvers.structure.rigid_modes import attach_rigid_modes
@@ -82,6 +82,7 @@ class Structure:
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
         self.energy = EnergyBalance()
         self.residual_force = np.zeros(self.layout.size)  #: left-hand side of the balance, supports included [N]
+        self._surface_load = np.zeros(self.layout.size)
         self._target = np.zeros(len(self.prescribed))
         self._increment = np.zeros(self.layout.size)
         self._diagonal = np.zeros(self.layout.size)
@@ -110,8 +111,8 @@ class Structure:
 
     @cached_property
     def mass(self) -> PETSc.Mat:
-        """Consistent mass matrix of all bodies [kg]."""
-        return block_diagonal([body.mass() for body in self.bodies])
+        """Mass matrix of all bodies [kg]."""
+        return self.time.mass(self, block_diagonal([body.mass() for body in self.bodies]))
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -127,7 +128,7 @@ class Structure:
         self._set_time(t)
         self._assemble_bodies()
         if self.constraint is not None:
-            self.constraint.start(self._at_constraint(self.now.u), self._at_constraint(self._stiffness()), t)
+            self.constraint.start(self.at_constraint(self.now.u), self.at_constraint(self._stiffness()), t)
         self.time.start(self, t, dt)
         self.energy.start(self)
 
@@ -147,17 +148,21 @@ class Structure:
         self._target = self.prescribed_displacement(t + dt)
         self.time.predict(self, dt)
 
+    def load(self, force: Array) -> None:
+        """Take forces [N] at owned dofs that another field exerts at the end of the step, besides the loads."""
+        self._surface_load = force
+
     def solve(self) -> StepInfo:
         """Newton to the tolerance. Raises StepFailed."""
         try:
             info = converge(self, self.settings.newton)
         except StepFailed as failure:
-            self._check_deformation(failure.iteration, failure.history)
+            self.check_deformation(failure.iteration, failure.history)
             raise
-        self._check_deformation(info.iterations, info.residuals)
+        self.check_deformation(info.iterations, info.residuals)
         return info if self.constraint is None else replace(info, numbers=self.constraint.numbers())
 
-    def _check_deformation(self, iteration: int, history: tuple[float, ...]) -> None:
+    def check_deformation(self, iteration: int, history: tuple[float, ...]) -> None:
         """Raise StepFailed if a body flies off, as one does that nothing holds, or is turned inside out anywhere."""
         farthest = self.comm.allreduce(float(np.abs(self.now.u).max(initial=0.0)), op=MPI.MAX)
         if farthest > FLOWN_OFF * self._extent:
@@ -194,18 +199,19 @@ class Structure:
             body.set_displacement(u)
             internal[:] = body.internal_force()
             external[:] = body.external_force()
+        now.external += self._surface_load
 
     def _assemble_constraint(self) -> None:
         if self.constraint is None:
             return
-        self.constraint.evaluate(self._at_constraint(self.now.u), self._time)
+        self.constraint.evaluate(self.at_constraint(self.now.u), self._time)
         dofs, force = self.constraint.dofs(), self.constraint.force()
         local = dofs - self.layout.start
         mine = (local >= 0) & (local < self.layout.size) & (dofs >= 0)
         self.now.constraint[:] = 0.0
         self.now.constraint[local[mine]] = force[mine]
 
-    def _at_constraint(self, owned: Array) -> Array:
+    def at_constraint(self, owned: Array) -> Array:
         """Values at the nodes of the constraint, shape (N, dim)."""
         assert self.constraint is not None
         return gather_at(self.comm, owned, self.layout.start, self.constraint.dofs())
@@ -229,42 +235,74 @@ class Structure:
 
     def advance(self) -> float:
         """One Newton step; returns |du| / |u|."""
-        with self.timer("assembly"):
-            matrix = self.tangent()
-        self._diagonal = matrix.getDiagonal().array.copy()
+        matrix = self.linearise()
         self._b.array[:] = -self.residual_force
-        self._x.array[:] = 0.0
-        self._x.array[self.prescribed] = self._target - self.now.u[self.prescribed]
-        constrained = self.constraint is not None and self.constraint.near
-        if constrained:
-            with self.timer("contact"):
-                matrix = self._condense(matrix)
+        if self.constrained:
+            matrix = self.condense(matrix, self._b)
+        self._x.array[:] = self.missing_displacement()
         rows = (self.layout.start + self.prescribed).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, self._x, self._b)
         if self._iterative:
             attach_rigid_modes(matrix, self.bodies, self.now.u)
         try:
             with self.timer("solve"):
-                linear.solve(self._constrained_ksp if constrained else self._ksp, matrix, self._b, self._x)
+                linear.solve(self._constrained_ksp if self.constrained else self._ksp, matrix, self._b, self._x)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
-        self._increment = self._x.array.copy()
-        if self.constraint is not None and constrained:
+        return self.update(self._x.array)
+
+    def linearise(self) -> PETSc.Mat:
+        """The tangent at the present iterate, supports not yet imposed; the next call overwrites it."""
+        with self.timer("assembly"):
+            matrix = self.tangent()
+        self._diagonal = matrix.getDiagonal().array.copy()
+        return matrix
+
+    @property
+    def constrained(self) -> bool:
+        """The constraint has something to say at the present iterate."""
+        return self.constraint is not None and self.constraint.near
+
+    def missing_displacement(self) -> Array:
+        """What the supports still ask of owned dofs [m], zero at free ones."""
+        missing = np.zeros(self.layout.size)
+        missing[self.prescribed] = self._target - self.now.u[self.prescribed]
+        return missing
+
+    def update(self, increment: Array, everything: Array | None = None) -> float:
+        """Add an increment of the owned dofs; returns |du| / |u|.
+
+        `everything`: the increment of all unknowns that the constraint was condensed with, if there are others.
+        """
+        self._increment = increment.copy()
+        if self.constraint is not None and self.constrained:
             with self.timer("contact"):
-                self.constraint.recover(gather(self.comm, self._increment))
+                self.constraint.recover(gather(self.comm, self._increment) if everything is None else everything)
         self.now.u += self._increment
         self.now.u[self.prescribed] = self._target
         size = self.norm(self.now.u)
         return self.norm(self._increment) / size if size > 0.0 else 0.0
 
-    def _condense(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        """The linear system without the multipliers of the constraint."""
+    def condense(self, matrix: PETSc.Mat, right: PETSc.Vec, numbering: Numbering | None = None) -> PETSc.Mat:
+        """The linear system without the multipliers of the constraint; `right` changes in place.
+
+        `numbering` places the structure's dofs in a system that has more unknowns.
+        """
         assert self.constraint is not None
         weight = self.time.constraint_weight
         without = self.residual_force + weight * self.now.constraint
-        self._b.array[:] = -without
-        changes = self.constraint.condense(weight, lambda rows: fetch_rows(matrix, rows), self._at_constraint(without))
-        return change_rows(matrix, self._b, changes)
+        with self.timer("contact"):
+            if numbering is None:
+                right.array[:] = -without
+                changes = self.constraint.condense(
+                    weight, lambda rows: fetch_rows(matrix, rows), self.at_constraint(without)
+                )
+                return change_rows(matrix, right, changes)
+            right.array[: self.layout.size] = -without
+            changes = self.constraint.condense(
+                weight, lambda rows: numbering.fetch_rows(matrix, rows), self.at_constraint(without)
+            )
+            return change_rows(matrix, right, numbering.place(changes))
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""

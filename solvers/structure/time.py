@@ -10,6 +10,7 @@ from petsc4py import PETSc
 
 from solvers.api import Array
 from solvers.blocks import block_diagonal
+from solvers.structure.massless import move_mass_inwards
 from solvers.time import GeneralisedAlpha
 
 if TYPE_CHECKING:
@@ -22,6 +23,15 @@ class TimeScheme(Protocol):
     @property
     def constraint_weight(self) -> float:
         """Weight of the new constraint force in the balance; the old one has the rest."""
+        ...
+
+    @property
+    def load_weight(self) -> float:
+        """Weight of the loads at the end of the step in the balance."""
+        ...
+
+    def mass(self, structure: Structure, consistent: PETSc.Mat) -> PETSc.Mat:
+        """The mass matrix [kg] it works with, from the consistent one."""
         ...
 
     def start(self, structure: Structure, t: float, dt: float) -> None:
@@ -57,6 +67,10 @@ class Statics:
     """f_int(u) = f_ext(t): every time step is a load step."""
 
     constraint_weight = 1.0
+    load_weight = 1.0
+
+    def mass(self, structure: Structure, consistent: PETSc.Mat) -> PETSc.Mat:
+        return consistent
 
     def start(self, structure: Structure, t: float, dt: float) -> None: ...
     def predict(self, structure: Structure, dt: float) -> None: ...
@@ -90,6 +104,11 @@ class Dynamics:
     """Generalised-alpha: M a_{1-alpha_m} + C v_{1-alpha_f} + (1 - alpha_f) f_{n+1} + alpha_f f_n = 0.
 
     The forces f = f_int - f_ext - f_contact are averaged, not evaluated in the middle.
+
+    constraint_at: the contact force is averaged like all others (mid) or that at the end of the step.
+    massless: surfaces with multipliers lose their mass to the nodes behind them. Their rows are static balances at
+    n+1, times 1 - alpha_f (the old forces there are in balance and drop out, or would ring for ever if they were not);
+    their velocity is (u_{n+1} - u_n) / dt.
     """
 
     def __init__(
@@ -98,16 +117,26 @@ class Dynamics:
         *,
         damping: Damping = Damping(),
         predictor: Literal["constant_displacement", "constant_velocity"] = "constant_displacement",
-        constraint_at: Literal["mid", "end"] = "mid",
+        constraint_at: Literal["mid", "end"] = "end",
+        massless: bool = False,
     ):
         self.scheme, self.damping, self.predictor = scheme, damping, predictor
+        self._wants_massless = massless
+        self._massless = np.empty(0, dtype=np.int64)
         self.constraint_weight = 1.0 - scheme.alpha_f if constraint_at == "mid" else 1.0
+        self.load_weight = 1.0 - scheme.alpha_f
         self._dt = 0.0
         self._damping_matrix: PETSc.Mat | None = None
         self._effective: PETSc.Mat | None = None
         self._effective_dt = 0.0
 
     # ------------------------------------------------------------------------------------------------- start
+
+    def mass(self, structure: Structure, consistent: PETSc.Mat) -> PETSc.Mat:
+        if not self._wants_massless or structure.constraint is None:
+            return consistent
+        matrix, self._massless = move_mass_inwards(consistent, structure.constraint.multiplier_dofs())
+        return matrix
 
     def start(self, structure: Structure, t: float, dt: float) -> None:
         """a_0 from M a_0 = -C v_0 - f_0; prescribed dofs follow their functions."""
@@ -136,8 +165,10 @@ class Dynamics:
         now, (x, b) = structure.now, self._work
         b.array[:] = now.external - now.internal - self._damping_force(now.v)
         x.array[:] = now.a
+        x.array[self._massless] = 0.0
         matrix = structure.mass.copy()
-        rows = (structure.layout.start + structure.prescribed).astype(PETSc.IntType)
+        without_row = np.union1d(structure.prescribed, self._massless)
+        rows = (structure.layout.start + without_row).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, x, b)
         ksp = PETSc.KSP().create(structure.comm)
         ksp.setOperators(matrix)
@@ -160,12 +191,14 @@ class Dynamics:
         du = now.u - old.u
         now.a = scheme.acceleration(du, old.v, old.a, dt)
         now.v = scheme.velocity(du, old.v, old.a, dt)
+        now.a[self._massless], now.v[self._massless] = 0.0, du[self._massless] / dt
         inertia = self._times(structure.mass, (1.0 - scheme.alpha_m) * now.a + scheme.alpha_m * old.a)
-        internal = (1.0 - scheme.alpha_f) * now.internal + scheme.alpha_f * old.internal
-        external, damping = self.averaged_forces(structure)
+        present, before = (at.internal - at.external + self._damping_force(at.v) for at in (now, old))
         weight = self.constraint_weight
-        constraint = weight * now.constraint + (1.0 - weight) * old.constraint
-        return inertia + damping + internal - external - constraint
+        present = (1.0 - scheme.alpha_f) * present - weight * now.constraint
+        before = scheme.alpha_f * before - (1.0 - weight) * old.constraint
+        before[self._massless] = 0.0
+        return inertia + present + before
 
     def averaged_forces(self, structure: Structure) -> tuple[Array, Array]:
         alpha, now, old = self.scheme.alpha_f, structure.now, structure.old
@@ -174,15 +207,28 @@ class Dynamics:
 
     def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
         """(1 - alpha_f) K + mass_factor M + damping_factor C."""
+        same = not len(self._massless)
+        pattern = PETSc.Mat.Structure.SAME_NONZERO_PATTERN if same else PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN
         if self._effective is None or self._effective_dt != self._dt:
             self._effective = structure.mass.copy()
             self._effective.scale(self.scheme.mass_factor(self._dt))
             if self._damping_matrix is not None:
-                self._effective.axpy(self.scheme.damping_factor(self._dt), self._damping_matrix)
+                self._effective.axpy(1.0, self._damping_tangent(), pattern)
             self._effective_dt = self._dt
+        if not same:
+            stiffness = stiffness.copy()  # the caller uses it again, and its pattern must stay
         stiffness.scale(1.0 - self.scheme.alpha_f)
-        stiffness.axpy(1.0, self._effective, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        stiffness.axpy(1.0, self._effective, pattern)
         return stiffness
+
+    def _damping_tangent(self) -> PETSc.Mat:
+        """d(damping force)/du [N/m]."""
+        assert self._damping_matrix is not None
+        matrix, (slope, _) = self._damping_matrix.copy(), self._work
+        slope.array[:] = self.scheme.damping_factor(self._dt)
+        slope.array[self._massless] = (1.0 - self.scheme.alpha_f) / self._dt
+        matrix.diagonalScale(None, slope)
+        return matrix
 
     def reaction(self, structure: Structure) -> Array:
         """M a + C v + f_int - f_ext at the present time."""

@@ -1,0 +1,148 @@
+"""Fixed-point iterations d -> D(d) made faster: constant relaxation, Aitken's, interface quasi-Newton.
+
+r = D(d) - d is the residual of the interface. All arrays are whole on every process.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from solvers.api import Array, State
+
+
+class Accelerator(Protocol):
+    """Remembers iterates of this step and perhaps of earlier ones."""
+
+    def begin_step(self) -> None: ...
+
+    def next(self, d: Array, found: Array) -> Array:
+        """The next iterate from d and D(d)."""
+        ...
+
+    def forget(self) -> None:
+        """The map has changed (contact opened or closed): what was learned about it is void."""
+        ...
+
+    def save(self) -> State: ...
+    def restore(self, state: State) -> None: ...
+
+
+class Relaxation:
+    """d + omega r with a constant omega; omega = 1 is the plain Dirichlet-Neumann iteration."""
+
+    def __init__(self, omega: float = 1.0):
+        self.omega = omega
+
+    def begin_step(self) -> None: ...
+    def forget(self) -> None: ...
+
+    def next(self, d: Array, found: Array) -> Array:
+        return d + self.omega * (found - d)
+
+    def save(self) -> State:
+        return {}
+
+    def restore(self, state: State) -> None: ...
+
+
+class Aitken:
+    """d + omega_k r_k, omega_k = -omega_{k-1} r_{k-1} . (r_k - r_{k-1}) / |r_k - r_{k-1}|^2.
+
+    A step starts with the last omega of the step before, at most `first`.
+    Source: Kuttler, Wall, Comput. Mech. 43 (2008) 61-72.
+    """
+
+    def __init__(self, first: float = 0.5):
+        self.first = first
+        self.omega = first
+        self._before: Array | None = None
+
+    def begin_step(self) -> None:
+        self.omega = np.sign(self.omega) * min(abs(self.omega), self.first)
+        self._before = None
+
+    def forget(self) -> None:
+        self._before = None
+
+    def next(self, d: Array, found: Array) -> Array:
+        residual = found - d
+        if self._before is not None:
+            change = residual - self._before
+            size = float((change * change).sum())
+            if size > 0.0:
+                self.omega *= -float((self._before * change).sum()) / size
+        self._before = residual
+        return d + self.omega * residual
+
+    def save(self) -> State:
+        return {"omega": float(self.omega)}
+
+    def restore(self, state: State) -> None:
+        self.omega, self._before = state["omega"], None
+
+
+class QuasiNewton:
+    """IQN-ILS: the least-squares combination of known differences that makes the residual vanish.
+
+    Columns of V are differences of r, those of W of D(d), newest first, this step's and those of `reuse` steps before;
+    with V = Q R and R a = -Q^T r the next iterate is D(d) + W a. Columns that depend on newer ones are dropped:
+    |R_ii| < `filter` |V_i|. Sources: Degroote, Bathe, Vierendeels, Comput. Struct. 87 (2009) 793-801; Haelterman,
+    Bogaers, Scheufele, Uekermann, Mehl, Comput. Struct. 171 (2016) 9-17 (filter).
+    """
+
+    def __init__(self, first: float = 0.1, reuse: int = 8, filter: float = 1e-3):
+        self.first, self.reuse, self.filter = first, reuse, filter
+        self._steps: list[tuple[list[Array], list[Array]]] = []
+        self._before: tuple[Array, Array] | None = None
+
+    def begin_step(self) -> None:
+        self._before = None
+        self._steps = [step for step in self._steps if step[0]][: self.reuse]
+        self._steps.insert(0, ([], []))
+
+    def forget(self) -> None:
+        self._steps = [([], [])]
+        self._before = None
+
+    def next(self, d: Array, found: Array) -> Array:
+        residual, mapped = (found - d).ravel(), found.ravel()
+        if self._before is not None:
+            v, w = self._steps[0]
+            v.insert(0, residual - self._before[0])
+            w.insert(0, mapped - self._before[1])
+        self._before = residual, mapped
+        columns = [c for step in self._steps for c in step[0]]
+        if not columns:
+            return d + self.first * (found - d)
+        V, W = np.stack(columns, axis=1), np.stack([c for step in self._steps for c in step[1]], axis=1)
+        kept = self._independent(V)
+        a = np.linalg.lstsq(V[:, kept], -residual, rcond=None)[0]
+        return (mapped + W[:, kept] @ a).reshape(d.shape)
+
+    def _independent(self, V: Array) -> list[int]:
+        """Columns that do not depend on newer ones, by modified Gram-Schmidt."""
+        basis: list[Array] = []
+        kept = []
+        for index in range(min(V.shape)):
+            column = V[:, index].copy()
+            size = np.linalg.norm(column)
+            for direction in basis:
+                column -= (direction @ column) * direction
+            rest = np.linalg.norm(column)
+            if rest > self.filter * size and rest > 0.0:
+                basis.append(column / rest)
+                kept.append(index)
+        return kept
+
+    def save(self) -> State:
+        return {
+            f"step{number}": {"V": np.stack(v), "W": np.stack(w)}
+            for number, (v, w) in enumerate(step for step in self._steps if step[0])
+        }
+
+    def restore(self, state: State) -> None:
+        steps = sorted(state.items(), key=lambda item: int(item[0].removeprefix("step")))
+        self._steps = [(list(step["V"]), list(step["W"])) for _, step in steps]
+        self._before = None

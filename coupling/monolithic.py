@@ -1,0 +1,142 @@
+"""Monolithic coupling: one Newton iteration for structure and fluid, contact condensed, the cut following each iterate.
+
+    [ K + w alpha M_G    -w C^T S ] [du]       [ r_s ]        w: weight of the load in the structure's balance
+    [ alpha C                A    ] [dw]  =  - [ r_f ]        C, S, M: see solvers.fluid.interface, g = alpha d - ...
+
+Derivatives with respect to the shape of the fluid's domain are left out.
+Source: Schott, Ager, Wall, Int. J. Numer. Meth. Engng 119 (2019) 757-796.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from coupling.coupled import Coupled
+from solvers import linear
+from solvers.api import State, StepFailed, StepInfo
+from solvers.newton import Tolerance, converge
+from solvers.rows import Numbering, from_entries
+
+
+class Monolithic:
+    """A Scheme, and the system that Newton's method solves."""
+
+    name = "fluid-structure system"
+
+    def __init__(self, coupled: Coupled, tolerance: Tolerance = Tolerance()):
+        self.coupled, self.tolerance = coupled, tolerance
+        structure, fluid = coupled.structure, coupled.fluid
+        self.comm = structure.comm
+        self._numbering = Numbering(self.comm, structure.layout.size, fluid.unknowns.owned)
+        self._ksp = linear.flow_direct_solver(self.comm, tolerance=0.0)
+
+    # ------------------------------------------------------------------------------------------------- steps
+
+    def step(self, t: float, dt: float) -> StepInfo:
+        coupled = self.coupled
+        coupled.begin_step(t, dt)
+        self._largest = np.zeros(2)
+        info = converge(self, self.tolerance)
+        coupled.structure.check_deformation(info.iterations, info.residuals)
+        coupled.end_step(self._force)
+        numbers = coupled.balance.numbers()
+        if coupled.structure.constraint is not None:
+            numbers.update(coupled.structure.constraint.numbers())
+        return StepInfo(info.iterations, info.residuals, numbers)
+
+    # ---------------------------------------------------------------------------- the system that Newton solves
+
+    def residual(self) -> float:
+        """The larger of both fields' residuals, relative to its largest of the step, times the sum of those [N]."""
+        fluid, structure, interface = self.coupled.fluid, self.coupled.structure, self.coupled.interface
+        fluid.move(interface.move(interface.displacement()))
+        of_fluid = fluid.residual()
+        self._force = self.coupled.force()
+        structure.load(interface.spread(self._force))
+        found = np.array([structure.residual(), of_fluid])
+        self._largest = np.maximum(self._largest, found)
+        noise = np.array([structure.round_off(), fluid.round_off()])
+        relative = np.divide(found, self._largest, out=np.zeros(2), where=found > noise)
+        return float(relative.max() * self._largest.sum())
+
+    def advance(self) -> float:
+        """One Newton step; the larger of both fields' relative increments."""
+        structure, fluid = self.coupled.structure, self.coupled.fluid
+        matrix = self._matrix()
+        b, x = matrix.createVecs()
+        own = structure.layout.size
+        b.array[:own] = -structure.residual_force
+        b.array[own:] = -fluid.residual_rows
+        if structure.constrained:
+            matrix = structure.condense(matrix, b, self._numbering)
+        x.array[:own] = structure.missing_displacement()
+        start = matrix.getOwnershipRange()[0]
+        matrix.zeroRowsColumns((start + structure.prescribed).astype(PETSc.IntType), 1.0, x, b)
+        try:
+            with fluid.timer("solve"):
+                linear.solve(self._ksp, matrix, b, x)
+        except linear.LinearSolveFailed as failure:
+            raise StepFailed(self.name, str(failure), where=self.worst()) from failure
+        everything = self._numbering.gather(self.comm, x.array) if structure.constrained else None
+        return max(structure.update(x.array[:own], everything), fluid.update(x.array[own:]))
+
+    def _matrix(self) -> PETSc.Mat:
+        structure, fluid = self.coupled.structure, self.coupled.fluid
+        K, A = structure.linearise(), fluid.linearise()
+        with fluid.timer("coupling"):
+            into_fluid, into_structure, mass = self._coupling_blocks()
+            K = K.copy()
+            K.axpy(1.0, mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+            nest = PETSc.Mat().createNest([[K, into_structure], [into_fluid, A]], comm=self.comm)
+            return nest.convert(PETSc.Mat.Type.AIJ, PETSc.Mat())
+
+    def _coupling_blocks(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
+        """alpha C, -w C^T S and w alpha M as distributed matrices; rows of held fluid dofs are empty."""
+        fluid, structure, surface = self.coupled.fluid, self.coupled.structure, self.coupled.interface
+        alpha, weight = fluid.difference.alpha, structure.time.load_weight
+        operator = fluid.system.interface
+        wetted = fluid.vertices_of([s.name for s in surface.surfaces])
+        columns = (wetted[:, None] * fluid.dim + np.arange(fluid.dim)).ravel()
+        C = operator.matrix[:, columns].tocoo()
+        flow, held = fluid.unknowns.global_dofs, fluid.held_everywhere()
+        own_structure, own_flow = structure.layout.size, fluid.unknowns.owned
+        dofs = surface.dofs.ravel()
+        free = ~held[C.row]
+        into_fluid = from_entries(
+            self.comm, (own_flow, own_structure), flow[C.row[free]], dofs[C.col[free]], alpha * C.data[free]
+        )
+        sign = np.where(fluid.velocity_mask, -1.0, 1.0)[C.row]
+        into_structure = from_entries(
+            self.comm, (own_structure, own_flow), dofs[C.col], flow[C.row], -weight * sign * C.data
+        )
+        M = operator.mass[columns][:, columns].tocoo()
+        mass = from_entries(
+            self.comm, (own_structure, own_structure), dofs[M.row], dofs[M.col], weight * alpha * M.data
+        )
+        return into_fluid, into_structure, mass
+
+    def retreat(self, fraction: float) -> None:
+        """Take back a fraction of the last increment."""
+        self.coupled.structure.retreat(fraction)
+        self.coupled.fluid.retreat(fraction)
+
+    def settled(self) -> bool:
+        """Supports and active sets are fulfilled."""
+        return self.coupled.structure.settled()
+
+    def round_off(self) -> float:
+        """Rounding errors of both fields are left out of `residual` already."""
+        return 0.0
+
+    def worst(self) -> tuple[float, ...] | None:
+        """Where the field that is farther off has its largest residual [m] (collective)."""
+        return self.coupled.fluid.worst()
+
+    # ---------------------------------------------------------------------------------------- save and restore
+
+    def save(self) -> State:
+        return self.coupled.save()
+
+    def restore(self, state: State) -> None:
+        self.coupled.restore(state)

@@ -1,0 +1,94 @@
+"""Partitioned Dirichlet-Neumann coupling: the fluid takes the surface's motion, the structure the fluid's force.
+
+d_k -> fluid on the surface at d_k -> force f_k -> structure under f_k -> displacement D(d_k), until D(d) = d.
+Source: Kuttler, Wall, Comput. Mech. 43 (2008) 61-72.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupling.accelerate import Accelerator
+from coupling.coupled import Coupled
+from solvers.api import Array, State, StepFailed, StepInfo
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """When the interface is in balance: |D(d) - d| in the root mean square of all vertices."""
+
+    relative: float = 1e-6  #: to the displacement of the step
+    absolute: float = 0.0  #: [m]
+    max_iterations: int = 50
+
+
+class Partitioned:
+    """A Scheme: each step iterates over the fields until the interface residual is small."""
+
+    def __init__(self, coupled: Coupled, accelerator: Accelerator, tolerance: Tolerance = Tolerance()):
+        self.coupled, self.accelerator, self.tolerance = coupled, accelerator, tolerance
+
+    def step(self, t: float, dt: float) -> StepInfo:
+        coupled, interface = self.coupled, self.coupled.interface
+        coupled.begin_step(t, dt)
+        self.accelerator.begin_step()
+        d = self._predict()
+        history: list[float] = []
+        newton = 0
+        contact: NDArray[np.bool_] | None = None
+        while True:
+            coupled.fluid.move(interface.move(d))
+            newton += coupled.fluid.solve().iterations
+            force = coupled.force()
+            coupled.structure.load(interface.spread(force))
+            newton += coupled.structure.solve().iterations
+            found = interface.displacement()
+            residual = _mean(found - d)
+            history.append(residual)
+            if residual <= self._small(found):
+                break
+            if not math.isfinite(residual) or len(history) == self.tolerance.max_iterations:
+                reason = f"fluid and structure did not agree in {len(history)} iterations (residual {residual:.3g} m)"
+                raise StepFailed("coupling", reason, iteration=len(history), history=tuple(history))
+            touching = self._touching()
+            if contact is not None and touching is not None and not np.array_equal(contact, touching):
+                self.accelerator.forget()
+            contact = touching
+            d = self.accelerator.next(d, found)
+        coupled.end_step(force)
+        numbers = {"coupling.newton": float(newton), **coupled.balance.numbers()}
+        constraint = coupled.structure.constraint
+        if constraint is not None:
+            numbers.update(constraint.numbers())
+        return StepInfo(len(history), tuple(history), numbers)
+
+    def _predict(self) -> Array:
+        """The structure's own prediction where it made one, else the displacement goes on as in the last step."""
+        interface = self.coupled.interface
+        predicted = interface.displacement()
+        if np.array_equal(predicted, interface.old) and self.coupled.fluid.difference.alpha:
+            return interface.old + (interface.old - interface.older)
+        return predicted
+
+    def _small(self, found: Array) -> float:
+        return max(self.tolerance.relative * _mean(found - self.coupled.interface.old), self.tolerance.absolute)
+
+    def _touching(self) -> NDArray[np.bool_] | None:
+        constraint = self.coupled.structure.constraint
+        return None if constraint is None else constraint.active()
+
+    def save(self) -> State:
+        return {**self.coupled.save(), "accelerator": self.accelerator.save()}
+
+    def restore(self, state: State) -> None:
+        self.coupled.restore(state)
+        self.accelerator.restore(state["accelerator"])
+
+
+def _mean(vectors: Array) -> float:
+    """Root mean square length."""
+    return float(np.sqrt((vectors**2).sum() / len(vectors)))

@@ -1,0 +1,239 @@
+"""What can be measured on the fluid: at points, on patches of the box, on bodies, of the whole.
+
+A probe is a function without arguments that every process calls; it returns the values by component. In 2D everything
+is per unit of depth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import ufl
+
+from solvers import fem
+from solvers.api import Array
+from solvers.fluid import forms
+from solvers.fluid.field import Fluid
+from solvers.fluid.space import Nodes
+from solvers.fluid.surface import Motion, together
+
+Probe = Callable[[], dict[str, float]]
+
+AXES = ("x", "y", "z")
+
+
+#: winding number above which a point is in a body; in a dent of the surface it is more than 0.5
+INSIDE = 1.0 - 1e-6
+
+
+class PointInBody(ValueError):
+    """There is no fluid at a probe's point."""
+
+
+# ---------------------------------------------------------------------------------------------------------- points
+
+
+def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> Probe:
+    """velocity [m/s] or pressure [Pa] at a point of the box; nan while a body covers it.
+
+    Raises PointInBody if one does at the time t (of bodies whose motion is known). Collective.
+    """
+    x = np.asarray(point, dtype=float)
+    known = [body for body in fluid.bodies if body.motion is not None]
+    motions = [body.motion(t) for body in known if body.motion is not None]
+    facets, motion = together([body.surface for body in known], motions, fluid.dim)
+    if winding(x, motion, facets) > INSIDE:
+        inside = next(b for b, m in zip(known, motions, strict=True) if winding(x, m, b.surface.facets) > INSIDE)
+        raise PointInBody(f"there is no fluid at {tuple(x.tolist())}: the point is in body '{inside.surface.name}'")
+    unknowns = fluid.unknowns
+    nodes, degree = (unknowns.velocity, unknowns.degree) if quantity == "velocity" else (unknowns.pressure, 1)
+    dofs, weights = interpolation(fluid, nodes, degree, x)
+    may_be_covered = not all(body.rests for body in fluid.bodies)
+
+    def probe() -> dict[str, float]:
+        value = fluid.comm.allreduce(weights @ fluid.flow[dofs])
+        if may_be_covered and winding(x, fluid.cut.motion, fluid.cut.facets) > INSIDE:
+            value = np.full_like(value, np.nan)
+        return _components(value) if quantity == "velocity" else {"": float(value[0])}
+
+    return probe
+
+
+def interpolation(fluid: Fluid, nodes: Nodes, degree: int, x: Array) -> tuple[np.ndarray, Array]:
+    """(dofs of shape (n, components), shape functions (n,)) at a point, of the nodes that this process owns."""
+    number, weight, stride = np.zeros(1, dtype=np.int64), np.ones(1), 1
+    for edge, coordinate in zip(fluid.grid.grid.edges, x, strict=True):
+        cell = int(np.clip(np.searchsorted(edge, coordinate) - 1, 0, len(edge) - 2))
+        s, places = (coordinate - edge[cell]) / (edge[cell + 1] - edge[cell]), np.arange(degree + 1) / degree
+        shape = [np.prod((s - np.delete(places, i)) / (at - np.delete(places, i))) for i, at in enumerate(places)]
+        steps = degree * cell + np.arange(degree + 1)
+        number = np.add.outer(stride * steps, number).ravel()
+        weight = np.multiply.outer(np.array(shape), weight).ravel()
+        stride *= degree * (len(edge) - 1) + 1
+    owned = nodes.numbers[: nodes.owned]
+    order = np.argsort(owned)
+    at = np.minimum(np.searchsorted(owned[order], number), max(len(owned) - 1, 0))
+    mine = owned[order[at]] == number if len(owned) else np.zeros(len(number), dtype=bool)
+    return nodes.dofs[order[at[mine]]], weight[mine]
+
+
+def winding(x: Array, motion: Motion, facets: np.ndarray) -> float:
+    """How often closed surfaces go round a point: 1 in a body, 0 outside, less than 1 on the surface.
+
+    The sum of the angles of segments, or of the solid angles of triangles (van Oosterom, Strackee, IEEE Trans. Biomed.
+    Eng. 30 (1983) 125-126), as part of the full one; a facet in line with the point has none, whatever its rounding.
+    """
+    corners = motion.x[facets] - x
+    lengths = np.linalg.norm(corners, axis=2)
+    if len(x) == 2:
+        a, b = corners[:, 0], corners[:, 1]
+        across, along = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)
+    else:
+        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+        la, lb, lc = lengths.T
+        across = np.linalg.det(corners)
+        along = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
+    seen = np.abs(across) > 1e-9 * lengths.prod(axis=1)
+    return float(np.arctan2(across[seen], along[seen]).sum() / (2.0 * np.pi))
+
+
+def difference(first: Probe, second: Probe) -> Probe:
+    """What one probe measures less what another does."""
+
+    def probe() -> dict[str, float]:
+        subtracted = second()
+        return {name: value - subtracted[name] for name, value in first().items()}
+
+    return probe
+
+
+# --------------------------------------------------------------------------------------------------------- patches
+
+
+def on_patch(fluid: Fluid, quantity: str, patch: str) -> Probe:
+    """flow_rate [m^3/s] out of the box through a patch, or pressure [Pa], its mean over the patch. Collective."""
+    if quantity == "flow_rate":
+        rate = flow_rate(fluid)
+        return lambda: {"": rate([patch])}
+    domain, p = fluid.grid.domain, fluid.unknowns.parts(fluid.system.flow)[1]
+    ds = fem.measure(domain, "ds", 1)
+    force, area = (fem.Integral(domain, f * ds) for f in (p, fem.constant(domain, 1.0)))
+
+    def probe() -> dict[str, float]:
+        facets = _facets(fluid, [patch])
+        total, size = (fem.assemble_scalar(f.on(exterior_facet=facets), fluid.comm) for f in (force, area))
+        return {"": total / size if size else float("nan")}
+
+    return probe
+
+
+def flow_rate(fluid: Fluid) -> Callable[[Sequence[str]], float]:
+    """Patches -> volume [m^3/s] that flows out of the box through them. Collective."""
+    domain, u = fluid.grid.domain, fluid.unknowns.parts(fluid.system.flow)[0]
+    form = fem.Integral(
+        domain, ufl.dot(u, ufl.FacetNormal(domain.mesh)) * fem.measure(domain, "ds", fluid.unknowns.degree)
+    )
+    return lambda patches: fem.assemble_scalar(form.on(exterior_facet=_facets(fluid, patches)), fluid.comm)
+
+
+def _facets(fluid: Fluid, patches: Sequence[str]) -> np.ndarray:
+    """Local faces of patches with fluid behind them, sorted."""
+    boundary = fluid.boundary
+    wet = np.zeros(len(fluid.grid.numbers), dtype=bool)
+    wet[np.concatenate([fluid.cut.uncut, fluid.cut.cut])] = True
+    chosen = [i for i, patch in enumerate(boundary.patches) if patch.name in patches]
+    return np.sort(np.concatenate([boundary.facets[i][wet[boundary.cells[i]]] for i in chosen]))
+
+
+def mass_balance(fluid: Fluid) -> Callable[[], dict[str, float]]:
+    """fluid.mass [m^3/s]: what flows out of the box, and what bodies make room for, zero but for the solver's tolerance.
+
+    Tested with q = 1, the equation of continuity is exactly the sum of both.
+    """
+    rate = flow_rate(fluid)
+    everywhere = [patch.name for patch in fluid.boundary.patches]
+
+    def balance() -> dict[str, float]:
+        cut = fluid.cut
+        mine = cut.cut[cut.pieces.cell] < fluid.grid.owned
+        swept = cut.pieces.moments[mine].sum(axis=1)
+        g, n = cut.motion.v[cut.facets[cut.pieces.facet[mine]]], cut.pieces.normal[mine]
+        into_bodies = fluid.comm.allreduce(float(np.einsum("pv,pvi,pi->", swept, g, n)))
+        return {"fluid.mass": rate(everywhere) + into_bodies}
+
+    return balance
+
+
+# ---------------------------------------------------------------------------------------------------------- bodies
+
+
+class Forces:
+    """The reactions of the bodies, found once for all probes until they are told to `forget`."""
+
+    def __init__(self, fluid: Fluid):
+        self.fluid = fluid
+        self._found: dict[str, Array] | None = None
+
+    def forget(self) -> None:
+        """A new step begins."""
+        self._found = None
+
+    def probe(self, quantity: str, body: str, about: Sequence[float] | None = None) -> Probe:
+        """force [N] of the fluid on a body, or moment [N m] of it about a point (the origin)."""
+        fluid = self.fluid
+        names = [b.surface.name for b in fluid.bodies]
+        index, ends = names.index(body), np.cumsum([0, *(b.surface.vertices for b in fluid.bodies)])
+        vertices = slice(ends[index], ends[index + 1])
+        centre = np.zeros(fluid.dim) if about is None else np.asarray(about, dtype=float)
+
+        def measure() -> dict[str, float]:
+            if self._found is None:
+                self._found = fluid.force()
+            force = self._found[body]
+            if quantity == "force":
+                return _components(force.sum(axis=0))
+            x = fluid.cut.motion.x[vertices]
+            arms, forces = (np.pad(a, ((0, 0), (0, 3 - fluid.dim))) for a in (x - centre, force))
+            moment = np.cross(arms, forces).sum(axis=0)
+            return _components(moment) if fluid.dim == 3 else {"": float(moment[2])}
+
+        return measure
+
+
+# ------------------------------------------------------------------------------------------------------- the whole
+
+
+def of_fluid(fluid: Fluid, quantity: str) -> Probe:
+    """volume [m^3], kinetic_energy [J] or dissipation [W] (of the viscous stress) of all fluid. Collective."""
+    if quantity == "volume":
+
+        def volume() -> dict[str, float]:
+            owned = slice(fluid.grid.owned)
+            size = fluid.cut.fraction[owned] @ fluid.grid.sizes[owned].prod(axis=1)
+            return {"": fluid.comm.allreduce(float(size))}
+
+        return volume
+    settings, domain, degree = fluid.settings, fluid.grid.domain, fluid.unknowns.degree
+    u = fluid.unknowns.parts(fluid.system.flow)[0]
+    density, viscosity = fem.constant(domain, settings.density), fem.constant(domain, settings.viscosity)
+    density_of = {
+        "kinetic_energy": 0.5 * density * ufl.dot(u, u),
+        "dissipation": 2.0 * viscosity * ufl.inner(forms.eps(u), forms.eps(u)),
+    }[quantity]
+    whole = fem.Integral(domain, density_of * fem.measure(domain, "dx", 2 * degree))
+    weights = fluid.system.weights
+    parts = [whole]
+    if fluid.bodies:
+        parts.append(fem.Integral(domain, weights.fluid * density_of * fem.measure(domain, "dx", weights.degree)))
+
+    def probe() -> dict[str, float]:
+        cells = [some[some < fluid.grid.owned] for some in (fluid.cut.uncut, fluid.cut.cut)]
+        forms_there = [part.on(cell=some) for part, some in zip(parts, cells, strict=False)]
+        return {"": sum(fem.assemble_scalar(form, fluid.comm) for form in forms_there)}
+
+    return probe
+
+
+def _components(values: Sequence[float] | Array) -> dict[str, float]:
+    return {axis: float(value) for axis, value in zip(AXES, values, strict=False)}
