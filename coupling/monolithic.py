@@ -15,6 +15,7 @@ from petsc4py import PETSc
 from coupling.coupled import Coupled
 from solvers import linear
 from solvers.api import State, StepFailed, StepInfo
+from solvers.fluid.shape import shape_derivatives
 from solvers.newton import Tolerance, converge
 from solvers.rows import Numbering, from_entries
 
@@ -98,22 +99,26 @@ class Monolithic:
         operator = fluid.system.interface
         wetted = fluid.vertices_of([s.name for s in surface.surfaces])
         columns = (wetted[:, None] * fluid.dim + np.arange(fluid.dim)).ravel()
+        by_shape, load_by_shape = shape_derivatives(operator, fluid.flow)
+        velocity_in = (alpha * operator.matrix + by_shape)[:, columns].tocoo()
         C = operator.matrix[:, columns].tocoo()
         flow, held = fluid.unknowns.global_dofs, fluid.held_everywhere()
         own_structure, own_flow = structure.layout.size, fluid.unknowns.owned
         dofs = surface.dofs.ravel()
-        free = ~held[C.row]
+        free = ~held[velocity_in.row]
         into_fluid = from_entries(
-            self.comm, (own_flow, own_structure), flow[C.row[free]], dofs[C.col[free]], alpha * C.data[free]
+            self.comm,
+            (own_flow, own_structure),
+            flow[velocity_in.row[free]],
+            dofs[velocity_in.col[free]],
+            velocity_in.data[free],
         )
         sign = np.where(fluid.velocity_mask, -1.0, 1.0)[C.row]
         into_structure = from_entries(
             self.comm, (own_structure, own_flow), dofs[C.col], flow[C.row], -weight * sign * C.data
         )
-        M = operator.mass[columns][:, columns].tocoo()
-        mass = from_entries(
-            self.comm, (own_structure, own_structure), dofs[M.row], dofs[M.col], weight * alpha * M.data
-        )
+        M = (alpha * operator.mass - load_by_shape)[columns][:, columns].tocoo()
+        mass = from_entries(self.comm, (own_structure, own_structure), dofs[M.row], dofs[M.col], weight * M.data)
         return into_fluid, into_structure, mass
 
     def retreat(self, fraction: float) -> None:

@@ -31,13 +31,17 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
         for side in (settings.slave, settings.master):
             key = (side.body or "", side.on or side.obstacle or "")
             if key not in found:
-                found[key] = _surface(comm, layout, bodies, *key) if side.body else _obstacle(case, comm, key[1])
+                found[key] = surface_of_body(comm, layout, bodies, *key) if side.body else _obstacle(case, comm, key[1])
             sides.append(found[key])
         pairs.append(Pair(sides[0], sides[1], settings.integration))
-    return Contact(comm, pairs, names=tuple(case.contact.pairs), c_n=case.contact.c_n)
+    assert case.structure is not None
+    moves = case.structure.dynamics is not None
+    return Contact(comm, pairs, names=tuple(case.contact.pairs), c_n=case.contact.c_n, keep_overlap=moves)
 
 
-def _surface(comm: MPI.Comm, layout: Layout, bodies: Sequence[Body], body_name: str, name: str) -> Surface:
+def surface_of_body(
+    comm: MPI.Comm, layout: Layout, bodies: Sequence[Body], body_name: str, name: str
+) -> Surface:
     """A named surface of a body, whole on every process."""
     index = next(i for i, body in enumerate(bodies) if body.name == body_name)
     body = bodies[index]

@@ -2,45 +2,73 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import ceil
 
 from fsci.case import Case
-from fsci.case.mesh import Shape
+from fsci.case.fluid import Fluid
+from fsci.case.mesh import Mesh, Shape
+from fsci.case.structure import Structure
 from fsci.estimate import size
+
+Row = tuple[str, str]
 
 
 def summary(case: Case) -> str:
-    """A few lines: steps, bodies with their size where it is known, probes, checks."""
-    time, structure = case.time, case.structure
+    """A few lines: steps, fields and bodies with their size where it is known, probes, checks."""
+    time = case.time
     steps = ceil((time.end - time.start) / time.step - 1e-9)
-    motion = "static"
-    if structure.dynamics is not None:
-        rho_inf = structure.dynamics.rho_inf
-        motion = "generalised-alpha" + ("" if rho_inf is None else f", rho_inf {rho_inf:g}")
     rows = [
         ("title", case.title),
         ("time", f"{time.start:g} to {time.end:g} {case.units.time}, {_count(steps, 'step')} of {time.step:g}"),
-        ("structure", motion + (f", plane {structure.plane}" if case.dimension != 3 else "")),
     ]
-    total, known = 0, True
-    for name, body in structure.bodies.items():
-        law = body.material.law
-        if isinstance(body.mesh, Shape):
-            cells, nodes = size(body.mesh)
-            total += nodes * body.mesh.dimension
-            kind = f"order {body.mesh.order} {body.mesh.cell}"
-            rows.append((f"body {name}", f"{body.mesh.shape}, {law}, {_count(cells, 'cell')} ({kind})"))
-        else:
-            known = False
-            rows.append((f"body {name}", f"{body.mesh.file}, {law}"))
-    if known:
-        rows.append(("dofs", f"{total:,}"))
+    if case.structure is not None:
+        rows += _structure(case, case.structure)
+    if case.fluid is not None:
+        rows += _fluid(case.fluid)
     if case.probes:
         rows.append(("probes", ", ".join(case.probes)))
     if case.verify:
         rows.append(("verify", _count(len(case.verify), "value")))
     width = max(len(word) for word, _ in rows)
     return "\n".join(f"  {word:<{width}}  {text}" for word, text in rows if text)
+
+
+def _structure(case: Case, structure: Structure) -> Iterator[Row]:
+    motion = "static"
+    if structure.dynamics is not None:
+        rho_inf = structure.dynamics.rho_inf
+        motion = "generalised-alpha" + ("" if rho_inf is None else f", rho_inf {rho_inf:g}")
+    yield "structure", motion + (f", plane {structure.plane}" if case.dimension != 3 else "")
+    total, known = 0, True
+    for name, body in structure.bodies.items():
+        text = f"{_name(body.mesh)}, {body.material.law}"
+        if isinstance(body.mesh, Shape):
+            cells, nodes = size(body.mesh)
+            total += nodes * body.mesh.dimension
+            text += f", {_count(cells, 'cell')} (order {body.mesh.order} {body.mesh.cell})"
+        else:
+            known = False
+        yield f"body {name}", text
+    if known:
+        yield "dofs", f"{total:,}"
+
+
+def _fluid(fluid: Fluid) -> Iterator[Row]:
+    flow = "Navier-Stokes" if fluid.flow == "navier_stokes" else "Stokes"
+    yield "fluid", f"{flow}, {fluid.scheme.replace('_', ' ')}, {fluid.element}"
+    cells = " x ".join(f"{count:,}" for count in fluid.grid.shape)
+    box = " x ".join(f"[{low:g}, {high:g}]" for low, high in zip(fluid.grid.start, fluid.grid.to, strict=True))
+    yield "grid", f"{box}, {cells} cells"
+    kinds = [f"{name} ({patch.kind.replace('_', ' ')})" for name, patch in fluid.patches.items()]
+    yield "patches", ", ".join(kinds)
+    for name, body in fluid.bodies.items():
+        yield f"body {name}", f"{_name(body.mesh)}, rigid, {'at rest' if body.motion is None else 'moved'}"
+    yield "dofs", f"{fluid.dofs:,} with those inside of bodies"
+
+
+def _name(mesh: Mesh) -> str:
+    return mesh.shape if isinstance(mesh, Shape) else mesh.file
 
 
 def _count(number: int, word: str) -> str:

@@ -15,6 +15,7 @@ from fsci.case.shapes import (
     Rectangle,
     Ring,
     SolidTorus,
+    Sphere,
     Tube,
 )
 
@@ -43,6 +44,9 @@ def size(mesh: Shape) -> Size:
         case HollowSphere():
             sphere = 6 * n[0] ** 2, 6 * (order * n[0]) ** 2 + 2
             cells, nodes = _product(sphere, _line(n[1], order))
+        case Sphere():
+            face, edge = 6 * n[0] ** 2, order * n[0]
+            cells, nodes = n[0] ** 3 + face * n[1], (edge + 1) ** 3 + (6 * edge**2 + 2) * order * n[1]
     parts = {"quad": 1, "hex": 1, "tri": 2, "tet": 6}
     return cells * parts[mesh.cell], nodes
 
@@ -76,6 +80,24 @@ def aspect(mesh: Shape) -> float:
             return 1.0
     edges = [extent / count for extent, count in zip(extents, n, strict=True)]
     return max(edges) / min(edges)
+
+
+def thickness(mesh: Shape) -> float:
+    """The shortest extent of the body."""
+    match mesh:
+        case Rectangle() | Box():
+            return min(mesh.size)
+        case Beam():
+            return min(mesh.length, mesh.width, mesh.height)
+        case Disc() | Sphere():
+            return 2 * mesh.radius
+        case Cylinder():
+            return min(2 * mesh.radius, mesh.height)
+        case SolidTorus():
+            return 2 * mesh.minor_radius
+        case Tube():
+            return min(mesh.outer_radius - mesh.inner_radius, mesh.height)
+    return mesh.outer_radius - mesh.inner_radius
 
 
 def _line(cells: int, order: int, *, closed: bool = False) -> Size:

@@ -16,7 +16,7 @@ from fsci.mesh_files import MeshError, read_mesh, unknown
 from solvers.mesh import Mesh
 from solvers.mesh_topology import CORNERS, FACET_TYPE, find_facets
 
-__all__ = ["MeshError", "build_mesh", "extract_region", "place", "require_region", "require_surface"]
+__all__ = ["MeshError", "build_mesh", "extract_region", "place", "require_region", "require_surface", "rotation_matrix"]
 
 
 def build_mesh(settings: Any, folder: Path) -> Mesh:
@@ -46,7 +46,7 @@ def place(mesh: Mesh, rotate: Any = None, translate: Sequence[float] | None = No
     points = mesh.points
     dim = points.shape[1]
     for rotation in rotate if isinstance(rotate, list | tuple) else [rotate] if rotate else []:
-        points = points @ _rotation(getattr(rotation, "axis", None), rotation.angle, dim).T
+        points = points @ rotation_matrix(getattr(rotation, "axis", None), rotation.angle, dim).T
     if translate is not None:
         if len(translate) != dim:
             raise MeshError(f"translate has {len(translate)} numbers, the mesh has {dim} dimensions")
@@ -54,7 +54,7 @@ def place(mesh: Mesh, rotate: Any = None, translate: Sequence[float] | None = No
     return replace(mesh, points=points)
 
 
-def _rotation(axis: Sequence[float] | None, angle: float, dim: int) -> NDArray[np.float64]:
+def rotation_matrix(axis: Sequence[float] | None, angle: float, dim: int) -> NDArray[np.float64]:
     """Matrix of the right-handed rotation by `angle` degrees about k: cos I + sin [k] + (1 - cos) k k^T."""
     if axis is None and dim == 3:
         raise MeshError("rotate: a mesh of three dimensions needs an axis")

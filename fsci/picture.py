@@ -11,10 +11,11 @@ from fsci.curves import DOTS, plot_convergence, plot_history
 from fsci.history import read_history
 from fsci.movie import plot_movie
 from fsci.output import Series, read_collection
-from fsci.render import load_body
+from fsci.render_flow import is_flow, load_parts
 from fsci.scene import compose, draw
 
-DEFAULT_FIELD = "displacement"
+STRUCTURE_FIELDS = ("displacement",)  #: what is drawn if nothing is asked for
+FLUID_FIELDS = ("velocity", "pressure")
 
 
 @dataclass(frozen=True)
@@ -29,8 +30,8 @@ class Labels:
 def plot_run(out: Path, *, movie: bool = False, field: str | None = None) -> list[Path]:
     """Draws the last state, the probes and the convergence of the run in folder `out` into out/pictures.
 
-    `field` colours the bodies: a point field (a vector's magnitude) or a component such as velocity.x; the
-    displacement by default. `movie` adds an animation of all output times. Returns the files; raises ValueError
+    `field` is what colours show: a point field (a vector's magnitude) or a component such as velocity.x; by default the
+    displacement, of a flow velocity and pressure. `movie` adds an animation of all output times. Returns the files; raises ValueError
     if no body has the field.
     """
     out = Path(out)
@@ -38,12 +39,12 @@ def plot_run(out: Path, *, movie: bool = False, field: str | None = None) -> lis
     folder = out / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
     drawn = []
-    bodies = [series for path in sorted((out / "fields").glob("*.pvd")) if (series := read_collection(path))]
+    bodies = read_series(out / "fields")
     if bodies:
-        name = field or DEFAULT_FIELD
-        drawn.append(plot_state(folder / f"final_{name}.png", bodies, name, labels))
+        names = (field,) if field else FLUID_FIELDS if is_flow(bodies[0][-1][1]) else STRUCTURE_FIELDS
+        drawn += [plot_state(folder / f"final_{name}.png", bodies, name, labels) for name in names]
         if movie:
-            drawn.append(plot_movie(folder / "movie.gif", bodies, name, labels.title, labels.units))
+            drawn.append(plot_movie(folder / "movie.gif", bodies, names[0], labels.title, labels.units))
     if (out / "history.csv").exists():
         drawn += plot_history(folder, read_history(out / "history.csv"), labels.quantities, labels.units)
     if (out / "summary.json").exists():
@@ -53,9 +54,15 @@ def plot_run(out: Path, *, movie: bool = False, field: str | None = None) -> lis
     return drawn
 
 
+def read_series(folder: Path) -> list[Series]:
+    """The files of all parts; those of a flow come first, so that bodies are drawn on top of it."""
+    found = [series for path in sorted(folder.glob("*.pvd")) if (series := read_collection(path))]
+    return sorted(found, key=lambda series: not is_flow(series[-1][1]))
+
+
 def plot_state(path: Path, bodies: list[Series], name: str, labels: Labels) -> Path:
     """Draws the last state of all bodies coloured by the field `name`."""
-    state = [load_body(series[-1][1], name) for series in bodies]
+    state = [part for series in bodies for part in load_parts(series[-1][1], name)]
     scene = compose([state], name, labels.title, labels.units)
     draw(scene, state, bodies[0][-1][0], dots=DOTS).savefig(path)
     return path

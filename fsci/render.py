@@ -33,6 +33,8 @@ class Body:
     edges: Array  #: polylines, shape (edges, points per edge, 3)
     outline: Array  #: polylines of the edges that only one face has
     values: Array | None  #: colour of each surface point; None: the body does not have the field
+    line_colour: str = "black"  #: of the edges
+    lit: bool = True  #: in space: shaded; else its colours are exactly those of the colour bar
 
 
 @dataclass(frozen=True)
@@ -140,20 +142,21 @@ def render(
     plotter.set_background("white")
     away = np.cross(view.right, view.up)
     flat = np.allclose(away, [0, 0, 1])
-    shading = FLAT if flat else ROUND
     lift = 0.005 * view.half_height * away  # keeps edges clear of the surface they lie in
-    for body in bodies:
-        surface = body.surface.copy(deep=False)
+    for index, body in enumerate(bodies):
+        surface, shading = body.surface.copy(deep=False), ROUND if body.lit and not flat else FLAT
+        if flat:  # a later body covers an earlier one
+            surface = surface.translate(2 * index * lift, inplace=False)
         if body.values is None:
             plotter.add_mesh(surface, color="lightgray", **shading)
         else:
             surface.point_data["colour"] = body.values
             plotter.add_mesh(surface, scalars="colour", clim=limits, cmap=colours, show_scalar_bar=False, **shading)
-        if len(body.edges) <= 2 * EDGES_UP_TO:
-            lines = polylines(body.edges + lift)
-            plotter.add_mesh(lines, color="black", line_width=SUPERSAMPLING, opacity=0.5, lighting=False)
-        if flat:
-            lines = polylines(body.outline + lift)
+        if 0 < len(body.edges) <= 2 * EDGES_UP_TO:
+            lines = polylines(body.edges + (2 * index * flat + 1) * lift)
+            plotter.add_mesh(lines, color=body.line_colour, line_width=SUPERSAMPLING, opacity=0.5, lighting=False)
+        if flat and len(body.outline):
+            lines = polylines(body.outline + (2 * index + 1) * lift)
             plotter.add_mesh(lines, color="black", line_width=2 * SUPERSAMPLING, lighting=False)
     return photograph(plotter, view, away, size)
 

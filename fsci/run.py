@@ -85,8 +85,10 @@ def keep_case(case: Case, folder: Path) -> None:
 
 def _meshes(case: Case) -> Iterator[tuple[str, str, Any]]:
     """(setting, name, mesh) of all bodies and obstacles."""
-    for name, body in case.structure.bodies.items():
+    for name, body in case.elastic_bodies.items():
         yield f"structure.bodies.{name}", name, body.mesh
+    for name, rigid in ({} if case.fluid is None else case.fluid.bodies).items():
+        yield f"fluid.bodies.{name}", name, rigid.mesh
     for name, obstacle in ({} if case.contact is None else case.contact.obstacles).items():
         yield f"contact.obstacles.{name}", name, obstacle.mesh
 

@@ -14,10 +14,11 @@ from fsci.render import Body, Pixels, View, axes_of_view, frame, render
 
 Rectangle = tuple[float, float, float, float]  #: left, bottom, width, height in parts of the figure
 
-#: where the picture and its colour bar are: beside each other, or one above the other
+#: where the picture and its colour bar are, beside each other
 UPRIGHT = ((0.125, 0.12, 0.70, 0.785), (0.85, 0.16, 0.018, 0.70))
-LONG = ((0.125, 0.31, 0.845, 0.60), (0.25, 0.125, 0.5, 0.025))
 SPATIAL = ((0.02, 0.05, 0.80, 0.855), (0.85, 0.16, 0.018, 0.70))
+LONG_FROM = 2.2  #: width over height from which the colour bar is below the picture, and the figure is as low as it can be
+LOPSIDED = 0.2  #: values on one side of zero, in parts of those on the other, below which zero is no middle
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,7 @@ class Scene:
     label: str  #: of the colour bar
     units: Mapping[str, str]  #: of length, mass and time
     layout: tuple[Rectangle, Rectangle]  #: of the picture and of the colour bar
+    size: tuple[float, float]  #: of the figure, in inches
 
 
 def compose(states: Iterable[list[Body]], field: str, title: str, units: Mapping[str, str]) -> Scene:
@@ -54,15 +56,17 @@ def compose(states: Iterable[list[Body]], field: str, title: str, units: Mapping
     if least > most:
         known = sorted({name for body in first for name in body.surface.point_data if not name.startswith("vtk")})
         raise ValueError(f"no body has a field '{field}'; there are {', '.join(known)}")
-    signed = least < 0 < most
+    signed = least < 0 < most and min(-least, most) > LOPSIDED * max(-least, most)
     if signed:
         least, most = -max(-least, most), max(-least, most)
     elif least == most:
         most = least + (abs(least) or 1.0)
     width, height = (high - low)[:2]
-    layout = SPATIAL if not flat else LONG if width > 2.2 * height else UPRIGHT
+    size, layout = SIZE, UPRIGHT if flat else SPATIAL
+    if flat and width > LONG_FROM * height:
+        size, layout = long_layout(height / width)
     return Scene(
-        view=frame(axes, low, high, aspect=SIZE[0] * layout[0][2] / (SIZE[1] * layout[0][3])),
+        view=frame(axes, low, high, aspect=size[0] * layout[0][2] / (size[1] * layout[0][3])),
         flat=flat,
         limits=(least, most),
         colours="coolwarm" if signed else "viridis",
@@ -70,6 +74,18 @@ def compose(states: Iterable[list[Body]], field: str, title: str, units: Mapping
         label=field_label(field, first, units),
         units=units,
         layout=layout,
+        size=size,
+    )
+
+
+def long_layout(slope: float) -> tuple[tuple[float, float], tuple[Rectangle, Rectangle]]:
+    """(size of the figure in inches, picture and colour bar in parts of it) for a scene of this height over width."""
+    picture = max(0.845 * SIZE[0] * slope, 0.8)
+    below, above = 1.4, 0.45
+    height = picture + below + above
+    return (SIZE[0], height), (
+        (0.125, below / height, 0.845, picture / height),
+        (0.25, 0.6 / height, 0.5, 0.125 / height),
     )
 
 
@@ -112,7 +128,7 @@ def lay_out(scene: Scene, dots: int) -> tuple[Any, Any, Any]:
     x, y = float(view.centre @ view.right), float(view.centre @ view.up)
     extent = (x - view.half_width, x + view.half_width, y - view.half_height, y + view.half_height)
     with matplotlib.rc_context({**STYLE, "axes.grid": False}):
-        figure = Figure(SIZE, dpi=dots)
+        figure = Figure(scene.size, dpi=dots)
         axes = figure.add_axes(scene.layout[0])
         image = axes.imshow(np.full((1, 1, 3), 255), extent=extent, interpolation="none", aspect="auto")
         if scene.flat:
@@ -141,7 +157,7 @@ def lay_out(scene: Scene, dots: int) -> tuple[Any, Any, Any]:
 def render_into(scene: Scene, bodies: list[Body], dots: int) -> Pixels:
     """The bodies at the size of the picture."""
     _, _, width, height = scene.layout[0]
-    size = (round(SIZE[0] * width * dots), round(SIZE[1] * height * dots))
+    size = (round(scene.size[0] * width * dots), round(scene.size[1] * height * dots))
     return render(bodies, scene.view, size=size, limits=scene.limits, colours=scene.colours)
 
 

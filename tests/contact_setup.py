@@ -10,7 +10,7 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from structure_setup import block, corner_count, corner_shape_functions
 
-from fsci.build_contact import _surface
+from fsci.build_contact import surface_of_body
 from solvers import fem
 from solvers.blocks import Layout
 from solvers.contact.contact import Contact
@@ -47,7 +47,7 @@ def make_contact(
         if isinstance(of, Surface):
             return of
         if of not in found:
-            found[of] = _surface(MPI.COMM_SELF, layout, bodies, *of)
+            found[of] = surface_of_body(MPI.COMM_SELF, layout, bodies, *of)
         return found[of]
 
     contact = Contact(MPI.COMM_SELF, [Pair(side(slave), side(master)) for slave, master in pairs], c_n=c_n)

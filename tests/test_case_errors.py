@@ -31,8 +31,9 @@ solver:
     max_iterations: 20
 """
 MESH = "mesh: {shape: rectangle, size: [2, 1], cells: [4, 2]}"
-SECTIONS = "title, units, time, structure, contact, probes, output, verify, solver"
-SHAPES = "rectangle, disc, ring, box, beam, cylinder, tube, annulus, solid_torus, hollow_torus, hollow_sphere"
+SECTIONS = "title, units, time, structure, fluid, contact, probes, output, verify, solver"
+SHAPES = "rectangle, disc, ring, box, beam, cylinder, tube, annulus, solid_torus, hollow_torus, hollow_sphere, "
+SHAPES += "sphere"
 CONSTANTS = "needs two constants, either E and nu, or lambda and mu, or mu and nu"
 
 #: what is replaced, by what, the message with line and column, the text that stands there
@@ -47,9 +48,9 @@ MISTAKES = [
     ("solver:", "colour: red\nsolver:", f"20:1: unknown setting 'colour' (available: {SECTIONS})", "colour"),
     (
         "solver:",
-        "fluid: {}\nsolver:",
-        f"20:1: section 'fluid' is not available in this version of fsci (available: {SECTIONS})",
-        "fluid",
+        "coupling: {}\nsolver:",
+        f"20:1: section 'coupling' is not available in this version of fsci (available: {SECTIONS})",
+        "coupling",
     ),
     (", end: 1}", "}", "3:1: missing setting 'end' in 'time'", "time"),
     ("time: {step: 0.1, end: 1}\n", "", "1:1: missing setting 'time'", "title"),

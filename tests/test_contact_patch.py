@@ -137,6 +137,27 @@ def test_irregular_quadrilaterals(cell_type):
     check(structure, contact, exact, pressure, nodes=slave_nodes(contact), tolerance=1e-6)
 
 
+@pytest.mark.parametrize("cell_type", ["quad", "triangle", "hexahedron", "tetra", "quad9"])
+@pytest.mark.parametrize("slave", ["upper", "lower"])
+def test_slave_nodes_held_entirely(cell_type, slave):
+    """Nodes on one side follow the exact displacement in all components: their pressure is that of their neighbours."""
+    dim = dimension(cell_type)
+    F, pressure, _ = pressed(dim, STRETCH)
+    exact = deformation(F)
+    one, other = (("upper", "bottom"), ("lower", "top"))
+    supports = {"lower": "bottom", "upper": "top"}
+    bodies = [
+        make_body(name, mesh, supports=[Support(supports[name], exact), Support("left", exact)])
+        for name, mesh in zip(("lower", "upper"), bricks(cell_type, cell_type), strict=True)
+    ]
+    structure, contact = make_contact(bodies, [(one, other) if slave == "upper" else (other, one)])
+    info = solve_step(structure)
+    held = contact.nodes.held.all(axis=1)[: slave_nodes(contact)].sum()
+    assert held > 0
+    check(structure, contact, exact, pressure, nodes=slave_nodes(contact) - held)
+    assert info.iterations <= 6, info.residuals
+
+
 def press_narrow_on_wide(cell_type, slave, width):
     """The upper body is narrower; the rest of the interface carries the same load. (structure, contact, exact, p)"""
     dim = dimension(cell_type)

@@ -22,6 +22,7 @@ SHAPES: list[dict[str, Any]] = [
     {"shape": "solid_torus", "major_radius": 3, "minor_radius": 1, "cells": [5, 16]},
     {"shape": "hollow_torus", "major_radius": 3, "inner_radius": 0.5, "outer_radius": 1, "cells": [6, 5, 2]},
     {"shape": "hollow_sphere", "inner_radius": 1, "outer_radius": 2, "cells": [3, 2]},
+    {"shape": "sphere", "radius": 2, "cells": [3, 2]},
 ]
 
 

@@ -112,6 +112,11 @@ SOLID = {
         28 * pi / 3,
         {"inner": lambda x: radius(x, 0, 1, 2) - 1, "outer": lambda x: radius(x, 0, 1, 2) - 2},
     ),
+    "sphere": (
+        lambda n, **kind: shapes.sphere(2, (n, n), **kind),
+        32 * pi / 3,
+        {"outer": lambda x: radius(x, 0, 1, 2) - 2},
+    ),
 }
 CASES = [(name, cell, order) for name in PLANE for cell in ("quad", "tri") for order in (1, 2)]
 CASES += [(name, cell, order) for name in SOLID for cell in ("hex", "tet") for order in (1, 2)]

@@ -11,12 +11,13 @@ from pydantic import PrivateAttr
 from fsci.case.contact import Contact
 from fsci.case.document import Document, override
 from fsci.case.errors import CaseError, Place
+from fsci.case.fluid import Fluid
 from fsci.case.mesh import Shape
 from fsci.case.output import Output
 from fsci.case.probes import Probe
 from fsci.case.section import Section, setting
 from fsci.case.solver import Solver
-from fsci.case.structure import Structure
+from fsci.case.structure import Body, Structure
 from fsci.case.time import Time
 from fsci.case.units import Units
 from fsci.case.values import Name, Text
@@ -24,12 +25,13 @@ from fsci.case.verify import Check
 
 
 class Case(Section):
-    """One simulation."""
+    """One simulation: of a structure, of a fluid."""
 
     title: Text = setting("", "what it is about, for pictures and tables")
     units: Units = setting(Units, "units of all numbers")
     time: Time = setting(..., "time interval and steps")
-    structure: Structure = setting(..., "elastic bodies")
+    structure: Structure | None = setting(None, "elastic bodies")
+    fluid: Fluid | None = setting(None, "incompressible flow")
     contact: Contact | None = setting(None, "surfaces that may touch")
     probes: dict[Name, Probe] = setting(dict, "quantities that every step records, by name")
     output: Output = setting(Output, "what is written, and how often")
@@ -55,9 +57,16 @@ class Case(Section):
         return self._warnings
 
     @property
+    def elastic_bodies(self) -> dict[str, Body]:
+        """The bodies of the structure; none without one."""
+        return {} if self.structure is None else self.structure.bodies
+
+    @property
     def dimension(self) -> int | None:
-        """2 or 3 if a built-in mesh tells, else None: mesh files are not read here."""
-        meshes: list[Any] = [body.mesh for body in self.structure.bodies.values()]
+        """2 or 3 if the fluid's grid or a built-in mesh tells, else None: mesh files are not read here."""
+        if self.fluid is not None:
+            return self.fluid.grid.dimension
+        meshes: list[Any] = [body.mesh for body in self.elastic_bodies.values()]
         return next((mesh.dimension for mesh in meshes if isinstance(mesh, Shape)), None)
 
     def place(self, *keys: str | int) -> Place:

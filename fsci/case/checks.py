@@ -3,40 +3,58 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 from fsci.case.case import Case
 from fsci.case.contact import Contact, Side
 from fsci.case.errors import did_you_mean
-from fsci.case.mesh import FileMesh, Mesh, Shape
-from fsci.case.probes import RESERVED
-from fsci.case.structure import Body
-from fsci.case.verify import CONTACT_COLUMNS, RUN_COLUMNS
+from fsci.case.fluid_checks import fluid_mistakes
+from fsci.case.mesh import Shape
+from fsci.case.mesh_checks import Mistake, length_mistakes, mesh_mistakes, surface_mistakes
+from fsci.case.probe_checks import probe_mistakes, verify_mistakes
+from fsci.case.structure import Body, Structure
 from fsci.case.yaml_text import Keys
 
-Mistake = tuple[Keys, str]  #: path of the setting, message
-
 VECTORS = ("gravity", "body_force", "initial_displacement", "initial_velocity")
-NEEDS_MASS = ("momentum", "angular_momentum", "mass", "centre")
 
 
 def mistakes(case: Case) -> Iterator[Mistake]:
     """All of them."""
-    yield from _plane(case)
-    for name, body in case.structure.bodies.items():
-        keys: Keys = ("structure", "bodies", name)
-        yield from _mesh(case, body, (*keys, "mesh"))
-        yield from _surfaces(body, keys)
-        yield from _vectors(case, body, keys)
-        yield from _needs(case, body, keys)
+    yield from _sections(case)
+    if case.structure is not None:
+        yield from _structure(case, case.structure)
+    if case.fluid is not None:
+        yield from fluid_mistakes(case, case.fluid)
     if case.contact is not None:
         yield from _contact(case, case.contact)
-    yield from _probes(case)
-    yield from _verify(case)
+    yield from probe_mistakes(case)
+    yield from verify_mistakes(case)
 
 
-def _plane(case: Case) -> Iterator[Mistake]:
-    structure = case.structure
+def _sections(case: Case) -> Iterator[Mistake]:
+    if case.structure is None and case.fluid is None:
+        yield (), "a case needs a section 'structure' or 'fluid'"
+    elif case.structure is not None and case.fluid is not None:
+        yield (
+            ("fluid",),
+            "'fluid' and 'structure' together need 'coupling', which is not available in this version of fsci",
+        )
+    if case.contact is not None and case.structure is None:
+        yield ("contact",), "'contact' needs the section 'structure'"
+
+
+def _structure(case: Case, structure: Structure) -> Iterator[Mistake]:
+    yield from _plane(case, structure)
+    for name, body in structure.bodies.items():
+        keys: Keys = ("structure", "bodies", name)
+        yield from mesh_mistakes(body.mesh, case.dimension, case.folder, (*keys, "mesh"))
+        if isinstance(body.mesh, Shape) and body.region is not None:
+            yield (*keys, "region"), "'region' is for mesh files; a built-in shape is one region"
+        yield from _surfaces(body, keys)
+        yield from _vectors(case, body, keys)
+        yield from _needs(structure, body, keys)
+
+
+def _plane(case: Case, structure: Structure) -> Iterator[Mistake]:
     if case.dimension == 3 and "plane" in structure.model_fields_set:
         yield ("structure", "plane"), "'plane' is for 2D, but the mesh is 3D"
     elif structure.plane == "stress":
@@ -46,72 +64,24 @@ def _plane(case: Case) -> Iterator[Mistake]:
                 yield keys, f"plane stress needs the law 'st_venant_kirchhoff', not '{body.material.law}'"
 
 
-def _mesh(case: Case, body: Body, keys: Keys) -> Iterator[Mistake]:
-    mesh, dimension = body.mesh, case.dimension
-    if isinstance(mesh, Shape):
-        if mesh.dimension != dimension:
-            yield (*keys, "shape"), f"this shape is {mesh.dimension}D, but another body is {dimension}D"
-        if body.region is not None:
-            yield (*keys[:-1], "region"), "'region' is for mesh files; a built-in shape is one region"
-    else:
-        yield from _file(mesh, case.folder, keys)
-    for i, rotation in enumerate(mesh.rotate):
-        at = (*keys, "rotate", i)
-        if rotation.axis is None and dimension == 3:
-            yield at, "a rotation in 3D needs the setting 'axis'"
-        elif rotation.axis is not None and dimension == 2:
-            yield at, "a rotation in 2D has no 'axis'"
-        elif rotation.axis is not None and not any(rotation.axis):
-            yield at, "the axis of a rotation must not be zero"
-    if mesh.translate is not None:
-        yield from _length(mesh.translate, dimension, (*keys, "translate"))
-
-
-def _file(mesh: FileMesh, folder: Path, keys: Keys) -> Iterator[Mistake]:
-    path = folder / mesh.file
-    try:
-        found = path.is_file()
-    except (OSError, ValueError):  # a name too long, or with a zero byte
-        found = False
-    if not found:
-        yield (*keys, "file"), f"mesh file '{mesh.file}' not found in {folder.absolute()}"
-    if path.suffix != ".geo":
-        for name in ("order", "parameters"):
-            if name in mesh.model_fields_set:
-                yield (*keys, name), f"'{name}' is for .geo files; '{mesh.file}' has its own"
-
-
 def _surfaces(body: Body, keys: Keys) -> Iterator[Mistake]:
     for kind in ("supports", "tractions", "pressures"):
         for i, item in enumerate(getattr(body, kind)):
             for j, name in enumerate(item.on):
-                yield from _surface(body.mesh, name, (*keys, kind, i, "on", j))
-
-
-def _surface(mesh: Mesh, name: str, keys: Keys) -> Iterator[Mistake]:
-    if isinstance(mesh, Shape) and name not in mesh.surfaces:
-        there = ", ".join(mesh.surfaces)
-        hint = did_you_mean(name, mesh.surfaces)
-        hint = f"{hint} (available: {there})" if hint.startswith(";") else hint
-        yield keys, f"'{mesh.shape}' has no surface '{name}'{hint}"  # type: ignore[attr-defined]
+                yield from surface_mistakes(body.mesh, name, (*keys, kind, i, "on", j))
 
 
 def _vectors(case: Case, body: Body, keys: Keys) -> Iterator[Mistake]:
     for name in VECTORS:
-        yield from _length(getattr(body, name), case.dimension, (*keys, name))
+        yield from length_mistakes(getattr(body, name), case.dimension, (*keys, name))
     for i, support in enumerate(body.supports):
-        yield from _length(support.displacement, case.dimension, (*keys, "supports", i, "displacement"))
+        yield from length_mistakes(support.displacement, case.dimension, (*keys, "supports", i, "displacement"))
     for i, traction in enumerate(body.tractions):
-        yield from _length(traction.value, case.dimension, (*keys, "tractions", i, "value"))
+        yield from length_mistakes(traction.value, case.dimension, (*keys, "tractions", i, "value"))
 
 
-def _length(vector: tuple[object, ...] | None, dimension: int | None, keys: Keys) -> Iterator[Mistake]:
-    if vector is not None and dimension is not None and len(vector) != dimension:
-        yield keys, f"'{keys[-1]}' must have {dimension} entries in {dimension}D, not {len(vector)}"
-
-
-def _needs(case: Case, body: Body, keys: Keys) -> Iterator[Mistake]:
-    dynamic = case.structure.dynamics is not None
+def _needs(structure: Structure, body: Body, keys: Keys) -> Iterator[Mistake]:
+    dynamic = structure.dynamics is not None
     reason = "gravity" if body.gravity else "dynamics" if dynamic else ""
     if reason and body.material.density is None:
         yield (*keys, "material"), f"missing setting 'density' in 'material': {reason} needs it"
@@ -124,8 +94,8 @@ def _contact(case: Case, contact: Contact) -> Iterator[Mistake]:
         yield ("contact", "pairs"), "'pairs' needs at least one pair"
     for name, obstacle in contact.obstacles.items():
         keys: Keys = ("contact", "obstacles", name)
-        yield from _length(obstacle.motion, case.dimension, (*keys, "motion"))
-        yield from _surface(obstacle.mesh, obstacle.on, (*keys, "on"))
+        yield from length_mistakes(obstacle.motion, case.dimension, (*keys, "motion"))
+        yield from surface_mistakes(obstacle.mesh, obstacle.on, (*keys, "on"))
     for name, pair in contact.pairs.items():
         for side in ("slave", "master"):
             yield from _side(case, contact, getattr(pair, side), ("contact", "pairs", name, side))
@@ -134,7 +104,7 @@ def _contact(case: Case, contact: Contact) -> Iterator[Mistake]:
 
 
 def _side(case: Case, contact: Contact, side: Side, keys: Keys) -> Iterator[Mistake]:
-    bodies = case.structure.bodies
+    bodies = case.elastic_bodies
     if side.body is None:
         if side.obstacle not in contact.obstacles:
             hint = did_you_mean(side.obstacle or "", contact.obstacles)
@@ -142,43 +112,4 @@ def _side(case: Case, contact: Contact, side: Side, keys: Keys) -> Iterator[Mist
     elif side.body not in bodies:
         yield (*keys, "body"), f"unknown body '{side.body}'{did_you_mean(side.body, bodies)}"
     elif side.on is not None:
-        yield from _surface(bodies[side.body].mesh, side.on, (*keys, "on"))
-
-
-def _probes(case: Case) -> Iterator[Mistake]:
-    bodies = case.structure.bodies
-    for name, probe in case.probes.items():
-        keys: Keys = ("probes", name)
-        if set(probe.columns(name, 3)) & set(RESERVED):
-            yield keys, f"a probe cannot be called '{name}': history.csv has a column of this name"
-        if probe.body is None and len(bodies) > 1 and (probe.at is not None or probe.on is not None):
-            yield keys, f"missing setting 'body' in '{name}': there are several bodies ({', '.join(bodies)})"
-            continue
-        if probe.body is not None and probe.body not in bodies:
-            yield (*keys, "body"), f"unknown body '{probe.body}'{did_you_mean(probe.body, bodies)}"
-            continue
-        measured = [bodies[probe.body]] if probe.body else list(bodies.values())
-        if probe.at is not None:
-            yield from _length(probe.at, case.dimension, (*keys, "at"))
-        if probe.on is not None:
-            yield from _surface(measured[0].mesh, probe.on, (*keys, "on"))
-        if probe.quantity in ("velocity", "acceleration") and case.structure.dynamics is None:
-            yield (*keys, "quantity"), f"quantity '{probe.quantity}' needs 'dynamics' in 'structure'"
-        if probe.quantity in NEEDS_MASS and any(body.material.density is None for body in measured):
-            yield (*keys, "quantity"), f"quantity '{probe.quantity}' needs the 'density' of the material"
-
-
-def _verify(case: Case) -> Iterator[Mistake]:
-    columns = [column for name, probe in case.probes.items() for column in probe.columns(name, case.dimension or 3)]
-    columns += RUN_COLUMNS
-    if case.contact is not None:
-        columns += [f"contact.{name}.{axis}" for name in case.contact.pairs for axis in "xyz"[: case.dimension or 3]]
-        columns += CONTACT_COLUMNS
-    for i, check in enumerate(case.verify):
-        keys: Keys = ("verify", i)
-        if check.value not in columns:
-            hint = did_you_mean(check.value, columns)
-            yield (*keys, "value"), f"there is no value '{check.value}'{hint}"
-        if check.start is not None and not case.time.start <= check.start < case.time.end:
-            span = f"{case.time.start:g} to {case.time.end:g}"
-            yield (*keys, "from"), f"'from' must be a time of the run, {span}, not {check.start:g}"
+        yield from surface_mistakes(bodies[side.body].mesh, side.on, (*keys, "on"))

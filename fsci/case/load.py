@@ -13,6 +13,7 @@ from fsci.case.document import override, read_document
 from fsci.case.errors import CaseError
 from fsci.case.messages import problems
 from fsci.case.plausible import doubts
+from fsci.case.probe_checks import field_of
 
 
 def load_case(path: str | Path, overrides: Iterable[tuple[str, str]] = ()) -> Case:
@@ -33,13 +34,18 @@ def load_case(path: str | Path, overrides: Iterable[tuple[str, str]] = ()) -> Ca
     if found:
         raise CaseError(found)
     case._warnings = tuple(f"{document.place(keys)}: {message}" for keys, message in doubts(case))
-    return _with_bodies(case)
+    return _with_defaults(case)
 
 
-def _with_bodies(case: Case) -> Case:
-    """Probes that name no body belong to the only one, if there is only one."""
-    if len(case.structure.bodies) > 1:
-        return case
-    update = {"body": next(iter(case.structure.bodies))}
-    probes = {name: probe.model_copy(update=update) for name, probe in case.probes.items()}
+def _with_defaults(case: Case) -> Case:
+    """Probes learn which field they measure, and the body if the field has only one."""
+    probes = {}
+    for name, probe in case.probes.items():
+        field = field_of(case, probe)
+        section = case.structure if field == "structure" else case.fluid
+        bodies = list(section.bodies) if section is not None else []
+        update: dict[str, str] = {"field": field or ""}
+        if probe.body is None and len(bodies) == 1 and (field == "structure" or probe.quantity in ("force", "moment")):
+            update["body"] = bodies[0]
+        probes[name] = probe.model_copy(update=update)
     return case.model_copy(update={"probes": probes})

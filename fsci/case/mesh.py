@@ -18,6 +18,7 @@ from fsci.case.shapes import (
     Rectangle,
     Ring,
     SolidTorus,
+    Sphere,
     Tube,
 )
 from fsci.case.values import Name, Number, Order, Text, chosen, spoken
@@ -31,7 +32,7 @@ class FileMesh(Placed):
     parameters: dict[Name, Number] = setting(dict, "values for the script's DefineConstant names (.geo only)")
 
 
-Shape = Rectangle | Disc | Ring | Box | Beam | Cylinder | Tube | SolidTorus | HollowTorus | HollowSphere
+Shape = Rectangle | Disc | Ring | Box | Beam | Cylinder | Tube | SolidTorus | HollowTorus | HollowSphere | Sphere
 SHAPES = [name for shape in get_args(Shape) for name in get_args(shape.model_fields["shape"].annotation)]
 
 

@@ -13,7 +13,7 @@ from fsci.case.values import spoken
 from fsci.case.yaml_text import Keys
 
 #: sections of the case format that are not there yet
-PLANNED = ("fluid", "coupling")
+PLANNED = ("coupling",)
 EMPTY = "is empty: give it a value"
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from fsci.case.case import Case
 from fsci.case.material import Elastic, Material
 from fsci.case.mesh import FileMesh, Shape
+from fsci.case.plausible_flow import flow_doubts
 from fsci.case.yaml_text import Keys
 from fsci.estimate import aspect
 
@@ -19,7 +20,7 @@ def doubts(case: Case) -> Iterator[tuple[Keys, str]]:
     span = case.time.end - case.time.start
     if case.time.step > span * (1 + 1e-12):
         yield ("time", "step"), f"the step {case.time.step:g} is longer than the run, {span:g}"
-    for name, body in case.structure.bodies.items():
+    for name, body in case.elastic_bodies.items():
         keys: Keys = ("structure", "bodies", name)
         yield from _material(case, body.material, (*keys, "material"))
         nu = poisson(body.material)
@@ -30,6 +31,8 @@ def doubts(case: Case) -> Iterator[tuple[Keys, str]]:
             )
         if isinstance(body.mesh, Shape) and (ratio := aspect(body.mesh)) > 50:
             yield (*keys, "mesh", "cells"), f"the cells are {ratio:.0f} times longer than wide"
+    if case.fluid is not None:
+        yield from flow_doubts(case, case.fluid)
 
 
 def _order_from_file(mesh: object) -> bool:

@@ -9,9 +9,20 @@ from pydantic import model_validator
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import Name, NumberVector, Text
 
-AT_POINT = ("displacement", "velocity", "acceleration")
-ON_SURFACE = ("reaction", "traction", "displacement", "area")
-OF_BODY = ("energy", "momentum", "angular_momentum", "mass", "volume", "centre")
+#: what can be measured where, by the setting that says where; "" is none of them
+STRUCTURE = {
+    "at": ("displacement", "velocity", "acceleration"),
+    "on": ("reaction", "traction", "displacement", "area"),
+    "": ("energy", "momentum", "angular_momentum", "mass", "volume", "centre"),
+}
+FLUID = {
+    "at": ("velocity", "pressure"),
+    "on": ("pressure",),
+    "through": ("flow_rate",),
+    "": ("force", "moment", "kinetic_energy", "dissipation", "volume"),
+}
+FIELDS = {"structure": STRUCTURE, "fluid": FLUID}
+PLACES = {"at": "'at: [..]'", "on": "'on: SURFACE'", "through": "'through: PATCH'"}
 ENERGIES = ("kinetic", "internal", "work", "total")
 #: columns of history.csv that cannot be names of probes
 RESERVED = ("step", "time", "dt", "iterations", "wall", "residual")
@@ -20,16 +31,29 @@ RESERVED = ("step", "time", "dt", "iterations", "wall", "residual")
 class Probe(Section):
     """A quantity that every step writes to history.csv.
 
+    Of the structure:
+
     - with `at`, at a point (reference coordinates): displacement, velocity, acceleration
     - with `on`, on a surface: reaction (force of the supports), traction (integral of P N over the reference surface),
       displacement (mean over the area), area
     - with neither, of the body: energy, momentum, angular_momentum, mass, volume, centre (of mass)
 
+    Of the fluid:
+
+    - with `at`, at a point: velocity, pressure; nan while a body covers the point; with `minus` too, the difference
+    - with `on`, on a patch: pressure (mean over the area)
+    - with `through`, out of the box through a patch: flow_rate (volume per time)
+    - with none of them: force of the fluid on the `body` and its moment; kinetic_energy, dissipation (power) and
+      volume of all fluid
+
     Vectors have the columns NAME.x, NAME.y, NAME.z (the last one in 3D); energy, always of all bodies, has
     NAME.kinetic, NAME.internal, NAME.work (of loads and supports) and NAME.total (kinetic + internal); all others,
-    angular_momentum in 2D too, have the column NAME.
+    angular_momentum and moment in 2D too, have the column NAME. In 2D everything is per unit of depth.
     """
 
+    field: Literal["structure", "fluid"] | None = setting(
+        None, "which field is measured, where quantity and body do not tell"
+    )
     body: Name | None = setting(
         None, "name of the body; default: the only one, or all bodies together where neither `at` nor `on` is given"
     )
@@ -46,30 +70,57 @@ class Probe(Section):
         "mass",
         "volume",
         "centre",
+        "pressure",
+        "flow_rate",
+        "force",
+        "moment",
+        "kinetic_energy",
+        "dissipation",
     ] = setting(..., "what is measured")
-    at: NumberVector | None = setting(None, "point, in reference coordinates", unit="m")
-    on: Text | None = setting(None, "name of a surface")
+    at: NumberVector | None = setting(None, "point; of a structure, in reference coordinates", unit="m")
+    on: Text | None = setting(None, "name of a surface, or of a patch of the fluid")
+    minus: NumberVector | None = setting(
+        None, "another point of the fluid, whose value is subtracted from that of `at`", unit="m"
+    )
+    through: Text | None = setting(None, "name of a patch of the fluid")
+    about: NumberVector | None = setting(None, "point that a moment is about; default: the origin", unit="m")
+
+    @property
+    def place(self) -> str:
+        """The setting that says where: at, on, through or none."""
+        return next((name for name in PLACES if getattr(self, name) is not None), "")
+
+    @property
+    def fields(self) -> list[str]:
+        """The fields in which there is such a quantity at such a place."""
+        return [name for name, table in FIELDS.items() if self.quantity in table.get(self.place, ())]
 
     @model_validator(mode="after")
     def _measurable(self) -> Probe:
-        where = {"'at: [..]'": AT_POINT, "'on: SURFACE'": ON_SURFACE}
-        if self.at is not None and self.on is not None:
-            raise fault("give either 'at' or 'on', not both", "on")
-        given = "'at: [..]'" if self.at is not None else "'on: SURFACE'" if self.on is not None else ""
-        if self.quantity in where.get(given, OF_BODY):
+        given = [name for name in PLACES if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise fault(f"give either '{given[0]}' or '{given[1]}', not both", given[1])
+        if self.about is not None and self.quantity != "moment":
+            raise fault(f"'about' is for the quantity 'moment', not '{self.quantity}'", "about")
+        if self.minus is not None and self.place != "at":
+            raise fault("'minus' is the second point of a difference: give the first one as 'at'", "minus")
+        if self.fields:
             return self
-        possible = [word for word, quantities in where.items() if self.quantity in quantities]
-        wanted = f"needs {' or '.join(possible)}" if possible else "belongs to the whole body: no 'at', no 'on'"
-        key = {"'at: [..]'": "at", "'on: SURFACE'": "on"}.get(given, "quantity")
-        raise fault(f"quantity '{self.quantity}' {wanted}", key)
+        possible = [
+            words for name, words in PLACES.items() if any(self.quantity in t.get(name, ()) for t in FIELDS.values())
+        ]
+        whole = "fluid" if self.quantity in ("kinetic_energy", "dissipation") else "body"
+        whole = f"belongs to the whole {whole}: no 'at', no 'on'"
+        wanted = f"needs {' or '.join(possible)}" if possible else whole
+        raise fault(f"quantity '{self.quantity}' {wanted}", self.place or "quantity")
 
     def columns(self, name: str, dimension: int) -> tuple[str, ...]:
         """The columns of history.csv that the probe called `name` fills."""
         match self.quantity:
             case "energy":
                 return tuple(f"{name}.{part}" for part in ENERGIES)
-            case "area" | "mass" | "volume":
+            case "area" | "mass" | "volume" | "pressure" | "flow_rate" | "kinetic_energy" | "dissipation":
                 return (name,)
-            case "angular_momentum" if dimension == 2:
+            case "angular_momentum" | "moment" if dimension == 2:
                 return (name,)
         return tuple(f"{name}.{axis}" for axis in "xyz"[:dimension])

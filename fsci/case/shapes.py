@@ -231,3 +231,12 @@ class HollowSphere(Solid):
     def _possible(self) -> HollowSphere:
         _wall(self.inner_radius, self.outer_radius)
         return self
+
+
+class Sphere(Solid):
+    """Ball about the origin, a cubic core in a round shell, with the surface outer."""
+
+    sides = ("outer",)
+    shape: Literal["sphere"] = setting(..., "kind of shape")
+    radius: Positive = setting(..., "radius", unit="m")
+    cells: Cells2 = setting(..., "number of cells along an edge of the core, and through the shell")

@@ -110,6 +110,7 @@ Order = Annotated[Literal[1, 2], _whole(1)]
 _SPACE, _ALL = "xyz", "".join(VARIABLES)
 Formula = Annotated[Expression, _formula(_ALL), _schema("expression of x, y, z, t")]
 SpaceFormula = Annotated[Expression, _formula(_SPACE), _schema("expression of x, y, z")]
+TimeFormula = Annotated[Expression, _formula("t"), _schema("expression of t")]
 PositiveFormula = Annotated[
     Expression,
     _formula(_SPACE, lambda v: v > 0, "greater than 0"),
@@ -159,6 +160,7 @@ class OneOrMany:
 
 
 Vector = Annotated[tuple[Formula, ...], Entries(2, 3)]
+TimeVector = Annotated[tuple[TimeFormula, ...], Entries(2, 3)]
 NumberVector = Annotated[tuple[Number, ...], Entries(2, 3)]
 
 

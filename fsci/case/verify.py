@@ -9,8 +9,11 @@ from pydantic import model_validator
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import NotNegative, Number, Text
 
-#: columns of history.csv that every run has; structure.energy is the error of the energy balance
-RUN_COLUMNS = ("iterations", "residual", "structure.energy")
+#: columns of history.csv that every run has
+RUN_COLUMNS = ("iterations", "residual")
+
+#: errors of the balances of the fields: energy of the structure, volume of the fluid
+FIELD_COLUMNS = {"structure": "structure.energy", "fluid": "fluid.mass"}
 
 #: and those of a run with contact, besides the resultants contact.PAIR.x, .y, .z on the slave
 CONTACT_COLUMNS = ("contact.active", "contact.changes")
@@ -23,7 +26,7 @@ class Check(Section):
     """
 
     value: Text = setting(
-        ..., "column of history.csv: of a probe such as A.y, iterations, residual or structure.energy"
+        ..., "column of history.csv: of a probe such as A.y, iterations, residual, structure.energy or fluid.mass"
     )
     statistic: Literal["final", "min", "max", "mean", "amplitude", "frequency"] = setting(
         "final", "what is taken of the column's values"

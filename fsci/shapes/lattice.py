@@ -104,6 +104,30 @@ def sphere(cells: int, order: int) -> Lattice:
     return Lattice(points, tuple(np.searchsorted(used, face) for face in faces), {}, order)
 
 
+def ball(cells: int, radial: int, order: int) -> Lattice:
+    """Unit ball: a cubic core with bulged sides, `cells` per edge, inside a shell of `radial` layers; side `outer`."""
+    edge, layers = order * cells, order * radial
+    cube = np.arange((edge + 1) ** 3).reshape(3 * (edge + 1,))
+    faces = sphere(cells, order)
+    rim = np.flatnonzero((np.stack(np.unravel_index(cube.ravel(), cube.shape)) % edge == 0).any(axis=0))
+    inner = np.column_stack(np.unravel_index(cube.ravel(), cube.shape)) * 2 / edge - 1
+
+    # cells of core and shell of about the same size; the bulge opens the angles at edges of the core
+    half = np.clip(cells / (2 * radial + 1.25 * cells), 0.3, 0.5)
+    bulge = 0.4
+    direction = np.tan(np.pi / 4 * inner)
+    length = np.linalg.norm(direction, axis=1, keepdims=True)
+    direction = np.divide(direction, length, out=np.zeros_like(direction), where=length > 0)
+    core = half * ((1 - bulge) * inner + bulge * np.abs(inner).max(axis=1, keepdims=True) * direction)
+    part = (np.arange(1, layers + 1) / layers)[:, None, None]
+    shell = (1 - part) * core[rim] + part * faces.points
+
+    number = np.vstack([rim, cube.size + np.arange(layers * len(rim)).reshape(layers, -1)])
+    blocks = tuple(np.moveaxis(number[:, face], 0, -1) for face in faces.blocks)
+    points = np.vstack([core, shell.reshape(-1, 3)])
+    return Lattice(points, (cube, *blocks), {"outer": number[-1]}, order)
+
+
 def mesh(lattice: Lattice, cell: str) -> Mesh:
     """The mesh of a lattice of 2 directions (cell quad or tri) or 3 (hex or tet), its sides as surfaces."""
     directions = lattice.blocks[0].ndim

@@ -100,6 +100,15 @@ def hollow_torus(
     return lattice.mesh(_turned(section, major_radius, around), cell)
 
 
+def sphere(radius: float, cells: Sequence[int], *, order: int = 1, cell: str = "hex") -> Mesh:
+    """Ball about the origin: a cubic core in a round shell; surface outer.
+
+    `cells` counts them along an edge of the core, and through the shell.
+    """
+    nodes = lattice.ball(cells[0], cells[1], order)
+    return lattice.mesh(nodes.mapped(lambda x, y, z: (radius * x, radius * y, radius * z)), cell)
+
+
 def hollow_sphere(
     inner_radius: float, outer_radius: float, cells: Sequence[int], *, order: int = 1, cell: str = "hex"
 ) -> Mesh:

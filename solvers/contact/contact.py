@@ -82,6 +82,7 @@ class Contact:
         self._shares = Shares(comm)
         self.terms: Terms | None = None
         self._columns = [_columns(sides, self.dim) for sides in self._sides]
+        self._lent = self._lend()
         #: rows of slave nodes in the basis of the multipliers, if that is not the nodal one (tri6)
         self.transformation = self._transformation()
 
@@ -93,6 +94,29 @@ class Contact:
             measure = _facet_measures(pair.slave) / facets.shape[1]
             np.add.at(areas, slave[facets], measure[:, None])
         return areas
+
+    def _lend(self) -> sp.csr_matrix | None:
+        """Shares that held slave nodes get of the multipliers of their neighbours, shape (N, N); None if none is held.
+
+        A node held entirely has no multiplier of its own: its constraint would contradict the support. With the mean of
+        its neighbours' the multipliers still contain all constants, so that a patch test is passed; the constraint of
+        the neighbours is then that of their own and the lent functions together.
+        Source: Popp, Seitz, Gee & Wall, Comput. Methods Appl. Mech. Engng 264 (2013), section 3.
+        """
+        slaves = self._areas > 0.0
+        held = slaves & self.nodes.held.all(axis=1)
+        if not held.any():
+            return None
+        beside = sp.lil_matrix((self.size, self.size))
+        for pair, (slave, _) in zip(self.pairs, self._sides, strict=True):
+            for facet in slave[pair.slave.facets]:
+                beside[np.ix_(facet[held[facet]], facet[~held[facet]])] = 1.0
+        count = np.asarray(beside.sum(axis=1)).ravel()
+        return (sp.diags(1.0 / np.maximum(count, 1.0)) @ beside).tocsr()
+
+    def _with_lent(self, rows):
+        """Rows (of gap, D, M, ...) of nodes plus those of the functions that are lent to them."""
+        return rows if self._lent is None else rows + self._lent.T @ rows
 
     def _transformation(self) -> sp.csr_matrix | None:
         if all(pair.slave.facet_type != "triangle6" for pair in self.pairs):
@@ -135,15 +159,19 @@ class Contact:
         """Mortar terms and active set at the displacements u, shape (N, dim), of the present iterate."""
         self.x = self.positions(u, t)
         self.terms = self._evaluate_pairs()
-        self._gap = np.zeros(self.size) if self.terms is None else self.terms.gap
+        self._gap = np.zeros(self.size) if self.terms is None else self._with_lent(self.terms.gap)
         if self.terms is None:
             self.active_set.clear()
         else:
             covered = self._may_touch(self.terms)
-            mean_gap = np.divide(self._gap - self._overlap, self.terms.D, out=np.ones(self.size), where=covered)
+            D = self._with_lent(self.terms.D)
+            mean_gap = np.divide(self._gap - self._overlap, D, out=np.ones(self.size), where=covered)
             pressure = np.einsum("nd,nd->n", self.z, self.terms.normals)
             self.active_set.update(pressure, mean_gap - self._touching, self._scale, covered)
-        self.z[~self.active_set.active] = 0.0
+        self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
+
+    def _set_multipliers(self, own: Array) -> None:
+        self.z[:] = own if self._lent is None else own + self._lent @ own
 
     def _may_touch(self, terms: Terms) -> NDArray[np.bool_]:
         """Nodes that can have a constraint. As for facet pairs: from some evaluation on none of them goes again."""
@@ -263,14 +291,16 @@ class Contact:
 
     def recover(self, du: Array) -> None:
         """Multipliers of the active nodes from the increment of all unknowns."""
-        self.z[self._linearised.active] = recover(self._linearised, self._condensed, self._rows @ du + self._right)
+        own = np.zeros_like(self.z)
+        own[self._linearised.active] = recover(self._linearised, self._condensed, self._rows @ du + self._right)
+        self._set_multipliers(own)
 
     def _linearise(self, weight: float) -> Linearised:
         assert self.terms is not None
         active = np.flatnonzero(self.active_set.active)
         normals = self.terms.normals[active]
         rows = self._dofs_of(active)
-        on_master = expand(self.terms.M[active], self.dim).T.tocsr()
+        on_master = expand(self._with_lent(self.terms.M)[active], self.dim).T.tocsr()
         if self.transformation is not None:
             on_master = (self.transformation.T @ on_master).tocsr()
         return Linearised(
@@ -283,7 +313,7 @@ class Contact:
             on_master=on_master,
             gap=(self._gap - self._overlap)[active],
             scale=self._scale[active],
-            dgap=self.terms.dgap[active],
+            dgap=self._with_lent(self.terms.dgap)[active],
             dnormals=self.terms.dnormals[rows],
         )
 

@@ -46,7 +46,7 @@ class Pair:
         self._search = Search(slave.facets, master.facets)
         self._types = KERNEL_TYPES[slave.facet_type], KERNEL_TYPES[master.facet_type]
         self._facets = tuple(np.ascontiguousarray(s.facets, dtype=np.int64) for s in (slave, master))
-        self._mask = None if slave.held is None else np.where(slave.held, 0.0, 1.0)
+        self._mask = None if slave.held is None else _free_of_planes(slave.held)
         T, inverse = basis_transformation(self._facets[0], self._types[0], len(slave.points))
         shape = (len(slave.points),) * 2
         #: slave basis N~ = N T, and its inverse
@@ -128,6 +128,14 @@ class Pair:
             result.area,
             facet_pairs[result.used.astype(bool)],
         )
+
+
+def _free_of_planes(held: NDArray[np.bool_]) -> Array:
+    """0 for components that normals do not have, for they lie in planes of symmetry, 1 for others; shape of `held`.
+
+    A node held in all its components is no such node: it needs a normal.
+    """
+    return np.where(held & ~held.all(axis=1, keepdims=True), 0.0, 1.0)
 
 
 def _widen(matrix: sp.csr_matrix, columns: int) -> sp.csr_matrix:

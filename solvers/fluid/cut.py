@@ -75,7 +75,9 @@ class Cutter:
         counts = np.ones(len(facets), dtype=bool) if wet is None else wet
         touched = counts[moments.piece_facet]
         is_cut, in_use = self._cut_cells(moments, touched)
-        solid = (moments.fraction >= 1.0 - NOTHING) & ~is_cut
+        # pieces in a cell without fluid still bound the cell next to it, unless solids overlap there
+        solid = (moments.fraction >= 1.0 - NOTHING) & ~(is_cut & (moments.fraction <= 1.0 + NOTHING))
+        is_cut &= ~solid
         near = _grow(box.as_box(is_cut), layers).ravel(order="F") if layers else is_cut
         strip = solid & near
         local_cut, local_strip = is_cut[grid.numbers], strip[grid.numbers]

@@ -15,6 +15,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from solvers.api import Array
@@ -31,39 +32,43 @@ class Interface:
         pieces = cut.pieces
         mine = cut.cut[pieces.cell] < grid.owned
         cells = cut.cut[pieces.cell[mine]]
-        moments = pieces.moments[mine][:, rule.order]
-        self._mu, self._unknowns, self._vertices = mu, unknowns, len(cut.motion.x)
-        self._n, self._penalty, self._mass = pieces.normal[mine], penalty[mine], pieces.mass[mine]
+        self.rule, self.mu, self.dim, self._unknowns, self._vertices = rule, mu, grid.dim, unknowns, len(cut.motion.x)
+        self.moments = pieces.moments[mine][:, rule.order]
+        self.n, self.penalty, self.mass_of_pieces = pieces.normal[mine], penalty[mine], pieces.mass[mine]
         self._corners = cut.facets[pieces.facet[mine]]
-        self._u, self._p = unknowns.cell_velocity[cells], unknowns.cell_pressure[cells]
+        self.x = cut.motion.x[self._corners]
+        self.sizes = grid.sizes[cells]
+        self.u, self.p = unknowns.cell_velocity[cells], unknowns.cell_pressure[cells]
         phi, gradient = rule.velocity_table
         psi, _ = rule.pressure_table
         #: int phi_a N_b, int grad phi_a N_b and int psi_a N_b over each piece
-        self._phi = np.einsum("pqv,qa->pav", moments, phi, optimize=True)
-        slope = np.einsum("pqv,qaj->pavj", moments, gradient, optimize=True)
-        self._grad = slope / grid.sizes[cells][:, None, None, :]
-        self._psi = np.einsum("pqv,qa->pav", moments, psi, optimize=True)
-        self._normal_slope = np.einsum("pavj,pj->pav", self._grad, self._n)
+        self._phi = np.einsum("pqv,qa->pav", self.moments, phi, optimize=True)
+        slope = np.einsum("pqv,qaj->pavj", self.moments, gradient, optimize=True)
+        self._grad = slope / self.sizes[:, None, None, :]
+        self._psi = np.einsum("pqv,qa->pav", self.moments, psi, optimize=True)
+        self._normal_slope = np.einsum("pavj,pj->pav", self._grad, self.n)
 
     def velocity_terms(self, g: Array) -> Array:
         """C g at local dofs, the ghosts' share still there; g [m/s] of shape (vertices, dim)."""
-        g, n, mu = g[self._corners], self._n, self._mu
+        g, n, mu = g[self._corners], self.n, self.mu
         against = np.einsum("pav,pvi->pai", mu * self._normal_slope, g)
         against += mu * np.einsum("pavj,pvj,pi->pai", self._grad, g, n, optimize=True)
-        against -= np.einsum("pij,pav,pvj->pai", self._penalty, self._phi, g, optimize=True)
+        against -= np.einsum("pij,pav,pvj->pai", self.penalty, self._phi, g, optimize=True)
         leak = np.einsum("pav,pvi,pi->pa", self._psi, g, n, optimize=True)
         size = self._unknowns.local
-        total: Array = np.bincount(self._u.ravel(), against.ravel(), size).astype(float)
-        return total + np.bincount(self._p.ravel(), leak.ravel(), size)
+        total: Array = np.bincount(self.u.ravel(), against.ravel(), size).astype(float)
+        return total + np.bincount(self.p.ravel(), leak.ravel(), size)
 
     def force(self, flow: Array, g: Array) -> Array:
         """This process' share of the force [N] on the vertices, shape (vertices, dim); `flow` at local dofs."""
-        u, p, n, mu = flow[self._u], flow[self._p], self._n, self._mu
+        u, p, n, mu = flow[self.u], flow[self.p], self.n, self.mu
         force = -mu * np.einsum("pav,pai->pvi", self._normal_slope, u)
         force -= mu * np.einsum("pavi,paj,pj->pvi", self._grad, u, n, optimize=True)
         force += np.einsum("pav,pa,pi->pvi", self._psi, p, n, optimize=True)
-        slip = np.einsum("pav,pai->pvi", self._phi, u) - np.einsum("pvw,pwi->pvi", self._mass, g[self._corners])
-        force += np.einsum("pij,pvj->pvi", self._penalty, slip)
+        slip = np.einsum("pav,pai->pvi", self._phi, u) - np.einsum(
+            "pvw,pwi->pvi", self.mass_of_pieces, g[self._corners]
+        )
+        force += np.einsum("pij,pvj->pvi", self.penalty, slip)
         total = np.zeros((self._vertices, n.shape[1]))
         np.add.at(total, self._corners, force)
         return total
@@ -71,28 +76,40 @@ class Interface:
     @cached_property
     def matrix(self) -> sparse.csr_matrix:
         """C, ghosts' share still there, shape (local dofs, vertices dim)."""
-        dim, mu, n = self._n.shape[1], self._mu, self._n
+        dim, mu, n = self.n.shape[1], self.mu, self.n
         identity = np.eye(dim)
         block = mu * self._normal_slope[:, :, None, :, None] * identity[:, None, :]
         block = block + mu * np.einsum("pavi,pk->pakvi", self._grad, n)
-        block = block - np.einsum("pki,pav->pakvi", self._penalty, self._phi)
+        block = block - np.einsum("pki,pav->pakvi", self.penalty, self._phi)
         leak = np.einsum("pav,pi->pavi", self._psi, n)
-        columns = dim * self._corners[:, :, None] + np.arange(dim)
-        rows = [np.broadcast_to(self._u[..., None, None], block.shape).ravel()]
-        rows.append(np.broadcast_to(self._p[..., None, None], leak.shape).ravel())
-        cols = [np.broadcast_to(columns[:, None, None], block.shape).ravel()]
-        cols.append(np.broadcast_to(columns[:, None], leak.shape).ravel())
-        data = np.concatenate([block.ravel(), leak.ravel()])
-        shape = (self._unknowns.local, dim * self._vertices)
-        return sparse.csr_matrix((data, (np.concatenate(rows), np.concatenate(cols))), shape=shape)
+        return self.scatter(block, leak)
 
     @cached_property
     def mass(self) -> sparse.csr_matrix:
         """M: -df/dg [kg/s], shape (vertices dim, vertices dim)."""
-        dim = self._n.shape[1]
-        block = np.einsum("pij,pvw->pviwj", self._penalty, self._mass)
-        dofs = dim * self._corners[:, :, None] + np.arange(dim)
-        rows = np.broadcast_to(dofs[:, :, :, None, None], block.shape).ravel()
-        cols = np.broadcast_to(dofs[:, None, None, :, :], block.shape).ravel()
-        size = dim * self._vertices
-        return sparse.csr_matrix((block.ravel(), (rows, cols)), shape=(size, size))
+        return self.scatter_surface(np.einsum("pij,pvw->pviwj", self.penalty, self.mass_of_pieces))
+
+    def scatter(self, on_velocity: Array, on_pressure: Array) -> sparse.csr_matrix:
+        """Blocks (pieces, functions, dim, vertices, dim) and (pieces, functions, vertices, dim) as one matrix."""
+        columns = self._columns()
+        parts = [
+            (self.u[..., None, None], columns[:, None, None], on_velocity),
+            (self.p[..., None, None], columns[:, None], on_pressure),
+        ]
+        return _assemble(parts, (self._unknowns.local, self.dim * self._vertices))
+
+    def scatter_surface(self, block: Array) -> sparse.csr_matrix:
+        """Blocks (pieces, vertices, dim, vertices, dim) as a matrix over the dofs of all vertices."""
+        columns, size = self._columns(), self.dim * self._vertices
+        return _assemble([(columns[..., None, None], columns[:, None, None], block)], (size, size))
+
+    def _columns(self) -> NDArray[np.int64]:
+        return self.dim * self._corners[:, :, None] + np.arange(self.dim)
+
+
+def _assemble(parts, shape: tuple[int, int]) -> sparse.csr_matrix:
+    """Sum of (rows, columns, values), each broadcast to the shape of the values."""
+    rows, columns = (
+        np.concatenate([np.broadcast_to(part[i], part[2].shape).ravel() for part in parts]) for i in (0, 1)
+    )
+    return sparse.csr_matrix((np.concatenate([part[2].ravel() for part in parts]), (rows, columns)), shape=shape)

@@ -3,8 +3,10 @@
 from ._kernels import (
     KdopTree2,
     KdopTree3,
+    Moments,
     MortarResult,
     basis_transformation,
+    moments,
     mortar,
     nodal_normals,
     nodal_tangents,
@@ -13,8 +15,10 @@ from ._kernels import (
 __all__ = [
     "KdopTree2",
     "KdopTree3",
+    "Moments",
     "MortarResult",
     "basis_transformation",
+    "moments",
     "mortar",
     "nodal_normals",
     "nodal_tangents",

@@ -2,10 +2,12 @@
 #include <nanobind/nanobind.h>
 
 void bind_kdop(nanobind::module_& module);
+void bind_moments(nanobind::module_& module);
 void bind_mortar(nanobind::module_& module);
 
 NB_MODULE(_kernels, module)
 {
   bind_kdop(module);
+  bind_moments(module);
   bind_mortar(module);
 }
