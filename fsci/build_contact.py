@@ -39,9 +39,7 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
     return Contact(comm, pairs, names=tuple(case.contact.pairs), c_n=case.contact.c_n, keep_overlap=moves)
 
 
-def surface_of_body(
-    comm: MPI.Comm, layout: Layout, bodies: Sequence[Body], body_name: str, name: str
-) -> Surface:
+def surface_of_body(comm: MPI.Comm, layout: Layout, bodies: Sequence[Body], body_name: str, name: str) -> Surface:
     """A named surface of a body, whole on every process."""
     index = next(i for i, body in enumerate(bodies) if body.name == body_name)
     body = bodies[index]

@@ -49,6 +49,12 @@ def _parser() -> argparse.ArgumentParser:
 
     new = command(_new, "write a small case that runs into a new folder")
     new.add_argument("name", metavar="NAME", type=Path, help="folder to make")
+    new.add_argument(
+        "--template",
+        choices=("beam", "channel"),
+        default="beam",
+        help="what it computes: a swinging beam (default), or flow past a cylinder in a channel",
+    )
 
     for function, words in (
         (_check, "say what is wrong with a case, or what it is"),
@@ -75,7 +81,7 @@ def _parser() -> argparse.ArgumentParser:
 
     plot = command(_plot, "draw the results of a run")
     plot.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
-    plot.add_argument("--field", metavar="FIELD", help="field to colour by (default: the displacement)")
+    plot.add_argument("--field", metavar="FIELD", help="field to colour by (default: displacement; of a flow velocity and pressure)")
     plot.add_argument("--movie", action="store_true", help="make an animation too")
 
     schema = command(_schema, "print the JSON schema of case files, for editors")
@@ -101,7 +107,7 @@ def _new(options: argparse.Namespace) -> int:
     from fsci.new import new_case
 
     try:
-        files = new_case(options.name)
+        files = new_case(options.name, options.template)
     except OSError as error:
         return _fail(f"fsci new: cannot make the folder '{options.name}': {error.strerror}")
     print(f"wrote {' and '.join(str(path) for path in files)}; next: fsci run {options.name}")

@@ -41,6 +41,11 @@ DIMENSIONS = {
     "area": (2, 0, 0),
     "volume": (3, 0, 0),
     "mass": (0, 1, 0),
+    "flow_rate": (3, 0, -1),
+    "force": (1, 1, -2),
+    "moment": (2, 1, -2),
+    "dissipation": (2, 1, -3),
+    "kinetic_energy": (2, 1, -2),
     "momentum": (1, 1, -1),
     "angular_momentum": (2, 1, -1),
     "reaction": (1, 1, -2),
@@ -107,7 +112,8 @@ def plot_curves(path: Path, time: Any, curves: Mapping[str, Any], below: str, be
     import matplotlib
     from matplotlib.figure import Figure
 
-    ranges = [spread for values in curves.values() if (spread := float(np.ptp(values[np.isfinite(values)]))) > 0]
+    finite = [values[np.isfinite(values)] for values in curves.values()]
+    ranges = [spread for values in finite if len(values) and (spread := float(np.ptp(values))) > 0]
     apart = len(ranges) > 1 and min(ranges) < 0.05 * max(ranges)
     with matplotlib.rc_context(STYLE):
         figure = Figure(SIZE, dpi=DOTS, layout="constrained")

@@ -1,10 +1,10 @@
-"""A first case to start from."""
+"""First cases to start from."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-CASE = """\
+BEAM = """\
 # A cantilever beam is released from its straight shape and swings under its own weight.
 # Check it:    fsci check {folder}
 # Run it:      fsci run {folder}
@@ -52,7 +52,7 @@ verify:
   - {{value: tip.y, statistic: frequency, reference: 5.355, relative: 0.05}}
 """
 
-README = """\
+BEAM_README = """\
 # {name}
 
 A cantilever beam, 1 m x 0.1 m in plane strain, is released from its straight shape and swings under its own weight.
@@ -67,11 +67,71 @@ Other settings without editing:
 """
 
 
-def new_case(folder: Path) -> list[Path]:
+CHANNEL = """\
+# Flow past a cylinder in a channel, from rest to a steady flow of Reynolds number 20.
+# Check it:    fsci check {folder}
+# Run it:      fsci run {folder}
+# See it:      fsci plot results/{name}
+# All settings: fsci schema --markdown
+title: {name}
+time: {{step: 0.05, end: 3}}
+
+fluid:
+  density: 1
+  viscosity: 1e-3
+  # The grid is a box; the cylinder cuts its cells. Here they are 1 cm, but 4 mm around the cylinder.
+  grid:
+    from: [0, 0]
+    to: [2.2, 0.41]
+    x: [{{to: 0.1, cells: 10}}, {{to: 0.3, cells: 50}}, {{to: 2.2, cells: 80, ratio: 8}}]
+    y: [{{to: 0.1, cells: 15, ratio: 0.4}}, {{to: 0.3, cells: 50}}, {{to: 0.41, cells: 15, ratio: 3}}]
+  # What happens on the faces x-, x+, y-, y+ of the box; where patches meet, the one named last decides.
+  patches:
+    inlet: {{on: x-, velocity: ["min(t, 1)*1.2*y*(0.41 - y)/0.41^2", 0]}}
+    outlet: {{on: x+, outflow: true}}
+    walls: {{on: [y-, y+], no_slip: true}}
+  bodies:
+    cylinder:
+      mesh: {{shape: disc, radius: 0.05, cells: [120, 1], translate: [0.2, 0.2]}}
+      # motion: {{displacement: [0, "0.02*sin(2*pi*t)"]}}   # it may move
+
+# Every step writes these to history.csv.
+probes:
+  force: {{quantity: force, body: cylinder}}
+  dp: {{quantity: pressure, at: [0.15, 0.2], minus: [0.25, 0.2]}}
+  outlet: {{quantity: flow_rate, through: outlet}}
+
+output: {{fields_every: 5}}
+
+# The run fails if it misses these: the drag of a benchmark (Schaefer and Turek, 1996), and that what comes in goes out.
+verify:
+  - {{value: force.x, reference: 0.01116, relative: 0.02}}
+  - {{value: outlet, reference: 0.2*0.41, relative: 0.01}}
+"""
+
+CHANNEL_README = """\
+# {name}
+
+Flow past a cylinder of 0.1 m in a channel of 2.2 m x 0.41 m; it speeds up for 1 s and becomes steady, Reynolds number 20.
+
+    fsci check {folder}           # is the case right?
+    fsci run {folder}             # results in results/{name}
+    fsci plot results/{name}      # pictures
+
+Other settings without editing, here for a vortex street at Reynolds number 100:
+
+    fsci run {folder} --set fluid.viscosity=2e-4 --set time.end=15 --set verify=[] -o results/vortices
+"""
+
+TEMPLATES = {"beam": (BEAM, BEAM_README), "channel": (CHANNEL, CHANNEL_README)}
+
+
+def new_case(folder: Path, template: str = "beam") -> list[Path]:
     """Write a commented case that runs; raises FileExistsError rather than overwrite anything."""
     folder.mkdir(parents=True)
     name = folder.absolute().name
-    files = {folder / "case.yaml": CASE, folder / "README.md": README}
+    case, readme = TEMPLATES[template]
+    files = {folder / "case.yaml": case, folder / "README.md": readme}
     for path, text in files.items():
         path.write_text(text.format(name=name, folder=folder), encoding="utf-8")
     return list(files)

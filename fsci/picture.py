@@ -31,8 +31,8 @@ def plot_run(out: Path, *, movie: bool = False, field: str | None = None) -> lis
     """Draws the last state, the probes and the convergence of the run in folder `out` into out/pictures.
 
     `field` is what colours show: a point field (a vector's magnitude) or a component such as velocity.x; by default the
-    displacement, of a flow velocity and pressure. `movie` adds an animation of all output times. Returns the files; raises ValueError
-    if no body has the field.
+    displacement, of a flow velocity and pressure. `movie` adds an animation of all output times. Returns the files;
+    raises ValueError if no body has the field.
     """
     out = Path(out)
     labels = read_labels(out)

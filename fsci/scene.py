@@ -17,7 +17,7 @@ Rectangle = tuple[float, float, float, float]  #: left, bottom, width, height in
 #: where the picture and its colour bar are, beside each other
 UPRIGHT = ((0.125, 0.12, 0.70, 0.785), (0.85, 0.16, 0.018, 0.70))
 SPATIAL = ((0.02, 0.05, 0.80, 0.855), (0.85, 0.16, 0.018, 0.70))
-LONG_FROM = 2.2  #: width over height from which the colour bar is below the picture, and the figure is as low as it can be
+LONG_FROM = 2.2  #: width over height from which the colour bar is below the picture, and the figure as low as it can be
 LOPSIDED = 0.2  #: values on one side of zero, in parts of those on the other, below which zero is no middle
 
 

@@ -156,3 +156,14 @@ def test_result_does_not_depend_on_c_n(name):
         assert error < 1e-9, f"c_n = {c_n}: {error:.1e}; Newton steps {counts}"
         assert np.abs(other.z - contact.z).max() < 1e-9 * np.abs(contact.z).max(), f"Newton steps {counts}"
     assert max(counts.values()) <= 8, f"Newton steps {counts}"
+
+
+def test_a_return_makes_c_n_smaller_for_the_step():
+    """With a large c_n the set steps over the solution to and fro; the solution does not depend on c_n."""
+    active_set = ActiveSet(3, c_n=10.0)
+    active_set.begin_step()
+    for pressure, gap in (([1, 1, 0], 0), ([1, 0, 0], 0), ([1, 1, 0], 0)):  # the last one is a return
+        update(active_set, pressure, [gap] * 3)
+    assert update(active_set, [1, 1, 0], [0, 0.5, 0]) == [True, True, False]
+    active_set.begin_step()
+    assert update(active_set, [1, 1, 0], [0, 0.5, 0]) == [True, False, False]

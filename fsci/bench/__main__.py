@@ -9,7 +9,7 @@ import platform
 from collections.abc import Callable
 from pathlib import Path
 
-from fsci.bench import contact, flag, linear, moments, static
+from fsci.bench import contact, flag, hertz, linear, moments, static
 from fsci.bench.table import Row, show
 from fsci.summary import plain, versions
 
@@ -21,6 +21,7 @@ BENCHMARKS: dict[str, tuple[str, Callable[[], list[Row]]]] = {
     "flag_accuracy": ("CSM3, 2 s: error against wall time, by mesh and time step", flag.run_accuracy),
     "search": ("contact search on two wavy sheets of quads, 3D", contact.run_search),
     "moments": ("moments of a torus in the cells of a box, 3D", moments.run),
+    "hertz": ("a ball pressed onto a plane in one load step, by cells per radius of contact", hertz.run),
     "tori": ("two tori collide, 200 steps: seconds by part", contact.run_tori),
 }
 

@@ -10,6 +10,9 @@ from solvers.api import Array, StepFailed
 #: How often a step may come back to an active set it has left before it is given up.
 MAX_RETURNS = 6
 
+#: What c_n is multiplied by at every return: with a large one, iterates step over the solution to and fro.
+ON_RETURN = 0.1
+
 
 class ActiveSet:
     """Active where z_n - c_n s g > 0 with the pressure z_n, the mean gap g and the nodal stiffness per area s.
@@ -23,12 +26,14 @@ class ActiveSet:
         self.active = np.zeros(size, dtype=bool)
         self.changed = False  #: by the latest update
         self.changes = 0  #: updates in this step that changed the set
+        self._c_n = c_n  # of this step
         self._seen: list[bytes] = []
         self._returns = 0
 
     def begin_step(self) -> None:
         """Forget what was seen in the last step; the set itself stays."""
         self.changed, self.changes = False, 0
+        self._c_n = self.c_n
         self._seen, self._returns = [self.active.tobytes()], 0
 
     def clear(self) -> None:
@@ -37,14 +42,16 @@ class ActiveSet:
 
     def update(self, pressure: Array, gap: Array, stiffness: Array, covered: NDArray[np.bool_]) -> None:
         """Choose the active nodes among the covered ones. Raises StepFailed if the set goes in circles."""
-        self._take(covered & (pressure - self.c_n * stiffness * gap > 0.0))
+        self._take(covered & (pressure - self._c_n * stiffness * gap > 0.0))
 
     def _take(self, chosen: NDArray[np.bool_]) -> None:
         self.changed = bool(np.any(chosen != self.active))
         self.changes += self.changed
         if self.changed:
             known = chosen.tobytes()
-            self._returns += known in self._seen
+            if known in self._seen:
+                self._returns += 1
+                self._c_n *= ON_RETURN
             if self._returns > MAX_RETURNS:
                 flickering = int(np.sum(chosen != self.active))
                 raise StepFailed("contact", f"the active set goes in circles: {flickering} nodes cannot decide")

@@ -147,9 +147,9 @@ def _facets(fluid: Fluid, patches: Sequence[str]) -> np.ndarray:
 
 
 def mass_balance(fluid: Fluid) -> Callable[[], dict[str, float]]:
-    """fluid.mass [m^3/s]: what flows out of the box, and what bodies make room for, zero but for the solver's tolerance.
+    """fluid.mass [m^3/s]: what flows out of the box, and into the room that bodies make; zero but for the solver.
 
-    Tested with q = 1, the equation of continuity is exactly the sum of both.
+    Tested with q = 1, the discrete equation of continuity is exactly the sum of both.
     """
     rate = flow_rate(fluid)
     everywhere = [patch.name for patch in fluid.boundary.patches]

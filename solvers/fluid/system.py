@@ -226,6 +226,20 @@ class FlowSystem:
         diagonal.array[:] = ~self.active_dofs[: self.unknowns.owned]
         return diagonal
 
+    def pressure_shares(self) -> Array:
+        """int q dx over the fluid of each owned dof's pressure function, relative to their sum (collective)."""
+        assert self.cut is not None
+        cut, unknowns, weights = self.cut, self.unknowns, self.weights
+        volume, (psi, _) = self.grid.sizes.prod(axis=1), weights.pressure_table
+        uncut, mine = cut.uncut[cut.uncut < self.grid.owned], cut.cut < self.grid.owned
+        cells = np.concatenate([uncut, cut.cut[mine]])
+        fluid = np.concatenate([np.ones((len(uncut), len(weights.rule))), cut.fluid[mine][:, weights.order]])
+        parts = volume[cells, None] * ((fluid * weights.rule) @ psi)
+        size = np.bincount(unknowns.cell_pressure[cells].ravel(), parts.ravel(), unknowns.local)
+        fem.add_ghosts(unknowns.space, size)
+        owned = size[: unknowns.owned]
+        return owned / self.grid.comm.allreduce(float(owned.sum()))
+
     def _interface_penalties(self, pieces: Pieces, cut: Cut) -> Array:
         """P = s I + s_n n n^T of pieces [Pa s/m], shape (pieces, dim, dim).
 

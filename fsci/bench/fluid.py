@@ -1,0 +1,122 @@
+"""Flow around bodies in a fixed grid: error against time, direct solver by size, a step in 3D by part."""
+
+from __future__ import annotations
+
+import math
+from time import perf_counter
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fsci.bench.table import Row
+from solvers.fluid.field import Body, Fluid, SolverSettings
+from solvers.fluid.grid import Grid, uniform
+from solvers.fluid.patches import Patch
+from solvers.fluid.probes import at_point, difference
+from solvers.fluid.surface import Motion, Surface
+from solvers.fluid.system import FlowSettings
+from solvers.newton import Tolerance
+from solvers.timing import Timer
+
+Array = NDArray[np.float64]
+
+#: Schaefer and Turek's channel [m], and the flow 2D-1: http://www.mathematik.tu-dortmund.de/~featflow/en/benchmarks
+LENGTH, HEIGHT, DIAMETER, CENTRE = 2.2, 0.41, 0.1, (0.2, 0.2)
+DRAG, LIFT, PRESSURE = 5.57953523384, 0.010618948146, 0.11752016697
+
+#: (element, cells along the diameter) of the table of 2D-1
+STEADY_RUNS = (*(("q1q1", n) for n in (10, 20, 30, 40)), *(("q2q1", n) for n in (5, 10, 15, 20)))
+
+
+def zero(x: Array, t: float) -> Array:
+    return np.zeros(x.shape[1])
+
+
+def graded(low: float, high: float, fine: tuple[float, float], h: float, ratio: float, largest: float) -> Array:
+    """Planes from low to high: distance h between the two `fine` ones, growing by `ratio` up to `largest` outside."""
+    middle = np.linspace(*fine, round((fine[1] - fine[0]) / h) + 1)
+    before, after = _growing(fine[0] - low, h, ratio, largest), _growing(high - fine[1], h, ratio, largest)
+    return np.concatenate([fine[0] - before[::-1], middle, fine[1] + after])
+
+
+def _growing(length: float, h: float, ratio: float, largest: float) -> Array:
+    steps: list[float] = []
+    while sum(steps) < length:
+        h = min(h * ratio, largest)
+        steps.append(h)
+    return np.cumsum(steps) * (length / sum(steps))
+
+
+def polygon(centre: tuple[float, float], radius: float, count: int) -> Array:
+    """Corners of a regular polygon in a circle, counterclockwise."""
+    angles = 2.0 * np.pi * np.arange(count) / count
+    return np.asarray(centre) + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+def at_rest(name: str, points: Array, facets: NDArray[np.int64]) -> Body:
+    """A body that does not move."""
+    return Body(Surface(name, facets, len(points)), lambda t: Motion(points, np.zeros_like(points)), rests=True)
+
+
+def disc(name: str, points: Array) -> Body:
+    """The polygon of some corners."""
+    count = np.arange(len(points))
+    return at_rest(name, points, np.stack([count, np.roll(count, -1)], axis=1))
+
+
+def cylinder_grid(cells: int, ratio: float = 1.08) -> Grid:
+    """The channel with this many cells along the diameter of the cylinder."""
+    h, pad = DIAMETER / cells, 0.03
+    low, high = 0.15 - pad, 0.25 + pad
+    x = graded(0.0, LENGTH, (low, high + 0.02), h, ratio, 4 * h + 0.01)
+    return Grid((x, graded(0.0, HEIGHT, (low, high), h, ratio, 3 * h)))
+
+
+def cylinder(
+    grid: Grid, element: str, mean: float, scheme: str = "steady", timer: Timer | None = None, *, segments: int = 800,
+    tolerance: float = 1e-8, varying: bool = False,
+) -> Fluid:  # fmt: skip
+    """Schaefer and Turek's channel with inflow of largest velocity 1.5 `mean`; `varying` times sin(pi t / 8)."""
+
+    def inflow(x: Array, t: float) -> Array:
+        return 6.0 * mean * x[1] * (HEIGHT - x[1]) / HEIGHT**2 * (math.sin(math.pi * t / 8.0) if varying else 1.0)
+
+    patches = [
+        Patch("in", ("x-",), "velocity", (inflow, zero)),
+        Patch("out", ("x+",), "outflow"),
+        Patch("walls", ("y-", "y+"), "no_slip"),
+    ]
+    body = disc("cylinder", polygon(CENTRE, DIAMETER / 2, segments))
+    flow = FlowSettings(1.0, 1e-3, element=element, scheme=scheme)  # type: ignore[arg-type]
+    return Fluid(MPI.COMM_SELF, grid, flow, patches, [body], SolverSettings(Tolerance(tolerance)), timer)
+
+
+def run_steady() -> list[Row]:
+    """2D-1: errors of drag, lift and pressure difference against wall time, of four meshes for both elements."""
+    return [steady(element, cells) for element, cells in STEADY_RUNS]
+
+
+def steady(element: str, cells: int) -> Row:
+    timer, mean, grid = Timer(), 0.2, cylinder_grid(cells)
+    begin = perf_counter()
+    fluid = cylinder(grid, element, mean, timer=timer)
+    fluid.initialise(0.0, 1.0)
+    ready = perf_counter()
+    fluid.begin_step(0.0, 1.0)
+    info = fluid.solve()
+    drag, lift = 2.0 * fluid.force()["cylinder"].sum(axis=0) / (mean**2 * DIAMETER)
+    end = perf_counter()
+    front, back = (at_point(fluid, "pressure", (x, 0.2), 0.0) for x in (0.15, 0.25))
+    drop = difference(front, back)()[""]
+    return {
+        "element": element,
+        "cells of D": cells,
+        "dofs": fluid.dofs(),
+        "newton": info.iterations,
+        "start [s]": ready - begin,
+        "solve [s]": end - ready,
+        "c_D error [%]": 100.0 * (drag / DRAG - 1.0),
+        "c_L error [%]": 100.0 * (lift / LIFT - 1.0),
+        "dp error [%]": 100.0 * (drop / PRESSURE - 1.0),
+    }

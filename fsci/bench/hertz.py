@@ -1,0 +1,145 @@
+"""Hertz in 3D: a quarter of an elastic ball is pressed onto a rigid plane, in one load step.
+
+Radius 100, E = 1000, nu = 0.3, contact radius 1 on a block of 16 x 16 x 16: small deformation, finite-deformation code.
+Source of the solution: K. L. Johnson, Contact Mechanics (1985), chapter 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+from mpi4py import MPI
+from scipy.optimize import brentq
+
+from fsci import shapes
+from fsci.bench.table import Row
+from fsci.build_contact import surface_of_body
+from solvers import fem
+from solvers.blocks import Layout
+from solvers.contact.contact import Contact
+from solvers.contact.pair import Pair
+from solvers.contact.surface import Surface
+from solvers.mesh import Mesh
+from solvers.newton import Tolerance
+from solvers.structure.body import Body, BodySettings, Support
+from solvers.structure.field import SolverSettings, Structure
+from solvers.structure.materials import NeoHooke, lame
+from solvers.structure.time import Statics
+from solvers.timing import Timer
+
+Array = np.ndarray
+
+RADIUS, E, NU, BLOCK = 100.0, 1000.0, 0.3, 16.0
+#: Cells are equal up to here, which is beyond the edge of contact.
+CORE = 1.25
+#: Displacement of the top that gives a contact radius of 1.
+PRESS = 0.00965
+
+
+@dataclass(frozen=True)
+class Found:
+    """A solution, and what Hertz says to the force it has."""
+
+    structure: Structure
+    contact: Contact
+    seconds: float  #: wall time of the load step
+    newton: int  #: linear solves
+    force: float  #: on the whole ball [N]
+    radius: float  #: of contact, Hertz [m]
+    peak: float  #: pressure in the middle, Hertz [Pa]
+    pressure: Array  #: at the nodes of the slave surface [Pa]
+    distance: Array  #: of these nodes from the axis [m]
+
+    @property
+    def peak_error(self) -> float:
+        """Largest pressure relative to Hertz', minus 1."""
+        return float(self.pressure.max() / self.peak - 1.0)
+
+    @property
+    def pressure_error(self) -> float:
+        """L2 norm of the error of the pressure over that of the pressure, by nodal areas."""
+        assert self.contact.terms is not None
+        area = self.contact.terms.D[self.contact.nodes.of_surface[0]]
+        exact = self.peak * np.sqrt(np.maximum(0.0, 1.0 - (self.distance / self.radius) ** 2))
+        return float(np.sqrt(area @ (self.pressure - exact) ** 2 / (area @ exact**2)))
+
+
+def graded(cells: int, outer: int) -> Array:
+    """Places [m] from 0 to the size of the block: equal cells in the core, then ones that grow by a constant factor."""
+    edge = CORE / cells
+    powers = np.arange(1, outer + 1)
+    factor = brentq(lambda q: edge * np.sum(q**powers) - (BLOCK - CORE), 1.0, 100.0)
+    return np.concatenate([np.linspace(0.0, CORE, cells + 1), CORE + edge * np.cumsum(factor**powers)])
+
+
+def quarter_ball(per_radius: int, outer: int) -> Mesh:
+    """Hexahedra, `per_radius` along the radius of contact; `outer` ones from there to the sides of the block."""
+    cells = round(CORE * per_radius)
+    across, up = graded(cells, outer), graded(max(2, cells), outer)
+    unit = shapes.box([1, 1, 1], [len(across) - 1, len(across) - 1, len(up) - 1])
+    index = np.rint(unit.points * (np.array([len(across)] * 2 + [len(up)]) - 1)).astype(int)
+    x, y, z = across[index[:, 0]], across[index[:, 1]], up[index[:, 2]]
+    low = RADIUS - np.sqrt(RADIUS**2 - x**2 - y**2)
+    return replace(unit, points=np.column_stack([x, y, low + (1.0 - low / BLOCK) * z]))
+
+
+def solve(per_radius: int, outer: int) -> Found:
+    """Press the ball onto the plane in one step."""
+    structure, contact = build(quarter_ball(per_radius, outer))
+    structure.initialise(0.0, 1.0)
+    start = perf_counter()
+    structure.begin_step(0.0, 1.0)
+    info = structure.solve()
+    structure.end_step()
+    seconds = perf_counter() - start
+
+    assert contact.terms is not None
+    force = 4.0 * contact.resultant(0)[2]
+    radius = (0.75 * force * RADIUS * (1.0 - NU**2) / E) ** (1.0 / 3.0)
+    nodes = contact.nodes.of_surface[0]
+    pressure = np.einsum("nd,nd->n", contact.z[nodes], contact.terms.normals[nodes])
+    distance = np.linalg.norm(contact.x[nodes, :2], axis=1)
+    peak = 1.5 * force / (np.pi * radius**2)
+    return Found(structure, contact, seconds, info.iterations, force, radius, peak, pressure, distance)
+
+
+def build(mesh: Mesh) -> tuple[Structure, Contact]:
+    """The ball with its planes of symmetry, and the plane, one facet."""
+    supports = [
+        Support("left", (_value(0.0), None, None)),
+        Support("front", (None, _value(0.0), None)),
+        Support("top", (None, None, _value(-PRESS))),
+    ]
+    settings = BodySettings("ball", NeoHooke(*lame(E, NU)), supports=supports)
+    body = Body(fem.distribute(MPI.COMM_SELF, mesh), settings)
+    layout = Layout(MPI.COMM_SELF, [body.size])
+    slave = surface_of_body(MPI.COMM_SELF, layout, [body], "ball", "bottom")
+    corners = BLOCK * np.array([[-0.1, -0.1, 0], [1.1, -0.1, 0], [1.1, 1.1, 0], [-0.1, 1.1, 0]])
+    contact = Contact(MPI.COMM_SELF, [Pair(slave, Surface("plane", corners, np.array([[0, 1, 2, 3]]), "quad", None))])
+    solver = SolverSettings(Tolerance(residual=1e-10), linear="direct")
+    return Structure(MPI.COMM_SELF, [body], Statics(), solver, Timer(), contact), contact
+
+
+def _value(number: float) -> Callable[[Array, float], Array]:
+    return lambda x, t: np.full(x.shape[1], number)
+
+
+def run() -> list[Row]:
+    """One load step by cells per radius of contact; the meshes have the sizes of those measured with other programs."""
+    rows: list[Row] = []
+    for per_radius, outer in ((2, 6), (4, 9), (8, 14)):
+        found = solve(per_radius, outer)
+        rows.append(
+            {
+                "cells per radius": per_radius,
+                "dofs": found.structure.dofs(),
+                "newton": found.newton,
+                "wall [s]": found.seconds,
+                "peak error": found.peak_error,
+                "pressure error": found.pressure_error,
+            }
+        )
+    return rows

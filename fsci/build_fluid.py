@@ -1,0 +1,154 @@
+"""From the `fluid` section of a case to grid, patches, rigid bodies, the field and its probes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fsci.build import Numbers, columns
+from fsci.build_solver import build_tolerance
+from fsci.case import Case
+from fsci.case.fluid import Fluid as Section
+from fsci.mesh import MeshError, build_mesh, require_surface
+from fsci.rigid_motion import rigid_motion
+from solvers.fluid import probes
+from solvers.fluid.field import Body, Fluid, SolverSettings
+from solvers.fluid.grid import Grid
+from solvers.fluid.patches import Patch, UncoveredFaces, Value
+from solvers.fluid.surface import Motion, Surface
+from solvers.fluid.system import FlowSettings
+from solvers.tessellation import is_closed, tessellate
+from solvers.timing import Timer
+
+Array = NDArray[np.float64]
+
+
+def build_fluid(case: Case, comm: MPI.Comm, timer: Timer) -> Fluid:
+    """The flow around rigid bodies. Raises CaseError (collective)."""
+    assert case.fluid is not None
+    settings, linear = case.fluid, case.solver.linear
+    solver = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
+    bodies = [_body(case, name, comm) for name in settings.bodies]
+    grid, flow, patches = Grid(settings.grid.edges()), _flow(settings), _patches(settings)
+    try:
+        return Fluid(comm, grid, flow, patches, bodies, solver, timer)
+    except UncoveredFaces as error:
+        faces = ", ".join(error.faces)
+        raise case.error(("fluid", "patches"), f"no patch is on part of the box's boundary: {faces}") from None
+
+
+def _flow(settings: Section) -> FlowSettings:
+    return FlowSettings(
+        density=settings.density,
+        viscosity=settings.viscosity,
+        element=settings.element,
+        convection=settings.flow == "navier_stokes",
+        scheme=settings.scheme,
+        body_force=_body_force(settings),
+        initial_velocity=settings.initial_velocity,
+    )
+
+
+def _body_force(settings: Section) -> tuple[Value, ...] | None:
+    """Body force and density times gravity together [N/m^3]."""
+    force, gravity, density = settings.body_force, settings.gravity, settings.density
+    if gravity is None:
+        return force
+
+    def component(axis: int) -> Value:
+        return lambda x, t: density * gravity[axis](x, t) + (0.0 if force is None else force[axis](x, t))
+
+    return tuple(component(axis) for axis in range(len(gravity)))
+
+
+def _patches(settings: Section) -> list[Patch]:
+    return [
+        Patch(name, patch.on, patch.kind, patch.velocity or patch.traction, patch.where)
+        for name, patch in settings.patches.items()
+    ]
+
+
+# ---------------------------------------------------------------------------------------------------------- bodies
+
+
+def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
+    """A rigid body, whole on every process."""
+    assert case.fluid is not None
+    found: Any = None
+    if comm.rank == 0:
+        try:
+            found = _surface(case, name)
+        except Exception as raised:  # every process must hear of it
+            found = raised
+    found = comm.bcast(found, root=0)
+    if isinstance(found, Exception):
+        raise found
+    points, facets = found
+    surface = Surface(name, facets, len(points))
+    movement = case.fluid.bodies[name].motion
+    if movement is None:
+        return Body(surface, lambda t: Motion(points, np.zeros_like(points)), rests=True)
+    moved = rigid_motion(points, movement, case.time.step)
+    return Body(surface, lambda t: Motion(*moved(t)))
+
+
+def _surface(case: Case, name: str) -> tuple[Array, NDArray[np.int64]]:
+    """(points [m], segments or triangles) of a body's closed surface."""
+    assert case.fluid is not None
+    settings, dim = case.fluid.bodies[name], case.fluid.grid.dimension
+    base: tuple[str | int, ...] = ("fluid", "bodies", name)
+    keys = (*base, "mesh")
+    try:
+        mesh = build_mesh(settings.mesh, case.folder)
+        if mesh.points.shape[1] != dim:
+            raise MeshError(f"the mesh is {mesh.points.shape[1]}D, but the grid is {dim}D")
+        keys = (*base, "on")
+        for surface in settings.on or ():
+            require_surface(mesh, surface)
+        facets, nodes = tessellate(mesh, settings.on)
+        if not is_closed(facets):
+            raise MeshError("these surfaces do not enclose the body: name all of them")
+    except (MeshError, ValueError) as error:
+        raise case.error(keys, str(error)) from None
+    return mesh.points[nodes], facets
+
+
+# ---------------------------------------------------------------------------------------------------------- probes
+
+
+def build_probes(case: Case, fluid: Fluid) -> Callable[[], Numbers]:
+    """What is measured on the fluid. Raises CaseError (collective)."""
+    forces = probes.Forces(fluid)
+    found: dict[str, probes.Probe] = {}
+    for name, settings in case.probes.items():
+        if settings.field != "fluid":
+            continue
+        if settings.at is not None:
+            found[name] = _at(case, fluid, name, "at")
+            if settings.minus is not None:
+                found[name] = probes.difference(found[name], _at(case, fluid, name, "minus"))
+        elif patch := settings.on or settings.through:
+            found[name] = probes.on_patch(fluid, settings.quantity, patch)
+        elif settings.quantity in ("force", "moment"):
+            found[name] = forces.probe(settings.quantity, settings.body or "", settings.about)
+        else:
+            found[name] = probes.of_fluid(fluid, settings.quantity)
+    measure = columns(found)
+
+    def all_probes() -> Numbers:
+        forces.forget()
+        return measure()
+
+    return all_probes
+
+
+def _at(case: Case, fluid: Fluid, name: str, key: str) -> probes.Probe:
+    settings = case.probes[name]
+    try:
+        return probes.at_point(fluid, settings.quantity, getattr(settings, key), case.time.start)
+    except probes.PointInBody as error:
+        raise case.error(("probes", name, key), str(error)) from None

@@ -1,0 +1,218 @@
+"""From the `structure` section of a case to bodies, the field and its probes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+from mpi4py import MPI
+
+from fsci.build import Numbers, columns
+from fsci.build_solver import build_tolerance
+from fsci.case import Case
+from fsci.case.probes import Probe
+from fsci.mesh import MeshError, build_mesh, extract_region, require_surface
+from solvers import fem
+from solvers.api import Constraint
+from solvers.structure import materials, probes
+from solvers.structure.body import Body, BodySettings, Pressure, Support, Symmetry, Traction
+from solvers.structure.field import SolverSettings, Structure
+from solvers.structure.materials import Parameter, Value
+from solvers.structure.supports import SupportError
+from solvers.structure.time import Damping, Dynamics, Statics, TimeScheme
+from solvers.time import GeneralisedAlpha
+from solvers.timing import Timer
+
+
+def build_bodies(case: Case, comm: MPI.Comm) -> list[Body]:
+    """The elastic bodies of a case. Raises CaseError (collective)."""
+    return [_body(case, name, comm) for name in case.elastic_bodies]
+
+
+def build_structure(
+    case: Case, comm: MPI.Comm, bodies: list[Body], contact: Constraint | None, timer: Timer
+) -> Structure:
+    """The field of all bodies. Raises CaseError (collective)."""
+    linear = case.solver.linear
+    settings = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
+    try:
+        return Structure(comm, bodies, _time_scheme(case), settings, timer, contact)
+    except SupportError as error:
+        supports = case.elastic_bodies[error.body].supports
+        index = next(i for i, support in enumerate(supports) if error.surface in support.on)
+        keys = ("structure", "bodies", error.body, "supports", index)
+        raise case.error(keys, error.message) from None
+
+
+def _time_scheme(case: Case) -> TimeScheme:
+    assert case.structure is not None
+    dynamics = case.structure.dynamics
+    if dynamics is None:
+        return Statics()
+    if dynamics.rho_inf is not None:
+        scheme = GeneralisedAlpha.from_rho_inf(dynamics.rho_inf)
+    else:
+        alphas: list[Any] = [dynamics.alpha_m, dynamics.alpha_f, dynamics.beta, dynamics.gamma]
+        scheme = GeneralisedAlpha(*alphas)
+    damping = Damping(dynamics.damping.mass, dynamics.damping.stiffness)
+    contact = case.contact
+    at: Literal["mid", "end"] = "end" if contact is None else contact.force_at
+    massless = contact is not None and contact.massless
+    return Dynamics(scheme, damping=damping, predictor=dynamics.predictor, constraint_at=at, massless=massless)
+
+
+def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
+    assert case.structure is not None
+    settings = case.elastic_bodies[name]
+    domain = fem.distribute(comm, _mesh(case, name, comm))
+    vectors = {key: getattr(settings, key) for key in _VECTORS}
+    _check_lengths(case, name, domain.dim)
+    return Body(
+        domain,
+        BodySettings(
+            name=name,
+            material=_material(settings.material, case.structure.plane if domain.dim == 2 else "strain"),
+            supports=tuple(entry for support in settings.supports for entry in _supports(support)),
+            tractions=tuple(Traction(on, load.value) for load in settings.tractions for on in load.on),
+            pressures=tuple(Pressure(on, load.value) for load in settings.pressures for on in load.on),
+            **vectors,
+        ),
+    )
+
+
+_VECTORS = ("gravity", "body_force", "initial_displacement", "initial_velocity")
+
+
+def _mesh(case: Case, name: str, comm: MPI.Comm) -> Any:
+    """The body's mesh on rank 0, with every surface that the case names; None elsewhere."""
+    error, mesh = None, None
+    if comm.rank == 0:
+        try:
+            mesh = _checked_mesh(case, name)
+        except Exception as raised:  # every process must hear of it
+            error = raised
+    error = comm.bcast(error, root=0)
+    if error is not None:
+        raise error
+    return mesh
+
+
+def _checked_mesh(case: Case, name: str):
+    settings = case.elastic_bodies[name]
+    keys: tuple[str | int, ...] = ("structure", "bodies", name, "mesh")
+    try:
+        mesh = build_mesh(settings.mesh, case.folder)
+        if settings.region is not None:
+            keys = ("structure", "bodies", name, "region")
+            mesh = extract_region(mesh, settings.region)
+        for keys, surface in _named_surfaces(case, name):  # noqa: B007
+            require_surface(mesh, surface)
+    except MeshError as error:
+        raise case.error(keys, str(error)) from None
+    return mesh
+
+
+def _named_surfaces(case: Case, name: str):
+    """(where, surface name) of every surface of a body that the case mentions."""
+    body = case.elastic_bodies[name]
+    for section in ("supports", "tractions", "pressures"):
+        for index, entry in enumerate(getattr(body, section)):
+            for surface in entry.on:
+                yield ("structure", "bodies", name, section, index, "on"), surface
+    for pair_name, pair in ({} if case.contact is None else case.contact.pairs).items():
+        for role, side in (("slave", pair.slave), ("master", pair.master)):
+            if side.body == name:
+                yield ("contact", "pairs", pair_name, role, "on"), side.on
+    for probe_name, probe in _probes(case):
+        if probe.on is not None and probe.body == name:
+            yield ("probes", probe_name, "on"), probe.on
+
+
+def _check_lengths(case: Case, name: str, dim: int) -> None:
+    """Vectors have as many entries as the mesh has dimensions; for files only the mesh tells."""
+    body = case.elastic_bodies[name]
+    base = ("structure", "bodies", name)
+    vectors: list[tuple[tuple[str | int, ...], Any]] = [((*base, key), getattr(body, key)) for key in _VECTORS]
+    vectors += [((*base, "tractions", i, "value"), load.value) for i, load in enumerate(body.tractions)]
+    vectors += [((*base, "supports", i, "displacement"), s.displacement) for i, s in enumerate(body.supports)]
+    vectors += [(("probes", key, "at"), p.at) for key, p in _probes(case) if p.body == name]
+    for keys, vector in vectors:
+        if vector is not None and len(vector) != dim:
+            raise case.error(keys, f"'{keys[-1]}' has {len(vector)} entries, but the mesh is of {dim} dimensions")
+
+
+def _supports(support) -> list[Support | Symmetry]:
+    if support.symmetry:
+        return [Symmetry(surface) for surface in support.on]
+    return [Support(surface, support.displacement) for surface in support.on]
+
+
+def _material(settings, plane: str) -> materials.Material:
+    density = _parameter(settings.density) if settings.density is not None else 0.0
+    if settings.law == "mooney_rivlin":
+        c10, c01, bulk = (_parameter(p) for p in (settings.c10, settings.c01, settings.bulk))
+        return materials.MooneyRivlin(c10, c01, bulk, density)
+    mu, lmbda = _lame(settings)
+    if settings.law == "st_venant_kirchhoff" and plane == "stress":
+        lmbda = _combine(materials.plane_stress_lambda, mu, lmbda)
+        return materials.PlaneStressStVenantKirchhoff(mu, lmbda, density)
+    law: Any = {
+        "st_venant_kirchhoff": materials.StVenantKirchhoff,
+        "neo_hooke": materials.NeoHooke,
+        "coup_neo_hooke": materials.CoupNeoHooke,
+    }[settings.law]
+    return law(mu, lmbda, density)
+
+
+def _lame(settings) -> tuple[Parameter, Parameter]:
+    """(mu, lambda) from the pair of constants that the case gives."""
+    if settings.E is not None:
+        E, nu = _parameter(settings.E), _parameter(settings.nu)
+        pair = [_combine(lambda E, nu, i=i: materials.lame(E, nu)[i], E, nu) for i in (0, 1)]
+        return pair[0], pair[1]
+    mu = _parameter(settings.mu)
+    if settings.lmbda is not None:
+        return mu, _parameter(settings.lmbda)
+    return mu, _combine(lambda mu, nu: 2.0 * mu * nu / (1.0 - 2.0 * nu), mu, _parameter(settings.nu))
+
+
+def _parameter(expression) -> Parameter:
+    return expression if expression.constant is None else float(expression.constant)
+
+
+def _combine(function: Callable[..., Any], *parameters: Parameter) -> Parameter:
+    """function(*parameters), where some may be fields."""
+    numbers = [p for p in parameters if not callable(p)]
+    if len(numbers) == len(parameters):
+        return float(function(*numbers))
+
+    def combined(x, t):
+        return function(*(p(x, t) if callable(p) else p for p in parameters))
+
+    value: Value = combined
+    return value
+
+
+# ---------------------------------------------------------------------------------------------------------- probes
+
+
+def build_probes(case: Case, structure: Structure) -> Callable[[], Numbers]:
+    """What is measured on the structure. Raises CaseError (collective)."""
+    by_name = {body.name: body for body in structure.bodies}
+    found: dict[str, probes.Probe] = {}
+    for name, settings in _probes(case):
+        if settings.at is not None:
+            try:
+                found[name] = probes.at_point(structure, by_name[settings.body or ""], settings.quantity, settings.at)
+            except probes.PointOutside as error:
+                raise case.error(("probes", name, "at"), str(error)) from None
+        elif settings.on is not None:
+            found[name] = probes.on_surface(structure, by_name[settings.body or ""], settings.quantity, settings.on)
+        else:
+            chosen = structure.bodies if settings.body is None else [by_name[settings.body]]
+            found[name] = probes.of_bodies(structure, chosen, settings.quantity)
+    return columns(found)
+
+
+def _probes(case: Case) -> list[tuple[str, Probe]]:
+    return [(name, probe) for name, probe in case.probes.items() if probe.field == "structure"]

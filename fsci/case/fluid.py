@@ -1,0 +1,123 @@
+"""Section `fluid`: the flow, its grid, what happens on the boundary of the box, and rigid bodies in it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import model_validator
+
+from fsci.case.grid import Grid
+from fsci.case.mesh import Mesh
+from fsci.case.section import Section, fault, setting
+from fsci.case.values import (
+    Entries,
+    Name,
+    Number,
+    NumberVector,
+    OneOrMany,
+    Positive,
+    SpaceFormula,
+    Surfaces,
+    Switch,
+    TimeFormula,
+    TimeVector,
+    Vector,
+)
+
+FACES = ("x-", "x+", "y-", "y+", "z-", "z+")
+Face = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
+KINDS = ("velocity", "no_slip", "slip", "symmetry", "traction", "outflow")
+
+
+class Patch(Section):
+    """Part of the boundary of the box, with one condition."""
+
+    on: Annotated[tuple[Face, ...], Entries(1, None), OneOrMany()] = setting(
+        ..., "face of the box, or list of faces: x- is the one where x is smallest"
+    )
+    where: SpaceFormula | None = setting(
+        None, "only the part of the faces where this is positive at the middle of a cell's face; default: all of it"
+    )
+    velocity: Vector | None = setting(None, "prescribed velocity", unit="m/s")
+    no_slip: Switch = setting(False, "true: a wall at rest that the flow sticks to")
+    slip: Switch = setting(False, "true: nothing flows through, and there is no shear stress")
+    symmetry: Switch = setting(False, "true: a plane of symmetry, the same as slip")
+    traction: Vector | None = setting(None, "prescribed force per area", unit="Pa")
+    outflow: Switch = setting(False, "true: the flow leaves as if it went on unchanged, at pressure 0")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Patch:
+        given = [kind for kind in KINDS if getattr(self, kind) not in (None, False)]
+        words = "'velocity', 'no_slip', 'slip', 'symmetry', 'traction' or 'outflow'"
+        if not given:
+            raise fault(f"a patch needs one of {words}")
+        if len(given) > 1:
+            raise fault(f"give only one of {words}", given[1])
+        return self
+
+    @property
+    def kind(self) -> Literal["velocity", "no_slip", "slip", "traction", "outflow"]:
+        """Which condition it is."""
+        if self.velocity is not None:
+            return "velocity"
+        if self.traction is not None:
+            return "traction"
+        return "no_slip" if self.no_slip else "outflow" if self.outflow else "slip"
+
+
+class Turn(Section):
+    """A rotation that changes with time."""
+
+    centre: NumberVector = setting(..., "point that stays where it is", unit="m")
+    axis: Annotated[tuple[Number, ...], Entries(3, 3)] | None = setting(
+        None, "direction of the axis (3D only)", unit="1"
+    )
+    angle: TimeFormula = setting(..., "angle, counterclockwise seen against the axis", unit="degrees")
+
+
+class Movement(Section):
+    """A rigid motion: the body is rotated about the centre, then displaced."""
+
+    displacement: TimeVector | None = setting(None, "displacement by components", unit="m")
+    rotation: Turn | None = setting(None, "rotation")
+
+
+class RigidBody(Section):
+    """A rigid body in the flow, at rest or moved as given."""
+
+    mesh: Mesh = setting(..., "mesh file or built-in shape; only its surface counts, as fine as it is meshed")
+    on: Surfaces | None = setting(
+        None, "names of the surfaces that enclose the body; default: the whole boundary of the mesh"
+    )
+    motion: Movement | None = setting(None, "motion from the place of the mesh; default: at rest")
+
+
+class Fluid(Section):
+    """Incompressible flow in a box around bodies that cut its grid."""
+
+    density: Positive = setting(..., "mass per volume", unit="kg/m^3")
+    viscosity: Positive = setting(..., "dynamic viscosity", unit="Pa s")
+    flow: Literal["navier_stokes", "stokes"] = setting(
+        "navier_stokes", "stokes: slow flow, without the convective term"
+    )
+    scheme: Literal["bdf2", "backward_euler", "steady"] = setting(
+        "bdf2", "time integration; steady: each time step is the steady flow under the conditions of its time"
+    )
+    element: Literal["q1q1", "q2q1"] = setting("q1q1", "velocity and pressure of first order, or velocity of second")
+    grid: Grid = setting(..., "box and cells")
+    patches: dict[Name, Patch] = setting(
+        ..., "conditions on the boundary of the box by name; where patches meet, the one named last decides"
+    )
+    bodies: dict[Name, RigidBody] = setting(dict, "rigid bodies by name")
+    gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
+    body_force: Vector | None = setting(None, "force per volume", unit="N/m^3")
+    initial_velocity: Vector | None = setting(None, "velocity at the start; default: at rest", unit="m/s")
+
+    @property
+    def dofs(self) -> int:
+        """Unknowns of velocity and pressure, those inside bodies included."""
+        dim, degree = self.grid.dimension, 1 if self.element == "q1q1" else 2
+        velocity = pressure = 1
+        for cells in self.grid.shape:
+            velocity, pressure = velocity * (degree * cells + 1), pressure * (cells + 1)
+        return dim * velocity + pressure

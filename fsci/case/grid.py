@@ -1,0 +1,105 @@
+"""Section `grid` of the fluid: a box of cells, equal or graded, direction by direction."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import model_validator
+
+from fsci.case.section import Section, fault, setting
+from fsci.case.values import Count, Entries, Number, NumberVector, Positive
+
+
+class Stretch(Section):
+    """Part of one direction: cells from the end of the part before to its own."""
+
+    to: Number = setting(..., "where it ends", unit="m")
+    cells: Count = setting(..., "number of cells")
+    ratio: Positive = setting(1.0, "size of its last cell over that of its first one", unit="1")
+
+
+Stretches = Annotated[tuple[Stretch, ...], Entries(1, None)]
+
+
+class Grid(Section):
+    """A box of axis-aligned cells. Each direction has a number of equal `cells`, or a list of stretches `x`, `y`, `z`.
+
+    In a stretch of n cells each is ratio^(1/(n - 1)) times as long as the one before.
+    """
+
+    start: NumberVector = setting(..., "lowest corner of the box", unit="m", name="from")
+    to: NumberVector = setting(..., "highest corner of the box", unit="m")
+    cells: Annotated[tuple[Count | None, ...], Entries(2, 3)] | None = setting(
+        None, "number of equal cells along x, y (and z); null for a direction with stretches"
+    )
+    x: Stretches | None = setting(None, "stretches along x")
+    y: Stretches | None = setting(None, "stretches along y")
+    z: Stretches | None = setting(None, "stretches along z")
+
+    @property
+    def dimension(self) -> int:
+        return len(self.start)
+
+    @property
+    def graded(self) -> tuple[tuple[Stretch, ...] | None, ...]:
+        """The stretches of each direction, None where there are none."""
+        return (self.x, self.y, self.z)[: self.dimension]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Grid:
+        dim = self.dimension
+        if len(self.to) != dim:
+            raise fault(f"must have {dim} entries like 'from', not {len(self.to)}", "to")
+        if self.cells is not None and len(self.cells) != dim:
+            raise fault(f"must have {dim} entries like 'from', not {len(self.cells)}", "cells")
+        if dim == 2 and self.z is not None:
+            raise fault("'from' has 2 entries: a grid in 2D has no 'z'", "z")
+        for axis, (low, high) in enumerate(zip(self.start, self.to, strict=True)):
+            if low >= high:
+                raise fault(f"must be greater than that of 'from', {low:g}, not {high:g}", "to", axis)
+            self._check_direction(axis)
+        return self
+
+    def _check_direction(self, axis: int) -> None:
+        name, stretches = "xyz"[axis], self.graded[axis]
+        cells = None if self.cells is None else self.cells[axis]
+        if stretches is None and cells is None:
+            raise fault(f"the direction {name} needs a number of cells in 'cells', or stretches in '{name}'")
+        if stretches is None:
+            return
+        if cells is not None:
+            raise fault(f"'{name}' has stretches: write null here, not {cells}", "cells", axis)
+        before = self.start[axis]
+        for number, stretch in enumerate(stretches):
+            if stretch.to <= before:
+                end = f"must be greater than {before:g}, where this stretch begins, not {stretch.to:g}"
+                raise fault(end, name, number, "to")
+            before = stretch.to
+        if before != self.to[axis]:
+            end = f"must be {self.to[axis]:g} like entry {axis + 1} of the grid's 'to', not {before:g}"
+            raise fault(end, name, len(stretches) - 1, "to")
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Cells per direction."""
+        return tuple(
+            (self.cells or ())[axis] or 0 if stretches is None else sum(stretch.cells for stretch in stretches)
+            for axis, stretches in enumerate(self.graded)
+        )
+
+    def edges(self) -> tuple[NDArray[np.float64], ...]:
+        """Coordinates of the grid planes, increasing, one array per direction."""
+        found = []
+        for axis, (low, high) in enumerate(zip(self.start, self.to, strict=True)):
+            stretches = self.graded[axis] or (Stretch(to=high, cells=self.shape[axis]),)
+            parts = [np.array([low])]
+            for stretch in stretches:
+                sizes = stretch.ratio ** (np.arange(stretch.cells) / max(stretch.cells - 1, 1))
+                inner = np.concatenate([[0.0], np.cumsum(sizes) / sizes.sum()])
+                inner[-1] = 1.0
+                begin = parts[-1][-1]
+                parts.append((begin * (1.0 - inner) + stretch.to * inner)[1:])
+            found.append(np.concatenate(parts))
+        return tuple(found)

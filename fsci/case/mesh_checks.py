@@ -1,0 +1,66 @@
+"""Mistakes about meshes that show only beside the rest of the case: files, dimensions, names of surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from fsci.case.errors import did_you_mean
+from fsci.case.mesh import FileMesh, Mesh, Shape
+from fsci.case.yaml_text import Keys
+
+Mistake = tuple[Keys, str]  #: path of the setting, message
+
+
+def mesh_mistakes(
+    mesh: Mesh, dimension: int | None, folder: Path, keys: Keys, other: str = "another body"
+) -> Iterator[Mistake]:
+    """Of the mesh of a body; `other` is what has the dimension."""
+    if isinstance(mesh, Shape):
+        if mesh.dimension != dimension:
+            yield (*keys, "shape"), f"this shape is {mesh.dimension}D, but {other} is {dimension}D"
+    else:
+        yield from _file(mesh, folder, keys)
+    for i, rotation in enumerate(mesh.rotate):
+        yield from axis_mistakes(rotation.axis, dimension, (*keys, "rotate", i))
+    if mesh.translate is not None:
+        yield from length_mistakes(mesh.translate, dimension, (*keys, "translate"))
+
+
+def axis_mistakes(axis: tuple[float, ...] | None, dimension: int | None, keys: Keys) -> Iterator[Mistake]:
+    """A rotation in 3D has an axis."""
+    if axis is None and dimension == 3:
+        yield keys, "a rotation in 3D needs the setting 'axis'"
+    elif axis is not None and dimension == 2:
+        yield keys, "a rotation in 2D has no 'axis'"
+    elif axis is not None and not any(axis):
+        yield keys, "the axis of a rotation must not be zero"
+
+
+def surface_mistakes(mesh: Mesh, name: str, keys: Keys) -> Iterator[Mistake]:
+    """The surfaces of built-in shapes are known."""
+    if isinstance(mesh, Shape) and name not in mesh.surfaces:
+        there = ", ".join(mesh.surfaces)
+        hint = did_you_mean(name, mesh.surfaces)
+        hint = f"{hint} (available: {there})" if hint.startswith(";") else hint
+        yield keys, f"'{mesh.shape}' has no surface '{name}'{hint}"  # type: ignore[attr-defined]
+
+
+def length_mistakes(vector: tuple[object, ...] | None, dimension: int | None, keys: Keys) -> Iterator[Mistake]:
+    """A vector has as many entries as there are dimensions."""
+    if vector is not None and dimension is not None and len(vector) != dimension:
+        yield keys, f"'{keys[-1]}' must have {dimension} entries in {dimension}D, not {len(vector)}"
+
+
+def _file(mesh: FileMesh, folder: Path, keys: Keys) -> Iterator[Mistake]:
+    path = folder / mesh.file
+    try:
+        found = path.is_file()
+    except (OSError, ValueError):  # a name too long, or with a zero byte
+        found = False
+    if not found:
+        yield (*keys, "file"), f"mesh file '{mesh.file}' not found in {folder.absolute()}"
+    if path.suffix != ".geo":
+        for name in ("order", "parameters"):
+            if name in mesh.model_fields_set:
+                yield (*keys, name), f"'{name}' is for .geo files; '{mesh.file}' has its own"

@@ -1,0 +1,67 @@
+"""Doubts about a flow that can be computed: cells too coarse, steps too long, nothing that drives it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fsci.case.case import Case
+from fsci.case.fluid import Fluid, Patch
+from fsci.case.mesh import Shape
+from fsci.case.yaml_text import Keys
+from fsci.estimate import thickness
+
+MOST_CELLS_PER_STEP = 10.0  #: that a flow or a body may cross in a time step without being asked about it
+DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
+
+
+def flow_doubts(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
+    """Paths of settings with a warning about each."""
+    density = fluid.density * case.units.density
+    if not DENSITIES[0] <= density <= DENSITIES[1]:
+        unit = f"{case.units.mass}/{case.units.length}^3"
+        value = f"{fluid.density:g} {unit} is {density:.3g} kg/m^3"
+        yield ("fluid", "density"), f"implausible density: {value}; check 'units'"
+    if not _driven(fluid):
+        yield ("fluid", "patches"), "nothing drives the flow: no velocity, traction, force or moving body"
+    smallest = min(float(np.diff(edges).min()) for edges in fluid.grid.edges())
+    for name, body in fluid.bodies.items():
+        if isinstance(body.mesh, Shape) and (extent := thickness(body.mesh)) < smallest:
+            yield (
+                ("fluid", "bodies", name, "mesh"),
+                f"the body is {extent:g} thick, thinner than the smallest cell, {smallest:g}: refine the grid",
+            )
+    if fluid.scheme == "steady":
+        return
+    for name, patch in fluid.patches.items():
+        crossed = _cells_per_step(case, fluid, patch)
+        if crossed > MOST_CELLS_PER_STEP:
+            message = f"the flow crosses {crossed:.0f} cells in a time step here; take a smaller 'step'"
+            yield ("fluid", "patches", name), message
+
+
+def _driven(fluid: Fluid) -> bool:
+    loads = (fluid.gravity, fluid.body_force, fluid.initial_velocity)
+    moved = any(body.motion is not None for body in fluid.bodies.values())
+    return any(loads) or moved or any(patch.velocity or patch.traction for patch in fluid.patches.values())
+
+
+def _cells_per_step(case: Case, fluid: Fluid, patch: Patch) -> float:
+    """Largest |u_i| dt / h_i of the velocity prescribed on a patch, over its nodes and some times of the run."""
+    if patch.velocity is None:
+        return 0.0
+    edges, largest = fluid.grid.edges(), 0.0
+    cells = [np.pad(np.diff(edge), 1, mode="edge") for edge in edges]
+    sizes = [np.minimum(h[1:], h[:-1]) for h in cells]
+    times = np.linspace(case.time.start, case.time.end, 5)
+    for face in patch.on:
+        axis, side = "xyz".index(face[0]), -1 if face[1] == "+" else 0
+        on_face = [edge[[side]] if i == axis else edge for i, edge in enumerate(edges)]
+        near = [h[[side]] if i == axis else h for i, h in enumerate(sizes)]
+        x, h = (np.stack([part.ravel() for part in np.meshgrid(*parts, indexing="ij")]) for parts in (on_face, near))
+        inside = np.ones(x.shape[1], dtype=bool) if patch.where is None else patch.where(x, 0.0) > 0.0
+        for t in times:
+            speed = np.abs([component(x, t) for component in patch.velocity])[:, inside]
+            largest = max(largest, float(np.nanmax(speed / h[:, inside], initial=0.0)) * case.time.step)
+    return largest

@@ -1,0 +1,115 @@
+"""Mistakes in `probes` and `verify` that show only beside the rest of the case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from fsci.case.case import Case
+from fsci.case.errors import did_you_mean, listed
+from fsci.case.fluid import Fluid
+from fsci.case.mesh_checks import Mistake, length_mistakes, surface_mistakes
+from fsci.case.probes import RESERVED, Probe
+from fsci.case.structure import Structure
+from fsci.case.verify import CONTACT_COLUMNS, FIELD_COLUMNS, RUN_COLUMNS
+from fsci.case.yaml_text import Keys
+
+NEEDS_MASS = ("momentum", "angular_momentum", "mass", "centre")
+
+
+def field_of(case: Case, probe: Probe) -> str | None:
+    """The field that a probe measures: structure or fluid; None if the case leaves it open or has none."""
+    if probe.field is not None:
+        return probe.field if probe.field in probe.fields and getattr(case, probe.field) is not None else None
+    there = [name for name in probe.fields if getattr(case, name) is not None]
+    if len(there) == 2 and probe.body is not None:  # of a point in a body, or of its volume
+        return "structure"
+    return there[0] if len(there) == 1 else None
+
+
+def probe_mistakes(case: Case) -> Iterator[Mistake]:
+    """Of all probes."""
+    for name, probe in case.probes.items():
+        keys: Keys = ("probes", name)
+        if set(probe.columns(name, 3)) & set(RESERVED):
+            yield keys, f"a probe cannot be called '{name}': history.csv has a column of this name"
+        yield from length_mistakes(probe.at, case.dimension, (*keys, "at"))
+        match field_of(case, probe):
+            case "structure" if case.structure is not None:
+                yield from _of_structure(case.structure, name, probe)
+            case "fluid" if case.fluid is not None:
+                yield from _of_fluid(case.fluid, name, probe)
+            case _:
+                yield from _of_none(case, name, probe)
+
+
+def _of_none(case: Case, name: str, probe: Probe) -> Iterator[Mistake]:
+    there = [field for field in probe.fields if getattr(case, field) is not None]
+    if len(there) == 2 and probe.field is None:
+        yield ("probes", name), f"missing setting 'field' in '{name}': there are {listed(there, 'and')}"
+    elif probe.field is not None and probe.field not in probe.fields:
+        yield ("probes", name, "field"), f"the {probe.field} has no such quantity '{probe.quantity}'"
+    else:
+        needed = probe.field or probe.fields[0]
+        yield ("probes", name, "quantity"), f"quantity '{probe.quantity}' needs the section '{needed}'"
+
+
+def _of_structure(structure: Structure, name: str, probe: Probe) -> Iterator[Mistake]:
+    keys, bodies = ("probes", name), structure.bodies
+    if probe.minus is not None:
+        yield (*keys, "minus"), "'minus' is for points of the fluid"
+    if probe.body is None and len(bodies) > 1 and probe.place:
+        yield keys, f"missing setting 'body' in '{name}': there are several bodies ({', '.join(bodies)})"
+        return
+    if probe.body is not None and probe.body not in bodies:
+        yield (*keys, "body"), f"unknown body '{probe.body}'{did_you_mean(probe.body, bodies)}"
+        return
+    measured = [bodies[probe.body]] if probe.body else list(bodies.values())
+    if probe.on is not None:
+        yield from surface_mistakes(measured[0].mesh, probe.on, (*keys, "on"))
+    if probe.quantity in ("velocity", "acceleration") and structure.dynamics is None:
+        yield (*keys, "quantity"), f"quantity '{probe.quantity}' needs 'dynamics' in 'structure'"
+    if probe.quantity in NEEDS_MASS and any(body.material.density is None for body in measured):
+        yield (*keys, "quantity"), f"quantity '{probe.quantity}' needs the 'density' of the material"
+
+
+def _of_fluid(fluid: Fluid, name: str, probe: Probe) -> Iterator[Mistake]:
+    keys, bodies, grid = ("probes", name), fluid.bodies, fluid.grid
+    if probe.quantity not in ("force", "moment"):
+        if probe.body is not None:
+            yield (*keys, "body"), f"quantity '{probe.quantity}' of the fluid is not that of a body"
+    elif probe.body is not None and probe.body not in bodies:
+        yield (*keys, "body"), f"unknown body '{probe.body}'{did_you_mean(probe.body, bodies)}"
+    elif not bodies:
+        yield (*keys, "quantity"), f"quantity '{probe.quantity}' needs a body in the flow"
+    elif probe.body is None and len(bodies) > 1:
+        yield keys, f"missing setting 'body' in '{name}': there are several bodies ({', '.join(bodies)})"
+    for place in ("on", "through"):
+        patch = getattr(probe, place)
+        if patch is not None and patch not in fluid.patches:
+            yield (*keys, place), f"unknown patch '{patch}'{did_you_mean(patch, fluid.patches)}"
+    yield from length_mistakes(probe.about, grid.dimension, (*keys, "about"))
+    yield from length_mistakes(probe.minus, grid.dimension, (*keys, "minus"))
+    for key in ("at", "minus"):
+        point = getattr(probe, key)
+        inside = zip(grid.start, point or (), grid.to, strict=False)
+        if point is not None and not all(low <= x <= high for low, x, high in inside):
+            place = ", ".join(f"{x:g}" for x in point)
+            yield (*keys, key), f"the point ({place}) is outside of the fluid's box"
+
+
+def verify_mistakes(case: Case) -> Iterator[Mistake]:
+    """Of all checks: columns that there will not be, times that are not of the run."""
+    columns = [column for name, probe in case.probes.items() for column in probe.columns(name, case.dimension or 3)]
+    columns += RUN_COLUMNS
+    columns += [column for field, column in FIELD_COLUMNS.items() if getattr(case, field) is not None]
+    if case.contact is not None:
+        columns += [f"contact.{name}.{axis}" for name in case.contact.pairs for axis in "xyz"[: case.dimension or 3]]
+        columns += CONTACT_COLUMNS
+    for i, check in enumerate(case.verify):
+        keys: Keys = ("verify", i)
+        if check.value not in columns:
+            hint = did_you_mean(check.value, columns)
+            yield (*keys, "value"), f"there is no value '{check.value}'{hint}"
+        if check.start is not None and not case.time.start <= check.start < case.time.end:
+            span = f"{case.time.start:g} to {case.time.end:g}"
+            yield (*keys, "from"), f"'from' must be a time of the run, {span}, not {check.start:g}"

@@ -1,0 +1,79 @@
+"""The flow as files and pictures show it: the cells with fluid in them, and the bodies' surfaces where they are now."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solvers.api import Array, Snapshot
+from solvers.distributed import Nodal, gather_nodal
+from solvers.fluid.field import Fluid
+
+
+def snapshots(fluid: Fluid) -> list[Snapshot]:
+    """The flow, then each body, on rank 0; an empty list elsewhere (collective)."""
+    flow, bodies = _flow(fluid), _bodies(fluid)
+    return [] if flow is None else [flow, *bodies]
+
+
+def _flow(fluid: Fluid) -> Snapshot | None:
+    """Velocity and pressure at the corners of all cells with fluid; of q2q1 the values at other nodes are left out.
+
+    Corners inside of bodies carry the flow's smooth extension, so that colours reach the surface undisturbed.
+    """
+    unknowns, grid = fluid.unknowns, fluid.grid
+    velocity, pressure = (
+        gather_nodal(fluid.comm, Nodal(fluid.flow[nodes.dofs[: nodes.owned]], nodes.numbers[: nodes.owned]))
+        for nodes in (unknowns.velocity, unknowns.pressure)
+    )
+    share = np.zeros(len(grid.numbers))
+    wet = np.concatenate([fluid.cut.uncut, fluid.cut.cut])
+    share[wet] = np.maximum(fluid.cut.fraction[wet], np.finfo(float).tiny)
+    fraction = gather_nodal(fluid.comm, Nodal(share[: grid.owned, None], grid.numbers[: grid.owned]))
+    if velocity is None or pressure is None or fraction is None:
+        return None
+    mesh = grid.grid.mesh()
+    active = fraction[:, 0] > 0.0
+    nodes, cells = np.unique(mesh.cells[active], return_inverse=True)
+    corners = _corners(fluid)
+    fields = {"velocity": _in_space(velocity[corners][nodes]), "pressure": pressure[nodes, 0]}
+    cells = cells.reshape(-1, mesh.cells.shape[1])
+    inside = {"fluid_fraction": fraction[active, 0]}
+    return Snapshot("fluid", _in_space(mesh.points[nodes]), cells, mesh.cell_type, fields, inside)
+
+
+def _corners(fluid: Fluid) -> np.ndarray:
+    """Number of each corner of the cells, x fastest, in the lattice of the velocity's nodes."""
+    degree, shape = fluid.unknowns.degree, fluid.grid.grid.shape
+    lattice = np.arange(int(np.prod([degree * n + 1 for n in shape])))
+    lattice = lattice.reshape([degree * n + 1 for n in shape], order="F")
+    return lattice[(slice(None, None, degree),) * len(shape)].ravel(order="F")
+
+
+def _bodies(fluid: Fluid) -> list[Snapshot]:
+    """Surfaces with their velocity and what the fluid does to them, as force per area (zero before the first step)."""
+    found, start = [], 0
+    forces = fluid.force() if fluid.bodies and fluid.started else {}
+    for body in fluid.bodies:
+        surface, dim = body.surface, fluid.dim
+        part = slice(start, start + surface.vertices)
+        start = part.stop
+        x, v = fluid.cut.motion.x[part], fluid.cut.motion.v[part]
+        force = forces.get(surface.name, np.zeros_like(x))
+        area = vertex_areas(x, surface.facets)[:, None]
+        traction = np.divide(force, area, out=np.zeros_like(force), where=area > 0.0)
+        fields = {"velocity": _in_space(v), "traction": _in_space(traction)}
+        kind = "line" if dim == 2 else "triangle"
+        found.append(Snapshot(surface.name, _in_space(x), surface.facets, kind, fields))
+    return found
+
+
+def vertex_areas(x: Array, facets: np.ndarray) -> Array:
+    """Share of each vertex in the area [m^2] (length in 2D) of segments or triangles: int N_b ds, shape (n,)."""
+    edges = x[facets[:, 1:]] - x[facets[:, :1]]
+    dim = x.shape[1]
+    size = np.linalg.norm(edges[:, 0] if dim == 2 else 0.5 * np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    return np.asarray(np.bincount(facets.ravel(), weights=np.repeat(size / dim, dim), minlength=len(x)), dtype=float)
+
+
+def _in_space(vectors: Array) -> Array:
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))

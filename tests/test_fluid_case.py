@@ -1,0 +1,230 @@
+"""The section `fluid` of a case: every mistake with its message, the text it points at, doubts, and what grids become."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from fsci.case import CaseError, load_case
+from fsci.case.grid import Grid
+from fsci.check import summary
+
+CASE = """\
+title: channel
+time: {step: 0.01, end: 1}
+fluid:
+  density: 1.2
+  viscosity: 1e-3
+  grid: {from: [0, 0], to: [4, 1], cells: [40, 10]}
+  patches:
+    inlet: {on: x-, velocity: ["4*y*(1 - y)", 0]}
+    outlet: {on: x+, outflow: true}
+    walls: {on: [y-, y+], no_slip: true}
+  bodies:
+    cylinder:
+      mesh: {shape: disc, radius: 0.2, cells: [40, 1], translate: [1, 0.5]}
+      motion: {displacement: [0, "0.1*sin(t)"], rotation: {centre: [1, 0.5], angle: 90*t}}
+probes:
+  force: {quantity: force}
+  wake: {quantity: velocity, at: [2, 0.5]}
+  dp: {quantity: pressure, at: [0, 0.5], minus: [4, 0.5]}
+  out: {quantity: flow_rate, through: outlet}
+verify:
+  - {value: force.x, statistic: max, reference: 1, relative: 0.1}
+"""
+GRID = "cells: [40, 10]"
+KINDS = "'velocity', 'no_slip', 'slip', 'symmetry', 'traction' or 'outflow'"
+FACES = "'x-', 'x+', 'y-', 'y+', 'z-' or 'z+'"
+
+#: what is replaced, by what, the message with line and column, the text that stands there
+MISTAKES = [
+    # sections
+    ("fluid:", "flux:", "3:1: unknown setting 'flux'; did you mean 'fluid'?", "flux"),
+    (
+        "probes:",
+        "structure: {bodies: {a: {mesh: {shape: disc, radius: 1, cells: [4, 1]}, "
+        "material: {law: neo_hooke, E: 1, nu: 0}}}}\nprobes:",
+        "3:1: 'fluid' and 'structure' together need 'coupling', which is not available in this version of fsci",
+        "fluid",
+    ),
+    ("probes:", "contact: {pairs: {}}\nprobes:", "15:10: 'contact' needs the section 'structure'", "{pairs"),
+    ("  density: 1.2\n", "", "3:1: missing setting 'density' in 'fluid'", "fluid"),
+    ("density: 1.2", "density: -1", "4:12: 'density' must be greater than 0, not -1", "-1"),
+    ("density: 1.2", "density: 1\n  scheme: bdf3", "5:11: 'scheme' must be", "bdf3"),
+    ("density: 1.2", "density: 1\n  gravity: [0, 0, -9.81]", "5:12: 'gravity' must have 2 entries in 2D, not 3", "[0, 0"),
+    # grid
+    ("to: [4, 1]", "to: [4, 1, 1]", "6:28: 'to' must have 2 entries like 'from', not 3", "[4"),
+    ("to: [4, 1]", "to: [-4, 1]", "6:29: entry 1 of 'to' must be greater than that of 'from', 0, not -4", "-4"),
+    (GRID, "cells: [40]", "6:43: 'cells' must have 2 or 3 entries, not 1", "[40]"),
+    (GRID, "cells: [40, 10, 10]", "6:43: 'cells' must have 2 entries like 'from', not 3", "[40"),
+    (GRID, "cells: [40, 0]", "6:48: entry 2 of 'cells' must be at least 1, not 0", "0]"),
+    (", " + GRID, "", "6:9: the direction x needs a number of cells in 'cells', or stretches in 'x'", "{from"),
+    (GRID, GRID + ", z: [{to: 1, cells: 2}]", "6:56: 'from' has 2 entries: a grid in 2D has no 'z'", "[{to"),
+    (
+        GRID,
+        GRID + ", x: [{to: 4, cells: 2}]",
+        "6:44: 'x' has stretches: write null here, not 40",
+        "40",
+    ),
+    (
+        GRID,
+        "cells: [null, 10], x: [{to: 3, cells: 2}]",
+        "6:64: 'to' must be 4 like entry 1 of the grid's 'to', not 3",
+        "3",
+    ),
+    (
+        GRID,
+        "cells: [null, 10], x: [{to: 3, cells: 2}, {to: 2, cells: 1}]",
+        "6:83: 'to' must be greater than 3, where this stretch begins, not 2",
+        "2",
+    ),
+    # patches
+    ("on: x-", "on: left", f"8:17: 'on' must be {FACES}, not 'left'", "left"),
+    ("on: x-", "on: [x-, z-]", "8:22: a box in 2D has no face 'z-'", "z-"),
+    (", outflow: true", "", f"9:13: a patch needs one of {KINDS}", "{on"),
+    ("outflow: true", "outflow: true, slip: true", f"9:31: give only one of {KINDS}", "true"),
+    ("[y-, y+]", "y-", "7:3: no patch is on the face 'y+' of the box", "patches"),
+    ('["4*y*(1 - y)", 0]', "[1, 0, 0]", "8:31: 'velocity' must have 2 entries in 2D, not 3", "[1"),
+    ("on: x-", "on: x-, where: y - t", "8:28: 'where' must not depend on t", "y - t"),
+    # bodies
+    ("    cylinder:", "    fluid:", "12:5: a body cannot be called 'fluid': the files of the flow are", "fluid"),
+    (
+        "{shape: disc, radius: 0.2, cells: [40, 1], translate: [1, 0.5]}",
+        "{shape: sphere, radius: 0.2, cells: [4, 1]}",
+        "13:21: this shape is 3D, but the grid is 2D",
+        "sphere",
+    ),
+    (
+        "      motion",
+        "      on: inner\n      motion",
+        "14:11: 'disc' has no surface 'inner' (available: outer)",
+        "inner",
+    ),
+    ('[0, "0.1*sin(t)"]', "[x, 0]", "14:31: entry 1 of 'displacement' must not depend on x", "x"),
+    ('[0, "0.1*sin(t)"]', "[t, 0, 0]", "14:30: 'displacement' must have 2 entries in 2D, not 3", "[t"),
+    ("angle: 90*t", "axis: [0, 0, 1], angle: 1", "14:59: a rotation in 2D has no 'axis'", "{centre"),
+    ("{centre: [1, 0.5]", "{centre: [1]", "14:68: 'centre' must have 2 or 3 entries, not 1", "[1]"),
+    # probes
+    ("{quantity: force}", "{quantity: force, body: box}", "16:34: unknown body 'box' (available: cylinder)", "box"),
+    (
+        "{quantity: force}",
+        "{quantity: force, at: [1, 1]}",
+        "16:32: quantity 'force' belongs to the whole body: no 'at', no 'on'",
+        "[1, 1]",
+    ),
+    ("{quantity: force}", "{quantity: mass}", "16:21: quantity 'mass' needs the section 'structure'", "mass"),
+    ("at: [2, 0.5]", "at: [2, 1.5]", "17:34: the point (2, 1.5) is outside of the fluid's box", "[2, 1.5]"),
+    ("at: [2, 0.5]", "at: [2, 0.5, 0]", "17:34: 'at' must have 2 entries in 2D, not 3", "[2"),
+    ("minus: [4, 0.5]", "minus: [5, 0.5]", "18:49: the point (5, 0.5) is outside of the fluid's box", "[5"),
+    (
+        "at: [0, 0.5], minus",
+        "on: inlet, minus",
+        "18:46: 'minus' is the second point of a difference: give the first one as 'at'",
+        "[4",
+    ),
+    ("through: outlet", "through: outled", "19:39: unknown patch 'outled'; did you mean 'outlet'?", "outled"),
+    (", through: outlet", "", "19:19: quantity 'flow_rate' needs 'through: PATCH'", "flow_rate"),
+    (
+        "{quantity: flow_rate",
+        "{field: structure, quantity: flow_rate",
+        "19:16: the structure has no such quantity 'flow_rate'",
+        "structure",
+    ),
+    ("{quantity: force}", "{quantity: force, about: [1, 1]}", "16:35: 'about' is for the quantity 'moment'", "[1, 1]"),
+    ("force.x", "structure.energy", "21:13: there is no value 'structure.energy'", "structure"),
+]
+
+
+def problems(text):
+    with open("case.yaml", "w", encoding="utf-8") as file:
+        file.write(text)
+    with pytest.raises(CaseError) as caught:
+        load_case("case.yaml")
+    return caught.value.problems
+
+
+def load(text):
+    with open("case.yaml", "w", encoding="utf-8") as file:
+        file.write(text)
+    return load_case("case.yaml")
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize(("old", "new", "message", "at"), MISTAKES, ids=[m[2] for m in MISTAKES])
+def test_message(old, new, message, at):
+    assert CASE.count(old) >= 1
+    text = CASE.replace(old, new, 1)
+    found = problems(text)
+    expected = "case.yaml:" + message
+    said = [str(problem).split("\n")[0] for problem in found]
+    assert any(line.startswith(expected) for line in said), said
+    place = next(p.place for p in found if str(p).startswith(expected))
+    assert text.split("\n")[place.line - 1][place.column - 1 :].startswith(at)
+
+
+def test_a_case_without_any_field():
+    assert str(problems("title: a\ntime: {step: 1, end: 2}\n")[0]).startswith(
+        "case.yaml:1:1: a case needs a section 'structure' or 'fluid'"
+    )
+
+
+def test_the_case_without_mistakes_loads():
+    case = load(CASE)
+    assert case.warnings == ()
+    assert case.dimension == 2
+    assert {probe.field for probe in case.probes.values()} == {"fluid"}
+    assert case.probes["force"].body == "cylinder"
+    assert case.fluid.dofs == 3 * 41 * 11
+    text = summary(case)
+    for words in ("Navier-Stokes, bdf2, q1q1", "40 x 10 cells", "inlet (velocity)", "disc, rigid, moved", "1,353"):
+        assert words in text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "warning"),
+    [
+        ("step: 0.01, end: 1", "step: 2, end: 4", "8:13: the flow crosses 20 cells in a time step here; take a smaller 'step'"),
+        (
+            "radius: 0.2",
+            "radius: 0.04",
+            "13:13: the body is 0.08 thick, thinner than the smallest cell, 0.1: refine the grid",
+        ),
+        ("density: 1.2", "density: 1e6", "4:12: implausible density: 1e+06 kg/m^3 is 1e+06 kg/m^3; check 'units'"),
+    ],
+)
+def test_doubts(old, new, warning):
+    found = load(CASE.replace(old, new)).warnings
+    assert found == (f"case.yaml:{warning}",)
+
+
+def test_a_flow_that_nothing_drives():
+    still = CASE[: CASE.index("      motion")].replace('velocity: ["4*y*(1 - y)", 0]', "outflow: true")
+    assert load(still).warnings == (
+        "case.yaml:7:3: nothing drives the flow: no velocity, traction, force or moving body",
+    )
+
+
+def test_edges_of_a_graded_grid():
+    """Equal cells, and cells that grow by the same factor from the first to the last."""
+    stretches = [{"to": 1, "cells": 2}, {"to": 3, "cells": 3, "ratio": 4}, {"to": 4, "cells": 1, "ratio": 7}]
+    grid = Grid.model_validate({"from": [0, -1], "to": [4, 1], "cells": [None, 4], "x": stretches})
+    x, y = grid.edges()
+    assert grid.shape == (6, 4)
+    assert np.allclose(y, [-1, -0.5, 0, 0.5, 1], atol=0)
+    assert np.allclose(np.diff(x), [0.5, 0.5, 2 / 7, 4 / 7, 8 / 7, 1])
+    assert (x[2], x[5], x[6]) == (1.0, 3.0, 4.0)
+
+
+def test_check_of_a_fluid_needs_no_finite_elements():
+    load(CASE)
+    code = (
+        "import sys; from fsci.cli import execute; assert execute(['check', 'case.yaml']) == 0; "
+        "assert not {'dolfinx', 'petsc4py', 'mpi4py', 'pyvista', 'gmsh'} & set(sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,97 @@
+"""The tangent is the derivative of the residual: all terms, all schemes, while the scales of the stabilisation are held."""
+
+import numpy as np
+import pytest
+from fluid_setup import body, circle, field, loop, make_fluid, sphere, step
+
+from solvers.fluid.grid import uniform
+from solvers.fluid.patches import Patch
+
+
+def channel(dim, element, scheme, convection):
+    """Every kind of patch, a moving body, and a flow without any symmetry."""
+    inflow = [lambda x, y, *zt: 1.0 + x + 0.3 * y, 0.1, 0.2][:dim]
+    sides = ("y-", "y+", "z-", "z+")[: 2 * dim - 2]
+    patches = [
+        Patch("in", ("x-",), "velocity", field(*inflow)),
+        Patch("out", ("x+",), "outflow"),
+        Patch("pulled", sides[:1], "traction", field(*[0.3, -0.2, 0.1][:dim])),
+        Patch("slip", sides[1:], "slip"),
+    ]
+    if dim == 2:
+        points, facets = circle((0.47, 0.52), 0.2, 24), loop(24)
+    else:
+        points, facets = sphere((0.47, 0.52, 0.5), 0.27, 1)
+    v = np.array([0.3, -0.2, 0.1])[:dim]
+    mover = body("mover", points, facets, motion=lambda x, t: (x + t * v, 0 * x + v + 0.3 * x[:, ::-1]))
+    return make_fluid(
+        uniform([0] * dim, [1] * dim, [5] * dim if dim == 2 else [3] * dim), patches, [mover],
+        rho=1.2, mu=0.03, element=element, scheme=scheme, convection=convection, dt=0.05,
+        body_force=field(*[1, -2, 0.5][:dim]),
+    )  # fmt: skip
+
+
+CASES = [(2, e, s, True) for e in ("q1q1", "q2q1") for s in ("steady", "backward_euler", "bdf2")] + [
+    (2, "q1q1", "bdf2", False),
+    (3, "q1q1", "bdf2", True),
+]
+
+
+def at_random_state(case):
+    """A system in its second step at a random flow, and a generator of random numbers."""
+    rng = np.random.default_rng(5)
+    fluid = channel(*case)
+    if case[2] != "steady":
+        step(fluid, 0.0, 0.05)
+    fluid.begin_step(0.05, 0.05)
+    fluid.flow[:] = rng.normal(size=len(fluid.flow)) * fluid.system.active_dofs
+    velocity = np.where(fluid.velocity_mask, fluid.flow, 0.0)
+    fluid.system.set_scales(velocity)
+    fluid.system.set_penalties()
+    return fluid, rng
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_tangent_is_the_derivative(case):
+    fluid, rng = at_random_state(case)
+    system, state = fluid.system, fluid.flow.copy()
+    nothing = np.zeros(fluid.unknowns.owned, dtype=bool)
+    tangent = system.tangent(nothing, picard=False)
+    for _ in range(3):
+        direction = rng.normal(size=len(state)) * system.active_dofs
+        x, y = tangent.createVecs()
+        x.array[:] = direction
+        tangent.mult(x, y)
+        size = 1e-5
+        found = []
+        for sign in (1, -1):
+            fluid.flow[:] = state + sign * size * direction
+            found.append(system.residual())
+        fluid.flow[:] = state
+        difference = (found[0] - found[1]) / (2 * size)
+        assert np.abs(y.array - difference).max() < 1e-6 * np.abs(difference).max()
+
+
+@pytest.mark.parametrize("case", [c for c in CASES if c[3]])
+def test_picard_is_exact_where_the_flow_carries_itself(case):
+    """With a = u the residual is affine in u: r(u) = A u + r(0)."""
+    fluid, _ = at_random_state(case)
+    system, state = fluid.system, fluid.flow.copy()
+    tangent = system.tangent(np.zeros(fluid.unknowns.owned, dtype=bool), picard=True)
+    x, y = tangent.createVecs()
+    x.array[:] = state
+    tangent.mult(x, y)
+    residual = system.residual()
+    fluid.flow[:] = 0.0
+    assert np.abs(residual - y.array - system.residual()).max() < 1e-11 * np.abs(residual).max()
+
+
+def test_newton_converges_quadratically():
+    """Scales fixed within a time step: the last residuals fall at second order."""
+    fluid = channel(2, "q1q1", "bdf2", True)
+    step(fluid, 0.0, 0.05)
+    fluid.begin_step(0.05, 0.05)
+    info = fluid.solve()
+    r = np.array(info.residuals) / max(info.residuals)
+    assert info.iterations <= 4
+    assert all(b < 30 * a**2 or b < 1e-12 for a, b in zip(r[1:], r[2:], strict=False)), r

@@ -1,0 +1,45 @@
+"""Orders in time with a moving body, for flows that are linear in space: the error is that of the time scheme alone."""
+
+import numpy as np
+import pytest
+from fluid_setup import body, circle, errors, field, loop, make_fluid, step, symbolic, wall
+
+from solvers.fluid.grid import uniform
+
+RHO, MU, END = 1.3, 0.05, 0.8
+
+
+def flow():
+    import sympy
+
+    x, y, t = sympy.symbols("x y t")
+    velocity = [sympy.sin(3 * t) * y + sympy.cos(2 * t), sympy.sin(2 * t) * x - sympy.cos(3 * t)]
+    return symbolic(velocity, sympy.cos(4 * t) * (x - 2 * y), (x, y, t), rho=RHO, mu=MU, steady=False)
+
+
+def error(scheme, element, steps, moving=True):
+    """L2 errors of velocity and pressure at the end; a disc crosses the box and carries the exact velocity."""
+    u, gradient, p, force = flow()
+    velocity, dt = field(*u), END / steps
+
+    def motion(points, t):
+        now = points + moving * np.array([0.25 * np.sin(2 * t), 0.1 * t])
+        return now, np.stack([c(now.T, t) for c in velocity], axis=1)
+
+    disc = body("disc", circle((-0.11, 0.02), 0.19, 40), loop(40), motion=motion)
+    fluid = make_fluid(
+        uniform([-0.5, -0.5], [0.5, 0.5], [10, 10]), [wall(velocity)], [disc], rho=RHO, mu=MU, element=element,
+        scheme=scheme, body_force=field(*force), initial_velocity=velocity, dt=dt,
+    )  # fmt: skip
+    for number in range(steps):
+        step(fluid, number * dt, dt)
+    return errors(fluid, u, gradient, p, END)[[0, 2]]
+
+
+@pytest.mark.parametrize(("scheme", "order"), [("backward_euler", 1), ("bdf2", 2)])
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_order_in_time(element, scheme, order):
+    found = np.array([error(scheme, element, steps) for steps in (16, 32, 64)])
+    rates = np.log2(found[:-1] / found[1:])
+    assert rates[-1, 0] > order - 0.15, (found, rates)
+    assert rates[-1, 1] > order - 0.15, (found, rates)
