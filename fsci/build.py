@@ -7,12 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
 from fsci.case import Case
 from solvers.api import Field, Scheme, Snapshot, State, StepInfo
 from solvers.timing import Timer
+
+if TYPE_CHECKING:
+    from solvers.contact.contact import Contact
+    from solvers.structure.body import Body
 
 Numbers = dict[str, float]
 
@@ -50,6 +55,8 @@ class Simulation:
 
 def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     """All objects of a case. Raises CaseError for what only the meshes can tell (collective)."""
+    if case.coupling is not None:
+        return _coupled(case, comm, timer)
     if case.fluid is not None:
         return _fluid_alone(case, comm, timer)
     return _structure_alone(case, comm, timer)
@@ -60,11 +67,7 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from solvers.structure.snapshot import snapshots
 
     bodies = build_bodies(case, comm)
-    contact = None
-    if case.contact is not None:
-        from fsci.build_contact import build_contact
-
-        contact = build_contact(case, comm, bodies)
+    contact = _contact(case, comm, bodies)
     structure = build_structure(case, comm, bodies, contact, timer)
     return Simulation(
         scheme=Alone(structure),
@@ -76,13 +79,44 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     )
 
 
+def _contact(case: Case, comm: MPI.Comm, bodies: list[Body]) -> Contact | None:
+    if case.contact is None:
+        return None
+    from fsci.build_contact import build_contact
+
+    return build_contact(case, comm, bodies)
+
+
+def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
+    from fsci import build_fluid, build_structure
+    from fsci.build_coupling import build_coupled
+    from solvers.fluid.probes import mass_balance
+    from solvers.fluid.snapshot import snapshots as of_fluid
+    from solvers.structure.snapshot import snapshots as of_structure
+
+    bodies = build_structure.build_bodies(case, comm)
+    contact = _contact(case, comm, bodies)
+    structure = build_structure.build_structure(case, comm, bodies, contact, timer)
+    scheme, coupled = build_coupled(case, comm, bodies, structure, timer)
+    fluid = coupled.fluid
+    mass = mass_balance(fluid)
+    probes = [build_structure.build_probes(case, structure), build_fluid.build_probes(case, fluid)]
+    return Simulation(
+        scheme=scheme,
+        initialise=coupled.initialise,
+        snapshots=lambda: of_structure(structure, None if contact is None else contact.fields()) + of_fluid(fluid),
+        probes=lambda: {column: value for measure in probes for column, value in measure().items()},
+        balances=lambda: {"structure.energy": structure.energy.error, **mass(), **coupled.balance.numbers()},
+        dofs={"fluid": fluid.dofs(), "structure": structure.dofs()},
+    )
+
+
 def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
+    from fsci.build_fluid import build_fluid, build_probes, build_rigid_bodies
     from solvers.fluid.probes import mass_balance
     from solvers.fluid.snapshot import snapshots
 
-    from fsci.build_fluid import build_fluid, build_probes
-
-    fluid = build_fluid(case, comm, timer)
+    fluid = build_fluid(case, comm, timer, build_rigid_bodies(case, comm))
     return Simulation(
         scheme=Alone(fluid),
         initialise=fluid.initialise,

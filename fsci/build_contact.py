@@ -45,7 +45,7 @@ def surface_of_body(comm: MPI.Comm, layout: Layout, bodies: Sequence[Body], body
     body = bodies[index]
     mesh = body.domain.source
     points, facets, nodes = comm.bcast(None if mesh is None else _cut_out(mesh, name), root=0)
-    dofs = _global_dofs(comm, layout, index, body, nodes)
+    dofs = global_dofs(comm, layout, index, body, nodes)
     held = np.zeros(len(nodes) * body.dim, dtype=bool)
     prescribed = prescribe(body).dofs + layout.start + layout.offsets[index]
     for part in comm.allgather(prescribed):
@@ -61,7 +61,7 @@ def _cut_out(mesh: Mesh, name: str) -> tuple[NDArray[np.float64], NDArray[np.int
     return mesh.points[nodes], local.reshape(facets.shape).astype(np.int64), nodes
 
 
-def _global_dofs(comm: MPI.Comm, layout: Layout, index: int, body: Body, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+def global_dofs(comm: MPI.Comm, layout: Layout, index: int, body: Body, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
     """Global dofs of nodes of the mesh file, shape (n, dim) (collective)."""
     order = np.argsort(body.nodes[: body.owned])
     owned = body.nodes[: body.owned][order]

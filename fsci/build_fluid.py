@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,13 +27,17 @@ from solvers.timing import Timer
 Array = NDArray[np.float64]
 
 
-def build_fluid(case: Case, comm: MPI.Comm, timer: Timer) -> Fluid:
-    """The flow around rigid bodies. Raises CaseError (collective)."""
+def build_rigid_bodies(case: Case, comm: MPI.Comm) -> list[Body]:
+    """The rigid bodies of a case. Raises CaseError (collective)."""
+    return [] if case.fluid is None else [_body(case, name, comm) for name in case.fluid.bodies]
+
+
+def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Body]) -> Fluid:
+    """The flow around bodies. Raises CaseError (collective)."""
     assert case.fluid is not None
     settings, linear = case.fluid, case.solver.linear
     solver = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
-    bodies = [_body(case, name, comm) for name in settings.bodies]
-    grid, flow, patches = Grid(settings.grid.edges()), _flow(settings), _patches(settings)
+    grid, flow, patches = Grid(settings.grid.planes), _flow(settings), _patches(settings)
     try:
         return Fluid(comm, grid, flow, patches, bodies, solver, timer)
     except UncoveredFaces as error:
@@ -134,7 +138,7 @@ def build_probes(case: Case, fluid: Fluid) -> Callable[[], Numbers]:
         elif patch := settings.on or settings.through:
             found[name] = probes.on_patch(fluid, settings.quantity, patch)
         elif settings.quantity in ("force", "moment"):
-            found[name] = forces.probe(settings.quantity, settings.body or "", settings.about)
+            found[name] = forces.probe(settings.quantity, settings.body, settings.about)
         else:
             found[name] = probes.of_fluid(fluid, settings.quantity)
     measure = columns(found)

@@ -81,7 +81,9 @@ def _parser() -> argparse.ArgumentParser:
 
     plot = command(_plot, "draw the results of a run")
     plot.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
-    plot.add_argument("--field", metavar="FIELD", help="field to colour by (default: displacement; of a flow velocity and pressure)")
+    plot.add_argument(
+        "--field", metavar="FIELD", help="field to colour by (default: displacement; of a flow velocity and pressure)"
+    )
     plot.add_argument("--movie", action="store_true", help="make an animation too")
 
     schema = command(_schema, "print the JSON schema of case files, for editors")

@@ -56,6 +56,29 @@ structure:
 probes:
   middle: {quantity: displacement, at: [0, 0]}
 """,
+    """\
+time: {step: 0.1, end: 1}
+fluid:
+  density: 1
+  viscosity: 0.1
+  grid: {from: [0, 0], to: [4, 1], cells: [null, 9], x: [{to: 1, cells: 4}, {to: 4, cells: 6, ratio: 3}]}
+  patches:
+    inlet: {on: x-, velocity: ["y*(1 - y)", 0]}
+    outlet: {on: x+, where: "y - 0.5", outflow: true}
+    walls: {on: [y-, y+], no_slip: true}
+    above: {on: x+, where: "0.5 - y", traction: [0, t]}
+  bodies:
+    disc:
+      mesh: {shape: disc, radius: 0.3, cells: [8, 2], translate: [1, 0.5]}
+      on: outer
+      motion: {displacement: [0, "sin(t)/9"], rotation: {centre: [0, 0], angle: 3*t}}
+  gravity: [0, -9.81]
+probes:
+  force: {quantity: moment, body: disc, about: [1, 0.5]}
+  dp: {quantity: pressure, at: [0, 0.5], minus: [4, 0.5]}
+  out: {field: fluid, quantity: flow_rate, through: outlet}
+verify: [{value: out, reference: 1, relative: 0.1}]
+""",
 ]
 
 #: other values for settings, of all kinds

@@ -64,6 +64,18 @@ def test_commented_settings_of_the_new_case_are_valid_too(beam):
     assert (len(body.tractions), len(body.pressures)) == (1, 1)
 
 
+def test_new_writes_a_flow_too():
+    assert execute(["new", "channel", "--template", "channel"]) == 0
+    case = load_case("channel")
+    assert case.warnings == ()
+    assert case.title == "channel"
+    assert case.structure is None
+    text = Path("channel/case.yaml").read_text()
+    Path("channel/case.yaml").write_text(text.replace("# motion:", "motion:"))
+    assert load_case("channel").fluid.bodies["cylinder"].motion is not None
+    assert "fsci run channel" in Path("channel/README.md").read_text()
+
+
 def test_new_overwrites_nothing(beam, capsys):
     (beam / "case.yaml").write_text("mine")
     assert execute(["new", "beam"]) == 2

@@ -79,6 +79,14 @@ MISTAKES = [
         "6:83: 'to' must be greater than 3, where this stretch begins, not 2",
         "2",
     ),
+    (GRID, "cells: [40, 2e5]", "6:9: 200000 cells along y are too many: 100000 are the most", "{from"),
+    ("to: [4, 1]", "to: [5e-324, 1]", "6:9: the box has no room for so many cells along x", "{from"),
+    (
+        GRID,
+        "cells: [null, 10], x: [{to: 4, cells: 2, ratio: 1e9}]",
+        "6:84: 'ratio' must be from 1e-06 to 1e+06, not 1e+09",
+        "1e9",
+    ),
     # patches
     ("on: x-", "on: left", f"8:17: 'on' must be {FACES}, not 'left'", "left"),
     ("on: x-", "on: [x-, z-]", "8:22: a box in 2D has no face 'z-'", "z-"),
@@ -188,7 +196,7 @@ def test_the_case_without_mistakes_loads():
 @pytest.mark.parametrize(
     ("old", "new", "warning"),
     [
-        ("step: 0.01, end: 1", "step: 2, end: 4", "8:13: the flow crosses 20 cells in a time step here; take a smaller 'step'"),
+        ("step: 0.01, end: 1", "step: 2, end: 4", "8:12: the flow crosses 20 cells in a time step here; take a smaller 'step'"),
         (
             "radius: 0.2",
             "radius: 0.04",
@@ -213,7 +221,7 @@ def test_edges_of_a_graded_grid():
     """Equal cells, and cells that grow by the same factor from the first to the last."""
     stretches = [{"to": 1, "cells": 2}, {"to": 3, "cells": 3, "ratio": 4}, {"to": 4, "cells": 1, "ratio": 7}]
     grid = Grid.model_validate({"from": [0, -1], "to": [4, 1], "cells": [None, 4], "x": stretches})
-    x, y = grid.edges()
+    x, y = grid.planes
     assert grid.shape == (6, 4)
     assert np.allclose(y, [-1, -0.5, 0, 0.5, 1], atol=0)
     assert np.allclose(np.diff(x), [0.5, 0.5, 2 / 7, 4 / 7, 8 / 7, 1])

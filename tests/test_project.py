@@ -72,7 +72,7 @@ def test_error_shown_in_the_quickstart(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", ["quickstart", "running"])
+@pytest.mark.parametrize("page", ["quickstart", "running", "flow"])
 def test_commands_of_the_docs_run(page, tmp_path):
     shutil.copytree(ROOT / "cases", tmp_path / "cases")
     lines = [line for line in commands(ROOT / "docs" / f"{page}.md") if not line.startswith("make")]

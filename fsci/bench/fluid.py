@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fsci.bench.table import Row
 from solvers.fluid.field import Body, Fluid, SolverSettings
-from solvers.fluid.grid import Grid, uniform
+from solvers.fluid.grid import Grid
 from solvers.fluid.patches import Patch
 from solvers.fluid.probes import at_point, difference
 from solvers.fluid.surface import Motion, Surface

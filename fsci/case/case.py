@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import PrivateAttr
 
 from fsci.case.contact import Contact
+from fsci.case.coupling import Coupling
 from fsci.case.document import Document, override
 from fsci.case.errors import CaseError, Place
 from fsci.case.fluid import Fluid
@@ -32,6 +33,7 @@ class Case(Section):
     time: Time = setting(..., "time interval and steps")
     structure: Structure | None = setting(None, "elastic bodies")
     fluid: Fluid | None = setting(None, "incompressible flow")
+    coupling: Coupling | None = setting(None, "how fluid and structure are solved together")
     contact: Contact | None = setting(None, "surfaces that may touch")
     probes: dict[Name, Probe] = setting(dict, "quantities that every step records, by name")
     output: Output = setting(Output, "what is written, and how often")

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from fsci.case.case import Case
 from fsci.case.contact import Contact, Side
+from fsci.case.coupling_checks import coupling_mistakes
 from fsci.case.errors import did_you_mean
 from fsci.case.fluid_checks import fluid_mistakes
 from fsci.case.mesh import Shape
@@ -33,11 +34,13 @@ def mistakes(case: Case) -> Iterator[Mistake]:
 def _sections(case: Case) -> Iterator[Mistake]:
     if case.structure is None and case.fluid is None:
         yield (), "a case needs a section 'structure' or 'fluid'"
-    elif case.structure is not None and case.fluid is not None:
+    elif case.structure is not None and case.fluid is not None and case.coupling is None:
         yield (
             ("fluid",),
-            "'fluid' and 'structure' together need 'coupling', which is not available in this version of fsci",
+            "'fluid' and 'structure' together need the section 'coupling'; 'coupling: {}' for its defaults",
         )
+    if case.coupling is not None:
+        yield from coupling_mistakes(case, case.coupling)
     if case.contact is not None and case.structure is None:
         yield ("contact",), "'contact' needs the section 'structure'"
 

@@ -12,12 +12,22 @@ from fsci.case.section import Section, fault, setting
 from fsci.case.values import Count, Entries, Number, NumberVector, Positive
 
 
+MOST_CELLS = 100_000  #: along one direction
+MOST_GROWTH = 1e6  #: of cells within a stretch
+
+
 class Stretch(Section):
     """Part of one direction: cells from the end of the part before to its own."""
 
     to: Number = setting(..., "where it ends", unit="m")
     cells: Count = setting(..., "number of cells")
     ratio: Positive = setting(1.0, "size of its last cell over that of its first one", unit="1")
+
+    @model_validator(mode="after")
+    def _moderate(self) -> Stretch:
+        if not 1 / MOST_GROWTH <= self.ratio <= MOST_GROWTH:
+            raise fault(f"must be from {1 / MOST_GROWTH:g} to {MOST_GROWTH:g}, not {self.ratio:g}", "ratio")
+        return self
 
 
 Stretches = Annotated[tuple[Stretch, ...], Entries(1, None)]
@@ -60,6 +70,11 @@ class Grid(Section):
             if low >= high:
                 raise fault(f"must be greater than that of 'from', {low:g}, not {high:g}", "to", axis)
             self._check_direction(axis)
+        for axis, (count, name) in enumerate(zip(self.shape, "xyz", strict=False)):
+            if count > MOST_CELLS:
+                raise fault(f"{count} cells along {name} are too many: {MOST_CELLS} are the most")
+            if not np.all(np.diff(self.edges(axis)) > 0.0):
+                raise fault(f"the box has no room for so many cells along {name}")
         return self
 
     def _check_direction(self, axis: int) -> None:
@@ -89,17 +104,18 @@ class Grid(Section):
             for axis, stretches in enumerate(self.graded)
         )
 
-    def edges(self) -> tuple[NDArray[np.float64], ...]:
-        """Coordinates of the grid planes, increasing, one array per direction."""
-        found = []
-        for axis, (low, high) in enumerate(zip(self.start, self.to, strict=True)):
-            stretches = self.graded[axis] or (Stretch(to=high, cells=self.shape[axis]),)
-            parts = [np.array([low])]
-            for stretch in stretches:
-                sizes = stretch.ratio ** (np.arange(stretch.cells) / max(stretch.cells - 1, 1))
-                inner = np.concatenate([[0.0], np.cumsum(sizes) / sizes.sum()])
-                inner[-1] = 1.0
-                begin = parts[-1][-1]
-                parts.append((begin * (1.0 - inner) + stretch.to * inner)[1:])
-            found.append(np.concatenate(parts))
-        return tuple(found)
+    @property
+    def planes(self) -> tuple[NDArray[np.float64], ...]:
+        """The edges of all directions."""
+        return tuple(self.edges(axis) for axis in range(self.dimension))
+
+    def edges(self, axis: int) -> NDArray[np.float64]:
+        """Coordinates of the grid planes along one direction, increasing."""
+        parts = [np.array([self.start[axis]])]
+        for stretch in self.graded[axis] or (Stretch(to=self.to[axis], cells=self.shape[axis]),):
+            sizes = stretch.ratio ** (np.arange(stretch.cells) / max(stretch.cells - 1, 1))
+            inner = np.concatenate([[0.0], np.cumsum(sizes) / sizes.sum()])
+            inner[-1] = 1.0
+            begin = parts[-1][-1]
+            parts.append((begin * (1.0 - inner) + stretch.to * inner)[1:])
+        return np.concatenate(parts)

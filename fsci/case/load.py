@@ -45,7 +45,7 @@ def _with_defaults(case: Case) -> Case:
         section = case.structure if field == "structure" else case.fluid
         bodies = list(section.bodies) if section is not None else []
         update: dict[str, str] = {"field": field or ""}
-        if probe.body is None and len(bodies) == 1 and (field == "structure" or probe.quantity in ("force", "moment")):
+        if probe.body is None and len(bodies) == 1 and field == "structure":
             update["body"] = bodies[0]
         probes[name] = probe.model_copy(update=update)
     return case.model_copy(update={"probes": probes})

@@ -12,8 +12,6 @@ from fsci.case.errors import Problem, did_you_mean, listed
 from fsci.case.values import spoken
 from fsci.case.yaml_text import Keys
 
-#: sections of the case format that are not there yet
-PLANNED = ("coupling",)
 EMPTY = "is empty: give it a value"
 
 
@@ -74,8 +72,6 @@ def _root(value: Any) -> str:
 
 def _unknown(keys: Keys, names: list[str]) -> str:
     name = str(keys[-1])
-    if len(keys) == 1 and name in PLANNED:
-        return f"section '{name}' is not available in this version of fsci (available: {', '.join(names)})"
     return f"unknown setting '{name}'{did_you_mean(name, names)}"
 
 

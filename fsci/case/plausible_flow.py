@@ -25,7 +25,7 @@ def flow_doubts(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
         yield ("fluid", "density"), f"implausible density: {value}; check 'units'"
     if not _driven(fluid):
         yield ("fluid", "patches"), "nothing drives the flow: no velocity, traction, force or moving body"
-    smallest = min(float(np.diff(edges).min()) for edges in fluid.grid.edges())
+    smallest = min(float(np.diff(edges).min()) for edges in fluid.grid.planes)
     for name, body in fluid.bodies.items():
         if isinstance(body.mesh, Shape) and (extent := thickness(body.mesh)) < smallest:
             yield (
@@ -51,7 +51,7 @@ def _cells_per_step(case: Case, fluid: Fluid, patch: Patch) -> float:
     """Largest |u_i| dt / h_i of the velocity prescribed on a patch, over its nodes and some times of the run."""
     if patch.velocity is None:
         return 0.0
-    edges, largest = fluid.grid.edges(), 0.0
+    edges, largest = fluid.grid.planes, 0.0
     cells = [np.pad(np.diff(edge), 1, mode="edge") for edge in edges]
     sizes = [np.minimum(h[1:], h[:-1]) for h in cells]
     times = np.linspace(case.time.start, case.time.end, 5)

@@ -37,7 +37,7 @@ def probe_mistakes(case: Case) -> Iterator[Mistake]:
             case "structure" if case.structure is not None:
                 yield from _of_structure(case.structure, name, probe)
             case "fluid" if case.fluid is not None:
-                yield from _of_fluid(case.fluid, name, probe)
+                yield from _of_fluid(case, case.fluid, name, probe)
             case _:
                 yield from _of_none(case, name, probe)
 
@@ -72,8 +72,9 @@ def _of_structure(structure: Structure, name: str, probe: Probe) -> Iterator[Mis
         yield (*keys, "quantity"), f"quantity '{probe.quantity}' needs the 'density' of the material"
 
 
-def _of_fluid(fluid: Fluid, name: str, probe: Probe) -> Iterator[Mistake]:
-    keys, bodies, grid = ("probes", name), fluid.bodies, fluid.grid
+def _of_fluid(case: Case, fluid: Fluid, name: str, probe: Probe) -> Iterator[Mistake]:
+    keys, grid = ("probes", name), fluid.grid
+    bodies = [*fluid.bodies, *(case.elastic_bodies if case.coupling is not None else ())]
     if probe.quantity not in ("force", "moment"):
         if probe.body is not None:
             yield (*keys, "body"), f"quantity '{probe.quantity}' of the fluid is not that of a body"
@@ -81,8 +82,6 @@ def _of_fluid(fluid: Fluid, name: str, probe: Probe) -> Iterator[Mistake]:
         yield (*keys, "body"), f"unknown body '{probe.body}'{did_you_mean(probe.body, bodies)}"
     elif not bodies:
         yield (*keys, "quantity"), f"quantity '{probe.quantity}' needs a body in the flow"
-    elif probe.body is None and len(bodies) > 1:
-        yield keys, f"missing setting 'body' in '{name}': there are several bodies ({', '.join(bodies)})"
     for place in ("on", "through"):
         patch = getattr(probe, place)
         if patch is not None and patch not in fluid.patches:

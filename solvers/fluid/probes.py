@@ -179,18 +179,17 @@ class Forces:
         """A new step begins."""
         self._found = None
 
-    def probe(self, quantity: str, body: str, about: Sequence[float] | None = None) -> Probe:
-        """force [N] of the fluid on a body, or moment [N m] of it about a point (the origin)."""
+    def probe(self, quantity: str, body: str | None, about: Sequence[float] | None = None) -> Probe:
+        """force [N] of the fluid on a body (None: on all), or moment [N m] of it about a point (the origin)."""
         fluid = self.fluid
-        names = [b.surface.name for b in fluid.bodies]
-        index, ends = names.index(body), np.cumsum([0, *(b.surface.vertices for b in fluid.bodies)])
-        vertices = slice(ends[index], ends[index + 1])
+        names = [body] if body is not None else [b.surface.name for b in fluid.bodies]
+        vertices = fluid.vertices_of(names)
         centre = np.zeros(fluid.dim) if about is None else np.asarray(about, dtype=float)
 
         def measure() -> dict[str, float]:
             if self._found is None:
                 self._found = fluid.force()
-            force = self._found[body]
+            force = np.concatenate([self._found[name] for name in names])
             if quantity == "force":
                 return _components(force.sum(axis=0))
             x = fluid.cut.motion.x[vertices]

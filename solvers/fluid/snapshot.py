@@ -50,13 +50,18 @@ def _corners(fluid: Fluid) -> np.ndarray:
 
 
 def _bodies(fluid: Fluid) -> list[Snapshot]:
-    """Surfaces with their velocity and what the fluid does to them, as force per area (zero before the first step)."""
+    """Rigid surfaces with their velocity and the fluid's force per area on them (zero before the first step).
+
+    A body that another field moves is that field's to show.
+    """
     found, start = [], 0
     forces = fluid.force() if fluid.bodies and fluid.started else {}
     for body in fluid.bodies:
         surface, dim = body.surface, fluid.dim
         part = slice(start, start + surface.vertices)
         start = part.stop
+        if body.motion is None:
+            continue
         x, v = fluid.cut.motion.x[part], fluid.cut.motion.v[part]
         force = forces.get(surface.name, np.zeros_like(x))
         area = vertex_areas(x, surface.facets)[:, None]

@@ -1,0 +1,124 @@
+"""From a case with fluid and structure to the coupled system and its scheme."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from coupling.accelerate import Accelerator, Aitken, QuasiNewton, Relaxation
+from coupling.coupled import Coupled
+from coupling.interface import Interface, Wetted
+from coupling.monolithic import Monolithic
+from coupling.partitioned import Partitioned, Tolerance
+from fsci.build_contact import global_dofs
+from fsci.build_fluid import build_fluid, build_rigid_bodies
+from fsci.build_solver import build_tolerance
+from fsci.case import Case
+from fsci.mesh import MeshError, require_surface
+from solvers.api import Scheme
+from solvers.blocks import Layout
+from solvers.fluid.field import Body as Bather
+from solvers.fluid.probes import winding
+from solvers.fluid.surface import Motion, Surface
+from solvers.structure.body import Body
+from solvers.structure.field import Structure
+from solvers.tessellation import tessellate
+from solvers.timing import Timer
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Skin:
+    """The boundary of an elastic body as the fluid sees it; the same on every process."""
+
+    name: str
+    points: Array  #: reference positions [m], shape (n, dim)
+    facets: NDArray[np.int64]
+    nodes: NDArray[np.int64]  #: numbers in the mesh
+    wet: NDArray[np.bool_] | None  #: facets that the case names; None: it names none
+
+
+def build_coupled(
+    case: Case, comm: MPI.Comm, bodies: Sequence[Body], structure: Structure, timer: Timer
+) -> tuple[Scheme, Coupled]:
+    """The scheme and what it couples. Raises CaseError (collective)."""
+    assert case.coupling is not None
+    skins = [_skin(case, comm, body) for body in bodies]
+    layout = Layout(comm, [body.size for body in bodies])
+    wetted = [
+        Wetted(skin.name, skin.points, global_dofs(comm, layout, index, bodies[index], skin.nodes))
+        for index, skin in enumerate(skins)
+    ]
+    rigid = build_rigid_bodies(case, comm)
+    at_start = [(b.surface, b.motion(case.time.start).x) for b in rigid if b.motion is not None]
+    at_start += [(Surface(s.name, s.facets, len(s.points), s.wet), s.points) for s in skins]
+    wet = _not_inside_others(at_start)
+    bathers = [replace(body, surface=surface) for body, surface in zip(rigid, wet, strict=False)]
+    bathers += [Bather(surface, None) for surface in wet[len(rigid) :]]
+    fluid = build_fluid(case, comm, timer, bathers)
+    coupled = Coupled(fluid, structure, Interface(structure, wetted))
+    if case.coupling.scheme == "monolithic":
+        return Monolithic(coupled, build_tolerance(case)), coupled
+    settings = case.coupling
+    tolerance = Tolerance(settings.tolerance, settings.tolerance_absolute, settings.max_iterations)
+    return Partitioned(coupled, _accelerator(case), tolerance), coupled
+
+
+def _not_inside_others(surfaces: Sequence[tuple[Surface, Array]]) -> list[Surface]:
+    """Surfaces whose facets with the middle in another body are dry: there bodies are one piece."""
+    found = []
+    for index, (surface, x) in enumerate(surfaces):
+        wet = np.ones(len(surface.facets), dtype=bool) if surface.wet is None else surface.wet.copy()
+        middles = x[surface.facets].mean(axis=1)
+        for other, (body, at) in enumerate(surfaces):
+            if other == index or surface.wet is not None:
+                continue
+            near = np.all((middles > at.min(axis=0)) & (middles < at.max(axis=0)), axis=1)
+            motion = Motion(at, np.zeros_like(at))
+            for facet in np.flatnonzero(near & wet):
+                wet[facet] = winding(middles[facet], motion, body.facets) < 0.75
+        found.append(replace(surface, wet=wet))
+    return found
+
+
+def _skin(case: Case, comm: MPI.Comm, body: Body) -> Skin:
+    found = None
+    if comm.rank == 0:
+        try:
+            found = _cut_out(case, body)
+        except MeshError as error:
+            found = case.error(("coupling", "wetted", body.name), str(error))
+    found = comm.bcast(found, root=0)
+    if isinstance(found, Exception):
+        raise found
+    return Skin(body.name, *found)
+
+
+def _cut_out(case: Case, body: Body):
+    """(points, facets, node numbers, wet facets) on rank 0. Raises MeshError."""
+    mesh = body.domain.source
+    assert mesh is not None
+    assert case.coupling is not None
+    facets, nodes = tessellate(mesh)
+    names = case.coupling.wetted.get(body.name)
+    wet = None
+    if names is not None:
+        for name in names:
+            require_surface(mesh, name)
+        some, some_nodes = tessellate(mesh, names)
+        chosen = {tuple(facet) for facet in np.sort(some_nodes[some], axis=1).tolist()}
+        wet = np.array([tuple(facet) in chosen for facet in np.sort(nodes[facets], axis=1).tolist()])
+    return mesh.points[nodes], facets, nodes, wet
+
+
+def _accelerator(case: Case) -> Accelerator:
+    assert case.coupling is not None
+    settings = case.coupling
+    if settings.accelerator == "iqn":
+        return QuasiNewton(settings.relaxation, settings.reuse)
+    return Aitken(settings.relaxation) if settings.accelerator == "aitken" else Relaxation(settings.relaxation)

@@ -1,0 +1,40 @@
+"""Section `coupling`: how the fluid and the elastic bodies in it are solved together."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import model_validator
+
+from fsci.case.section import Section, fault, setting
+from fsci.case.values import Count, CountOrZero, Name, NotNegative, Positive, Surfaces
+
+PARTITIONED = ("accelerator", "relaxation", "reuse", "tolerance", "tolerance_absolute", "max_iterations")
+
+
+class Coupling(Section):
+    """Fluid and structure at once (monolithic), or by turns until they agree (partitioned)."""
+
+    scheme: Literal["monolithic", "partitioned"] = setting(
+        "monolithic", "monolithic: one Newton iteration for all; partitioned: Dirichlet-Neumann iterations"
+    )
+    wetted: dict[Name, Surfaces] = setting(
+        dict, "surfaces that the fluid touches, by body; default: all but what lies in other bodies at the start"
+    )
+    accelerator: Literal["iqn", "aitken", "constant"] = setting(
+        "iqn", "partitioned: interface quasi-Newton, Aitken's relaxation, or a constant one"
+    )
+    relaxation: Positive = setting(0.5, "partitioned: share of the first correction that is taken", unit="1")
+    reuse: CountOrZero = setting(8, "partitioned, iqn: earlier steps whose iterations are still used")
+    tolerance: Positive = setting(
+        1e-6, "partitioned: disagreement of the displacements, relative to those of the step", unit="1"
+    )
+    tolerance_absolute: NotNegative = setting(0.0, "partitioned: disagreement that is small in any case", unit="m")
+    max_iterations: Count = setting(50, "partitioned: iterations after which a step has failed")
+
+    @model_validator(mode="after")
+    def _for_partitioned(self) -> Coupling:
+        for name in PARTITIONED:
+            if self.scheme == "monolithic" and name in self.model_fields_set:
+                raise fault(f"'{name}' is for the partitioned scheme", name)
+        return self
