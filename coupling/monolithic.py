@@ -3,7 +3,8 @@
     [ K + w alpha M_G    -w C^T S ] [du]       [ r_s ]        w: weight of the load in the structure's balance
     [ alpha C                A    ] [dw]  =  - [ r_f ]        C, S, M: see solvers.fluid.interface, g = alpha d - ...
 
-Derivatives with respect to the shape of the fluid's domain are left out.
+Derivatives with respect to the shape of the fluid's domain count in steady flows only, where alpha = 0 and they are all
+that the fluid feels of du; in time they are small against alpha C, and cost more than the Newton steps that they save.
 Source: Schott, Ager, Wall, Int. J. Numer. Meth. Engng 119 (2019) 757-796.
 """
 
@@ -30,7 +31,8 @@ class Monolithic:
         structure, fluid = coupled.structure, coupled.fluid
         self.comm = structure.comm
         self._numbering = Numbering(self.comm, structure.layout.size, fluid.unknowns.owned)
-        self._ksp = linear.flow_direct_solver(self.comm, tolerance=0.0)
+        self._iterative = linear.choose_flow(fluid.solver.linear, fluid.dim, fluid.dofs()) == "iterative"
+        self._direct = linear.flow_direct_solver(self.comm, tolerance=0.0)
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -76,11 +78,22 @@ class Monolithic:
         matrix.zeroRowsColumns((start + structure.prescribed).astype(PETSc.IntType), 1.0, x, b)
         try:
             with fluid.timer("solve"):
-                linear.solve(self._ksp, matrix, b, x)
+                linear.solve(self._solver(matrix), matrix, b, x)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         everything = self._numbering.gather(self.comm, x.array) if structure.constrained else None
         return max(structure.update(x.array[:own], everything), fluid.update(x.array[own:]))
+
+    def _solver(self, matrix: PETSc.Mat) -> PETSc.KSP:
+        """A new one if it is iterative: the rows of the fields are the same, but what PETSc took from them is not."""
+        if not self._iterative:
+            return self._direct
+        start, own = matrix.getOwnershipRange()[0], self.coupled.structure.layout.size
+        rows = [(own, start), (self.coupled.fluid.unknowns.owned, start + own)]
+        structure, flow = (PETSc.IS().createStride(size, first, 1, comm=self.comm) for size, first in rows)
+        return linear.coupled_solver(
+            self.comm, structure, flow, tolerance=self.coupled.fluid.solver.linear_tolerance
+        )
 
     def _matrix(self) -> PETSc.Mat:
         structure, fluid = self.coupled.structure, self.coupled.fluid
@@ -99,8 +112,11 @@ class Monolithic:
         operator = fluid.system.interface
         wetted = fluid.vertices_of([s.name for s in surface.surfaces])
         columns = (wetted[:, None] * fluid.dim + np.arange(fluid.dim)).ravel()
-        by_shape, load_by_shape = shape_derivatives(operator, fluid.flow)
-        velocity_in = (alpha * operator.matrix + by_shape)[:, columns].tocoo()
+        into, load = alpha * operator.matrix, alpha * operator.mass
+        if fluid.settings.steady:
+            by_shape, load_by_shape = shape_derivatives(operator, fluid.flow)
+            into, load = into + by_shape, load - load_by_shape
+        velocity_in = into[:, columns].tocoo()
         C = operator.matrix[:, columns].tocoo()
         flow, held = fluid.unknowns.global_dofs, fluid.held_everywhere()
         own_structure, own_flow = structure.layout.size, fluid.unknowns.owned
@@ -117,7 +133,7 @@ class Monolithic:
         into_structure = from_entries(
             self.comm, (own_structure, own_flow), dofs[C.col], flow[C.row], -weight * sign * C.data
         )
-        M = (alpha * operator.mass - load_by_shape)[columns][:, columns].tocoo()
+        M = load[columns][:, columns].tocoo()
         mass = from_entries(self.comm, (own_structure, own_structure), dofs[M.row], dofs[M.col], weight * M.data)
         return into_fluid, into_structure, mass
 

@@ -112,7 +112,8 @@ verify:
 CHANNEL_README = """\
 # {name}
 
-Flow past a cylinder of 0.1 m in a channel of 2.2 m x 0.41 m; it speeds up for 1 s and becomes steady, Reynolds number 20.
+Flow past a cylinder of 0.1 m in a channel of 2.2 m x 0.41 m. It speeds up for 1 s and becomes steady;
+the Reynolds number is 20.
 
     fsci check {folder}           # is the case right?
     fsci run {folder}             # results in results/{name}

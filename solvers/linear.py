@@ -117,6 +117,35 @@ def flow_solver(comm, *, tolerance: float) -> PETSc.KSP:
     return ksp
 
 
+def coupled_solver(comm, structure, flow, *, tolerance: float) -> PETSc.KSP:
+    """FGMRES for structure and flow together; `structure`, `flow`: their rows, as index sets.
+
+    Preconditioner: block Gauss-Seidel, the structure by LU, then the flow by incomplete factors on overlapping parts.
+    Source: Gee, Kuttler, Wall, Int. J. Numer. Meth. Engng 85 (2011) 987-1016.
+    """
+    options = PETSc.Options("coupled_")
+    for name, value in {
+        "pc_fieldsplit_type": "multiplicative",
+        "fieldsplit_structure_ksp_type": "preonly",
+        "fieldsplit_structure_pc_type": "lu",
+        "fieldsplit_structure_pc_factor_mat_solver_type": "mumps",
+        "fieldsplit_flow_ksp_type": "preonly",
+        "fieldsplit_flow_pc_type": "asm",
+        "fieldsplit_flow_pc_asm_overlap": 1,
+        "fieldsplit_flow_sub_pc_type": "ilu",
+    }.items():
+        options[name] = value
+    ksp = PETSc.KSP().create(comm)
+    ksp.setOptionsPrefix("coupled_")
+    ksp.setType(PETSc.KSP.Type.FGMRES)
+    ksp.setGMRESRestart(150)
+    ksp.setTolerances(rtol=tolerance, max_it=600)
+    ksp.getPC().setType(PETSc.PC.Type.FIELDSPLIT)
+    ksp.getPC().setFieldSplitIS(("structure", structure), ("flow", flow))
+    ksp.setFromOptions()
+    return ksp
+
+
 def solve(ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
     """Solve matrix x = b with a freshly assembled matrix. Raises LinearSolveFailed."""
     if ksp.getOptionsPrefix() == "elastic_":

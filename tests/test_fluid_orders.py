@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 import sympy
-from fluid_setup import body, circle, errors, field, loop, make_fluid, solve_steady, sphere, step, symbolic, wall
+from fluid_setup import body, circle, errors, field, loop, make_fluid, solve_steady, symbolic, wall
 
 from solvers.fluid.field import SolverSettings
 from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
 from solvers.newton import Tolerance
 
 X, Y, Z, T = sympy.symbols("x y z t")

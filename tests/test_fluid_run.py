@@ -1,4 +1,4 @@
-"""Flows run as a user runs them: what is measured, resumed bit for bit, on two processes, with what files and pictures."""
+"""Flows run as a user runs them: measured, resumed bit for bit, on two processes, with files and pictures."""
 
 import json
 import shutil
@@ -186,7 +186,7 @@ def test_pictures_of_a_flow(moving, tmp_path):
 
 
 def test_a_resumed_flow_is_the_same_bit_for_bit(moving, tmp_path):
-    out, whole = moving
+    _, whole = moving
     (tmp_path / "case.yaml").write_text(MOVING)
     half = load_case(tmp_path / "case.yaml", [("time.end", "0.06")])
     assert run_case(half, tmp_path / "out") == FINISHED

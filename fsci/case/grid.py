@@ -11,7 +11,6 @@ from pydantic import model_validator
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import Count, Entries, Number, NumberVector, Positive
 
-
 MOST_CELLS = 100_000  #: along one direction
 MOST_GROWTH = 1e6  #: of cells within a stretch
 

@@ -17,8 +17,9 @@ from solvers.kernels import basis_transformation, mortar, nodal_normals
 #: Slave facets take part when a master is nearer than this share of the longest edge (and the motion of the step).
 NEAR = 0.3
 
-#: Evaluations of a step after which facet pairs that are in use stay in use.
-KEEP_AFTER = 3
+#: Evaluations of a step after which facet pairs that are in use stay in use: late, as the result then depends on the
+#: path to it, but in time for pairs that come and go for ever.
+KEEP_AFTER = 12
 
 Integration = Literal["segments", "elements"]
 
