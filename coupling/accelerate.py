@@ -137,12 +137,12 @@ class QuasiNewton:
         return kept
 
     def save(self) -> State:
-        return {
-            f"step{number}": {"V": np.stack(v), "W": np.stack(w)}
-            for number, (v, w) in enumerate(step for step in self._steps if step[0])
-        }
+        steps = [step for step in self._steps if step[0]]
+        V, W = (np.array([column for step in steps for column in step[which]]) for which in (0, 1))
+        return {"V": V, "W": W, "lengths": np.array([len(step[0]) for step in steps], dtype=np.int64)}
 
     def restore(self, state: State) -> None:
-        steps = sorted(state.items(), key=lambda item: int(item[0].removeprefix("step")))
-        self._steps = [(list(step["V"]), list(step["W"])) for _, step in steps]
+        ends = np.cumsum(state["lengths"])
+        starts = ends - state["lengths"]
+        self._steps = [(list(state["V"][a:b]), list(state["W"][a:b])) for a, b in zip(starts, ends, strict=True)]
         self._before = None

@@ -91,9 +91,7 @@ class Monolithic:
         start, own = matrix.getOwnershipRange()[0], self.coupled.structure.layout.size
         rows = [(own, start), (self.coupled.fluid.unknowns.owned, start + own)]
         structure, flow = (PETSc.IS().createStride(size, first, 1, comm=self.comm) for size, first in rows)
-        return linear.coupled_solver(
-            self.comm, structure, flow, tolerance=self.coupled.fluid.solver.linear_tolerance
-        )
+        return linear.coupled_solver(self.comm, structure, flow, tolerance=self.coupled.fluid.solver.linear_tolerance)
 
     def _matrix(self) -> PETSc.Mat:
         structure, fluid = self.coupled.structure, self.coupled.fluid

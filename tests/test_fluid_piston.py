@@ -48,8 +48,6 @@ def piston(dim, scheme, element, dt=DT):
     )  # fmt: skip
 
 
-
-
 @pytest.mark.parametrize(
     ("dim", "element", "scheme"),
     [(2, e, s) for e in ("q1q1", "q2q1") for s in ("backward_euler", "bdf2")] + [(3, "q1q1", "backward_euler")],

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.condense import Linearised, condense, expand, place_columns, recover
+from solvers.contact.held import lent_shares
 from solvers.contact.pair import KEEP_AFTER, Pair
 from solvers.contact.share import Shares
 from solvers.contact.surface import Nodes, Surface, number_nodes
@@ -82,7 +83,8 @@ class Contact:
         self._shares = Shares(comm)
         self.terms: Terms | None = None
         self._columns = [_columns(sides, self.dim) for sides in self._sides]
-        self._lent = self._lend()
+        facets = [slave[pair.slave.facets] for pair, (slave, _) in zip(self.pairs, self._sides, strict=True)]
+        self._lent = lent_shares(facets, self.nodes.held.all(axis=1) & (self._areas > 0.0))
         #: rows of slave nodes in the basis of the multipliers, if that is not the nodal one (tri6)
         self.transformation = self._transformation()
 
@@ -94,25 +96,6 @@ class Contact:
             measure = _facet_measures(pair.slave) / facets.shape[1]
             np.add.at(areas, slave[facets], measure[:, None])
         return areas
-
-    def _lend(self) -> sp.csr_matrix | None:
-        """Shares that held slave nodes get of the multipliers of their neighbours, shape (N, N); None if none is held.
-
-        A node held entirely has no multiplier of its own: its constraint would contradict the support. With the mean of
-        its neighbours' the multipliers still contain all constants, so that a patch test is passed; the constraint of
-        the neighbours is then that of their own and the lent functions together.
-        Source: Popp, Seitz, Gee & Wall, Comput. Methods Appl. Mech. Engng 264 (2013), section 3.
-        """
-        slaves = self._areas > 0.0
-        held = slaves & self.nodes.held.all(axis=1)
-        if not held.any():
-            return None
-        beside = sp.lil_matrix((self.size, self.size))
-        for pair, (slave, _) in zip(self.pairs, self._sides, strict=True):
-            for facet in slave[pair.slave.facets]:
-                beside[np.ix_(facet[held[facet]], facet[~held[facet]])] = 1.0
-        count = np.asarray(beside.sum(axis=1)).ravel()
-        return (sp.diags(1.0 / np.maximum(count, 1.0)) @ beside).tocsr()
 
     def _with_lent(self, rows):
         """Rows (of gap, D, M, ...) of nodes plus those of the functions that are lent to them."""

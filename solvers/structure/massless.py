@@ -30,7 +30,7 @@ def move_mass_inwards(mass: PETSc.Mat, surface: NDArray[np.int64]) -> tuple[PETS
     total = np.bincount(rows, behind, minlength=end - start)
     massless = np.flatnonzero(total > 0.0)
 
-    T = PETSc.Mat().createAIJ(mass.sizes, nnz=(np.diff(indptr).max(initial=1),) * 2, comm=mass.comm)
+    T = PETSc.Mat().createAIJ(mass.sizes, nnz=(np.diff(indptr).max(initial=0) + 1,) * 2, comm=mass.comm)
     kept = np.setdiff1d(np.arange(end - start), massless)
     for i in kept.tolist():
         T.setValue(start + i, start + i, 1.0)
@@ -38,5 +38,6 @@ def move_mass_inwards(mass: PETSc.Mat, surface: NDArray[np.int64]) -> tuple[PETS
         part = slice(indptr[i], indptr[i + 1])
         found = behind[part] > 0.0
         T.setValues([start + i], columns[part][found], behind[part][found] / total[i])
+        T.setValue(start + i, start + i, 0.0)  # so that the diagonal has a place in T^T M T
     T.assemble()
     return mass.ptap(T), massless

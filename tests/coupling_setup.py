@@ -1,0 +1,113 @@
+"""Small coupled systems that several tests use."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from coupling.coupled import Coupled
+from coupling.interface import Interface, Wetted
+from fsci import shapes
+from fsci.build_contact import global_dofs
+from solvers import fem
+from solvers.blocks import Layout
+from solvers.fluid.field import Body as Bather
+from solvers.fluid.field import Fluid
+from solvers.fluid.field import SolverSettings as FlowSolver
+from solvers.fluid.grid import Grid, uniform
+from solvers.fluid.patches import Patch
+from solvers.fluid.surface import Surface
+from solvers.fluid.system import FlowSettings
+from solvers.mesh import Mesh
+from solvers.newton import Tolerance
+from solvers.structure.body import Body, BodySettings, Support, Symmetry
+from solvers.structure.field import SolverSettings, Structure
+from solvers.structure.materials import StVenantKirchhoff, lame
+from solvers.structure.time import Dynamics, TimeScheme
+from solvers.tessellation import tessellate
+from solvers.time import GeneralisedAlpha
+
+TIGHT = Tolerance(1e-10)
+
+
+def zero(x, t):
+    return np.zeros(x.shape[1])
+
+
+def couple(
+    mesh: Mesh,
+    body: BodySettings,
+    time: TimeScheme,
+    grid: Grid,
+    flow: FlowSettings,
+    patches: list[Patch],
+    *,
+    dry=lambda middles: np.zeros(len(middles), dtype=bool),
+    comm=MPI.COMM_SELF,
+) -> Coupled:
+    """One elastic body in a flow; `dry` marks facets by their middles that the fluid does not touch."""
+    domain = fem.distribute(comm, mesh if comm.rank == 0 else None)
+    solid = Body(domain, body)
+    structure = Structure(comm, [solid], time, SolverSettings(TIGHT))
+    facets, nodes = tessellate(mesh)
+    points = mesh.points[nodes]
+    dofs = global_dofs(comm, Layout(comm, [solid.size]), 0, solid, nodes)
+    surface = Surface(body.name, facets, len(points), ~dry(points[facets].mean(axis=1)))
+    fluid = Fluid(comm, grid, flow, patches, [Bather(surface, None)], FlowSolver(TIGHT))
+    return Coupled(fluid, structure, Interface(structure, [Wetted(body.name, points, dofs)]))
+
+
+#: rho_s L_s / (rho_f L) -> smallest k with k tan k = r
+BAR_MODES = {10.0: 1.428870011, 1.0: 0.860333589, 0.1: 0.3110528482}
+
+
+def bar_and_column(ratio: float, *, density: float | None = None, amplitude: float = 1e-3, cells: int = 10) -> Coupled:
+    """An elastic bar 0 < x < 1, fixed at x = 0, and a column of fluid 1 < x < 2 with a free end, in a slip channel.
+
+    E = rho_s = 1, nu = 0; starts at rest in its first mode, of angular frequency k. Density of the fluid: 1 / ratio.
+    """
+    k, height, shift = BAR_MODES[ratio], 0.2, 0.0137
+    density = 1.0 / ratio if density is None else density
+    first_mode = (lambda x, t: amplitude * np.sin(k * x[0]) / np.sin(k), zero)
+    mu, lmbda = lame(1.0, 0.0)
+    body = BodySettings(
+        "bar",
+        StVenantKirchhoff(mu, lmbda, 1.0),
+        supports=(Support("left", (zero, zero)), Symmetry("top"), Symmetry("bottom")),
+        initial_displacement=first_mode,
+    )
+    return couple(
+        shapes.rectangle([1.0, height], [cells, 2], order=1, cell="quad"),
+        body,
+        Dynamics(GeneralisedAlpha.from_rho_inf(1.0)),
+        uniform([0.5 + shift, 0.0], [2.0, height], [15, 2]),
+        FlowSettings(density, 1e-9, convection=False, scheme="bdf2"),
+        [
+            Patch("sides", ("y-", "y+"), "slip"),
+            Patch("behind", ("x-",), "slip"),
+            Patch("end", ("x+",), "traction", (zero, zero)),
+        ],
+        dry=lambda middles: middles[:, 0] < 1.0 - 1e-9,
+    )
+
+
+def post_in_flow(*, E: float = 100.0, rho_s: float = 2.0, scheme: str = "bdf2", mu: float = 0.05) -> Coupled:
+    """A soft square post that stands on the bottom of a channel, in a flow that begins to move."""
+    a, b = lame(E, 0.3)
+    body = BodySettings("post", StVenantKirchhoff(a, b, rho_s), supports=(Support("bottom", (zero, zero)),))
+    inflow = (lambda x, t: 4.0 * x[1] * (1.0 - x[1]) * np.minimum(t / 0.1, 1.0), zero)
+    mesh = shapes.rectangle([0.23, 0.41], [3, 5], order=1, cell="quad")
+    mesh.points[:, 0] += 0.62
+    return couple(
+        mesh,
+        body,
+        Dynamics(GeneralisedAlpha.from_rho_inf(0.8)),
+        uniform([0.0, 0.0], [2.0, 1.0], [20, 10]),
+        FlowSettings(1.0, mu, scheme=scheme),
+        [
+            Patch("inlet", ("x-",), "velocity", inflow),
+            Patch("outlet", ("x+",), "outflow"),
+            Patch("walls", ("y-", "y+"), "no_slip"),
+        ],
+        dry=lambda middles: middles[:, 1] < 1e-9,
+    )

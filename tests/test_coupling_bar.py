@@ -1,0 +1,85 @@
+"""An elastic bar against a column of fluid: exact frequency, limit of plain iterations (references of the docs, 2.6)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coupling.accelerate import Aitken, QuasiNewton, Relaxation
+from coupling.monolithic import Monolithic
+from coupling.partitioned import Partitioned, Tolerance
+from solvers.api import StepFailed
+from tests.coupling_setup import BAR_MODES, TIGHT, bar_and_column
+
+
+def swing(scheme, dt: float, steps: int):
+    """(displacement of the end after each step, iterations of each step)."""
+    coupled = scheme.coupled
+    coupled.initialise(0.0, dt)
+    end = int(np.argmax(coupled.interface.points[:, 0]))
+    found, iterations = [], []
+    for step in range(steps):
+        info = scheme.step(step * dt, dt)
+        found.append(coupled.interface.now[end, 0])
+        iterations.append(info.iterations)
+    return np.array(found), iterations
+
+
+def zeros(values: np.ndarray, dt: float) -> np.ndarray:
+    """Times at which a piecewise linear function changes sign; its first value is at dt."""
+    t = dt * (1 + np.arange(len(values)))
+    change = np.flatnonzero(values[1:] * values[:-1] < 0.0)
+    return t[change] - values[change] * dt / (values[change + 1] - values[change])
+
+
+@pytest.mark.parametrize("ratio", [10.0, 1.0, 0.1])
+def test_frequency(ratio: float):
+    omega = BAR_MODES[ratio]
+    dt = 2.0 * np.pi / omega / 60.0
+    end, iterations = swing(Monolithic(bar_and_column(ratio), TIGHT), dt, 80)
+    crossings = zeros(end, dt)
+    assert np.pi / (crossings[1] - crossings[0]) == pytest.approx(omega, rel=0.005)
+    assert max(iterations) <= 3
+
+
+@pytest.mark.parametrize("accelerator", [Aitken(0.5), QuasiNewton(0.5)], ids=["aitken", "iqn"])
+def test_both_schemes_take_the_same_way(accelerator):
+    """50 steps with the heavy fluid, ratio 0.1."""
+    dt = 0.1
+    one, newton = swing(Monolithic(bar_and_column(0.1), TIGHT), dt, 50)
+    two, _ = swing(Partitioned(bar_and_column(0.1), accelerator, Tolerance(1e-7)), dt, 50)
+    assert np.abs(one - two).max() < 10 * 1e-7 * np.abs(one).max()
+    light, _ = swing(Monolithic(bar_and_column(10.0), TIGHT), dt, 5)
+    assert np.isfinite(light).all()
+    assert max(newton) <= 3
+
+
+def contraction(dt: float, cells: int) -> float:
+    """Exact factor of plain Dirichlet-Neumann iterations: added mass of the column over what the bar's end resists.
+
+    Both fields by their own rules: the fluid's acceleration of the first step, backward Euler, 1/dt^2 of a displacement,
+    the bar's linear elements as in the computation.
+    """
+    h = 1.0 / cells
+    main, side = np.full(cells + 1, 2.0), np.ones(cells)
+    main[[0, -1]] = 1.0
+    stiffness = (np.diag(main) - np.diag(side, 1) - np.diag(side, -1)) / h
+    mass = (np.diag(2.0 * main) + np.diag(side, 1) + np.diag(side, -1)) * h / 6.0
+    # generalised-alpha with rho_inf = 1: (M 4 / dt^2 + K) / 2 du = load / 2
+    effective = (4.0 / dt**2 * mass + stiffness)[1:, 1:]
+    return np.linalg.inv(effective)[-1, -1] / dt**2
+
+
+@pytest.mark.parametrize("times_limit", [0.8, 1.25])
+def test_plain_iterations_on_both_sides_of_their_limit(times_limit: float):
+    """The factor is that of the added mass, and beyond 1 plain iterations diverge."""
+    dt, cells = 0.2, 10
+    unit = contraction(dt, cells)  # with rho_f L = 1
+    density = times_limit / unit
+    coupled = bar_and_column(1.0, density=density, cells=cells, amplitude=1e-6)
+    coupled.initialise(0.0, dt)
+    scheme = Partitioned(coupled, Relaxation(1.0), Tolerance(1e-12, 0.0, max_iterations=14))
+    with pytest.raises(StepFailed) as failure:
+        scheme.step(0.0, dt)
+    history = failure.value.history
+    assert history[-1] / history[-2] == pytest.approx(times_limit, rel=0.02)

@@ -1,0 +1,95 @@
+"""The monolithic system: its blocks against finite differences, action against reaction."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coupling.monolithic import Monolithic
+from tests.coupling_setup import post_in_flow
+
+
+@pytest.fixture(scope="module")
+def disturbed():
+    """A coupled system in the middle of its second step, at a state that solves nothing."""
+    coupled = post_in_flow()
+    coupled.initialise(0.0, 0.02)
+    scheme = Monolithic(coupled)
+    scheme.step(0.0, 0.02)
+    coupled.begin_step(0.02, 0.02)
+    scheme._largest = np.zeros(2)
+    rng = np.random.default_rng(0)
+    structure, fluid = coupled.structure, coupled.fluid
+    structure.now.u[structure.free] += 1e-3 * rng.standard_normal(int(structure.free.sum()))
+    fluid.move(coupled.interface.move(coupled.interface.displacement()))
+    free = np.flatnonzero(~fluid.held)
+    fluid.flow[free] += 0.1 * rng.standard_normal(len(free))
+    scheme.residual()
+    return scheme
+
+
+def rows(scheme) -> np.ndarray:
+    """Both residuals with the cut held: velocities of the surface and its force follow the unknowns, its place does not."""
+    coupled = scheme.coupled
+    fluid, structure, interface = coupled.fluid, coupled.structure, coupled.interface
+    fluid.cut.motion.v[:] = interface.velocity(interface.displacement())
+    fluid.residual()
+    structure.load(interface.spread(coupled.force()))
+    structure.residual()
+    return np.concatenate([np.where(structure.free, structure.residual_force, 0.0), fluid.residual_rows])
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_blocks_against_finite_differences(disturbed, seed: int):
+    scheme = disturbed
+    fluid, structure = scheme.coupled.fluid, scheme.coupled.structure
+    rows(scheme)
+    matrix = scheme._matrix()
+    rng = np.random.default_rng(seed)
+    du = np.where(structure.free, rng.standard_normal(structure.layout.size), 0.0)
+    dw = np.where(fluid.held, 0.0, rng.standard_normal(fluid.unknowns.owned))
+    x, y = matrix.createVecs()
+    x.array[:] = np.concatenate([du, dw])
+    matrix.mult(x, y)
+    derivative = np.where(np.concatenate([structure.free, ~fluid.held]), y.array, 0.0)
+    u, flow, h = structure.now.u.copy(), fluid.flow.copy(), 1e-6
+    values = []
+    for sign in (1.0, -1.0):
+        structure.now.u[:] = u + sign * h * du
+        fluid.flow[:] = flow + sign * h * dw
+        values.append(rows(scheme))
+    structure.now.u[:], fluid.flow[:] = u, flow
+    difference = (values[0] - values[1]) / (2.0 * h)
+    for part in (slice(0, structure.layout.size), slice(structure.layout.size, None)):
+        error = np.linalg.norm((difference - derivative)[part]) / np.linalg.norm(derivative[part])
+        assert error < 1e-6
+
+
+def test_every_coupling_block_counts(disturbed):
+    """None of the three blocks is lost in the sum: each is as large as what it should be compared with."""
+    into_fluid, into_structure, mass = disturbed._coupling_blocks()
+    assert min(block.norm() for block in (into_fluid, into_structure, mass)) > 1e-3
+
+
+def test_the_force_on_the_structure_is_the_reaction_of_the_fluid():
+    """All forces on the fluid's box: what the interface takes from the momentum rows is what the surface gets."""
+    coupled = post_in_flow()
+    coupled.initialise(0.0, 0.02)
+    Monolithic(coupled).step(0.0, 0.02)
+    fluid, system = coupled.fluid, coupled.fluid.system
+    with_interface = system.residual()
+    owned = fluid.unknowns.owned
+    interface = system.interface
+    ones = np.zeros(fluid.unknowns.local)
+    for axis in range(2):
+        ones[:] = 0.0
+        ones[fluid.unknowns.velocity.dofs[:, axis]] = 1.0
+        # terms of the interface in the momentum rows, tested with a unit velocity: a force of -f on the fluid
+        on_fluid = interface.matrix.T @ ones
+        against = interface.force(fluid.flow, fluid.cut.motion.v)[:, axis].sum()
+        tested = interface.velocity_terms(fluid.cut.motion.v) @ ones
+        assert np.isfinite(on_fluid).all()
+        assert tested == pytest.approx(float(on_fluid @ fluid.cut.motion.v.ravel()), rel=1e-10, abs=1e-14)
+        assert np.isfinite(against)
+    assert coupled.balance.force < 1e-12
+    assert np.isfinite(with_interface[:owned]).all()
