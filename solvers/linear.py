@@ -150,6 +150,8 @@ def solve(ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None
     """Solve matrix x = b with a freshly assembled matrix. Raises LinearSolveFailed."""
     if ksp.getOptionsPrefix() == "elastic_":
         ksp.setPC(_multigrid(ksp.comm))
+    # PETSc frees what Python has dropped only where all processes ask for it
+    PETSc.garbage_cleanup(ksp.comm)
     ksp.setOperators(matrix)
     ksp.solve(b, x)
     reason = ksp.getConvergedReason()
