@@ -38,6 +38,7 @@ class Cut:
     cut: Cells  #: cells with a piece of surface, or partly solid
     strip: Cells  #: solid cells that the flow is extended to
     ghost_faces: NDArray[np.int32]  #: faces between active cells, one of them cut or of the strip
+    reach: NDArray[np.bool_]  #: local cells that the surfaces may soon cut or uncover
     fluid: Array  #: int_fluid L_q dx / (w_q |K|) on cut cells, shape (cut, points)
     fraction: Array  #: share of fluid in each local cell
     pieces: Pieces
@@ -91,6 +92,7 @@ class Cutter:
             cut=cut,
             strip=np.flatnonzero(local_strip).astype(np.int32),
             ghost_faces=faces[special],
+            reach=self._reach(box.as_box(is_cut | strip), layers),
             fluid=fluid,
             fraction=1.0 - moments.fraction[grid.numbers],
             pieces=pieces,
@@ -105,8 +107,21 @@ class Cutter:
         pieces = Pieces(nothing, nothing, np.empty((0, points, dim)), np.empty((0, dim, dim)), np.empty((0, dim)))
         everything = np.arange(len(self.grid.numbers), dtype=np.int32)
         return Cut(
-            everything, none, none, none, np.empty((0, points)), np.ones(len(everything)), pieces, facets, motion
+            everything,
+            none,
+            none,
+            none,
+            np.zeros(len(everything), dtype=bool),
+            np.empty((0, points)),
+            np.ones(len(everything)),
+            pieces,
+            facets,
+            motion,
         )
+
+    def _reach(self, special: NDArray[np.bool_], layers: int) -> NDArray[np.bool_]:
+        """One layer more than the strip has, none around bodies at rest."""
+        return _grow(special, 1 if layers else 0).ravel(order="F")[self.grid.numbers]
 
     def _cut_cells(self, moments, touched) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """(cut or not for each box cell, kept or not for each cell of `moments`): slivers of surface do not cut."""

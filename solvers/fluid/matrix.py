@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
@@ -12,12 +15,38 @@ from solvers.fluid.cut import Cut
 from solvers.fluid.space import Unknowns
 
 
-def create_matrix(unknowns: Unknowns, cut: Cut, face_cells: NDArray[np.int32]) -> PETSc.Mat:
-    """An empty matrix with room for the couplings of a cut; `face_cells` are the two cells of each ghost face."""
+@dataclass(frozen=True)
+class Pattern:
+    """What a matrix has room for: couplings within cells and across faces of this process."""
+
+    cells: NDArray[np.bool_]  #: per local cell
+    faces: NDArray[np.bool_]  #: per local face with two cells, in the order of `interior_faces`
+
+    def covers(self, cut: Cut, faces: NDArray[np.int32]) -> bool:
+        """A cut needs no more than this."""
+        return bool(self.cells[cut.active].all() and self.faces[np.searchsorted(faces, cut.ghost_faces)].all())
+
+
+def choose_pattern(unknowns: Unknowns, cut: Cut) -> Pattern:
+    """Room for a cut and for those that its bodies may make in the next steps."""
+    _, sides = unknowns.grid.interior_faces
+    cells = cut.reach.copy()
+    cells[cut.active] = True
+    return Pattern(cells, cut.reach[sides].any(axis=1) & cells[sides].all(axis=1))
+
+
+def fits(unknowns: Unknowns, pattern: Pattern | None, cut: Cut) -> bool:
+    """The pattern has room for a cut on every process (collective)."""
+    faces, _ = unknowns.grid.interior_faces
+    return unknowns.grid.comm.allreduce(pattern is not None and pattern.covers(cut, faces), op=MPI.LAND)
+
+
+def create_matrix(unknowns: Unknowns, pattern: Pattern) -> PETSc.Mat:
+    """An empty matrix with room for a pattern (collective)."""
     size = unknowns.block_size
     index_map = unknowns.index_map
     owned, local = int(index_map.size_local), int(index_map.size_local + index_map.num_ghosts)
-    neighbours = _neighbours(unknowns, cut, face_cells, local)
+    neighbours = _neighbours(unknowns, pattern, local)
     total = np.maximum(fem.sum_ghosts(unknowns.space, neighbours.astype(float)), 1.0).astype(np.int64)
     comm = unknowns.grid.comm
     rows_global = int(index_map.size_global) * size
@@ -39,13 +68,14 @@ def create_matrix(unknowns: Unknowns, cut: Cut, face_cells: NDArray[np.int32]) -
     return matrix
 
 
-def _neighbours(unknowns: Unknowns, cut: Cut, face_cells: NDArray[np.int32], local: int) -> NDArray[np.int64]:
+def _neighbours(unknowns: Unknowns, pattern: Pattern, local: int) -> NDArray[np.int64]:
     """Blocks that each local block is coupled with, by what this process holds."""
     blocks = unknowns.cell_blocks
-    groups = [blocks[cut.active]]
-    pairs = blocks[face_cells].reshape(len(face_cells), 2 * blocks.shape[1])
-    columns = np.concatenate([groups[0].ravel(), pairs.ravel()])
-    lengths = np.concatenate([np.full(len(groups[0]), blocks.shape[1]), np.full(len(pairs), 2 * blocks.shape[1])])
+    _, sides = unknowns.grid.interior_faces
+    cells = blocks[pattern.cells]
+    pairs = blocks[sides[pattern.faces]].reshape(-1, 2 * blocks.shape[1])
+    columns = np.concatenate([cells.ravel(), pairs.ravel()])
+    lengths = np.concatenate([np.full(len(cells), blocks.shape[1]), np.full(len(pairs), 2 * blocks.shape[1])])
     starts = np.concatenate([[0], np.cumsum(lengths)])
     incidence = sparse.csr_matrix((np.ones(len(columns), dtype=np.int32), columns, starts), shape=(len(lengths), local))
     return np.diff((incidence.T @ incidence).tocsr().indptr)

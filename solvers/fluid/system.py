@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 import ufl
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from solvers import fem
@@ -17,7 +16,7 @@ from solvers.fluid import forms
 from solvers.fluid.cut import Cut, Pieces
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.interface import Interface
-from solvers.fluid.matrix import create_matrix
+from solvers.fluid.matrix import Pattern, choose_pattern, create_matrix, fits
 from solvers.fluid.patches import Boundary, Value
 from solvers.fluid.space import Unknowns
 from solvers.fluid.time import Difference
@@ -70,6 +69,7 @@ class FlowSystem:
         self._out = np.zeros(unknowns.local)
         self._matrix: PETSc.Mat | None = None
         self._ghost: PETSc.Mat | None = None
+        self._pattern: Pattern | None = None
         self.cut: Cut | None = None
 
     # ------------------------------------------------------------------------------------------------- the forms
@@ -157,10 +157,7 @@ class FlowSystem:
 
     def set_cut(self, cut: Cut) -> None:
         """Take a cut; cells, faces and the matrix follow."""
-        before, self.cut = self.cut, cut
-        grid = self.grid
-        faces, sides = grid.interior_faces
-        where = np.searchsorted(faces, cut.ghost_faces)
+        self.cut, grid = cut, self.grid
         active = np.zeros(len(grid.numbers), dtype=bool)
         active[cut.active] = True
         blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)
@@ -173,12 +170,25 @@ class FlowSystem:
             for integrals in (self._residuals, self._tangents)
         )
         self._add_outer_faces(active)
-        same = before is not None and all(
-            np.array_equal(getattr(before, name), getattr(cut, name)) for name in ("uncut", "cut", "strip")
-        )
-        if self._matrix is None or not grid.comm.allreduce(same, op=MPI.LAND):
-            self._matrix = create_matrix(self.unknowns, cut, sides[where])
-            self._ghost = None
+        if not fits(self.unknowns, self._pattern, cut):
+            self._pattern = choose_pattern(self.unknowns, cut)
+            self._matrix = self._fill_pattern(self._pattern)
+            self._ghost = self._matrix.duplicate(copy=False)
+
+    def _fill_pattern(self, pattern: Pattern) -> PETSc.Mat:
+        """A matrix that has all entries of a pattern, with values that do not matter."""
+        matrix = create_matrix(self.unknowns, pattern)
+        cells = np.flatnonzero(pattern.cells[: self.grid.owned]).astype(np.int32)
+        fem.assemble_matrix(matrix, self._tangents[0].on(cell=cells))
+        if self.with_bodies:
+            faces = self.grid.interior_faces[0][pattern.faces]
+            fem.assemble_matrix(matrix, self._ghost_penalty.on(interior_facet=faces))
+        diagonal = matrix.createVecLeft()
+        diagonal.set(1.0)
+        matrix.setDiagonal(diagonal, addv=PETSc.InsertMode.ADD_VALUES)
+        matrix.assemble()
+        matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
+        return matrix
 
     def _add_outer_faces(self, active) -> None:
         boundary = self.boundary
@@ -193,38 +203,17 @@ class FlowSystem:
     def set_penalties(self) -> None:
         """Weights of the interface and the ghost penalty, after the cut or the scales changed."""
         assert self.cut is not None
-        assert self._matrix is not None
+        assert self._ghost is not None
         pieces, cut = self.cut.pieces, self.cut
         if self.with_bodies:
             penalty = self._interface_penalties(pieces, cut)
             self.weights.set(cut, penalty)
             self.interface = Interface(self.grid, self.unknowns, self.weights, cut, self.settings.viscosity, penalty)
-        if self._ghost is None:
-            self._ghost = self._matrix
-            self._ghost.zeroEntries()
-            for form in self._tangent_forms:
-                fem.assemble_matrix(self._ghost, form)
-            self._add_ghost_penalty()
-            self._ghost.setDiagonal(self._inactive_diagonal(), addv=PETSc.InsertMode.ADD_VALUES)
-            self._ghost.assemble()
-            self._matrix = self._ghost.duplicate(copy=False)
-            self._matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
         self._ghost.zeroEntries()
-        self._add_ghost_penalty()
+        if self.with_bodies:
+            fem.assemble_matrix(self._ghost, self._ghost_penalty.on(interior_facet=cut.ghost_faces))
         self._ghost.assemble()
         self._in, self._through = self._ghost.createVecs()
-
-    def _add_ghost_penalty(self) -> None:
-        assert self._ghost is not None
-        assert self.cut is not None
-        if self.with_bodies:
-            fem.assemble_matrix(self._ghost, self._ghost_penalty.on(interior_facet=self.cut.ghost_faces))
-
-    def _inactive_diagonal(self) -> PETSc.Vec:
-        assert self._matrix is not None
-        diagonal = self._matrix.createVecLeft()
-        diagonal.array[:] = ~self.active_dofs[: self.unknowns.owned]
-        return diagonal
 
     def pressure_shares(self) -> Array:
         """int q dx over the fluid of each owned dof's pressure function, relative to their sum (collective)."""
@@ -235,7 +224,7 @@ class FlowSystem:
         cells = np.concatenate([uncut, cut.cut[mine]])
         fluid = np.concatenate([np.ones((len(uncut), len(weights.rule))), cut.fluid[mine][:, weights.order]])
         parts = volume[cells, None] * ((fluid * weights.rule) @ psi)
-        size = np.bincount(unknowns.cell_pressure[cells].ravel(), parts.ravel(), unknowns.local)
+        size = np.bincount(unknowns.cell_pressure[cells].ravel(), parts.ravel(), unknowns.local).astype(float)
         fem.add_ghosts(unknowns.space, size)
         owned = size[: unknowns.owned]
         return owned / self.grid.comm.allreduce(float(owned.sum()))
