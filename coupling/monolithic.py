@@ -33,13 +33,16 @@ class Monolithic:
         self._numbering = Numbering(self.comm, structure.layout.size, fluid.unknowns.owned)
         self._iterative = linear.choose_flow(fluid.solver.linear, fluid.dim, fluid.dofs()) == "iterative"
         self._direct = linear.flow_direct_solver(self.comm, tolerance=0.0)
+        self._krylov: PETSc.KSP | None = None
+        self._preconditioned_by: PETSc.Mat | None = None
+        self._fresh_iterations = 0
 
     # ------------------------------------------------------------------------------------------------- steps
 
     def step(self, t: float, dt: float) -> StepInfo:
         coupled = self.coupled
         coupled.begin_step(t, dt)
-        self._largest = np.zeros(2)
+        self._largest, self._krylov = np.zeros(2), None
         info = converge(self, self.tolerance)
         coupled.structure.check_deformation(info.iterations, info.residuals)
         coupled.end_step(self._force)
@@ -78,16 +81,31 @@ class Monolithic:
         matrix.zeroRowsColumns((start + structure.prescribed).astype(PETSc.IntType), 1.0, x, b)
         try:
             with fluid.timer("solve"):
-                linear.solve(self._solver(matrix), matrix, b, x)
+                self._solve(matrix, b, x)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         everything = self._numbering.gather(self.comm, x.array) if structure.constrained else None
         return max(structure.update(x.array[:own], everything), fluid.update(x.array[own:]))
 
-    def _solver(self, matrix: PETSc.Mat) -> PETSc.KSP:
-        """A new one if it is iterative: the rows of the fields are the same, but what PETSc took from them is not."""
+    def _solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
+        """Directly, or preconditioned by the first matrix of the step as long as that serves."""
         if not self._iterative:
-            return self._direct
+            linear.solve(self._direct, matrix, b, x)
+            return
+        if self._krylov is not None:
+            try:
+                linear.solve(self._krylov, matrix, b, x, self._preconditioned_by)
+            except linear.LinearSolveFailed:
+                self._krylov = None
+            else:
+                if self._krylov.getIterationNumber() > 2 * self._fresh_iterations:
+                    self._krylov = None
+                return
+        self._krylov, self._preconditioned_by = self._iterative_solver(matrix), matrix
+        linear.solve(self._krylov, matrix, b, x)
+        self._fresh_iterations = self._krylov.getIterationNumber()
+
+    def _iterative_solver(self, matrix: PETSc.Mat) -> PETSc.KSP:
         start, own = matrix.getOwnershipRange()[0], self.coupled.structure.layout.size
         rows = [(own, start), (self.coupled.fluid.unknowns.owned, start + own)]
         structure, flow = (PETSc.IS().createStride(size, first, 1, comm=self.comm) for size, first in rows)

@@ -146,13 +146,18 @@ def coupled_solver(comm, structure, flow, *, tolerance: float) -> PETSc.KSP:
     return ksp
 
 
-def solve(ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
-    """Solve matrix x = b with a freshly assembled matrix. Raises LinearSolveFailed."""
+def solve(
+    ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, preconditioned_by: PETSc.Mat | None = None
+) -> None:
+    """Solve matrix x = b with a freshly assembled matrix. Raises LinearSolveFailed.
+
+    `preconditioned_by`: the matrix of an earlier solve whose preconditioner is to serve again.
+    """
     if ksp.getOptionsPrefix() == "elastic_":
         ksp.setPC(_multigrid(ksp.comm))
     # PETSc frees what Python has dropped only where all processes ask for it
     PETSc.garbage_cleanup(ksp.comm)
-    ksp.setOperators(matrix)
+    ksp.setOperators(matrix, preconditioned_by)
     ksp.solve(b, x)
     reason = ksp.getConvergedReason()
     if reason < 0:

@@ -8,6 +8,8 @@ from typing import Literal
 
 import numpy as np
 import ufl
+from mpi4py import MPI
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers import fem
@@ -70,6 +72,7 @@ class FlowSystem:
         self._matrix: PETSc.Mat | None = None
         self._ghost: PETSc.Mat | None = None
         self._pattern: Pattern | None = None
+        self._penalised: NDArray[np.int32] | None = None  #: faces that the ghost penalty is assembled for
         self.cut: Cut | None = None
 
     # ------------------------------------------------------------------------------------------------- the forms
@@ -145,7 +148,7 @@ class FlowSystem:
     def set_scales(self, velocity: Array) -> None:
         """Take local velocity dofs [m/s] that scale stabilisation and penalties from now on."""
         settings, unknowns = self.settings, self.unknowns
-        self._scale_velocity.x.array[:] = velocity
+        self._scale_velocity.x.array[:], self._penalised = velocity, None
         h = self.grid.sizes.min(axis=1)
         speed = np.linalg.norm(velocity[unknowns.velocity.dofs], axis=1)
         by_dof = np.zeros(unknowns.local)
@@ -173,7 +176,7 @@ class FlowSystem:
         if not fits(self.unknowns, self._pattern, cut):
             self._pattern = choose_pattern(self.unknowns, cut)
             self._matrix = self._fill_pattern(self._pattern)
-            self._ghost = self._matrix.duplicate(copy=False)
+            self._ghost, self._penalised = self._matrix.duplicate(copy=False), None
 
     def _fill_pattern(self, pattern: Pattern) -> PETSc.Mat:
         """A matrix that has all entries of a pattern, with values that do not matter."""
@@ -209,11 +212,18 @@ class FlowSystem:
             penalty = self._interface_penalties(pieces, cut)
             self.weights.set(cut, penalty)
             self.interface = Interface(self.grid, self.unknowns, self.weights, cut, self.settings.viscosity, penalty)
-        self._ghost.zeroEntries()
-        if self.with_bodies:
-            fem.assemble_matrix(self._ghost, self._ghost_penalty.on(interior_facet=cut.ghost_faces))
-        self._ghost.assemble()
-        self._in, self._through = self._ghost.createVecs()
+        if not self._same_faces(cut):
+            self._penalised = cut.ghost_faces
+            self._ghost.zeroEntries()
+            if self.with_bodies:
+                fem.assemble_matrix(self._ghost, self._ghost_penalty.on(interior_facet=cut.ghost_faces))
+            self._ghost.assemble()
+            self._in, self._through = self._ghost.createVecs()
+
+    def _same_faces(self, cut: Cut) -> bool:
+        """The ghost penalty is assembled for these faces already, on every process (collective)."""
+        same = self._penalised is not None and np.array_equal(self._penalised, cut.ghost_faces)
+        return self.grid.comm.allreduce(same, op=MPI.LAND)
 
     def pressure_shares(self) -> Array:
         """int q dx over the fluid of each owned dof's pressure function, relative to their sum (collective)."""
