@@ -35,18 +35,18 @@ class Monolithic:
         self._direct = linear.flow_direct_solver(self.comm, tolerance=0.0)
         self._krylov: PETSc.KSP | None = None
         self._preconditioned_by: PETSc.Mat | None = None
-        self._fresh_iterations = 0
+        self._fresh_iterations = self._linear_iterations = 0
 
     # ------------------------------------------------------------------------------------------------- steps
 
     def step(self, t: float, dt: float) -> StepInfo:
         coupled = self.coupled
         coupled.begin_step(t, dt)
-        self._largest, self._krylov = np.zeros(2), None
+        self._largest, self._krylov, self._linear_iterations = np.zeros(2), None, 0
         info = converge(self, self.tolerance)
         coupled.structure.check_deformation(info.iterations, info.residuals)
         coupled.end_step(self._force)
-        numbers = coupled.balance.numbers()
+        numbers = coupled.balance.numbers() | {"coupling.linear": float(self._linear_iterations)}
         if coupled.structure.constraint is not None:
             numbers.update(coupled.structure.constraint.numbers())
         return StepInfo(info.iterations, info.residuals, numbers)
@@ -98,12 +98,15 @@ class Monolithic:
             except linear.LinearSolveFailed:
                 self._krylov = None
             else:
-                if self._krylov.getIterationNumber() > 2 * self._fresh_iterations:
+                iterations = self._krylov.getIterationNumber()
+                self._linear_iterations += iterations
+                if iterations > 2 * self._fresh_iterations:
                     self._krylov = None
                 return
         self._krylov, self._preconditioned_by = self._iterative_solver(matrix), matrix
         linear.solve(self._krylov, matrix, b, x)
         self._fresh_iterations = self._krylov.getIterationNumber()
+        self._linear_iterations += self._fresh_iterations
 
     def _iterative_solver(self, matrix: PETSc.Mat) -> PETSc.KSP:
         start, own = matrix.getOwnershipRange()[0], self.coupled.structure.layout.size

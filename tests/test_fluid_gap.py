@@ -14,7 +14,7 @@ MU, FORCE = 0.7, 3.0
 def flow_ratio(gap, element, place, *, cells=12):
     """Q / Q_exact for a gap (in cells) that begins at a share `place` of a cell above a plane of the grid."""
     h = 1.0 / cells
-    low = 0.5 + place * h
+    low = (2 + place) * h
     bodies = [body("lower", *block([-1, -1], [2, low])), body("upper", *block([-1, low + gap * h], [2, 2]))]
     patches = [Patch("ends", ("x-", "x+"), "traction", field(0, 0)), Patch("walls", ("y-", "y+"), "no_slip")]
     fluid = make_fluid(

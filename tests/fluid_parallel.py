@@ -1,0 +1,64 @@
+"""A flow on all processes of MPI: writes forces, and velocity and pressure at all nodes, into a file."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from fluid_setup import SolverSettings, Tolerance, block, body, circle, field, loop, make_fluid, sphere, step
+from mpi4py import MPI
+
+from solvers.distributed import Nodal, gather_nodal
+from solvers.fluid.grid import uniform
+from solvers.fluid.patches import Patch
+from solvers.fluid.probes import mass_balance
+
+
+def scene(dim, element, comm, *, closed=False):
+    """A moving and a resting body in a channel, or in a closed box."""
+    inflow = field(*[lambda x, y, *zt: 4 * y * (1 - y), 0, 0][:dim])
+    swirl = field(*[lambda x, y, *zt: y * y - 1 / 3, lambda x, y, *zt: 0.1 * x * x, 0][:dim])
+    sides = ("y-", "y+", "z-", "z+")[: 2 * dim - 2]
+    patches = (
+        [Patch("box", ("x-", "x+", *sides), "velocity", swirl)]
+        if closed
+        else [
+            Patch("in", ("x-",), "velocity", inflow),
+            Patch("out", ("x+",), "outflow"),
+            Patch("sides", sides, "slip"),
+        ]
+    )
+    disc = (circle((0.4, 0.45), 0.17, 40), loop(40)) if dim == 2 else sphere((0.4, 0.45, 0.5), 0.2, 2)
+    v = np.array([0.7, 0.2, -0.1])[:dim]
+    bodies = [
+        body("disc", *disc, motion=lambda x, t: (x + t * v, 0 * x + v)),
+        body("brick", *block([1.1, 0.3, 0.3][:dim], [1.3, 0.63, 0.71][:dim])),
+    ]
+    cells = [21, 13] if dim == 2 else [12, 7, 7]
+    return make_fluid(
+        uniform([0] * dim, [1.6, 1, 1][:dim], cells), patches, bodies, mu=0.01, element=element, dt=0.03, comm=comm,
+        body_force=field(*[0.1, -0.5, 0][:dim]),
+        solver=SolverSettings(Tolerance(1e-10), linear="direct" if dim == 2 else "iterative", linear_tolerance=1e-11),
+    )  # fmt: skip
+
+
+def everything(fluid):
+    """Velocity and pressure by the numbers of nodes, on rank 0."""
+    nodes = (fluid.unknowns.velocity, fluid.unknowns.pressure)
+    return [
+        gather_nodal(fluid.comm, Nodal(fluid.flow[n.dofs[: n.owned]], n.numbers[: n.owned])) for n in nodes
+    ]
+
+
+def main(dim, element, closed, out):
+    fluid = scene(dim, element, MPI.COMM_WORLD, closed=closed)
+    for number in range(4):
+        step(fluid, 0.03 * number, 0.03)
+    force = fluid.force()
+    balance = mass_balance(fluid)()["fluid.mass"]
+    found = everything(fluid)
+    if fluid.comm.rank == 0:
+        np.savez(out, velocity=found[0], pressure=found[1], balance=balance, **force)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), sys.argv[2], sys.argv[3] == "closed", Path(sys.argv[4]))
