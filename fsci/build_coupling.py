@@ -57,7 +57,7 @@ def build_coupled(
     rigid = build_rigid_bodies(case, comm)
     at_start = [(b.surface, b.motion(case.time.start).x) for b in rigid if b.motion is not None]
     at_start += [(Surface(s.name, s.facets, len(s.points), s.wet), s.points) for s in skins]
-    wet = _not_inside_others(at_start)
+    wet = _touched(case, at_start)
     bathers = [replace(body, surface=surface) for body, surface in zip(rigid, wet, strict=False)]
     bathers += [Bather(surface, None) for surface in wet[len(rigid) :]]
     fluid = build_fluid(case, comm, timer, bathers)
@@ -69,20 +69,28 @@ def build_coupled(
     return Partitioned(coupled, _accelerator(case), tolerance), coupled
 
 
-def _not_inside_others(surfaces: Sequence[tuple[Surface, Array]]) -> list[Surface]:
-    """Surfaces whose facets with the middle in another body are dry: there bodies are one piece."""
+def _touched(case: Case, surfaces: Sequence[tuple[Surface, Array]]) -> list[Surface]:
+    """Surfaces without the facets in other bodies, where bodies are one piece, and those on the box's boundary.
+
+    Where the case names what is wet, that stays.
+    """
+    assert case.fluid is not None
+    low, high = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
     found = []
     for index, (surface, x) in enumerate(surfaces):
-        wet = np.ones(len(surface.facets), dtype=bool) if surface.wet is None else surface.wet.copy()
-        middles = x[surface.facets].mean(axis=1)
-        for other, (body, at) in enumerate(surfaces):
-            if other == index or surface.wet is not None:
-                continue
-            near = np.all((middles > at.min(axis=0)) & (middles < at.max(axis=0)), axis=1)
-            motion = Motion(at, np.zeros_like(at))
-            for facet in np.flatnonzero(near & wet):
-                wet[facet] = winding(middles[facet], motion, body.facets) < 0.75
-        found.append(replace(surface, wet=wet))
+        if surface.wet is None:
+            middles = x[surface.facets].mean(axis=1)
+            distance = np.abs(np.concatenate([middles - low, middles - high], axis=1)).min(axis=1)
+            wet = distance > 1e-9 * (high - low).max()
+            for other, (body, at) in enumerate(surfaces):
+                if other == index:
+                    continue
+                near = np.all((middles > at.min(axis=0)) & (middles < at.max(axis=0)), axis=1)
+                motion = Motion(at, np.zeros_like(at))
+                for facet in np.flatnonzero(near & wet):
+                    wet[facet] = winding(middles[facet], motion, body.facets) < 0.75
+            surface = replace(surface, wet=wet)
+        found.append(surface)
     return found
 
 

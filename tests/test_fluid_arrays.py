@@ -68,3 +68,10 @@ def hold_tangential(fluid, numbers):
 def test_cylinders(concentration, element, cells):
     found = resistance(2, concentration, cells, element)[0]
     assert found == pytest.approx(CYLINDERS[concentration], rel=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("concentration", [0.064, 0.216])
+def test_spheres(concentration):
+    found = resistance(3, concentration, 20)[0]
+    assert found == pytest.approx(SPHERES[concentration], rel=0.01)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import sympy
-from fluid_setup import body, circle, errors, field, loop, make_fluid, solve_steady, symbolic, wall
+from fluid_setup import body, circle, errors, field, loop, make_fluid, solve_steady, sphere, symbolic, wall
 
 from solvers.fluid.field import SolverSettings
 from solvers.fluid.grid import uniform
@@ -79,5 +79,54 @@ def test_errors_do_not_depend_on_the_position(element):
     """A disc is shifted through one cell in twenty steps."""
     cells = 16
     shift = np.linspace(0.0, 1.0, 20, endpoint=False)[:, None] * np.array([1.0, 0.37]) / cells
-    found = np.array([stokes_errors(element, cells, centre=(0.48, 0.49) + d) for d in shift])
+    found = np.array([stokes_errors(element, cells, centre=d + (0.48, 0.49)) for d in shift])
     assert np.all(found.max(axis=0) < 1.5 * found.min(axis=0)), found.max(axis=0) / found.min(axis=0)
+
+
+# ---------------------------------------------------------------------------------------------------------- in 3D
+
+
+def beltrami():
+    """Velocity and pressure of a steady flow with curl u parallel to u (4C's BELTRAMI)."""
+    a = b = sympy.pi / 4
+    k1 = sympy.exp(a * (X - Z) + b * (Y - Z))
+    k2 = sympy.exp(a * (Z - Y) + b * (X - Y))
+    k3 = sympy.exp(a * (Y - X) + b * (Z - X))
+    return [b * k1 - a * k2, b * k3 - a * k1, b * k2 - a * k3], (a**2 + b**2 + a * b) * (1 / k1 + 1 / k2 + 1 / k3)
+
+
+def beltrami_errors(cells, *, element="q1q1", centre=(0.513, 0.478, 0.502), refinements=5, linear="auto"):
+    """(errors, iterations of the linear solver) in the unit cube with a spherical hole."""
+    exact = symbolic(*beltrami(), (X, Y, Z, T), rho=1.0, mu=1.0)
+    velocity = field(*exact[0])
+    points, facets = sphere(centre, 0.225, refinements)
+    ball = body("ball", points, facets, velocity=on_surface(velocity, points))
+    fluid = make_fluid(
+        uniform([0, 0, 0], [1, 1, 1], [cells] * 3), [wall(velocity)], [ball], element=element, scheme="steady",
+        solver=SolverSettings(Tolerance(residual=1e-8), linear=linear), body_force=field(*exact[3]),
+    )  # fmt: skip
+    solve_steady(fluid)
+    return errors(fluid, *exact[:3]), fluid._ksp.getIterationNumber()
+
+
+@pytest.mark.slow
+def test_beltrami_flow_around_a_sphere():
+    found = np.array([beltrami_errors(cells)[0] for cells in (8, 16)])
+    assert np.all(rates(found)[0] >= BARS["q1q1"]), (found, rates(found))
+
+
+@pytest.mark.slow
+def test_beltrami_flow_around_a_sphere_second_order():
+    found = np.array([beltrami_errors(cells, element="q2q1", refinements=6)[0] for cells in (4, 8)])
+    assert np.all(rates(found)[0] >= BARS["q2q1"]), (found, rates(found))
+
+
+def test_errors_and_iterations_do_not_depend_on_the_position_3d():
+    """A sphere is shifted through one cell in twenty steps."""
+    cells = 8
+    shift = np.linspace(0.0, 1.0, 20, endpoint=False)[:, None] * np.array([1.0, 0.37, 0.61]) / cells
+    found, iterations = zip(
+        *(beltrami_errors(cells, centre=0.45 + d, refinements=3, linear="iterative") for d in shift), strict=True
+    )
+    assert np.all(np.max(found, axis=0) < 1.5 * np.min(found, axis=0))
+    assert max(iterations) < 1.5 * min(iterations)

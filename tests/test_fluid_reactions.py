@@ -93,7 +93,7 @@ def moment(x, forces):
 
 
 def test_couette_torque():
-    """A disc that turns in a fixed ring: u = A r + B / r, torque 4 pi mu B (per depth) on the disc, exact in the limit."""
+    """A disc that turns in a fixed ring: u = A r + B / r, torque 4 pi mu B per depth."""
     inner, outer, omega, mu = 0.2, 0.43, 2.0, 0.7
     B = omega * inner**2 * outer**2 / (outer**2 - inner**2)
     errors = []

@@ -1,4 +1,6 @@
-"""The tangent is the derivative of the residual: all terms, all schemes, while the scales of the stabilisation are held."""
+"""The tangent is the derivative of the residual, all terms and schemes, while the stabilisation's scales are held."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -94,4 +96,4 @@ def test_newton_converges_quadratically():
     info = fluid.solve()
     r = np.array(info.residuals) / max(info.residuals)
     assert info.iterations <= 4
-    assert all(b < 30 * a**2 or b < 1e-12 for a, b in zip(r[1:], r[2:], strict=False)), r
+    assert all(b < 30 * a**2 or b < 1e-12 for a, b in pairwise(r[1:])), r

@@ -9,7 +9,7 @@ import platform
 from collections.abc import Callable
 from pathlib import Path
 
-from fsci.bench import contact, flag, hertz, linear, moments, static
+from fsci.bench import contact, flag, fluid, hertz, linear, moments, static
 from fsci.bench.table import Row, show
 from fsci.summary import plain, versions
 
@@ -23,6 +23,9 @@ BENCHMARKS: dict[str, tuple[str, Callable[[], list[Row]]]] = {
     "moments": ("moments of a torus in the cells of a box, 3D", moments.run),
     "hertz": ("a ball pressed onto a plane in one load step, by cells per radius of contact", hertz.run),
     "tori": ("two tori collide, 200 steps: seconds by part", contact.run_tori),
+    "cylinder_2d1": ("Schaefer-Turek 2D-1: error against time, four meshes of both elements", fluid.run_steady),
+    "cut_stokes": ("Stokes flow around a disc by the direct solver: seconds by size", fluid.run_stokes),
+    "channel": ("a ring moves through a channel in 3D: seconds of one time step by part", fluid.run_channel),
 }
 
 

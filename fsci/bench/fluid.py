@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fsci.bench.table import Row
 from solvers.fluid.field import Body, Fluid, SolverSettings
-from solvers.fluid.grid import Grid
+from solvers.fluid.grid import Grid, uniform
 from solvers.fluid.patches import Patch
 from solvers.fluid.probes import at_point, difference
 from solvers.fluid.surface import Motion, Surface
@@ -121,4 +121,88 @@ def steady(element: str, cells: int) -> Row:
         "c_D error [%]": 100.0 * (drag / DRAG - 1.0),
         "c_L error [%]": 100.0 * (lift / LIFT - 1.0),
         "dp error [%]": 100.0 * (drop / PRESSURE - 1.0),
+    }
+
+
+# ------------------------------------------------------------------------------------------------ one linear system
+
+
+def run_stokes() -> list[Row]:
+    """Stokes flow around a disc by the direct solver, all of it from the grid on: seconds by size."""
+    return [stokes(cells) for cells in (58, 116, 231)]
+
+
+def stokes(cells: int) -> Row:
+    timer, begin = Timer(), perf_counter()
+
+    def lid(x: Array, t: float) -> Array:
+        return np.where(x[1] > 1.0 - 1e-9, 1.0, 0.0)
+
+    patches = [Patch("box", ("x-", "x+", "y-", "y+"), "velocity", (lid, zero))]
+    body = disc("disc", polygon((0.51, 0.48), 0.21, 4 * cells))
+    flow = FlowSettings(1.0, 1.0, scheme="steady", convection=False)
+    solver = SolverSettings(Tolerance(1e-8), linear="direct")
+    fluid = Fluid(MPI.COMM_SELF, uniform([0, 0], [1, 1], [cells] * 2), flow, patches, [body], solver, timer)
+    fluid.initialise(0.0, 1.0)
+    fluid.begin_step(0.0, 1.0)
+    fluid.solve()
+    return {"cells": f"{cells} x {cells}", "dofs": fluid.dofs(), **parts(timer, perf_counter() - begin)}
+
+
+def parts(timer: Timer, total: float) -> dict[str, float]:
+    """Seconds by part."""
+    known = {f"{name} [s]": timer.seconds.get(name, 0.0) for name in ("cut", "weights", "assembly", "solve")}
+    return {"total [s]": total, **known, "rest [s]": total - sum(known.values())}
+
+
+# ---------------------------------------------------------------------------------------------------- a step in 3D
+
+
+def run_channel() -> list[Row]:
+    """A ring moves through a channel, backward Euler: seconds of one time step by part."""
+    return [channel(cells, 3) for cells in (20, 30, 36)]
+
+
+def ring(count: int, around: int, radius: float, thickness: float, tilt: float) -> tuple[Array, NDArray[np.int64]]:
+    """(points, triangles) of a torus about the z axis, tilted about y by an angle [rad]."""
+    u, v = np.meshgrid(*(2.0 * np.pi * np.arange(n) / n for n in (count, around)), indexing="ij")
+    r = radius + thickness * np.cos(v)
+    flat = np.stack([r * np.cos(u), r * np.sin(u), thickness * np.sin(v)], axis=-1).reshape(-1, 3)
+    i, j = (index.ravel() for index in np.indices((count, around)))
+    a, b, c, d = (((i + p) % count) * around + (j + q) % around for p, q in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    turn = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
+    return flat @ turn.T, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+
+
+def channel(cells: int, steps: int, dt: float = 0.05) -> Row:
+    points, facets = ring(64, 32, 0.5, 0.2, math.radians(65.0))
+    speed = np.array([0.0, 0.0, -0.2])
+
+    def inflow(x: Array, t: float) -> Array:
+        return -(1.0 - x[0] ** 2) * (1.0 - x[1] ** 2)
+
+    patches = [
+        Patch("in", ("z+",), "velocity", (zero, zero, inflow)),
+        Patch("out", ("z-",), "outflow"),
+        Patch("walls", ("x-", "x+", "y-", "y+"), "no_slip"),
+    ]
+    body = Body(Surface("ring", facets, len(points)), lambda t: Motion(points + t * speed, 0.0 * points + speed))
+    flow = FlowSettings(1.0, 0.01, scheme="backward_euler")
+    solver, timer = SolverSettings(Tolerance(1e-6), linear_tolerance=1e-5), Timer()
+    fluid = Fluid(MPI.COMM_SELF, uniform([-1.0] * 3, [1.0] * 3, [cells] * 3), flow, patches, [body], solver, timer)
+    fluid.initialise(0.0, dt)
+    timer.seconds.clear()
+    begin, newton = perf_counter(), 0
+    for number in range(steps):
+        fluid.begin_step(number * dt, dt)
+        newton += fluid.solve().iterations
+        fluid.end_step()
+    seconds = {name: value / steps for name, value in parts(timer, perf_counter() - begin).items()}
+    return {
+        "cells": f"{cells}^3",
+        "dofs": fluid.dofs(),
+        "cut cells": len(fluid.cut.cut),
+        "newton per step": newton / steps,
+        "krylov, last": fluid._ksp.getIterationNumber() if fluid._ksp is not None else 0,
+        **seconds,
     }

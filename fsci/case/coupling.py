@@ -19,7 +19,9 @@ class Coupling(Section):
         "monolithic", "monolithic: one Newton iteration for all; partitioned: Dirichlet-Neumann iterations"
     )
     wetted: dict[Name, Surfaces] = setting(
-        dict, "surfaces that the fluid touches, by body; default: all but what lies in other bodies at the start"
+        dict,
+        "surfaces that the fluid touches, by body; default: all but what lies in other bodies or on the boundary of "
+        "the box at the start",
     )
     accelerator: Literal["iqn", "aitken", "constant"] = setting(
         "iqn", "partitioned: interface quasi-Newton, Aitken's relaxation, or a constant one"

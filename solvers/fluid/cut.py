@@ -52,13 +52,22 @@ class Cut:
 
 
 class Cutter:
-    """Cuts one grid again and again; `points` (n,) are the 1D points of the rule on cut cells."""
+    """Cuts one grid again and again; `points` (n,) are the 1D points of the rule on cut cells.
+
+    Within a step no cell leaves the ghost penalty that once was under it: iterates that go to and fro across a cell's
+    face would otherwise solve two systems in turn and never settle.
+    """
 
     def __init__(self, grid: DistributedGrid, points: Array):
         self.grid, self.points = grid, points
         own = np.zeros(grid.grid.size, dtype=bool)
         own[grid.numbers] = True
         self._own = grid.grid.as_box(own)
+        self._special = np.zeros(grid.grid.size, dtype=bool)
+
+    def begin_step(self) -> None:
+        """Forget where the surfaces have been."""
+        self._special[:] = False
 
     def __call__(
         self, facets: NDArray[np.int64], motion: Motion, layers: int, wet: NDArray[np.bool_] | None = None
@@ -80,11 +89,12 @@ class Cutter:
         solid = (moments.fraction >= 1.0 - NOTHING) & ~(is_cut & (moments.fraction <= 1.0 + NOTHING))
         is_cut &= ~solid
         near = _grow(box.as_box(is_cut), layers).ravel(order="F") if layers else is_cut
-        strip = solid & near
+        strip = solid & (near | self._special)
+        self._special |= is_cut | strip
         local_cut, local_strip = is_cut[grid.numbers], strip[grid.numbers]
         active = ~solid[grid.numbers] | local_strip
         faces, sides = grid.interior_faces
-        special = (local_cut | local_strip)[sides].any(axis=1) & active[sides].all(axis=1)
+        special = self._special[grid.numbers][sides].any(axis=1) & active[sides].all(axis=1)
         cut = np.flatnonzero(local_cut).astype(np.int32)
         fluid, pieces = self._on_local_cells(moments, in_use, touched, cut, normal)
         return Cut(
@@ -92,7 +102,7 @@ class Cutter:
             cut=cut,
             strip=np.flatnonzero(local_strip).astype(np.int32),
             ghost_faces=faces[special],
-            reach=self._reach(box.as_box(is_cut | strip), layers),
+            reach=self._reach(box.as_box(self._special), layers),
             fluid=fluid,
             fraction=1.0 - moments.fraction[grid.numbers],
             pieces=pieces,

@@ -135,6 +135,7 @@ class Fluid:
         """Remember the state at t; boundary, loads and moving bodies at t + dt."""
         self._t, self.dt = t + dt, dt
         velocity = np.where(self.velocity_mask, self.flow, 0.0)
+        self.cutter.begin_step()
         self.older, self.old = self.old, Past(velocity, self.system.active_dofs | self._first)
         self.difference = self._choose_difference(dt)
         difference = self.difference
