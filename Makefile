@@ -47,9 +47,9 @@ $(DOCS_STAMP): pyproject.toml | $(PROJECT_STAMP)
 	@touch $@
 
 demo: setup
-	$(BIN)/fsci run cases/csm3 -o results/csm3
-	$(BIN)/fsci plot results/csm3 --movie
-	@echo "Pictures are in results/csm3/pictures/, fields for ParaView in results/csm3/fields/."
+	mpirun -n 2 $(BIN)/fsci run cases/torus_wall -o results/torus_wall
+	$(BIN)/fsci plot results/torus_wall --movie
+	@echo "Pictures are in results/torus_wall/pictures/, fields for ParaView in results/torus_wall/fields/."
 
 test: setup lint
 	$(BIN)/python -m pytest -n 2 -m "not slow"

@@ -206,12 +206,21 @@ def build_probes(case: Case, structure: Structure) -> Callable[[], Numbers]:
                 found[name] = probes.at_point(structure, by_name[settings.body or ""], settings.quantity, settings.at)
             except probes.PointOutside as error:
                 raise case.error(("probes", name, "at"), str(error)) from None
+        elif settings.pair is not None:
+            assert case.contact is not None
+            found[name] = _gap(structure, list(case.contact.pairs).index(settings.pair))
         elif settings.on is not None:
             found[name] = probes.on_surface(structure, by_name[settings.body or ""], settings.quantity, settings.on)
         else:
             chosen = structure.bodies if settings.body is None else [by_name[settings.body]]
             found[name] = probes.of_bodies(structure, chosen, settings.quantity)
     return columns(found)
+
+
+def _gap(structure: Structure, pair: int) -> probes.Probe:
+    contact = structure.constraint
+    assert contact is not None
+    return lambda: {"": contact.distance(pair)}
 
 
 def _probes(case: Case) -> list[tuple[str, Probe]]:

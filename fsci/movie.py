@@ -8,7 +8,7 @@ from typing import Any
 
 from fsci.output import Series
 from fsci.render import Body, Pixels
-from fsci.render_flow import load_parts
+from fsci.render_flow import load_state
 from fsci.scene import animate, compose
 
 FRAMES = 200  #: at most; of a longer series every second, third, ... time is shown
@@ -23,7 +23,7 @@ def plot_movie(path: Path, bodies: list[Series], field: str, title: str, units: 
 
     def states() -> Iterator[tuple[float, list[Body]]]:
         for moment in shown:
-            yield moment[0][0], [part for _, file in moment for part in load_parts(file, field)]
+            yield moment[0][0], load_state([file for _, file in moment], field)
 
     scene = compose((state for _, state in states()), field, title, units)
     write_gif(path, animate(scene, states(), dots=DOTS))

@@ -11,7 +11,7 @@ from fsci.curves import DOTS, plot_convergence, plot_history
 from fsci.history import read_history
 from fsci.movie import plot_movie
 from fsci.output import Series, read_collection
-from fsci.render_flow import is_flow, load_parts
+from fsci.render_flow import is_flow, load_state
 from fsci.scene import compose, draw
 
 STRUCTURE_FIELDS = ("displacement",)  #: what is drawn if nothing is asked for
@@ -62,8 +62,8 @@ def read_series(folder: Path) -> list[Series]:
 
 def plot_state(path: Path, bodies: list[Series], name: str, labels: Labels) -> Path:
     """Draws the last state of all bodies coloured by the field `name`."""
-    state = [part for series in bodies for part in load_parts(series[-1][1], name)]
-    scene = compose([state], name, labels.title, labels.units)
+    state = load_state([series[-1][1] for series in bodies], name)
+    scene = compose([state], name, labels.title, labels.units, crop=1.0)
     draw(scene, state, bodies[0][-1][0], dots=DOTS).savefig(path)
     return path
 

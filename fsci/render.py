@@ -18,6 +18,7 @@ Pixels = NDArray[np.uint8]  #: shape (height, width, 3)
 SUBDIVISION = 3  #: times the faces of second-order cells are halved to look curved
 EDGES_UP_TO = 20_000  #: faces of a body; beyond that its element edges would cover everything
 SUPERSAMPLING = 2  #: pixels rendered per pixel shown, along each side
+BARE = "lightgray"  #: colour of bodies that do not have the field
 ISOMETRIC = np.array([1.0, -1.0, 0.8]) / np.sqrt(2.64)  #: from the bodies to the camera
 CORNERS = {5: 3, 9: 4, 22: 3, 23: 4, 28: 4}  #: VTK type of a face -> its corners; second-order edges have a midnode
 
@@ -35,6 +36,7 @@ class Body:
     values: Array | None  #: colour of each surface point; None: the body does not have the field
     line_colour: str = "black"  #: of the edges
     lit: bool = True  #: in space: shaded; else its colours are exactly those of the colour bar
+    opacity: float = 1.0  #: of the surface
 
 
 @dataclass(frozen=True)
@@ -62,13 +64,16 @@ def import_pyvista() -> Any:
     return pyvista
 
 
-def load_body(path: Path, field: str) -> Body:
-    """Reads a VTU file and what colours it: `field` is a point field (a vector's magnitude) or a component, name.x."""
+def load_body(mesh: Any, field: str) -> Body:
+    """An elastic body from its mesh or VTU file.
+
+    `field` is what colours it: a point field (a vector's magnitude) or a component, name.x.
+    """
     pyvista = import_pyvista()
     from vtkmodules.vtkFiltersGeometry import vtkUnstructuredGridGeometryFilter
 
     outer = vtkUnstructuredGridGeometryFilter()
-    outer.SetInputData(pyvista.read(path))
+    outer.SetInputData(pyvista.read(mesh) if isinstance(mesh, Path) else mesh)
     outer.Update()
     faces = pyvista.wrap(outer.GetOutput())
     surface = faces.extract_surface(nonlinear_subdivision=SUBDIVISION, algorithm="dataset_surface")
@@ -109,16 +114,16 @@ def face_edges(faces: Any) -> tuple[Array, NDArray[np.bool_]]:
     return lines, counts > 1
 
 
-def axes_of_view(flat: bool) -> Array:
+def axes_of_view(flat: bool, away: Array = ISOMETRIC) -> Array:
     """The unit vectors right, up and away (towards the camera) as columns, shape (3, 3).
 
-    Flat bodies are seen from the front, others isometrically with z upwards.
+    Flat bodies are seen from the front, others from the direction `away`, isometrically by default, with z upwards.
     """
     if flat:
         return np.eye(3)
-    right = np.cross([0.0, 0.0, 1.0], ISOMETRIC)
+    right = np.cross([0.0, 0.0, 1.0], away)
     right /= np.linalg.norm(right)
-    return np.column_stack([right, np.cross(ISOMETRIC, right), ISOMETRIC])
+    return np.column_stack([right, np.cross(away, right), away])
 
 
 def frame(axes: Array, low: Array, high: Array, *, aspect: float) -> View:
@@ -144,11 +149,12 @@ def render(
     flat = np.allclose(away, [0, 0, 1])
     lift = 0.005 * view.half_height * away  # keeps edges clear of the surface they lie in
     for index, body in enumerate(bodies):
-        surface, shading = body.surface.copy(deep=False), ROUND if body.lit and not flat else FLAT
+        surface = body.surface.copy(deep=False)
+        shading = {**(ROUND if body.lit and not flat else FLAT), "opacity": body.opacity}
         if flat:  # a later body covers an earlier one
             surface = surface.translate(2 * index * lift, inplace=False)
         if body.values is None:
-            plotter.add_mesh(surface, color="lightgray", **shading)
+            plotter.add_mesh(surface, color=BARE, **shading)
         else:
             surface.point_data["colour"] = body.values
             plotter.add_mesh(surface, scalars="colour", clim=limits, cmap=colours, show_scalar_bar=False, **shading)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,11 @@ from fsci.render import Array, Body, field_values, import_pyvista, load_body
 STREAMLINES = "velocity"  #: the field that is drawn with streamlines, besides its components
 SPACING = 0.035  #: distance of streamlines in the plane, as part of the edge of a square as large as the box
 RESOLUTION = 400  #: points along the diagonal at which the plane flow is sampled for them
-SEEDS = 6  #: streamlines in space start from so many points along each edge of the middle cross-section
-TUBES = 0.002  #: their radius, as part of the box's diagonal
+SEEDS = 5  #: streamlines in space start from so many points along each edge of the middle cross-section,
+BODY_SEEDS = 9  #: and from so many along each edge of a rectangle
+AROUND = 1.2  #: that is so many times as large as a body
+VEIL = 0.4  #: opacity of the slice through a flow in space
+TUBES = 0.0025  #: their radius, as part of the box's diagonal
 LINE, TRIANGLE = 3, 5  #: VTK's numbers of cell types
 
 NO_LINES = np.empty((0, 2, 3))
@@ -25,27 +30,38 @@ def is_flow(path: Path) -> bool:
     return "fluid_fraction" in import_pyvista().read(path).cell_data
 
 
-def load_parts(path: Path, field: str) -> list[Body]:
-    """What is drawn of a VTU file: a flow, the surface of a rigid body, or an elastic body."""
-    mesh = import_pyvista().read(path)
-    if "fluid_fraction" in mesh.cell_data:
-        return _plane_flow(mesh, field) if _is_flat(mesh) else _spatial_flow(mesh, field)
+def load_state(files: Sequence[Path], field: str) -> list[Body]:
+    """What is drawn of the VTU files of one time, flow first; bodies in a flow that has the field are grey."""
+    meshes = [import_pyvista().read(path) for path in files]
+    flow = meshes[0] if "fluid_fraction" in meshes[0].cell_data else None
+    parts = [part for mesh in meshes if mesh is not flow for part in _load_body(mesh, field)]
+    if flow is None:
+        return parts
+    if field_values(flow.point_data, field) is not None:
+        parts = [replace(part, values=None) for part in parts]
+    return ([plane_flow(flow, field)] if is_flat(flow) else _spatial_flow(flow, field, meshes[1:])) + parts
+
+
+def _load_body(mesh: Any, field: str) -> list[Body]:
+    """The surface of a rigid body, or an elastic body."""
     if set(np.unique(mesh.celltypes)) == {LINE}:
-        return [_section(mesh)]
-    if set(np.unique(mesh.celltypes)) == {TRIANGLE} and not _is_flat(mesh):
+        return [fill_lines(mesh.points, mesh.cells.reshape(-1, 3)[:, 1:])]
+    if set(np.unique(mesh.celltypes)) == {TRIANGLE} and not is_flat(mesh):
         return [Body(mesh.extract_surface(algorithm="dataset_surface"), NO_LINES, NO_LINES, None)]
-    return [load_body(path, field)]
+    return [load_body(mesh, field)]
 
 
-def _is_flat(mesh: Any) -> bool:
+def is_flat(mesh: Any) -> bool:
+    """Whether a mesh lies in a plane z = constant."""
     low, high = np.array(mesh.bounds[::2]), np.array(mesh.bounds[1::2])
     return bool(high[2] - low[2] <= 1e-9 * (high - low).max())
 
 
-def _plane_flow(mesh: Any, field: str) -> list[Body]:
+def plane_flow(mesh: Any, field: str) -> Body:
+    """A flow in the plane (x, y), with streamlines if its velocity is asked for."""
     surface = mesh.extract_surface(algorithm="dataset_surface")
     lines = _plane_streamlines(mesh) if field.partition(".")[0] == STREAMLINES else NO_LINES
-    return [Body(surface, lines, NO_LINES, field_values(surface.point_data, field), line_colour="white")]
+    return Body(surface, lines, NO_LINES, field_values(surface.point_data, field), line_colour="white")
 
 
 def _plane_streamlines(mesh: Any) -> Array:
@@ -83,44 +99,77 @@ def segments(lines: Any) -> Array:
     return np.asarray(lines.points, dtype=np.float64)[np.concatenate(found)]
 
 
-def _spatial_flow(mesh: Any, field: str) -> list[Body]:
-    """Slices through the middle, normal to the two shortest edges of the box, with tubes along streamlines."""
-    extents = np.array(mesh.bounds[1::2]) - np.array(mesh.bounds[::2])
-    axes = np.argsort(extents)[:2]
-    slices = [mesh.slice(normal="xyz"[axis]) for axis in axes]
-    parts = [Body(s, NO_LINES, NO_LINES, field_values(s.point_data, field), lit=False) for s in slices if s.n_points]
+def _spatial_flow(mesh: Any, field: str, bodies: Sequence[Any]) -> list[Body]:
+    """A translucent slice along the middle of the box, the edges of the box, and tubes along streamlines."""
+    parts = []
+    middle = mesh.slice(normal=lengthwise(mesh))
+    if middle.n_points:
+        parts.append(Body(middle, NO_LINES, NO_LINES, field_values(middle.point_data, field), lit=False, opacity=VEIL))
     box = mesh.outline()
     parts.append(Body(box, segments(box), NO_LINES, None))
     if field.partition(".")[0] == STREAMLINES and np.any(mesh.point_data[STREAMLINES]):
-        tubes = _tubes(mesh, int(np.argmax(extents)))
+        tubes = _tubes(mesh, bodies)
         if tubes.n_points:
             parts.append(Body(tubes, NO_LINES, NO_LINES, field_values(tubes.point_data, field)))
     return parts
 
 
-def _tubes(mesh: Any, along: int) -> Any:
+def lengthwise(mesh: Any) -> str:
+    """The normal, x or y, of the upright plane through the middle that is longer; y if both are as long."""
+    length = np.array(mesh.bounds[1::2]) - np.array(mesh.bounds[::2])
+    return "x" if length[0] < (1 - 1e-9) * length[1] else "y"
+
+
+def _tubes(mesh: Any, bodies: Sequence[Any]) -> Any:
+    """Streamlines through the middle of the box, across its longest edge, and through the middle of each body."""
     low, high = np.array(mesh.bounds[::2]), np.array(mesh.bounds[1::2])
-    part = (np.arange(SEEDS) + 0.5) / SEEDS
-    across = [low[i] + part * (high[i] - low[i]) if i != along else [0.5 * (low[i] + high[i])] for i in range(3)]
-    seeds = np.stack([x.ravel() for x in np.meshgrid(*across, indexing="ij")], axis=1)
+    seeds = [_lattice((low + high) / 2, np.eye(3), np.where(np.arange(3) == np.argmax(high - low), 0, high - low))]
+    for body in bodies:
+        surface = body.extract_surface(algorithm="dataset_surface").triangulate()
+        centre = surface.points.mean(axis=0)
+        axes = np.linalg.svd(surface.points - centre, full_matrices=False)[2].T  # the last one is a torus's
+        extent = np.ptp((surface.points - centre) @ axes, axis=0)
+        around = _lattice(centre, axes, AROUND * extent * [1, 1, 0], BODY_SEEDS)
+        seeds.append(around[~_inside(around, surface)])
     lines = mesh.streamlines_from_source(
-        import_pyvista().PolyData(seeds), vectors=STREAMLINES, integration_direction="both", max_steps=2000
+        import_pyvista().PolyData(np.concatenate(seeds)),
+        vectors=STREAMLINES,
+        integration_direction="both",
+        max_step_length=0.2,
+        max_steps=5000,
     )
     return lines.tube(radius=TUBES * mesh.length) if lines.n_points else lines
 
 
-def _section(mesh: Any) -> Body:
-    """The inside of closed lines in the plane, with its outline."""
+def _inside(points: Array, surface: Any) -> NDArray[np.bool_]:
+    """Which points a closed surface encloses."""
+    from vtkmodules.vtkFiltersModeling import vtkSelectEnclosedPoints
+
+    pyvista = import_pyvista()
+    enclosed = vtkSelectEnclosedPoints()
+    enclosed.SetInputData(pyvista.PolyData(points))
+    enclosed.SetSurfaceData(surface)
+    enclosed.Update()
+    return np.asarray(pyvista.wrap(enclosed.GetOutput()).point_data["SelectedPoints"]).astype(bool)
+
+
+def _lattice(centre: Array, axes: Array, extent: Array, count: int = SEEDS) -> Array:
+    """count x count points in a rectangle, one of whose three extents is zero."""
+    part = (np.arange(count) + 0.5) / count - 0.5
+    steps = [part * length if length else np.zeros(1) for length in extent]
+    return centre + np.stack([x.ravel() for x in np.meshgrid(*steps, indexing="ij")], axis=1) @ axes.T
+
+
+def fill_lines(points: Any, ends: NDArray[np.int64]) -> Body:
+    """The inside of closed lines in a plane, with its outline; `ends` are the points of each segment, shape (n, 2)."""
     from vtkmodules.vtkFiltersCore import vtkStripper
     from vtkmodules.vtkFiltersGeneral import vtkContourTriangulator
 
     pyvista = import_pyvista()
-    ends: NDArray[np.int64] = mesh.cells.reshape(-1, 3)
     loops = vtkStripper()
-    loops.SetInputData(pyvista.PolyData(mesh.points, lines=ends.ravel()))
+    loops.SetInputData(pyvista.PolyData(points, lines=np.column_stack([np.full(len(ends), 2), ends]).ravel()))
     loops.JoinContiguousSegmentsOn()
     filled = vtkContourTriangulator()
     filled.SetInputConnection(loops.GetOutputPort())
     filled.Update()
-    outline = np.asarray(mesh.points, dtype=np.float64)[ends[:, 1:]]
-    return Body(pyvista.wrap(filled.GetOutput()), NO_LINES, outline, None)
+    return Body(pyvista.wrap(filled.GetOutput()), NO_LINES, np.asarray(points, dtype=np.float64)[ends], None)

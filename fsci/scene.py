@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 
 from fsci.curves import SIZE, STYLE, label
-from fsci.render import Body, Pixels, View, axes_of_view, frame, render
+from fsci.render import ISOMETRIC, Array, Body, Pixels, View, axes_of_view, frame, render
 
 Rectangle = tuple[float, float, float, float]  #: left, bottom, width, height in parts of the figure
 
 #: where the picture and its colour bar are, beside each other
 UPRIGHT = ((0.125, 0.12, 0.70, 0.785), (0.85, 0.16, 0.018, 0.70))
 SPATIAL = ((0.02, 0.05, 0.80, 0.855), (0.85, 0.16, 0.018, 0.70))
+TALL = ((0.02, 0.04, 0.76, 0.87), (0.82, 0.16, 0.024, 0.66))
+TALL_SIZE = (6.2, 7.0)  #: inches
+TALL_FROM = 1.2  #: height over width from which a picture in space is upright
 LONG_FROM = 2.2  #: width over height from which the colour bar is below the picture, and the figure as low as it can be
 LOPSIDED = 0.2  #: values on one side of zero, in parts of those on the other, below which zero is no middle
 
@@ -30,29 +33,42 @@ class Scene:
     limits: tuple[float, float]  #: values at the ends of the colour bar
     colours: str  #: name of the colour map
     title: str
-    label: str  #: of the colour bar
+    label: str  #: of the colour bar; without colours there is none
     units: Mapping[str, str]  #: of length, mass and time
+    cropped: bool  #: some values lie above the colour bar
     layout: tuple[Rectangle, Rectangle]  #: of the picture and of the colour bar
     size: tuple[float, float]  #: of the figure, in inches
 
 
-def compose(states: Iterable[list[Body]], field: str, title: str, units: Mapping[str, str]) -> Scene:
+def compose(
+    states: Iterable[list[Body]],
+    field: str | None,
+    title: str,
+    units: Mapping[str, str],
+    *,
+    away: Array = ISOMETRIC,
+    colours: str | None = None,
+    crop: float = 0.0,
+) -> Scene:
     """The scene that has room and colours for all the given states, of which there must be one.
 
-    Raises ValueError if no body has the field.
+    Bodies in space are seen from the direction `away`. Without a field nothing has colours. `crop`: percent of the
+    points whose values may lie above the colour bar. Raises ValueError if no body has the field.
     """
     states = iter(states)
     first = next(states)
     spans = np.max([np.ptp(body.surface.points, axis=0) for body in first], axis=0)
     flat = bool(spans[2] <= 1e-9 * spans.max())
-    axes = axes_of_view(flat)
+    axes = axes_of_view(flat, away)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     least, most = np.inf, -np.inf
     for body in chain(first, chain.from_iterable(states)):
         seen = np.asarray(body.surface.points, dtype=np.float64) @ axes
         low, high = np.minimum(low, seen.min(axis=0)), np.maximum(high, seen.max(axis=0))
         if body.values is not None:
-            least, most = min(least, float(body.values.min())), max(most, float(body.values.max()))
+            least, most = min(least, float(body.values.min())), max(most, float(np.percentile(body.values, 100 - crop)))
+    if field is None:
+        least, most = 0.0, 1.0
     if least > most:
         known = sorted({name for body in first for name in body.surface.point_data if not name.startswith("vtk")})
         raise ValueError(f"no body has a field '{field}'; there are {', '.join(known)}")
@@ -64,25 +80,33 @@ def compose(states: Iterable[list[Body]], field: str, title: str, units: Mapping
     width, height = (high - low)[:2]
     size, layout = SIZE, UPRIGHT if flat else SPATIAL
     if flat and width > LONG_FROM * height:
-        size, layout = long_layout(height / width)
+        size, layout = long_layout(height / width, below=1.4 if field else 0.75)
+    if not flat and height > TALL_FROM * width:
+        size, layout = TALL_SIZE, TALL
+    if field is None and layout in (UPRIGHT, SPATIAL, TALL):
+        _, bottom, across, up = layout[0]
+        layout = ((0.5 - across / 2, bottom, across, up), layout[1])
     return Scene(
         view=frame(axes, low, high, aspect=size[0] * layout[0][2] / (size[1] * layout[0][3])),
         flat=flat,
         limits=(least, most),
-        colours="coolwarm" if signed else "viridis",
+        colours=colours or ("coolwarm" if signed else "viridis"),
         title=title,
-        label=field_label(field, first, units),
+        label=field_label(field, first, units) if field else "",
         units=units,
+        cropped=crop > 0,
         layout=layout,
         size=size,
     )
 
 
-def long_layout(slope: float) -> tuple[tuple[float, float], tuple[Rectangle, Rectangle]]:
-    """(size of the figure in inches, picture and colour bar in parts of it) for a scene of this height over width."""
+def long_layout(slope: float, below: float) -> tuple[tuple[float, float], tuple[Rectangle, Rectangle]]:
+    """(size of the figure in inches, picture and colour bar in parts of it) for a scene of this height over width.
+
+    `below`: inches below the picture.
+    """
     picture = max(0.845 * SIZE[0] * slope, 0.8)
-    below, above = 1.4, 0.45
-    height = picture + below + above
+    height = picture + below + 0.45
     return (SIZE[0], height), (
         (0.125, below / height, 0.845, picture / height),
         (0.25, 0.6 / height, 0.5, 0.125 / height),
@@ -120,8 +144,6 @@ def animate(scene: Scene, states: Iterable[tuple[float, list[Body]]], *, dots: i
 def lay_out(scene: Scene, dots: int) -> tuple[Any, Any, Any]:
     """(figure, its picture, its title): everything around the picture, which is still white."""
     import matplotlib
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
 
     view = scene.view
@@ -140,18 +162,33 @@ def lay_out(scene: Scene, dots: int) -> tuple[Any, Any, Any]:
             axes.set_axis_off()
             draw_triad(figure, view)
         title = axes.set_title("", pad=10)
-        _, _, width, height = scene.layout[1]
-        colour_bar = figure.colorbar(
-            ScalarMappable(Normalize(*scene.limits), scene.colours),
-            cax=figure.add_axes(scene.layout[1]),
-            orientation="horizontal" if width > height else "vertical",
-            label=scene.label,
-        )
-        colour_bar.outline.set_linewidth(0.6)
-        if height > width:  # the power of ten belongs above the numbers, not over the picture
-            colour_bar.ax.yaxis.set_offset_position("right")
-            colour_bar.ax.yaxis.get_offset_text().set_horizontalalignment("left")
+        if scene.label:
+            draw_colour_bar(
+                figure, scene.layout[1], scene.limits, scene.colours, scene.label, cropped=scene.cropped
+            )
     return figure, image, title
+
+
+def draw_colour_bar(
+    figure: Any, place: Rectangle, limits: tuple[float, float], colours: str, label: str, *, cropped: bool = False
+) -> None:
+    """The colours and what they mean, in a rectangle of the figure; an arrow if there are values above, `cropped`."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    upright = place[3] * figure.get_figheight() > place[2] * figure.get_figwidth()
+    colour_bar = figure.colorbar(
+        ScalarMappable(Normalize(*limits), colours),
+        cax=figure.add_axes(place),
+        orientation="vertical" if upright else "horizontal",
+        label=label,
+        extend="max" if cropped else "neither",
+        extendfrac=0.03,
+    )
+    colour_bar.outline.set_linewidth(0.6)
+    if upright:  # the power of ten belongs above the numbers, not over the picture
+        colour_bar.ax.yaxis.set_offset_position("right")
+        colour_bar.ax.yaxis.get_offset_text().set_horizontalalignment("left")
 
 
 def render_into(scene: Scene, bodies: list[Body], dots: int) -> Pixels:
@@ -178,7 +215,7 @@ def field_label(field: str, bodies: list[Body], units: Mapping[str, str]) -> str
 
 def draw_triad(figure: Any, view: View) -> None:
     """The directions of x, y and z in the lower left corner."""
-    axes = figure.add_axes((0.02, 0.03, 0.12 * SIZE[1] / SIZE[0], 0.12))
+    axes = figure.add_axes((0.02, 0.03, 0.6 / figure.get_figwidth(), 0.6 / figure.get_figheight()))
     axes.set_axis_off()
     axes.set_xlim(-1, 1)
     axes.set_ylim(-1, 1)

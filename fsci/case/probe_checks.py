@@ -33,6 +33,9 @@ def probe_mistakes(case: Case) -> Iterator[Mistake]:
         if set(probe.columns(name, 3)) & set(RESERVED):
             yield keys, f"a probe cannot be called '{name}': history.csv has a column of this name"
         yield from length_mistakes(probe.at, case.dimension, (*keys, "at"))
+        pairs = {} if case.contact is None else case.contact.pairs
+        if probe.pair is not None and probe.pair not in pairs:
+            yield (*keys, "pair"), f"unknown pair '{probe.pair}'{did_you_mean(probe.pair, pairs)}"
         match field_of(case, probe):
             case "structure" if case.structure is not None:
                 yield from _of_structure(case.structure, name, probe)

@@ -13,6 +13,7 @@ from fsci.case.values import Name, NumberVector, Text
 STRUCTURE = {
     "at": ("displacement", "velocity", "acceleration"),
     "on": ("reaction", "traction", "displacement", "area"),
+    "pair": ("gap",),
     "": ("energy", "momentum", "angular_momentum", "mass", "volume", "centre"),
 }
 FLUID = {
@@ -22,7 +23,7 @@ FLUID = {
     "": ("force", "moment", "kinetic_energy", "dissipation", "volume"),
 }
 FIELDS = {"structure": STRUCTURE, "fluid": FLUID}
-PLACES = {"at": "'at: [..]'", "on": "'on: SURFACE'", "through": "'through: PATCH'"}
+PLACES = {"at": "'at: [..]'", "on": "'on: SURFACE'", "through": "'through: PATCH'", "pair": "'pair: PAIR'"}
 ENERGIES = ("kinetic", "internal", "work", "total")
 #: columns of history.csv that cannot be names of probes
 RESERVED = ("step", "time", "dt", "iterations", "wall", "residual")
@@ -36,7 +37,8 @@ class Probe(Section):
     - with `at`, at a point (reference coordinates): displacement, velocity, acceleration
     - with `on`, on a surface: reaction (force of the supports), traction (integral of P N over the reference surface),
       displacement (mean over the area), area
-    - with neither, of the body: energy, momentum, angular_momentum, mass, volume, centre (of mass)
+    - with `pair`, of a pair of contact: gap (shortest distance of slave nodes to the master)
+    - with none of them, of the body: energy, momentum, angular_momentum, mass, volume, centre (of mass)
 
     Of the fluid:
 
@@ -76,6 +78,7 @@ class Probe(Section):
         "moment",
         "kinetic_energy",
         "dissipation",
+        "gap",
     ] = setting(..., "what is measured")
     at: NumberVector | None = setting(None, "point; of a structure, in reference coordinates", unit="m")
     on: Text | None = setting(None, "name of a surface, or of a patch of the fluid")
@@ -83,6 +86,7 @@ class Probe(Section):
         None, "another point of the fluid, whose value is subtracted from that of `at`", unit="m"
     )
     through: Text | None = setting(None, "name of a patch of the fluid")
+    pair: Name | None = setting(None, "name of a pair of contact")
     about: NumberVector | None = setting(None, "point that a moment is about; default: the origin", unit="m")
 
     @property
@@ -119,7 +123,7 @@ class Probe(Section):
         match self.quantity:
             case "energy":
                 return tuple(f"{name}.{part}" for part in ENERGIES)
-            case "area" | "mass" | "volume" | "pressure" | "flow_rate" | "kinetic_energy" | "dissipation":
+            case "area" | "gap" | "mass" | "volume" | "pressure" | "flow_rate" | "kinetic_energy" | "dissipation":
                 return (name,)
             case "angular_momentum" | "moment" if dimension == 2:
                 return (name,)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.condense import Linearised, condense, expand, place_columns, recover
+from solvers.contact.distance import shortest_distance
 from solvers.contact.held import lent_shares
 from solvers.contact.pair import KEEP_AFTER, Pair
 from solvers.contact.share import Shares
@@ -341,6 +342,12 @@ class Contact:
         if self.terms is None:
             return np.zeros(self.dim)
         return -(self.terms.D[slave, None] * self.z[slave]).sum(axis=0)
+
+    def distance(self, index: int) -> float:
+        """Shortest distance [m] of the slave nodes of a pair to its master, as of the latest `evaluate`."""
+        slave, master = self._sides[index]
+        surface = self.pairs[index].master
+        return shortest_distance(self.x[slave], self.x[master], surface.facets, surface.facet_type)
 
     def mean_gap(self) -> Array:
         """Mean gap [m] around each slave node, NaN where no master is near, shape (N,)."""

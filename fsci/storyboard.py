@@ -1,0 +1,128 @@
+"""A flow at several times side by side: a plane of it with streamlines, and the bodies where the plane cuts them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fsci.curves import DOTS, STYLE, label
+from fsci.render import Array, Body, Pixels, View, import_pyvista, render
+from fsci.render_flow import NO_LINES, fill_lines, is_flat, lengthwise, load_state, plane_flow, segments
+from fsci.scene import draw_colour_bar, field_label
+
+PANELS = 6  #: at most
+WIDTH = 9.0  #: of the picture, inches
+SHAPE = 1.4  #: width over height that the panels together come close to
+BESIDE, BELOW, BAR, TITLE, GAP = 0.75, 0.6, 1.0, 0.55, 0.15  #: inches left of, below, right of, above, between panels
+HEAD = 0.32  #: inches for the time above each panel
+CROP = 1.0  #: percent of the points of a slice through cells, whose values may lie above the colour bar
+
+Axes = tuple[str, str]  #: names of the coordinates to the right and upwards
+
+
+def plot_story(
+    path: Path, moments: Sequence[Sequence[tuple[float, Path]]], title: str, units: Mapping[str, str]
+) -> Path:
+    """Draws the velocity in the whole plane or in the middle of the box; `moments`: (time, file) of flow and bodies."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    states = [plane_state([file for _, file in moment]) for moment in moments]
+    flows = [bodies[0] for bodies, _ in states]
+    low, high = (np.array(flows[0].surface.bounds[side:4:2]) for side in (0, 1))
+    limits = (0.0, max(float(np.percentile(flow.values, 100 - CROP)) for flow in flows) or 1.0)
+    columns, rows = arrange(len(states), *(high - low))
+    width = (WIDTH - BESIDE - BAR - (columns - 1) * GAP) / columns
+    height = width * float(np.divide(*(high - low)[::-1]))
+    total = BELOW + TITLE + rows * (height + HEAD) + (rows - 1) * GAP
+    with matplotlib.rc_context({**STYLE, "axes.grid": False}):
+        figure = Figure((WIDTH, total), dpi=DOTS)
+        for index, (moment, (bodies, names)) in enumerate(zip(moments, states, strict=True)):
+            row, column = divmod(index, columns)
+            left = BESIDE + column * (width + GAP)
+            bottom = BELOW + (rows - 1 - row) * (height + HEAD + GAP)
+            axes = figure.add_axes((left / WIDTH, bottom / total, width / WIDTH, height / total))
+            extent = (low[0], high[0], low[1], high[1])
+            axes.imshow(snapshot(bodies, low, high, limits, width), extent=extent, aspect="auto", interpolation="none")
+            axes.spines[:].set_visible(True)
+            axes.locator_params(nbins=4)
+            axes.set_title(f"t = {moment[0][0]:.4g} {units['time']}", fontsize=STYLE["font.size"], pad=5)
+            axes.tick_params(labelleft=column == 0, labelbottom=index + columns >= len(states))
+            if column == 0:
+                axes.set_ylabel(label(names[1], "displacement", units))
+            if index + columns >= len(states):
+                axes.set_xlabel(label(names[0], "displacement", units))
+        figure.suptitle(title, y=1 - 0.1 / total, va="top")
+        tall = min(total - BELOW - TITLE - HEAD, 4.0)
+        middle = BELOW + (total - BELOW - TITLE - HEAD) / 2
+        place = ((WIDTH - BAR + 0.2) / WIDTH, (middle - tall / 2) / total, 0.14 / WIDTH, tall / total)
+        draw_colour_bar(figure, place, limits, "viridis", field_label("velocity", flows, units), cropped=True)
+        figure.savefig(path)
+    return path
+
+
+def choose(count: int, needed: Sequence[int] = ()) -> list[int]:
+    """Up to PANELS of the states 0 ... count-1, evenly, the last one and the needed ones among them."""
+    chosen = {round(index) for index in np.linspace(0, count - 1, min(PANELS, count))}
+    for state in sorted(set(needed) - chosen):
+        others = chosen - {count - 1, *needed}
+        chosen -= {min(others, key=lambda other: abs(other - state))}
+        chosen.add(state)
+    return sorted(chosen)
+
+
+def arrange(count: int, width: float, height: float) -> tuple[int, int]:
+    """(columns, rows) with which panels of this size together come closest to the shape of a page."""
+
+    def shape(columns: int) -> float:
+        return columns * width / (-(-count // columns) * height)
+
+    columns = min(range(1, count + 1), key=lambda columns: abs(np.log(shape(columns) / SHAPE)))
+    return columns, -(-count // columns)
+
+
+def plane_state(files: Sequence[Path]) -> tuple[list[Body], Axes]:
+    """The flow, coloured by velocity, and the grey bodies in the plane (x, y, 0), and what its coordinates are."""
+    pyvista = import_pyvista()
+    meshes = [pyvista.read(path) for path in files]
+    if is_flat(meshes[0]):
+        flow, *bodies = load_state(files, "velocity")
+        return [flow, *(replace(body, edges=NO_LINES) for body in bodies)], ("x", "y")
+    return list(cut(meshes)), ("y" if lengthwise(meshes[0]) == "x" else "x", "z")
+
+
+def cut(meshes: Sequence[Any]) -> Iterator[Body]:
+    """What the lengthwise plane through the middle of a box in space cuts, seen from the front."""
+    normal, origin = lengthwise(meshes[0]), meshes[0].center
+    order = [1, 2, 0] if normal == "x" else [0, 2, 1]
+    for mesh in meshes:
+        section = mesh.slice(normal=normal, origin=origin)
+        section.points = np.asarray(section.points)[:, order] * [1, 1, 0]
+        if mesh is meshes[0]:
+            section.point_data["velocity"] = np.asarray(section.point_data["velocity"])[:, order]
+            yield plane_flow(section, "velocity")
+        elif section.n_lines:
+            yield fill_lines(section.points, section.lines.reshape(-1, 3)[:, 1:])
+        elif section.n_points:
+            yield Body(section, NO_LINES, boundary(section), None)
+
+
+def boundary(section: Any) -> Array:
+    """The outer edges of faces, shape (n, 2, 3)."""
+    return segments(
+        section.clean().extract_feature_edges(
+            boundary_edges=True, feature_edges=False, manifold_edges=False, non_manifold_edges=False
+        )
+    )
+
+
+def snapshot(bodies: list[Body], low: Array, high: Array, limits: tuple[float, float], width: float) -> Pixels:
+    """The plane from `low` to `high`, at the given width in inches."""
+    half = (high - low) / 2
+    view = View(np.array([*(low + half), 0.0]), np.array([1.0, 0, 0]), np.array([0.0, 1, 0]), *half)
+    size = (round(width * DOTS), round(width * DOTS * half[1] / half[0]))
+    return render(bodies, view, size=size, limits=limits, colours="viridis")

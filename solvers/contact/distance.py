@@ -1,0 +1,43 @@
+"""The shortest distance between two surfaces, however far they are from each other: what a probe of the gap shows."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.tessellation import SIMPLICES
+
+
+def shortest_distance(points: Array, x: Array, facets: NDArray[np.int64], facet_type: str) -> float:
+    """Smallest distance [m] from points (n, dim) to facets with nodes at x, as flat pieces through their nodes."""
+    simplices = np.array(SIMPLICES[facet_type])
+    corners = x[facets[:, simplices].reshape(-1, simplices.shape[1])]
+    closest = np.inf
+    for simplex in corners:
+        inside = _to_inside(points, simplex) if len(simplex) == 3 else np.full(len(points), np.inf)
+        edges = [(a, b) for a in range(len(simplex)) for b in range(a)]
+        to_edges = [_to_segment(points, simplex[a], simplex[b]) for a, b in edges]
+        closest = min(closest, float(np.minimum.reduce([inside, *to_edges]).min()))
+    return closest
+
+
+def _to_segment(points: Array, a: Array, b: Array) -> Array:
+    along = b - a
+    size = float(along @ along)
+    share = np.clip((points - a) @ along / size, 0.0, 1.0) if size > 0.0 else np.zeros(len(points))
+    return np.linalg.norm(points - a - share[:, None] * along, axis=1)
+
+
+def _to_inside(points: Array, corners: Array) -> Array:
+    """Distance to the plane of a triangle where the point is above its inside, else infinity."""
+    first, second = corners[1] - corners[0], corners[2] - corners[0]
+    normal = np.cross(first, second)
+    size = float(normal @ normal)
+    if size == 0.0:
+        return np.full(len(points), np.inf)
+    away = points - corners[0]
+    u = np.cross(away, second) @ normal / size
+    v = np.cross(first, away) @ normal / size
+    above = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0)
+    return np.where(above, np.abs(away @ normal) / np.sqrt(size), np.inf)
