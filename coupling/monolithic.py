@@ -3,8 +3,8 @@
     [ K + w alpha M_G    -w C^T S ] [du]       [ r_s ]        w: weight of the load in the structure's balance
     [ alpha C                A    ] [dw]  =  - [ r_f ]        C, S, M: see solvers.fluid.interface, g = alpha d - ...
 
-Derivatives with respect to the shape of the fluid's domain count in steady flows only, where alpha = 0 and they are all
-that the fluid feels of du; in time they are small against alpha C, and cost more than the Newton steps that they save.
+To alpha C and M_G come the derivatives with respect to the shape of the fluid's domain (solvers.fluid.shape): in steady
+flows, where alpha = 0, they are all that the fluid feels of du; in time they halve the number of Newton steps.
 Source: Schott, Ager, Wall, Int. J. Numer. Meth. Engng 119 (2019) 757-796.
 """
 
@@ -29,7 +29,7 @@ class Monolithic:
     def __init__(self, coupled: Coupled, tolerance: Tolerance = Tolerance()):
         self.coupled, self.tolerance = coupled, tolerance
         structure, fluid = coupled.structure, coupled.fluid
-        self.comm = structure.comm
+        self.comm, fluid.solved_with_bodies = structure.comm, True
         self._numbering = Numbering(self.comm, structure.layout.size, fluid.unknowns.owned)
         self._iterative = linear.choose_flow(fluid.solver.linear, fluid.dim, fluid.dofs()) == "iterative"
         self._direct = linear.flow_direct_solver(self.comm, tolerance=0.0)
@@ -131,10 +131,8 @@ class Monolithic:
         operator = fluid.system.interface
         wetted = fluid.vertices_of([s.name for s in surface.surfaces])
         columns = (wetted[:, None] * fluid.dim + np.arange(fluid.dim)).ravel()
-        into, load = alpha * operator.matrix, alpha * operator.mass
-        if fluid.settings.steady:
-            by_shape, load_by_shape = shape_derivatives(operator, fluid.flow)
-            into, load = into + by_shape, load - load_by_shape
+        by_shape, load_by_shape = shape_derivatives(operator, fluid.flow)
+        into, load = alpha * operator.matrix + by_shape, alpha * operator.mass - load_by_shape
         velocity_in = into[:, columns].tocoo()
         C = operator.matrix[:, columns].tocoo()
         flow, held = fluid.unknowns.global_dofs, fluid.held_everywhere()

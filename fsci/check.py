@@ -26,6 +26,9 @@ def summary(case: Case) -> str:
         rows += _structure(case, case.structure)
     if case.fluid is not None:
         rows += _fluid(case.fluid)
+    if case.coupling is not None:
+        scheme, by = case.coupling.scheme, case.coupling.accelerator
+        rows.append(("coupling", scheme if scheme == "monolithic" else f"{scheme}, {by}"))
     if case.probes:
         rows.append(("probes", ", ".join(case.probes)))
     if case.verify:

@@ -84,6 +84,15 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument(
         "--field", metavar="FIELD", help="field to colour by (default: displacement; of a flow velocity and pressure)"
     )
+    plot.add_argument(
+        "--time",
+        dest="times",
+        metavar="T",
+        action="append",
+        default=[],
+        type=float,
+        help="draw only the output nearest to this time; may be repeated",
+    )
     plot.add_argument("--movie", action="store_true", help="make an animation too")
 
     schema = command(_schema, "print the JSON schema of case files, for editors")
@@ -170,7 +179,7 @@ def _plot(options: argparse.Namespace) -> int:
     if not options.out.is_dir():
         return _fail(f"fsci plot: there is no folder '{options.out}'")
     try:
-        files = plot_run(options.out, movie=options.movie, field=options.field)
+        files = plot_run(options.out, movie=options.movie, field=options.field, times=options.times)
     except (ValueError, RuntimeError) as error:
         return _fail(f"fsci plot: {error}")
     print("\n".join(str(path) for path in files))

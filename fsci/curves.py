@@ -11,6 +11,7 @@ import numpy as np
 from fsci.history import COLUMNS, History
 
 SIZE = (8.0, 5.0)  #: of a picture in inches; 1600 x 1000 pixels
+PANEL = 2.2  #: inches of height of each panel where there are several
 DOTS = 200  #: per inch
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  #: told apart by colour-blind readers
 STYLE: Any = {
@@ -53,7 +54,25 @@ DIMENSIONS = {
     "energy": (2, 1, -2),
     "pressure": (-1, 1, -2),
     "von_mises": (-1, 1, -2),
+    "contact_pressure": (-1, 1, -2),
+    "contact_traction": (-1, 1, -2),
+    "contact_gap": (1, 0, 0),
+    "gap": (1, 0, 0),
 }
+
+#: balances in the history -> what they are; all would be zero without errors of solvers and time steps
+BALANCES = {
+    "structure.energy": ("error of the structure's energy", "energy"),
+    "fluid.mass": ("error of the fluid's volume", "flow_rate"),
+    "interface.work": ("error of the work at the interface", "energy"),
+    "interface.force": ("relative error of the forces at the interface", ""),
+}
+NODES = "contact nodes"  #: a panel
+CONTACT = "contact."  #: what columns of contact begin with
+NEGLIGIBLE, SMALL = (
+    1e-3,
+    0.05,
+)  #: ranges of components in parts of the largest one that get no axis, an axis of their own
 
 #: (length, mass, time) -> the names of the units of force, energy and stress
 DERIVED = {
@@ -92,31 +111,92 @@ def plot_history(folder: Path, history: History, quantities: Mapping[str, str], 
     """
     families: dict[str, list[str]] = {}
     for name in history:
-        if name not in (*COLUMNS, "residual"):
+        if name not in (*COLUMNS, *BALANCES, "residual") and not name.startswith(CONTACT):
             families.setdefault(name.rpartition(".")[0] or name, []).append(name)
+    time, below = history["time"], label("time", "time", units)
     drawn = []
     for family, columns in families.items():
         quantity = quantities.get(family, family)
         text = quantity if quantity == family else f"{quantity} of {family}"
         if len(columns) == 1 and family not in quantities:
             text = columns[0].replace(".", " ")
-        path = folder / f"history_{family}.png"
         curves = {name.rpartition(".")[2]: history[name] for name in columns}
-        plot_curves(path, history["time"], curves, label("time", "time", units), label(text, quantity, units))
-        drawn.append(path)
+        drawn.append(plot_curves(folder / f"history_{family}.png", time, curves, below, label(text, quantity, units)))
+    if any(name.startswith(CONTACT) for name in history):
+        drawn.append(plot_panels(folder / "history_contact.png", time, contact_panels(history, units), below))
+    balances = {
+        label(text, quantity, units): {"": np.abs(history[name])}
+        for name, (text, quantity) in BALANCES.items()
+        if name in history
+    }
+    if balances:
+        drawn.append(plot_panels(folder / "history_balances.png", time, balances, below, logarithmic=True))
     return drawn
 
 
-def plot_curves(path: Path, time: Any, curves: Mapping[str, Any], below: str, beside: str) -> None:
+def contact_panels(history: History, units: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+    """Label -> curves: the force of each pair of surfaces, then other numbers of theirs, then counts of nodes."""
+    panels: dict[str, dict[str, Any]] = {}
+    for name, values in history.items():
+        pair, _, number = name.removeprefix(CONTACT).rpartition(".")
+        if not name.startswith(CONTACT):
+            continue
+        if number in ("x", "y", "z"):
+            panels.setdefault(label(f"contact force of {pair}", "force", units), {})[number] = values
+        elif pair:
+            panels[label(f"contact {number} of {pair}", f"contact_{number}", units)] = {"": values}
+        else:
+            panels.setdefault(NODES, {})[number] = values
+    if NODES in panels:
+        panels[NODES] = panels.pop(NODES)
+    return panels
+
+
+def plot_panels(
+    path: Path, time: Any, panels: Mapping[str, Mapping[str, Any]], below: str, *, logarithmic: bool = False
+) -> Path:
+    """Draws curves over time in panels above each other, label -> name -> values; counts of nodes as steps."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(STYLE):
+        height = max(SIZE[1], PANEL * len(panels))
+        figure = Figure((SIZE[0], height), dpi=DOTS, layout="constrained")
+        rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+        marker = "o" if len(time) < 30 else ""
+        for axes, (beside, curves) in zip(rows, panels.items(), strict=True):
+            scaled = logarithmic and any(np.any(values > 0) for values in curves.values())
+            for index, (name, values) in enumerate(curves.items()):
+                style = {"color": COLOURS[index % len(COLOURS)], "marker": marker, "label": name}
+                steps = {"drawstyle": "steps-post"} if beside == NODES else {}
+                axes.plot(time, np.where(values > 0, values, np.nan) if scaled else values, **style, **steps)
+            if scaled:
+                axes.set_yscale("log")
+            axes.set_title(beside, loc="left", fontsize=STYLE["font.size"])
+            if len(curves) > 1:
+                add_legend(axes)
+        rows[-1].set_xlabel(below)
+        figure.savefig(path)
+    return path
+
+
+def add_legend(axes: Any) -> None:
+    """Names of curves above the right end of a panel, where no power of ten and no title is."""
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, borderaxespad=0.2)
+
+
+def plot_curves(path: Path, time: Any, curves: Mapping[str, Any], below: str, beside: str) -> Path:
     """Draws curves over time; those of very different ranges get an axis each."""
     import matplotlib
     from matplotlib.figure import Figure
 
     finite = [values[np.isfinite(values)] for values in curves.values()]
     ranges = [spread for values in finite if len(values) and (spread := float(np.ptp(values))) > 0]
-    apart = len(ranges) > 1 and min(ranges) < 0.05 * max(ranges)
+    ranges = [spread for spread in ranges if spread > NEGLIGIBLE * max(ranges)]
+    apart = len(ranges) > 1 and min(ranges) < SMALL * max(ranges)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(SIZE, dpi=DOTS, layout="constrained")
+        height = max(SIZE[1], PANEL * len(curves)) if apart else SIZE[1]
+        figure = Figure((SIZE[0], height), dpi=DOTS, layout="constrained")
         panels = figure.subplots(len(curves) if apart else 1, 1, sharex=True, squeeze=False)[:, 0]
         marker = "o" if len(time) < 30 else ""
         for index, (name, values) in enumerate(curves.items()):
@@ -126,8 +206,9 @@ def plot_curves(path: Path, time: Any, curves: Mapping[str, Any], below: str, be
         figure.supylabel(beside, fontsize=STYLE["font.size"])
         if len(curves) > 1:
             for axes in panels:
-                axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=6, borderaxespad=0.2)
+                add_legend(axes)
         figure.savefig(path)
+    return path
 
 
 def plot_convergence(path: Path, residuals: Mapping[str, Sequence[float]]) -> Path:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fsci.output import Series
 from fsci.render import Body, Pixels
 from fsci.render_flow import load_state
 from fsci.scene import animate, compose
@@ -16,9 +15,10 @@ DOTS = 120  #: pixels per inch: 960 x 600
 MILLISECONDS = 50  #: per frame
 
 
-def plot_movie(path: Path, bodies: list[Series], field: str, title: str, units: Mapping[str, str]) -> Path:
-    """Animates the series of all bodies, coloured by a field, as a GIF."""
-    moments = list(zip(*bodies, strict=False))
+def plot_movie(
+    path: Path, moments: Sequence[Sequence[tuple[float, Path]]], field: str, title: str, units: Mapping[str, str]
+) -> Path:
+    """Animates all bodies, coloured by a field, as a GIF; `moments`: (time, file) of each body at each time."""
     shown = moments[:: -(-len(moments) // FRAMES)]
 
     def states() -> Iterator[tuple[float, list[Body]]]:

@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+
+import numpy as np
 
 from fsci.curves import DOTS, plot_convergence, plot_history
 from fsci.history import read_history
 from fsci.movie import plot_movie
 from fsci.output import Series, read_collection
-from fsci.render_flow import is_flow, load_state
+from fsci.render import ISOMETRIC, Array, import_pyvista, load_body
+from fsci.render_flow import is_flow, load_meshes, load_state
 from fsci.scene import compose, draw
+from fsci.storyboard import choose, plot_story
 
 STRUCTURE_FIELDS = ("displacement",)  #: what is drawn if nothing is asked for
 FLUID_FIELDS = ("velocity", "pressure")
+PRESSURE = "contact_pressure"
+OBLIQUE = 0.8  #: how far from the side a contact surface is seen
+CROP = 1.0  #: percent of the points of a flow in space whose values may lie above the colour bar
+
+Moment = tuple[tuple[float, Path], ...]  #: (time, VTU file) of each part at one output time
 
 
 @dataclass(frozen=True)
@@ -27,24 +36,36 @@ class Labels:
     quantities: Mapping[str, str] = field(default_factory=dict)  #: probe -> what it measures
 
 
-def plot_run(out: Path, *, movie: bool = False, field: str | None = None) -> list[Path]:
-    """Draws the last state, the probes and the convergence of the run in folder `out` into out/pictures.
+def plot_run(out: Path, *, movie: bool = False, field: str | None = None, times: Sequence[float] = ()) -> list[Path]:
+    """Draws the states, the probes and the convergence of the run in folder `out` into out/pictures.
 
     `field` is what colours show: a point field (a vector's magnitude) or a component such as velocity.x; by default the
-    displacement, of a flow velocity and pressure. `movie` adds an animation of all output times. Returns the files;
-    raises ValueError if no body has the field.
+    displacement, of a flow velocity and pressure. `movie` adds an animation of all output times. With `times` only the
+    states nearest to them are drawn. Returns the files; raises ValueError if no body has the field.
     """
     out = Path(out)
     labels = read_labels(out)
     folder = out / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
+    moments: list[Moment] = list(zip(*read_series(out / "fields"), strict=False))
+    flow = bool(moments) and is_flow(moments[-1][0][1])
+    names = (field,) if field else FLUID_FIELDS if flow else STRUCTURE_FIELDS
+    if times:
+        if not moments:
+            raise ValueError(f"there are no fields in '{out}'")
+        nearest = [min(moments, key=lambda moment: abs(moment[0][0] - time)) for time in times]
+        return [
+            plot_state(folder / f"{name}_{moment[0][0]:.6g}.png", moment, name, labels)
+            for moment in nearest
+            for name in names
+        ]
     drawn = []
-    bodies = read_series(out / "fields")
-    if bodies:
-        names = (field,) if field else FLUID_FIELDS if is_flow(bodies[0][-1][1]) else STRUCTURE_FIELDS
-        drawn += [plot_state(folder / f"final_{name}.png", bodies, name, labels) for name in names]
+    if moments:
+        drawn += [plot_state(folder / f"final_{name}.png", moments[-1], name, labels) for name in names]
+        if not field:
+            drawn += plot_more(folder, moments, labels, flow=flow)
         if movie:
-            drawn.append(plot_movie(folder / "movie.gif", bodies, names[0], labels.title, labels.units))
+            drawn.append(plot_movie(folder / "movie.gif", moments, names[0], labels.title, labels.units))
     if (out / "history.csv").exists():
         drawn += plot_history(folder, read_history(out / "history.csv"), labels.quantities, labels.units)
     if (out / "summary.json").exists():
@@ -54,18 +75,70 @@ def plot_run(out: Path, *, movie: bool = False, field: str | None = None) -> lis
     return drawn
 
 
+def plot_more(folder: Path, moments: Sequence[Moment], labels: Labels, *, flow: bool) -> list[Path]:
+    """What helps to understand a run: its mesh, the flow over time, the state before contact, and contact pressure."""
+    drawn = [plot_mesh(folder / "mesh.png", moments[0], labels)]
+    touching = [index for index, moment in enumerate(moments) if has_contact(moment[flow:])]
+    if flow and len(moments[0]) > 1:
+        shown = [moments[index] for index in choose(len(moments), touching[:1])]
+        drawn.append(plot_story(folder / "story_velocity.png", shown, labels.title, labels.units))
+        if touching and touching[0] > 0:
+            before = moments[touching[0] - 1]
+            drawn.append(plot_state(folder / "before_contact_velocity.png", before, "velocity", labels))
+    if touching:
+        name = "final" if touching[-1] == len(moments) - 1 else "last"
+        drawn.append(plot_pressure(folder / f"{name}_contact_pressure.png", moments[touching[-1]], labels))
+    return drawn
+
+
 def read_series(folder: Path) -> list[Series]:
     """The files of all parts; those of a flow come first, so that bodies are drawn on top of it."""
     found = [series for path in sorted(folder.glob("*.pvd")) if (series := read_collection(path))]
     return sorted(found, key=lambda series: not is_flow(series[-1][1]))
 
 
-def plot_state(path: Path, bodies: list[Series], name: str, labels: Labels) -> Path:
-    """Draws the last state of all bodies coloured by the field `name`."""
-    state = load_state([series[-1][1] for series in bodies], name)
-    scene = compose([state], name, labels.title, labels.units, crop=1.0)
-    draw(scene, state, bodies[0][-1][0], dots=DOTS).savefig(path)
+def plot_state(path: Path, moment: Moment, name: str, labels: Labels) -> Path:
+    """Draws the state of all bodies at one time, coloured by the field `name`."""
+    time, first = moment[0]
+    state = load_state([file for _, file in moment], name)
+    crop = CROP if is_flow(first) else 0.0
+    scene = compose([state], name, labels.title, labels.units, crop=crop)
+    draw(scene, state, time, dots=DOTS).savefig(path)
     return path
+
+
+def plot_mesh(path: Path, moment: Moment, labels: Labels) -> Path:
+    """Draws the elements of all bodies and the cells of a flow."""
+    state = load_meshes([file for _, file in moment])
+    draw(compose([state], None, labels.title, labels.units), state, moment[0][0], dots=DOTS).savefig(path)
+    return path
+
+
+def plot_pressure(path: Path, moment: Moment, labels: Labels) -> Path:
+    """Draws the contact pressure on the bodies that have some, seen from the side where it acts."""
+    loaded = [load_body(file, PRESSURE) for _, file in moment]
+    bodies = [body for body in loaded if body.values is not None and body.values.max() > 0]
+    towards = np.sum([np.sum(body.surface.point_data["contact_traction"], axis=0) for body in bodies], axis=0)
+    away = look_at(-towards)
+    scene = compose([bodies], PRESSURE, labels.title, labels.units, away=away, colours="Reds")
+    draw(scene, bodies, moment[0][0], dots=DOTS).savefig(path)
+    return path
+
+
+def look_at(normal: Array) -> Array:
+    """The direction from which a surface with this outward normal is seen, a little from the side."""
+    length = np.linalg.norm(normal)
+    if length == 0.0:
+        return ISOMETRIC
+    normal = normal / length
+    away = normal + OBLIQUE * (ISOMETRIC - (ISOMETRIC @ normal) * normal)
+    return np.asarray(away / np.linalg.norm(away))
+
+
+def has_contact(moment: Moment) -> bool:
+    """Whether any body has contact pressure."""
+    data = [import_pyvista().read(file).point_data for _, file in moment]
+    return any(PRESSURE in fields and fields[PRESSURE].max() > 0 for fields in data)
 
 
 def read_labels(out: Path) -> Labels:

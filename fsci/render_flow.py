@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.render import Array, Body, field_values, import_pyvista, load_body
+from fsci.render import ISOMETRIC, Array, Body, field_values, import_pyvista, load_body
 
 STREAMLINES = "velocity"  #: the field that is drawn with streamlines, besides its components
 SPACING = 0.035  #: distance of streamlines in the plane, as part of the edge of a square as large as the box
@@ -40,6 +40,33 @@ def load_state(files: Sequence[Path], field: str) -> list[Body]:
     if field_values(flow.point_data, field) is not None:
         parts = [replace(part, values=None) for part in parts]
     return ([plane_flow(flow, field)] if is_flat(flow) else _spatial_flow(flow, field, meshes[1:])) + parts
+
+
+def load_meshes(files: Sequence[Path]) -> list[Body]:
+    """The bodies with the edges of their elements, the cells of a flow: all of a plane one, the back faces of a box."""
+    pyvista = import_pyvista()
+    parts = []
+    for path in files:
+        mesh = pyvista.read(path)
+        if "fluid_fraction" not in mesh.cell_data:
+            parts += [replace(part, values=None) for part in _load_body(mesh, "")]
+            continue
+        faces = mesh.extract_surface(algorithm="dataset_surface")
+        box = mesh.outline()
+        if not is_flat(mesh):
+            parts.append(Body(box, segments(box), NO_LINES, None))
+            faces = faces.extract_cells(_on_back(faces)).extract_surface(algorithm="dataset_surface")
+        edges = segments(faces.extract_all_edges())
+        parts.append(Body(box, edges, NO_LINES, None, line_colour="gray"))
+    return parts
+
+
+def _on_back(faces: Any) -> NDArray[np.int64]:
+    """Which faces lie in one of the three sides of the box that are turned away from the camera."""
+    centres = np.asarray(faces.cell_centers().points)
+    bounds, margin = np.array(faces.bounds), 1e-6 * faces.length
+    back = np.where(ISOMETRIC > 0, bounds[::2], bounds[1::2])
+    return np.flatnonzero(np.any(np.abs(centres - back) < margin, axis=1))
 
 
 def _load_body(mesh: Any, field: str) -> list[Body]:

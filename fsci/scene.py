@@ -35,7 +35,7 @@ class Scene:
     title: str
     label: str  #: of the colour bar; without colours there is none
     units: Mapping[str, str]  #: of length, mass and time
-    cropped: bool  #: some values lie above the colour bar
+    cropped: bool  #: some values lie beyond the colour bar
     layout: tuple[Rectangle, Rectangle]  #: of the picture and of the colour bar
     size: tuple[float, float]  #: of the figure, in inches
 
@@ -53,7 +53,8 @@ def compose(
     """The scene that has room and colours for all the given states, of which there must be one.
 
     Bodies in space are seen from the direction `away`. Without a field nothing has colours. `crop`: percent of the
-    points whose values may lie above the colour bar. Raises ValueError if no body has the field.
+    points whose values may lie above the colour bar, and of those with negative ones below it. Raises ValueError if no
+    body has the field.
     """
     states = iter(states)
     first = next(states)
@@ -66,7 +67,9 @@ def compose(
         seen = np.asarray(body.surface.points, dtype=np.float64) @ axes
         low, high = np.minimum(low, seen.min(axis=0)), np.maximum(high, seen.max(axis=0))
         if body.values is not None:
-            least, most = min(least, float(body.values.min())), max(most, float(np.percentile(body.values, 100 - crop)))
+            lowest = float(body.values.min())
+            least = min(least, float(np.percentile(body.values, crop)) if lowest < 0 else lowest)
+            most = max(most, float(np.percentile(body.values, 100 - crop)))
     if field is None:
         least, most = 0.0, 1.0
     if least > most:
@@ -163,16 +166,14 @@ def lay_out(scene: Scene, dots: int) -> tuple[Any, Any, Any]:
             draw_triad(figure, view)
         title = axes.set_title("", pad=10)
         if scene.label:
-            draw_colour_bar(
-                figure, scene.layout[1], scene.limits, scene.colours, scene.label, cropped=scene.cropped
-            )
+            draw_colour_bar(figure, scene.layout[1], scene.limits, scene.colours, scene.label, cropped=scene.cropped)
     return figure, image, title
 
 
 def draw_colour_bar(
     figure: Any, place: Rectangle, limits: tuple[float, float], colours: str, label: str, *, cropped: bool = False
 ) -> None:
-    """The colours and what they mean, in a rectangle of the figure; an arrow if there are values above, `cropped`."""
+    """The colours and what they mean, in a rectangle of the figure; with arrows if values lie beyond, `cropped`."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -182,7 +183,7 @@ def draw_colour_bar(
         cax=figure.add_axes(place),
         orientation="vertical" if upright else "horizontal",
         label=label,
-        extend="max" if cropped else "neither",
+        extend=("both" if limits[0] < 0 else "max") if cropped else "neither",
         extendfrac=0.03,
     )
     colour_bar.outline.set_linewidth(0.6)

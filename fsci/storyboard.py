@@ -17,9 +17,9 @@ from fsci.scene import draw_colour_bar, field_label
 PANELS = 6  #: at most
 WIDTH = 9.0  #: of the picture, inches
 SHAPE = 1.4  #: width over height that the panels together come close to
-BESIDE, BELOW, BAR, TITLE, GAP = 0.75, 0.6, 1.0, 0.55, 0.15  #: inches left of, below, right of, above, between panels
+BESIDE, BELOW, BAR, TITLE, GAP = 0.75, 0.6, 1.2, 0.45, 0.3  #: inches left of, below, right of, above, between panels
 HEAD = 0.32  #: inches for the time above each panel
-CROP = 1.0  #: percent of the points of a slice through cells, whose values may lie above the colour bar
+CROP = {True: 0.3, False: 1.0}  #: percent of the points in the plane, on a slice, with values above the colour bar
 
 Axes = tuple[str, str]  #: names of the coordinates to the right and upwards
 
@@ -30,18 +30,22 @@ def plot_story(
     """Draws the velocity in the whole plane or in the middle of the box; `moments`: (time, file) of flow and bodies."""
     import matplotlib
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
 
     states = [plane_state([file for _, file in moment]) for moment in moments]
-    flows = [bodies[0] for bodies, _ in states]
+    flows = [bodies[0] for bodies, *_ in states]
+    speeds = [flow.values for flow in flows if flow.values is not None]
     low, high = (np.array(flows[0].surface.bounds[side:4:2]) for side in (0, 1))
-    limits = (0.0, max(float(np.percentile(flow.values, 100 - CROP)) for flow in flows) or 1.0)
+    names, plane = states[0][1:]
+    crop = CROP[not plane]
+    limits = (0.0, max(float(np.percentile(speed, 100 - crop)) for speed in speeds) or 1.0)
     columns, rows = arrange(len(states), *(high - low))
     width = (WIDTH - BESIDE - BAR - (columns - 1) * GAP) / columns
     height = width * float(np.divide(*(high - low)[::-1]))
     total = BELOW + TITLE + rows * (height + HEAD) + (rows - 1) * GAP
     with matplotlib.rc_context({**STYLE, "axes.grid": False}):
         figure = Figure((WIDTH, total), dpi=DOTS)
-        for index, (moment, (bodies, names)) in enumerate(zip(moments, states, strict=True)):
+        for index, (moment, (bodies, *_)) in enumerate(zip(moments, states, strict=True)):
             row, column = divmod(index, columns)
             left = BESIDE + column * (width + GAP)
             bottom = BELOW + (rows - 1 - row) * (height + HEAD + GAP)
@@ -49,14 +53,15 @@ def plot_story(
             extent = (low[0], high[0], low[1], high[1])
             axes.imshow(snapshot(bodies, low, high, limits, width), extent=extent, aspect="auto", interpolation="none")
             axes.spines[:].set_visible(True)
-            axes.locator_params(nbins=4)
-            axes.set_title(f"t = {moment[0][0]:.4g} {units['time']}", fontsize=STYLE["font.size"], pad=5)
+            axes.xaxis.set_major_locator(MaxNLocator(max(2, round(width / 0.7)), steps=[1, 2, 5, 10]))
+            axes.yaxis.set_major_locator(MaxNLocator(max(2, round(height / 0.5)), steps=[1, 2, 5, 10]))
+            axes.set_title(f"t = {moment[0][0]:.3g} {units['time']}", fontsize=STYLE["font.size"], pad=5)
             axes.tick_params(labelleft=column == 0, labelbottom=index + columns >= len(states))
             if column == 0:
                 axes.set_ylabel(label(names[1], "displacement", units))
             if index + columns >= len(states):
                 axes.set_xlabel(label(names[0], "displacement", units))
-        figure.suptitle(title, y=1 - 0.1 / total, va="top")
+        figure.suptitle(f"{title}, {plane} {units['length']}" if plane else title, y=1 - 0.1 / total, va="top")
         tall = min(total - BELOW - TITLE - HEAD, 4.0)
         middle = BELOW + (total - BELOW - TITLE - HEAD) / 2
         place = ((WIDTH - BAR + 0.2) / WIDTH, (middle - tall / 2) / total, 0.14 / WIDTH, tall / total)
@@ -66,8 +71,13 @@ def plot_story(
 
 
 def choose(count: int, needed: Sequence[int] = ()) -> list[int]:
-    """Up to PANELS of the states 0 ... count-1, evenly, the last one and the needed ones among them."""
-    chosen = {round(index) for index in np.linspace(0, count - 1, min(PANELS, count))}
+    """Up to PANELS of the states 0 ... count-1, evenly, the last one and the needed ones among them.
+
+    Of more states the first one, mostly at rest, is not shown.
+    """
+    chosen = set(range(count))
+    if count > PANELS:
+        chosen = {round(index) for index in np.linspace(0, count - 1, PANELS + 1)[1:]}
     for state in sorted(set(needed) - chosen):
         others = chosen - {count - 1, *needed}
         chosen -= {min(others, key=lambda other: abs(other - state))}
@@ -81,18 +91,21 @@ def arrange(count: int, width: float, height: float) -> tuple[int, int]:
     def shape(columns: int) -> float:
         return columns * width / (-(-count // columns) * height)
 
-    columns = min(range(1, count + 1), key=lambda columns: abs(np.log(shape(columns) / SHAPE)))
+    full = [columns for columns in range(1, count + 1) if -count % columns <= count // 5]  # few empty places
+    columns = min(full, key=lambda columns: abs(np.log(shape(columns) / SHAPE)))
     return columns, -(-count // columns)
 
 
-def plane_state(files: Sequence[Path]) -> tuple[list[Body], Axes]:
-    """The flow, coloured by velocity, and the grey bodies in the plane (x, y, 0), and what its coordinates are."""
+def plane_state(files: Sequence[Path]) -> tuple[list[Body], Axes, str]:
+    """The flow, coloured by velocity, and grey bodies in the plane (x, y, 0); its coordinates; where it is in space."""
     pyvista = import_pyvista()
     meshes = [pyvista.read(path) for path in files]
     if is_flat(meshes[0]):
         flow, *bodies = load_state(files, "velocity")
-        return [flow, *(replace(body, edges=NO_LINES) for body in bodies)], ("x", "y")
-    return list(cut(meshes)), ("y" if lengthwise(meshes[0]) == "x" else "x", "z")
+        return [flow, *(replace(body, edges=NO_LINES) for body in bodies)], ("x", "y"), ""
+    normal = lengthwise(meshes[0])
+    place = f"{normal} = {meshes[0].center['xyz'.index(normal)]:.3g}"
+    return list(cut(meshes)), ("y" if normal == "x" else "x", "z"), place
 
 
 def cut(meshes: Sequence[Any]) -> Iterator[Body]:

@@ -31,7 +31,7 @@ solver:
     max_iterations: 20
 """
 MESH = "mesh: {shape: rectangle, size: [2, 1], cells: [4, 2]}"
-SECTIONS = "title, units, time, structure, fluid, contact, probes, output, verify, solver"
+SECTIONS = "title, units, time, structure, fluid, coupling, contact, probes, output, verify, solver"
 SHAPES = "rectangle, disc, ring, box, beam, cylinder, tube, annulus, solid_torus, hollow_torus, hollow_sphere, "
 SHAPES += "sphere"
 CONSTANTS = "needs two constants, either E and nu, or lambda and mu, or mu and nu"
@@ -46,12 +46,7 @@ MISTAKES = [
         "max_",
     ),
     ("solver:", "colour: red\nsolver:", f"20:1: unknown setting 'colour' (available: {SECTIONS})", "colour"),
-    (
-        "solver:",
-        "coupling: {}\nsolver:",
-        f"20:1: section 'coupling' is not available in this version of fsci (available: {SECTIONS})",
-        "coupling",
-    ),
+    ("solver:", "coupling: {}\nsolver:", "20:11: 'coupling' needs the section 'fluid'", "{}"),
     (", end: 1}", "}", "3:1: missing setting 'end' in 'time'", "time"),
     ("time: {step: 0.1, end: 1}\n", "", "1:1: missing setting 'time'", "title"),
     ("{on: left, d", "{d", "11:11: missing setting 'on' in entry 1 of 'supports'", "{displacement"),
@@ -344,8 +339,7 @@ def test_bodies_of_different_dimensions():
         ("time..end=3", "write names separated by single dots"),
         ("verify=[1,", "the text ends before the value is complete"),
         ("time.end=", "'end' is empty: give it a value"),
-        ("coupling.scheme=monolithic",
-         f"section 'coupling' is not available in this version of fsci (available: {SECTIONS})"),
+        ("coupling.scheme=monolithic", "'coupling' needs the section 'fluid'"),
     ],
 )  # fmt: skip
 def test_override(override, message):

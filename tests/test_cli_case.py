@@ -138,11 +138,11 @@ def test_run_refuses_a_bad_case_before_it_starts(beam, calls, capsys):
 def test_resume_and_plot(calls, capsys):
     assert execute(["resume", "out"]) == 3
     Path("out").mkdir()
-    assert execute(["plot", "out", "--movie", "--field", "velocity"]) == 0
+    assert execute(["plot", "out", "--movie", "--field", "velocity", "--time", "0.5", "--time", "1"]) == 0
     assert capsys.readouterr().out == "a.png\nb.png\n"
     assert calls == [
         ("resume", (Path("out"),), {}),
-        ("plot", (Path("out"),), {"movie": True, "field": "velocity"}),
+        ("plot", (Path("out"),), {"movie": True, "field": "velocity", "times": [0.5, 1.0]}),
     ]
 
 

@@ -79,7 +79,7 @@ def test_errors_do_not_depend_on_the_position(element):
     """A disc is shifted through one cell in twenty steps."""
     cells = 16
     shift = np.linspace(0.0, 1.0, 20, endpoint=False)[:, None] * np.array([1.0, 0.37]) / cells
-    found = np.array([stokes_errors(element, cells, centre=d + (0.48, 0.49)) for d in shift])
+    found = np.array([stokes_errors(element, cells, centre=(0.48 + d[0], 0.49 + d[1])) for d in shift])
     assert np.all(found.max(axis=0) < 1.5 * found.min(axis=0)), found.max(axis=0) / found.min(axis=0)
 
 

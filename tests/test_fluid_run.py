@@ -165,7 +165,8 @@ def test_pictures_of_a_flow(moving, tmp_path):
 
     out, _ = moving
     shutil.copytree(out / "fields", tmp_path / "fields")
-    assert [path.name for path in plot_run(tmp_path)] == ["final_velocity.png", "final_pressure.png"]
+    names = ["final_velocity.png", "final_pressure.png", "mesh.png", "story_velocity.png"]
+    assert [path.name for path in plot_run(tmp_path)] == names
     with pytest.raises(ValueError, match="no body has a field 'displacement'"):
         plot_run(tmp_path, field="displacement")
     pixels = np.asarray(Image.open(tmp_path / "pictures" / "final_pressure.png").convert("RGB")).astype(int)

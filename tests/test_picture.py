@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fsci.curves import label, plot_history
+from fsci.curves import contact_panels, label, plot_history
 from fsci.history import HistoryWriter
 from fsci.output import FieldWriter, write_text, write_vtu
 from fsci.picture import plot_run
@@ -134,17 +134,48 @@ def test_a_run_is_drawn_from_its_folder(tmp_path):
     write_text(tmp_path / "case.yaml", "title: Flag\nprobes: {A: {quantity: displacement, at: [0.6, 0.2]}}\n")
     write_summary(tmp_path / "summary.json", {"newton": {"residuals": {"1": [1.0, 1e-3, 1e-9]}}})
     drawn = plot_run(tmp_path, movie=True)
-    names = ["final_displacement.png", "movie.gif", "history_A.png", "history_energy.png", "convergence.png"]
+    names = [
+        "final_displacement.png",
+        "mesh.png",
+        "movie.gif",
+        "history_A.png",
+        "history_energy.png",
+        "convergence.png",
+    ]
     assert [path.relative_to(tmp_path / "pictures").as_posix() for path in drawn] == names
     for path in drawn:
         picture = Image.open(path)
         if path.suffix == ".gif":
             assert (picture.n_frames, picture.size) == (3, (960, 600))
         else:
-            assert picture.size == (1600, 1000)
+            assert picture.size == (1600, 400 if path.name == "mesh.png" else 1000), "a straight beam is long"
         colours = np.asarray(picture.convert("RGB")).reshape(-1, 3)
         assert np.all(colours[0] == 255), "the background is white"
-        assert np.mean(np.ptp(colours.astype(int), axis=1) > 60) > 1e-3, "something coloured is there"
+        coloured = np.mean(np.ptp(colours.astype(int), axis=1) > 60) > 1e-3
+        assert coloured == (path.name != "mesh.png"), "something coloured is there"
+
+
+def test_states_at_times(tmp_path):
+    fields = FieldWriter(tmp_path / "fields")
+    for step in range(3):
+        fields.write(step, 0.1 * step, [bent_beam(0.5 * step + 0.01)])
+    drawn = plot_run(tmp_path, times=(0.12, 7.0))
+    assert [path.name for path in drawn] == ["displacement_0.1.png", "displacement_0.2.png"]
+    with pytest.raises(ValueError, match="no fields"):
+        plot_run(tmp_path / "fields", times=(0.1,))
+
+
+def test_balances_and_contact_are_a_picture_each(tmp_path):
+    time = np.linspace(0, 1, 40)
+    history = {"time": time, "structure.energy": -1e-6 * time, "fluid.mass": 0 * time, "contact.active": np.round(time)}
+    history |= {f"contact.wall.{axis}": time for axis in "xyz"}
+    drawn = plot_history(tmp_path, history, {}, SI)
+    assert [path.name for path in drawn] == ["history_contact.png", "history_balances.png"]
+    panels = contact_panels(history, SI)
+    assert {label: list(curves) for label, curves in panels.items()} == {
+        "contact force of wall [N]": ["x", "y", "z"],
+        "contact nodes": ["active"],
+    }
 
 
 def test_a_broken_off_run_without_fields_or_summary_is_drawn(tmp_path):

@@ -15,6 +15,9 @@ RUN_COLUMNS = ("iterations", "residual")
 #: errors of the balances of the fields: energy of the structure, volume of the fluid
 FIELD_COLUMNS = {"structure": "structure.energy", "fluid": "fluid.mass"}
 
+#: those of the interface between both
+COUPLING_COLUMNS = ("interface.force", "interface.work")
+
 #: and those of a run with contact, besides the resultants contact.PAIR.x, .y, .z on the slave
 CONTACT_COLUMNS = ("contact.active", "contact.changes")
 

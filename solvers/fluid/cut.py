@@ -16,6 +16,9 @@ from solvers.fluid.surface import Motion, normals
 #: Share of a cell (of its face) below which fluid (surface) in it is rounding error of the geometry.
 NOTHING = 1e-10
 
+#: Distance from the box's boundary, in cells, up to which a facet lies on it: no fluid gets between.
+FLUSH = 1e-6
+
 Cells = NDArray[np.int32]
 
 
@@ -74,7 +77,7 @@ class Cutter:
     ) -> Cut:
         """Cells and weights for the surfaces, with this many layers of cells behind them kept active.
 
-        Facets that are not `wet` only close the solid.
+        Facets that are not `wet`, and those on the boundary of the box, only close the solid.
         """
         grid, box = self.grid, self.grid.grid
         if not len(facets):
@@ -82,7 +85,9 @@ class Cutter:
         wanted = _grow(self._own, layers + 1)
         moments = kernels.moments(box.edges, self.points, motion.x, facets, wanted.ravel(order="F"))
         normal = -normals(motion.x, facets)
-        counts = np.ones(len(facets), dtype=bool) if wet is None else wet
+        counts = self._off_boundary(motion.x[facets])
+        if wet is not None:
+            counts &= wet
         touched = counts[moments.piece_facet]
         is_cut, in_use = self._cut_cells(moments, touched)
         # pieces in a cell without fluid still bound the cell next to it, unless solids overlap there
@@ -109,6 +114,15 @@ class Cutter:
             facets=facets,
             motion=motion,
         )
+
+    def _off_boundary(self, corners: Array) -> NDArray[np.bool_]:
+        """Facets that do not lie on the boundary of the box; those that do are in dry contact with it."""
+        off = np.ones(len(corners), dtype=bool)
+        for axis, edge in enumerate(self.grid.grid.edges):
+            near = FLUSH * float(np.diff(edge).min())
+            for place in (edge[0], edge[-1]):
+                off &= (np.abs(corners[:, :, axis] - place) > near).any(axis=1)
+        return off
 
     def _whole(self, facets: NDArray[np.int64], motion: Motion) -> Cut:
         """No surface at all."""

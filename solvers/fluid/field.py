@@ -18,6 +18,7 @@ from solvers.fluid import time
 from solvers.fluid.cut import Cut, Cutter
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.patches import Boundary, Patch
+from solvers.fluid.pockets import find_pockets
 from solvers.fluid.space import Unknowns
 from solvers.fluid.surface import Motion, Surface, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
@@ -85,7 +86,8 @@ class Fluid:
         everywhere = np.ones(self.unknowns.local, dtype=bool)
         self.old, self.older = (Past(np.zeros(self.unknowns.local), everywhere.copy()) for _ in range(2))
         self._dt_before: float | None = None
-        self._shares: Array | None = None
+        #: the equations of elastic bodies are solved together with these, and bound the pressure in closed pockets
+        self.solved_with_bodies = False
         self._motions: list[Motion] = []
         self._wet = wetness([body.surface for body in self.bodies])
         self._ksp: PETSc.KSP | None = None
@@ -203,20 +205,41 @@ class Fluid:
             raise StepFailed(self.name, reason)
 
     def _hold_pressure(self) -> None:
-        """Fix the pressure at one node if nothing else does: the first active one of the box's lattice."""
-        self._pinned, self._shares = -1, None
-        if not self.boundary.closed():
+        """Fix the pressure at one node of each pocket where nothing else does.
+
+        That is zero if all of the box is closed, else the pressure that was there when the pocket closed.
+        """
+        self._pockets: list[tuple[NDArray[np.bool_], Array]] = []
+        closed = self.boundary.closed()
+        if not (closed or self.bodies):
             return
-        self._shares = self.system.pressure_shares()
-        nodes = self.unknowns.pressure
+        elastic = np.concatenate([np.full(b.surface.vertices, b.motion is None) for b in self.bodies] + [[]]) > 0.0
+        pockets = find_pockets(self.grid, self.cut, self.boundary.open_cells(), elastic)
+        held = [p for p in pockets if (closed and p.largest) or not (p.elastic and self.solved_with_bodies)]
+        if not held:
+            return
+        sizes = self.system.pressure_sizes()
+        for pocket in held:
+            self._hold_pocket(pocket.cells, sizes, keep_level=not (closed and pocket.largest))
+
+    def _hold_pocket(self, cells: NDArray[np.bool_], sizes: Array, *, keep_level: bool) -> None:
+        """At the first of its nodes of the box's lattice, or the first that had a pressure before (collective)."""
+        nodes, last = self.unknowns.pressure, np.iinfo(np.int64).max
         dofs = nodes.dofs[: nodes.owned, 0]
-        active = self.system.active_dofs[dofs]
-        numbers = np.where(active, nodes.numbers[: nodes.owned], np.iinfo(np.int64).max)
-        best = int(numbers.min(initial=np.iinfo(np.int64).max))
-        if best == self.comm.allreduce(best, op=MPI.MIN) and len(numbers):
-            self._pinned = int(dofs[np.argmin(numbers)])
-            self.held[self._pinned] = True
-            self.flow[self._pinned] = 0.0
+        inside = (self.system.dofs_of(np.flatnonzero(cells)) & ~self.velocity_mask)[: self.unknowns.owned]
+        numbers = np.where(inside[dofs], nodes.numbers[: nodes.owned], last)
+        if keep_level:
+            numbers = np.stack([np.where(self.flow[dofs] != 0.0, numbers, last), numbers])
+        smallest = [int(row.min(initial=last)) for row in np.atleast_2d(numbers)]
+        smallest = [self.comm.allreduce(number, op=MPI.MIN) for number in smallest]
+        best = next((number for number in smallest if number < last), last)
+        for node in np.flatnonzero(nodes.numbers[: nodes.owned] == best):
+            self.held[dofs[node]] = True
+            if not keep_level:
+                self.flow[dofs[node]] = 0.0
+        shares = np.where(inside, sizes, 0.0)
+        total = self.comm.allreduce(float(shares.sum()))
+        self._pockets.append((inside, shares / total if total > 0.0 else shares))
 
     def solve(self) -> StepInfo:
         """Newton to the tolerance. Raises StepFailed."""
@@ -238,20 +261,20 @@ class Fluid:
                 self.system.set_penalties()
                 self._fresh = False
             self.residual_rows = self.system.residual()
-        if self._shares is not None:
-            self._spread_excess()
+        self._spread_excess()
         self.residual_rows[self.held] = 0.0
         self._size = self._norm(self.residual_rows)
         self._largest = max(self._largest, self._size)
         return self._size
 
     def _spread_excess(self) -> None:
-        """Take what interpolated velocities let through the closed boundary from all of the fluid alike.
+        """Take what surfaces let into a closed pocket, or displace there, from all of its fluid alike.
 
         Else the one node that fixes the pressure is all of the outlet: an error of pressure that no mesh cures.
         """
-        excess = float(np.where(self.velocity_mask[: self.unknowns.owned], 0.0, self.residual_rows).sum())
-        self.residual_rows -= self.comm.allreduce(excess) * self._shares
+        for inside, shares in self._pockets:
+            excess = float(self.residual_rows[inside].sum())
+            self.residual_rows -= self.comm.allreduce(excess) * shares
 
     def _norm(self, rows: Array) -> float:
         settings, h = self.settings, self.grid.sizes.min(axis=1)

@@ -32,29 +32,31 @@ class Interface:
         pieces = cut.pieces
         mine = cut.cut[pieces.cell] < grid.owned
         cells = cut.cut[pieces.cell[mine]]
-        self.rule, self.mu, self.dim, self._unknowns, self._vertices = rule, mu, grid.dim, unknowns, len(cut.motion.x)
-        self.moments = pieces.moments[mine][:, rule.order]
+        self.mu, self.dim, self._unknowns, self._vertices = mu, grid.dim, unknowns, len(cut.motion.x)
+        moments = pieces.moments[mine][:, rule.order]
         self.n, self.penalty, self.mass_of_pieces = pieces.normal[mine], penalty[mine], pieces.mass[mine]
         self._corners = cut.facets[pieces.facet[mine]]
         self.x = cut.motion.x[self._corners]
         self.sizes = grid.sizes[cells]
         self.u, self.p = unknowns.cell_velocity[cells], unknowns.cell_pressure[cells]
         phi, gradient = rule.velocity_table
-        psi, _ = rule.pressure_table
-        #: int phi_a N_b, int grad phi_a N_b and int psi_a N_b over each piece
-        self._phi = np.einsum("pqv,qa->pav", self.moments, phi, optimize=True)
-        slope = np.einsum("pqv,qaj->pavj", self.moments, gradient, optimize=True)
-        self._grad = slope / self.sizes[:, None, None, :]
-        self._psi = np.einsum("pqv,qa->pav", self.moments, psi, optimize=True)
-        self._normal_slope = np.einsum("pavj,pj->pav", self._grad, self.n)
+        psi, psi_gradient = rule.pressure_table
+        #: int phi_a N_b, int grad phi_a N_b, int psi_a N_b, int d_n phi_a N_b and int grad psi_a over each piece
+        self.phi = np.einsum("pqv,qa->pav", moments, phi, optimize=True)
+        slope = np.einsum("pqv,qaj->pavj", moments, gradient, optimize=True)
+        self.grad = slope / self.sizes[:, None, None, :]
+        self.psi = np.einsum("pqv,qa->pav", moments, psi, optimize=True)
+        self.normal_slope = np.einsum("pavj,pj->pav", self.grad, self.n)
+        slope = np.einsum("pq,qaj->paj", moments.sum(axis=2), psi_gradient, optimize=True)
+        self.pressure_slope = slope / self.sizes[:, None, :]
 
     def velocity_terms(self, g: Array) -> Array:
         """C g at local dofs, the ghosts' share still there; g [m/s] of shape (vertices, dim)."""
         g, n, mu = g[self._corners], self.n, self.mu
-        against = np.einsum("pav,pvi->pai", mu * self._normal_slope, g)
-        against += mu * np.einsum("pavj,pvj,pi->pai", self._grad, g, n, optimize=True)
-        against -= np.einsum("pij,pav,pvj->pai", self.penalty, self._phi, g, optimize=True)
-        leak = np.einsum("pav,pvi,pi->pa", self._psi, g, n, optimize=True)
+        against = np.einsum("pav,pvi->pai", mu * self.normal_slope, g)
+        against += mu * np.einsum("pavj,pvj,pi->pai", self.grad, g, n, optimize=True)
+        against -= np.einsum("pij,pav,pvj->pai", self.penalty, self.phi, g, optimize=True)
+        leak = np.einsum("pav,pvi,pi->pa", self.psi, g, n, optimize=True)
         size = self._unknowns.local
         total: Array = np.bincount(self.u.ravel(), against.ravel(), size).astype(float)
         return total + np.bincount(self.p.ravel(), leak.ravel(), size)
@@ -62,12 +64,10 @@ class Interface:
     def force(self, flow: Array, g: Array) -> Array:
         """This process' share of the force [N] on the vertices, shape (vertices, dim); `flow` at local dofs."""
         u, p, n, mu = flow[self.u], flow[self.p], self.n, self.mu
-        force = -mu * np.einsum("pav,pai->pvi", self._normal_slope, u)
-        force -= mu * np.einsum("pavi,paj,pj->pvi", self._grad, u, n, optimize=True)
-        force += np.einsum("pav,pa,pi->pvi", self._psi, p, n, optimize=True)
-        slip = np.einsum("pav,pai->pvi", self._phi, u) - np.einsum(
-            "pvw,pwi->pvi", self.mass_of_pieces, g[self._corners]
-        )
+        force = -mu * np.einsum("pav,pai->pvi", self.normal_slope, u)
+        force -= mu * np.einsum("pavi,paj,pj->pvi", self.grad, u, n, optimize=True)
+        force += np.einsum("pav,pa,pi->pvi", self.psi, p, n, optimize=True)
+        slip = np.einsum("pav,pai->pvi", self.phi, u) - np.einsum("pvw,pwi->pvi", self.mass_of_pieces, g[self._corners])
         force += np.einsum("pij,pvj->pvi", self.penalty, slip)
         total = np.zeros((self._vertices, n.shape[1]))
         np.add.at(total, self._corners, force)
@@ -78,10 +78,10 @@ class Interface:
         """C, ghosts' share still there, shape (local dofs, vertices dim)."""
         dim, mu, n = self.n.shape[1], self.mu, self.n
         identity = np.eye(dim)
-        block = mu * self._normal_slope[:, :, None, :, None] * identity[:, None, :]
-        block = block + mu * np.einsum("pavi,pk->pakvi", self._grad, n)
-        block = block - np.einsum("pki,pav->pakvi", self.penalty, self._phi)
-        leak = np.einsum("pav,pi->pavi", self._psi, n)
+        block = mu * self.normal_slope[:, :, None, :, None] * identity[:, None, :]
+        block = block + mu * np.einsum("pavi,pk->pakvi", self.grad, n)
+        block = block - np.einsum("pki,pav->pakvi", self.penalty, self.phi)
+        leak = np.einsum("pav,pi->pavi", self.psi, n)
         return self.scatter(block, leak)
 
     @cached_property

@@ -96,6 +96,12 @@ class Boundary:
         """The velocity is prescribed all round, so that the pressure has no level."""
         return all(patch.kind not in ("traction", "outflow") for patch in self.patches)
 
+    def open_cells(self) -> NDArray[np.int32]:
+        """Local cells at the rest of the boundary."""
+        kinds = [patch.kind for patch in self.patches]
+        cells = [c for c, kind in zip(self.cells, kinds, strict=True) if kind in ("traction", "outflow")]
+        return np.concatenate([np.empty(0, dtype=np.int32), *cells]).astype(np.int32)
+
     def velocity(self, t: float) -> Array:
         """Prescribed velocities [m/s] of `dofs` at a time."""
         values = np.zeros(len(self.dofs))

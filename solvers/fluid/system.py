@@ -163,10 +163,7 @@ class FlowSystem:
         self.cut, grid = cut, self.grid
         active = np.zeros(len(grid.numbers), dtype=bool)
         active[cut.active] = True
-        blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)
-        blocks[self.unknowns.cell_blocks[cut.active]] = True
-        blocks = fem.sum_ghosts(self.unknowns.space, blocks.astype(float)) > 0.0
-        self.active_dofs = self.unknowns.expand(blocks)
+        self.active_dofs = self.dofs_of(cut.active)
         cells = [some[some < grid.owned] for some in (cut.uncut, cut.cut)]
         self._residual_forms, self._tangent_forms = (
             [form.on(cell=some) for form, some in zip(integrals, cells, strict=False)]
@@ -177,6 +174,13 @@ class FlowSystem:
             self._pattern = choose_pattern(self.unknowns, cut)
             self._matrix = self._fill_pattern(self._pattern)
             self._ghost, self._penalised = self._matrix.duplicate(copy=False), None
+
+    def dofs_of(self, cells: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """Which local dofs belong to some local cells or, on other processes, to theirs (collective)."""
+        blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)
+        blocks[self.unknowns.cell_blocks[cells]] = True
+        blocks = fem.sum_ghosts(self.unknowns.space, blocks.astype(float)) > 0.0
+        return self.unknowns.expand(blocks)
 
     def _fill_pattern(self, pattern: Pattern) -> PETSc.Mat:
         """A matrix that has all entries of a pattern, with values that do not matter."""
@@ -225,8 +229,8 @@ class FlowSystem:
         same = self._penalised is not None and np.array_equal(self._penalised, cut.ghost_faces)
         return self.grid.comm.allreduce(same, op=MPI.LAND)
 
-    def pressure_shares(self) -> Array:
-        """int q dx over the fluid of each owned dof's pressure function, relative to their sum (collective)."""
+    def pressure_sizes(self) -> Array:
+        """int q dx over the fluid of each owned dof's pressure function [m^dim] (collective)."""
         assert self.cut is not None
         cut, unknowns, weights = self.cut, self.unknowns, self.weights
         volume, (psi, _) = self.grid.sizes.prod(axis=1), weights.pressure_table
@@ -236,8 +240,7 @@ class FlowSystem:
         parts = volume[cells, None] * ((fluid * weights.rule) @ psi)
         size = np.bincount(unknowns.cell_pressure[cells].ravel(), parts.ravel(), unknowns.local).astype(float)
         fem.add_ghosts(unknowns.space, size)
-        owned = size[: unknowns.owned]
-        return owned / self.grid.comm.allreduce(float(owned.sum()))
+        return size[: unknowns.owned]
 
     def _interface_penalties(self, pieces: Pieces, cut: Cut) -> Array:
         """P = s I + s_n n n^T of pieces [Pa s/m], shape (pieces, dim, dim).

@@ -1,0 +1,110 @@
+"""The section `coupling` of a case: each mistake with its message and the text it points at."""
+
+import pytest
+from coupled_case import POST
+
+from fsci.case import CaseError, load_case
+from fsci.check import summary
+
+COUPLING = "coupling: {scheme: monolithic}"
+STRUCTURE = POST[POST.index("structure:") : POST.index("coupling:")]
+FLUID = POST[POST.index("fluid:") : POST.index("structure:")]
+RIGID = "  bodies: {post: {mesh: {shape: disc, radius: 0.1, cells: [8, 1], translate: [1.5, 0.5]}}}\nstructure:"
+
+#: what is replaced, by what, the message with line and column, the text that stands there
+MISTAKES = [
+    (COUPLING, "coupling: {sceme: monolithic}", "18:12: unknown setting 'sceme'; did you mean 'scheme'?", "sceme"),
+    (COUPLING, "coupling: {scheme: both}", "18:20: 'scheme' must be 'monolithic' or 'partitioned', not 'both'", "both"),
+    (COUPLING, "coupling: {reuse: 3}", "18:19: 'reuse' is for the partitioned scheme", "3"),
+    (
+        COUPLING,
+        "coupling: {scheme: partitioned, relaxation: 0}",
+        "18:45: 'relaxation' must be greater than 0, not 0",
+        "0}",
+    ),
+    (
+        COUPLING,
+        "coupling: {scheme: partitioned, accelerator: iqn-ils}",
+        "18:46: 'accelerator' must be 'iqn', 'aitken' or 'constant', not 'iqn-ils'",
+        "iqn-ils",
+    ),
+    (
+        COUPLING,
+        "coupling: {scheme: partitioned, max_iterations: 0}",
+        "18:49: 'max_iterations' must be at least 1, not 0",
+        "0}",
+    ),
+    (
+        COUPLING,
+        "coupling: {wetted: {pots: top}}",
+        "18:27: unknown body 'pots'; did you mean 'post'?",
+        "top",
+    ),
+    (
+        COUPLING,
+        "coupling: {wetted: {post: [top, lfet]}}",
+        "18:33: 'rectangle' has no surface 'lfet'; did you mean 'left'? (available: left, right, bottom, top)",
+        "lfet",
+    ),
+    (STRUCTURE, "", "11:11: 'coupling' needs the section 'structure'", "{scheme"),
+    (FLUID, "", "10:11: 'coupling' needs the section 'fluid'", "{scheme"),
+    (
+        "structure:",
+        RIGID,
+        "11:18: 'post' is an elastic body already: give this rigid one another name",
+        "{mesh",
+    ),
+    (
+        "  viscosity: 0.05\n",
+        "  viscosity: 0.05\n  scheme: steady\n",
+        "6:11: a steady flow goes with a static structure: remove 'dynamics', or choose bdf2",
+        "steady",
+    ),
+    (
+        "  dynamics: {rho_inf: 0.8}\n",
+        "",
+        "3:1: a flow in time needs 'dynamics' in 'structure', or choose the scheme steady",
+        "fluid",
+    ),
+    (
+        "{quantity: force}",
+        "{quantity: force, body: pots}",
+        "21:34: unknown body 'pots'; did you mean 'post'?",
+        "pots",
+    ),
+    ("value: tip.x", "value: interface.wrok", "24:13: there is no value 'interface.wrok'; did you mean", "interface"),
+]
+
+
+def load(text: str):
+    with open("case.yaml", "w", encoding="utf-8") as file:
+        file.write(text)
+    return load_case("case.yaml")
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize(("old", "new", "message", "at"), MISTAKES, ids=[m[2] for m in MISTAKES])
+def test_message(old, new, message, at):
+    assert POST.count(old) == 1
+    text = POST.replace(old, new)
+    with pytest.raises(CaseError) as caught:
+        load(text)
+    said = {str(problem).split("\n")[0]: problem.place for problem in caught.value.problems}
+    found = [line for line in said if line.startswith(f"case.yaml:{message}")]
+    assert len(found) == 1, list(said)
+    place = said[found[0]]
+    assert text.split("\n")[place.line - 1][place.column - 1 :].startswith(at)
+
+
+def test_the_case_without_mistakes_loads():
+    case = load(POST)
+    assert case.warnings == ()
+    text = summary(case)
+    for words in ("monolithic", "693", "48", "body post"):
+        assert words in text
+    partitioned = load(POST.replace("scheme: monolithic", "scheme: partitioned, accelerator: aitken"))
+    assert "partitioned, aitken" in summary(partitioned)

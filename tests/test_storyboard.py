@@ -1,0 +1,121 @@
+"""Pictures of a flow in space around a ring that touches the floor: what the plane cuts, what passes the hole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fsci.output import FieldWriter
+from fsci.picture import look_at, plot_run
+from fsci.render_flow import load_meshes, load_state
+from fsci.storyboard import arrange, choose, plane_state
+from solvers.api import Snapshot
+
+HEXAHEDRON = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
+INNER, OUTER, THICK = 0.3, 0.6, 0.3  #: radii and height of the ring
+
+
+def bricks(shape: tuple[int, int, int], index: np.ndarray) -> np.ndarray:
+    """The cells of a lattice whose points have the numbers `index`."""
+    return np.array([[index[tuple(np.array(cell) + corner)] for corner in HEXAHEDRON] for cell in np.ndindex(shape)])
+
+
+def channel() -> Snapshot:
+    """A flow downwards through [-1, 1]^2 x [0, 2]."""
+    axes = (np.linspace(-1, 1, 7), np.linspace(-1, 1, 7), np.linspace(0, 2, 6))
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
+    x, y, _ = points.T
+    velocity = np.stack([0 * x, 0 * x, -(1 - x**2) * (1 - y**2)], -1)
+    cells = bricks((6, 6, 5), np.arange(len(points)).reshape(7, 7, 6))
+    data = {"velocity": velocity, "pressure": points[:, 2]}
+    return Snapshot("fluid", points, cells, "hexahedron", data, {"fluid_fraction": np.ones(len(cells))})
+
+
+def ring(height: float, pressure: float) -> Snapshot:
+    """A flat ring around the z axis; the pressure acts on its lower face."""
+    angle, radius, z = np.meshgrid(2 * np.pi * np.arange(24) / 24, [INNER, OUTER], [0.0, THICK], indexing="ij")
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), height + z], -1).reshape(-1, 3)
+    index = np.arange(len(points)).reshape(24, 2, 2)
+    index = np.concatenate([index, index[:1]])
+    acting = np.where(points[:, 2] == height, pressure, 0.0)
+    data = {
+        "displacement": 0 * points,
+        "contact_pressure": acting,
+        "contact_traction": acting[:, None] * [0.0, 0.0, 1.0],
+    }
+    return Snapshot("ring", points, bricks((24, 1, 1), index), "hexahedron", data)
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory) -> Path:
+    """A run in which the ring sinks to the floor."""
+    folder = tmp_path_factory.mktemp("ring")
+    fields = FieldWriter(folder / "fields")
+    for step, height in enumerate([1.0, 0.5, 0.0]):
+        fields.write(step, 0.1 * step, [channel(), ring(height, 100.0 * (height == 0))])
+    return folder
+
+
+def files(out: Path, step: int) -> list[Path]:
+    return [out / "fields" / f"{name}_{step:06d}.vtu" for name in ("fluid", "ring")]
+
+
+def test_which_times_are_shown():
+    assert choose(3) == [0, 1, 2]
+    assert choose(13) == [2, 4, 6, 8, 10, 12]
+    assert choose(13, [9]) == [2, 4, 6, 9, 10, 12]
+    assert choose(13, [12]) == choose(13)
+
+
+def test_panels_fill_a_page():
+    assert arrange(6, 2.0, 3.2) == (3, 2)
+    assert arrange(6, 2.5, 0.41) == (1, 6)
+    assert arrange(1, 2.0, 3.2) == (1, 1)
+    assert arrange(5, 1.0, 1.0) == (3, 2)
+
+
+def test_the_plane_cuts_flow_and_body(out):
+    (flow, body), names, place = plane_state(files(out, 1))
+    assert (names, place) == (("x", "z"), "y = 0")
+    assert flow.surface.bounds == pytest.approx((-1, 1, 0, 2, 0, 0), abs=1e-6)
+    assert flow.values.max() == pytest.approx(1)
+    assert body.values is None
+    assert body.surface.area == pytest.approx(2 * (OUTER - INNER) * THICK, rel=1e-5)
+    assert np.linalg.norm(body.outline[:, 1] - body.outline[:, 0], axis=1).sum() == pytest.approx(2.4, rel=1e-5)
+
+
+def test_stream_tubes_pass_through_the_hole(out):
+    *_, tubes, body = load_state(files(out, 1), "velocity")
+    assert body.values is None, "bodies in a flow are grey"
+    at_ring = np.asarray(tubes.surface.points)
+    at_ring = at_ring[np.abs(at_ring[:, 2] - 0.65) < 0.1]
+    assert np.any(np.hypot(*at_ring[:, :2].T) < 0.5 * INNER)
+    assert load_state(files(out, 1)[1:], "displacement")[0].values is not None
+
+
+def test_the_mesh_has_the_cells_at_the_back_of_the_box(out):
+    box, grid, body = load_meshes(files(out, 0))
+    assert len(box.edges) == 12
+    floor, side = 2 * 6 * 7, 6 * 6 + 5 * 7
+    assert len(grid.edges) == floor + 2 * side - (6 + 6 + 5), "three sides that share edges of the box"
+    assert len(body.edges) == 24 * 8
+
+
+def test_contact_is_seen_from_where_it_acts():
+    assert look_at(np.array([0.0, 0.0, -3.0]))[2] < -0.5
+    assert look_at(np.array([1.0, 0.0, 0.0]))[0] > 0.5
+    for normal in np.eye(3):
+        assert np.linalg.norm(look_at(normal)) == pytest.approx(1)
+
+
+def test_all_pictures_of_the_run(out):
+    assert [path.name for path in plot_run(out)] == [
+        "final_velocity.png",
+        "final_pressure.png",
+        "mesh.png",
+        "story_velocity.png",
+        "before_contact_velocity.png",
+        "final_contact_pressure.png",
+    ]
