@@ -18,7 +18,7 @@ RESOLUTION = 400  #: points along the diagonal at which the plane flow is sample
 SEEDS = 5  #: streamlines in space start from so many points along each edge of the middle cross-section,
 BODY_SEEDS = 9  #: and from so many along each edge of a rectangle
 AROUND = 1.2  #: that is so many times as large as a body
-VEIL = 0.4  #: opacity of the slice through a flow in space
+VEIL, PANE = 0.4, 0.8  #: opacity of the slice through a flow in space, with stream tubes and without
 TUBES = 0.0025  #: their radius, as part of the box's diagonal
 LINE, TRIANGLE = 3, 5  #: VTK's numbers of cell types
 
@@ -129,12 +129,14 @@ def segments(lines: Any) -> Array:
 def _spatial_flow(mesh: Any, field: str, bodies: Sequence[Any]) -> list[Body]:
     """A translucent slice along the middle of the box, the edges of the box, and tubes along streamlines."""
     parts = []
+    moving = field.partition(".")[0] == STREAMLINES
     middle = mesh.slice(normal=lengthwise(mesh))
     if middle.n_points:
-        parts.append(Body(middle, NO_LINES, NO_LINES, field_values(middle.point_data, field), lit=False, opacity=VEIL))
+        values = field_values(middle.point_data, field)
+        parts.append(Body(middle, NO_LINES, NO_LINES, values, lit=False, opacity=VEIL if moving else PANE))
     box = mesh.outline()
     parts.append(Body(box, segments(box), NO_LINES, None))
-    if field.partition(".")[0] == STREAMLINES and np.any(mesh.point_data[STREAMLINES]):
+    if moving and np.any(mesh.point_data[STREAMLINES]):
         tubes = _tubes(mesh, bodies)
         if tubes.n_points:
             parts.append(Body(tubes, NO_LINES, NO_LINES, field_values(tubes.point_data, field)))

@@ -35,7 +35,7 @@ class Scene:
     title: str
     label: str  #: of the colour bar; without colours there is none
     units: Mapping[str, str]  #: of length, mass and time
-    cropped: bool  #: some values lie beyond the colour bar
+    extend: str  #: where values lie beyond the colour bar: neither, max or both
     layout: tuple[Rectangle, Rectangle]  #: of the picture and of the colour bar
     size: tuple[float, float]  #: of the figure, in inches
 
@@ -62,12 +62,12 @@ def compose(
     flat = bool(spans[2] <= 1e-9 * spans.max())
     axes = axes_of_view(flat, away)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    least, most = np.inf, -np.inf
+    lowest, least, most = np.inf, np.inf, -np.inf
     for body in chain(first, chain.from_iterable(states)):
         seen = np.asarray(body.surface.points, dtype=np.float64) @ axes
         low, high = np.minimum(low, seen.min(axis=0)), np.maximum(high, seen.max(axis=0))
         if body.values is not None:
-            lowest = float(body.values.min())
+            lowest = min(lowest, float(body.values.min()))
             least = min(least, float(np.percentile(body.values, crop)) if lowest < 0 else lowest)
             most = max(most, float(np.percentile(body.values, 100 - crop)))
     if field is None:
@@ -97,7 +97,7 @@ def compose(
         title=title,
         label=field_label(field, first, units) if field else "",
         units=units,
-        cropped=crop > 0,
+        extend="neither" if crop == 0 else "both" if lowest < least else "max",
         layout=layout,
         size=size,
     )
@@ -166,14 +166,14 @@ def lay_out(scene: Scene, dots: int) -> tuple[Any, Any, Any]:
             draw_triad(figure, view)
         title = axes.set_title("", pad=10)
         if scene.label:
-            draw_colour_bar(figure, scene.layout[1], scene.limits, scene.colours, scene.label, cropped=scene.cropped)
+            draw_colour_bar(figure, scene.layout[1], scene.limits, scene.colours, scene.label, extend=scene.extend)
     return figure, image, title
 
 
 def draw_colour_bar(
-    figure: Any, place: Rectangle, limits: tuple[float, float], colours: str, label: str, *, cropped: bool = False
+    figure: Any, place: Rectangle, limits: tuple[float, float], colours: str, label: str, *, extend: str = "neither"
 ) -> None:
-    """The colours and what they mean, in a rectangle of the figure; with arrows if values lie beyond, `cropped`."""
+    """The colours and what they mean, in a rectangle of the figure; with arrows where values lie beyond, `extend`."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -183,7 +183,7 @@ def draw_colour_bar(
         cax=figure.add_axes(place),
         orientation="vertical" if upright else "horizontal",
         label=label,
-        extend=("both" if limits[0] < 0 else "max") if cropped else "neither",
+        extend=extend,
         extendfrac=0.03,
     )
     colour_bar.outline.set_linewidth(0.6)
@@ -201,7 +201,7 @@ def render_into(scene: Scene, bodies: list[Body], dots: int) -> Pixels:
 
 def headline(scene: Scene, time: float) -> str:
     """The title with the time."""
-    return f"{scene.title}, t = {time:g} {scene.units['time']}"
+    return f"{scene.title}, t = {time:.5g} {scene.units['time']}"
 
 
 def field_label(field: str, bodies: list[Body], units: Mapping[str, str]) -> str:
@@ -216,11 +216,18 @@ def field_label(field: str, bodies: list[Body], units: Mapping[str, str]) -> str
 
 def draw_triad(figure: Any, view: View) -> None:
     """The directions of x, y and z in the lower left corner."""
-    axes = figure.add_axes((0.02, 0.03, 0.6 / figure.get_figwidth(), 0.6 / figure.get_figheight()))
+    axes = figure.add_axes(
+        (
+            0.3 / figure.get_figwidth(),
+            0.3 / figure.get_figheight(),
+            0.6 / figure.get_figwidth(),
+            0.6 / figure.get_figheight(),
+        )
+    )
     axes.set_axis_off()
     axes.set_xlim(-1, 1)
     axes.set_ylim(-1, 1)
     for name, direction in zip("xyz", np.eye(3), strict=True):
         tip = np.array([direction @ view.right, direction @ view.up])
         axes.annotate("", tip, (0, 0), arrowprops={"arrowstyle": "->", "shrinkA": 0, "shrinkB": 0})
-        axes.text(*(1.35 * tip), name, ha="center", va="center", fontsize=11)
+        axes.text(*(tip + 0.35 * tip / max(float(np.hypot(*tip)), 0.1)), name, ha="center", va="center", fontsize=11)

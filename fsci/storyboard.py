@@ -35,7 +35,8 @@ def plot_story(
     states = [plane_state([file for _, file in moment]) for moment in moments]
     flows = [bodies[0] for bodies, *_ in states]
     speeds = [flow.values for flow in flows if flow.values is not None]
-    low, high = (np.array(flows[0].surface.bounds[side:4:2]) for side in (0, 1))
+    bounds = np.array([body.surface.bounds for bodies, *_ in states for body in bodies])
+    low, high = bounds[:, :4:2].min(axis=0), bounds[:, 1:4:2].max(axis=0)
     names, plane = states[0][1:]
     crop = CROP[not plane]
     limits = (0.0, max(float(np.percentile(speed, 100 - crop)) for speed in speeds) or 1.0)
@@ -65,7 +66,7 @@ def plot_story(
         tall = min(total - BELOW - TITLE - HEAD, 4.0)
         middle = BELOW + (total - BELOW - TITLE - HEAD) / 2
         place = ((WIDTH - BAR + 0.2) / WIDTH, (middle - tall / 2) / total, 0.14 / WIDTH, tall / total)
-        draw_colour_bar(figure, place, limits, "viridis", field_label("velocity", flows, units), cropped=True)
+        draw_colour_bar(figure, place, limits, "viridis", field_label("velocity", flows, units), extend="max")
         figure.savefig(path)
     return path
 

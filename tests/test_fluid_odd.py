@@ -124,7 +124,7 @@ def test_overlap_beside_a_plane_of_the_grid():
 def test_sealed_pocket_has_no_pressure_level():
     """Fluid that a body encloses has no connection with the rest: flow and pressure are right but for its level.
 
-    The matrix is singular, and rounding decides on that level; the documentation says so.
+    That is held at one node.
     """
     outer, inner = circle((0.5, 0.5), 0.35, 60), circle((0.5, 0.5), 0.2, 60)[::-1]
     shell = body("shell", np.concatenate([outer, inner]), np.concatenate([loop(60), 60 + loop(60)]))

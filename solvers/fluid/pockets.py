@@ -33,7 +33,7 @@ def find_pockets(grid: DistributedGrid, cut: Cut, is_open: NDArray[np.int32], el
     box, own = grid.grid, cut.active[cut.active < grid.owned]
     active = np.zeros(box.size, dtype=bool)
     active[grid.numbers[own]] = True
-    active = grid.comm.allreduce(active, op=MPI.LOR)
+    grid.comm.Allreduce(MPI.IN_PLACE, active, op=MPI.LOR)
     labels, count = ndimage.label(box.as_box(active), np.ones((3,) * grid.dim))
     labels = labels.ravel(order="F")[grid.numbers]
     at_elastic = elastic[cut.facets[cut.pieces.facet]].any(axis=1)

@@ -1,0 +1,76 @@
+"""Drag of a cylinder and of a sphere that approach a wall in creeping flow: exact, and computed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solvers.fluid.field import Fluid
+from solvers.fluid.grid import Grid
+from solvers.fluid.patches import Patch
+from tests.fluid_setup import body, circle, field, loop, make_fluid, solve_steady, sphere
+
+
+def cylinder_drag(gap: float) -> float:
+    """F / (mu V) per length for a gap in radii (Jeffrey and Onishi 1981)."""
+    alpha = np.arccosh(1.0 + gap)
+    return float(4.0 * np.pi / (alpha - np.tanh(alpha)))
+
+
+def sphere_drag(gap: float) -> float:
+    """F / (6 pi mu a V) for a gap in radii (Brenner 1961)."""
+    alpha, n = np.arccosh(1.0 + gap), np.arange(1.0, 40.0 / np.arccosh(1.0 + gap))
+    top = 2.0 * np.sinh((2 * n + 1) * alpha) + (2 * n + 1) * np.sinh(2 * alpha)
+    bottom = 4.0 * np.sinh((n + 0.5) * alpha) ** 2 - (2 * n + 1) ** 2 * np.sinh(alpha) ** 2
+    terms = n * (n + 1) / ((2 * n - 1) * (2 * n + 3)) * (top / bottom - 1.0)
+    return float(4.0 / 3.0 * np.sinh(alpha) * terms.sum())
+
+
+def stretched(h: float, fine: float, end: float, growth: float) -> np.ndarray:
+    """Planes from 0: cells of size h up to `fine`, then each larger than the last by a factor, up to `end`."""
+    planes = list(np.linspace(0.0, fine, round(fine / h) + 1))
+    size = h
+    while planes[-1] < end:
+        size *= growth
+        planes.append(planes[-1] + size)
+    return np.array(planes)
+
+
+def approaching(dim: int, gap: float, h: float, element: str, *, size=8.0, growth=1.15, fine=1.0) -> Fluid:
+    """A body of radius 1 at rest for an instant, its surface moving down to the wall y = 0 (z = 0) with velocity 1.
+
+    Half of the cylinder, a quarter of the sphere; free outer boundary. Cells of size h near the gap.
+    """
+    sides = stretched(h, fine, size, growth)
+    up = stretched(h, max(4 * h, round((gap + 0.3) / h) * h), size, growth)
+    down = -np.eye(dim)[-1]
+    if dim == 2:
+        points, facets = circle([0.0, 1.0 + gap], 1.0, 2000), loop(2000)
+        planes = [Patch("symmetry", ("x-",), "slip"), Patch("free", ("x+", "y+"), "traction", field(0, 0))]
+        wall = Patch("wall", ("y-",), "no_slip")
+    else:
+        points, facets = sphere([0.0, 0.0, 1.0 + gap], 1.0, 5)
+        planes = [
+            Patch("symmetry", ("x-", "y-"), "slip"),
+            Patch("free", ("x+", "y+", "z+"), "traction", field(0, 0, 0)),
+        ]
+        wall = Patch("wall", ("z-",), "no_slip")
+    moving = body("body", points, facets, velocity=down)
+    grid = Grid((*[sides] * (dim - 1), up))
+    fluid = make_fluid(grid, [*planes, wall], [moving], element=element, scheme="steady", convection=False)
+    solve_steady(fluid)
+    return fluid
+
+
+def drag_ratio(dim: int, gap: float, h: float, element: str, **options) -> float:
+    """Computed over exact drag."""
+    force = approaching(dim, gap, h, element, **options).force()["body"].sum(axis=0)[-1]
+    exact = cylinder_drag(gap) if dim == 2 else 6.0 * np.pi * sphere_drag(gap)
+    return float(force * 2 ** (dim - 1) / exact)
+
+
+if __name__ == "__main__":
+    import sys
+
+    dim, element, h = int(sys.argv[1]), sys.argv[2], float(sys.argv[3])
+    for gap in (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01):
+        print(f"{dim}D {element} h {h} gap {gap:5} = {gap / h:6.2f} h  drag / exact {drag_ratio(dim, gap, h, element):.4f}", flush=True)
