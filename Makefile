@@ -10,14 +10,13 @@ DEBIAN_PACKAGES := \
   python3-dolfinx python3-petsc4py python3-mpi4py python3-h5py-mpi python3-scipy libopenblas0-pthread \
   libosmesa6 libegl1 libgl1 libglu1-mesa libxrender1 libxft2 libxcursor1 libxinerama1 libxfixes3
 
-# One thread per process. Open MPI: as root, on few or shared cores (waiting processes that neither yield nor move made
-# two parallel tests at a time 2 to 10 times slower), and without complaints about shared memory in containers.
+# One thread per process. Open MPI: as root, on few or shared cores (processes that do not move made two parallel tests at
+# a time 2 to 10 times slower), and without complaints about shared memory in containers.
 export OPENBLAS_NUM_THREADS ?= 1
 export OMPI_ALLOW_RUN_AS_ROOT ?= 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM ?= 1
 export OMPI_MCA_rmaps_base_oversubscribe ?= 1
 export OMPI_MCA_hwloc_base_binding_policy ?= none
-export OMPI_MCA_mpi_yield_when_idle ?= 1
 export OMPI_MCA_btl_vader_single_copy_mechanism ?= none
 export PYVISTA_OFF_SCREEN ?= true
 

@@ -16,6 +16,10 @@ ENVIRONMENT = {
 }
 
 
+#: for mpirun: processes that wait give their core to others
+PARALLEL = {**ENVIRONMENT, "OMPI_MCA_mpi_yield_when_idle": "1"}
+
+
 def command(*arguments, processes: int = 1) -> list[str]:
     launcher = ["mpirun", "-n", str(processes)] if processes > 1 else []
     return [*launcher, sys.executable, "-m", "fsci", *map(str, arguments)]
@@ -23,8 +27,9 @@ def command(*arguments, processes: int = 1) -> list[str]:
 
 def fsci(*arguments, processes: int = 1, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
     """Run `fsci` to its end."""
+    environment = PARALLEL if processes > 1 else ENVIRONMENT
     return subprocess.run(
-        command(*arguments, processes=processes), capture_output=True, text=True, env=ENVIRONMENT, timeout=timeout
+        command(*arguments, processes=processes), capture_output=True, text=True, env=environment, timeout=timeout
     )
 
 

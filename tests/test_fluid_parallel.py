@@ -9,13 +9,11 @@ import pytest
 from fluid_parallel import everything, scene
 from fluid_setup import step
 from mpi4py import MPI
-from programs import ENVIRONMENT
+from programs import PARALLEL
 
 from solvers.fluid.probes import mass_balance
 
 PROGRAM = Path(__file__).parent / "fluid_parallel.py"
-#: processes that wait leave the core to those that compute
-PARALLEL = {**ENVIRONMENT, "OMPI_MCA_mpi_yield_when_idle": "1"}
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ def flow_doubts(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
         unit = f"{case.units.mass}/{case.units.length}^3"
         value = f"{fluid.density:g} {unit} is {density:.3g} kg/m^3"
         yield ("fluid", "density"), f"implausible density: {value}; check 'units'"
-    if not _driven(fluid):
+    if case.coupling is None and not _driven(fluid):
         yield ("fluid", "patches"), "nothing drives the flow: no velocity, traction, force or moving body"
     smallest = min(float(np.diff(edges).min()) for edges in fluid.grid.planes)
     for name, body in fluid.bodies.items():

@@ -215,7 +215,7 @@ class Fluid:
             return
         elastic = np.concatenate([np.full(b.surface.vertices, b.motion is None) for b in self.bodies] + [[]]) > 0.0
         pockets = find_pockets(self.grid, self.cut, self.boundary.open_cells(), elastic)
-        held = [p for p in pockets if (closed and p.largest) or not (p.elastic and self.solved_with_bodies)]
+        held = [p for p in pockets if not (p.elastic and self.solved_with_bodies)]
         if not held:
             return
         sizes = self.system.pressure_sizes()

@@ -1,0 +1,42 @@
+"""A column of fluid pushes a block against a stop: exact way, impact and pressure at rest (references of the docs)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from programs import fsci
+
+from fsci.history import read_history
+
+#: time: way, velocity and pressure on the block; P = rho = L0 = m_s = 1, gap 0.1
+EXACT = {
+    0.2: (0.009991686, 0.09983391416, 0.4975144957),
+    0.4: (0.03986789523, 0.1986850168, 0.4902278242),
+    0.6: (0.08933877538, 0.2956364658, 0.4786203232),
+}
+IMPACT, VELOCITY, IMPULSE, HEIGHT = 0.6350681354, 0.3123785017, 0.6559948536, 0.2
+
+
+def test_piston_with_impact(tmp_path):
+    run = fsci("run", "cases/piston_impact", "-o", tmp_path, "--set", "output.fields_every=0", timeout=400)
+    assert run.returncode == 0, run.stdout[-2000:]
+    assert "MISSED" not in run.stdout
+    history = read_history(tmp_path / "history.csv")
+    t, d = history["time"], history["block.x"] - 1.25
+    v, pressure = history["momentum.x"] / HEIGHT, history["force.x"] / HEIGHT
+    contact = -history["contact.stop.x"] / HEIGHT
+    for time, exact in EXACT.items():
+        i = int(np.argmin(np.abs(t - time)))
+        assert [d[i], v[i], pressure[i]] == pytest.approx(exact, rel=5e-4)
+    last = int(np.flatnonzero(history["contact.active"] > 0)[0]) - 1
+    rest = (0.1 - d[last]) / v[last]
+    acceleration = (v[last] - v[last - 1]) / (t[last] - t[last - 1])
+    assert t[last] + rest == pytest.approx(IMPACT, rel=2e-3)
+    assert v[last] + acceleration * rest == pytest.approx(VELOCITY, rel=2e-3)
+    # the impact step and the ring-down after it: no retry, impulse of a plastic stop, then the pressure of the inlet
+    assert len(t) == 450
+    stop = (contact[last + 1 :] * history["dt"][last + 1 :]).sum() - (t[-1] - t[last])
+    assert stop == pytest.approx(IMPULSE, rel=0.01)
+    assert contact[-1] == pytest.approx(1.0, rel=1e-8)
+    assert pressure[-1] == pytest.approx(1.0, rel=1e-8)
+    assert np.abs(v[-1]) < 1e-12

@@ -1,0 +1,111 @@
+"""Closed pockets of fluid: what their pressure is, and that the run goes on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from fluid_setup import body, field, loop, make_fluid, step
+
+from coupling.monolithic import Monolithic
+from fsci import shapes
+from solvers.fluid.grid import uniform
+from solvers.fluid.patches import Patch
+from solvers.fluid.system import FlowSettings
+from solvers.structure.body import BodySettings, Symmetry
+from solvers.structure.materials import StVenantKirchhoff, lame
+from solvers.structure.time import Dynamics
+from solvers.time import GeneralisedAlpha
+from tests.coupling_setup import TIGHT, couple, zero
+
+WEIGHT, DT = 3.0, 0.05
+
+
+def bell(ceiling=0.0, *, element="q1q1"):
+    """A rigid bell on the bottom of a channel with an outlet; its ceiling comes down with a velocity."""
+    corners = np.array(
+        [[0.2, -0.2], [0.4, -0.2], [0.4, 0.2], [0.6, 0.2], [0.6, -0.2], [0.8, -0.2], [0.8, 0.43], [0.2, 0.43]]
+    )
+    corners += [0.012, 0.013]
+
+    def motion(points, t):
+        x, v = points.copy(), np.zeros_like(points)
+        x[[2, 3], 1] -= ceiling * t
+        v[[2, 3], 1] -= ceiling
+        return x, v
+
+    inflow = field(lambda x, y, t: y * (1 - y) * np.minimum(t / DT, 1), 0)
+    patches = [
+        Patch("in", ("x-",), "velocity", inflow),
+        Patch("out", ("x+",), "outflow"),
+        Patch("walls", ("y-", "y+"), "no_slip"),
+    ]
+    return make_fluid(
+        uniform([0, 0], [1, 1], [20, 20]), patches, [body("bell", corners, loop(8), motion=motion if ceiling else None)],
+        mu=0.05, scheme="backward_euler", dt=DT, element=element, body_force=field(0, -WEIGHT),
+    )  # fmt: skip
+
+
+def pocket_pressure(fluid):
+    nodes = fluid.unknowns.pressure
+    inside = (np.abs(nodes.points[:, 0] - 0.512) < 0.07) & (nodes.points[:, 1] < 0.21)
+    return nodes.points[inside, 1], fluid.flow[nodes.dofs[inside, 0]]
+
+
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_pocket_between_rigid_walls(element):
+    """Its pressure is hydrostatic and has a level that stays."""
+    fluid = bell(element=element)
+    levels = []
+    for number in range(3):
+        info = step(fluid, number * DT, DT)
+        assert info.iterations <= 4
+        y, p = pocket_pressure(fluid)
+        levels.append(p + WEIGHT * y)
+        assert np.ptp(levels[-1]) < 1e-9
+    assert np.ptp([level[0] for level in levels]) < 1e-9
+
+
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_pocket_that_has_to_shrink(element):
+    """What cannot be is done as if its fluid vanished everywhere alike: no step fails, no pressure explodes."""
+    fluid = bell(0.1, element=element)
+    for number in range(4):
+        info = step(fluid, number * DT, DT)
+        assert info.iterations <= 5
+        assert np.abs(fluid.flow[fluid.unknowns.pressure.dofs]).max() < 20.0
+
+
+def chamber():
+    """An elastic plug in a channel between an inlet with pressure 2 and a closed end."""
+    mesh = shapes.rectangle([0.4, 0.2], [4, 2], order=1, cell="quad")
+    mesh.points[:, 0] += 0.513
+    mu, lmbda = lame(100.0, 0.0)
+    plug = BodySettings("plug", StVenantKirchhoff(mu, lmbda, 1.0), supports=(Symmetry("top"), Symmetry("bottom")))
+    push = (lambda x, t: 2.0 * np.ones(x.shape[1]), zero)
+    return couple(
+        mesh,
+        plug,
+        Dynamics(GeneralisedAlpha.from_rho_inf(0.0)),
+        uniform([0.0, 0.0], [1.5, 0.2], [15, 2]),
+        FlowSettings(1.0, 0.1, scheme="backward_euler"),
+        [
+            Patch("inlet", ("x-",), "traction", push),
+            Patch("sides", ("y-", "y+"), "slip"),
+            Patch("end", ("x+",), "slip"),
+        ],
+        dry=lambda middles: (middles[:, 1] < 1e-9) | (middles[:, 1] > 0.2 - 1e-9),
+    )
+
+
+def test_pocket_behind_an_elastic_body():
+    """The elasticity of the plug makes the pressure behind it known: that of the inlet, when all is at rest."""
+    coupled = chamber()
+    scheme = Monolithic(coupled, TIGHT)
+    coupled.initialise(0.0, 1.0)
+    for number in range(25):
+        scheme.step(float(number), 1.0)
+    nodes, fluid = coupled.fluid.unknowns.pressure, coupled.fluid
+    behind = nodes.points[:, 0] > 1.05
+    assert fluid.flow[nodes.dofs[behind, 0]] == pytest.approx(2.0, rel=1e-8)
+    right = coupled.interface.points[:, 0] > 0.9
+    assert np.abs(coupled.interface.now[right, 0]).max() < 1e-10

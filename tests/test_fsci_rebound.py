@@ -1,0 +1,109 @@
+"""An elastic ball that bounces off the bottom of a box full of fluid: balances, both schemes, and how high it jumps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from programs import fsci
+
+from fsci.build import build
+from fsci.case import load_case
+from fsci.history import read_history
+from solvers.timing import Timer
+
+CASE = "cases/rebound/case.yaml"
+DT = 0.02
+#: a small and coarse one that reaches the wall in a few steps
+SMALL = {
+    "fluid.grid.cells": "[10, 10]",
+    "structure.bodies.ball.mesh.cells": "[16, 1]",
+    "structure.bodies.ball.mesh.translate": "[0, 0.54]",
+    "structure.bodies.ball.initial_velocity": "[0, -0.8]",
+    "solver.newton.residual": "1e-10",
+    "verify": "[]",
+}
+
+
+def start(**more: str):
+    """The small case at its start."""
+    settings = SMALL | {name.replace("__", "."): value for name, value in more.items()}
+    simulation = build(load_case(CASE, settings.items()), MPI.COMM_SELF, Timer())
+    simulation.initialise(0.0, DT)
+    return simulation
+
+
+def total(owned):
+    """Sum over all nodes, by components."""
+    return owned.reshape(-1, 2).sum(axis=0)
+
+
+def test_forces_balance_and_nothing_penetrates():
+    """m a = F_fluid + F_gravity + F_contact in every step, by the weights of the time scheme; gaps closed or open."""
+    simulation = start()
+    coupled = simulation.scheme.coupled
+    structure, contact = coupled.structure, coupled.structure.constraint
+    scheme, touched = structure.time.scheme, 0
+    mass = structure.mass.createVecLeft()
+    ones = structure.mass.createVecRight()
+    ones.set(1.0)
+    structure.mass.mult(ones, mass)
+    weight, fluid_before = -total(mass.array) * [0.0, 1.0], None
+    for step in range(14):
+        old = structure.now.copy()
+        simulation.scheme.step(step * DT, DT)
+        now, mean = structure.now, structure.mass.createVecRight()
+        mean.array[:] = (1.0 - scheme.alpha_m) * now.a + scheme.alpha_m * old.a
+        structure.mass.mult(mean, mass)
+        fluid = coupled.force().sum(axis=0)
+        fluid_before = np.zeros(2) if fluid_before is None else fluid_before
+        load = weight + (1.0 - scheme.alpha_f) * fluid + scheme.alpha_f * fluid_before
+        missing = total(mass.array) - load - contact.resultant(0)
+        assert np.abs(missing).max() < 1e-8 * np.abs(total(mass.array)).max()
+        fluid_before = fluid
+        active, gap = contact.active(), np.nan_to_num(contact.mean_gap())
+        touched += int(active.any())
+        assert np.abs(gap[active]).max(initial=0.0) < 1e-10
+    assert touched > 3
+
+
+@pytest.mark.parametrize("accelerator", ["iqn", "aitken"])
+def test_both_schemes_agree(accelerator):
+    """The partitioned scheme gets through the changes of the active set; until facets open again, with the same result."""
+    partitioned = {
+        "coupling__scheme": "partitioned",
+        "coupling__accelerator": accelerator,
+        "coupling__tolerance": "1e-8",
+    }
+    one, two = start(), start(**partitioned)
+    sets = []
+    for step in range(12):
+        for simulation in (one, two):
+            simulation.scheme.step(step * DT, DT)
+        contacts = [simulation.scheme.coupled.structure.constraint for simulation in (one, two)]
+        sets.append(contacts[0].active().sum())
+        moved = [simulation.scheme.coupled.interface.now for simulation in (one, two)]
+        if step < 8:
+            assert np.array_equal(contacts[0].active(), contacts[1].active())
+            assert contacts[1].resultant(0) == pytest.approx(contacts[0].resultant(0), rel=1e-7, abs=1e-7)
+            assert np.abs(moved[0] - moved[1]).max() < 1e-8
+        else:
+            # a dry patch that may open can also stay closed: here the schemes open it one step apart
+            assert np.abs(moved[0] - moved[1]).max() < 2e-3
+    assert sets[2:8] == [0, 1, 1, 1, 1, 3]
+
+
+@pytest.mark.slow
+def test_the_thinner_the_fluid_the_higher_the_rebound(tmp_path):
+    heights = []
+    for viscosity in (0.1, 0.03, 0.01, 0.003):
+        out = tmp_path / str(viscosity)
+        change = [f"fluid.viscosity={viscosity}", "output.fields_every=0", "verify=[]"]
+        run = fsci("run", "cases/rebound", "-o", out, *(word for c in change for word in ("--set", c)), timeout=400)
+        assert run.returncode == 0, run.stdout[-2000:]
+        y = read_history(out / "history.csv")["ball.y"]
+        lowest = int(np.flatnonzero(np.diff(y) > 0)[0])
+        heights.append(y[lowest:].max() - 0.5)
+    assert heights == sorted(heights)
+    assert heights[0] > 0.02
+    assert heights[-1] > 5 * heights[0]
