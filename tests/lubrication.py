@@ -73,7 +73,5 @@ if __name__ == "__main__":
 
     dim, element, h = int(sys.argv[1]), sys.argv[2], float(sys.argv[3])
     for gap in (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01):
-        print(
-            f"{dim}D {element} h {h} gap {gap:5} = {gap / h:6.2f} h  drag / exact {drag_ratio(dim, gap, h, element):.4f}",
-            flush=True,
-        )
+        ratio = drag_ratio(dim, gap, h, element)
+        print(f"{dim}D {element} h {h} gap {gap:5} = {gap / h:6.2f} h  drag / exact {ratio:.4f}", flush=True)

@@ -1,4 +1,4 @@
-"""An elastic bar against a column of fluid: exact frequency, limit of plain iterations (references of the docs, 2.6)."""
+"""An elastic bar against a column of fluid: exact frequency, exact limit of plain iterations."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ def test_both_schemes_take_the_same_way(accelerator):
 def contraction(dt: float, cells: int) -> float:
     """Exact factor of plain Dirichlet-Neumann iterations: added mass of the column over what the bar's end resists.
 
-    Both fields by their own rules: the fluid's acceleration of the first step, backward Euler, 1/dt^2 of a displacement,
-    the bar's linear elements as in the computation.
+    Both fields by their own rules: the fluid's acceleration of the first step is 1/dt^2 of a displacement (backward
+    Euler); the bar has linear elements as in the computation.
     """
     h = 1.0 / cells
     main, side = np.full(cells + 1, 2.0), np.ones(cells)

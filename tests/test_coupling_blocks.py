@@ -30,7 +30,7 @@ def disturbed():
 
 
 def rows(scheme) -> np.ndarray:
-    """Both residuals with the cut held: velocities of the surface and its force follow the unknowns, its place does not."""
+    """Both residuals with the cut held: velocity and force of the surface follow the unknowns, its place does not."""
     coupled = scheme.coupled
     fluid, structure, interface = coupled.fluid, coupled.structure, coupled.interface
     fluid.cut.motion.v[:] = interface.velocity(interface.displacement())

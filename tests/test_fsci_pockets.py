@@ -39,8 +39,9 @@ def bell(ceiling=0.0, *, element="q1q1"):
         Patch("out", ("x+",), "outflow"),
         Patch("walls", ("y-", "y+"), "no_slip"),
     ]
+    rigid = body("bell", corners, loop(8), motion=motion if ceiling else None)
     return make_fluid(
-        uniform([0, 0], [1, 1], [20, 20]), patches, [body("bell", corners, loop(8), motion=motion if ceiling else None)],
+        uniform([0, 0], [1, 1], [20, 20]), patches, [rigid],
         mu=0.05, scheme="backward_euler", dt=DT, element=element, body_force=field(0, -WEIGHT),
     )  # fmt: skip
 

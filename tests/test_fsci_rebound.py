@@ -69,7 +69,7 @@ def test_forces_balance_and_nothing_penetrates():
 
 @pytest.mark.parametrize("accelerator", ["iqn", "aitken"])
 def test_both_schemes_agree(accelerator):
-    """The partitioned scheme gets through the changes of the active set; until facets open again, with the same result."""
+    """The partitioned scheme gets through the changes of the active set, with the same result until facets open."""
     partitioned = {
         "coupling__scheme": "partitioned",
         "coupling__accelerator": accelerator,
