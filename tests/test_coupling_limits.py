@@ -1,0 +1,71 @@
+"""Limits with a known answer, and how hard the coupling is: stiff bodies, no fluid, heavy and light fluid, 3D."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from coupled_case import POST
+from test_coupled_run import BLOCK, run
+
+SHORT = ("time.end", "0.1"), ("verify", "[]")
+
+
+FLUID, STRUCTURE, REST = (
+    POST[POST.index(a) : POST.index(b)]
+    for a, b in (("fluid:", "structure:"), ("structure:", "coupling:"), ("probes:", "verify:"))
+)
+COUPLING = "coupling: {scheme: monolithic}\n"
+TIP = "  tip: {quantity: displacement, at: [0.735, 0.41]}\n"
+
+
+def test_a_stiff_body_is_a_rigid_one(tmp_path):
+    """E = 1e9: the flow and its force are those of a rigid body that may move but does not.
+
+    The post goes through the floor, so that there are no facets on it, which the coupled run leaves dry.
+    """
+    mesh = "mesh: {shape: rectangle, size: [0.23, 0.46], origin: [0.62, -0.05], cells: [3, 5]}"
+    structure = STRUCTURE.replace(STRUCTURE[STRUCTURE.index("mesh:") : STRUCTURE.index("\n      material")], mesh)
+    coupled = run(
+        POST.replace(STRUCTURE, structure), tmp_path / "coupled", *SHORT, ("structure.bodies.post.material.E", "1e9")
+    )
+    body = f"  bodies: {{post: {{{mesh}, motion: {{displacement: [1e-15*t, 0]}}}}}}\n"
+    text = POST.replace(STRUCTURE, "").replace(COUPLING, "").replace(TIP, "").replace(FLUID, FLUID + body)
+    rigid = run(text, tmp_path / "rigid", *SHORT)
+    assert np.abs(coupled["tip.x"]).max() < 1e-6
+    for name in ("force.x", "force.y", "outflow"):
+        assert np.abs(coupled[name] - rigid[name]).max() < 1e-4 * np.abs(rigid["force.x"]).max(), name
+
+
+def test_without_fluid_the_structure_is_alone(tmp_path):
+    """Density and viscosity 1e-9: the post swings as it does in nothing."""
+    swinging = POST.replace("      supports:", '      initial_velocity: ["0.5*y", 0]\n      supports:')
+    thin = ("fluid.density", "1e-9"), ("fluid.viscosity", "1e-9")
+    coupled = run(swinging, tmp_path / "coupled", *SHORT, *thin)
+    dry = run(swinging.replace(FLUID, "").replace(COUPLING, "").replace(REST, "probes:\n" + TIP), tmp_path, *SHORT)
+    moved = np.abs(dry["tip.x"]).max()
+    assert moved > 5e-3
+    assert np.abs(coupled["tip.x"] - dry["tip.x"]).max() < 1e-6 * moved
+
+
+def test_a_heavy_fluid_is_no_harder_for_the_monolithic_scheme(tmp_path):
+    """Newton steps per time step with a structure of 0.1 times the fluid's density, and of 10 times."""
+    needed = {}
+    for density in ("10", "0.1"):
+        found = run(POST, tmp_path, *SHORT, ("structure.bodies.post.material.density", density))
+        needed[density] = found["iterations"].max()
+    assert needed["0.1"] <= needed["10"] + 1
+    assert needed["0.1"] <= 7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("text", [POST, BLOCK], ids=["2d", "3d"])
+def test_both_schemes_over_50_steps(text, tmp_path):
+    """The same trajectory to 10 times the tolerance of the coupling; IQN needs few iterations."""
+    long = ("time.end", "1.0"), ("verify", "[]")
+    one = run(text, tmp_path / "monolithic", *long)
+    partitioned = text.replace("coupling: {scheme: monolithic}", "coupling: {scheme: partitioned}")
+    two = run(partitioned, tmp_path / "partitioned", *long)
+    assert len(one["step"]) == len(two["step"]) == 50
+    moved = np.abs(one["tip.x"]).max()
+    assert np.abs(one["tip.x"] - two["tip.x"]).max() < 1e-5 * moved
+    assert two["iterations"].mean() <= 8
