@@ -1,4 +1,4 @@
-"""Coupled cases run as a user runs them: both schemes, resumed bit for bit, repeated after a failure, on two processes."""
+"""Coupled cases as a user runs them: both schemes, resumed bit for bit, repeated after failures, on two processes."""
 
 import numpy as np
 import pytest

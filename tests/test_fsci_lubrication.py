@@ -31,3 +31,10 @@ def test_cylinder_second_order_below_a_cell():
 def test_cylinder_first_order(gap, ratio):
     """Known and documented: 2 % with four cells in the gap, 8 % with two, 10 % are passed at 1.8 cells."""
     assert drag_ratio(2, gap, H, "q1q1") == pytest.approx(ratio, abs=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("gap", "ratio"), [(0.5, 1.032), (0.2, 1.071), (0.1, 1.232)])
+def test_sphere_first_order(gap, ratio):
+    """As in 2D: 10 % are passed at 1.7 cells."""
+    assert drag_ratio(3, gap, 0.1, "q1q1", growth=1.2, fine=0.6, size=10.0) == pytest.approx(ratio, abs=0.01)

@@ -16,6 +16,7 @@ CASE = "cases/rebound/case.yaml"
 DT = 0.02
 #: a small and coarse one that reaches the wall in a few steps
 SMALL = {
+    "fluid.viscosity": "0.05",
     "fluid.grid.cells": "[10, 10]",
     "structure.bodies.ball.mesh.cells": "[16, 1]",
     "structure.bodies.ball.mesh.translate": "[0, 0.54]",
