@@ -16,9 +16,11 @@ from petsc4py import PETSc
 from coupling.coupled import Coupled
 from solvers import linear
 from solvers.api import State, StepFailed, StepInfo
+from solvers.fluid.field import Fluid
 from solvers.fluid.shape import shape_derivatives
 from solvers.newton import Tolerance, converge
 from solvers.rows import Numbering, from_entries
+from solvers.structure.field import Structure
 
 
 class Monolithic:
@@ -33,6 +35,7 @@ class Monolithic:
         self._numbering = Numbering(self.comm, structure.layout.size, fluid.unknowns.owned)
         self._iterative = linear.choose_flow(fluid.solver.linear, fluid.dim, fluid.dofs()) == "iterative"
         self._direct = linear.flow_direct_solver(self.comm, tolerance=0.0)
+        self._farther: Structure | Fluid = fluid
         self._krylov: PETSc.KSP | None = None
         self._preconditioned_by: PETSc.Mat | None = None
         self._fresh_iterations = self._linear_iterations = 0
@@ -64,6 +67,7 @@ class Monolithic:
         self._largest = np.maximum(self._largest, found)
         noise = np.array([structure.round_off(), fluid.round_off()])
         relative = np.divide(found, self._largest, out=np.zeros(2), where=found > noise)
+        self._farther = structure if relative[0] > relative[1] else fluid
         return float(relative.max() * self._largest.sum())
 
     def advance(self) -> float:
@@ -169,7 +173,7 @@ class Monolithic:
 
     def worst(self) -> tuple[float, ...] | None:
         """Where the field that is farther off has its largest residual [m] (collective)."""
-        return self.coupled.fluid.worst()
+        return self._farther.worst()
 
     # ---------------------------------------------------------------------------------------- save and restore
 

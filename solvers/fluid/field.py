@@ -191,7 +191,6 @@ class Fluid:
         return max(1, math.ceil(1.25 * steps * fastest * self.dt / smallest))
 
     def _check_strip(self, cut: Cut) -> None:
-        used = np.zeros(self.unknowns.local, dtype=bool)
         blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)
         blocks[self.unknowns.cell_blocks[np.concatenate([cut.uncut, cut.cut])]] = True
         used = self.unknowns.expand(blocks) & self.velocity_mask
@@ -402,10 +401,9 @@ class Fluid:
         owned[:] = 0.0
         owned[velocity.dofs[: velocity.owned]] = state["old_velocity"].values
         self.old.velocity = self._shared(owned)
-        for column, past in ((1, self.old),):
-            owned[:] = 0.0
-            owned[velocity.dofs[: velocity.owned]] = state["known"].values[:, [column]]
-            past.known = self._shared(owned) > 0.5
+        owned[:] = 0.0
+        owned[velocity.dofs[: velocity.owned]] = state["known"].values[:, [1]]
+        self.old.known = self._shared(owned) > 0.5
         self._dt_before, self._t = state["dt_before"], state["time"]
         self.difference = time.STEADY
         kept = self.flow.copy()
