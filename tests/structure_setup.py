@@ -56,7 +56,7 @@ def corner_count(mesh: Mesh) -> int:
 
 def corner_shape_functions(mesh: Mesh) -> np.ndarray:
     """Linear shape functions of the corners at all nodes of a cell, shape (nodes, corners)."""
-    nodes = np.array(fem._VTK_POINTS[mesh.cell_type], dtype=float)
+    nodes = np.array(fem.VTK_POINTS[mesh.cell_type], dtype=float)
     corners = nodes[: corner_count(mesh)]
     if mesh.cell_type[:4] in ("tria", "tetr"):
         return np.column_stack([1 - nodes.sum(axis=1), nodes])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +16,8 @@ from solvers.contact.distance import shortest_distance
 from solvers.contact.held import lent_shares
 from solvers.contact.pair import KEEP_AFTER, Pair
 from solvers.contact.share import Shares
-from solvers.contact.surface import Nodes, Surface, number_nodes
+from solvers.contact.surface import Nodes, Surface, nodal_areas, number_nodes
+from solvers.contact.terms import Sides, Terms, total_terms
 from solvers.rows import RowChanges
 
 #: Share of a slave node's area that must see a master, and the share with which a node that did in this step still may.
@@ -25,19 +25,6 @@ LEAST_COVERED, LEAST_KEPT = 0.02, 0.01
 
 #: Gap, as a share of the extent of all surfaces, up to which nodes without pressure touch: rounding of positions.
 TOUCHING = 1e-12
-
-
-@dataclass(frozen=True)
-class Terms:
-    """Mortar integrals of all pairs at one iterate; columns are interface dofs (dim * node + component)."""
-
-    D: Array  #: shape (N,), zero for nodes that are no slaves or see no master
-    M: sp.csr_matrix  #: shape (N, N)
-    gap: Array  #: weighted gap [m^dim], shape (N,)
-    normals: Array  #: of slave nodes, shape (N, dim)
-    dgap: sp.csr_matrix  #: shape (N, dim * N)
-    dforce: sp.csr_matrix  #: derivative of the contact force at fixed multipliers, shape (dim * N,) * 2
-    dnormals: sp.csr_matrix  #: shape (dim * N, dim * N)
 
 
 class Contact:
@@ -65,8 +52,9 @@ class Contact:
         self.comm, self.pairs, self.surfaces = comm, list(pairs), surfaces
         self.names = tuple(names) or tuple(f"pair{i}" for i in range(len(pairs)))
         self.nodes: Nodes = number_nodes(surfaces)
-        self._sides = [
-            tuple(self.nodes.of_surface[_index(surfaces, side)] for side in (pair.slave, pair.master)) for pair in pairs
+        numbers = self.nodes.of_surface
+        self._sides: list[Sides] = [
+            (numbers[_index(surfaces, pair.slave)], numbers[_index(surfaces, pair.master)]) for pair in pairs
         ]
         self.size, self.dim = self.nodes.points.shape
         self.z = np.zeros((self.size, self.dim))
@@ -78,25 +66,15 @@ class Contact:
         self._overlap = np.zeros(self.size)  # how much of it may stay negative, <= 0
         self._seen = np.zeros(self.size, dtype=bool)  # nodes that could have a constraint in this step
         self._evaluations = 0
-        self._areas = self._nodal_areas()
+        self._areas = nodal_areas(self.size, [pair.slave for pair in pairs], [slave for slave, _ in self._sides])
         self._scale = np.zeros(self.size)
         self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
         self._shares = Shares(comm)
         self.terms: Terms | None = None
-        self._columns = [_columns(sides, self.dim) for sides in self._sides]
         facets = [slave[pair.slave.facets] for pair, (slave, _) in zip(self.pairs, self._sides, strict=True)]
         self._lent = lent_shares(facets, self.nodes.held.all(axis=1) & (self._areas > 0.0))
         #: rows of slave nodes in the basis of the multipliers, if that is not the nodal one (tri6)
         self.transformation = self._transformation()
-
-    def _nodal_areas(self) -> Array:
-        """Reference area of the slave surface around each node [m^(dim-1)], shape (N,); zero elsewhere."""
-        areas = np.zeros(self.size)
-        for pair, (slave, _) in zip(self.pairs, self._sides, strict=True):
-            facets = pair.slave.facets
-            measure = _facet_measures(pair.slave) / facets.shape[1]
-            np.add.at(areas, slave[facets], measure[:, None])
-        return areas
 
     def _with_lent(self, rows):
         """Rows (of gap, D, M, ...) of nodes plus those of the functions that are lent to them."""
@@ -182,29 +160,8 @@ class Contact:
             pair.keep(self._shares.together(found.used))
             area = self._shares.combine(index, found.area)
             if area.any():
-                pieces.append((index, found))
-        if not pieces:
-            return None
-        return self._sum(pieces)
-
-    def _sum(self, pieces) -> Terms:
-        """Pieces of all pairs and processes in the numbering of all nodes."""
-        N, n = self.size, self.size * self.dim
-        D, gap, normals = np.zeros(N), np.zeros(N), np.zeros((N, self.dim))
-        matrices: dict[str, list[sp.csr_matrix]] = {"M": [], "dgap": [], "dforce": []}
-        dnormals = []
-        for index, found in pieces:
-            slave, master = self._sides[index]
-            columns = self._columns[index]
-            D[slave] += self._shares.total(found.D)
-            gap[slave] += self._shares.total(found.gap)
-            normals[slave] = found.normals
-            dnormals.append(_renumber(found.dnormals, columns[: self.dim * len(slave)], columns, (n, n)))
-            matrices["M"].append(_renumber(found.M, slave, master, (N, N)))
-            matrices["dgap"].append(_renumber(found.dgap, slave, columns, (N, n)))
-            matrices["dforce"].append(_renumber(found.dforce, columns, columns, (n, n)))
-        summed = {name: self._shares.total(sum(parts[1:], parts[0])) for name, parts in matrices.items()}
-        return Terms(D=D, gap=gap, normals=normals, dnormals=sum(dnormals[1:], dnormals[0]), **summed)
+                pieces.append(((slave, master), found))
+        return total_terms(pieces, self._shares, self.size, self.dim) if pieces else None
 
     # ------------------------------------------------------------------------------------- what the balance needs
 
@@ -392,22 +349,3 @@ class Contact:
 
 def _index(surfaces: Sequence[Surface], wanted: Surface) -> int:
     return next(i for i, surface in enumerate(surfaces) if surface is wanted)
-
-
-def _columns(sides: tuple[NDArray[np.int64], ...], dim: int) -> NDArray[np.int64]:
-    """Interface dof of each slave dof, then of each master dof of a pair."""
-    return (dim * np.concatenate(sides)[:, None] + np.arange(dim)).ravel()
-
-
-def _renumber(matrix: sp.csr_matrix, rows: NDArray, columns: NDArray, shape: tuple[int, int]) -> sp.csr_matrix:
-    entries = matrix.tocoo()
-    return sp.csr_matrix((entries.data, (rows[entries.row], columns[entries.col])), shape=shape)
-
-
-def _facet_measures(surface: Surface) -> Array:
-    """Area (2D: length) [m^(dim-1)] of each facet between its corners, shape (k,)."""
-    corners = surface.points[surface.facets[:, : {"line": 2, "tria": 3, "quad": 4}[surface.facet_type[:4]]]]
-    if corners.shape[1] == 2:
-        return np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
-    diagonals = corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1]
-    return 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)

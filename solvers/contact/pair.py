@@ -53,7 +53,7 @@ class Pair:
         #: slave basis N~ = N T, and its inverse
         self.transformation = sp.csr_matrix(T, shape=shape)
         self.inverse_transformation = sp.csr_matrix(inverse, shape=shape)
-        self._edge = _longest_edge(slave)
+        self._edge = _longest_edge(slave.corners)
         self.begin_step()
 
     def begin_step(self) -> None:
@@ -143,6 +143,5 @@ def _widen(matrix: sp.csr_matrix, columns: int) -> sp.csr_matrix:
     return sp.csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape=(matrix.shape[0], columns))
 
 
-def _longest_edge(surface: Surface) -> float:
-    corners = surface.points[surface.facets[:, : {"line": 2, "tria": 3, "quad": 4}[surface.facet_type[:4]]]]
+def _longest_edge(corners: Array) -> float:
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())

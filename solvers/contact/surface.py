@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.mesh_topology import CORNERS
 
 #: Meshio facet type -> name in the kernels
 KERNEL_TYPES = {
@@ -37,6 +38,11 @@ class Surface:
     body: str = ""  #: whose surface it is
     mesh_nodes: NDArray[np.int64] | None = None  #: number of each node in the mesh of the body
     motion: Callable[[float], Array] | None = None  #: rigid: positions [m] at a time, shape (n, dim)
+
+    @property
+    def corners(self) -> Array:
+        """Reference positions [m] of the corners of the facets, shape (k, corners, dim)."""
+        return self.points[self.facets[:, : CORNERS[self.facet_type]]]
 
 
 @dataclass(frozen=True)
@@ -83,3 +89,23 @@ def number_nodes(surfaces: Sequence[Surface]) -> Nodes:
         held.append(np.zeros((len(new), dim), dtype=bool) if fixed is None else fixed[new])
         numbers.append(number)
     return Nodes(np.concatenate(points), np.concatenate(dofs), np.concatenate(held), tuple(numbers))
+
+
+def nodal_areas(size: int, slaves: Sequence[Surface], numbers: Sequence[NDArray[np.int64]]) -> Array:
+    """Reference area of the slave surfaces around each of all nodes [m^(dim-1)], shape (size,); zero elsewhere.
+
+    numbers: of the nodes of each slave surface. Every node of a facet has an equal part of it.
+    """
+    areas = np.zeros(size)
+    for slave, nodes in zip(slaves, numbers, strict=True):
+        share = _facet_measures(slave.corners) / slave.facets.shape[1]
+        np.add.at(areas, nodes[slave.facets], share[:, None])
+    return areas
+
+
+def _facet_measures(corners: Array) -> Array:
+    """Area (2D: length) [m^(dim-1)] of each facet between its corners, shape (k,)."""
+    if corners.shape[1] == 2:
+        return np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
+    diagonals = corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1]
+    return 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)

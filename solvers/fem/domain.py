@@ -1,0 +1,171 @@
+"""Distributed meshes: their cells, facets and named surfaces, and the way back to the numbers in the mesh file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import basix
+import numpy as np
+import ufl
+from dolfinx import cpp
+from dolfinx import mesh as dolfinx_mesh
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.mesh import Mesh
+
+#: Meshio cell type -> (UFL cell, degree)
+CELLS = {
+    "triangle": ("triangle", 1),
+    "triangle6": ("triangle", 2),
+    "quad": ("quadrilateral", 1),
+    "quad9": ("quadrilateral", 2),
+    "tetra": ("tetrahedron", 1),
+    "tetra10": ("tetrahedron", 2),
+    "hexahedron": ("hexahedron", 1),
+    "hexahedron27": ("hexahedron", 2),
+}
+
+_SQUARE: list[tuple[float, ...]] = [(0, 0), (1, 0), (1, 1), (0, 1)]
+_QUAD9: list[tuple[float, ...]] = [*_SQUARE, (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5), (0.5, 0.5)]
+_TRIANGLE6: list[tuple[float, ...]] = [(0, 0), (1, 0), (0, 1), (0.5, 0), (0.5, 0.5), (0, 0.5)]
+_CUBE: list[tuple[float, ...]] = [(x, y, z) for z in (0, 1) for x, y in _SQUARE]
+
+#: Reference coordinates of VTK's nodes: matching them with basix' points gives the node permutation of any version.
+VTK_POINTS: dict[str, list[tuple[float, ...]]] = {
+    "triangle": _TRIANGLE6[:3],
+    "triangle6": _TRIANGLE6,
+    "quad": list(_SQUARE),
+    "quad9": _QUAD9,
+    "tetra": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
+    "tetra10": [
+        *[(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
+        *[(0.5, 0, 0), (0.5, 0.5, 0), (0, 0.5, 0), (0, 0, 0.5), (0.5, 0, 0.5), (0, 0.5, 0.5)],
+    ],
+    "hexahedron": list(_CUBE),
+    "hexahedron27": [
+        *_CUBE,
+        *[(x, y, 0) for x, y in _QUAD9[4:8]],
+        *[(x, y, 1) for x, y in _QUAD9[4:8]],
+        *[(x, y, 0.5) for x, y in _SQUARE],
+        *[(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0), (0.5, 0.5, 1)],
+        (0.5, 0.5, 0.5),
+    ],
+}
+
+
+def vtk_from_basix(cell_type: str) -> NDArray[np.int64]:
+    """Permutation p with nodes_vtk = nodes_basix[p]."""
+    name, degree = CELLS[cell_type]
+    element = basix.create_element(
+        basix.ElementFamily.P, getattr(basix.CellType, name), degree, basix.LagrangeVariant.equispaced
+    )
+    vtk = np.array(VTK_POINTS[cell_type], dtype=float)
+    distance = np.linalg.norm(vtk[:, None, :] - element.points[None, :, :], axis=2)
+    return np.argmin(distance, axis=1)
+
+
+@dataclass(frozen=True)
+class Domain:
+    """A distributed mesh and what is needed to find its nodes again."""
+
+    mesh: dolfinx_mesh.Mesh
+    cell_type: str
+    degree: int
+    nodes: int  #: nodes of the whole mesh
+    surfaces: dict[str, NDArray[np.int32]] = field(default_factory=dict)  #: name -> local exterior facets, sorted
+    source: Mesh | None = None  #: rank 0 only: the whole mesh
+
+    @property
+    def comm(self) -> MPI.Comm:
+        return self.mesh.comm
+
+    @property
+    def dim(self) -> int:
+        return self.mesh.geometry.dim
+
+
+def distribute(comm: MPI.Comm, mesh: Mesh | None) -> Domain:
+    """Distribute a mesh that rank 0 holds (other ranks pass None)."""
+    header = comm.bcast(None if mesh is None else (mesh.cell_type, mesh.points.shape, mesh.surfaces), root=0)
+    cell_type, (nodes, dim), named = header
+    name, degree = CELLS[cell_type]
+    vtk = vtk_from_basix(cell_type)
+    if mesh is not None:
+        cells, points = np.ascontiguousarray(mesh.cells[:, np.argsort(vtk)], dtype=np.int64), mesh.points
+    else:
+        cells, points = np.empty((0, len(vtk)), dtype=np.int64), np.empty((0, dim))
+    element = ufl.VectorElement("Lagrange", ufl.Cell(name, geometric_dimension=dim), degree)
+    distributed = dolfinx_mesh.create_mesh(comm, cells, points, ufl.Mesh(element))
+    domain = Domain(distributed, cell_type, degree, nodes, source=mesh)
+    return Domain(**{**vars(domain), "surfaces": _find_surfaces(domain, named)})
+
+
+def _find_surfaces(domain: Domain, named: dict[str, NDArray[np.int64]]) -> dict[str, NDArray[np.int32]]:
+    """Local facets of each named surface, found by their corner nodes (whatever the facet's node order)."""
+    mesh = domain.mesh
+    dim = mesh.topology.dim
+    mesh.topology.create_connectivity(dim - 1, dim)
+    exterior = np.sort(exterior_facets(domain))
+    geometry = cpp.mesh.entities_to_geometry(mesh._mesh, dim - 1, exterior, False)
+    corners = np.sort(input_nodes(domain)[geometry], axis=1).reshape(len(exterior), -1)
+    facet_of = {tuple(corner): facet for corner, facet in zip(corners.tolist(), exterior, strict=True)}
+    found = {}
+    for name, facets in named.items():
+        local = (facet_of.get(tuple(facet)) for facet in np.sort(facets, axis=1).tolist())
+        found[name] = np.sort(np.array([f for f in local if f is not None], dtype=np.int32))
+    return found
+
+
+def exterior_facets(domain: Domain) -> NDArray[np.int32]:
+    """Local numbers of the facets on the boundary of the body that this process integrates over."""
+    mesh = domain.mesh
+    mesh.topology.create_entities(mesh.topology.dim - 1)
+    mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
+    return np.asarray(cpp.mesh.exterior_facet_indices(mesh.topology), dtype=np.int32)
+
+
+def input_nodes(domain: Domain) -> NDArray[np.int64]:
+    """Number in the mesh file of each local geometry node."""
+    return np.asarray(domain.mesh.geometry.input_global_indices, dtype=np.int64)
+
+
+def input_cells(domain: Domain) -> NDArray[np.int64]:
+    """Number in the mesh file of each local cell (ghosts last)."""
+    return np.asarray(domain.mesh.topology.original_cell_index, dtype=np.int64)
+
+
+def owned_cells(domain: Domain) -> int:
+    """How many of the local cells this process owns; they come first."""
+    return int(domain.mesh.topology.index_map(domain.dim).size_local)
+
+
+def _facet_cells(domain: Domain) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """(offsets, cells) of the cells at each local facet."""
+    topology = domain.mesh.topology
+    topology.create_entities(domain.dim - 1)
+    topology.create_connectivity(domain.dim - 1, domain.dim)
+    links = topology.connectivity(domain.dim - 1, domain.dim)
+    return np.asarray(links.offsets, dtype=np.int32), np.asarray(links.array, dtype=np.int32)
+
+
+def interior_facets(domain: Domain) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """(local facets with two local cells, those cells of shape (facets, 2))."""
+    offsets, cells = _facet_cells(domain)
+    facets = np.flatnonzero(np.diff(offsets) == 2).astype(np.int32)
+    return facets, np.stack([cells[offsets[facets]], cells[offsets[facets] + 1]], axis=1)
+
+
+def boundary_facets(domain: Domain) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """(local facets on the boundary of the mesh that this process integrates over, the cell of each)."""
+    facets = np.sort(exterior_facets(domain))
+    offsets, cells = _facet_cells(domain)
+    return facets, cells[offsets[facets]]
+
+
+def facet_midpoints(domain: Domain, facets: NDArray[np.int32]) -> Array:
+    """Midpoints [m] of facets, shape (facets, dim)."""
+    if len(facets) == 0:
+        return np.empty((0, domain.dim))
+    return dolfinx_mesh.compute_midpoints(domain.mesh, domain.dim - 1, facets)[:, : domain.dim]

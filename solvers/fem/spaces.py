@@ -1,0 +1,133 @@
+"""Finite element spaces and what their dofs belong to."""
+
+from __future__ import annotations
+
+import basix
+import numpy as np
+import ufl
+from dolfinx import fem
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.fem.domain import CELLS, Domain, input_nodes
+from solvers.fem.quiet import quiet
+
+
+def vector_space(domain: Domain) -> fem.FunctionSpace:
+    """Isoparametric vector Lagrange space: one dof block per node."""
+    with quiet():
+        return fem.VectorFunctionSpace(domain.mesh, ("Lagrange", domain.degree))
+
+
+def scalar_space(domain: Domain) -> fem.FunctionSpace:
+    """Isoparametric scalar Lagrange space: one dof per node."""
+    with quiet():
+        return fem.FunctionSpace(domain.mesh, ("Lagrange", domain.degree))
+
+
+def cellwise_space(domain: Domain) -> fem.FunctionSpace:
+    """One number per cell."""
+    with quiet():
+        return fem.FunctionSpace(domain.mesh, ("Discontinuous Lagrange", 0))
+
+
+def flow_space(domain: Domain, velocity_degree: int) -> fem.FunctionSpace:
+    """Velocity and pressure as one function with dim + 1 components, pressure last and of first degree.
+
+    Equal order: one block of dim + 1 unknowns per node, side by side in the matrix; otherwise a mixed element.
+    """
+    cell = domain.mesh.ufl_cell()
+    if velocity_degree == 1:
+        element = ufl.VectorElement("Lagrange", cell, 1, dim=domain.dim + 1)
+    else:
+        velocity = ufl.VectorElement("Lagrange", cell, velocity_degree)
+        element = ufl.MixedElement([velocity, ufl.FiniteElement("Lagrange", cell, 1)])
+    with quiet():
+        return fem.FunctionSpace(domain.mesh, element)
+
+
+def component_dofs(space: fem.FunctionSpace, component: int) -> tuple[NDArray[np.int32], Array]:
+    """(local unrolled dofs, their points of shape (dofs, 3)) of one component of a `flow_space` (collective)."""
+    if space.dofmap.index_map_bs > 1:
+        blocks = np.arange(len(space.tabulate_dof_coordinates()), dtype=np.int32)
+        return blocks * space.dofmap.index_map_bs + component, space.tabulate_dof_coordinates()
+    with quiet():
+        part = space.sub(0).sub(component) if component < space.mesh.geometry.dim else space.sub(1)
+        collapsed, dofs = part.collapse()
+    return np.asarray(dofs, dtype=np.int32), collapsed.tabulate_dof_coordinates()
+
+
+def component_cell_dofs(space: fem.FunctionSpace, component: int) -> NDArray[np.int32]:
+    """Local dofs of one component of a `flow_space` in each local cell, in the order of the scalar element."""
+    if space.dofmap.index_map_bs > 1:
+        part = space.sub(component)
+    else:
+        part = space.sub(0).sub(component) if component < space.mesh.geometry.dim else space.sub(1)
+    cells = space.mesh.topology.index_map(space.mesh.topology.dim)
+    return np.asarray(part.dofmap.list.array).reshape(cells.size_local + cells.num_ghosts, -1)
+
+
+def tabulate_lagrange(domain: Domain, degree: int, points: Array) -> tuple[Array, Array]:
+    """Scalar shape functions (points, functions) and their reference gradients (points, functions, dim)."""
+    element = basix.create_element(
+        basix.ElementFamily.P,
+        getattr(basix.CellType, CELLS[domain.cell_type][0]),
+        degree,
+        basix.LagrangeVariant.gll_warped,
+    )
+    table = element.tabulate(1, points)[..., 0]
+    return table[0], np.moveaxis(table[1:], 0, -1)
+
+
+def facet_dofs(space: fem.FunctionSpace, component: int, facets: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Local dofs of one component of a `flow_space` on facets, on every process that knows them (collective)."""
+    dim = space.mesh.topology.dim
+    if space.dofmap.index_map_bs > 1:
+        blocks = fem.locate_dofs_topological(space, dim - 1, facets)
+        return np.asarray(blocks, dtype=np.int32) * space.dofmap.index_map_bs + component
+    part = space.sub(0).sub(component) if component < dim else space.sub(1)
+    return np.asarray(fem.locate_dofs_topological(part, dim - 1, facets), dtype=np.int32)
+
+
+def quadrature_space(domain: Domain, degree: int, shape: tuple[int, ...] = ()) -> fem.FunctionSpace:
+    """Values at the points of the quadrature rule of a degree; shape () for scalars, (n,) vectors, (n, m) tensors."""
+    cell = domain.mesh.ufl_cell()
+    if not shape:
+        element = ufl.FiniteElement("Quadrature", cell, degree, quad_scheme="default")
+    elif len(shape) == 1:
+        element = ufl.VectorElement("Quadrature", cell, degree, dim=shape[0], quad_scheme="default")
+    else:
+        element = ufl.TensorElement("Quadrature", cell, degree, shape=shape, quad_scheme="default")
+    with quiet():
+        return fem.FunctionSpace(domain.mesh, element)
+
+
+def quadrature_points(domain: Domain, degree: int) -> tuple[Array, Array]:
+    """(points of shape (n, dim), weights) on the reference cell that a measure of this degree uses."""
+    return basix.make_quadrature(getattr(basix.CellType, CELLS[domain.cell_type][0]), degree)
+
+
+def function(space: fem.FunctionSpace) -> fem.Function:
+    """A finite element function, zero at first."""
+    return fem.Function(space)
+
+
+def node_of_block(domain: Domain, space: fem.FunctionSpace) -> NDArray[np.int64]:
+    """Mesh-file number of the node behind each local dof block (owned blocks first, then ghosts)."""
+    cells = domain.mesh.topology.index_map(domain.mesh.topology.dim)
+    local_cells = cells.size_local + cells.num_ghosts
+    blocks = space.dofmap.list.array.reshape(local_cells, -1)
+    geometry = domain.mesh.geometry.dofmap.array.reshape(local_cells, -1)
+    nodes = np.full(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, -1, dtype=np.int64)
+    nodes[blocks] = input_nodes(domain)[geometry]
+    return nodes
+
+
+def surface_blocks(domain: Domain, space: fem.FunctionSpace, name: str) -> NDArray[np.int32]:
+    """Local dof blocks on a named surface, on every process that knows the node (a collective call)."""
+    return fem.locate_dofs_topological(space, domain.mesh.topology.dim - 1, domain.surfaces[name])
+
+
+def block_points(space: fem.FunctionSpace) -> Array:
+    """Reference position of each local dof block, shape (3, blocks)."""
+    return np.ascontiguousarray(space.tabulate_dof_coordinates().T)
