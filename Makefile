@@ -23,10 +23,11 @@ export PYVISTA_OFF_SCREEN ?= true
 PACKAGES_STAMP := .venv/debian-packages.stamp
 PROJECT_STAMP  := .venv/project.stamp
 DOCS_STAMP     := .venv/docs.stamp
+MODULES        := .venv/modules.txt
 KERNEL_SOURCES := $(wildcard solvers/kernels/CMakeLists.txt solvers/kernels/*.hpp solvers/kernels/*.cpp)
 INSTALL        := $(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation
 
-.PHONY: setup demo test test-slow lint bench docs clean
+.PHONY: setup demo test test-slow lint bench docs clean FORCE
 
 setup: $(PROJECT_STAMP)
 
@@ -34,7 +35,13 @@ $(PACKAGES_STAMP): Makefile .ci/install-packages
 	.ci/install-packages $(DEBIAN_PACKAGES)
 	@mkdir -p .venv && touch $@
 
-$(PROJECT_STAMP): pyproject.toml $(KERNEL_SOURCES) | $(PACKAGES_STAMP)
+# An installed module is found where it was: one that came, went or moved since needs a new installation.
+$(MODULES): FORCE
+	@mkdir -p .venv
+	@find fsci solvers coupling -name '*.py' | sort > $@.new
+	@cmp -s $@.new $@ && rm $@.new || mv $@.new $@
+
+$(PROJECT_STAMP): pyproject.toml $(KERNEL_SOURCES) $(MODULES) | $(PACKAGES_STAMP)
 	@test -x $(BIN)/pip || $(PYTHON) -m venv --system-site-packages .venv
 	@echo "setup: building and installing fsci into .venv"
 	$(INSTALL) nanobind scikit-build-core

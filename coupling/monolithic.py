@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
+from coupling.blocks import Blocks
 from coupling.coupled import Coupled
 from solvers import linear
 from solvers.api import State, StepFailed, StepInfo
@@ -73,29 +74,29 @@ class Monolithic:
     def advance(self) -> float:
         """One Newton step; the larger of both fields' relative increments."""
         structure, fluid = self.coupled.structure, self.coupled.fluid
-        matrix = self._matrix()
-        b, x = matrix.createVecs()
+        blocks = self._blocks()
+        b, x = blocks.create_vectors()
         own = structure.layout.size
         b.array[:own] = -structure.residual_force
         b.array[own:] = -fluid.residual_rows
         if structure.constrained:
-            matrix = structure.condense(matrix, b, self._numbering)
+            blocks.condense(structure, b, self._numbering)
         x.array[:own] = structure.missing_displacement()
-        start = matrix.getOwnershipRange()[0]
-        matrix.zeroRowsColumns((start + structure.prescribed).astype(PETSc.IntType), 1.0, x, b)
+        blocks.hold(structure, b, x)
         try:
             with fluid.timer("solve"):
-                self._solve(matrix, b, x)
+                self._solve(blocks, b, x)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         everything = self._numbering.gather(self.comm, x.array) if structure.constrained else None
         return max(structure.update(x.array[:own], everything), fluid.update(x.array[own:]))
 
-    def _solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
+    def _solve(self, blocks: Blocks, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Directly, or preconditioned by the first matrix of the step as long as that serves."""
         if not self._iterative:
-            linear.solve(self._direct, matrix, b, x)
+            linear.solve(self._direct, blocks.assembled(), b, x)
             return
+        matrix = blocks.nested()
         if self._krylov is not None:
             try:
                 linear.solve(self._krylov, matrix, b, x, self._preconditioned_by)
@@ -107,55 +108,52 @@ class Monolithic:
                 if iterations > 2 * self._fresh_iterations:
                     self._krylov = None
                 return
-        self._krylov, self._preconditioned_by = self._iterative_solver(matrix), matrix
+        tolerance = self.coupled.fluid.solver.linear_tolerance
+        self._krylov = linear.coupled_solver(
+            self.comm, self._numbering.first, self._numbering.second, tolerance=tolerance
+        )
+        self._preconditioned_by = matrix
         linear.solve(self._krylov, matrix, b, x)
+        linear.keep_factors(self._krylov)
         self._fresh_iterations = self._krylov.getIterationNumber()
         self._linear_iterations += self._fresh_iterations
 
-    def _iterative_solver(self, matrix: PETSc.Mat) -> PETSc.KSP:
-        start, own = matrix.getOwnershipRange()[0], self.coupled.structure.layout.size
-        rows = [(own, start), (self.coupled.fluid.unknowns.owned, start + own)]
-        structure, flow = (PETSc.IS().createStride(size, first, 1, comm=self.comm) for size, first in rows)
-        return linear.coupled_solver(self.comm, structure, flow, tolerance=self.coupled.fluid.solver.linear_tolerance)
-
-    def _matrix(self) -> PETSc.Mat:
+    def _blocks(self) -> Blocks:
         structure, fluid = self.coupled.structure, self.coupled.fluid
         K, A = structure.linearise(), fluid.linearise()
         with fluid.timer("coupling"):
             into_fluid, into_structure, mass = self._coupling_blocks()
             K = K.copy()
             K.axpy(1.0, mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-            nest = PETSc.Mat().createNest([[K, into_structure], [into_fluid, A]], comm=self.comm)
-            return nest.convert(PETSc.Mat.Type.AIJ, PETSc.Mat())
+            return Blocks(K, into_structure, into_fluid, A)
 
     def _coupling_blocks(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
         """alpha C, -w C^T S and w alpha M as distributed matrices; rows of held fluid dofs are empty."""
         fluid, structure, surface = self.coupled.fluid, self.coupled.structure, self.coupled.interface
         alpha, weight = fluid.difference.alpha, structure.time.load_weight
         operator = fluid.system.interface
-        wetted = fluid.vertices_of([s.name for s in surface.surfaces])
-        columns = (wetted[:, None] * fluid.dim + np.arange(fluid.dim)).ravel()
         by_shape, load_by_shape = shape_derivatives(operator, fluid.flow)
-        into, load = alpha * operator.matrix + by_shape, alpha * operator.mass - load_by_shape
-        velocity_in = into[:, columns].tocoo()
-        C = operator.matrix[:, columns].tocoo()
-        flow, held = fluid.unknowns.global_dofs, fluid.held_everywhere()
-        own_structure, own_flow = structure.layout.size, fluid.unknowns.owned
-        dofs = surface.dofs.ravel()
-        free = ~held[velocity_in.row]
-        into_fluid = from_entries(
-            self.comm,
-            (own_flow, own_structure),
-            flow[velocity_in.row[free]],
-            dofs[velocity_in.col[free]],
-            velocity_in.data[free],
-        )
-        sign = np.where(fluid.velocity_mask, -1.0, 1.0)[C.row]
+        C = operator.coupling_blocks
+        back = np.concatenate([-C[0].ravel(), C[1].ravel()])
+        into = np.concatenate([(alpha * c + s).ravel() for c, s in zip(C, by_shape, strict=True)])
+        load = (alpha * operator.mass_blocks - load_by_shape).ravel()
+
+        #: the structure's dof of each dof of the vertices, -1 for those of rigid bodies
+        moved = np.full((len(fluid.cut.motion.x), fluid.dim), -1)
+        moved[fluid.vertices_of([s.name for s in surface.surfaces])] = surface.dofs
+        flow, moved = fluid.unknowns.global_dofs, moved.ravel()
+        rows, columns = operator.places
+        held, elastic = fluid.held_everywhere()[rows], moved[columns] >= 0
+        own, own_flow = structure.layout.size, fluid.unknowns.owned
+        of_flow, of_structure = flow[rows], moved[columns]
+        kept = elastic & ~held
+        into_fluid = from_entries(self.comm, (own_flow, own), of_flow[kept], of_structure[kept], into[kept])
         into_structure = from_entries(
-            self.comm, (own_structure, own_flow), dofs[C.col], flow[C.row], -weight * sign * C.data
+            self.comm, (own, own_flow), of_structure[elastic], of_flow[elastic], -weight * back[elastic]
         )
-        M = load[columns][:, columns].tocoo()
-        mass = from_entries(self.comm, (own_structure, own_structure), dofs[M.row], dofs[M.col], weight * M.data)
+        rows, columns = (moved[places] for places in operator.surface_places)
+        elastic = (rows >= 0) & (columns >= 0)
+        mass = from_entries(self.comm, (own, own), rows[elastic], columns[elastic], weight * load[elastic])
         return into_fluid, into_structure, mass
 
     def retreat(self, fraction: float) -> None:

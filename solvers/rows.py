@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,7 +31,7 @@ def fetch_rows(matrix: PETSc.Mat, rows: NDArray[np.int64]) -> sp.csr_matrix:
     start, end = matrix.getOwnershipRange()
     if comm.size == 1:
         indptr, indices, data = matrix.getValuesCSR()
-        return sp.csr_matrix((data, indices, indptr), shape=(unknowns, unknowns))[rows]
+        return sp.csr_matrix((data, indices, indptr), shape=matrix.size)[rows]
     wanted = rows[(rows >= start) & (rows < end)] - start
     indptr, indices, data = matrix.getValuesCSR()
     owned = sp.csr_matrix((data, indices, indptr), shape=(end - start, unknowns))[wanted]
@@ -44,7 +44,6 @@ def fetch_rows(matrix: PETSc.Mat, rows: NDArray[np.int64]) -> sp.csr_matrix:
 def change_rows(matrix: PETSc.Mat, b: PETSc.Vec, changes: RowChanges) -> PETSc.Mat:
     """The changed matrix; `b` is changed in place and `matrix` is used up. Collective."""
     start, end = matrix.getOwnershipRange()
-    unknowns = matrix.size[1]
 
     def owned(rows: NDArray[np.int64]) -> NDArray[np.bool_]:
         return (rows >= start) & (rows < end)
@@ -59,7 +58,7 @@ def change_rows(matrix: PETSc.Mat, b: PETSc.Vec, changes: RowChanges) -> PETSc.M
     else:
         matrix.zeroRows(changes.replaced[replace].astype(PETSc.IntType), 0.0)
         changed = PETSc.Mat().createAIJ(
-            ((end - start, None), (end - start, unknowns)),
+            (matrix.getSizes()[0], matrix.getSizes()[1]),
             csr=(local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data),
             comm=matrix.comm,
         )
@@ -101,7 +100,7 @@ def from_entries(
 
 
 class Numbering:
-    """A system of two blocks, on each process the rows of the first and then of the second.
+    """The columns of a system of two blocks: on each process those of the first and then of the second.
 
     Outside, the unknowns are numbered as those of the first block alone, then those of the second.
     """
@@ -110,33 +109,34 @@ class Numbering:
         """Owned unknowns of the blocks (collective)."""
         sizes = np.array(comm.allgather((first, second)), dtype=np.int64)
         starts = np.concatenate([[0], np.cumsum(sizes.sum(axis=1))])[:-1]
-        #: row in the system of each unknown
+        #: column in the system of each unknown
         self.placed = np.concatenate(
             [start + np.arange(own) for start, own in zip(starts, sizes[:, 0], strict=True)]
             + [start + own[0] + np.arange(own[1]) for start, own in zip(starts, sizes, strict=True)]
         ).astype(np.int64)
         self._unknown = np.argsort(self.placed)
+        start = int(starts[comm.rank])
+        self.first = PETSc.IS().createStride(first, start, 1, comm=comm)
+        self.second = PETSc.IS().createStride(second, start + first, 1, comm=comm)
 
     def fetch_rows(self, matrix: PETSc.Mat, rows: NDArray[np.int64]) -> sp.csr_matrix:
-        """Rows of unknowns, columns in the order of the unknowns (collective)."""
-        found = fetch_rows(matrix, self.placed[rows]).tocoo()
+        """Rows of a matrix with these columns, columns in the order of the unknowns (collective)."""
+        found = fetch_rows(matrix, rows).tocoo()
         return sp.csr_matrix((found.data, (found.row, self._unknown[found.col])), shape=found.shape)
 
     def place(self, changes: RowChanges) -> RowChanges:
-        """Changes by unknowns as changes of the system."""
+        """Changes by unknowns as changes of a matrix with these columns."""
 
         def columns(rows: sp.csr_matrix) -> sp.csr_matrix:
             entries = rows.tocoo()
             return sp.csr_matrix((entries.data, (entries.row, self.placed[entries.col])), shape=rows.shape)
 
-        return RowChanges(
-            self.placed[changes.replaced],
-            columns(changes.replaced_rows),
-            changes.replaced_right,
-            self.placed[changes.added],
-            columns(changes.added_rows),
-            changes.added_right,
-        )
+        return replace(changes, replaced_rows=columns(changes.replaced_rows), added_rows=columns(changes.added_rows))
+
+    def split(self, matrix: PETSc.Mat) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """The columns of the first block and those of the second (collective)."""
+        rows = PETSc.IS().createStride(matrix.getLocalSize()[0], matrix.getOwnershipRange()[0], 1, comm=matrix.comm)
+        return matrix.createSubMatrix(rows, self.first), matrix.createSubMatrix(rows, self.second)
 
     def gather(self, comm: MPI.Comm, system: Array) -> Array:
         """Values of all unknowns from the owned ones of the system (collective)."""

@@ -79,7 +79,16 @@ class Fluid:
         self.dim = grid.dim
         self.unknowns = Unknowns(self.grid, settings.degree)
         self.boundary = Boundary(self.grid, self.unknowns, patches)
-        self.system = FlowSystem(self.grid, settings, self.boundary, self.unknowns, with_bodies=bool(self.bodies))
+        self._iterative = linear.choose_flow(solver.linear, self.dim, self.dofs()) == "iterative"
+        self.system = FlowSystem(
+            self.grid,
+            settings,
+            self.boundary,
+            self.unknowns,
+            with_bodies=bool(self.bodies),
+            # incomplete factors of dense blocks are two times as fast
+            blocked=self._iterative and self.unknowns.block_size > 1,
+        )
         self.cutter = Cutter(self.grid, self.system.weights.points)
         self.velocity_mask = np.zeros(self.unknowns.local, dtype=bool)
         self.velocity_mask[self.unknowns.velocity.dofs] = True
@@ -91,7 +100,6 @@ class Fluid:
         self._motions: list[Motion] = []
         self._wet = wetness([body.surface for body in self.bodies])
         self._ksp: PETSc.KSP | None = None
-        self._iterative = linear.choose_flow(solver.linear, self.dim, self.dofs()) == "iterative"
 
     # ------------------------------------------------------------------------------------------------- the state
 
@@ -209,14 +217,17 @@ class Fluid:
         That is zero if all of the box is closed, else the pressure that was there when the pocket closed.
         """
         self._pockets: list[tuple[NDArray[np.bool_], Array]] = []
+        self.level_unknown = False  #: a body that another field moves could know the pressure that is held here
         closed = self.boundary.closed()
         if not (closed or self.bodies):
             return
         elastic = np.concatenate([np.full(b.surface.vertices, b.motion is None) for b in self.bodies] + [[]]) > 0.0
         pockets = find_pockets(self.grid, self.cut, self.boundary.open_cells(), elastic)
-        held = [p for p in pockets if not (p.elastic and self.solved_with_bodies)]
+        known = self.solved_with_bodies and not self.settings.steady  # by the room that bodies leave
+        held = [p for p in pockets if not (p.elastic and known)]
         if not held:
             return
+        self.level_unknown = any(pocket.elastic for pocket in held)
         sizes = self.system.pressure_sizes()
         for pocket in held:
             self._hold_pocket(pocket.cells, sizes, keep_level=not (closed and pocket.largest))

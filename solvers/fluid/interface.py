@@ -16,13 +16,15 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from solvers.api import Array
 from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.space import Unknowns
 from solvers.fluid.weights import Weights
+
+#: By pieces: velocity rows (pieces, functions, dim, vertices, dim), pressure rows (pieces, functions, vertices, dim)
+Blocks = tuple[Array, Array]
 
 
 class Interface:
@@ -74,42 +76,43 @@ class Interface:
         return total
 
     @cached_property
-    def matrix(self) -> sparse.csr_matrix:
-        """C, ghosts' share still there, shape (local dofs, vertices dim)."""
-        dim, mu, n = self.n.shape[1], self.mu, self.n
-        identity = np.eye(dim)
-        block = mu * self.normal_slope[:, :, None, :, None] * identity[:, None, :]
-        block = block + mu * np.einsum("pavi,pk->pakvi", self.grad, n)
-        block = block - np.einsum("pki,pav->pakvi", self.penalty, self.phi)
-        leak = np.einsum("pav,pi->pavi", self.psi, n)
-        return self.scatter(block, leak)
+    def coupling_blocks(self) -> Blocks:
+        """C by pieces."""
+        mu, n = self.mu, self.n
+        block = mu * np.einsum("pavi,pk->pakvi", self.grad, n)
+        block -= np.einsum("pki,pav->pakvi", self.penalty, self.phi)
+        for axis in range(self.dim):
+            block[:, :, axis, :, axis] += mu * self.normal_slope
+        return block, np.einsum("pav,pi->pavi", self.psi, n)
 
     @cached_property
-    def mass(self) -> sparse.csr_matrix:
-        """M: -df/dg [kg/s], shape (vertices dim, vertices dim)."""
-        return self.scatter_surface(np.einsum("pij,pvw->pviwj", self.penalty, self.mass_of_pieces))
+    def mass_blocks(self) -> Array:
+        """M = -df/dg [kg/s] by pieces, shape (pieces, vertices, dim, vertices, dim)."""
+        return np.einsum("pij,pvw->pviwj", self.penalty, self.mass_of_pieces)
 
-    def scatter(self, on_velocity: Array, on_pressure: Array) -> sparse.csr_matrix:
-        """Blocks (pieces, functions, dim, vertices, dim) and (pieces, functions, vertices, dim) as one matrix."""
+    @cached_property
+    def places(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(local dofs, dofs of the vertices) of the entries of `Blocks`, those of the velocity first."""
+        pieces, functions, dim = self.u.shape
         columns = self._columns()
-        parts = [
-            (self.u[..., None, None], columns[:, None, None], on_velocity),
-            (self.p[..., None, None], columns[:, None], on_pressure),
-        ]
-        return _assemble(parts, (self._unknowns.local, self.dim * self._vertices))
+        shape = (pieces, functions, dim, dim, dim)
+        on_velocity = self.u[:, :, :, None, None], columns[:, None, None]
+        on_pressure = self.p[:, :, None, None], columns[:, None]
+        shapes = shape, (pieces, self.p.shape[1], dim, dim)
+        rows, all_columns = (
+            np.concatenate([np.broadcast_to(part[i], s).ravel() for part, s in zip(parts, shapes, strict=True)])
+            for i, parts in ((0, (on_velocity, on_pressure)), (1, (on_velocity, on_pressure)))
+        )
+        return rows, all_columns
 
-    def scatter_surface(self, block: Array) -> sparse.csr_matrix:
-        """Blocks (pieces, vertices, dim, vertices, dim) as a matrix over the dofs of all vertices."""
-        columns, size = self._columns(), self.dim * self._vertices
-        return _assemble([(columns[..., None, None], columns[:, None, None], block)], (size, size))
+    @cached_property
+    def surface_places(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(rows, columns) of the entries of `mass_blocks` among the dofs of the vertices."""
+        columns, shape = self._columns(), self.mass_blocks.shape
+        return (
+            np.broadcast_to(columns[..., None, None], shape).ravel(),
+            np.broadcast_to(columns[:, None, None], shape).ravel(),
+        )
 
     def _columns(self) -> NDArray[np.int64]:
         return self.dim * self._corners[:, :, None] + np.arange(self.dim)
-
-
-def _assemble(parts, shape: tuple[int, int]) -> sparse.csr_matrix:
-    """Sum of (rows, columns, values), each broadcast to the shape of the values."""
-    rows, columns = (
-        np.concatenate([np.broadcast_to(part[i], part[2].shape).ravel() for part in parts]) for i in (0, 1)
-    )
-    return sparse.csr_matrix((np.concatenate([part[2].ravel() for part in parts]), (rows, columns)), shape=shape)

@@ -41,8 +41,8 @@ def fits(unknowns: Unknowns, pattern: Pattern | None, cut: Cut) -> bool:
     return unknowns.grid.comm.allreduce(pattern is not None and pattern.covers(cut, faces), op=MPI.LAND)
 
 
-def create_matrix(unknowns: Unknowns, pattern: Pattern) -> PETSc.Mat:
-    """An empty matrix with room for a pattern (collective)."""
+def create_matrix(unknowns: Unknowns, pattern: Pattern, *, blocked: bool) -> PETSc.Mat:
+    """An empty matrix with room for a pattern; blocked: by dense blocks of the unknowns of a node (collective)."""
     size = unknowns.block_size
     index_map = unknowns.index_map
     owned, local = int(index_map.size_local), int(index_map.size_local + index_map.num_ghosts)
@@ -53,15 +53,16 @@ def create_matrix(unknowns: Unknowns, pattern: Pattern) -> PETSc.Mat:
     matrix = PETSc.Mat().create(comm)
     matrix.setSizes(((owned * size, rows_global), (owned * size, rows_global)))
     matrix.setBlockSize(size)
-    matrix.setType(PETSc.Mat.Type.AIJ)
+    matrix.setType(PETSc.Mat.Type.BAIJ if blocked else PETSc.Mat.Type.AIJ)
     ghosts = np.asarray(index_map.ghosts)
     start = int(index_map.local_range[0])
     numbers = np.concatenate([np.arange(start, start + owned), ghosts]).astype(PETSc.IntType)
     mapping = PETSc.LGMap().create(numbers, bsize=size, comm=comm)
     matrix.setLGMap(mapping, mapping)
-    room = np.repeat(total[:owned] * size, size)
-    inside = np.minimum(room, owned * size).astype(PETSc.IntType)
-    outside = np.minimum(room, rows_global - owned * size).astype(PETSc.IntType)
+    inside = np.minimum(total[:owned], owned).astype(PETSc.IntType)
+    outside = np.minimum(total[:owned], int(index_map.size_global) - owned).astype(PETSc.IntType)
+    if not blocked:
+        inside, outside = (np.repeat(room * size, size) for room in (inside, outside))
     matrix.setPreallocationNNZ((inside, outside) if comm.size > 1 else inside)
     matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)
     matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)

@@ -13,14 +13,13 @@ it costs no accuracy, and halves the Newton steps.
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
 
 from solvers.api import Array
-from solvers.fluid.interface import Interface
+from solvers.fluid.interface import Blocks, Interface
 
 
-def shape_derivatives(interface: Interface, flow: Array) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:
-    """(dr/dd at local dofs, shape (local, vertices dim); df/dd, shape (vertices dim, vertices dim))."""
+def shape_derivatives(interface: Interface, flow: Array) -> tuple[Blocks, Array]:
+    """(dr/dd, df/dd) by pieces, as `Interface` has them; `flow` at local dofs."""
     at, n, mu, P = interface, interface.n, interface.mu, interface.penalty
     u, p = flow[at.u], flow[at.p]
     area = at.psi.sum(axis=(1, 2))
@@ -41,7 +40,7 @@ def shape_derivatives(interface: Interface, flow: Array) -> tuple[sparse.csr_mat
     load = np.einsum("pbv,pij->pbivj", at.mass_of_pieces, field) + np.einsum(
         "pb,pivj->pbivj", at.psi.sum(axis=1), turned
     )
-    return at.scatter(rows_u, rows_p), at.scatter_surface(load)
+    return (rows_u, rows_p), load
 
 
 def _normal_derivative(x: Array, n: Array) -> Array:

@@ -58,8 +58,9 @@ class FlowSystem:
         unknowns: Unknowns,
         *,
         with_bodies: bool,
+        blocked: bool,
     ):
-        self.with_bodies = with_bodies
+        self.with_bodies, self._blocked = with_bodies, blocked
         self.grid, self.settings, self.boundary, self.unknowns = grid, settings, boundary, unknowns
         domain, space = grid.domain, unknowns.space
         self.flow, self._history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
@@ -87,7 +88,7 @@ class FlowSystem:
         rho, mu = fem.constant(domain, settings.density), fem.constant(domain, settings.viscosity)
         if settings.body_force is None:
             force = ufl.as_vector([fem.constant(domain, 0.0)] * self.grid.dim)
-        self._terms = forms.Flow(
+        self.terms = forms.Flow(
             rho=rho,
             mu=mu,
             alpha=self._alpha,
@@ -100,7 +101,7 @@ class FlowSystem:
             degree=settings.degree,
             mesh=domain.mesh.ufl_domain(),
         )
-        flow = self._terms
+        flow = self.terms
         everywhere = forms.bulk(flow, u, p, v, q) + forms.residual_based(flow, u, p, v, q)
         dx = fem.measure(domain, "dx", 2 * settings.degree + 1)
         dx_cut = fem.measure(domain, "dx", self.weights.degree)
@@ -127,7 +128,7 @@ class FlowSystem:
                 self._tractions.append((number, t, form))
         self._outflow = [number for number, patch in enumerate(patches) if patch.kind == "outflow"]
         if self._outflow:
-            form = forms.outflow(self._terms, u, v) * ds
+            form = forms.outflow(self.terms, u, v) * ds
             self._outflow_form = fem.Integral(domain, form)
             self._outflow_tangent = fem.Integral(domain, ufl.derivative(form, self.flow, trial))
 
@@ -184,7 +185,7 @@ class FlowSystem:
 
     def _fill_pattern(self, pattern: Pattern) -> PETSc.Mat:
         """A matrix that has all entries of a pattern, with values that do not matter."""
-        matrix = create_matrix(self.unknowns, pattern)
+        matrix = create_matrix(self.unknowns, pattern, blocked=self._blocked)
         cells = np.flatnonzero(pattern.cells[: self.grid.owned]).astype(np.int32)
         fem.assemble_matrix(matrix, self._tangents[0].on(cell=cells))
         if self.with_bodies:
@@ -298,6 +299,13 @@ class FlowSystem:
         """Force [N] of the fluid on the vertices of all surfaces, shape (n, dim) (collective)."""
         assert self.cut is not None
         return self.grid.comm.allreduce(self.interface.force(self.flow.x.array, self.cut.motion.v))
+
+    def outer_rows(self) -> Array:
+        """Rows of tractions and outflow alone at local dofs, the ghosts' share still there."""
+        out = np.zeros(self.unknowns.local)
+        for form in self._residual_forms[len(self._residuals) :]:
+            fem.assemble_vector(form, out)
+        return out
 
 
 def _set_velocity(function, nodes, value: Sequence[Value], t: float) -> None:

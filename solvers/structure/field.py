@@ -89,14 +89,17 @@ class Structure:
         self._tangents = [body.create_tangent() for body in bodies]
         self._combined: PETSc.Mat | None = None
         self._b, self._x = self.layout.vector(), self.layout.vector()
-        self._iterative = linear.choose(settings.linear, self.dim, self.dofs()) == "iterative"
+        self._method = linear.choose(settings.linear, self.dim, self.dofs())
         # the tangent of a follower pressure has an unsymmetric boundary term
         self._ksp = self._linear_solver(symmetric=not any(body.settings.pressures for body in self.bodies))
         self._constrained_ksp = None if constraint is None else self._linear_solver(symmetric=False)
 
     def _linear_solver(self, *, symmetric: bool) -> PETSc.KSP:
-        if self._iterative:
-            return linear.elastic_solver(self.comm, tolerance=self.settings.linear_tolerance)
+        tolerance = self.settings.linear_tolerance
+        if self._method == "iterative":
+            return linear.elastic_solver(self.comm, tolerance=tolerance)
+        if self._method == "ilu":
+            return linear.incomplete_solver(self.comm, tolerance=tolerance)
         return linear.direct_solver(self.comm, dim=self.dim, dofs=self.dofs(), symmetric=symmetric)
 
     def dofs(self) -> int:
@@ -242,7 +245,7 @@ class Structure:
         self._x.array[:] = self.missing_displacement()
         rows = (self.layout.start + self.prescribed).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, self._x, self._b)
-        if self._iterative:
+        if self._method == "iterative":
             attach_rigid_modes(matrix, self.bodies, self.now.u)
         try:
             with self.timer("solve"):
