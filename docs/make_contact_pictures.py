@@ -5,7 +5,8 @@ Every folder gives what is in it. The pictures of this documentation come from
     fsci run cases/two_tori -o results/two_tori
     fsci run cases/two_tori -o results/tori_close --set output.fields_every=1 --set time.end=5.6 --set 'verify=[]'
     fsci run cases/sphere_tube -o results/sphere_tube
-    python docs/make_contact_pictures.py results/two_tori results/tori_close results/sphere_tube
+    fsci run cases/double_arch -o results/double_arch
+    python docs/make_contact_pictures.py results/two_tori results/tori_close results/sphere_tube results/double_arch
 
 The second run is for two times 0.05 apart, at which the first one keeps no fields.
 """
@@ -28,7 +29,14 @@ from fsci.render import ROUND, SUPERSAMPLING, View, face_edges, frame, import_py
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "verification_contact.md"
-LIGHT = {"lower": "#f2c9a0", "upper": "#a9c9e8", "sphere": "#f2c9a0", "tube": "#a9c9e8"}
+LIGHT = {
+    "lower": "#f2c9a0",
+    "upper": "#a9c9e8",
+    "sphere": "#f2c9a0",
+    "tube": "#a9c9e8",
+    "ring": "#a9c9e8",
+    "base": "#f2c9a0",
+}
 PAPER_TIMES = (3, 5, 7, 7.5, 8, 10)
 CLOSE_TIMES = (5.5, 5.55)
 PIXELS = 1200  #: width of a picture
@@ -57,6 +65,9 @@ def main(folders: list[Path]) -> None:
         elif "tube" in states:
             draw_tube(states)
             write_table(folder, "sphere_tube")
+        elif "ring" in states:
+            axes = axes_towards(0.0, 0.0, 1.0, up=(0.0, 1.0, 0.0))
+            panel("double_arch", states, (0, 15, 35, 50, 60, 70), columns=3, axes=axes)
 
 
 def draw_tori(folder: Path, states: dict[str, dict[float, Path]]) -> None:

@@ -19,6 +19,7 @@ BENCHMARKS: dict[str, tuple[str, Callable[[], list[Row]]]] = {
     "linear": ("one linear system of a body under load: direct against iterative, by size", linear.run),
     "flag": ("CSM3: milliseconds of one time step, by mesh", flag.run_steps),
     "flag_accuracy": ("CSM3, 2 s: error against wall time, by mesh and time step", flag.run_accuracy),
+    "kernel": ("mortar integrals of a pair of facets, by their types", contact.run_kernel),
     "search": ("contact search on two wavy sheets of quads, 3D", contact.run_search),
     "moments": ("moments of a torus in the cells of a box, 3D", moments.run),
     "hertz": ("a ball pressed onto a plane in one load step, by cells per radius of contact", hertz.run),

@@ -1,15 +1,68 @@
-"""Contact: search, and two tori from beginning to end. The mortar kernel's numbers belong here too."""
+"""Contact: mortar kernel, search, and two tori from beginning to end."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import process_time
+from typing import Any
 
+import numpy as np
+
+from fsci import shapes
 from fsci.bench.program import run_case
 from fsci.bench.table import Row
-from solvers.contact.search import measure_search
+from solvers.contact.search import Search, measure_search
+from solvers.contact.surface import KERNEL_TYPES
+from solvers.kernels import mortar, nodal_normals
+from solvers.mesh_topology import FACET_TYPE, surface_facets
 
 TORI = Path(__file__).parents[2] / "cases" / "two_tori"
+
+#: Cell and order of the slave's body, of the master's
+KERNEL_PAIRS = (
+    (("tet", 1), ("tet", 1)),
+    (("hex", 1), ("tet", 1)),
+    (("hex", 1), ("hex", 1)),
+    (("tet", 2), ("tet", 2)),
+    (("hex", 2), ("hex", 2)),
+)
+
+
+def run_kernel() -> list[Row]:
+    """Microseconds of processor time for a pair of facets that overlap, all integrals of it; best of three."""
+    rows: list[Row] = []
+    for (cell_s, order_s), (cell_m, order_m) in KERNEL_PAIRS:
+        slave = _wavy_side(cell_s, order_s, 12, "top")
+        master = _wavy_side(cell_m, order_m, 13, "bottom")
+        rows.append({"slave": slave[2], "master": master[2], **measure_kernel(slave, master)})
+    return rows
+
+
+def _wavy_side(cell: str, order: int, cells: int, name: str) -> tuple[Any, Any, str]:
+    """Positions, facets and kernel type of the top of a bent plate, or of the bottom of one just above it."""
+    mesh = shapes.box((1, 1, 0.1), (cells, cells, 1), (0, 0, 0 if name == "top" else 0.101), order=order, cell=cell)
+    x, y, z = mesh.points.T
+    bent = np.ascontiguousarray(np.stack([x, y, z + 0.05 * np.sin(3 * x) * np.cos(2 * y)], axis=1))
+    facets = np.ascontiguousarray(surface_facets(mesh, name), dtype=np.int64)
+    return bent, facets, KERNEL_TYPES[FACET_TYPE[mesh.cell_type]]
+
+
+def measure_kernel(slave: tuple[Any, Any, str], master: tuple[Any, Any, str]) -> Row:
+    """Two surfaces, each as (positions, facets, kernel type)."""
+    (xs, fs, type_s), (xm, fm, type_m) = slave, master
+    normals, _ = nodal_normals(xs, fs, type_s)
+    pairs = Search(fs, fm).pairs(xs, xm, 0.01)
+    times, overlapping = {}, 0
+    for name, derivatives in (("with derivatives [us]", True), ("values only [us]", False)):
+        spent = []
+        for _ in range(3):
+            start = process_time()
+            result = mortar(xs, fs, type_s, xm, fm, type_m, normals, pairs, np.ones_like(xs), derivatives=derivatives)
+            spent.append(process_time() - start)
+        overlapping = int(result.used.sum())
+        times[name] = 1e6 * min(spent) / overlapping
+    return {"pairs": overlapping, **times}
 
 
 def run_search() -> list[Row]:

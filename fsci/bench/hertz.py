@@ -120,7 +120,7 @@ def build(mesh: Mesh) -> tuple[Structure, Contact]:
     slave = surface_of_body(MPI.COMM_SELF, layout, [body], "ball", "bottom")
     corners = BLOCK * np.array([[-0.1, -0.1, 0], [1.1, -0.1, 0], [1.1, 1.1, 0], [-0.1, 1.1, 0]])
     contact = Contact(MPI.COMM_SELF, [Pair(slave, Surface("plane", corners, np.array([[0, 1, 2, 3]]), "quad", None))])
-    solver = SolverSettings(Tolerance(residual=1e-10), linear="direct")
+    solver = SolverSettings(Tolerance(residual=1e-10), linear="ilu")
     return Structure(MPI.COMM_SELF, [body], Statics(), solver, Timer(), contact), contact
 
 

@@ -21,8 +21,9 @@ class Newton(Section):
 class Linear(Section):
     """How linear systems are solved."""
 
-    method: Literal["auto", "direct", "iterative"] = setting(
-        "auto", "auto takes direct in 2D and for small systems, else iterative"
+    method: Literal["auto", "direct", "iterative", "ilu"] = setting(
+        "auto",
+        "auto takes direct in 2D and for small systems, else iterative; ilu: incomplete factors, for solids in motion",
     )
     tolerance: Positive = setting(1e-8, "residual of iterative solvers, relative to the first", unit="1")
 

@@ -1,0 +1,81 @@
+"""Contact with linear systems solved by incomplete factors: the results of the direct solver, on 1 and 2 processes."""
+
+import numpy as np
+import pytest
+from contact_setup import make_body, make_contact, solve_step
+from programs import fsci
+from structure_setup import constant
+
+from fsci import shapes
+from fsci.history import read_history
+from solvers.newton import Tolerance
+from solvers.structure.body import Support
+from solvers.structure.field import SolverSettings
+from solvers.structure.materials import NeoHooke, lame
+
+ZERO = constant(0.0)
+
+
+def pressed_blocks(method):
+    """A block pressed into a larger one in one step: (structure, contact, info)."""
+    settings = SolverSettings(Tolerance(residual=1e-10), linear=method)
+    material = NeoHooke(*lame(1000.0, 0.3))
+    lower = make_body("lower", shapes.box((2, 2, 1), (8, 8, 4)), material, supports=[Support("bottom", (ZERO,) * 3)])
+    down = (ZERO, ZERO, constant(-0.08))
+    upper = shapes.box((1, 1, 1), (5, 5, 5), (0.5, 0.5, 1.0))
+    upper_body = make_body("upper", upper, material, supports=[Support("top", down)])
+    structure, contact = make_contact([lower, upper_body], [(("upper", "bottom"), ("lower", "top"))], settings=settings)
+    return structure, contact, solve_step(structure)
+
+
+def test_static_contact():
+    direct, ilu = (pressed_blocks(method) for method in ("direct", "ilu"))
+    assert direct[2].iterations == ilu[2].iterations
+    size = np.abs(direct[0].now.u).max()
+    assert np.abs(ilu[0].now.u - direct[0].now.u).max() < 1e-6 * size
+    force = direct[1].resultant(0)
+    assert np.abs(ilu[1].resultant(0) - force).max() < 1e-6 * np.abs(force).max()
+    used = ilu[0]._constrained_ksp
+    assert used.getPC().getType() == "asm"
+    assert 0 < used.getIterationNumber() < 100
+
+
+COLLISION = """
+time: {step: 0.01, end: 0.15}
+structure:
+  dynamics: {rho_inf: 1.0}
+  bodies:
+    left:
+      mesh: {shape: box, size: [1, 1, 1], cells: [4, 4, 4]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3, density: 1}
+      initial_velocity: [1, 0.2, 0]
+    right:
+      mesh: {shape: box, size: [1, 1, 1], cells: [3, 3, 3], translate: [1.05, 0.1, 0.1]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3, density: 1}
+contact:
+  pairs:
+    face: {slave: {body: left, on: right}, master: {body: right, on: left}}
+probes:
+  momentum: {quantity: momentum}
+  right: {body: right, quantity: centre}
+"""
+
+
+def test_impact_on_two_processes(tmp_path):
+    (tmp_path / "case.yaml").write_text(COLLISION)
+    found = []
+    for method, processes in (("direct", 1), ("ilu", 1), ("ilu", 2)):
+        out = tmp_path / f"{method}{processes}"
+        change = [f"solver.linear.method={method}", "solver.linear.tolerance=1e-12", "output.fields_every=0"]
+        run = fsci("run", tmp_path, "-o", out, *(w for c in change for w in ("--set", c)), processes=processes)
+        assert run.returncode == 0, run.stdout + run.stderr
+        found.append(read_history(out / "history.csv"))
+    direct, *others = found
+    assert direct["contact.active"].max() > 4
+    for ilu in others:
+        assert (ilu["iterations"] == direct["iterations"]).all()
+        for column in ("right.x", "right.y", "right.z"):
+            assert ilu[column] == pytest.approx(direct[column], rel=1e-8), column
+        for axis in "xyz":
+            change = np.abs(ilu[f"momentum.{axis}"] - ilu[f"momentum.{axis}"][0]).max()
+            assert change < 1e-9 * np.abs(direct["momentum.x"][0])
