@@ -1,4 +1,4 @@
-"""Balances of the interface: action against reaction, and the power that crosses it."""
+"""Balances of the interface: action against reaction, momentum that crosses it, and power."""
 
 from __future__ import annotations
 
@@ -7,16 +7,32 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solvers.api import Array, State
+from solvers.fluid.balances import Balances
+from solvers.fluid.field import Fluid
 
 if TYPE_CHECKING:
     from coupling.coupled import Coupled
 
 
+#: columns of the history -> attributes
+COLUMNS = {
+    "interface.force": "force",
+    "interface.momentum": "momentum",
+    "interface.power": "power",
+    "interface.work": "work",
+    "fluid.loss": "loss",
+}
+
+
 class Balance:
     """What the last step left over."""
 
-    def __init__(self) -> None:
+    def __init__(self, fluid: Fluid) -> None:
+        self._of_fluid = Balances(fluid)
         self.force = 0.0  #: |force on the structure - reaction of the fluid| / |reaction|, 1
+        self.momentum = 0.0  #: |force on all bodies - what it is by the momentum of the fluid| [N]
+        self.power = 0.0  #: of the fluid on the structure [W]
+        self.loss = 0.0  #: power that the method takes from the fluid [W]
         self.work = 0.0  #: work that fluid and structure count differently in all steps [J]
 
     def add_step(self, coupled: Coupled, carried: Array) -> None:
@@ -24,16 +40,21 @@ class Balance:
         interface, reaction = coupled.interface, coupled.force()
         size = float(np.abs(reaction).sum())
         self.force = float(np.abs(carried - reaction).sum()) / size if size > 0.0 else 0.0
+        total = sum(force.sum(axis=0) for force in coupled.fluid.force().values())
+        missed = total + (carried - reaction).sum(axis=0) - self._of_fluid.force_on_bodies()
+        self.momentum = float(np.linalg.norm(missed))
         structure_moves = interface.displacement() - interface.old
-        dt = coupled.fluid.dt
-        fluid_moves = dt * interface.velocity(interface.now)
-        self.work += float((carried * structure_moves).sum() - (reaction * fluid_moves).sum())
+        self.power = float((reaction * interface.velocity(interface.now)).sum())
+        self.loss = self._of_fluid.lost_power()
+        self.work += float((carried * structure_moves).sum()) - coupled.fluid.dt * self.power
 
     def numbers(self) -> dict[str, float]:
-        return {"interface.force": self.force, "interface.work": self.work}
+        """Columns of the history."""
+        return {column: getattr(self, name) for column, name in COLUMNS.items()}
 
     def save(self) -> State:
-        return {"force": self.force, "work": self.work}
+        return {name: getattr(self, name) for name in COLUMNS.values()}
 
     def restore(self, state: State) -> None:
-        self.force, self.work = state["force"], state["work"]
+        for name in COLUMNS.values():
+            setattr(self, name, state[name])

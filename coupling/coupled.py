@@ -18,7 +18,10 @@ class Coupled:
     fluid: Fluid
     structure: Structure
     interface: Interface
-    balance: Balance = field(default_factory=Balance)
+    balance: Balance = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.balance = Balance(self.fluid)
 
     def initialise(self, t: float, dt: float) -> None:
         """Both fields at the first time, the fluid around the structure as it starts."""

@@ -24,15 +24,35 @@ class Wetted:
     dofs: NDArray[np.int64]  #: their global dofs in the structure, shape (n, dim)
 
 
+@dataclass(frozen=True)
+class DrySide:
+    """The line that closes the solid behind a wetted surface with two ends, 2D.
+
+    It goes from the end of the surface along corners that stay in their place to its start.
+    """
+
+    name: str  #: of its surface in the fluid
+    behind: str  #: name of the wetted surface
+    ends: tuple[int, int]  #: vertices of that at its end and at its start
+    corners: Array  #: positions [m], shape (n, dim)
+
+    def motion(self, wetted: Motion) -> Motion:
+        """That of its vertices: those of the wetted surface's ends first and last."""
+        end, start = self.ends
+        x = np.concatenate([wetted.x[[end]], self.corners, wetted.x[[start]]])
+        v = np.concatenate([wetted.v[[end]], np.zeros_like(self.corners), wetted.v[[start]]])
+        return Motion(x, v)
+
+
 class Interface:
-    """All wetted surfaces, vertices of one after those of the other.
+    """All wetted surfaces, vertices of one after those of the other; `dry_sides` close those with two ends.
 
     The velocity that the fluid sees follows from the displacements by the fluid's own time rule,
     g = alpha d_{n+1} - beta_0 d_n - beta_1 d_{n-1}, so that fluid and surface sweep the same volume.
     """
 
-    def __init__(self, structure: Structure, surfaces: Sequence[Wetted]):
-        self.structure, self.surfaces = structure, list(surfaces)
+    def __init__(self, structure: Structure, surfaces: Sequence[Wetted], dry_sides: Sequence[DrySide] = ()):
+        self.structure, self.surfaces, self.dry_sides = structure, list(surfaces), list(dry_sides)
         self.dofs = np.concatenate([surface.dofs for surface in surfaces])
         self.points = np.concatenate([surface.points for surface in surfaces])
         self.now, self.old, self.older = (np.zeros_like(self.points) for _ in range(3))
@@ -59,7 +79,8 @@ class Interface:
     def move(self, d: Array) -> dict[str, Motion]:
         """Take displacements d [m] and say how each surface moves."""
         self.now = d.copy()
-        return self._by_surface(self.points + d, self.velocity(d))
+        motions = self._by_surface(self.points + d, self.velocity(d))
+        return motions | {side.name: side.motion(motions[side.behind]) for side in self.dry_sides}
 
     def _by_surface(self, x: Array, v: Array) -> dict[str, Motion]:
         ends = np.cumsum([len(surface.points) for surface in self.surfaces])[:-1]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from mpi4py import MPI
@@ -89,7 +90,8 @@ def _contact(case: Case, comm: MPI.Comm, bodies: list[Body]) -> Contact | None:
 
 def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci import build_fluid, build_structure
-    from fsci.build_coupling import build_coupled
+    from fsci.build_coupling import build_coupled, start
+    from fsci.dry_side import outlines
     from solvers.fluid.probes import mass_balance
     from solvers.fluid.snapshot import snapshots as of_fluid
     from solvers.structure.snapshot import snapshots as of_structure
@@ -101,10 +103,15 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     fluid = coupled.fluid
     mass = mass_balance(fluid)
     probes = [build_structure.build_probes(case, structure), build_fluid.build_probes(case, fluid)]
+
+    def snapshots() -> list[Snapshot]:
+        contact_fields = None if contact is None else contact.fields()
+        return of_structure(structure, contact_fields) + of_fluid(fluid) + outlines(coupled)
+
     return Simulation(
         scheme=scheme,
-        initialise=coupled.initialise,
-        snapshots=lambda: of_structure(structure, None if contact is None else contact.fields()) + of_fluid(fluid),
+        initialise=partial(start, case, coupled),
+        snapshots=snapshots,
         probes=lambda: {column: value for measure in probes for column, value in measure().items()},
         balances=lambda: {"structure.energy": structure.energy.error, **mass(), **coupled.balance.numbers()},
         dofs={"fluid": fluid.dofs(), "structure": structure.dofs()},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -11,13 +12,15 @@ from numpy.typing import NDArray
 
 from coupling.accelerate import Accelerator, Aitken, QuasiNewton, Relaxation
 from coupling.coupled import Coupled
-from coupling.interface import Interface, Wetted
+from coupling.interface import DrySide, Interface, Wetted
 from coupling.monolithic import Monolithic
 from coupling.partitioned import Partitioned, Tolerance
 from fsci.build_contact import global_dofs
 from fsci.build_fluid import build_fluid, build_rigid_bodies
 from fsci.build_solver import build_tolerance
 from fsci.case import Case
+from fsci.case.coupling_checks import closed_in
+from fsci.dry_side import DrySideError, close, find_ends
 from fsci.mesh import MeshError, require_surface
 from solvers.api import Scheme
 from solvers.blocks import Layout
@@ -41,6 +44,7 @@ class Skin:
     facets: NDArray[np.int64]
     nodes: NDArray[np.int64]  #: numbers in the mesh
     wet: NDArray[np.bool_] | None  #: facets that the case names; None: it names none
+    corners: Array | None  #: of the line that closes the solid behind a wetted surface [m]; None: it is closed
 
 
 def build_coupled(
@@ -60,13 +64,23 @@ def build_coupled(
     wet = _touched(case, at_start)
     bathers = [replace(body, surface=surface) for body, surface in zip(rigid, wet, strict=False)]
     bathers += [Bather(surface, None) for surface in wet[len(rigid) :]]
+    dry_sides = [_dry_side(skin, skin.corners) for skin in skins if skin.corners is not None]
+    bathers += [Bather(_dry_line(side), None) for side in dry_sides]
     fluid = build_fluid(case, comm, timer, bathers)
-    coupled = Coupled(fluid, structure, Interface(structure, wetted))
+    coupled = Coupled(fluid, structure, Interface(structure, wetted, dry_sides))
     if case.coupling.scheme == "monolithic":
         return Monolithic(coupled, build_tolerance(case)), coupled
     settings = case.coupling
     tolerance = Tolerance(settings.tolerance, settings.tolerance_absolute, settings.max_iterations)
     return Partitioned(coupled, _accelerator(case), tolerance), coupled
+
+
+def start(case: Case, coupled: Coupled, t: float, dt: float) -> None:
+    """Both fields at the first time. Raises CaseError (collective)."""
+    coupled.initialise(t, dt)
+    if coupled.fluid.level_unknown:
+        where, why = closed_in(case)
+        raise case.error(where, f"bodies close in a part of the fluid, and {why}")
 
 
 def _touched(case: Case, surfaces: Sequence[tuple[Surface, Array]]) -> list[Surface]:
@@ -95,33 +109,54 @@ def _touched(case: Case, surfaces: Sequence[tuple[Surface, Array]]) -> list[Surf
 
 
 def _skin(case: Case, comm: MPI.Comm, body: Body) -> Skin:
-    found = None
+    found: Any = None
     if comm.rank == 0:
         try:
             found = _cut_out(case, body)
         except MeshError as error:
             found = case.error(("coupling", "wetted", body.name), str(error))
+        except DrySideError as error:
+            found = case.error(("coupling", "dry_side", body.name), str(error))
     found = comm.bcast(found, root=0)
     if isinstance(found, Exception):
         raise found
-    return Skin(body.name, *found)
+    return found
 
 
-def _cut_out(case: Case, body: Body):
-    """(points, facets, node numbers, wet facets) on rank 0. Raises MeshError."""
+def _cut_out(case: Case, body: Body) -> Skin:
+    """On rank 0. Raises MeshError and DrySideError."""
     mesh = body.domain.source
     assert mesh is not None
     assert case.coupling is not None
-    facets, nodes = tessellate(mesh)
     names = case.coupling.wetted.get(body.name)
+    for name in names or ():
+        require_surface(mesh, name)
+    if body.name in case.coupling.dry_side:
+        assert case.fluid is not None
+        facets, nodes = tessellate(mesh, names)
+        given, box = case.coupling.dry_side[body.name], (case.fluid.grid.start, case.fluid.grid.to)
+        middles = mesh.points[mesh.cells].mean(axis=1)
+        low, high = (np.array(corner) for corner in box)
+        corners = close(mesh.points[nodes], facets, middles, np.array(given), (low, high))
+        return Skin(body.name, mesh.points[nodes], facets, nodes, np.ones(len(facets), dtype=bool), corners)
+    facets, nodes = tessellate(mesh)
     wet = None
     if names is not None:
-        for name in names:
-            require_surface(mesh, name)
         some, some_nodes = tessellate(mesh, names)
         chosen = {tuple(facet) for facet in np.sort(some_nodes[some], axis=1).tolist()}
         wet = np.array([tuple(facet) in chosen for facet in np.sort(nodes[facets], axis=1).tolist()])
-    return mesh.points[nodes], facets, nodes, wet
+    return Skin(body.name, mesh.points[nodes], facets, nodes, wet, None)
+
+
+def _dry_side(skin: Skin, corners: Array) -> DrySide:
+    return DrySide(f"{skin.name}.dry_side", skin.name, find_ends(skin.facets), corners)
+
+
+def _dry_line(side: DrySide) -> Surface:
+    """Its segments, which fluid never touches."""
+    vertices = np.arange(len(side.corners) + 2)
+    segments = np.stack([vertices[:-1], vertices[1:]], axis=1)
+    return Surface(side.name, segments, len(vertices), np.zeros(len(segments), dtype=bool))
 
 
 def _accelerator(case: Case) -> Accelerator:

@@ -116,8 +116,10 @@ def test_all_schemes_agree(whole, monolithic):
 
 def test_balances_are_in_the_history(whole):
     _, _, history = whole
-    assert {"interface.force", "interface.work", "structure.energy", "fluid.mass"} <= history.keys()
+    columns = {"interface.force", "interface.momentum", "interface.work", "structure.energy", "fluid.mass"}
+    assert columns <= history.keys()
     assert history["interface.force"].max() < 1e-12
+    assert history["interface.momentum"].max() < 1e-9 * np.abs(history["force.x"]).max()
     assert np.abs(history["fluid.mass"]).max() < 1e-9
 
 
@@ -190,7 +192,8 @@ def test_two_processes(text, scheme, tmp_path):
     two = read_history(tmp_path / "two" / "history.csv")
     if "contact.active" in one:
         assert one["contact.active"].max() > 0
-    solving = {"residual", "iterations", "coupling.newton", "coupling.linear", "interface.force", "fluid.mass"}
+    solving = {"residual", "iterations", "coupling.newton", "coupling.linear"}
+    solving |= {"interface.force", "interface.momentum", "fluid.mass"}
     for name in one.keys() - solving - {"wall"}:
         size = max(np.abs(one[other]).max() for other in one if other.partition(".")[0] == name.partition(".")[0])
         assert np.abs(one[name] - two[name]).max() <= 1e-8 * size + 1e-12, name

@@ -7,6 +7,9 @@ import pytest
 from coupled_case import POST
 from test_coupled_run import BLOCK, run
 
+from fsci.case import load_case
+from fsci.run import FINISHED, run_case
+
 SHORT = ("time.end", "0.1"), ("verify", "[]")
 
 
@@ -69,3 +72,10 @@ def test_both_schemes_over_50_steps(text, tmp_path):
     moved = np.abs(one["tip.x"]).max()
     assert np.abs(one["tip.x"] - two["tip.x"]).max() < 1e-5 * moved
     assert two["iterations"].mean() <= 8
+
+
+@pytest.mark.slow
+def test_ring_in_a_fluid_ten_times_as_heavy(tmp_path):
+    """omega within 2 % of 1.804513 rad/s, from 2.555042 dry: cases/ring_added_mass with 140 kg/m^3."""
+    heavy = ("fluid.density", "140"), ("time.end", "7.5"), ("verify.0.reference", "1.804513/(2*pi)")
+    assert run_case(load_case("cases/ring_added_mass", heavy), tmp_path) == FINISHED

@@ -63,4 +63,18 @@ def test_force_is_smooth_while_cells_come_and_go():
 
 @pytest.mark.slow
 def test_noise_of_the_second_order_scheme():
-    assert noise(*oscillate("bdf2", 50, 2, 10)) < 0.01
+    """BDF2: below 1 % of the amplitude too; halving the step does not double it (Lehrenfeld, Olshanskii 2019)."""
+    coarse, fine = (noise(*oscillate("bdf2", steps, 2, 10)) for steps in (50, 100))
+    assert fine < 0.01
+    assert fine < 1.5 * coarse
+
+
+@pytest.mark.slow
+def test_drag_of_the_oscillating_cylinder():
+    """Duetsch et al.: c_d 2.09, c_i 1.45, and the largest coefficient of drag 3.30, after two periods."""
+    t, force = oscillate("bdf2", 50, 2, 20)
+    drag, inertia = morison(t, force)
+    largest = 2.0 * np.abs(force[t > t[-1] - 1.0 / FREQUENCY, 0]).max()
+    assert drag == pytest.approx(2.09, rel=0.03)
+    assert inertia == pytest.approx(1.45, rel=0.03)
+    assert largest == pytest.approx(3.30, rel=0.03)

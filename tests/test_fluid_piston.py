@@ -22,7 +22,7 @@ def velocity(number, dt):
 
 def acceleration(scheme, number, dt):
     v = [velocity(n, dt) for n in (number, number - 1, number - 2)]
-    if scheme == "backward_euler" or number == 1:
+    if scheme == "backward_euler" or number <= 2:
         return (v[0] - v[1]) / dt
     return (1.5 * v[0] - 2.0 * v[1] + 0.5 * v[2]) / dt
 

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from fluid_setup import body, circle, errors, field, loop, make_fluid, step, symbolic, wall
+from fluid_setup import body, circle, errors, field, loop, make_fluid, nodal_errors, step, symbolic, wall
 
 from solvers.fluid.grid import uniform
+from solvers.fluid.patches import Patch
 
 RHO, MU, END = 1.3, 0.05, 0.8
 
@@ -43,3 +44,19 @@ def test_order_in_time(element, scheme, order):
     rates = np.log2(found[:-1] / found[1:])
     assert rates[-1, 0] > order - 0.15, (found, rates)
     assert rates[-1, 1] > order - 0.15, (found, rates)
+
+
+@pytest.mark.parametrize("scheme", ["backward_euler", "bdf2"])
+def test_flow_that_starts_at_once(scheme):
+    """All of the water moves from the first step on: one blow p = rho (L - x) v / dt, and no pressure afterwards."""
+    v, dt, rho = 0.7, 0.1, RHO
+    patches = [
+        Patch("in", ("x-",), "velocity", field(v, 0)), Patch("sides", ("y-", "y+"), "slip"),
+        Patch("out", ("x+",), "traction", field(0, 0)),
+    ]  # fmt: skip
+    fluid = make_fluid(uniform([0, 0], [1, 1], [4, 3]), patches, rho=rho, mu=MU, scheme=scheme, dt=dt)
+    for number in range(5):
+        step(fluid, number * dt, dt)
+        blow = rho * v / dt if number == 0 else 0.0
+        u, p = nodal_errors(fluid, field(v, 0), lambda x, t, blow=blow: blow * (1.0 - x[0]), 0.0)
+        assert max(u, p) < 1e-10

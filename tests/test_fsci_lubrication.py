@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from programs import fsci
 
-from tests.lubrication import cylinder_drag, drag_ratio, sphere_drag
+from fsci.history import read_history
+from tests.lubrication import cylinder_drag, drag_ratio, settling_ratio, sphere_drag
 
 H = 0.05
 
@@ -23,8 +26,8 @@ def test_cylinder_second_order(gap):
 
 def test_cylinder_second_order_below_a_cell():
     """10 % are passed between 0.4 and 0.2 cells: the wall is felt less and less."""
-    assert drag_ratio(2, 0.02, H, "q2q1") == pytest.approx(0.919, abs=0.02)
-    assert drag_ratio(2, 0.01, H, "q2q1") == pytest.approx(0.635, abs=0.03)
+    assert drag_ratio(2, 0.02, H, "q2q1") == pytest.approx(0.915, abs=0.02)
+    assert drag_ratio(2, 0.01, H, "q2q1") == pytest.approx(0.644, abs=0.03)
 
 
 @pytest.mark.parametrize(("gap", "ratio"), [(0.5, 1.003), (0.2, 1.023), (0.1, 1.078), (0.05, 1.372), (0.01, 0.643)])
@@ -38,3 +41,59 @@ def test_cylinder_first_order(gap, ratio):
 def test_sphere_first_order(gap, ratio):
     """As in 2D: 10 % are passed at 1.7 cells."""
     assert drag_ratio(3, gap, 0.1, "q1q1", growth=1.2, fine=0.6, size=10.0) == pytest.approx(ratio, abs=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gap", [0.2, 0.1])
+def test_sphere_second_order(gap):
+    """Within 2 % with two cells in the gap, and with one."""
+    ratio = drag_ratio(3, gap, 0.1, "q2q1", growth=1.45, fine=0.6, size=5.0)
+    assert ratio == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("element", "ratio", "bar"), [("q2q1", 1.0, 0.02), ("q1q1", 1.048, 0.01)])
+def test_settling_time(element, ratio, bar):
+    """From a gap of 5 cells to one of 2, by the drag between: within 2 %; first order is known to be too slow."""
+    assert settling_ratio(0.5, 0.2, 0.1, element) == pytest.approx(ratio, abs=bar)
+
+
+SETTLING = """\
+title: A cylinder without inertia settles on a wall in creeping flow
+time: {step: 0.1, end: 3}
+fluid:
+  density: 1e-3
+  viscosity: 1
+  flow: stokes
+  element: q2q1
+  grid:
+    from: [-8, 0]
+    to: [8, 8]
+    x: [{to: -1, cells: 14, ratio: 0.1}, {to: 1, cells: 20}, {to: 8, cells: 14, ratio: 10}]
+    y: [{to: 0.9, cells: 9}, {to: 8, cells: 15, ratio: 10}]
+  patches:
+    far: {on: [x-, x+, y+], traction: [0, 0]}
+    wall: {on: y-, no_slip: true}
+structure:
+  dynamics: {rho_inf: 0}
+  bodies:
+    cylinder:
+      mesh: {shape: disc, radius: 1, cells: [128, 2], translate: [0, 1.6]}
+      material: {law: neo_hooke, E: 1e5, nu: 0.3, density: 1e-3}
+      body_force: [0, -4]
+coupling: {scheme: monolithic}
+probes:
+  cylinder: {field: structure, body: cylinder, quantity: centre}
+output: {fields_every: 0}
+"""
+
+
+@pytest.mark.slow
+def test_settling_of_an_elastic_cylinder(tmp_path):
+    """The same by a coupled run: the force 4 pi moves it from gap 0.5 to 0.2 in 2.3303295 s, within 2 %."""
+    (tmp_path / "case.yaml").write_text(SETTLING)
+    run = fsci("run", tmp_path / "case.yaml", "-o", tmp_path / "out", timeout=400)
+    assert run.returncode == 0, run.stdout[-2000:]
+    history = read_history(tmp_path / "out" / "history.csv")
+    gap = history["cylinder.y"] - 1.0
+    start, end = np.interp([-np.log(0.5), -np.log(0.2)], -np.log(gap), history["time"])
+    assert end - start == pytest.approx(2.3303295, rel=0.02)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Count, CountOrZero, Name, NotNegative, Positive, Surfaces
+from fsci.case.values import Count, CountOrZero, Entries, Name, NotNegative, NumberVector, Positive, Surfaces
 
 PARTITIONED = ("accelerator", "relaxation", "reuse", "tolerance", "tolerance_absolute", "max_iterations")
 
@@ -22,6 +22,12 @@ class Coupling(Section):
         dict,
         "surfaces that the fluid touches, by body; default: all but what lies in other bodies or on the boundary of "
         "the box at the start",
+    )
+    dry_side: dict[Name, Annotated[tuple[NumberVector, ...], Entries(1, None)]] = setting(
+        dict,
+        "2D: corners of a way around the box, from one end of the wetted surface of a body to its other end; between "
+        "both there is no fluid, wherever the surface moves: for walls and membranes with fluid on one side",
+        unit="m",
     )
     accelerator: Literal["iqn", "aitken", "constant"] = setting(
         "iqn", "partitioned: interface quasi-Newton, Aitken's relaxation, or a constant one"

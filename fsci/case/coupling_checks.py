@@ -8,6 +8,7 @@ from fsci.case.case import Case
 from fsci.case.coupling import Coupling
 from fsci.case.errors import did_you_mean
 from fsci.case.mesh_checks import Mistake, surface_mistakes
+from fsci.case.yaml_text import Keys
 
 
 def coupling_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
@@ -22,6 +23,7 @@ def coupling_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
             continue
         for i, surface in enumerate(surfaces):
             yield from surface_mistakes(bodies[name].mesh, surface, ("coupling", "wetted", name, i))
+    yield from _dry_side_mistakes(case, coupling)
     if case.fluid is None or case.structure is None:
         return
     for name in case.fluid.bodies:
@@ -32,3 +34,31 @@ def coupling_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
         yield ("fluid", "scheme"), "a steady flow goes with a static structure: remove 'dynamics', or choose bdf2"
     if static and not steady:
         yield ("fluid", "scheme"), "a flow in time needs 'dynamics' in 'structure', or choose the scheme steady"
+    kinds = {patch.kind for patch in case.fluid.patches.values()}
+    if (steady or coupling.scheme == "partitioned") and not kinds & {"traction", "outflow"}:
+        where, why = closed_in(case)
+        yield where, f"the boundary closes the fluid in, and {why}, or a patch with 'traction' or 'outflow'"
+
+
+def closed_in(case: Case) -> Mistake:
+    """Why a steady or partitioned solution has no level of the pressure in fluid that walls and bodies close in."""
+    assert case.fluid is not None
+    if case.fluid.scheme == "steady":
+        return ("fluid", "scheme"), "a steady flow does not know how much there is of it: take 'bdf2'"
+    reason = "iterations by turns cannot find the level of its pressure: take 'monolithic'"
+    return ("coupling", "scheme"), reason
+
+
+def _dry_side_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
+    bodies = case.elastic_bodies
+    for name, corners in coupling.dry_side.items():
+        keys: Keys = ("coupling", "dry_side", name)
+        if name not in bodies:
+            yield keys, f"unknown body '{name}'{did_you_mean(name, bodies)}"
+        elif case.dimension == 3:
+            yield keys, "'dry_side' is for 2D; in 3D a body is wet all round, or where 'wetted' says so"
+        elif name not in coupling.wetted:
+            yield keys, f"say which surface is wet: 'wetted: {{{name}: [..]}}'"
+        for i, corner in enumerate(corners):
+            if len(corner) != 2 and case.dimension == 2:
+                yield (*keys, i), f"a corner has 2 entries in 2D, not {len(corner)}"

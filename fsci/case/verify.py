@@ -16,7 +16,7 @@ RUN_COLUMNS = ("iterations", "residual")
 FIELD_COLUMNS = {"structure": "structure.energy", "fluid": "fluid.mass"}
 
 #: those of the interface between both
-COUPLING_COLUMNS = ("interface.force", "interface.work")
+COUPLING_COLUMNS = ("interface.force", "interface.momentum", "interface.power", "interface.work", "fluid.loss")
 
 #: and those of a run with contact, besides the resultants contact.PAIR.x, .y, .z on the slave
 CONTACT_COLUMNS = ("contact.active", "contact.changes")

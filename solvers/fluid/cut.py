@@ -11,26 +11,13 @@ from scipy import ndimage
 from solvers import kernels
 from solvers.api import Array
 from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.pieces import FLUSH, Pieces, put_where_fluid_is
 from solvers.fluid.surface import Motion, normals
 
 #: Share of a cell (of its face) below which fluid (surface) in it is rounding error of the geometry.
 NOTHING = 1e-10
 
-#: Distance from the box's boundary, in cells, up to which a facet lies on it: no fluid gets between.
-FLUSH = 1e-6
-
 Cells = NDArray[np.int32]
-
-
-@dataclass(frozen=True)
-class Pieces:
-    """The surface by pieces, each in one cut cell that this process owns or knows; sorted by cell."""
-
-    cell: NDArray[np.int64]  #: index into the cut cells
-    facet: NDArray[np.int64]
-    moments: Array  #: int L_q lambda_v ds [m^(dim-1)], shape (pieces, points, dim)
-    mass: Array  #: int lambda_v lambda_w ds, shape (pieces, dim, dim)
-    normal: Array  #: unit normal out of the fluid, shape (pieces, dim)
 
 
 @dataclass(frozen=True)
@@ -41,6 +28,7 @@ class Cut:
     cut: Cells  #: cells with a piece of surface, or partly solid
     strip: Cells  #: solid cells that the flow is extended to
     ghost_faces: NDArray[np.int32]  #: faces between active cells, one of them cut or of the strip
+    shut: Cells  #: solid cells where surfaces touch each other or the box's boundary
     reach: NDArray[np.bool_]  #: local cells that the surfaces may soon cut or uncover
     fluid: Array  #: int_fluid L_q dx / (w_q |K|) on cut cells, shape (cut, points)
     fraction: Array  #: share of fluid in each local cell
@@ -82,31 +70,41 @@ class Cutter:
         grid, box = self.grid, self.grid.grid
         if not len(facets):
             return self._whole(facets, motion)
-        wanted = _grow(self._own, layers + 1)
+        wanted = _grow(self._own, layers + 2)
         moments = kernels.moments(box.edges, self.points, motion.x, facets, wanted.ravel(order="F"))
         normal = -normals(motion.x, facets)
-        counts = self._off_boundary(motion.x[facets])
-        if wet is not None:
-            counts &= wet
-        touched = counts[moments.piece_facet]
-        is_cut, in_use = self._cut_cells(moments, touched)
-        # pieces in a cell without fluid still bound the cell next to it, unless solids overlap there
-        solid = (moments.fraction >= 1.0 - NOTHING) & ~(is_cut & (moments.fraction <= 1.0 + NOTHING))
-        is_cut &= ~solid
+        off = self._off_boundary(motion.x[facets])
+        counts = off if wet is None else off & wet
+        overlap = moments.fraction > 1.0 + NOTHING
+        piece_normal = normal[moments.piece_facet]
+        cells, piece_moments = put_where_fluid_is(box, self.points, moments, piece_normal, overlap)
+        touched = counts[moments.piece_facet] & (cells >= 0)
+        is_cut, in_use = self._cut_cells(moments, cells, touched)
+        solid = (moments.fraction >= 1.0 - NOTHING) & ~is_cut  # surfaces that touch keep their cells: they may part
         near = _grow(box.as_box(is_cut), layers).ravel(order="F") if layers else is_cut
         strip = solid & (near | self._special)
         self._special |= is_cut | strip
+        shut = solid & (self._facing(moments, counts, normal) | self._covered(motion.x[facets[~off]]))
         local_cut, local_strip = is_cut[grid.numbers], strip[grid.numbers]
         active = ~solid[grid.numbers] | local_strip
         faces, sides = grid.interior_faces
         special = self._special[grid.numbers][sides].any(axis=1) & active[sides].all(axis=1)
         cut = np.flatnonzero(local_cut).astype(np.int32)
-        fluid, pieces = self._on_local_cells(moments, in_use, touched, cut, normal)
+        fluid = self._fluid_weights(moments, cut)
+        row_of = np.full(box.size, -1, dtype=np.int64)
+        row_of[grid.numbers[cut]] = np.arange(len(cut))
+        rows = np.where(touched, row_of[cells], -1)
+        mine = np.flatnonzero((rows >= 0) & in_use[cells])
+        mine = mine[np.argsort(rows[mine], kind="stable")]
+        pieces = Pieces(
+            rows[mine], moments.piece_facet[mine], piece_moments[mine], moments.piece_mass[mine], piece_normal[mine]
+        )
         return Cut(
             uncut=np.flatnonzero(active & ~local_cut & ~local_strip).astype(np.int32),
             cut=cut,
             strip=np.flatnonzero(local_strip).astype(np.int32),
             ghost_faces=faces[special],
+            shut=np.flatnonzero(shut[grid.numbers]).astype(np.int32),
             reach=self._reach(box.as_box(self._special), layers),
             fluid=fluid,
             fraction=1.0 - moments.fraction[grid.numbers],
@@ -135,6 +133,7 @@ class Cutter:
             none,
             none,
             none,
+            none,
             np.zeros(len(everything), dtype=bool),
             np.empty((0, points)),
             np.ones(len(everything)),
@@ -147,34 +146,41 @@ class Cutter:
         """One layer more than the strip has, none around bodies at rest."""
         return _grow(special, 1 if layers else 0).ravel(order="F")[self.grid.numbers]
 
-    def _cut_cells(self, moments, touched) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """(cut or not for each box cell, kept or not for each cell of `moments`): slivers of surface do not cut."""
+    def _cut_cells(self, moments, cells, touched) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Box cells that are cut, and those whose pieces of surface are more than slivers."""
         sizes = self.grid.grid.cell_sizes()
-        is_cut = (moments.fraction > NOTHING) & (moments.fraction < 1.0 - NOTHING)
-        area = np.bincount(
-            moments.piece_cell, weights=touched * moments.piece_mass.sum(axis=(1, 2)), minlength=len(moments.cells)
-        )
-        volume = sizes[moments.cells].prod(axis=1)
-        in_use = area > NOTHING * volume / sizes[moments.cells].max(axis=1, initial=0.0)
-        is_cut[moments.cells[in_use]] = True
-        return is_cut, in_use
+        area = np.bincount(cells[touched], moments.piece_mass[touched].sum(axis=(1, 2)), len(sizes))
+        in_use = area > NOTHING * sizes.prod(axis=1) / sizes.max(axis=1)
+        return (moments.fraction > NOTHING) & (moments.fraction < 1.0 - NOTHING) | in_use, in_use
 
-    def _on_local_cells(self, moments, in_use, touched, cut: Cells, normal: Array) -> tuple[Array, Pieces]:
-        grid = self.grid
-        weights = _tensor_weights(self.points, grid.dim)
-        row_of = np.full(grid.grid.size, -1, dtype=np.int64)
-        row_of[grid.numbers[cut]] = np.arange(len(cut))
-        rows = row_of[moments.cells]
-        fluid = np.tile(1.0 - np.round(moments.fraction[grid.numbers[cut]])[:, None], (1, len(weights)))
-        known = rows >= 0
-        fluid[rows[known]] = 1.0 - moments.solid[known] / weights
-        mine = (known & in_use)[moments.piece_cell] & touched
-        cell = rows[moments.piece_cell[mine]]
-        order = np.argsort(cell, kind="stable")
-        facet = moments.piece_facet[mine][order]
-        return fluid, Pieces(
-            cell[order], facet, moments.piece_moments[mine][order], moments.piece_mass[mine][order], normal[facet]
-        )
+    def _facing(self, moments, counts, normal) -> NDArray[np.bool_]:
+        """Box cells with surfaces that face each other: if they part, fluid comes between."""
+        number, size = moments.cells[moments.piece_cell], self.grid.grid.size
+        area = moments.piece_mass.sum(axis=(1, 2)) * counts[moments.piece_facet]
+        total = np.bincount(number, area, size)
+        net = np.stack([np.bincount(number, area * n, size) for n in normal[moments.piece_facet].T])
+        return (total > 0.0) & (np.linalg.norm(net, axis=0) < 0.5 * total)
+
+    def _covered(self, corners: Array) -> NDArray[np.bool_]:
+        """Box cells around facets that lie on the box's boundary: if these leave it, fluid comes between."""
+        box = self.grid.grid
+        marked = np.zeros(box.shape, dtype=bool)
+        ends = [
+            np.clip(np.searchsorted(edge, corners[:, :, axis], side="right") - 1, 0, len(edge) - 2)
+            for axis, edge in enumerate(box.edges)
+        ]
+        for cells in np.stack(ends, axis=2):  # of the corners of one facet
+            marked[tuple(slice(i, j + 1) for i, j in zip(cells.min(axis=0), cells.max(axis=0), strict=True))] = True
+        return marked.ravel(order="F")
+
+    def _fluid_weights(self, moments, cut: Cells) -> Array:
+        """int_fluid L_q dx / (w_q |K|) on local cut cells, shape (cut, points)."""
+        weights, numbers = _tensor_weights(self.points, self.grid.dim), self.grid.numbers[cut]
+        fluid = np.tile(1.0 - np.round(moments.fraction[numbers])[:, None], (1, len(weights)))
+        row = np.minimum(np.searchsorted(moments.cells, numbers), len(moments.cells) - 1)
+        known = moments.cells[row] == numbers if len(moments.cells) else np.zeros(len(cut), dtype=bool)
+        fluid[known] = 1.0 - moments.solid[row[known]] / weights
+        return fluid
 
 
 def _tensor_weights(points: Array, dim: int) -> Array:

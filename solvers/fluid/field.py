@@ -17,9 +17,10 @@ from solvers.distributed import Nodal
 from solvers.fluid import time
 from solvers.fluid.cut import Cut, Cutter
 from solvers.fluid.grid import DistributedGrid, Grid
+from solvers.fluid.history import History
 from solvers.fluid.patches import Boundary, Patch
-from solvers.fluid.pockets import find_pockets
-from solvers.fluid.space import Unknowns
+from solvers.fluid.pressure_level import hold_pressure, spread_excess
+from solvers.fluid.space import Nodes, Unknowns
 from solvers.fluid.surface import Motion, Surface, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
 from solvers.newton import Tolerance, converge
@@ -45,17 +46,6 @@ class Body:
     surface: Surface
     motion: Callable[[float], Motion] | None
     rests: bool = False  #: it never moves
-
-
-@dataclass
-class Past:
-    """Velocities of a time behind, local dofs, and where they are known."""
-
-    velocity: Array
-    known: np.ndarray
-
-    def copy(self) -> Past:
-        return Past(self.velocity.copy(), self.known.copy())
 
 
 class Fluid:
@@ -92,9 +82,8 @@ class Fluid:
         self.cutter = Cutter(self.grid, self.system.weights.points)
         self.velocity_mask = np.zeros(self.unknowns.local, dtype=bool)
         self.velocity_mask[self.unknowns.velocity.dofs] = True
-        everywhere = np.ones(self.unknowns.local, dtype=bool)
-        self.old, self.older = (Past(np.zeros(self.unknowns.local), everywhere.copy()) for _ in range(2))
-        self._dt_before: float | None = None
+        self.history = History(settings.scheme, self.unknowns.local)
+        self._smallest = min(float(np.diff(edge).min()) for edge in grid.edges)
         #: the equations of elastic bodies are solved together with these, and bound the pressure in closed pockets
         self.solved_with_bodies = False
         self._motions: list[Motion] = []
@@ -146,28 +135,13 @@ class Fluid:
         self._t, self.dt = t + dt, dt
         velocity = np.where(self.velocity_mask, self.flow, 0.0)
         self.cutter.begin_step()
-        self.older, self.old = self.old, Past(velocity, self.system.active_dofs | self._first)
-        self.difference = self._choose_difference(dt)
-        difference = self.difference
-        history = difference.beta_0 * self.old.velocity + difference.beta_1 * self.older.velocity
-        self.system.set_time(t + dt, difference, history)
+        self.difference = self.history.begin_step(velocity, dt)
+        self.system.set_time(t + dt, self.difference, self.history.rate(self.difference))
         self.flow[self.boundary.dofs] = self.boundary.velocity(t + dt)
         self.system.set_scales(velocity)
         self._fresh, self._largest = True, 0.0
         if not self._coupled:
             self.move({})
-
-    @property
-    def _first(self) -> bool:
-        """No step was taken: the initial velocity is known everywhere."""
-        return self._dt_before is None
-
-    def _choose_difference(self, dt: float) -> time.Difference:
-        if self.settings.steady:
-            return time.STEADY
-        if self.settings.scheme == "backward_euler" or self._dt_before is None:
-            return time.backward_euler(dt)
-        return time.bdf2(dt, self._dt_before)
 
     def move(self, coupled: Mapping[str, Motion]) -> None:
         """Cut the grid by the surfaces where they are now: `coupled` bodies by name, all others as prescribed.
@@ -195,61 +169,27 @@ class Fluid:
             return 0
         fastest = float(np.linalg.norm(motion.v, axis=1).max(initial=0.0))
         steps = 2.0 if self.settings.scheme == "bdf2" else 1.0
-        smallest = min(float(np.diff(edge).min()) for edge in self.grid.grid.edges)
-        return max(1, math.ceil(1.25 * steps * fastest * self.dt / smallest))
+        return max(1, math.ceil(1.25 * steps * fastest * self.dt / self._smallest))
 
     def _check_strip(self, cut: Cut) -> None:
         blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)
         blocks[self.unknowns.cell_blocks[np.concatenate([cut.uncut, cut.cut])]] = True
         used = self.unknowns.expand(blocks) & self.velocity_mask
-        unknown = np.zeros(self.unknowns.local, dtype=bool)
-        if self.difference.beta_0:
-            unknown |= used & ~self.old.known
-        if self.difference.beta_1:
-            unknown |= used & ~self.older.known
-        if self.comm.allreduce(bool(unknown.any()), op=MPI.LOR):
+        missing = bool((used & self.history.unknown(self.difference)).any())
+        if self.comm.allreduce(missing, op=MPI.LOR):
             reason = "a body moved farther in one step than the flow behind it is known: take a smaller time step"
             raise StepFailed(self.name, reason)
 
     def _hold_pressure(self) -> None:
-        """Fix the pressure at one node of each pocket where nothing else does.
-
-        That is zero if all of the box is closed, else the pressure that was there when the pocket closed.
-        """
-        self._pockets: list[tuple[NDArray[np.bool_], Array]] = []
-        self.level_unknown = False  #: a body that another field moves could know the pressure that is held here
-        closed = self.boundary.closed()
-        if not (closed or self.bodies):
-            return
         elastic = np.concatenate([np.full(b.surface.vertices, b.motion is None) for b in self.bodies] + [[]]) > 0.0
-        pockets = find_pockets(self.grid, self.cut, self.boundary.open_cells(), elastic)
-        known = self.solved_with_bodies and not self.settings.steady  # by the room that bodies leave
-        held = [p for p in pockets if not (p.elastic and known)]
-        if not held:
-            return
-        self.level_unknown = any(pocket.elastic for pocket in held)
-        sizes = self.system.pressure_sizes()
-        for pocket in held:
-            self._hold_pocket(pocket.cells, sizes, keep_level=not (closed and pocket.largest))
-
-    def _hold_pocket(self, cells: NDArray[np.bool_], sizes: Array, *, keep_level: bool) -> None:
-        """At the first of its nodes of the box's lattice, or the first that had a pressure before (collective)."""
-        nodes, last = self.unknowns.pressure, np.iinfo(np.int64).max
-        dofs = nodes.dofs[: nodes.owned, 0]
-        inside = (self.system.dofs_of(np.flatnonzero(cells)) & ~self.velocity_mask)[: self.unknowns.owned]
-        numbers = np.where(inside[dofs], nodes.numbers[: nodes.owned], last)
-        if keep_level:
-            numbers = np.stack([np.where(self.flow[dofs] != 0.0, numbers, last), numbers])
-        smallest = [int(row.min(initial=last)) for row in np.atleast_2d(numbers)]
-        smallest = [self.comm.allreduce(number, op=MPI.MIN) for number in smallest]
-        best = next((number for number in smallest if number < last), last)
-        for node in np.flatnonzero(nodes.numbers[: nodes.owned] == best):
-            self.held[dofs[node]] = True
-            if not keep_level:
-                self.flow[dofs[node]] = 0.0
-        shares = np.where(inside, sizes, 0.0)
-        total = self.comm.allreduce(float(shares.sum()))
-        self._pockets.append((inside, shares / total if total > 0.0 else shares))
+        known = self.solved_with_bodies and not self.settings.steady
+        self._holds = hold_pressure(self.system, elastic, known_by_bodies=known)
+        #: a body that another field moves could know the pressure that is held here
+        self.level_unknown = any(hold.elastic for hold in self._holds)
+        for hold in self._holds:
+            self.held[hold.dofs] = True
+            if not hold.keeps_level:
+                self.flow[hold.dofs] = 0.0
 
     def solve(self) -> StepInfo:
         """Newton to the tolerance. Raises StepFailed."""
@@ -257,8 +197,8 @@ class Fluid:
         return converge(self, self.solver.newton)
 
     def end_step(self) -> None:
-        """Accept the step."""
-        self._dt_before = self.dt
+        """Accept the step. Fluid that comes between surfaces which touch now will have been at rest."""
+        self.history.end_step(self.dt, self.system.active_dofs | self.system.dofs_of(self.cut.shut))
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
@@ -271,26 +211,15 @@ class Fluid:
                 self.system.set_penalties()
                 self._fresh = False
             self.residual_rows = self.system.residual()
-        self._spread_excess()
+        spread_excess(self.comm, self._holds, self.residual_rows)
         self.residual_rows[self.held] = 0.0
         self._size = self._norm(self.residual_rows)
         self._largest = max(self._largest, self._size)
         return self._size
 
-    def _spread_excess(self) -> None:
-        """Take what surfaces let into a closed pocket, or displace there, from all of its fluid alike.
-
-        Else the one node that fixes the pressure is all of the outlet: an error of pressure that no mesh cures.
-        """
-        for inside, shares in self._pockets:
-            excess = float(self.residual_rows[inside].sum())
-            self.residual_rows -= self.comm.allreduce(excess) * shares
-
     def _norm(self, rows: Array) -> float:
-        settings, h = self.settings, self.grid.sizes.min(axis=1)
-        h_min, fastest = float(h.min()), float(self.system.speed.max(initial=0.0))
-        h_min, fastest = self.comm.allreduce(h_min, op=MPI.MIN), self.comm.allreduce(fastest, op=MPI.MAX)
-        impedance = settings.viscosity / h_min + settings.density * (fastest + h_min * self.difference.alpha)
+        settings, h = self.settings, self._smallest
+        impedance = settings.viscosity / h + settings.density * (self.system.fastest + h * self.difference.alpha)
         scaled = np.where(self.velocity_mask[: len(rows)], rows, impedance * rows)
         return math.sqrt(self.comm.allreduce(float(scaled @ scaled)))
 
@@ -388,13 +317,14 @@ class Fluid:
         def nodal(values: Array, nodes) -> Nodal:
             return Nodal(values[nodes.dofs[: nodes.owned]].astype(float), nodes.numbers[: nodes.owned])
 
-        known = np.stack([self.system.active_dofs | self._first, self.old.known], axis=1)[velocity.dofs[:, 0]]
+        known = np.stack([self.history.known_now, self.history.old.known], axis=1)[velocity.dofs[:, 0]]
         return {
             "velocity": nodal(self.flow, velocity),
             "pressure": nodal(self.flow, pressure),
-            "old_velocity": nodal(self.old.velocity, velocity),
+            "old_velocity": nodal(self.history.old.velocity, velocity),
             "known": Nodal(known[: velocity.owned].astype(float), velocity.numbers[: velocity.owned]),
-            "dt_before": self._dt_before,
+            "room": Nodal(self.system.room(), self.grid.numbers[: self.grid.owned]),
+            "steps": list(self.history.steps),
             "time": self._t,
             "motion": {body.surface.name: {"x": m.x, "v": m.v} for body, m in self._moved()},
         }
@@ -405,21 +335,26 @@ class Fluid:
     def restore(self, state: State) -> None:
         """Back to a saved state."""
         velocity, pressure = self.unknowns.velocity, self.unknowns.pressure
-        owned = np.zeros(self.unknowns.local)
-        owned[velocity.dofs[: velocity.owned]] = state["velocity"].values
-        owned[pressure.dofs[: pressure.owned]] = state["pressure"].values
-        self.flow[:] = self._shared(owned)
-        owned[:] = 0.0
-        owned[velocity.dofs[: velocity.owned]] = state["old_velocity"].values
-        self.old.velocity = self._shared(owned)
-        owned[:] = 0.0
-        owned[velocity.dofs[: velocity.owned]] = state["known"].values[:, [1]]
-        self.old.known = self._shared(owned) > 0.5
-        self._dt_before, self._t = state["dt_before"], state["time"]
+        known = state["known"].values
+        self.flow[:] = self._at_nodes(velocity, state["velocity"].values)
+        self.flow[:] += self._at_nodes(pressure, state["pressure"].values)
+        self.history.old.velocity = self._at_nodes(velocity, state["old_velocity"].values)
+        self.history.known_now, self.history.old.known = (
+            self._at_nodes(velocity, known[:, [column]]) > 0.5 for column in (0, 1)
+        )
+        self.history.steps, self._t = tuple(state["steps"]), state["time"]
         self.difference = time.STEADY
+        self.system.set_room(state["room"].values)
+        self.cutter.begin_step()
         kept = self.flow.copy()
         self.move({name: Motion(m["x"], m["v"]) for name, m in state["motion"].items()})
         self.flow[:] = kept
+
+    def _at_nodes(self, nodes: Nodes, values: Array) -> Array:
+        """Local dofs from values at owned nodes, zero elsewhere."""
+        owned = np.zeros(self.unknowns.local)
+        owned[nodes.dofs[: nodes.owned]] = values
+        return self._shared(owned)
 
     def _shared(self, owned: Array) -> Array:
         """Local dofs from owned ones."""

@@ -29,9 +29,10 @@ class Penalties:
     mass: float = 35.0 / 40.0  #: normal Nitsche penalty rho h alpha
     convection: float = 35.0 / 6.0  #: normal Nitsche penalty rho |a|
     ghost_viscous: float = 0.1
-    ghost_mass: float = 1e-3
-    ghost_convection: float = 0.05
+    ghost_mass: float = 3e-3
+    ghost_convection: float = 0.01
     ghost_pressure: float = 0.05
+    ghost_second: float = 0.05  #: second derivatives, relative to first ones
 
 
 @dataclass(frozen=True)
@@ -118,20 +119,25 @@ def interface(flow: Flow, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> E
     )
 
 
-def ghost_penalty(flow: Flow, factors: Penalties, phi: Expr, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
-    """Integrand over faces of sum_j h^(2j-1) (gamma_v mu + gamma_t rho alpha h^2 + gamma_b rho phi) [d_n^j u] [d_n^j v]
-    and gamma_p h^3 / (rho phi) [d_n p] [d_n q]; phi [m^2/s] per cell is the scale of `cell_scale`."""
+def ghost_penalty(flow: Flow, factors: Penalties, phi: Expr, carried: Expr, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+    """Integrand over faces of gamma_p h^3 / (rho phi) [d_n p] [d_n q] and
+
+    sum_j c_j h^(2j-1) (gamma_v mu + gamma_t rho alpha h^2 + gamma_b rho phi_b) [d_n^j u] [d_n^j v],  c_1 = 1.
+
+    phi and `carried`, phi_b = (|a| h)^2 / phi, are scales per cell [m^2/s]: phi_b is small where viscosity or the time
+    step rule. Were it phi, the term would be an artificial viscosity along bodies that grows as steps get smaller.
+    """
     n = ufl.FacetNormal(flow.mesh)
     h = avg(abs(sum(n[i] ** 2 * size for i, size in enumerate(flow.sizes))))
-    phi = avg(phi)
     factor = factors.ghost_viscous * flow.mu
     if not flow.steady:
         factor += factors.ghost_mass * flow.rho * flow.alpha * h**2
-    if flow.convection or not flow.steady:
-        factor += factors.ghost_convection * flow.rho * phi
-    terms = factors.ghost_pressure * h**3 / (flow.rho * phi) * _jump(p, n, 1) * _jump(q, n, 1)
+    if flow.convection:
+        factor += factors.ghost_convection * flow.rho * avg(carried)
+    terms = factors.ghost_pressure * h**3 / (flow.rho * avg(phi)) * _jump(p, n, 1) * _jump(q, n, 1)
     for order in range(1, flow.degree + 1):
-        terms += h ** (2 * order - 1) * factor * dot(_jump(u, n, order), _jump(v, n, order))
+        weight = 1.0 if order == 1 else factors.ghost_second
+        terms += weight * h ** (2 * order - 1) * factor * dot(_jump(u, n, order), _jump(v, n, order))
     return terms
 
 

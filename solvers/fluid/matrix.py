@@ -21,6 +21,7 @@ class Pattern:
 
     cells: NDArray[np.bool_]  #: per local cell
     faces: NDArray[np.bool_]  #: per local face with two cells, in the order of `interior_faces`
+    reach: NDArray[np.bool_]  #: per local cell: all its faces with cells of the pattern belong to it
 
     def covers(self, cut: Cut, faces: NDArray[np.int32]) -> bool:
         """A cut needs no more than this."""
@@ -29,10 +30,15 @@ class Pattern:
 
 def choose_pattern(unknowns: Unknowns, cut: Cut) -> Pattern:
     """Room for a cut and for those that its bodies may make in the next steps."""
-    _, sides = unknowns.grid.interior_faces
     cells = cut.reach.copy()
     cells[cut.active] = True
-    return Pattern(cells, cut.reach[sides].any(axis=1) & cells[sides].all(axis=1))
+    return pattern_of(unknowns, cells, cut.reach)
+
+
+def pattern_of(unknowns: Unknowns, cells: NDArray[np.bool_], reach: NDArray[np.bool_]) -> Pattern:
+    """Some local cells, and the faces between them of those in reach of a body."""
+    _, sides = unknowns.grid.interior_faces
+    return Pattern(cells, reach[sides].any(axis=1) & cells[sides].all(axis=1), reach)
 
 
 def fits(unknowns: Unknowns, pattern: Pattern | None, cut: Cut) -> bool:

@@ -15,11 +15,12 @@ from petsc4py import PETSc
 from solvers import fem
 from solvers.api import Array
 from solvers.fluid import forms
-from solvers.fluid.cut import Cut, Pieces
+from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.interface import Interface
-from solvers.fluid.matrix import Pattern, choose_pattern, create_matrix, fits
+from solvers.fluid.matrix import Pattern, choose_pattern, create_matrix, fits, pattern_of
 from solvers.fluid.patches import Boundary, Value
+from solvers.fluid.pieces import Pieces
 from solvers.fluid.space import Unknowns
 from solvers.fluid.time import Difference
 from solvers.fluid.weights import Weights
@@ -66,7 +67,7 @@ class FlowSystem:
         self.flow, self._history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
         self._alpha = fem.constant(domain, 0.0)
         self._newton = fem.constant(domain, 1.0)
-        self._phi = fem.function(fem.cellwise_space(domain))
+        self._phi, self._carried = (fem.function(fem.cellwise_space(domain)) for _ in range(2))
         self.weights = Weights(grid, settings.degree)
         self._compile()
         self._out = np.zeros(unknowns.local)
@@ -111,7 +112,7 @@ class FlowSystem:
             cell_forms.append(self.weights.fluid * everywhere * dx_cut + on_interface * dx_cut)
             dS = fem.measure(domain, "dS", 2 * settings.degree)
             du, dp = unknowns.parts(trial)
-            ghost = forms.ghost_penalty(flow, settings.penalties, self._phi, du, dp, v, q) * dS
+            ghost = forms.ghost_penalty(flow, settings.penalties, self._phi, self._carried, du, dp, v, q) * dS
             self._ghost_penalty = fem.Integral(domain, ghost)
         self._residuals = [fem.Integral(domain, form) for form in cell_forms]
         self._tangents = [fem.Integral(domain, ufl.derivative(form, self.flow, trial)) for form in cell_forms]
@@ -147,7 +148,7 @@ class FlowSystem:
             _set_velocity(function, nodes, value, t)
 
     def set_scales(self, velocity: Array) -> None:
-        """Take local velocity dofs [m/s] that scale stabilisation and penalties from now on."""
+        """Take local velocity dofs [m/s] that scale stabilisation and penalties from now on (collective)."""
         settings, unknowns = self.settings, self.unknowns
         self._scale_velocity.x.array[:], self._penalised = velocity, None
         h = self.grid.sizes.min(axis=1)
@@ -156,8 +157,10 @@ class FlowSystem:
         by_dof[unknowns.velocity.dofs[:, 0]] = speed
         dofs = unknowns.cell_blocks if unknowns.block_size == 1 else unknowns.cell_blocks * unknowns.block_size
         self.speed = by_dof[dofs].max(axis=1) if settings.convection else np.zeros(len(h))
-        alpha = float(self._alpha.value)
-        self._phi.x.array[:] = settings.viscosity / settings.density + self.speed * h + alpha * h**2
+        self.fastest = float(self.grid.comm.allreduce(self.speed.max(initial=0.0), op=MPI.MAX))
+        carried = self.speed * h
+        phi = settings.viscosity / settings.density + carried + float(self._alpha.value) * h**2
+        self._phi.x.array[:], self._carried.x.array[:] = phi, carried**2 / phi
 
     def set_cut(self, cut: Cut) -> None:
         """Take a cut; cells, faces and the matrix follow."""
@@ -172,9 +175,7 @@ class FlowSystem:
         )
         self._add_outer_faces(active)
         if not fits(self.unknowns, self._pattern, cut):
-            self._pattern = choose_pattern(self.unknowns, cut)
-            self._matrix = self._fill_pattern(self._pattern)
-            self._ghost, self._penalised = self._matrix.duplicate(copy=False), None
+            self._make_room(choose_pattern(self.unknowns, cut))
 
     def dofs_of(self, cells: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Which local dofs belong to some local cells or, on other processes, to theirs (collective)."""
@@ -182,6 +183,22 @@ class FlowSystem:
         blocks[self.unknowns.cell_blocks[cells]] = True
         blocks = fem.sum_ghosts(self.unknowns.space, blocks.astype(float)) > 0.0
         return self.unknowns.expand(blocks)
+
+    def room(self) -> Array:
+        """What the matrix has room for, per owned cell: couplings within it, and across its faces."""
+        assert self._pattern is not None
+        return np.stack([self._pattern.cells, self._pattern.reach], axis=1)[: self.grid.owned].astype(float)
+
+    def set_room(self, room: Array) -> None:
+        """Make the matrix of a saved state: the rounding of a direct solver depends on its pattern (collective)."""
+        both = np.zeros((2, len(self.grid.numbers)))
+        both[:, : self.grid.owned] = room.T
+        cells, reach = (fem.share_owned(self._phi.function_space, column) > 0.5 for column in both)
+        self._make_room(pattern_of(self.unknowns, cells, reach))
+
+    def _make_room(self, pattern: Pattern) -> None:
+        self._pattern, self._matrix = pattern, self._fill_pattern(pattern)
+        self._ghost, self._penalised = self._matrix.duplicate(copy=False), None
 
     def _fill_pattern(self, pattern: Pattern) -> PETSc.Mat:
         """A matrix that has all entries of a pattern, with values that do not matter."""

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from solvers import fem
 from solvers.api import Array
-from solvers.fluid.cut import Cut, Pieces
+from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.pieces import Pieces
 
 
 class Weights:

@@ -1,0 +1,108 @@
+"""Surfaces with fluid on one side only, 2D: the line behind them that closes the solid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupling.coupled import Coupled
+from solvers.api import Snapshot
+from solvers.fluid.probes import winding
+from solvers.fluid.surface import Motion
+
+Array = NDArray[np.float64]
+Facets = NDArray[np.int64]
+
+
+class DrySideError(ValueError):
+    """The line does not close the solid; the message says why."""
+
+
+def find_ends(facets: Facets) -> tuple[int, int]:
+    """(vertex at the end, vertex at the start) of segments that make one line. Raises DrySideError."""
+    following = dict(facets.tolist())
+    starts = set(following) - set(following.values())
+    if len(starts) != 1 or len(following) != len(facets):
+        raise DrySideError("the wetted surface must be one line with two ends")
+    start = end = starts.pop()
+    length = 0
+    while end in following:
+        end, length = following[end], length + 1
+    if length != len(facets):
+        raise DrySideError("the wetted surface must be one line with two ends")
+    return end, start
+
+
+def close(points: Array, facets: Facets, inside: Array, corners: Array, box: tuple[Array, Array]) -> Array:
+    """The corners in the order that leads from the end of a wetted line back to its start, solid on the left.
+
+    `inside`: points in the body that the line belongs to. The way round must not pass through the box, whose lowest and
+    highest corners are given. Raises DrySideError.
+    """
+    end, start = find_ends(facets)
+    way = max((corners, corners[::-1]), key=lambda some: _area(points, facets, _line(points[end], some, points[start])))
+    line = _line(points[end], way, points[start])
+    loop, around = _loop(points, facets, line)
+    if any(winding(x, Motion(loop, np.zeros_like(loop)), around) < 1.0 - 1e-6 for x in inside):
+        raise DrySideError("the body must lie between its wetted surface and these points")
+    for a, b in pairwise(line):
+        if _crosses(a, b, *box):
+            raise DrySideError(f"the way from {_spoken(a)} to {_spoken(b)} passes through the box: go around it")
+    return way
+
+
+def outlines(coupled: Coupled) -> list[Snapshot]:
+    """What lies behind surfaces with one wet side, as closed lines that do not leave the box, on rank 0."""
+    fluid = coupled.fluid
+    if fluid.comm.rank != 0:
+        return []
+    surfaces = {body.surface.name: body.surface for body in fluid.bodies}
+    edges = fluid.grid.grid.edges
+    low, high = (np.array([edge[at] for edge in edges]) for at in (0, -1))
+    found = []
+    for side in coupled.interface.dry_sides:
+        wet = fluid.cut.motion.x[fluid.vertices_of([side.behind])]
+        end, start = side.ends
+        way = np.concatenate([[end], len(wet) + np.arange(len(side.corners)), [start]])
+        lines = np.concatenate([surfaces[side.behind].facets, np.stack([way[:-1], way[1:]], axis=1)])
+        points = np.concatenate([wet, np.clip(side.corners, low, high)])
+        found.append(Snapshot(side.name, np.pad(points, ((0, 0), (0, 1))), lines, "line", {}))
+    return found
+
+
+def _line(end: Array, corners: Array, start: Array) -> Array:
+    return np.concatenate([[end], corners, [start]])
+
+
+def _loop(points: Array, facets: Facets, line: Array) -> tuple[Array, Facets]:
+    """(vertices, segments) of a wetted line and the one that closes it."""
+    numbers = len(points) + np.arange(len(line))
+    return np.concatenate([points, line]), np.concatenate([facets, np.stack([numbers[:-1], numbers[1:]], axis=1)])
+
+
+def _area(points: Array, facets: Facets, line: Array) -> float:
+    """What the loop encloses, positive if counterclockwise [m^2]."""
+    x, segments = _loop(points, facets, line)
+    a, b = x[segments[:, 0]], x[segments[:, 1]]
+    return float(0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+
+
+def _crosses(a: Array, b: Array, low: Array, high: Array) -> bool:
+    """Some of the way from a to b lies in the box, its boundary left out."""
+    margin = 1e-9 * float((high - low).max())
+    first, last = 0.0, 1.0
+    for start, step, least, most in zip(a, b - a, low + margin, high - margin, strict=True):
+        if step == 0.0:
+            if not least < start < most:
+                return False
+            continue
+        enters, leaves = sorted([(least - start) / step, (most - start) / step])
+        first, last = max(first, enters), min(last, leaves)
+    return bool(last > first)
+
+
+def _spoken(point: Sequence[float] | Array) -> str:
+    return "(" + ", ".join(f"{value:.6g}" for value in point) + ")"

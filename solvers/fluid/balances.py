@@ -1,0 +1,67 @@
+"""Momentum and power of the whole fluid: what its bodies get by them, found without the interface terms."""
+
+from __future__ import annotations
+
+import numpy as np
+import ufl
+
+from solvers import fem
+from solvers.api import Array
+from solvers.fluid import forms
+from solvers.fluid.field import Fluid
+
+
+class Balances:
+    """Sums of all momentum equations, tested with a constant velocity and with that of the fluid.
+
+    Stabilisation and ghost penalty vanish in the first sum; what they take from the second is lost by the method.
+    """
+
+    def __init__(self, fluid: Fluid):
+        self.fluid = fluid
+        system = fluid.system
+        u = fluid.unknowns.parts(system.flow)[0]
+        inertia, strain = forms.inertia(system.terms, u), forms.eps(u)
+        self._inertia = [self._over_fluid(component) for component in inertia]
+        self._taken = self._over_fluid(ufl.dot(inertia, u) + 2.0 * system.terms.mu * ufl.inner(strain, strain))
+
+    def force_on_bodies(self) -> Array:
+        """Force [N] of the fluid on all bodies together, shape (dim,) (collective).
+
+        That on walls and patches less int rho (u_t + u . grad u) - f.
+        """
+        rows = self._outer_rows()[self.fluid.unknowns.velocity.dofs].sum(axis=0)
+        return self.fluid.comm.allreduce(rows) - np.array([self._integral(forms) for forms in self._inertia])
+
+    def lost_power(self) -> float:
+        """Power [W] that the method takes: by stabilisation, ghost penalty and slip at the bodies (collective).
+
+        That of walls and patches less what bodies get and int (rho (u_t + u . grad u) - f) . u + 2 mu eps(u) : eps(u).
+        """
+        fluid, dofs = self.fluid, self.fluid.unknowns.velocity.dofs
+        given = fluid.comm.allreduce(float((self._outer_rows() * fluid.flow)[dofs].sum()))
+        to_bodies = float((fluid.system.surface_force() * fluid.cut.motion.v).sum())
+        return given - to_bodies - self._integral(self._taken)
+
+    def _outer_rows(self) -> Array:
+        """Forces [N] on the fluid from walls and patches at local dofs, the ghosts' share still there."""
+        fluid = self.fluid
+        owned = np.where(fluid.held, fluid.system.residual(), 0.0)
+        rows = -fluid.system.outer_rows()
+        rows[: len(owned)] += owned
+        return rows
+
+    def _over_fluid(self, integrand) -> list[fem.Integral]:
+        """Its integral over uncut cells, and over the fluid's part of cut cells."""
+        fluid, domain, weights = self.fluid, self.fluid.grid.domain, self.fluid.system.weights
+        parts = [fem.Integral(domain, integrand * fem.measure(domain, "dx", 2 * fluid.unknowns.degree + 1))]
+        if fluid.bodies:
+            dx_cut = fem.measure(domain, "dx", weights.degree)
+            parts.append(fem.Integral(domain, weights.fluid * integrand * dx_cut))
+        return parts
+
+    def _integral(self, parts: list[fem.Integral]) -> float:
+        fluid = self.fluid
+        cells = [some[some < fluid.grid.owned] for some in (fluid.cut.uncut, fluid.cut.cut)]
+        there = [part.on(cell=some) for part, some in zip(parts, cells, strict=False)]
+        return sum(fem.assemble_scalar(form, fluid.comm) for form in there)

@@ -1,0 +1,70 @@
+"""The level of the pressure where nothing determines it: held at one node, and no node an outlet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.fluid.pockets import Pocket, find_pockets
+from solvers.fluid.system import FlowSystem
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A pocket whose pressure is held."""
+
+    dofs: NDArray[np.int64]  #: owned dofs with identity rows, none or one
+    inside: Mask  #: owned pressure dofs of the pocket
+    shares: Array  #: of its fluid, at owned dofs; their sum on all processes is one
+    keeps_level: bool  #: the pressure stays what it was when the pocket closed; else zero
+    elastic: bool  #: a surface that another field moves bounds the pocket
+
+
+def hold_pressure(system: FlowSystem, elastic: Mask, *, known_by_bodies: bool) -> list[Hold]:
+    """One node of each pocket where nothing says how high the pressure is (collective).
+
+    `elastic`: vertices that another field moves; `known_by_bodies`: the pressure at them follows from the room that
+    they leave. The level is zero if all of the box is closed, else that of the time when the pocket closed.
+    """
+    closed = system.boundary.closed()
+    if not (closed or system.with_bodies):
+        return []
+    assert system.cut is not None
+    pockets = find_pockets(system.grid, system.cut, system.boundary.open_cells(), elastic)
+    pockets = [pocket for pocket in pockets if not (pocket.elastic and known_by_bodies)]
+    sizes = system.pressure_sizes() if pockets else np.empty(0)
+    return [_hold(system, pocket, sizes, keep_level=not (closed and pocket.largest)) for pocket in pockets]
+
+
+def _hold(system: FlowSystem, pocket: Pocket, sizes: Array, *, keep_level: bool) -> Hold:
+    """At the first of its nodes of the box's lattice, or the first that had a pressure before (collective)."""
+    unknowns, comm = system.unknowns, system.grid.comm
+    nodes, last = unknowns.pressure, np.iinfo(np.int64).max
+    dofs = nodes.dofs[: nodes.owned, 0]
+    inside = np.zeros(unknowns.owned, dtype=bool)
+    inside[dofs] = system.dofs_of(np.flatnonzero(pocket.cells).astype(np.int32))[dofs]
+    numbers = np.where(inside[dofs], nodes.numbers[: nodes.owned], last)
+    had_pressure = np.where(system.flow.x.array[dofs] != 0.0, numbers, last)
+    choices = [had_pressure, numbers] if keep_level else [numbers]
+    smallest = [comm.allreduce(int(choice.min(initial=last)), op=MPI.MIN) for choice in choices]
+    best = next((number for number in smallest if number < last), last)
+    shares = np.where(inside, sizes, 0.0)
+    total = comm.allreduce(float(shares.sum()))
+    at = dofs[nodes.numbers[: nodes.owned] == best].astype(np.int64)
+    return Hold(at, inside, shares / total if total > 0.0 else shares, keep_level, pocket.elastic)
+
+
+def spread_excess(comm: MPI.Comm, holds: list[Hold], rows: Array) -> None:
+    """Take what surfaces let into a closed pocket, or displace there, from all of its fluid alike (collective).
+
+    Else the one node that fixes the pressure is all of the outlet: an error of pressure that no mesh cures.
+    """
+    for hold in holds:
+        excess = comm.allreduce(float(rows[hold.inside].sum()))
+        rows -= excess * hold.shares

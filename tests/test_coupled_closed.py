@@ -1,0 +1,80 @@
+"""Fluid closed in by walls and bodies: the monolithic scheme finds the level of its pressure, others say why not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from coupled_case import POST
+from test_coupled_dry_side import COLUMN
+from test_coupled_run import run
+
+from fsci.case import CaseError, load_case
+from fsci.run import run_case
+
+#: fluid inside of a ring, and outside of it in an open channel
+RING = """\
+title: a ring with fluid in it
+time: {step: 0.02, end: 0.04}
+fluid:
+  density: 1
+  viscosity: 0.05
+  grid: {from: [0, 0], to: [1, 1], cells: [40, 40]}
+  patches:
+    ends: {on: [x-, x+], outflow: true}
+    walls: {on: [y-, y+], no_slip: true}
+structure:
+  dynamics: {rho_inf: 0.8}
+  bodies:
+    ring:
+      mesh: {shape: ring, inner_radius: 0.17, outer_radius: 0.33, cells: [24, 2], translate: [0.51, 0.49]}
+      material: {law: neo_hooke, E: 500, nu: 0.3, density: 5}
+      initial_velocity: [1, 0]
+coupling: {scheme: monolithic}
+"""
+OPEN, CLOSED = (f"    top: {{on: y+, {condition}}}\n" for condition in ("traction: [0, 0]", "slip: true"))
+
+
+def message(text: str, folder) -> str:
+    (folder / "case.yaml").write_text(text)
+    with pytest.raises(CaseError) as caught:
+        run_case(load_case(folder / "case.yaml"), folder / "out")
+    return str(caught.value)
+
+
+def test_walls_all_round(tmp_path):
+    closed = POST.replace("{on: x+, outflow: true}", "{on: x+, no_slip: true}").replace("monolithic", "partitioned")
+    said = message(closed, tmp_path)
+    assert "case.yaml:18:20: the boundary closes the fluid in, and iterations by turns cannot find the level" in said
+    assert "take 'monolithic', or a patch with 'traction' or 'outflow'" in said
+
+
+def test_walls_all_round_a_steady_flow(tmp_path):
+    said = message(COLUMN.replace(OPEN, CLOSED), tmp_path)
+    assert "case.yaml:6:11: the boundary closes the fluid in, and a steady flow does not know how much there is" in said
+    assert "take 'bdf2', or a patch with 'traction' or 'outflow'" in said
+
+
+def test_a_room_in_a_body(tmp_path):
+    said = message(RING.replace("monolithic", "partitioned"), tmp_path)
+    assert "case.yaml:17:20: bodies close in a part of the fluid, and iterations by turns cannot find the level" in said
+    run(RING, tmp_path)
+
+
+@pytest.mark.parametrize("scheme", ["bdf2", "backward_euler"])
+def test_the_monolithic_scheme_finds_the_level(scheme, tmp_path):
+    """A column of fluid between a lid and an elastic block without mass, which is pushed up from below.
+
+    Its top has nowhere to go, so that the stretch is 1 - d/0.1 and the pressure on it E/2 (1 - s^2) s, to rounding.
+    """
+    text = COLUMN.replace(OPEN, CLOSED).replace("scheme: steady", f"scheme: {scheme}")
+    text = text.replace("structure:\n", "structure:\n  dynamics: {rho_inf: 0}\n").replace(
+        "nu: 0}", "nu: 0, density: 1e-9}"
+    )
+    text = text.replace("on: bottom, displacement: [0, 0]", "on: bottom, displacement: [0, 0.001*t]")
+    history = run(text.replace("end: 1}", "end: 4}"), tmp_path)
+    stretch = 1 - 0.01 * history["time"]
+    on_block = 0.5e5 * (1 - stretch**2) * stretch
+    assert np.abs(history["top.y"]).max() < 1e-12
+    assert np.abs(history["volume"] - 0.5).max() < 1e-12
+    assert history["pressure"] == pytest.approx(on_block - 2000, rel=1e-8)
+    assert history["force.y"] == pytest.approx(-on_block, rel=1e-8)

@@ -1,0 +1,169 @@
+"""Fluid on one side of a surface, nothing on the other: exact answers at rest, and mistakes with their messages."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from test_coupled_run import run
+
+from fsci.case import CaseError, load_case
+from fsci.dry_side import DrySideError, close, find_ends
+from fsci.run import run_case
+
+#: a block across the box, half way up, with fluid above it and none below
+COLUMN = """\
+title: a column of fluid on an elastic block
+time: {step: 1, end: 1}
+fluid:
+  density: 1000
+  viscosity: 1
+  scheme: steady
+  flow: stokes
+  gravity: [0, -10]
+  grid: {from: [0, 0], to: [1, 1], cells: [5, 11]}
+  patches:
+    sides: {on: [x-, x+, y-], slip: true}
+    top: {on: y+, traction: [0, 0]}
+structure:
+  bodies:
+    block:
+      mesh: {shape: rectangle, size: [1, 0.1], cells: [4, 1], origin: [0, 0.4]}
+      material: {law: st_venant_kirchhoff, E: 1e5, nu: 0}
+      supports: [{on: bottom, displacement: [0, 0]}, {on: [left, right], symmetry: true}]
+coupling:
+  wetted: {block: top}
+  dry_side: {block: [[0, 0], [1, 0]]}
+probes:
+  top: {quantity: displacement, at: [0.5, 0.5]}
+  force: {quantity: force}
+  volume: {field: fluid, quantity: volume}
+  pressure: {quantity: pressure, at: [0.4, 0.7]}
+solver: {newton: {residual: 1.0e-11}}
+"""
+
+#: the membrane of cases/cavity_flexible_bottom under uniform pressure; it starts deflected, because flat it is slack
+MEMBRANE = """\
+title: a membrane under a fluid at rest
+time: {step: 1, end: 1}
+fluid:
+  density: 1
+  viscosity: 0.01
+  scheme: steady
+  flow: stokes
+  grid: {from: [0, -0.3], to: [1, 0.3], cells: [20, 12]}
+  patches:
+    sides: {on: [x-, x+, y-], no_slip: true}
+    top: {on: y+, traction: [0, -0.1]}
+structure:
+  bodies:
+    membrane:
+      mesh: {shape: rectangle, size: [1, 0.002], cells: [32, 1], order: 2, origin: [0, -0.002]}
+      material: {law: st_venant_kirchhoff, E: 250, nu: 0}
+      supports: [{on: [left, right], displacement: [0, 0]}]
+      initial_displacement: [0, "-0.6*x*(1 - x)"]
+coupling:
+  wetted: {membrane: top}
+  dry_side: {membrane: [[0, -0.3], [1, -0.3]]}
+probes:
+  middle: {quantity: displacement, at: [0.5, 0]}
+  force: {quantity: force}
+  volume: {field: fluid, quantity: volume}
+"""
+
+
+@pytest.mark.parametrize("corners", ["[[0, 0], [1, 0]]", "[[1, 0], [0, 0]]", "[[1.3, -0.2], [-0.1, -5]]"])
+def test_column_on_a_block(corners, tmp_path):
+    """One dimension: E/2 (s^2 - 1) s = -rho g H with the stretch s and the height H = 0.6 - 0.1 s, to rounding.
+
+    The ends of the wetted surface slide down with it; corners on the boundary of the box or outside are the same.
+    """
+    history = run(COLUMN.replace("[[0, 0], [1, 0]]", corners), tmp_path)
+    stretch = brentq(lambda s: 0.5e5 * (s**2 - 1) * s + 1e4 * (0.6 - 0.1 * s), 0.9, 1.0, xtol=1e-15)
+    height = 0.6 - 0.1 * stretch
+    expected = {"top.y": 0.1 * (stretch - 1), "force.y": -1e4 * height, "volume": height, "pressure": 3000.0}
+    for name, value in expected.items():
+        assert history[name][-1] == pytest.approx(value, rel=1e-10), name
+    assert abs(history["force.x"][-1]) < 1e-9
+    assert abs(history["fluid.mass"][-1]) < 1e-12
+
+
+def test_membrane_under_pressure(tmp_path):
+    """A circular arc of half angle a: tension p R = E h/2 (s^2 - 1) s with s = a / sin a and R = 1/2 / sin a.
+
+    The clamped ends, which cannot turn within one cell, cost as much as they are long: first order in the mesh.
+    """
+    E, thickness, p = 250.0, 0.002, 0.1
+
+    def excess(a: float) -> float:
+        s = a / np.sin(a)
+        return E * thickness / 2 * (s**2 - 1) * s - p * 0.5 / np.sin(a)
+
+    a = brentq(excess, 0.1, 1.5)
+    radius = 0.5 / np.sin(a)
+    exact = np.array([radius * (1 - np.cos(a)), radius**2 * (a - np.sin(a) * np.cos(a))])
+    errors = []
+    for cells in (32, 64):
+        history = run(MEMBRANE.replace("cells: [32, 1]", f"cells: [{cells}, 1]"), tmp_path)
+        found = np.array([-history["middle.y"][-1], history["volume"][-1] - 0.3])
+        errors.append(np.abs(found / exact - 1))
+    assert (errors[1] < [0.006, 0.015]).all()
+    assert (errors[1] < 0.6 * errors[0]).all()
+    # pressure on any line between two points is that on the chord
+    assert history["force.y"][-1] == pytest.approx(-p, rel=1e-9)
+    assert abs(history["force.x"][-1]) < 1e-9
+
+
+MISTAKES = [
+    ("dry_side: {block:", "dry_side: {blok:", "21:20: unknown body 'blok'; did you mean 'block'?"),
+    ("  wetted: {block: top}\n", "", "20:21: say which surface is wet: 'wetted: {block: [..]}'"),
+    ("[[0, 0], [1, 0]]", "[]", "21:21: 'block' must have 1 or more entries, not 0"),
+    ("[1, 0]]", "[1, 0, 0]]", "21:30: a corner has 2 entries in 2D, not 3"),
+    ("wetted: {block: top}", "wetted: {block: [top, bottom]}", "21:21: the wetted surface must be one line with two"),
+    (
+        "[[0, 0], [1, 0]]",
+        "[[0, 0.1], [1, 0.1]]",
+        "21:21: the way from (0, 0.1) to (1, 0.1) passes through the box: go around it",
+    ),
+    (
+        "[[0, 0], [1, 0]]",
+        "[[0, 2], [1, 2]]",
+        "21:21: the body must lie between its wetted surface and these points",
+    ),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), MISTAKES, ids=[m[2] for m in MISTAKES])
+def test_message(old, new, message, tmp_path):
+    assert COLUMN.count(old) == 1
+    (tmp_path / "case.yaml").write_text(COLUMN.replace(old, new))
+    with pytest.raises(CaseError) as caught:
+        run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out")
+    lines = [str(problem).split("\n")[0] for problem in caught.value.problems]
+    assert any(f"case.yaml:{message}" in line for line in lines), lines
+
+
+def test_3d_has_no_dry_side(tmp_path):
+    text = COLUMN.replace("[0, -10]", "[0, -10, 0]").replace("[5, 11]", "[5, 11, 5]")
+    text = text.replace("from: [0, 0], to: [1, 1]", "from: [0, 0, 0], to: [1, 1, 1]")
+    (tmp_path / "case.yaml").write_text(text)
+    with pytest.raises(CaseError, match="'dry_side' is for 2D; in 3D a body is wet all round, or where 'wetted' says"):
+        load_case(tmp_path / "case.yaml")
+
+
+def test_a_line_and_a_loop_have_no_two_ends():
+    line, loop = [[0, 1], [1, 2]], [[3, 4], [4, 5], [5, 3]]
+    assert find_ends(np.array(line)) == (2, 0)
+    for facets in (loop, line + loop):
+        with pytest.raises(DrySideError):
+            find_ends(np.array(facets))
+
+
+def test_a_way_that_only_touches_the_box_is_good():
+    points, inside = np.array([[1.0, 0.5], [0.0, 0.5]]), np.array([[0.5, 0.4]])
+    box = np.zeros(2), np.ones(2)
+    for corners in ([[0.0, 0.0], [1.0, 0.0]], [[0.0, -1.0], [1.0, -1.0]], [[-1.0, 0.5], [0.5, -7.0], [2.0, 0.5]]):
+        way = close(points, np.array([[0, 1]]), inside, np.array(corners), box)
+        assert np.array_equal(way, corners)
+    with pytest.raises(DrySideError, match="passes through the box"):
+        close(points, np.array([[0, 1]]), inside, np.array([[0.5, 0.0], [1.0, 0.0]]), box)

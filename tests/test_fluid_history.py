@@ -1,0 +1,79 @@
+"""Velocities of the steps behind: known wherever a body was within a step, also after a restart."""
+
+import numpy as np
+import pytest
+from fluid_setup import block, body, circle, field, loop, make_fluid, nodal_errors, step, wall
+
+from solvers.api import StepFailed
+from solvers.fluid.field import Body
+from solvers.fluid.grid import uniform
+from solvers.fluid.surface import Motion, Surface
+
+VELOCITY, DT = field(2.0, 0.0), 0.01
+
+
+def carried():
+    """A block that another field moves with the flow, in a flow that does not notice it."""
+    points, facets = block([0.23, 0.32], [0.57, 0.66])
+    body = Body(Surface("block", facets, len(points)), motion=None)
+    fluid = make_fluid(
+        uniform([0, 0], [1, 1], [20, 20]), [wall(VELOCITY)], [body], dt=DT, initial_velocity=VELOCITY, mu=0.1
+    )
+    return fluid, points
+
+
+def place(fluid, points, x, speed=2.0):
+    fluid.move({"block": Motion(points + np.array([x, 0.0]), 0 * points + np.array([speed, 0.0]))})
+
+
+def advance(fluid, points, number, x, *, hasty=False):
+    """A step to x; hasty: with a first iterate so fast that a wide strip is solved for."""
+    fluid.begin_step(number * DT, DT)
+    if hasty:
+        place(fluid, points, x, 20.0)
+    place(fluid, points, x)
+    fluid.solve()
+    fluid.end_step()
+
+
+def test_restart_knows_all_that_the_steps_knew():
+    """More cells stay active through a step than its last iterate asks for; the next step may need them."""
+    fluid, points = carried()
+    place(fluid, points, 0.0)
+    for number in range(3):
+        advance(fluid, points, number, 0.02 * (number + 1), hasty=True)
+    other, _ = carried()
+    other.restore(fluid.save())
+    for some in (fluid, other):
+        advance(some, points, 3, 0.25)
+    assert np.allclose(other.flow, fluid.flow, rtol=0, atol=1e-11)
+    u, _ = nodal_errors(fluid, VELOCITY, lambda x, t: 0 * x[0], 0.0, level=True)
+    assert u < 1e-9
+
+
+def test_restart_among_cells_that_come_and_go():
+    """Bit for bit: also the matrix is as it was, with room for bodies where they were before."""
+
+    def make():
+        way = np.array([1.0, 0.0])
+        disc = body("disc", circle((0.3, 0.5), 0.15, 40), loop(40), motion=lambda x, t: (x + t * way, 0 * x + way))
+        return make_fluid(uniform([0, 0], [1, 1], [20, 20]), [wall(field(0, 0))], [disc], mu=0.1, dt=DT)
+
+    fluid = make()
+    for number in range(10):
+        step(fluid, number * DT, DT)
+    other = make()
+    other.restore(fluid.save())
+    for number in range(10, 25):
+        for some in (fluid, other):
+            step(some, number * DT, DT)
+        assert np.array_equal(other.flow, fluid.flow)
+
+
+def test_block_that_was_nowhere_near_is_an_error():
+    fluid, points = carried()
+    place(fluid, points, 0.0)
+    for number in range(3):
+        advance(fluid, points, number, 0.02 * (number + 1))
+    with pytest.raises(StepFailed, match="take a smaller time step"):
+        advance(fluid, points, 3, 0.25)
