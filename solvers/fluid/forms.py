@@ -33,6 +33,11 @@ class Penalties:
     ghost_convection: float = 0.01
     ghost_pressure: float = 0.05
     ghost_second: float = 0.05  #: second derivatives, relative to first ones
+    ghost_mass_second: float = 0.05  #: the same of the mass
+
+
+#: Of q2q1 around elastic bodies: with less, slivers that these uncover keep Newton's method from converging.
+ELASTIC = Penalties(ghost_mass=2e-2, ghost_mass_second=1.0)
 
 
 @dataclass(frozen=True)
@@ -122,22 +127,23 @@ def interface(flow: Flow, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> E
 def ghost_penalty(flow: Flow, factors: Penalties, phi: Expr, carried: Expr, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     """Integrand over faces of gamma_p h^3 / (rho phi) [d_n p] [d_n q] and
 
-    sum_j c_j h^(2j-1) (gamma_v mu + gamma_t rho alpha h^2 + gamma_b rho phi_b) [d_n^j u] [d_n^j v],  c_1 = 1.
+    sum_j h^(2j-1) (c_j (gamma_v mu + gamma_b rho phi_b) + m_j gamma_t rho alpha h^2) [d_n^j u] [d_n^j v],
+    c_1 = m_1 = 1.
 
     phi and `carried`, phi_b = (|a| h)^2 / phi, are scales per cell [m^2/s]: phi_b is small where viscosity or the time
     step rule. Were it phi, the term would be an artificial viscosity along bodies that grows as steps get smaller.
     """
     n = ufl.FacetNormal(flow.mesh)
     h = avg(abs(sum(n[i] ** 2 * size for i, size in enumerate(flow.sizes))))
-    factor = factors.ghost_viscous * flow.mu
+    factor, mass = factors.ghost_viscous * flow.mu, 0.0
     if not flow.steady:
-        factor += factors.ghost_mass * flow.rho * flow.alpha * h**2
+        mass = factors.ghost_mass * flow.rho * flow.alpha * h**2
     if flow.convection:
         factor += factors.ghost_convection * flow.rho * avg(carried)
     terms = factors.ghost_pressure * h**3 / (flow.rho * avg(phi)) * _jump(p, n, 1) * _jump(q, n, 1)
     for order in range(1, flow.degree + 1):
-        weight = 1.0 if order == 1 else factors.ghost_second
-        terms += weight * h ** (2 * order - 1) * factor * dot(_jump(u, n, order), _jump(v, n, order))
+        c, m = (1.0, 1.0) if order == 1 else (factors.ghost_second, factors.ghost_mass_second)
+        terms += h ** (2 * order - 1) * (c * factor + m * mass) * dot(_jump(u, n, order), _jump(v, n, order))
     return terms
 
 
