@@ -14,6 +14,10 @@ CASES = sorted(path.parent for path in Path("cases").glob("*/case.yaml"))
 LONG = ("torus_wall_fine",)
 #: what makes the first steps quick without changing what they are about
 SMALLER = {
+    "cylinder_2d1": [
+        "fluid.grid.x=[{to: 0.14, cells: 8, ratio: 0.1}, {to: 0.26, cells: 20}, {to: 2.2, cells: 24, ratio: 25}]",
+        "fluid.grid.y=[{to: 0.14, cells: 10, ratio: 0.25}, {to: 0.26, cells: 20}, {to: 0.41, cells: 10, ratio: 4}]",
+    ],
     "fsi1": ["fluid.element=q1q1"],
     "fsi3": ["fluid.element=q1q1"],
     "falling_sphere": [
