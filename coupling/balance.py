@@ -41,11 +41,11 @@ class Balance:
         size = float(np.abs(reaction).sum())
         self.force = float(np.abs(carried - reaction).sum()) / size if size > 0.0 else 0.0
         total = sum(force.sum(axis=0) for force in coupled.fluid.force().values())
-        missed = total + (carried - reaction).sum(axis=0) - self._of_fluid.force_on_bodies()
+        of_fluid, self.loss = self._of_fluid()
+        missed = total + (carried - reaction).sum(axis=0) - of_fluid
         self.momentum = float(np.linalg.norm(missed))
         structure_moves = interface.displacement() - interface.old
         self.power = float((reaction * interface.velocity(interface.now)).sum())
-        self.loss = self._of_fluid.lost_power()
         self.work += float((carried * structure_moves).sum()) - coupled.fluid.dt * self.power
 
     def numbers(self) -> dict[str, float]:

@@ -25,23 +25,18 @@ class Balances:
         inertia, strain = forms.inertia(system.terms, u), forms.eps(u)
         self._inner = self._over_fluid(ufl.dot(inertia, v) + 2.0 * system.terms.mu * ufl.inner(strain, forms.eps(v)))
 
-    def force_on_bodies(self) -> Array:
-        """Force [N] of the fluid on all bodies together, shape (dim,) (collective).
+    def __call__(self) -> tuple[Array, float]:
+        """(force [N] of the fluid on all bodies together, shape (dim,); power [W] that the method takes) (collective).
 
-        That on walls and patches less int rho (u_t + u . grad u) - f.
+        Force: that on walls and patches less int rho (u_t + u . grad u) - f. Power, by stabilisation, ghost penalty and
+        slip at the bodies: that of walls and patches less what bodies get and
+        int (rho (u_t + u . grad u) - f) . u + 2 mu eps(u) : eps(u).
         """
+        fluid, dofs = self.fluid, self.fluid.unknowns.velocity.dofs
         rows = self._outer_rows() - self._inner_rows()
-        return self.fluid.comm.allreduce(rows[self.fluid.unknowns.velocity.dofs].sum(axis=0))
-
-    def lost_power(self) -> float:
-        """Power [W] that the method takes: by stabilisation, ghost penalty and slip at the bodies (collective).
-
-        That of walls and patches less what bodies get and int (rho (u_t + u . grad u) - f) . u + 2 mu eps(u) : eps(u).
-        """
-        fluid = self.fluid
-        rows = (self._outer_rows() - self._inner_rows()) * fluid.flow
-        given = fluid.comm.allreduce(float(rows[fluid.unknowns.velocity.dofs].sum()))
-        return given - float((fluid.system.surface_force() * fluid.cut.motion.v).sum())
+        force = fluid.comm.allreduce(rows[dofs].sum(axis=0))
+        given = fluid.comm.allreduce(float((rows * fluid.flow)[dofs].sum()))
+        return force, given - float((fluid.system.surface_force() * fluid.cut.motion.v).sum())
 
     def _outer_rows(self) -> Array:
         """Forces [N] on the fluid from walls and patches at local dofs, the ghosts' share still there."""

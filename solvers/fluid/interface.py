@@ -93,17 +93,16 @@ class Interface:
     @cached_property
     def places(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(local dofs, dofs of the vertices) of the entries of `Blocks`, those of the velocity first."""
-        pieces, functions, dim = self.u.shape
-        columns = self._columns()
-        shape = (pieces, functions, dim, dim, dim)
-        on_velocity = self.u[:, :, :, None, None], columns[:, None, None]
-        on_pressure = self.p[:, :, None, None], columns[:, None]
-        shapes = shape, (pieces, self.p.shape[1], dim, dim)
-        rows, all_columns = (
-            np.concatenate([np.broadcast_to(part[i], s).ravel() for part, s in zip(parts, shapes, strict=True)])
-            for i, parts in ((0, (on_velocity, on_pressure)), (1, (on_velocity, on_pressure)))
-        )
-        return rows, all_columns
+        columns, (on_velocity, on_pressure) = self._columns(), (block.shape for block in self.coupling_blocks)
+        rows = [
+            np.broadcast_to(self.u[..., None, None], on_velocity),
+            np.broadcast_to(self.p[..., None, None], on_pressure),
+        ]
+        vertices = [
+            np.broadcast_to(columns[:, None, None], on_velocity),
+            np.broadcast_to(columns[:, None], on_pressure),
+        ]
+        return np.concatenate([part.ravel() for part in rows]), np.concatenate([part.ravel() for part in vertices])
 
     @cached_property
     def surface_places(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
