@@ -10,6 +10,8 @@ Source: Schott, Ager, Wall, Int. J. Numer. Meth. Engng 119 (2019) 757-796.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from petsc4py import PETSc
 
@@ -19,6 +21,7 @@ from solvers import linear
 from solvers.api import State, StepFailed, StepInfo
 from solvers.fluid.field import Fluid
 from solvers.fluid.shape import shape_derivatives
+from solvers.lagged import LaggedFactors
 from solvers.newton import Tolerance, converge
 from solvers.rows import Numbering, from_entries
 from solvers.structure.field import Structure
@@ -35,7 +38,8 @@ class Monolithic:
         self.comm, fluid.solved_with_bodies = structure.comm, True
         self._numbering = Numbering(self.comm, structure.layout.size, fluid.unknowns.owned)
         self._iterative = linear.choose_flow(fluid.solver.linear, fluid.dim, fluid.dofs()) == "iterative"
-        self._direct = linear.flow_direct_solver(self.comm, tolerance=0.0)
+        #: in time the first matrix of a step is that of a cut, the others are those of another
+        self._direct = LaggedFactors(self.comm, fresh=math.inf if fluid.settings.steady else 2)
         self._farther: Structure | Fluid = fluid
         self._krylov: PETSc.KSP | None = None
         self._preconditioned_by: PETSc.Mat | None = None
@@ -47,6 +51,7 @@ class Monolithic:
         coupled = self.coupled
         coupled.begin_step(t, dt)
         self._largest, self._krylov, self._linear_iterations = np.zeros(2), None, 0
+        self._direct.begin_step()
         info = converge(self, self.tolerance)
         coupled.structure.check_deformation(info.iterations, info.residuals)
         coupled.end_step(self._force)
@@ -92,11 +97,13 @@ class Monolithic:
         return max(structure.update(x.array[:own], everything), fluid.update(x.array[own:]))
 
     def _solve(self, blocks: Blocks, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Directly, or preconditioned by the first matrix of the step as long as that serves."""
-        if not self._iterative:
-            linear.solve(self._direct, blocks.assembled(), b, x)
-            return
-        matrix = blocks.nested()
+        if self._iterative:
+            self._iterate(blocks.nested(), b, x)
+        else:
+            self._direct.solve(blocks.assembled(), b, x)
+
+    def _iterate(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
+        """Preconditioned by the first matrix of the step as long as that serves."""
         if self._krylov is not None:
             try:
                 linear.solve(self._krylov, matrix, b, x, self._preconditioned_by)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from coupling.accelerate import Accelerator
 from coupling.coupled import Coupled
+from coupling.predict import Predictor
 from solvers.api import Array, State, StepFailed, StepInfo
 
 
@@ -31,12 +32,14 @@ class Partitioned:
 
     def __init__(self, coupled: Coupled, accelerator: Accelerator, tolerance: Tolerance = Tolerance()):
         self.coupled, self.accelerator, self.tolerance = coupled, accelerator, tolerance
+        self.predictor = Predictor()
 
     def step(self, t: float, dt: float) -> StepInfo:
         coupled, interface = self.coupled, self.coupled.interface
         coupled.begin_step(t, dt)
         self.accelerator.begin_step()
-        d = self._predict()
+        self.predictor.add(t - dt, interface.old)
+        d = self._predict(t)
         history: list[float] = []
         newton = 0
         contact: NDArray[np.bool_] | None = None
@@ -66,13 +69,11 @@ class Partitioned:
             numbers.update(constraint.numbers())
         return StepInfo(len(history), tuple(history), numbers)
 
-    def _predict(self) -> Array:
-        """The structure's own prediction where it made one, else the displacement goes on as in the last step."""
-        interface = self.coupled.interface
-        predicted = interface.displacement()
-        if np.array_equal(predicted, interface.old) and self.coupled.fluid.difference.alpha:
-            return interface.old + (interface.old - interface.older)
-        return predicted
+    def _predict(self, t: float) -> Array:
+        """The structure's own prediction where it made one, else the displacements go on as before."""
+        found = self.coupled.interface.displacement()
+        in_time = self.coupled.fluid.difference.alpha != 0.0
+        return self.predictor.at(t) if in_time and np.array_equal(found, self.coupled.interface.old) else found
 
     def _small(self, found: Array) -> float:
         return max(self.tolerance.relative * _mean(found - self.coupled.interface.old), self.tolerance.absolute)
@@ -82,11 +83,13 @@ class Partitioned:
         return None if constraint is None else constraint.active()
 
     def save(self) -> State:
-        return {**self.coupled.save(), "accelerator": self.accelerator.save()}
+        own = {"accelerator": self.accelerator.save(), "predictor": self.predictor.save()}
+        return {**self.coupled.save(), **own}
 
     def restore(self, state: State) -> None:
         self.coupled.restore(state)
         self.accelerator.restore(state["accelerator"])
+        self.predictor.restore(state["predictor"])
 
 
 def _mean(vectors: Array) -> float:

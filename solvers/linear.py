@@ -93,15 +93,6 @@ def choose_flow(method: Method, dim: int, dofs: int) -> Literal["direct", "itera
 FLOW_DIRECT_LIMIT = {2: 400_000, 3: 4_000}
 
 
-def flow_direct_solver(comm, *, tolerance: float) -> PETSc.KSP:
-    """LU by MUMPS: velocity and pressure need pivoting."""
-    ksp = PETSc.KSP().create(comm)
-    ksp.setType(PETSc.KSP.Type.PREONLY)
-    ksp.getPC().setType(PETSc.PC.Type.LU)
-    ksp.getPC().setFactorSolverType("mumps")
-    return ksp
-
-
 def flow_solver(comm, *, tolerance: float) -> PETSc.KSP:
     """GMRES with overlapping subdomains and incomplete factors, velocity and pressure of a node side by side."""
     return _schwarz_solver(comm, "flow_", tolerance)
@@ -183,6 +174,6 @@ def solve(
     if reason < 0:
         raise LinearSolveFailed(
             "the linear system is singular: is a body not held?"
-            if ksp.getType() == PETSc.KSP.Type.PREONLY
+            if reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
             else f"the linear solver stalled after {ksp.getIterationNumber()} iterations (PETSc reason {reason})"
         )

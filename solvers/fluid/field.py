@@ -23,6 +23,7 @@ from solvers.fluid.pressure_level import hold_pressure, spread_excess
 from solvers.fluid.space import Nodes, Unknowns
 from solvers.fluid.surface import Motion, Surface, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
+from solvers.lagged import LaggedFactors
 from solvers.newton import Tolerance, converge
 from solvers.timing import Timer
 
@@ -88,7 +89,8 @@ class Fluid:
         self.solved_with_bodies = False
         self._motions: list[Motion] = []
         self._wet = wetness([body.surface for body in self.bodies])
-        self._ksp: PETSc.KSP | None = None
+        self._krylov: PETSc.KSP | None = None
+        self._direct = LaggedFactors(comm, fresh=math.inf if settings.steady else 1)
 
     # ------------------------------------------------------------------------------------------------- the state
 
@@ -140,6 +142,7 @@ class Fluid:
         self.flow[self.boundary.dofs] = self.boundary.velocity(t + dt)
         self.system.set_scales(velocity)
         self._fresh, self._largest = True, 0.0
+        self._direct.begin_step()
         if not self._coupled:
             self.move({})
 
@@ -254,10 +257,12 @@ class Fluid:
         return self.settings.steady and self.settings.convection and self._size > NEWTON_FROM * self._largest
 
     def _solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        if self._ksp is None:
-            make = linear.flow_solver if self._iterative else linear.flow_direct_solver
-            self._ksp = make(self.comm, tolerance=self.solver.linear_tolerance)
-        linear.solve(self._ksp, matrix, b, x)
+        if not self._iterative:
+            self._direct.solve(matrix, b, x)
+            return
+        if self._krylov is None:
+            self._krylov = linear.flow_solver(self.comm, tolerance=self.solver.linear_tolerance)
+        linear.solve(self._krylov, matrix, b, x)
 
     def _add(self, owned: Array) -> None:
         self.flow[: self.unknowns.owned] += owned

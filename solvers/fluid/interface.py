@@ -24,7 +24,7 @@ from solvers.fluid.space import Unknowns
 from solvers.fluid.weights import Weights
 
 #: By pieces: velocity rows (pieces, functions, dim, vertices, dim), pressure rows (pieces, functions, vertices, dim)
-Blocks = tuple[Array, Array]
+CouplingBlocks = tuple[Array, Array]
 
 
 class Interface:
@@ -76,7 +76,7 @@ class Interface:
         return total
 
     @cached_property
-    def coupling_blocks(self) -> Blocks:
+    def coupling_blocks(self) -> CouplingBlocks:
         """C by pieces."""
         mu, n = self.mu, self.n
         block = mu * np.einsum("pavi,pk->pakvi", self.grad, n)
@@ -92,7 +92,7 @@ class Interface:
 
     @cached_property
     def places(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(local dofs, dofs of the vertices) of the entries of `Blocks`, those of the velocity first."""
+        """(local dofs, dofs of the vertices) of the entries of `CouplingBlocks`, those of the velocity first."""
         columns, (on_velocity, on_pressure) = self._columns(), (block.shape for block in self.coupling_blocks)
         rows = [
             np.broadcast_to(self.u[..., None, None], on_velocity),

@@ -15,10 +15,10 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.api import Array
-from solvers.fluid.interface import Blocks, Interface
+from solvers.fluid.interface import CouplingBlocks, Interface
 
 
-def shape_derivatives(interface: Interface, flow: Array) -> tuple[Blocks, Array]:
+def shape_derivatives(interface: Interface, flow: Array) -> tuple[CouplingBlocks, Array]:
     """(dr/dd, df/dd) by pieces, as `Interface` has them; `flow` at local dofs."""
     at, n, mu, P = interface, interface.n, interface.mu, interface.penalty
     u, p = flow[at.u], flow[at.p]

@@ -1,0 +1,66 @@
+"""Factors that serve again: the answer is that of the matrix asked for, whatever was factored before."""
+
+import numpy as np
+import pytest
+from petsc4py import PETSc
+from scipy import sparse
+
+from solvers.lagged import LaggedFactors
+from solvers.linear import LinearSolveFailed
+
+SIZE = 60
+NUMBERS = np.random.default_rng(3)
+NEAR = sparse.random(SIZE, SIZE, 0.1, random_state=1).tocsr()
+BASE = (sparse.eye(SIZE) * 4.0 + sparse.random(SIZE, SIZE, 0.2, random_state=2)).tocsr()
+LOAD = NUMBERS.standard_normal(SIZE)
+
+
+def solve(factors: LaggedFactors, matrix: sparse.csr_matrix) -> np.ndarray:
+    as_petsc = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data))
+    b, x = as_petsc.createVecs()
+    b.array[:] = LOAD
+    factors.solve(as_petsc, b, x)
+    return x.array.copy()
+
+
+def error(x: np.ndarray, matrix: sparse.csr_matrix) -> float:
+    return float(np.linalg.norm(matrix @ x - LOAD) / np.linalg.norm(LOAD))
+
+
+def test_near_matrices_are_solved_with_the_factors_there_are() -> None:
+    factors = LaggedFactors(PETSc.COMM_SELF, fresh=1)
+    assert error(solve(factors, BASE), BASE) < 1e-13
+    for share in (0.01, 0.02, 0.03):
+        matrix = (BASE + share * NEAR).tocsr()
+        assert error(solve(factors, matrix), matrix) < 1e-8
+    assert factors.factored == 1
+
+
+def test_far_matrices_are_factored_and_serve_from_then_on() -> None:
+    factors = LaggedFactors(PETSc.COMM_SELF, fresh=1)
+    solve(factors, BASE)
+    far = (BASE @ sparse.diags(10.0 ** NUMBERS.uniform(-3.0, 3.0, SIZE)) + 50.0 * NEAR).tocsr()
+    assert error(solve(factors, far), far) < 1e-8
+    assert factors.factored == 2
+    near = (far * 1.01).tocsr()
+    assert error(solve(factors, near), near) < 1e-8
+    assert factors.factored == 2
+
+
+@pytest.mark.parametrize("fresh", [1, 2, float("inf")])
+def test_the_first_matrices_of_a_step_are_factored(fresh: float) -> None:
+    factors = LaggedFactors(PETSc.COMM_SELF, fresh=fresh)
+    for _ in range(2):
+        factors.begin_step()
+        for _ in range(4):
+            solve(factors, BASE)
+        assert factors.factored == min(fresh, 4)
+
+
+def test_singular_matrices_are_an_error() -> None:
+    factors = LaggedFactors(PETSc.COMM_SELF, fresh=1)
+    singular = BASE.tolil()
+    singular[7, :] = singular[:, 7] = 0.0
+    singular[7, 7] = 0.0
+    with pytest.raises(LinearSolveFailed):
+        solve(factors, singular.tocsr())
