@@ -92,7 +92,7 @@ class QuasiNewton:
     Bogaers, Scheufele, Uekermann, Mehl, Comput. Struct. 171 (2016) 9-17 (filter).
     """
 
-    def __init__(self, first: float = 0.1, reuse: int = 8, filter: float = 1e-3):
+    def __init__(self, first: float = 0.1, reuse: int = 8, filter: float = 0.1):
         self.first, self.reuse, self.filter = first, reuse, filter
         self._steps: list[tuple[list[Array], list[Array]]] = []
         self._before: tuple[Array, Array] | None = None

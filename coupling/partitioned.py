@@ -36,10 +36,11 @@ class Partitioned:
 
     def step(self, t: float, dt: float) -> StepInfo:
         coupled, interface = self.coupled, self.coupled.interface
+        before = interface.displacement()
         coupled.begin_step(t, dt)
         self.accelerator.begin_step()
-        self.predictor.add(t - dt, interface.old)
-        d = self._predict(t)
+        self.predictor.add(t, interface.old)
+        d = self._predict(t + dt, before)
         history: list[float] = []
         newton = 0
         contact: NDArray[np.bool_] | None = None
@@ -69,11 +70,11 @@ class Partitioned:
             numbers.update(constraint.numbers())
         return StepInfo(len(history), tuple(history), numbers)
 
-    def _predict(self, t: float) -> Array:
+    def _predict(self, t: float, before: Array) -> Array:
         """The structure's own prediction where it made one, else the displacements go on as before."""
         found = self.coupled.interface.displacement()
         in_time = self.coupled.fluid.difference.alpha != 0.0
-        return self.predictor.at(t) if in_time and np.array_equal(found, self.coupled.interface.old) else found
+        return self.predictor.at(t) if in_time and np.array_equal(found, before) else found
 
     def _small(self, found: Array) -> float:
         return max(self.tolerance.relative * _mean(found - self.coupled.interface.old), self.tolerance.absolute)

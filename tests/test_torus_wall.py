@@ -44,12 +44,12 @@ def history(run):
 
 
 def test_it_arrives_and_is_pressed_against_the_wall(history):
-    """It starts 1.15 m above the wall; the contact force grows after first contact."""
+    """It starts 1.15 m above the wall; at the end it hardly moves, and the wall bears what the fluid pushes."""
     touching = history["contact.active"] > 0
     assert history["gap"][0] == pytest.approx(1.15, abs=0.05)
     assert 0.38 < history["time"][touching][0] < 0.46
     assert history["contact.wall.z"][-1] > 10.0
-    assert not touching[: len(touching) // 2].any()
+    assert history["contact.wall.z"][-1] == pytest.approx(-history["force.z"][-1], rel=0.05)
 
 
 def test_nothing_is_lost_on_the_way(history):
