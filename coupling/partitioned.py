@@ -40,6 +40,8 @@ class Partitioned:
         coupled.begin_step(t, dt)
         self.accelerator.begin_step()
         self.predictor.add(t, interface.old)
+        # cells that the surface leaves in this step keep their ghost penalty, whatever the first iterate
+        coupled.fluid.move(interface.move(interface.old))
         d = self._predict(t + dt, before)
         history: list[float] = []
         newton = 0

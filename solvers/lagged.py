@@ -28,8 +28,8 @@ class LaggedFactors:
         """The next matrix is one of another step."""
         self.factored = 0
 
-    def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Solve matrix x = b. Raises LinearSolveFailed."""
+    def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> int:
+        """Solve matrix x = b; how many iterations that took. Raises LinearSolveFailed."""
         if self.factored >= self.fresh:
             self._ksp.getPC().setReusePreconditioner(True)
             try:
@@ -37,7 +37,8 @@ class LaggedFactors:
             except LinearSolveFailed:
                 pass
             else:
-                return
+                return int(self._ksp.getIterationNumber())
         self._ksp.getPC().setReusePreconditioner(False)
         self.factored += 1
         solve(self._ksp, matrix, b, x)
+        return int(self._ksp.getIterationNumber())

@@ -48,7 +48,7 @@ def resistance(dim, concentration, cells, element="q1q1"):
     rate = share * -on_patch(fluid, "flow_rate", "in")()[""]
     force = 2 * share * fluid.force()["grain"].sum(axis=0)[0]
     assert force == pytest.approx(1.0, rel=1e-6)
-    iterations = fluid._ksp.getIterationNumber()
+    iterations = fluid.linear_iterations
     return 1.0 / (rate if dim == 2 else 6 * np.pi * a * rate), fluid.dofs(), (info.iterations, iterations)
 
 

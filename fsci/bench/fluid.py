@@ -203,6 +203,6 @@ def channel(cells: int, steps: int, dt: float = 0.05) -> Row:
         "dofs": fluid.dofs(),
         "cut cells": len(fluid.cut.cut),
         "newton per step": newton / steps,
-        "krylov, last": fluid._krylov.getIterationNumber() if fluid._krylov is not None else 0,
+        "krylov, last": fluid.linear_iterations,
         **seconds,
     }

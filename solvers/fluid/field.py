@@ -90,6 +90,7 @@ class Fluid:
         self._motions: list[Motion] = []
         self._wet = wetness([body.surface for body in self.bodies])
         self._krylov: PETSc.KSP | None = None
+        self.linear_iterations = 0  #: of the last linear system
         self._direct = LaggedFactors(comm, fresh=math.inf if settings.steady else 1)
 
     # ------------------------------------------------------------------------------------------------- the state
@@ -258,11 +259,12 @@ class Fluid:
 
     def _solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
         if not self._iterative:
-            self._direct.solve(matrix, b, x)
+            self.linear_iterations = self._direct.solve(matrix, b, x)
             return
         if self._krylov is None:
             self._krylov = linear.flow_solver(self.comm, tolerance=self.solver.linear_tolerance)
         linear.solve(self._krylov, matrix, b, x)
+        self.linear_iterations = self._krylov.getIterationNumber()
 
     def _add(self, owned: Array) -> None:
         self.flow[: self.unknowns.owned] += owned

@@ -1,0 +1,24 @@
+// The flag of Turek and Hron with its root on the cylinder's surface, 5e-6 m deep in it.
+DefineConstant[ along = 35, across = 2, deep = 5e-6 ];
+r = 0.05 - deep;
+root = 0.2 + Sqrt(r*r - 0.01*0.01);
+Point(1) = {0.2, 0.2, 0};
+Point(2) = {root, 0.19, 0};
+Point(3) = {0.6, 0.19, 0};
+Point(4) = {0.6, 0.21, 0};
+Point(5) = {root, 0.21, 0};
+Line(1) = {2, 3};
+Line(2) = {3, 4};
+Line(3) = {4, 5};
+Circle(4) = {5, 1, 2};
+Curve Loop(1) = {1, 2, 3, 4};
+Plane Surface(1) = {1};
+Transfinite Curve {1, 3} = along + 1;
+Transfinite Curve {2, 4} = across + 1;
+Transfinite Surface {1};
+Recombine Surface {1};
+Physical Curve("bottom") = {1};
+Physical Curve("right") = {2};
+Physical Curve("top") = {3};
+Physical Curve("left") = {4};
+Physical Surface("flag") = {1};
