@@ -54,6 +54,24 @@ def test_both_schemes_take_the_same_way(accelerator):
     assert max(newton) <= 3
 
 
+def test_steps_begin_on_the_parabola_through_the_last_places(monkeypatch):
+    """After the cut of the old place, which cells that the surface leaves in this step need."""
+    dt, steps = 0.1, 6
+    scheme = Partitioned(bar_and_column(1.0), QuasiNewton(0.5), Tolerance(1e-9))
+    interface = scheme.coupled.interface
+    scheme.coupled.initialise(0.0, dt)
+    places, tried, move = [interface.now.copy()], [], interface.move
+    monkeypatch.setattr(interface, "move", lambda d: tried.append(d.copy()) or move(d))
+    for step in range(steps):
+        tried.clear()
+        scheme.step(step * dt, dt)
+        assert np.array_equal(tried[0], places[-1])
+        if step >= 2:
+            a, b, c = places[-3:]
+            assert tried[1] == pytest.approx(a - 3.0 * b + 3.0 * c, rel=1e-12, abs=1e-15)
+        places.append(interface.now.copy())
+
+
 def contraction(dt: float, cells: int) -> float:
     """Exact factor of plain Dirichlet-Neumann iterations: added mass of the column over what the bar's end resists.
 
