@@ -68,7 +68,12 @@ class Clock:
         return False
 
     def save(self) -> State:
-        return {"tick": self.tick, "level": self.level, "accepted": self.accepted, "step": self.step}
+        count = {"tick": self.tick, "level": self.level, "accepted": self.accepted, "step": self.step}
+        return count | {"time": self.time}
 
     def restore(self, state: State) -> None:
-        vars(self).update(state)
+        """Go on where a clock was saved; with another step size than it had, from its time on."""
+        self.tick, self.level = state["tick"], state["level"]
+        self.accepted, self.step = state["accepted"], state["step"]
+        if self.time != state["time"]:
+            self.start, self.tick, self.level, self.accepted = state["time"], 0, 0, 0

@@ -148,3 +148,28 @@ def test_save_and_restore():
     other.restore(state)
     assert steps(other) == rest
     assert other.save() == run.save()
+
+
+@pytest.mark.parametrize("step", [0.5, 0.3, 2.0])
+def test_goes_on_with_another_step_from_the_time_of_the_checkpoint(step):
+    """A case whose step was changed between run and resume: ticks of the old size say nothing."""
+    run = clock(10.0, 1.0)
+    for _ in range(4):
+        run.accept()
+    other = clock(10.0, step)
+    other.restore(run.save())
+    assert other.time == 4.0
+    assert other.step == 4
+    found = steps(other)
+    assert found[0] == (4.0, pytest.approx(step))
+    assert other.time == 10.0
+
+
+def test_a_later_end_after_a_partial_last_step():
+    """The last step to 2.5 was half a step: the next ones start there."""
+    run = clock(2.5, 1.0)
+    steps(run)
+    longer = clock(4.0, 1.0)
+    longer.restore(run.save())
+    assert longer.time == 2.5
+    assert [time for time, _ in steps(longer)] == pytest.approx([2.5, 3.5])
