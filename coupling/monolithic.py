@@ -38,7 +38,7 @@ class Monolithic:
         self.comm, fluid.solved_with_bodies = structure.comm, True
         self._numbering = Numbering(self.comm, structure.layout.size, fluid.unknowns.owned)
         self._iterative = linear.choose_flow(fluid.solver.linear, fluid.dim, fluid.dofs()) == "iterative"
-        #: in time the first matrix of a step is that of a cut, the others are those of another
+        # in time the first matrix of a step belongs to the old place of the bodies: it does not serve for the others
         self._direct = LaggedFactors(self.comm, fresh=math.inf if fluid.settings.steady else 2)
         self._farther: Structure | Fluid = fluid
         self._krylov: PETSc.KSP | None = None

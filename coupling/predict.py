@@ -1,7 +1,6 @@
 """Where a surface will be: the parabola through its last three places, or as much of it as is known.
 
-d(t) = sum_i L_i(t) d_i, L_i the Lagrange polynomials on the times t_i. Source: Degroote, Arch. Comput. Methods Eng. 20
-(2013) 185-238, section 3.1.
+d(t) = sum_i L_i(t) d_i, L_i the Lagrange polynomials on the times t_i, whatever the lengths of the steps were.
 """
 
 from __future__ import annotations

@@ -174,6 +174,6 @@ def solve(
     if reason < 0:
         raise LinearSolveFailed(
             "the linear system is singular: is a body not held?"
-            if reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
+            if ksp.getType() == PETSc.KSP.Type.PREONLY or reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
             else f"the linear solver stalled after {ksp.getIterationNumber()} iterations (PETSc reason {reason})"
         )
