@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+from mpi4py import MPI
+
 from coupling.balance import Balance
 from coupling.interface import Interface
+from coupling.predict import Predictor
 from solvers.api import Array, State
 from solvers.fluid.field import Fluid
 from solvers.structure.field import Structure
@@ -19,9 +23,10 @@ class Coupled:
     structure: Structure
     interface: Interface
     balance: Balance = field(init=False)
+    predictor: Predictor = field(init=False)
 
     def __post_init__(self) -> None:
-        self.balance = Balance(self.fluid)
+        self.balance, self.predictor = Balance(self.fluid), Predictor()
 
     def initialise(self, t: float, dt: float) -> None:
         """Both fields at the first time, the fluid around the structure as it starts."""
@@ -32,9 +37,23 @@ class Coupled:
         self.fluid.move(self.interface.move(self.interface.now))
 
     def begin_step(self, t: float, dt: float) -> None:
+        """Boundary and loads at t + dt, both fields as they were at t."""
         self.fluid.begin_step(t, dt)
         self.interface.begin_step(self.fluid.difference)
         self.structure.begin_step(t, dt)
+        self.predictor.add(t, self.structure.old.u)
+        # cells that the surface leaves in this step keep their ghost penalty, whatever the first guess
+        self.fluid.move(self.interface.move(self.interface.old))
+
+    def predict(self, t: float) -> None:
+        """First guess of the fields at t: places on a parabola, unless the structure has a guess of its own."""
+        structure = self.structure
+        if self.fluid.settings.steady:
+            return
+        self.fluid.predict()
+        own_guess = not np.array_equal(structure.now.u[structure.free], structure.old.u[structure.free])
+        if not structure.comm.allreduce(own_guess, op=MPI.LOR):
+            structure.now.u[structure.free] = self.predictor.at(t)[structure.free]
 
     def end_step(self, force: Array) -> None:
         """Accept the step; `force` [N] on the vertices is what the structure has carried."""
@@ -52,10 +71,20 @@ class Coupled:
             "structure": self.structure.save(),
             "interface": self.interface.save(),
             "balance": self.balance.save(),
+            "places": self._save_places(),
         }
+
+    def _save_places(self) -> State:
+        """Three of them at all times, so that all states have the same parts."""
+        places = [*self.predictor.places, *[self.structure.now.u] * 3][:3]
+        by_name: State = {str(i): self.structure.per_body(place) for i, place in enumerate(places)}
+        return by_name | {"times": list(self.predictor.times)}
 
     def restore(self, state: State) -> None:
         self.structure.restore(state["structure"])
         self.fluid.restore(state["fluid"])
         self.interface.restore(state["interface"])
         self.balance.restore(state["balance"])
+        times = list(state["places"]["times"])
+        self.predictor.times = times
+        self.predictor.places = [self.structure.from_bodies(state["places"][str(i)]) for i in range(len(times))]

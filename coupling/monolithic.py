@@ -38,7 +38,7 @@ class Monolithic:
         self.comm, fluid.solved_with_bodies = structure.comm, True
         self._numbering = Numbering(self.comm, structure.layout.size, fluid.unknowns.owned)
         self._iterative = linear.choose_flow(fluid.solver.linear, fluid.dim, fluid.dofs()) == "iterative"
-        # in time the first matrix of a step belongs to the old place of the bodies: it does not serve for the others
+        # in time the matrix of the first guess is too far from the later ones to serve for all of them
         self._direct = LaggedFactors(self.comm, fresh=math.inf if fluid.settings.steady else 2)
         self._farther: Structure | Fluid = fluid
         self._krylov: PETSc.KSP | None = None
@@ -52,7 +52,9 @@ class Monolithic:
         coupled.begin_step(t, dt)
         self._largest, self._krylov, self._linear_iterations = np.zeros(2), None, 0
         self._direct.begin_step()
-        info = converge(self, self.tolerance)
+        unmoved = self.residual()
+        coupled.predict(t + dt)
+        info = converge(self, self.tolerance, unmoved)
         coupled.structure.check_deformation(info.iterations, info.residuals)
         coupled.end_step(self._force)
         numbers = coupled.balance.numbers() | {"coupling.linear": float(self._linear_iterations)}

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from coupling.accelerate import Accelerator
 from coupling.coupled import Coupled
-from coupling.predict import Predictor
 from solvers.api import Array, State, StepFailed, StepInfo
 
 
@@ -32,17 +31,13 @@ class Partitioned:
 
     def __init__(self, coupled: Coupled, accelerator: Accelerator, tolerance: Tolerance = Tolerance()):
         self.coupled, self.accelerator, self.tolerance = coupled, accelerator, tolerance
-        self.predictor = Predictor()
 
     def step(self, t: float, dt: float) -> StepInfo:
         coupled, interface = self.coupled, self.coupled.interface
-        before = interface.displacement()
         coupled.begin_step(t, dt)
         self.accelerator.begin_step()
-        self.predictor.add(t, interface.old)
-        # cells that the surface leaves in this step keep their ghost penalty, whatever the first iterate
-        coupled.fluid.move(interface.move(interface.old))
-        d = self._predict(t + dt, before)
+        coupled.predict(t + dt)
+        d = interface.displacement()
         history: list[float] = []
         newton = 0
         contact: NDArray[np.bool_] | None = None
@@ -72,12 +67,6 @@ class Partitioned:
             numbers.update(constraint.numbers())
         return StepInfo(len(history), tuple(history), numbers)
 
-    def _predict(self, t: float, before: Array) -> Array:
-        """The structure's own prediction where it made one, else the displacements go on as before."""
-        found = self.coupled.interface.displacement()
-        in_time = self.coupled.fluid.difference.alpha != 0.0
-        return self.predictor.at(t) if in_time and np.array_equal(found, before) else found
-
     def _small(self, found: Array) -> float:
         return max(self.tolerance.relative * _mean(found - self.coupled.interface.old), self.tolerance.absolute)
 
@@ -86,13 +75,11 @@ class Partitioned:
         return None if constraint is None else constraint.active()
 
     def save(self) -> State:
-        own = {"accelerator": self.accelerator.save(), "predictor": self.predictor.save()}
-        return {**self.coupled.save(), **own}
+        return {**self.coupled.save(), "accelerator": self.accelerator.save()}
 
     def restore(self, state: State) -> None:
         self.coupled.restore(state)
         self.accelerator.restore(state["accelerator"])
-        self.predictor.restore(state["predictor"])
 
 
 def _mean(vectors: Array) -> float:

@@ -87,14 +87,17 @@ def _halve(system: System, before: float, increment: float, residual: float) -> 
     return increment * remaining, residual
 
 
-def converge(system: System, tolerance: Tolerance) -> StepInfo:
-    """Iterate until accepted. Raises StepFailed with the history of residuals and the worst place."""
+def converge(system: System, tolerance: Tolerance, unmoved: float = 0.0) -> StepInfo:
+    """Iterate until accepted. Raises StepFailed with the history of residuals and the worst place.
+
+    `unmoved`: residual [N] before a first guess moved the system; a good guess does not make the tolerance stricter.
+    """
     history: list[float] = []
     for iterate in iterates(system, line_search=tolerance.line_search):
         history.append(iterate.residual)
         if not math.isfinite(iterate.residual):
             reason = "the residual is not a number"
-        elif iterate.settled and _accepted(iterate, max(history), system.round_off(), tolerance):
+        elif iterate.settled and _accepted(iterate, max(unmoved, *history), system.round_off(), tolerance):
             return StepInfo(iterate.number, tuple(history))
         elif iterate.number == tolerance.max_iterations:
             reason = f"Newton did not converge in {iterate.number} iterations (residual {history[-1]:.3g} N)"

@@ -47,7 +47,7 @@ def at_random_state(case):
         step(fluid, 0.0, 0.05)
     fluid.begin_step(0.05, 0.05)
     fluid.flow[:] = rng.normal(size=len(fluid.flow)) * fluid.system.active_dofs
-    velocity = np.where(fluid.velocity_mask, fluid.flow, 0.0)
+    velocity = fluid.velocity()
     fluid.system.set_scales(velocity)
     fluid.system.set_penalties()
     return fluid, rng

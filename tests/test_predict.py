@@ -1,4 +1,4 @@
-"""The predicted place of a surface: exact for motions that are parabolas in time, whatever the steps."""
+"""The predicted place of a body: exact for motions that are parabolas in time, whatever the steps."""
 
 import numpy as np
 import pytest
@@ -25,13 +25,3 @@ def test_forgets_what_is_older_than_three_places() -> None:
     for t in (0.0, 0.1, 0.15):
         predictor.add(t, parabola(t))
     assert predictor.at(0.2) == pytest.approx(parabola(0.2), rel=1e-13)
-
-
-def test_state_survives() -> None:
-    predictor, other = Predictor(), Predictor()
-    for t in (0.0, 0.1):
-        predictor.add(t, parabola(t))
-    other.restore(predictor.save())
-    for one in (predictor, other):
-        one.add(0.2, parabola(0.2))
-    assert np.array_equal(predictor.at(0.3), other.at(0.3))

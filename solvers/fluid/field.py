@@ -17,7 +17,7 @@ from solvers.distributed import Nodal
 from solvers.fluid import time
 from solvers.fluid.cut import Cut, Cutter
 from solvers.fluid.grid import DistributedGrid, Grid
-from solvers.fluid.history import History
+from solvers.fluid.history import History, Past
 from solvers.fluid.patches import Boundary, Patch
 from solvers.fluid.pressure_level import hold_pressure, spread_excess
 from solvers.fluid.space import Nodes, Unknowns
@@ -114,6 +114,10 @@ class Fluid:
         assert self.system.cut is not None
         return self.system.cut
 
+    def velocity(self) -> Array:
+        """Velocity [m/s] at local dofs, zero at those of the pressure."""
+        return np.where(self.velocity_mask, self.flow, 0.0)
+
     def initialise(self, t: float, dt: float) -> None:
         """The initial velocity, known everywhere."""
         if self.settings.initial_velocity is not None:
@@ -121,6 +125,7 @@ class Fluid:
             points[: self.dim] = self.unknowns.velocity.points.T
             for axis, component in enumerate(self.settings.initial_velocity):
                 self.flow[self.unknowns.velocity.dofs[:, axis]] = component(points, t)
+        self.history.now.velocity = self.velocity()
         self._t, self.dt = t, dt
         self.difference = time.STEADY if self.settings.steady else time.backward_euler(dt)
         if not self._coupled:
@@ -136,16 +141,27 @@ class Fluid:
     def begin_step(self, t: float, dt: float) -> None:
         """Remember the state at t; boundary, loads and moving bodies at t + dt."""
         self._t, self.dt = t + dt, dt
-        velocity = np.where(self.velocity_mask, self.flow, 0.0)
         self.cutter.begin_step()
-        self.difference = self.history.begin_step(velocity, dt)
-        self.system.set_time(t + dt, self.difference, self.history.rate(self.difference))
+        self.difference = self.history.begin_step(dt)
+        rate, unknown = self.history.rate(self.difference), self.history.unknown(self.difference)
+        self.system.set_time(t + dt, self.difference, rate, unknown)
         self.flow[self.boundary.dofs] = self.boundary.velocity(t + dt)
-        self.system.set_scales(velocity)
+        self.system.set_scales(self.history.old.velocity)
         self._fresh, self._largest = True, 0.0
         self._direct.begin_step()
         if not self._coupled:
+            self.predict()
             self.move({})
+
+    def predict(self) -> None:
+        """Let the velocity go on as in the last step, where it was known before that too."""
+        old, older = self.history.old, self.history.older
+        if self.difference.beta_1 == 0.0:
+            return
+        going_on = old.known & older.known
+        going_on[self.boundary.dofs] = False
+        growth = self.dt / self.history.steps[-1]
+        self.flow[going_on] += growth * (old.velocity - older.velocity)[going_on]
 
     def move(self, coupled: Mapping[str, Motion]) -> None:
         """Cut the grid by the surfaces where they are now: `coupled` bodies by name, all others as prescribed.
@@ -202,7 +218,8 @@ class Fluid:
 
     def end_step(self) -> None:
         """Accept the step. Fluid that comes between surfaces which touch now will have been at rest."""
-        self.history.end_step(self.dt, self.system.active_dofs | self.system.dofs_of(self.cut.shut))
+        known = self.system.active_dofs | self.system.dofs_of(self.cut.shut)
+        self.history.end_step(self.dt, self.velocity(), known)
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
@@ -211,7 +228,7 @@ class Fluid:
         with self.timer("assembly"):
             if self._fresh or self.settings.steady:
                 if self.settings.steady:
-                    self.system.set_scales(np.where(self.velocity_mask, self.flow, 0.0))
+                    self.system.set_scales(self.velocity())
                 self.system.set_penalties()
                 self._fresh = False
             self.residual_rows = self.system.residual()
@@ -324,9 +341,9 @@ class Fluid:
         def nodal(values: Array, nodes) -> Nodal:
             return Nodal(values[nodes.dofs[: nodes.owned]].astype(float), nodes.numbers[: nodes.owned])
 
-        known = np.stack([self.history.known_now, self.history.old.known], axis=1)[velocity.dofs[:, 0]]
+        known = np.stack([self.history.now.known, self.history.old.known], axis=1)[velocity.dofs[:, 0]]
         return {
-            "velocity": nodal(self.flow, velocity),
+            "velocity": nodal(self.history.now.velocity, velocity),
             "pressure": nodal(self.flow, pressure),
             "old_velocity": nodal(self.history.old.velocity, velocity),
             "known": Nodal(known[: velocity.owned].astype(float), velocity.numbers[: velocity.owned]),
@@ -345,9 +362,10 @@ class Fluid:
         known = state["known"].values
         self.flow[:] = self._at_nodes(velocity, state["velocity"].values)
         self.flow[:] += self._at_nodes(pressure, state["pressure"].values)
-        self.history.old.velocity = self._at_nodes(velocity, state["old_velocity"].values)
-        self.history.known_now, self.history.old.known = (
-            self._at_nodes(velocity, known[:, [column]]) > 0.5 for column in (0, 1)
+        old_velocity = self._at_nodes(velocity, state["old_velocity"].values)
+        self.history.now, self.history.old = (
+            Past(values, self._at_nodes(velocity, known[:, [column]]) > 0.5)
+            for column, values in enumerate((self.velocity(), old_velocity))
         )
         self.history.steps, self._t = tuple(state["steps"]), state["time"]
         self.difference = time.STEADY

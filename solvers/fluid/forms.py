@@ -34,6 +34,7 @@ class Penalties:
     ghost_pressure: float = 0.05
     ghost_second: float = 0.05  #: second derivatives, relative to first ones
     ghost_mass_second: float = 0.05  #: the same of the mass
+    ghost_memory: float = 0.9  #: share of its past that the mass keeps per step: with 1, kinks stay where nothing flows
 
 
 #: Of q2q1 around elastic bodies: with less, slivers that these uncover keep Newton's method from converging.
@@ -61,6 +62,19 @@ class Flow:
         """Edge lengths [m] of an axis-aligned cell."""
         jacobian = ufl.Jacobian(self.mesh)
         return [jacobian[i, i] for i in range(self.mesh.geometric_dimension())]
+
+
+@dataclass(frozen=True)
+class GhostScales:
+    """What the ghost penalty takes from each cell.
+
+    phi_b = (|a| h)^2 / phi is small where viscosity or the time step rule. Were it phi, the term would be an artificial
+    viscosity along bodies that grows as steps get smaller.
+    """
+
+    phi: Expr  #: nu + |a| h + alpha h^2 [m^2/s]
+    carried: Expr  #: phi_b [m^2/s]
+    known: Expr  #: 1 where the history is known, else 0
 
 
 def eps(u: Expr) -> Expr:
@@ -124,26 +138,29 @@ def interface(flow: Flow, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> E
     )
 
 
-def ghost_penalty(flow: Flow, factors: Penalties, phi: Expr, carried: Expr, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+def ghost_penalty(flow: Flow, factors: Penalties, scales: GhostScales, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     """Integrand over faces of gamma_p h^3 / (rho phi) [d_n p] [d_n q] and
 
-    sum_j h^(2j-1) (c_j (gamma_v mu + gamma_b rho phi_b) + m_j gamma_t rho alpha h^2) [d_n^j u] [d_n^j v],
-    c_1 = m_1 = 1.
+    sum_j h^(2j-1) (c_j (gamma_v mu + gamma_b rho phi_b) [d_n^j u] + m_j gamma_t rho h^2 [d_n^j u_t]) [d_n^j v],
+    c_1 = m_1 = 1, u_t = alpha u - gamma_m history.
 
-    phi and `carried`, phi_b = (|a| h)^2 / phi, are scales per cell [m^2/s]: phi_b is small where viscosity or the time
-    step rule. Were it phi, the term would be an artificial viscosity along bodies that grows as steps get smaller.
+    So the share of the mass is one of the acceleration, as in a mass matrix. Were it one of alpha u (gamma_m = 0), as
+    it is where no history is known, it would take a power from the flow that grows as steps get smaller.
+    Source of mass matrices with it: Sticko, Kreiss, J. Sci. Comput. 80 (2019), doi:10.1007/s10915-019-01004-2.
     """
     n = ufl.FacetNormal(flow.mesh)
     h = avg(abs(sum(n[i] ** 2 * size for i, size in enumerate(flow.sizes))))
     factor, mass = factors.ghost_viscous * flow.mu, 0.0
     if not flow.steady:
-        mass = factors.ghost_mass * flow.rho * flow.alpha * h**2
+        mass = factors.ghost_mass * flow.rho * h**2
     if flow.convection:
-        factor += factors.ghost_convection * flow.rho * avg(carried)
-    terms = factors.ghost_pressure * h**3 / (flow.rho * avg(phi)) * _jump(p, n, 1) * _jump(q, n, 1)
+        factor += factors.ghost_convection * flow.rho * avg(scales.carried)
+    remembered = factors.ghost_memory * scales.known("+") * scales.known("-")
+    terms = factors.ghost_pressure * h**3 / (flow.rho * avg(scales.phi)) * _jump(p, n, 1) * _jump(q, n, 1)
     for order in range(1, flow.degree + 1):
         c, m = (1.0, 1.0) if order == 1 else (factors.ghost_second, factors.ghost_mass_second)
-        terms += h ** (2 * order - 1) * (c * factor + m * mass) * dot(_jump(u, n, order), _jump(v, n, order))
+        change = flow.alpha * _jump(u, n, order) - remembered * _jump(flow.history, n, order)
+        terms += h ** (2 * order - 1) * dot(c * factor * _jump(u, n, order) + m * mass * change, _jump(v, n, order))
     return terms
 
 

@@ -30,22 +30,22 @@ class History:
 
     def __init__(self, scheme: str, size: int):
         self.scheme = scheme
-        self.old, self.older = (Past(np.zeros(size), np.ones(size, dtype=bool)) for _ in range(2))
-        self.known_now = np.ones(size, dtype=bool)  #: where the flow of the last step is known
+        #: at the end of the last accepted step, and at the two times that the present step takes its rate from
+        self.now, self.old, self.older = (Past(np.zeros(size), np.ones(size, dtype=bool)) for _ in range(3))
         self.steps: tuple[float, ...] = ()  #: lengths [s] of the last accepted steps, two at most
 
-    def begin_step(self, velocity: Array, dt: float) -> time.Difference:
-        """Take the velocities of the last step; the time derivative in a step of length dt."""
-        self.older, self.old = self.old, Past(velocity, self.known_now)
+    def begin_step(self, dt: float) -> time.Difference:
+        """The time derivative in a step of length dt from now on."""
+        self.older, self.old = self.old, self.now
         if self.scheme == "steady":
             return time.STEADY
         if self.scheme == "backward_euler" or len(self.steps) < 2:
             return time.backward_euler(dt)
         return time.bdf2(dt, self.steps[-1])
 
-    def end_step(self, dt: float, known: Mask) -> None:
+    def end_step(self, dt: float, velocity: Array, known: Mask) -> None:
         """Accept a step that found the flow at some local dofs."""
-        self.known_now = known.copy()
+        self.now = Past(velocity, known)
         self.steps = (*self.steps, dt)[-2:]
 
     def rate(self, difference: time.Difference) -> Array:

@@ -67,9 +67,11 @@ class FlowSystem:
         self.flow, self._history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
         self._alpha = fem.constant(domain, 0.0)
         self._newton = fem.constant(domain, 1.0)
-        self._phi, self._carried = (fem.function(fem.cellwise_space(domain)) for _ in range(2))
+        self._phi, self._carried, self._known = (fem.function(fem.cellwise_space(domain)) for _ in range(3))
         self.weights = Weights(grid, settings.degree)
         self._compile()
+        #: the ghost penalty's share of the residual is a matrix times the flow, less what the history has of it
+        self._remembered = np.zeros(unknowns.local)
         self._out = np.zeros(unknowns.local)
         self._matrix: PETSc.Mat | None = None
         self._ghost: PETSc.Mat | None = None
@@ -112,8 +114,10 @@ class FlowSystem:
             cell_forms.append(self.weights.fluid * everywhere * dx_cut + on_interface * dx_cut)
             dS = fem.measure(domain, "dS", 2 * settings.degree)
             du, dp = unknowns.parts(trial)
-            ghost = forms.ghost_penalty(flow, settings.penalties, self._phi, self._carried, du, dp, v, q) * dS
-            self._ghost_penalty = fem.Integral(domain, ghost)
+            scales = forms.GhostScales(self._phi, self._carried, self._known)
+            ghost = forms.ghost_penalty(flow, settings.penalties, scales, du, dp, v, q) * dS
+            self._ghost_penalty, remembered = fem.Integral(domain, ufl.lhs(ghost)), ufl.rhs(ghost)
+            self._ghost_history = None if remembered.empty() else fem.Integral(domain, remembered)
         self._residuals = [fem.Integral(domain, form) for form in cell_forms]
         self._tangents = [fem.Integral(domain, ufl.derivative(form, self.flow, trial)) for form in cell_forms]
         self._compile_outer_faces(v, u, trial)
@@ -135,10 +139,11 @@ class FlowSystem:
 
     # ------------------------------------------------------------------------------------------------- a new step
 
-    def set_time(self, t: float, difference: Difference, history: Array) -> None:
-        """Loads at time t; u_t = alpha u - history, local velocity dofs [m/s^2]."""
+    def set_time(self, t: float, difference: Difference, history: Array, unknown: NDArray[np.bool_]) -> None:
+        """Loads at time t; u_t = alpha u - history [m/s^2], local dofs, `unknown` where no step has found them."""
         self._alpha.value = difference.alpha
         self._history.x.array[:] = history
+        self._known.x.array[:] = ~unknown[self.unknowns.cell_velocity].any(axis=(1, 2))
         nodes = self.unknowns.velocity
         if self.settings.body_force is not None:
             _set_velocity(self._force, nodes, self.settings.body_force, t)
@@ -238,9 +243,15 @@ class FlowSystem:
             self._penalised = cut.ghost_faces
             self._ghost.zeroEntries()
             if self.with_bodies:
-                fem.assemble_matrix(self._ghost, self._ghost_penalty.on(interior_facet=cut.ghost_faces))
+                self._assemble_ghost_penalty(cut.ghost_faces)
             self._ghost.assemble()
             self._in, self._through = self._ghost.createVecs()
+
+    def _assemble_ghost_penalty(self, faces: NDArray[np.int32]) -> None:
+        fem.assemble_matrix(self._ghost, self._ghost_penalty.on(interior_facet=faces))
+        if self._ghost_history is not None:
+            self._remembered[:] = 0.0
+            fem.assemble_vector(self._ghost_history.on(interior_facet=faces), self._remembered)
 
     def _same_faces(self, cut: Cut) -> bool:
         """The ghost penalty is assembled for these faces already, on every process (collective)."""
@@ -281,7 +292,7 @@ class FlowSystem:
         """Left-hand side of the equations at owned dofs: forces [N] of velocity rows, volume rates of pressure rows."""
         assert self._ghost is not None
         assert self.cut is not None
-        self._out[:] = 0.0
+        np.negative(self._remembered, out=self._out)
         for form in self._residual_forms:
             fem.assemble_vector(form, self._out)
         if self.with_bodies:

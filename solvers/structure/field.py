@@ -362,11 +362,14 @@ class Structure:
             for body, part in zip(self.bodies, self.split(array), strict=True)
         }
 
+    def from_bodies(self, state: State) -> Array:
+        """Owned dofs from nodal values by body."""
+        return np.concatenate([state[body.name].values.ravel() for body in self.bodies])
+
     def restore(self, state: State) -> None:
         """Go back to a saved state."""
         for name, array in vars(self.now).items():
-            for body, part in zip(self.bodies, self.split(array), strict=True):
-                part[:] = state[name][body.name].values.ravel()
+            array[:] = self.from_bodies(state[name])
         for body, u in zip(self.bodies, self.split(self.now.u), strict=True):
             body.set_displacement(u)
         self.energy.restore(state["energy"])
