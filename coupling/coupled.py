@@ -42,14 +42,13 @@ class Coupled:
         self.interface.begin_step(self.fluid.difference)
         self.structure.begin_step(t, dt)
         self.predictor.add(t, self.structure.old.u)
-        # cells that the surface leaves in this step keep their ghost penalty, whatever the first guess
-        self.fluid.move(self.interface.move(self.interface.old))
 
     def predict(self, t: float) -> None:
-        """First guess of the fields at t: places on a parabola, unless the structure has a guess of its own."""
+        """First guess of the fields at t: places on a parabola, unless the structure has a guess of its own.
+
+        Cut the grid at the old place before that: cells that the surface leaves keep their ghost penalty for the step.
+        """
         structure = self.structure
-        if self.fluid.settings.steady:
-            return
         self.fluid.predict()
         own_guess = not np.array_equal(structure.now.u[structure.free], structure.old.u[structure.free])
         if not structure.comm.allreduce(own_guess, op=MPI.LOR):

@@ -52,8 +52,10 @@ class Monolithic:
         coupled.begin_step(t, dt)
         self._largest, self._krylov, self._linear_iterations = np.zeros(2), None, 0
         self._direct.begin_step()
-        unmoved = self.residual()
-        coupled.predict(t + dt)
+        unmoved = 0.0
+        if not coupled.fluid.settings.steady:
+            unmoved = self.residual()
+            coupled.predict(t + dt)
         info = converge(self, self.tolerance, unmoved)
         coupled.structure.check_deformation(info.iterations, info.residuals)
         coupled.end_step(self._force)

@@ -36,7 +36,9 @@ class Partitioned:
         coupled, interface = self.coupled, self.coupled.interface
         coupled.begin_step(t, dt)
         self.accelerator.begin_step()
-        coupled.predict(t + dt)
+        if not coupled.fluid.settings.steady:
+            coupled.fluid.move(interface.move(interface.old))
+            coupled.predict(t + dt)
         d = interface.displacement()
         history: list[float] = []
         newton = 0

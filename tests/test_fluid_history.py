@@ -7,6 +7,7 @@ from fluid_setup import block, body, circle, field, loop, make_fluid, nodal_erro
 from solvers.api import StepFailed
 from solvers.fluid.field import Body
 from solvers.fluid.grid import uniform
+from solvers.fluid.history import Past
 from solvers.fluid.surface import Motion, Surface
 
 VELOCITY, DT = field(2.0, 0.0), 0.01
@@ -77,3 +78,31 @@ def test_block_that_was_nowhere_near_is_an_error():
         advance(fluid, points, number, 0.02 * (number + 1))
     with pytest.raises(StepFailed, match="take a smaller time step"):
         advance(fluid, points, 3, 0.25)
+
+
+def test_initial_velocity_is_known_where_bodies_are():
+    fluid, points = carried()
+    place(fluid, points, 0.0)
+    fluid.begin_step(0.0, DT)
+    x, y = fluid.unknowns.velocity.dofs.T
+    assert np.array_equal(fluid.history.rate(fluid.difference)[x], np.full(len(x), 2.0 / DT))
+    assert np.array_equal(fluid.history.rate(fluid.difference)[y], np.zeros(len(y)))
+
+
+def test_first_guess_goes_on_as_in_the_last_step():
+    """Where the velocity was known at both times behind, and not on the boundary; with half the step, half as far."""
+    fluid = make_fluid(uniform([0, 0], [1, 1], [4, 4]), [wall(VELOCITY)], dt=DT, initial_velocity=VELOCITY)
+    x = fluid.unknowns.velocity.dofs[:, 0]
+    inside = ~np.isin(x, fluid.boundary.dofs)
+    missing = np.zeros(fluid.unknowns.local, dtype=bool)
+    missing[x[inside][0]] = True
+    values = [np.where(np.isin(np.arange(fluid.unknowns.local), x), value, 0.0) for value in (3.0, 5.0)]
+    fluid.history.old, fluid.history.now = Past(values[0], ~missing), Past(values[1], ~missing)
+    fluid.history.steps = (DT, DT)
+    fluid.flow[:] = values[1]
+    fluid.dt, fluid.difference = 0.5 * DT, fluid.history.begin_step(0.5 * DT)
+    fluid.predict()
+    guess = fluid.flow[x[inside]]
+    assert guess[0] == 5.0
+    assert guess[1:] == pytest.approx(6.0, rel=1e-14)
+    assert np.array_equal(fluid.flow[x[~inside]], np.full(np.count_nonzero(~inside), 5.0))

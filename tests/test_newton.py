@@ -109,3 +109,11 @@ def test_unsettled_is_not_accepted():
     """What is imposed (a support, an active set) must be reached even if the residual is zero from the start."""
     system = Scalar(lambda x: 0.0 * x, lambda x: 1.0, 1.0, settled_after=2)
     assert converge(system, Tolerance()).iterations == 2
+
+
+def test_a_good_first_guess_does_not_make_the_tolerance_stricter():
+    """|x^2 - 2| = 3e-6 at the guess: with 1e-8 of the 7 that the unmoved system had, one step is enough."""
+    guess = math.sqrt(2.0) + 1e-6
+    alone, moved = (Scalar(lambda x: x * x - 2, lambda x: 2 * x, guess) for _ in range(2))
+    assert converge(moved, Tolerance(1e-8), 7.0).iterations == 1
+    assert converge(alone, Tolerance(1e-8)).iterations == 2
