@@ -134,6 +134,7 @@ class Monolithic:
         K, A = structure.linearise(), fluid.linearise()
         with fluid.timer("coupling"):
             into_fluid, into_structure, mass = self._coupling_blocks()
+            PETSc.garbage_cleanup(K.comm)  # the K of earlier iterates, on a communicator that no solver has
             K = K.copy()
             K.axpy(1.0, mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
             return Blocks(K, into_structure, into_fluid, A)

@@ -166,8 +166,9 @@ def solve(
     """
     if ksp.getOptionsPrefix() == "elastic_":
         ksp.setPC(_multigrid(ksp.comm))
-    # PETSc frees what Python has dropped only where all processes ask for it
-    PETSc.garbage_cleanup(ksp.comm)
+    # PETSc frees what Python has dropped only where all processes ask for it, per communicator
+    for comm in (ksp.comm, matrix.comm):
+        PETSc.garbage_cleanup(comm)
     ksp.setOperators(matrix, preconditioned_by)
     ksp.solve(b, x)
     reason = ksp.getConvergedReason()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from coupled_case import POST
-from programs import fsci
+from programs import ENVIRONMENT, fsci
 
 from coupling.coupled import Coupled
 from fsci.case import load_case
@@ -217,3 +217,19 @@ def test_files_and_pictures(monolithic):
     assert {"final_velocity.png", "final_pressure.png"} <= {path.name for path in pictures}
     pixels = np.asarray(Image.open(out / "pictures" / "final_velocity.png").convert("RGB")).astype(int)
     assert len(np.unique(np.round(pixels[300:700, 300:1200].reshape(-1, 3) / 8), axis=0)) > 20
+
+
+@pytest.mark.parametrize("scheme", ["monolithic", "iqn"])
+def test_no_matrix_is_kept_from_step_to_step(tmp_path, monkeypatch, scheme):
+    """PETSc counts what it creates and destroys; what Python has dropped it frees only if it is asked to."""
+    case, log = tmp_path / "case.yaml", tmp_path / "log.txt"
+    case.write_text(with_scheme(scheme))
+    monkeypatch.setitem(ENVIRONMENT, "PETSC_OPTIONS", f"-log_view :{log}")
+    kept = []
+    for steps in (2, 5):
+        run = fsci("run", case, "-o", tmp_path / f"{steps}", "--set", f"time.end={0.02 * steps}")
+        assert run.returncode == 0, run.stdout
+        line = next(line for line in log.read_text().splitlines() if line.split()[:1] == ["Matrix"])
+        created, destroyed = (int(number) for number in line.split()[1:3])
+        kept.append(created - destroyed)
+    assert kept[0] == kept[1]
