@@ -90,6 +90,7 @@ def test_every_newton_step_gains_much(E, rho_s, factor):
         residuals = np.array(scheme.step(0.02 * number, 0.02).residuals)
     assert len(residuals) <= 7
     assert (residuals[1] / residuals[-1]) ** (1.0 / (len(residuals) - 2)) > factor
+    assert (residuals[1:-1] / residuals[2:]).min() > 0.5 * factor
 
 
 def test_the_force_on_the_structure_is_the_reaction_of_the_fluid():
