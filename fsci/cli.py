@@ -75,6 +75,11 @@ def _parser() -> argparse.ArgumentParser:
             one.add_argument(
                 "-o", "--out", metavar="OUT", type=Path, help="folder for the results (default: results/NAME_OF_CASE)"
             )
+            one.add_argument(
+                "--force",
+                action="store_true",
+                help="take a results folder with other files in it; those in the way are renamed to NAME.old",
+            )
 
     resume = command(_resume, "continue a run from its last checkpoint")
     resume.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
@@ -152,7 +157,8 @@ def _run(options: argparse.Namespace) -> int:
             print(f"warning: {warning}", file=sys.stderr)
         from fsci.run import run_case
 
-        return int(run_case(case, options.out or Path("results") / case.folder.absolute().name))
+        out = options.out or Path("results") / case.folder.absolute().name
+        return int(run_case(case, out, force=options.force))
     except CaseError as error:
         return _fail(str(error)) if first else 2
 

@@ -15,6 +15,7 @@ from fsci.movie import plot_movie
 from fsci.output import Series, read_collection
 from fsci.render import ISOMETRIC, Array, import_pyvista, load_body
 from fsci.render_flow import is_flow, load_meshes, load_state
+from fsci.results_folder import list_pictures
 from fsci.scene import compose, draw
 from fsci.storyboard import choose, plot_story
 
@@ -43,7 +44,12 @@ def plot_run(out: Path, *, movie: bool = False, field: str | None = None, times:
     displacement, of a flow velocity and pressure. `movie` adds an animation of all output times. With `times` only the
     states nearest to them are drawn. Returns the files; raises ValueError if no body has the field.
     """
-    out = Path(out)
+    drawn = _plot(Path(out), movie, field, times)
+    list_pictures(Path(out) / "pictures", drawn)
+    return drawn
+
+
+def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float]) -> list[Path]:
     labels = read_labels(out)
     folder = out / "pictures"
     folder.mkdir(parents=True, exist_ok=True)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import shutil
 import signal
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,8 +12,10 @@ from fsci.case import Case, CaseError, load_case
 from fsci.checkpoint import read_checkpoint, write_checkpoint
 from fsci.clock import Clock
 from fsci.history import HistoryWriter, read_history
+from fsci.memory import require_memory
 from fsci.monitor import Monitor
 from fsci.output import FieldWriter, write_text
+from fsci.results_folder import keep_case, prepare_folder
 from fsci.summary import RunRecord, memory_mb, summarize, write_summary
 from fsci.verify import evaluate
 from solvers.api import State, StepFailed, StepInfo
@@ -26,14 +26,24 @@ if TYPE_CHECKING:
 FINISHED, FAILED, BAD_CASE, STOPPED = 0, 1, 2, 3  #: exit codes
 
 
-def run_case(case: Case, out: Path) -> int:
-    """Compute a case from its start into the folder `out`; returns the exit code. Raises CaseError."""
+def run_case(case: Case, out: Path, *, force: bool = False) -> int:
+    """Compute a case from its start into the folder `out`; returns the exit code. Raises CaseError.
+
+    `force`: take a folder that has files of others, see `prepare_folder`.
+    """
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD
+    require_memory(case, comm)
+    refused: CaseError | None = None
     if comm.rank == 0:
-        prepare_folder(case, out)
-    comm.Barrier()
+        try:
+            prepare_folder(case, out, force=force)
+        except CaseError as error:
+            refused = error
+    refused = comm.bcast(refused)
+    if refused is not None:
+        raise refused
     return Run(case, out, comm).from_start()
 
 
@@ -54,43 +64,6 @@ def resume_run(out: Path) -> int:
         raise checkpoint
     state, _ = checkpoint
     return Run(case, out, comm).from_checkpoint(state)
-
-
-def prepare_folder(case: Case, out: Path) -> None:
-    """An empty results folder with everything needed to repeat the run: the case and its mesh files."""
-    for old in ("fields", "checkpoint", "failure", "pictures"):
-        shutil.rmtree(out / old, ignore_errors=True)
-    for old in ("summary.json", "history.csv", "log.txt", "STOP"):
-        (out / old).unlink(missing_ok=True)
-    keep_case(case, out)
-
-
-def keep_case(case: Case, folder: Path) -> None:
-    """Write case.yaml and the mesh files it names, such that the folder can be moved and run again."""
-    folder.mkdir(parents=True, exist_ok=True)
-    changes = []
-    for setting, name, mesh in _meshes(case):
-        given = getattr(mesh, "file", None)
-        if given is None or Path(given).is_absolute():
-            continue
-        kept = Path(given)
-        if ".." in kept.parts:  # no results folder writes outside itself
-            kept = Path("meshes") / name / kept.name
-            changes.append((f"{setting}.mesh.file", json.dumps(kept.as_posix())))
-        if (case.folder / given).resolve() != (folder / kept).resolve():
-            (folder / kept).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(case.folder / given, folder / kept)
-    write_text(folder / "case.yaml", case.dump(changes))
-
-
-def _meshes(case: Case) -> Iterator[tuple[str, str, Any]]:
-    """(setting, name, mesh) of all bodies and obstacles."""
-    for name, body in case.elastic_bodies.items():
-        yield f"structure.bodies.{name}", name, body.mesh
-    for name, rigid in ({} if case.fluid is None else case.fluid.bodies).items():
-        yield f"fluid.bodies.{name}", name, rigid.mesh
-    for name, obstacle in ({} if case.contact is None else case.contact.obstacles).items():
-        yield f"contact.obstacles.{name}", name, obstacle.mesh
 
 
 @dataclass

@@ -8,7 +8,8 @@ from programs import fsci
 
 from fsci.case import load_case
 from fsci.history import read_history
-from fsci.run import FAILED, FINISHED, prepare_folder, run_case
+from fsci.results_folder import prepare_folder
+from fsci.run import FAILED, FINISHED, run_case
 
 CASE = """
 time: {step: 0.5, end: 1}  # a comment

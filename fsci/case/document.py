@@ -67,10 +67,20 @@ class Document:
         return stream.getvalue()
 
 
+#: Size [bytes] of a case file: the reader takes a minute for more.
+MOST_BYTES = 1_000_000
+
+
 def read_document(path: Path) -> Document:
     """Read a case file; raises CaseError."""
     try:
-        text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise CaseError([Problem(Place(str(path)), "is not a file")])
+        with path.open("rb") as file:
+            raw = file.read(MOST_BYTES + 1)
+        if len(raw) > MOST_BYTES:
+            raise CaseError([Problem(Place(str(path)), f"the file is larger than {MOST_BYTES // 1_000_000} MB")])
+        text = raw.decode("utf-8-sig").replace("\r\n", "\n")
     except (OSError, ValueError) as error:
         place, reason = Place(str(path)), "cannot be read"
         if isinstance(error, UnicodeDecodeError):

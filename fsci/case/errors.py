@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+WIDTH = 200  #: characters of a line that a message shows, those around the column
+
 
 @dataclass(frozen=True)
 class Place:
@@ -32,9 +34,11 @@ class Problem:
         first = f"{self.place}: {message}"
         if not self.line:
             return first
+        start = max(0, min(self.place.column - 1 - WIDTH // 2, len(self.line) - WIDTH))
+        line, column = self.line[start : start + WIDTH], self.place.column - 1 - start
         # tabs before the caret stay tabs, so that it stands below its column
-        before = "".join(c if c == "\t" else " " for c in self.line[: self.place.column - 1])
-        return f"{first}\n  {self.line}\n  {before.ljust(self.place.column - 1)}^"
+        before = "".join(c if c == "\t" else " " for c in line[:column])
+        return f"{first}\n  {line}\n  {before.ljust(column)}^"
 
 
 class CaseError(Exception):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 from pydantic import model_validator
 
 from fsci.case.section import Section, fault, setting
@@ -27,4 +29,6 @@ class Time(Section):
     def _ordered(self) -> Time:
         if self.end <= self.start:
             raise fault(f"must be later than 'start', {self.start:g}, not {self.end:g}", "end")
+        if self.step < 1e3 * sys.float_info.epsilon * max(abs(self.start), abs(self.end)):
+            raise fault(f"must be larger: at {self.end:g} a step of {self.step:g} is lost in rounding", "step")
         return self

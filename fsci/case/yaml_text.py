@@ -13,6 +13,9 @@ from fsci.case.errors import CaseError, Place, Problem
 
 Keys = tuple[str | int, ...]  #: path of a setting, such as ("structure", "bodies", "flag", "supports", 0, "on")
 
+#: Settings and list entries of a case, counted again wherever an alias repeats them. Long tables belong into files.
+MOST_VALUES = 20_000
+
 #: what the YAML reader says -> what the author of a case file can use; the first that fits counts
 PLAIN_WORDS = {
     "found character '\\t'": "a tab cannot stand here; indent with spaces",
@@ -87,6 +90,7 @@ class _Reader:
         self.text, self.source = text, source
         self.parsed = Parsed()
         self.open: list[Node] = []  # sections and lists around the current node
+        self.count = 0  # values read so far
 
     def error(self, line: int, column: int, message: str) -> CaseError:
         """`line` and `column` count from 0, as YAML marks do."""
@@ -102,6 +106,9 @@ class _Reader:
 
     def read(self, node: Node, keys: Keys) -> Any:
         self.parsed.values[keys] = place = self.place(node)
+        self.count += 1
+        if self.count > MOST_VALUES:
+            raise self.fail(node, f"the case has more than {MOST_VALUES} values up to here; put tables into files")
         if isinstance(node, ScalarNode):
             quoted = node.style in ("'", '"')
             begin = node.start_mark.index + quoted

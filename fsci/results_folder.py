@@ -1,0 +1,158 @@
+"""The results folder of a run: made ready without losing anything that a run did not write."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from fsci.case import Case, CaseError
+from fsci.case.errors import Place, Problem
+from fsci.output import write_text
+
+#: A folder with this file was made by a run; a later run may replace what runs write there.
+MARKER = ".fsci-run"
+MARKER_TEXT = "The results of a run of fsci. Another run into this folder replaces the files that runs write.\n"
+
+#: Names of the pictures in a folder, one a line: `fsci plot` draws them, the next run removes them.
+PICTURE_LIST = ".fsci-pictures"
+
+FILES = ("case.yaml", "summary.json", "history.csv", "log.txt", "STOP")
+FOLDERS = ("fields", "checkpoint", "failure", "pictures")
+
+
+def prepare_folder(case: Case, out: Path, *, force: bool = False) -> None:
+    """An empty results folder with everything needed to repeat the run: the case and its mesh files.
+
+    A folder that has content and no marker of a run, and the folder of the case itself, are refused. With `force` they
+    are taken: whatever stands where the run writes is renamed to NAME.old. Raises CaseError.
+    """
+    own = out.exists() and out.resolve() == case.folder.resolve()
+    foreign = own or (out.is_dir() and any(out.iterdir()) and not (out / MARKER).is_file())
+    if foreign and not force:
+        what = "is the folder of the case itself" if own else "has files that no run wrote"
+        raise _refused(out, f"this folder {what}; choose another one, or keep these files as NAME.old with --force")
+    try:
+        if foreign:
+            for path in (*(out / name for name in (*FILES, *FOLDERS)), *_copies(case, out)):
+                _set_aside(path)
+        else:
+            _remove_results(out)
+        keep_case(case, out)
+        write_text(out / MARKER, MARKER_TEXT)
+    except OSError as error:
+        raise _refused(out, f"cannot write here: {error.strerror or error}") from None
+
+
+def keep_case(case: Case, folder: Path) -> None:
+    """Write case.yaml and the mesh files it names, such that the folder can be moved and run again."""
+    folder.mkdir(parents=True, exist_ok=True)
+    changes = []
+    for setting, given, kept in _mesh_files(case):
+        if given != kept:
+            changes.append((f"{setting}.mesh.file", json.dumps(kept.as_posix())))
+        _copy(case.folder / given, folder / kept)
+    write_text(folder / "case.yaml", case.dump(changes))
+
+
+def list_pictures(folder: Path, drawn: list[Path]) -> None:
+    """Note the pictures in a folder, so that the next run knows which of its files are pictures of the last."""
+    listed = folder / PICTURE_LIST
+    names = set(listed.read_text(encoding="utf-8").splitlines()) if listed.exists() else set()
+    write_text(listed, "".join(f"{name}\n" for name in sorted(names | {path.name for path in drawn})))
+
+
+def _refused(out: Path, message: str) -> CaseError:
+    return CaseError([Problem(Place(f"-o {out}"), message)])
+
+
+def _copy(source: Path, target: Path) -> None:
+    """Replace `target` whole or not at all; a link is replaced, not what it points to."""
+    if source.resolve() == target.resolve():
+        return
+    target.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = target.with_name(target.name + ".tmp")
+    shutil.copyfile(source, unfinished)
+    os.replace(unfinished, target)
+
+
+def _mesh_files(case: Case) -> Iterator[tuple[str, Path, Path]]:
+    """(setting, file, name of its copy in a results folder) of all meshes that are read from files beside the case."""
+    for setting, name, mesh in _meshes(case):
+        given = getattr(mesh, "file", None)
+        if given is None or Path(given).is_absolute():
+            continue
+        # no results folder writes outside itself
+        kept = Path("meshes") / name / Path(given).name if ".." in Path(given).parts else Path(given)
+        yield setting, Path(given), kept
+
+
+def _meshes(case: Case) -> Iterator[tuple[str, str, Any]]:
+    """(setting, name, mesh) of all bodies and obstacles."""
+    for name, body in case.elastic_bodies.items():
+        yield f"structure.bodies.{name}", name, body.mesh
+    for name, rigid in ({} if case.fluid is None else case.fluid.bodies).items():
+        yield f"fluid.bodies.{name}", name, rigid.mesh
+    for name, obstacle in ({} if case.contact is None else case.contact.obstacles).items():
+        yield f"contact.obstacles.{name}", name, obstacle.mesh
+
+
+# ------------------------------------------------------------------------------------------- what stands there already
+
+
+def _copies(case: Case, out: Path) -> Iterator[Path]:
+    """Where copies of mesh files will stand, unless the file there is the mesh file itself."""
+    for _, given, kept in _mesh_files(case):
+        if (case.folder / given).resolve() != (out / kept).resolve():
+            yield out / kept
+
+
+def _set_aside(path: Path) -> None:
+    """Rename what stands at `path`, if anything: NAME.old, NAME.old2, ..."""
+    if path.exists() or path.is_symlink():
+        names = (path.with_name(f"{path.name}.old{number or ''}") for number in (0, *range(2, 1000)))
+        path.rename(next(free for free in names if not free.exists()))
+
+
+def _remove_results(out: Path) -> None:
+    """Remove the files that the last run wrote, and only these; folders go if nothing is left in them."""
+    if not out.is_dir():
+        return
+    for name in FILES:
+        (out / name).unlink(missing_ok=True)
+    for path in _results(out):
+        path.unlink(missing_ok=True)
+    for name in ("failure/fields", *FOLDERS):
+        folder = out / name
+        if folder.is_dir() and not folder.is_symlink() and not any(folder.iterdir()):
+            folder.rmdir()
+
+
+def _results(out: Path) -> list[Path]:
+    """Files that runs write into the folders of `out`."""
+    found = [*_checkpoints(out / "checkpoint"), *_checkpoints(out / "failure")]
+    found += [*_fields(out / "fields"), *_fields(out / "failure" / "fields")]
+    found += [out / "failure" / name for name in ("case.yaml", "failure.json")]
+    listed = out / "pictures" / PICTURE_LIST
+    if listed.is_file():
+        names = listed.read_text(encoding="utf-8").splitlines()
+        found += [out / "pictures" / Path(name).name for name in names if name] + [listed]
+    return found
+
+
+def _checkpoints(folder: Path) -> list[Path]:
+    return [path for path in folder.glob("checkpoint_*") if re.fullmatch(r"checkpoint_\d+\.h5(\.tmp)?", path.name)]
+
+
+def _fields(folder: Path) -> list[Path]:
+    """The collections, and the files of the parts that they name."""
+    found: list[Path] = []
+    for collection in folder.glob("*.pvd"):
+        name = re.escape(collection.stem)
+        steps = [path for path in folder.iterdir() if re.fullmatch(rf"{name}_\d{{6,}}\.vtu(\.tmp)?", path.name)]
+        found += [*steps, collection] if steps else []
+    return found

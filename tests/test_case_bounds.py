@@ -1,0 +1,78 @@
+"""Case files that would take all memory or never end are refused at once, with a message."""
+
+import os
+import threading
+
+import pytest
+
+from fsci.case import CaseError, load_case
+from fsci.memory import require_memory
+
+CASE = """\
+time: {step: 1, end: 1}
+structure:
+  bodies:
+    block:
+      mesh: {shape: rectangle, size: [1, 1], cells: [1, 1]}
+      material: {law: neo_hooke, E: 1, nu: 0}
+"""
+
+
+def message(tmp_path, text):
+    (tmp_path / "case.yaml").write_text(text)
+    with pytest.raises(CaseError) as error:
+        load_case(tmp_path)
+    return str(error.value)
+
+
+def test_aliases_that_multiply(tmp_path):
+    """Six lines stand for 10^6 values."""
+    lines = [f"a{i}: &a{i} [" + ",".join(["1" if i == 0 else f"*a{i - 1}"] * 10) + "]" for i in range(6)]
+    assert "the case has more than 20000 values up to here" in message(tmp_path, "\n".join(lines))
+
+
+def test_a_long_file(tmp_path):
+    assert "the file is larger than 1 MB" in message(tmp_path, "# " + "x" * 1_100_000)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "case.yaml")
+    found = []
+
+    def load():
+        try:
+            load_case(tmp_path / "case.yaml")
+        except CaseError as error:
+            found.append(str(error))
+
+    waiting = threading.Thread(target=load, daemon=True)
+    waiting.start()
+    waiting.join(10)
+    assert found == [f"{tmp_path}/case.yaml: is not a file"]
+
+
+@pytest.mark.parametrize("time", ["step: 1, end: 1e300", "step: 1e-300, end: 1", "start: -1e20, step: 1, end: 0"])
+def test_a_step_that_time_does_not_feel(tmp_path, time):
+    assert "is lost in rounding" in message(tmp_path, CASE.replace("step: 1, end: 1", time))
+
+
+def test_a_long_line_is_cut_around_the_mistake(tmp_path):
+    text = message(tmp_path, CASE.replace("E: 1,", f"{'rho: 1, ' * 1} E: '{' ' * 1000}1 + x + w',"))
+    shown = max(text.split("\n"), key=len)
+    assert "unknown" in text
+    assert len(shown) < 400
+
+
+class TwoMachines:
+    def allgather(self, value):
+        return [value, value]
+
+
+@pytest.mark.parametrize(
+    ("cells", "words"), [(30_000, "GB, and there are"), (100_000, "more than the 2,147,483,647 that can be numbered")]
+)
+def test_more_than_the_machine_holds(tmp_path, cells, words):
+    (tmp_path / "case.yaml").write_text(CASE.replace("cells: [1, 1]", f"cells: [{cells}, {cells}]"))
+    with pytest.raises(CaseError, match=words) as error:
+        require_memory(load_case(tmp_path), TwoMachines())
+    assert "case.yaml:5:13: the case has" in str(error.value)
