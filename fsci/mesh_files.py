@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.mesh_scripts import RefusedScript, require_harmless
+from fsci.serendipity import FULL, complete
 from solvers.mesh import Mesh
 from solvers.mesh_topology import (
     CORNERS,
@@ -26,6 +28,9 @@ from solvers.mesh_topology import (
 )
 
 Indices = NDArray[np.int64]
+
+#: Endings of gmsh's scripts.
+SCRIPTS = (".geo", ".geo_unrolled")
 
 
 class MeshError(Exception):
@@ -62,11 +67,17 @@ class Content:
 def read_mesh(path: Path, order: int | None = None, parameters: Mapping[str, float] | None = None) -> Mesh:
     """The mesh of a file; `order` (1 or 2) and `parameters` (for DefineConstant) are for gmsh's .geo scripts.
 
-    Raises MeshError: file missing or unreadable, unknown parameter, several cell types or a foreign one.
+    Raises MeshError: file missing or unreadable, unknown parameter, several cell types or a foreign one, a script that
+    would do more than make a mesh.
     """
     if not path.is_file():
         raise MeshError(f"there is no mesh file {path}")
-    if path.suffix in (".geo", ".geo_unrolled"):
+    if path.suffix in (*SCRIPTS, ".msh"):
+        try:
+            require_harmless(path)
+        except RefusedScript as refused:
+            raise MeshError(str(refused)) from None
+    if path.suffix in SCRIPTS:
         content = _read_gmsh(path, order, parameters or {})
     elif parameters:
         raise MeshError(f"parameters are for .geo files, {path.name} has none")
@@ -81,6 +92,7 @@ def read_mesh(path: Path, order: int | None = None, parameters: Mapping[str, flo
 
 
 def _mesh(content: Content) -> Mesh:
+    content, note = _completed(content)
     dim = max((block.dim for block in content.blocks), default=0)
     if dim < 2:
         raise MeshError("the file has no cells of two or three dimensions")
@@ -98,7 +110,18 @@ def _mesh(content: Content) -> Mesh:
 
     index = np.full(len(content.points), -1)
     index[used] = np.arange(len(used))
-    return replace(mesh, regions=_regions(content, dim, place), surfaces=_surfaces(content, mesh, index))
+    return replace(mesh, regions=_regions(content, dim, place), surfaces=_surfaces(content, mesh, index), note=note)
+
+
+def _completed(content: Content) -> tuple[Content, str]:
+    """Cells of 8 and 20 nodes become those of 9 and 27, and a note for the user says so."""
+    types = sorted({(-block.dim, block.cell_type) for block in content.blocks if block.cell_type in FULL})
+    if not types:
+        return content, ""
+    points, done = complete(content.points, [(block.cell_type, block.nodes) for block in content.blocks])
+    blocks = [replace(b, cell_type=name, nodes=nodes) for b, (name, nodes) in zip(content.blocks, done, strict=True)]
+    note = f"its {types[0][1]} cells became {FULL[types[0][1]]}: nodes were added in the middle of cells and faces"
+    return replace(content, points=points, blocks=blocks), note
 
 
 def _once(cells: Indices) -> tuple[Indices, Indices]:
@@ -249,10 +272,11 @@ def _gmsh_type(kind: int) -> tuple[str, Indices]:
 
     names = {1: "line", 2: "triangle", 3: "quad", 4: "tetra", 5: "hexahedron"}
     names |= {8: "line3", 9: "triangle6", 10: "quad9", 11: "tetra10", 12: "hexahedron27"}
+    names |= {16: "quad8", 17: "hexahedron20"}
     name, dim, _, count, positions, _ = gmsh.model.mesh.getElementProperties(kind)
     if kind not in names:
         return name, np.arange(count)
-    ours = reference_nodes(names[kind])
+    ours = reference_nodes(FULL.get(names[kind], names[kind]))[:count]
     theirs = positions.reshape(count, dim)
     if not name.startswith(("Triangle", "Tetrahedron")):
         theirs = (theirs + 1) / 2  # from -1 to 1, as gmsh has lines, quadrilaterals and hexahedra

@@ -22,3 +22,4 @@ class Mesh:
         default_factory=dict
     )  #: name -> corner nodes, shape (facets, corners)
     regions: dict[str, NDArray[np.int64]] = field(default_factory=dict)  #: name -> cell indices
+    note: str = ""  #: what was changed when the mesh was read, for the user

@@ -327,3 +327,71 @@ def test_impossible_places_are_refused(dim, rotate, translate, message):
     mesh = shapes.rectangle((1, 1), (1, 1)) if dim == 2 else shapes.box((1, 1, 1), (1, 1, 1))
     with pytest.raises(MeshError, match=message):
         place(mesh, rotate, translate)
+
+
+# --- cells without middle nodes
+
+
+def ring_without_middles(cell, dim):
+    """A curved mesh of second order, its cells as files have them that lack the nodes in the middle."""
+    mesh = shapes.ring(1, 2, (8, 2), order=2) if dim == 2 else shapes.tube(1, 2, 1, (8, 2, 2), order=2)
+    nodes = {"quad8": 8, "hexahedron20": 20}[cell]
+    used, cells = np.unique(mesh.cells[:, :nodes], return_inverse=True)
+    return mesh, mesh.points[used], cells.reshape(-1, nodes)
+
+
+@pytest.mark.parametrize(("cell", "dim"), [("quad8", 2), ("hexahedron20", 3)])
+@pytest.mark.parametrize("ending", ["vtu", "msh"])
+def test_serendipity_cells_are_completed(cell, dim, ending, tmp_path):
+    """The new nodes are those of the serendipity map; straight and parallel cells have theirs in the middle."""
+    full, points, cells = ring_without_middles(cell, dim)
+    points3 = np.pad(points, ((0, 0), (0, 3 - dim)))
+    mesh = meshio.Mesh(points3, [(cell, cells)])
+    mesh.write(tmp_path / f"ring.{ending}", **({"file_format": "gmsh"} if ending == "msh" else {}))
+    found = build(tmp_path, f"ring.{ending}")
+    assert found.cell_type == full.cell_type
+    assert len(found.points) == len(full.points)
+    assert found.note.startswith(f"its {cell} cells became {full.cell_type}")
+    assert smallest_determinant(found) > 0.3
+    assert volume(found) == pytest.approx(volume(full), rel=1e-3)
+    # a polynomial that serendipity functions contain is met in the new nodes: x of an affine map of the unit cell
+    x = found.points[found.cells]
+    middle = x[:, :4].sum(axis=1) * -0.25 + x[:, 4:8].sum(axis=1) * 0.5
+    if dim == 2:
+        assert np.allclose(x[:, 8], middle, atol=1e-14)
+    else:
+        assert np.allclose(x[:, 26], -0.25 * x[:, :8].sum(axis=1) + 0.25 * x[:, 8:20].sum(axis=1), atol=1e-14)
+        bottom = [0, 1, 2, 3, 8, 9, 10, 11]
+        weights = np.array([-0.25] * 4 + [0.5] * 4)
+        assert np.allclose(x[:, 24], np.einsum("a,cai->ci", weights, x[:, bottom]), atol=1e-14)
+
+
+def test_serendipity_cells_of_a_box_become_the_full_ones(tmp_path):
+    box = shapes.box((2, 1, 1), (2, 2, 1), order=2)
+    used, cells = np.unique(box.cells[:, :20], return_inverse=True)
+    left = np.flatnonzero(box.points[used][:, 0] == 0.0)
+    meshio.Mesh(box.points[used], [("hexahedron20", cells.reshape(-1, 20))], point_sets={"left": left}).write(
+        tmp_path / "box.inp"
+    )
+    mesh = build(tmp_path, "box.inp")
+    assert mesh.cell_type == "hexahedron27"
+    assert np.allclose(mesh.points[mesh.cells], box.points[box.cells], atol=1e-12)
+    assert mesh.surfaces["left"].shape == (2, 4)
+
+
+@pytest.mark.parametrize(
+    ("cell", "nodes", "words"),
+    [("wedge", 6, "wedge"), ("pyramid", 5, "pyramid")],
+)
+def test_foreign_cells_are_refused(cell, nodes, words, tmp_path):
+    points = np.random.default_rng(1).random((nodes, 3))
+    meshio.Mesh(points, [(cell, np.arange(nodes)[None, :])]).write(tmp_path / "part.vtu")
+    with pytest.raises(MeshError, match=f"part.vtu: the cells are {words}; all must be of one type, one of triangle"):
+        build(tmp_path, "part.vtu")
+
+
+def test_prisms_of_gmsh_are_refused(tmp_path):
+    prisms = QUARTER + "out[] = Extrude {0, 0, 0.5} { Surface{1}; Layers{n}; Recombine; };"
+    (tmp_path / "part.geo").write_text(prisms)
+    with pytest.raises(MeshError, match=r"part.geo: the cells are Prism 6; all must be of one type"):
+        build(tmp_path, "part.geo", order=1)

@@ -1,5 +1,7 @@
 """What is measured is what was applied: resultants, means and integrals with known values, and errors of probes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from structure_setup import TIGHT, block, constant, load_step, make_structure, vector
@@ -210,3 +212,16 @@ def test_a_body_that_nothing_holds(cell_type, law):
     structure = make_structure(mesh, law, tractions=[Traction("top", load)])
     with pytest.raises(StepFailed, match="is a body not held"):
         load_step(structure)
+
+
+@pytest.mark.parametrize("scale", [1e-5, 1e-8])
+def test_point_of_a_tiny_body(scale):
+    """Lengths are relative to the body: an absolute distance once lost the points of a body of 1e-5 m."""
+    mesh = block("quad", 2)
+    structure = make_structure(replace(mesh, points=scale * mesh.points), MATERIAL)
+    structure.now.u[:] = structure.bodies[0].points[:2].T.ravel()
+    for point in ([0.3, 0.9], [1.0, 1.0], [0.25, 0.5]):
+        found = probes.at_point(structure, structure.bodies[0], "displacement", scale * np.array(point))()
+        assert list(found.values()) == pytest.approx(scale * np.array(point), rel=1e-12)
+    with pytest.raises(probes.PointOutside):
+        probes.at_point(structure, structure.bodies[0], "displacement", [1.01 * scale, 0.5 * scale])

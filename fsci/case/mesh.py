@@ -25,7 +25,12 @@ from fsci.case.values import Name, Number, Order, Text, chosen, spoken
 
 
 class FileMesh(Placed):
-    """A mesh from a file: gmsh's .geo or .msh with physical names, or any format that meshio reads."""
+    """A mesh from a file: gmsh's .geo or .msh with physical names, or any format that meshio reads.
+
+    All cells are of one type: triangles or tetrahedra of first or second order, quadrilaterals or hexahedra of first or
+    full second order. Cells with 8 and 20 nodes get nodes in the middle, so that they have 9 and 27. Prisms, pyramids
+    and mixed meshes are refused, and so are scripts that would run programs or write files.
+    """
 
     file: Text = setting(..., "path of the file, relative to the case file")
     order: Order = setting(1, "polynomial order of the cells (.geo only; other files have theirs)")

@@ -6,39 +6,26 @@ import basix
 import numpy as np
 from dolfinx import fem
 from dolfinx import mesh as dolfinx_mesh
-from mpi4py import MPI
 
 from solvers.api import Array
-from solvers.fem.domain import CELLS, Domain
+from solvers.fem.domain import CELLS, Domain, input_cells, owned_cells
 from solvers.fem.ghosts import accumulate
 from solvers.fem.spaces import function, scalar_space
+from solvers.locate import locate
 
 
 def locate_point(domain: Domain, point: Array) -> tuple[int, Array] | None:
-    """(local cell, reference coordinates) of a material point on the one process that answers for it, else None.
+    """(local cell, reference coordinates) of a material point on the one process that owns the cell, else None.
 
-    Collective. Points up to 1e-8 of the body's size outside still count as inside.
+    Collective. None everywhere if the point is not in the body.
     """
-    from dolfinx import geometry
-
-    mesh, x = domain.mesh, np.zeros(3)
-    x[: len(point)] = point
-    size = domain.comm.allreduce(float(np.ptp(mesh.geometry.x, axis=0).max(initial=0.0)), op=MPI.MAX)
-    tree = geometry.BoundingBoxTree(mesh, mesh.topology.dim, padding=1e-8 * size)
-    candidates = geometry.compute_collisions(tree, x[None, :])
-    cells = np.asarray(candidates.links(0))
-    owned = mesh.topology.index_map(mesh.topology.dim).size_local
-    best: tuple[float, int] = (np.inf, -1)
-    for cell in cells[cells < owned]:
-        nodes = mesh.geometry.dofmap.links(cell)
-        distance = float(np.linalg.norm(geometry.compute_distance_gjk(x[None, :], mesh.geometry.x[nodes])))
-        best = min(best, (distance, int(cell)))
-    distance, rank = domain.comm.allreduce((best[0], domain.comm.rank), op=MPI.MINLOC)
-    if not distance <= 1e-6 * size or rank != domain.comm.rank:
+    found = None if domain.source is None else locate(domain.source, point)
+    found = domain.comm.bcast(found, root=0)
+    if found is None:
         return None
-    nodes = mesh.geometry.dofmap.links(best[1])
-    reference = mesh.geometry.cmap.pull_back(x[None, : domain.dim], mesh.geometry.x[nodes][:, : domain.dim])
-    return best[1], reference[0]
+    cell, reference = found
+    local = np.flatnonzero(input_cells(domain)[: owned_cells(domain)] == cell)
+    return (int(local[0]), reference) if len(local) else None
 
 
 def tabulate(domain: Domain, reference: Array) -> Array:

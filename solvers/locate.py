@@ -1,0 +1,90 @@
+"""Which cell of a mesh holds a point, and where in it: pure numpy, the same answer before a run and in it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solvers.api import Array
+from solvers.mesh import Mesh
+from solvers.mesh_topology import FIRST_ORDER, reference_nodes
+
+#: Distance, as a share of the mesh's extent, up to which a point beside the mesh counts as a point of it: a formula
+#: for a point on the boundary is seldom exact.
+TOLERANCE = 1e-6
+
+#: A quadratic function exceeds the range of its nodal values by at most 1/8 in each direction; 1/2 is ample in 3D.
+BULGE = {1: 0.0, 2: 0.5}
+
+NEWTON_STEPS = 30
+
+
+def locate(mesh: Mesh, point: Array) -> tuple[int, Array] | None:
+    """(cell, reference coordinates) of the cell that a point [m] is in, or nearest to; None if it is beside the mesh.
+
+    Solves x(xi) = point by Newton's method in all cells whose box holds the point. All lengths are relative to the
+    extent of the mesh.
+    """
+    extent = float(np.ptp(mesh.points, axis=0).max())
+    nodes = (mesh.points[mesh.cells] - point) / extent
+    low, high = nodes.min(axis=1), nodes.max(axis=1)
+    room = BULGE[_degree(mesh.cell_type)] * (high - low).max(axis=1, keepdims=True) + TOLERANCE
+    near = np.flatnonzero(((low - room <= 0.0) & (high + room >= 0.0)).all(axis=1))
+    if not len(near):
+        return None
+    reference, missed = _pull_back(mesh.cell_type, nodes[near])
+    best = int(np.argmin(missed))
+    return (int(near[best]), reference[best]) if missed[best] <= TOLERANCE else None
+
+
+def _pull_back(cell_type: str, nodes: Array) -> tuple[Array, Array]:
+    """(reference coordinates of a point of each cell near the origin, its distance from the origin).
+
+    Newton's iterates are clipped to the cell. They reach the origin if it is in the cell; else the distance that
+    remains is of the order of the cell's distance.
+    """
+    inside = _clip(cell_type, np.full((len(nodes), nodes.shape[2]), 1.0 / 3.0))
+    for _ in range(NEWTON_STEPS):
+        values, gradients = _shape_functions(cell_type, inside)
+        x = np.einsum("ca,cai->ci", values, nodes)
+        jacobian = np.einsum("caj,cai->cij", gradients, nodes)
+        step = np.einsum("cij,cj->ci", np.linalg.pinv(jacobian), -x)
+        new = _clip(cell_type, inside + step)
+        done = np.abs(new - inside).max() < 1e-15
+        inside = new
+        if done:
+            break
+    values, _ = _shape_functions(cell_type, inside)
+    return inside, np.linalg.norm(np.einsum("ca,cai->ci", values, nodes), axis=1)
+
+
+def _clip(cell_type: str, reference: Array) -> Array:
+    """The points moved into the unit cell."""
+    clipped = np.clip(reference, 0.0, 1.0)
+    if FIRST_ORDER[cell_type] in ("triangle", "tetra"):
+        clipped = clipped / np.maximum(clipped.sum(axis=1, keepdims=True), 1.0)
+    return clipped
+
+
+def _degree(cell_type: str) -> int:
+    return 1 if FIRST_ORDER[cell_type] == cell_type else 2
+
+
+def _exponents(cell_type: str) -> Array:
+    """Of the monomials that span the shape functions, shape (functions, dim)."""
+    dim, degree = reference_nodes(cell_type).shape[1], _degree(cell_type)
+    powers = np.stack(np.meshgrid(*[np.arange(degree + 1)] * dim, indexing="ij"), axis=-1).reshape(-1, dim)
+    simplex = FIRST_ORDER[cell_type] in ("triangle", "tetra")
+    return powers[powers.sum(axis=1) <= degree] if simplex else powers
+
+
+def _shape_functions(cell_type: str, reference: Array) -> tuple[Array, Array]:
+    """Lagrange functions (points, nodes) and their gradients (points, nodes, dim), nodes in the order of VTK."""
+    powers = _exponents(cell_type)
+    inverse = np.linalg.inv(np.prod(reference_nodes(cell_type)[:, None, :] ** powers, axis=2))
+    factors = reference[:, None, :] ** powers
+    slopes = powers * reference[:, None, :] ** np.maximum(powers - 1, 0)
+    gradients = [
+        np.prod(np.where(np.arange(powers.shape[1]) == axis, slopes, factors), axis=2)
+        for axis in range(powers.shape[1])
+    ]
+    return factors.prod(axis=2) @ inverse, np.einsum("pmj,ma->paj", np.stack(gradients, axis=2), inverse)
