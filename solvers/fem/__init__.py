@@ -35,6 +35,7 @@ from solvers.fem.forms import (
 )
 from solvers.fem.ghosts import accumulate, add_ghosts, share_owned, sum_ghosts
 from solvers.fem.points import average_at_nodes, cell_midpoints, evaluate_cells, locate_point, reference_nodes, tabulate
+from solvers.fem.quadrature import Entities, cell_quadrature, facet_quadrature
 from solvers.fem.spaces import (
     block_points,
     cellwise_space,
@@ -57,6 +58,7 @@ __all__ = [
     "COMPILE_OPTIONS",
     "VTK_POINTS",
     "Domain",
+    "Entities",
     "Integral",
     "accumulate",
     "add_ghosts",
@@ -67,6 +69,7 @@ __all__ = [
     "block_points",
     "boundary_facets",
     "cell_midpoints",
+    "cell_quadrature",
     "cellwise_space",
     "compile_expression",
     "compile_form",
@@ -79,6 +82,7 @@ __all__ = [
     "exterior_facets",
     "facet_dofs",
     "facet_midpoints",
+    "facet_quadrature",
     "flow_space",
     "function",
     "input_cells",

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import ufl
@@ -15,6 +14,7 @@ from petsc4py import PETSc
 from solvers import fem
 from solvers.api import Array
 from solvers.structure import forms
+from solvers.structure.loads import DeadLoads, FollowerPressure, Pressure, Traction
 from solvers.structure.materials import Material, Parameter, Value, parameters
 
 #: Cell type -> quadrature degree of (internal forces, mass): full integration of the affine cell.
@@ -46,22 +46,6 @@ class Symmetry:
 
 
 @dataclass(frozen=True)
-class Traction:
-    """Dead load [N/m^2 of reference surface]."""
-
-    surface: str
-    value: tuple[Value, ...]
-
-
-@dataclass(frozen=True)
-class Pressure:
-    """Follower pressure [Pa], positive against the surface."""
-
-    surface: str
-    value: Value
-
-
-@dataclass(frozen=True)
 class BodySettings:
     """What the user says of a body, besides its mesh. Vectors have one entry per dimension."""
 
@@ -90,6 +74,7 @@ class Body:
         self.density = self._parameter(settings.material.density)
         self.parameters = {k: self._parameter(p) for k, p in parameters(settings.material).items()}
         self._compile()
+        self._build_loads()
 
     @cached_property
     def _stress(self):
@@ -132,33 +117,18 @@ class Body:
         self._force = fem.function(self.space)
         nodes = fem.reference_nodes(self.domain)
         self._jacobian = fem.compile_expression(ufl.det(forms.deformation_gradient(self.u)), nodes)
-        self._compile_loads(v, du, mass_dx)
 
-    def _compile_loads(self, v, du, dx: ufl.Measure) -> None:
+    def _build_loads(self) -> None:
         settings = self.settings
-        self._dead: list[tuple[Any, tuple[Value, ...]]] = []
-        self._dead_forms = []
-        if settings.gravity or settings.body_force:
-            b, g = fem.function(self.space), fem.function(self.space)
-            self._dead += [(f, val) for f, val in ((b, settings.body_force), (g, settings.gravity)) if val]
-            self._dead_forms.append(fem.compile_form(forms.volume_load(b, g, self.density, v, dx)))
+        self._dead = DeadLoads(self.domain, self.space)
+        if settings.body_force:
+            self._dead.add_volume(settings.body_force)
+        if settings.gravity:
+            self._dead.add_volume(settings.gravity, settings.material.density)
         for traction in settings.tractions:
-            t = fem.function(self.space)
-            ds = fem.surface_measure(self.domain, traction.surface, self.mass_degree)
-            self._dead.append((t, traction.value))
-            self._dead_forms.append(fem.compile_form(forms.dead_traction(t, v, ds)))
+            self._dead.add_surface(traction.surface, traction.value)
         self._dead_load: Array | None = None
-
-        self._pressures: list[tuple[Any, Value]] = []
-        self._pressure_forms, self._pressure_tangents = [], []
-        N = ufl.FacetNormal(self.domain.mesh)
-        for pressure in settings.pressures:
-            p = fem.function(fem.scalar_space(self.domain))
-            ds = fem.surface_measure(self.domain, pressure.surface, self.mass_degree)
-            load = forms.follower_pressure(p, self.u, v, N, ds)
-            self._pressures.append((p, pressure.value))
-            self._pressure_forms.append(fem.compile_form(load))
-            self._pressure_tangents.append(fem.compile_form(-ufl.derivative(load, self.u, du)))
+        self._pressures = [FollowerPressure(self.domain, self.space, pressure) for pressure in settings.pressures]
 
     # ------------------------------------------------------------------------------------------------- state
 
@@ -173,15 +143,11 @@ class Body:
 
     def set_time(self, t: float) -> None:
         """Evaluate the loads at time t."""
-        changed = self._dead_load is None
-        for function, value in self._dead:
-            new = self.nodal(value, t).ravel()
-            changed = changed or not np.array_equal(new, function.x.array)
-            function.x.array[:] = new
-        for p, scalar in self._pressures:
-            p.x.array[:] = scalar(fem.block_points(p.function_space), t)
-        if self.domain.comm.allreduce(changed):
-            self._dead_load = self._assemble(self._dead_forms)
+        if self.domain.comm.allreduce(self._dead.update(t)):
+            self._force.x.array[:] = self._dead.force
+            self._dead_load = self._summed()
+        for pressure in self._pressures:
+            pressure.set_time(t)
 
     # ---------------------------------------------------------------------------------------------- assembly
 
@@ -189,6 +155,10 @@ class Body:
         self._force.x.array[:] = 0.0
         for form in compiled:
             fem.assemble_vector(form, self._force.x.array)
+        return self._summed()
+
+    def _summed(self) -> Array:
+        """What all processes have put into `_force`, at owned dofs."""
         fem.accumulate(self._force)
         return self._force.x.array[: self.size].copy()
 
@@ -199,9 +169,12 @@ class Body:
     def external_force(self) -> Array:
         """Loads at the time of `set_time` and the present displacement [N], shape (size,)."""
         assert self._dead_load is not None, "set_time comes first"
-        if not self._pressure_forms:
+        if not self._pressures:
             return self._dead_load.copy()
-        return self._dead_load + self._assemble(self._pressure_forms)
+        self._force.x.array[:] = 0.0
+        for pressure in self._pressures:
+            pressure.add_force(self.u.x.array, self._force.x.array)
+        return self._dead_load + self._summed()
 
     def mass(self) -> PETSc.Mat:
         """Consistent mass matrix [kg]."""
@@ -217,8 +190,9 @@ class Body:
     def assemble_tangent(self, matrix: PETSc.Mat) -> None:
         """d(internal - external force)/du [N/m]."""
         matrix.zeroEntries()
-        for form in (self._tangent, *self._pressure_tangents):
-            fem.assemble_matrix(matrix, form)
+        fem.assemble_matrix(matrix, self._tangent)
+        for pressure in self._pressures:
+            pressure.add_tangent(self.u.x.array, matrix)
         matrix.assemble()
 
     def smallest_jacobian(self) -> tuple[float, str, tuple[float, ...]]:

@@ -4,6 +4,8 @@ Find u(t) such that for all v, with W the stored energy, F = I + grad u, J = det
 
     int rho u_tt.v dX + int dW/dF : grad v dX = int (b + rho g).v dX + int_G t.v dA - int_G p J F^-T N . v dA
 
+The right-hand side is in solvers.structure.loads.
+
 Source: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (2008), sections 4.2 and 8.5.
 """
 
@@ -33,22 +35,6 @@ def first_piola_kirchhoff(u: Tensor, material: Material, parameters: dict[str, T
 def inertia(a: Tensor, v: Tensor, rho: Tensor, dx: ufl.Measure) -> ufl.Form:
     """int rho a.v dX."""
     return rho * ufl.inner(a, v) * dx
-
-
-def volume_load(b: Tensor, g: Tensor, rho: Tensor, v: Tensor, dx: ufl.Measure) -> ufl.Form:
-    """int (b + rho g).v dX."""
-    return ufl.inner(b + rho * g, v) * dx
-
-
-def dead_traction(t: Tensor, v: Tensor, ds: ufl.Measure) -> ufl.Form:
-    """int t.v dA: direction and size belong to the reference surface."""
-    return ufl.inner(t, v) * ds
-
-
-def follower_pressure(p: Tensor, u: Tensor, v: Tensor, N: Tensor, ds: ufl.Measure) -> ufl.Form:
-    """- int p J F^-T N . v dA = - int p n . v da on the deformed surface (Nanson)."""
-    F = deformation_gradient(u)
-    return -p * ufl.det(F) * ufl.inner(ufl.inv(F).T * N, v) * ds
 
 
 def cauchy_stress(u: Tensor, material: Material, parameters: dict[str, Tensor]) -> Tensor:
