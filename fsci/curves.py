@@ -64,6 +64,7 @@ DIMENSIONS = {
 BALANCES = {
     "structure.energy": ("error of the structure's energy", "energy"),
     "fluid.mass": ("error of the fluid's volume", "flow_rate"),
+    "fluid.leak": ("volume through surfaces of bodies", "flow_rate"),
     "interface.momentum": ("error of the fluid's momentum", "force"),
     "fluid.loss": ("power of the fluid that the method takes", "dissipation"),
     "interface.work": ("error of the work at the interface", "energy"),

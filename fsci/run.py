@@ -284,7 +284,8 @@ class Run:
     def _report(self, status: str, message: str, results: list[dict[str, Any]]) -> int:
         for result in results:
             word = "ok    " if result["ok"] else "MISSED"
-            found = f"{result['value']:.6g}, reference {result['reference']:.6g} +- {result['tolerance']:.2g}"
+            kind = "earlier result" if result["regression"] else "reference"
+            found = f"{result['value']:.6g}, {kind} {result['reference']:.6g} +- {result['tolerance']:.2g}"
             self.monitor.say(f"verify {word} {result['name']}: {found} {result['message']}".rstrip())
         missed = any(not result["ok"] for result in results)
         if status == "finished":

@@ -27,12 +27,15 @@ class Check(Protocol):
     def relative(self) -> float | None: ...
     @property
     def absolute(self) -> float | None: ...
+    @property
+    def regression(self) -> bool: ...  #: the reference is a result of an earlier version
 
 
 def evaluate(history: Mapping[str, Array], checks: Sequence[Check]) -> list[dict[str, Any]]:
-    """One dict {name, value, reference, tolerance, ok, message} per check.
+    """One dict {name, value, reference, tolerance, ok, regression, message} per check.
 
-    `tolerance` is the difference allowed between value and reference; `message` says why there is no value.
+    `tolerance` is the difference allowed between value and reference; `message` says why there is no value;
+    `regression` marks a reference that is the result of an earlier version.
     """
     return [evaluate_one(history, check) for check in checks]
 
@@ -61,6 +64,7 @@ def evaluate_one(history: Mapping[str, Array], check: Check) -> dict[str, Any]:
         "reference": check.reference,
         "tolerance": tolerance,
         "ok": bool(abs(value - check.reference) <= tolerance),
+        "regression": check.regression,
         "message": message,
     }
 

@@ -120,6 +120,7 @@ def test_probes_of_a_flow_known_in_closed_form(element, tmp_path):
         "power": 0,
         "volume": volume,
         "fluid.mass": 0,
+        "fluid.leak": 0,
     }
     for name, value in expected.items():
         assert final[name] == pytest.approx(value, abs=1e-9), name

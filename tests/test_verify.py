@@ -19,6 +19,7 @@ class Check:
     relative: float | None = None
     absolute: float | None = None
     start: float | None = None
+    regression: bool = False
 
 
 def sine(samples: int, periods: float, *, frequency: float = 1.1, phase: float = 0.3) -> dict[str, np.ndarray]:

@@ -13,6 +13,8 @@ from fsci.case.yaml_text import Keys
 from fsci.estimate import thickness
 
 MOST_CELLS_PER_STEP = 10.0  #: that a flow or a body may cross in a time step without being asked about it
+#: Cells across a body that both of its sides need to share no unknowns: with fewer, fluid passes through the body.
+CELLS_ACROSS_AT_REST, CELLS_ACROSS_IF_MOVING = 2.0, 4.0
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
 
 
@@ -25,13 +27,7 @@ def flow_doubts(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
         yield ("fluid", "density"), f"implausible density: {value}; check 'units'"
     if case.coupling is None and not _driven(fluid):
         yield ("fluid", "patches"), "nothing drives the flow: no velocity, traction, force or moving body"
-    smallest = min(float(np.diff(edges).min()) for edges in fluid.grid.planes)
-    for name, body in fluid.bodies.items():
-        if isinstance(body.mesh, Shape) and (extent := thickness(body.mesh)) < smallest:
-            yield (
-                ("fluid", "bodies", name, "mesh"),
-                f"the body is {extent:g} thick, thinner than the smallest cell, {smallest:g}: refine the grid",
-            )
+    yield from _thin_bodies(case, fluid)
     if fluid.scheme == "steady":
         return
     for name, patch in fluid.patches.items():
@@ -39,6 +35,24 @@ def flow_doubts(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
         if crossed > MOST_CELLS_PER_STEP:
             message = f"the flow crosses {crossed:.0f} cells in a time step here; take a smaller 'step'"
             yield ("fluid", "patches", name), message
+
+
+def _thin_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
+    """Bodies through which fluid passes, because both of their sides share unknowns."""
+    smallest = min(float(np.diff(edges).min()) for edges in fluid.grid.planes)
+    moving = {("fluid", "bodies", name): (body.mesh, body.motion is not None) for name, body in fluid.bodies.items()}
+    elastic = {("structure", "bodies", name): (body.mesh, True) for name, body in case.elastic_bodies.items()}
+    one_sided = set(case.coupling.dry_side) if case.coupling is not None else set()
+    for (section, kind, name), (mesh, moves) in (moving | elastic).items():
+        least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
+        if not isinstance(mesh, Shape) or name in one_sided or (extent := thickness(mesh)) >= least * smallest:
+            continue
+        how = "that moves " if moves else ""
+        size = f"the body is {extent:g} thick, {extent / smallest:.2g} of the smallest cells"
+        why = (
+            f"where it has fluid on both sides, fluid passes through a body {how}with less than {least:g} cells across"
+        )
+        yield (section, kind, name, "mesh"), f"{size}: {why}; refine the grid"
 
 
 def _driven(fluid: Fluid) -> bool:

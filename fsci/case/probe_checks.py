@@ -10,7 +10,7 @@ from fsci.case.fluid import Fluid
 from fsci.case.mesh_checks import Mistake, length_mistakes, surface_mistakes
 from fsci.case.probes import RESERVED, Probe
 from fsci.case.structure import Structure
-from fsci.case.verify import CONTACT_COLUMNS, COUPLING_COLUMNS, FIELD_COLUMNS, RUN_COLUMNS
+from fsci.case.verify import BODY_COLUMN, CONTACT_COLUMNS, COUPLING_COLUMNS, FIELD_COLUMNS, RUN_COLUMNS
 from fsci.case.yaml_text import Keys
 
 NEEDS_MASS = ("momentum", "angular_momentum", "mass", "centre")
@@ -104,6 +104,8 @@ def verify_mistakes(case: Case) -> Iterator[Mistake]:
     columns = [column for name, probe in case.probes.items() for column in probe.columns(name, case.dimension or 3)]
     columns += RUN_COLUMNS
     columns += [column for field, column in FIELD_COLUMNS.items() if getattr(case, field) is not None]
+    if case.fluid is not None and (case.fluid.bodies or case.coupling is not None):
+        columns.append(BODY_COLUMN)
     if case.coupling is not None:
         columns += COUPLING_COLUMNS
     if case.contact is not None:

@@ -7,13 +7,16 @@ from typing import Literal
 from pydantic import model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import NotNegative, Number, Text
+from fsci.case.values import NotNegative, Number, Switch, Text
 
 #: columns of history.csv that every run has
 RUN_COLUMNS = ("iterations", "residual")
 
 #: errors of the balances of the fields: energy of the structure, volume of the fluid
 FIELD_COLUMNS = {"structure": "structure.energy", "fluid": "fluid.mass"}
+
+#: volume that passes through the surfaces of bodies in a fluid
+BODY_COLUMN = "fluid.leak"
 
 #: those of the interface between both
 COUPLING_COLUMNS = ("interface.force", "interface.momentum", "interface.power", "interface.work", "fluid.loss")
@@ -40,6 +43,10 @@ class Check(Section):
     reference: Number = setting(..., "the value to reach")
     relative: NotNegative | None = setting(None, "allowed deviation, relative to the reference", unit="1")
     absolute: NotNegative | None = setting(None, "allowed deviation, in the unit of the value")
+    regression: Switch = setting(
+        False,
+        "the reference is a result of an earlier version, not a published or exact value",
+    )
 
     @model_validator(mode="after")
     def _one_tolerance(self) -> Check:

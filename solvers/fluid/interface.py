@@ -37,8 +37,8 @@ class Interface:
         self.mu, self.dim, self._unknowns, self._vertices = mu, grid.dim, unknowns, len(cut.motion.x)
         moments = pieces.moments[mine][:, rule.order]
         self.n, self.penalty, self.mass_of_pieces = pieces.normal[mine], penalty[mine], pieces.mass[mine]
-        self._corners = cut.facets[pieces.facet[mine]]
-        self.x = cut.motion.x[self._corners]
+        self.corners = cut.facets[pieces.facet[mine]]
+        self.x = cut.motion.x[self.corners]
         self.sizes = grid.sizes[cells]
         self.u, self.p = unknowns.cell_velocity[cells], unknowns.cell_pressure[cells]
         phi, gradient = rule.velocity_table
@@ -54,7 +54,7 @@ class Interface:
 
     def velocity_terms(self, g: Array) -> Array:
         """C g at local dofs, the ghosts' share still there; g [m/s] of shape (vertices, dim)."""
-        g, n, mu = g[self._corners], self.n, self.mu
+        g, n, mu = g[self.corners], self.n, self.mu
         against = np.einsum("pav,pvi->pai", mu * self.normal_slope, g)
         against += mu * np.einsum("pavj,pvj,pi->pai", self.grad, g, n, optimize=True)
         against -= np.einsum("pij,pav,pvj->pai", self.penalty, self.phi, g, optimize=True)
@@ -69,10 +69,10 @@ class Interface:
         force = -mu * np.einsum("pav,pai->pvi", self.normal_slope, u)
         force -= mu * np.einsum("pavi,paj,pj->pvi", self.grad, u, n, optimize=True)
         force += np.einsum("pav,pa,pi->pvi", self.psi, p, n, optimize=True)
-        slip = np.einsum("pav,pai->pvi", self.phi, u) - np.einsum("pvw,pwi->pvi", self.mass_of_pieces, g[self._corners])
+        slip = np.einsum("pav,pai->pvi", self.phi, u) - np.einsum("pvw,pwi->pvi", self.mass_of_pieces, g[self.corners])
         force += np.einsum("pij,pvj->pvi", self.penalty, slip)
         total = np.zeros((self._vertices, n.shape[1]))
-        np.add.at(total, self._corners, force)
+        np.add.at(total, self.corners, force)
         return total
 
     @cached_property
@@ -114,4 +114,4 @@ class Interface:
         )
 
     def _columns(self) -> NDArray[np.int64]:
-        return self.dim * self._corners[:, :, None] + np.arange(self.dim)
+        return self.dim * self.corners[:, :, None] + np.arange(self.dim)

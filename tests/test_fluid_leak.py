@@ -1,0 +1,75 @@
+"""Fluid that passes through a body shows in `fluid.leak`, and `fsci check` warns of it."""
+
+import numpy as np
+import pytest
+
+from fsci.case import load_case
+from fsci.history import read_history
+from fsci.run import run_case
+
+#: cells of 0.1, and a plate that seals the channel, pressure 1 on its left side
+CASE = """\
+time: {{step: 0.1, end: 0.5}}
+fluid:
+  density: 1
+  viscosity: 1e-3
+  scheme: backward_euler
+  grid: {{from: [0, 0], to: [3, 1], cells: [30, 10]}}
+  patches:
+    inlet: {{on: x-, traction: [1, 0]}}
+    outlet: {{on: x+, traction: [0, 0]}}
+    walls: {{on: [y-, y+], slip: true}}
+  bodies:
+    plate: {{mesh: {{shape: rectangle, size: [{thickness}, 1.2], cells: [1, 12], origin: [1.537, -0.1]}}{motion}}}
+probes:
+  force: {{quantity: force, body: plate}}
+  flow: {{quantity: flow_rate, through: outlet}}
+verify: [{{value: fluid.leak, statistic: max, reference: 0, absolute: 1e-12}}]
+"""
+MOVED = ', motion: {displacement: ["0.05*t", 0]}'
+
+
+def history_of(tmp_path, thickness, motion=""):
+    (tmp_path / "case.yaml").write_text(CASE.format(thickness=thickness, motion=motion))
+    code = run_case(load_case(tmp_path), tmp_path / "out")
+    return code, read_history(tmp_path / "out" / "history.csv")
+
+
+@pytest.mark.parametrize(("thickness", "motion", "rate"), [(0.25, "", 0.0), (0.4, MOVED, 0.05)])
+def test_a_thick_plate_is_tight(tmp_path, thickness, motion, rate):
+    code, history = history_of(tmp_path, thickness, motion)
+    assert code == 0, "verify holds"
+    assert np.allclose(history["flow"], rate, atol=1e-10)
+
+
+def test_what_passes_a_thin_plate_is_seen(tmp_path):
+    """Both faces of the plate see at least the flow that leaves the channel."""
+    code, history = history_of(tmp_path, 0.02)
+    assert code == 1, "verify is missed"
+    assert history["flow"][-1] > 0.01
+    assert np.all(history["fluid.leak"] > history["flow"])
+
+
+@pytest.mark.parametrize(
+    ("thickness", "motion", "words"),
+    [
+        (0.15, "", "the body is 0.15 thick, 1.5 of the smallest cells: where it has fluid on both sides, fluid passes"),
+        (0.3, MOVED, "fluid passes through a body that moves with less than 4 cells across"),
+        (0.21, "", None),
+        (0.41, MOVED, None),
+    ],
+)
+def test_check_warns(tmp_path, thickness, motion, words):
+    (tmp_path / "case.yaml").write_text(CASE.format(thickness=thickness, motion=motion))
+    warnings = [str(warning) for warning in load_case(tmp_path).warnings]
+    assert len(warnings) == (words is not None)
+    assert not words or words in warnings[0]
+
+
+def test_check_warns_of_elastic_bodies(tmp_path):
+    text = CASE.format(thickness=1, motion="")
+    body = "structure: {dynamics: {}, bodies: {plate: {mesh: {shape: rectangle, size: [0.2, 1], cells: [1, 4]}, \
+material: {law: neo_hooke, E: 1, nu: 0, density: 1}}}}\ncoupling: {}\n"
+    text = text.split("  bodies:")[0] + body
+    (tmp_path / "case.yaml").write_text(text)
+    assert any("2 of the smallest cells: where" in str(warning) for warning in load_case(tmp_path).warnings)
