@@ -38,6 +38,7 @@ from solvers.fem.points import average_at_nodes, cell_midpoints, evaluate_cells,
 from solvers.fem.quadrature import Entities, cell_quadrature, facet_quadrature
 from solvers.fem.spaces import (
     block_points,
+    cell_blocks,
     cellwise_space,
     component_cell_dofs,
     component_dofs,
@@ -68,6 +69,7 @@ __all__ = [
     "average_at_nodes",
     "block_points",
     "boundary_facets",
+    "cell_blocks",
     "cell_midpoints",
     "cell_quadrature",
     "cellwise_space",

@@ -10,7 +10,7 @@ from dolfinx import mesh as dolfinx_mesh
 from solvers.api import Array
 from solvers.fem.domain import CELLS, Domain, input_cells, owned_cells
 from solvers.fem.ghosts import accumulate
-from solvers.fem.spaces import function, scalar_space
+from solvers.fem.spaces import cell_blocks, function, scalar_space
 from solvers.locate import locate
 
 
@@ -47,8 +47,8 @@ def average_at_nodes(domain: Domain, expression: fem.Expression, *, components: 
     """Mean over the adjacent cells of an expression compiled at `reference_nodes`, shape (local nodes, components)."""
     space = scalar_space(domain)
     values = evaluate_cells(domain, expression)
-    values = values.reshape(len(values), -1, components)
-    blocks = space.dofmap.list.array.reshape(-1, values.shape[1])[: len(values)]
+    blocks = cell_blocks(space)[: len(values)]
+    values = values.reshape(*blocks.shape, components)
     total = function(space)
     mean = np.empty((len(total.x.array), components))
     for component in range(-1, components):

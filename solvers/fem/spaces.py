@@ -46,6 +46,11 @@ def flow_space(domain: Domain, velocity_degree: int) -> fem.FunctionSpace:
         return fem.FunctionSpace(domain.mesh, element)
 
 
+def cell_blocks(space: fem.FunctionSpace) -> NDArray[np.int32]:
+    """Local dof blocks of each local cell, shape (cells, blocks per cell); a process may have no cells."""
+    return np.asarray(space.dofmap.list.array).reshape(-1, space.dofmap.dof_layout.num_dofs)
+
+
 def component_dofs(space: fem.FunctionSpace, component: int) -> tuple[NDArray[np.int32], Array]:
     """(local unrolled dofs, their points of shape (dofs, 3)) of one component of a `flow_space` (collective)."""
     if space.dofmap.index_map_bs > 1:
@@ -63,8 +68,7 @@ def component_cell_dofs(space: fem.FunctionSpace, component: int) -> NDArray[np.
         part = space.sub(component)
     else:
         part = space.sub(0).sub(component) if component < space.mesh.geometry.dim else space.sub(1)
-    cells = space.mesh.topology.index_map(space.mesh.topology.dim)
-    return np.asarray(part.dofmap.list.array).reshape(cells.size_local + cells.num_ghosts, -1)
+    return cell_blocks(part)
 
 
 def tabulate_lagrange(domain: Domain, degree: int, points: Array) -> tuple[Array, Array]:
@@ -114,10 +118,8 @@ def function(space: fem.FunctionSpace) -> fem.Function:
 
 def node_of_block(domain: Domain, space: fem.FunctionSpace) -> NDArray[np.int64]:
     """Mesh-file number of the node behind each local dof block (owned blocks first, then ghosts)."""
-    cells = domain.mesh.topology.index_map(domain.mesh.topology.dim)
-    local_cells = cells.size_local + cells.num_ghosts
-    blocks = space.dofmap.list.array.reshape(local_cells, -1)
-    geometry = domain.mesh.geometry.dofmap.array.reshape(local_cells, -1)
+    blocks = cell_blocks(space)
+    geometry = domain.mesh.geometry.dofmap.array.reshape(blocks.shape)
     nodes = np.full(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, -1, dtype=np.int64)
     nodes[blocks] = input_nodes(domain)[geometry]
     return nodes

@@ -32,9 +32,8 @@ class Unknowns:
         self.grid, self.degree, self.dim = grid, degree, grid.dim
         self.space = fem.flow_space(grid.domain, degree)
         self.block_size = int(self.space.dofmap.index_map_bs)
-        cells = len(grid.numbers)
         #: dof blocks of each local cell
-        self.cell_blocks: Dofs = self.space.dofmap.list.array.reshape(cells, -1)
+        self.cell_blocks: Dofs = fem.cell_blocks(self.space)
         self.index_map = self.space.dofmap.index_map
         self.owned = int(self.index_map.size_local) * self.block_size  #: owned dofs
         self.local = (int(self.index_map.size_local) + int(self.index_map.num_ghosts)) * self.block_size

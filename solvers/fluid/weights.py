@@ -73,7 +73,7 @@ class Weights:
         if function is not self.fluid:
             scale = self.rule * self.grid.sizes[cells].prod(axis=1)[:, None]
             values = values / scale.reshape(*scale.shape, *([1] * (values.ndim - 2)))
-        blocks = function.function_space.dofmap.list.array.reshape(-1, len(self.rule))[cells]
+        blocks = fem.cell_blocks(function.function_space)[cells]
         function.x.array[:] = 0.0
         function.x.array.reshape(-1, *values.shape[2:])[blocks] = values
 
