@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.fem.domain import CELLS, Domain
-from solvers.fem.spaces import block_points, quadrature_points, tabulate_lagrange
+from solvers.fem.spaces import block_points, cell_blocks, quadrature_points, tabulate_lagrange
 
 #: Number of corners -> type of a facet.
 FACETS = {2: basix.CellType.interval, 3: basix.CellType.triangle, 4: basix.CellType.quadrilateral}
@@ -44,7 +44,7 @@ def cell_quadrature(domain: Domain, space: fem.FunctionSpace, degree: int) -> li
     points, rule = quadrature_points(domain, degree)
     shape, slopes = tabulate_lagrange(domain, domain.degree, points)
     cells = np.arange(domain.mesh.topology.index_map(domain.dim).size_local, dtype=np.int32)
-    blocks = _cell_blocks(space)[cells]
+    blocks = cell_blocks(space)[cells]
     x = block_points(space)[: domain.dim].T
     jacobian = np.einsum("pnk,end->epdk", slopes, x[blocks], optimize=True)
     weights = rule * np.abs(np.linalg.det(jacobian))
@@ -73,11 +73,11 @@ def _facets(domain: Domain, space: fem.FunctionSpace, number: int, cells: NDArra
     shape, slopes = tabulate_lagrange(domain, domain.degree, corners[0] + local @ edges)
 
     x = block_points(space)[: domain.dim].T
-    cell_blocks = _cell_blocks(space)[cells]
-    jacobian = np.einsum("nk,end->edk", slopes[0], x[cell_blocks], optimize=True)
+    of_cells = cell_blocks(space)[cells]
+    jacobian = np.einsum("nk,end->edk", slopes[0], x[of_cells], optimize=True)
     away = _normal(edges.T) @ basix.cell.facet_outward_normals(cell_type)[number]
     nodes = element.entity_closure_dofs[domain.dim - 1][number]
-    blocks = cell_blocks[:, nodes]
+    blocks = of_cells[:, nodes]
     along = np.einsum("pnk,jk->pnj", slopes[:, nodes], edges)
     on_facet = Entities(
         blocks=blocks,
@@ -98,11 +98,6 @@ def _normal(tangents: Array) -> Array:
     if tangents.shape[-1] == 1:
         return np.stack([tangents[..., 1, 0], -tangents[..., 0, 0]], axis=-1)
     return np.cross(tangents[..., 0], tangents[..., 1])
-
-
-def _cell_blocks(space: fem.FunctionSpace) -> NDArray[np.int32]:
-    cells = space.mesh.topology.index_map(space.mesh.topology.dim)
-    return np.asarray(space.dofmap.list.array).reshape(cells.size_local + cells.num_ghosts, -1)
 
 
 def _positions(space: fem.FunctionSpace, blocks: NDArray[np.int32], shape: Array) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import basix
 import numpy as np
 import ufl
@@ -51,15 +53,26 @@ def cell_blocks(space: fem.FunctionSpace) -> NDArray[np.int32]:
     return np.asarray(space.dofmap.list.array).reshape(-1, space.dofmap.dof_layout.num_dofs)
 
 
-def component_dofs(space: fem.FunctionSpace, component: int) -> tuple[NDArray[np.int32], Array]:
-    """(local unrolled dofs, their points of shape (dofs, 3)) of one component of a `flow_space` (collective)."""
+def component_dofs(
+    domain: Domain, space: fem.FunctionSpace, components: Sequence[int], degree: int
+) -> tuple[NDArray[np.int32], Array]:
+    """Local unrolled dofs (nodes, components) of components of a `flow_space` on straight cells, and their points.
+
+    `degree`: of the components. Points [m] have the shape (nodes, dim); owned nodes come first.
+    """
     if space.dofmap.index_map_bs > 1:
-        blocks = np.arange(len(space.tabulate_dof_coordinates()), dtype=np.int32)
-        return blocks * space.dofmap.index_map_bs + component, space.tabulate_dof_coordinates()
-    with quiet():
-        part = space.sub(0).sub(component) if component < space.mesh.geometry.dim else space.sub(1)
-        collapsed, dofs = part.collapse()
-    return np.asarray(dofs, dtype=np.int32), collapsed.tabulate_dof_coordinates()
+        points = space.tabulate_dof_coordinates()[:, : domain.dim]
+        blocks = np.arange(len(points), dtype=np.int32) * space.dofmap.index_map_bs
+        return blocks[:, None] + np.asarray(components, dtype=np.int32), points
+    # not DOLFINx's `collapse`, which fails on a process without cells
+    by_cell = [component_cell_dofs(space, component) for component in components]
+    _, place = np.unique(by_cell[0], return_index=True)
+    cell = getattr(basix.CellType, CELLS[domain.cell_type][0])
+    element = basix.create_element(basix.ElementFamily.P, cell, degree, basix.LagrangeVariant.gll_warped)
+    shapes, _ = tabulate_lagrange(domain, 1, element.points)
+    corners = domain.mesh.geometry.x[domain.mesh.geometry.dofmap.array].reshape(-1, shapes.shape[1], 3)
+    points = np.einsum("qa,cai->cqi", shapes, corners[:, :, : domain.dim]).reshape(-1, domain.dim)
+    return np.stack([dofs.ravel()[place] for dofs in by_cell], axis=1), points[place]
 
 
 def component_cell_dofs(space: fem.FunctionSpace, component: int) -> NDArray[np.int32]:

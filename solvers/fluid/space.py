@@ -51,9 +51,7 @@ class Unknowns:
         self.pressure = self._nodes([self.dim], 1)
 
     def _nodes(self, components, degree: int) -> Nodes:
-        found = [fem.component_dofs(self.space, component) for component in components]
-        points = found[0][1][:, : self.dim]
-        dofs = np.stack([dofs for dofs, _ in found], axis=1)
+        dofs, points = fem.component_dofs(self.grid.domain, self.space, components, degree)
         return Nodes(dofs, points, self._lattice(points, degree), int(np.count_nonzero(dofs[:, 0] < self.owned)))
 
     def _lattice(self, points: Array, degree: int) -> NDArray[np.int64]:

@@ -1,0 +1,56 @@
+"""A cube of 27 cells pressed from above, of which the second process has the cell in the middle only.
+
+Writes the displacement, what probes find and the nodal stresses into a file. That process has no facet of any surface.
+"""
+
+import sys
+
+import dolfinx
+import numpy as np
+from mpi4py import MPI
+from structure_setup import TIGHT, block, constant, load_step, vector
+
+from solvers import fem
+from solvers.structure.body import Body, BodySettings, Pressure, Support
+from solvers.structure.field import Structure
+from solvers.structure.materials import NeoHooke
+from solvers.structure.probes import at_point, of_bodies, on_surface
+from solvers.structure.snapshot import snapshots
+from solvers.structure.time import Statics
+
+
+def middle_apart(comm, parts, dim, cells, ghost_mode):
+    """Owners of the cells, all given by process 0, each followed by the process that has it as a ghost."""
+    middle, neighbours = 13, (4, 10, 12, 14, 16, 22)
+    owners = [[1, 0] if c == middle else [0, 1] if c in neighbours else [0] for c in range(cells.num_nodes)]
+    offsets = np.cumsum([0, *map(len, owners)])
+    return dolfinx.cpp.graph.AdjacencyList_int32(np.concatenate([[], *owners]).astype(np.int32), offsets.astype(np.int32))
+
+
+def main(out):
+    comm, create_mesh = MPI.COMM_WORLD, dolfinx.mesh.create_mesh
+    if comm.size > 1:
+        dolfinx.mesh.create_mesh = lambda *arguments: create_mesh(*arguments, partitioner=middle_apart)
+    domain = fem.distribute(comm, block("hexahedron", 3) if comm.rank == 0 else None)
+    if comm.rank == 1:
+        assert fem.owned_cells(domain) == 1
+        assert not any(len(facets) for facets in domain.surfaces.values())
+    supports = [Support("bottom", vector(0, 0, 0))]
+    load = [Pressure("top", constant(0.1))]
+    body = Body(domain, BodySettings("cube", NeoHooke(1.0, 1.0, 1.0), supports=supports, pressures=load))
+    structure = Structure(comm, [body], Statics(), TIGHT)
+    load_step(structure)
+    probes = [
+        at_point(structure, body, "displacement", (0.5, 0.5, 0.5)),
+        on_surface(structure, body, "reaction", "bottom"),
+        on_surface(structure, body, "displacement", "top"),
+        of_bodies(structure, [body], "volume"),
+    ]
+    measured = np.array([value for probe in probes for value in probe().values()])
+    fields = snapshots(structure)
+    if comm.rank == 0:
+        np.savez(out, measured=measured, **fields[0].point_data)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
