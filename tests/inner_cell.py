@@ -23,8 +23,8 @@ def middle_apart(comm, parts, dim, cells, ghost_mode):
     """Owners of the cells, all given by process 0, each followed by the process that has it as a ghost."""
     middle, neighbours = 13, (4, 10, 12, 14, 16, 22)
     owners = [[1, 0] if c == middle else [0, 1] if c in neighbours else [0] for c in range(cells.num_nodes)]
-    offsets = np.cumsum([0, *map(len, owners)])
-    return dolfinx.cpp.graph.AdjacencyList_int32(np.concatenate([[], *owners]).astype(np.int32), offsets.astype(np.int32))
+    offsets, flat = np.cumsum([0, *map(len, owners)]), np.concatenate([[], *owners])
+    return dolfinx.cpp.graph.AdjacencyList_int32(flat.astype(np.int32), offsets.astype(np.int32))
 
 
 def main(out):

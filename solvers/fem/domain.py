@@ -110,7 +110,8 @@ def _find_surfaces(domain: Domain, named: dict[str, NDArray[np.int64]]) -> dict[
     mesh.topology.create_connectivity(dim - 1, dim)
     exterior = np.sort(exterior_facets(domain))
     geometry = cpp.mesh.entities_to_geometry(mesh._mesh, dim - 1, exterior, False)
-    corners = np.sort(input_nodes(domain)[geometry].reshape(len(exterior), CORNERS[FACET_TYPE[domain.cell_type]]), axis=1)
+    corners = input_nodes(domain)[geometry].reshape(len(exterior), CORNERS[FACET_TYPE[domain.cell_type]])
+    corners = np.sort(corners, axis=1)
     facet_of = {tuple(corner): facet for corner, facet in zip(corners.tolist(), exterior, strict=True)}
     found = {}
     for name, facets in named.items():
