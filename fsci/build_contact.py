@@ -24,14 +24,16 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
     """All pairs of a case. Raises CaseError (collective)."""
     assert case.contact is not None
     layout = Layout(comm, [body.size for body in bodies])
-    found: dict[tuple[str, str], Surface] = {}
+    found: dict[tuple[str, ...], Surface] = {}
     pairs = []
     for settings in case.contact.pairs.values():
         sides = []
         for side in (settings.slave, settings.master):
-            key = (side.body or "", side.on or side.obstacle or "")
-            if key not in found:
-                found[key] = surface_of_body(comm, layout, bodies, *key) if side.body else _obstacle(case, comm, key[1])
+            key = (side.body or "", *(side.on or ()), side.obstacle or "")
+            if key not in found and side.obstacle is not None:
+                found[key] = _obstacle(case, comm, side.obstacle)
+            elif key not in found:
+                found[key] = surface_of_body(comm, layout, bodies, side.body or "", *(side.on or ()))
             sides.append(found[key])
         pairs.append(Pair(sides[0], sides[1], settings.integration))
     assert case.structure is not None
@@ -39,24 +41,27 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
     return Contact(comm, pairs, names=tuple(case.contact.pairs), c_n=case.contact.c_n, keep_overlap=moves)
 
 
-def surface_of_body(comm: MPI.Comm, layout: Layout, bodies: Sequence[Body], body_name: str, name: str) -> Surface:
-    """A named surface of a body, whole on every process."""
+def surface_of_body(comm: MPI.Comm, layout: Layout, bodies: Sequence[Body], body_name: str, *names: str) -> Surface:
+    """Named surfaces of a body as one, whole on every process."""
     index = next(i for i, body in enumerate(bodies) if body.name == body_name)
     body = bodies[index]
     mesh = body.domain.source
-    points, facets, nodes = comm.bcast(None if mesh is None else _cut_out(mesh, name), root=0)
+    points, facets, nodes = comm.bcast(None if mesh is None else _cut_out(mesh, names), root=0)
     dofs = global_dofs(comm, layout, index, body, nodes)
     held = np.zeros(len(nodes) * body.dim, dtype=bool)
     prescribed = prescribe(body).dofs + layout.start + layout.offsets[index]
     for part in comm.allgather(prescribed):
         held |= np.isin(dofs.ravel(), part)
     facet_type = FACET_TYPE[body.domain.cell_type]
-    return Surface(f"{body_name}.{name}", points, facets, facet_type, dofs, held.reshape(dofs.shape), body_name, nodes)
+    return Surface(
+        ".".join([body_name, *names]), points, facets, facet_type, dofs, held.reshape(dofs.shape), body_name, nodes
+    )
 
 
-def _cut_out(mesh: Mesh, name: str) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """(points, facets, node numbers in the mesh) of a named surface."""
-    facets = surface_facets(mesh, name)
+def _cut_out(mesh: Mesh, names: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """(points, facets, node numbers in the mesh) of named surfaces; a facet that is in several counts once."""
+    facets = np.concatenate([surface_facets(mesh, name) for name in names])
+    facets = facets[np.sort(np.unique(facets, axis=0, return_index=True)[1])]
     nodes, local = np.unique(facets, return_inverse=True)
     return mesh.points[nodes], local.reshape(facets.shape).astype(np.int64), nodes
 
@@ -82,7 +87,8 @@ def _obstacle(case: Case, comm: MPI.Comm, name: str) -> Surface:
         try:
             mesh = build_mesh(settings.mesh, case.folder)
             keys = ("contact", "obstacles", name, "on")
-            require_surface(mesh, settings.on)
+            for surface in settings.on:
+                require_surface(mesh, surface)
             found = (*_cut_out(mesh, settings.on)[:2], FACET_TYPE[mesh.cell_type])
         except MeshError as problem:
             error = case.error(keys, str(problem))

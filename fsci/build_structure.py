@@ -121,8 +121,8 @@ def _named_surfaces(case: Case, name: str):
                 yield ("structure", "bodies", name, section, index, "on"), surface
     for pair_name, pair in ({} if case.contact is None else case.contact.pairs).items():
         for role, side in (("slave", pair.slave), ("master", pair.master)):
-            if side.body == name:
-                yield ("contact", "pairs", pair_name, role, "on"), side.on
+            for surface in side.on or () if side.body == name else ():
+                yield ("contact", "pairs", pair_name, role, "on"), surface
     for probe_name, probe in _probes(case):
         if probe.on is not None and probe.body == name:
             yield ("probes", probe_name, "on"), probe.on

@@ -47,6 +47,11 @@ def _parser() -> argparse.ArgumentParser:
         new.set_defaults(command=function)
         return new
 
+    def settings(one: argparse.ArgumentParser, words: str) -> None:
+        one.add_argument(
+            "--set", dest="overrides", metavar="NAME=VALUE", action="append", default=[], type=_override, help=words
+        )
+
     new = command(_new, "write a small case that runs into a new folder")
     new.add_argument("name", metavar="NAME", type=Path, help="folder to make")
     new.add_argument(
@@ -62,15 +67,7 @@ def _parser() -> argparse.ArgumentParser:
     ):
         one = command(function, words)
         one.add_argument("case", metavar="CASE", type=Path, help="case file, or folder with a case.yaml")
-        one.add_argument(
-            "--set",
-            dest="overrides",
-            metavar="NAME=VALUE",
-            action="append",
-            default=[],
-            type=_override,
-            help="replace a setting: --set time.end=2 --set structure.bodies.beam.supports.0.on=top",
-        )
+        settings(one, "replace a setting: --set time.end=2 --set structure.bodies.beam.supports.0.on=top")
         if function is _run:
             one.add_argument(
                 "-o", "--out", metavar="OUT", type=Path, help="folder for the results (default: results/NAME_OF_CASE)"
@@ -83,6 +80,9 @@ def _parser() -> argparse.ArgumentParser:
 
     resume = command(_resume, "continue a run from its last checkpoint")
     resume.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
+    settings(
+        resume, "change a setting that a run can go on with: --set time.end=2 --set solver.newton.max_iterations=50"
+    )
 
     plot = command(_plot, "draw the results of a run")
     plot.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
@@ -170,7 +170,7 @@ def _resume(options: argparse.Namespace) -> int:
     from fsci.run import resume_run
 
     try:
-        return int(resume_run(options.out))
+        return int(resume_run(options.out, options.overrides))
     except CaseError as error:
         return _fail(str(error)) if MPI.COMM_WORLD.rank == 0 else 2
     except FileNotFoundError as error:

@@ -73,7 +73,7 @@ class Clock:
 
     def restore(self, state: State) -> None:
         """Go on where a clock was saved; with another step size than it had, from its time on."""
-        self.tick, self.level = state["tick"], state["level"]
+        self.tick, self.level = state["tick"], min(state["level"], self.halvings)
         self.accepted, self.step = state["accepted"], state["step"]
         if self.time != state["time"]:
             self.start, self.tick, self.level, self.accepted = state["time"], 0, 0, 0

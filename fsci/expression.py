@@ -51,6 +51,7 @@ FUNCTIONS: dict[str, tuple[int, int | None, Callable[..., Any]]] = {
     "tanh": (1, 1, np.tanh),
     "floor": (1, 1, np.floor),
     "ceil": (1, 1, np.ceil),
+    "ramp": (3, 3, lambda x, start, end: _rise((x - start) / (end - start))),
 }
 COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
     "<": np.less,
@@ -61,12 +62,19 @@ COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
     "!=": np.not_equal,
 }
 KEYWORDS = ("and", "or", "not")
+RESERVED = frozenset((*VARIABLES, *CONSTANTS, *FUNCTIONS, *KEYWORDS))  #: what no function of the user can be called
 TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
     r"|(?P<name>[A-Za-z_][A-Za-z_0-9]*)"
     r"|(?P<sign>\*\*|<=|>=|==|!=|[-+*/^<>(),])"
     r"|(?P<wrong>\S))"
 )
+
+
+def _rise(s: Any) -> Any:
+    """From 0 to 1 between s = 0 and 1, the first two derivatives being zero at both ends."""
+    s = np.clip(s, 0.0, 1.0)
+    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 
 
 class ExpressionError(ValueError):
@@ -86,9 +94,9 @@ class Expression:
     _value: Node = field(repr=False, compare=False)
 
     @staticmethod
-    def parse(text: str | float) -> Expression:
-        """Read text (or a number); raises ExpressionError."""
-        return _Parser(str(text)).expression()
+    def parse(text: str | float, functions: Mapping[str, Callable[..., Any]] | None = None) -> Expression:
+        """Read text (or a number) that may call `functions` of one argument too; raises ExpressionError."""
+        return _Parser(str(text), functions or {}).expression()
 
     @property
     def constant(self) -> float | None:
@@ -102,6 +110,11 @@ class Expression:
         value = self._evaluate(dict(zip(VARIABLES, (*places, np.float64(t)), strict=True)))
         return np.array(np.broadcast_to(value, x.shape[1:]), dtype=float)
 
+    def at_times(self, t: ArrayLike) -> Array:
+        """Values of a formula of t alone, of the shape of t."""
+        t = np.asarray(t, dtype=float)
+        return np.array(np.broadcast_to(self._evaluate({"t": t}), t.shape), dtype=float)
+
     def _evaluate(self, values: Values) -> Any:
         # The branch that `where` does not take may divide by zero.
         with np.errstate(all="ignore"):
@@ -111,8 +124,9 @@ class Expression:
 class _Parser:
     """Recursive descent over the tokens of one text."""
 
-    def __init__(self, text: str):
+    def __init__(self, text: str, functions: Mapping[str, Callable[..., Any]]):
         self.text = text
+        self.functions = FUNCTIONS | {name: (1, 1, function) for name, function in functions.items()}
         self.uses: set[str] = set()
         self.tokens: list[tuple[str, str, int]] = []  # kind, text, column
         for match in TOKEN.finditer(text):
@@ -249,20 +263,20 @@ class _Parser:
             return lambda v: v[word]
         if word in CONSTANTS:
             return lambda v: CONSTANTS[word]
-        if word in FUNCTIONS:
+        if word in self.functions:
             raise ExpressionError(f"'{word}' is a function: write {word}(...)", column)
-        raise _unknown(word, column, "name", [*VARIABLES, *CONSTANTS, *FUNCTIONS])
+        raise _unknown(word, column, "name", [*VARIABLES, *CONSTANTS, *self.functions])
 
     def call(self, word: str, column: int) -> Node:
-        if word not in FUNCTIONS:
+        if word not in self.functions:
             if word in VARIABLES or word in CONSTANTS:
                 raise ExpressionError(f"'{word}' is not a function; write '{word}*(' to multiply", column)
-            raise _unknown(word, column, "function", list(FUNCTIONS))
+            raise _unknown(word, column, "function", list(self.functions))
         arguments = [self.disjunction()]
         while self.take(","):
             arguments.append(self.disjunction())
         self.close()
-        fewest, most, function = FUNCTIONS[word]
+        fewest, most, function = self.functions[word]
         if len(arguments) < fewest or (most is not None and len(arguments) > most):
             wanted = f"{fewest} argument" + "s" * (fewest > 1) if most else f"at least {fewest} arguments"
             raise ExpressionError(f"'{word}' takes {wanted}, not {len(arguments)}", column)

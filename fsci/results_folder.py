@@ -6,7 +6,7 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ FOLDERS = ("fields", "checkpoint", "failure", "pictures")
 
 
 def prepare_folder(case: Case, out: Path, *, force: bool = False) -> None:
-    """An empty results folder with everything needed to repeat the run: the case and its mesh files.
+    """An empty results folder with everything needed to repeat the run: the case and the files it names.
 
     A folder that has content and no marker of a run, and the folder of the case itself, are refused. With `force` they
     are taken: whatever stands where the run writes is renamed to NAME.old. Raises CaseError.
@@ -49,12 +49,12 @@ def prepare_folder(case: Case, out: Path, *, force: bool = False) -> None:
 
 
 def keep_case(case: Case, folder: Path) -> None:
-    """Write case.yaml and the mesh files it names, such that the folder can be moved and run again."""
+    """Write case.yaml and the files it names, such that the folder can be moved and run again."""
     folder.mkdir(parents=True, exist_ok=True)
     changes = []
-    for setting, given, kept in _mesh_files(case):
+    for setting, given, kept in _files(case):
         if given != kept:
-            changes.append((f"{setting}.mesh.file", json.dumps(kept.as_posix())))
+            changes.append((setting, json.dumps(kept.as_posix())))
         _copy(case.folder / given, folder / kept)
     write_text(folder / "case.yaml", case.dump(changes))
 
@@ -80,33 +80,40 @@ def _copy(source: Path, target: Path) -> None:
     os.replace(unfinished, target)
 
 
-def _mesh_files(case: Case) -> Iterator[tuple[str, Path, Path]]:
-    """(setting, file, name of its copy in a results folder) of all meshes that are read from files beside the case."""
-    for setting, name, mesh in _meshes(case):
-        given = getattr(mesh, "file", None)
+def _files(case: Case) -> Iterator[tuple[str, Path, Path]]:
+    """(setting, file, name of its copy in a results folder) of all meshes and curves that are in files beside the case.
+
+    Settings have dots between their names.
+    """
+    for setting, name, given in _named_files(case):
         if given is None or Path(given).is_absolute():
             continue
         # no results folder writes outside itself
-        kept = Path("meshes") / name / Path(given).name if ".." in Path(given).parts else Path(given)
+        folder = Path("curves" if setting.startswith("curves.") else "meshes")
+        kept = folder / name / Path(given).name if ".." in Path(given).parts else Path(given)
         yield setting, Path(given), kept
 
 
-def _meshes(case: Case) -> Iterator[tuple[str, str, Any]]:
-    """(setting, name, mesh) of all bodies and obstacles."""
-    for name, body in case.elastic_bodies.items():
-        yield f"structure.bodies.{name}", name, body.mesh
-    for name, rigid in ({} if case.fluid is None else case.fluid.bodies).items():
-        yield f"fluid.bodies.{name}", name, rigid.mesh
-    for name, obstacle in ({} if case.contact is None else case.contact.obstacles).items():
-        yield f"contact.obstacles.{name}", name, obstacle.mesh
+def _named_files(case: Case) -> Iterator[tuple[str, str, str | None]]:
+    """(setting, name of what it is for, file if it is one) of the meshes of bodies and obstacles, and of curves."""
+    groups: dict[str, Mapping[str, Any]] = {
+        "structure.bodies": case.elastic_bodies,
+        "fluid.bodies": {} if case.fluid is None else case.fluid.bodies,
+        "contact.obstacles": {} if case.contact is None else case.contact.obstacles,
+    }
+    for group, members in groups.items():
+        for name, member in members.items():
+            yield f"{group}.{name}.mesh.file", name, getattr(member.mesh, "file", None)
+    for name, curve in case.curves.items():
+        yield f"curves.{name}.csv", name, curve.csv
 
 
 # ------------------------------------------------------------------------------------------- what stands there already
 
 
 def _copies(case: Case, out: Path) -> Iterator[Path]:
-    """Where copies of mesh files will stand, unless the file there is the mesh file itself."""
-    for _, given, kept in _mesh_files(case):
+    """Where copies of meshes and curves will stand, unless the file there is the one that is copied."""
+    for _, given, kept in _files(case):
         if (case.folder / given).resolve() != (out / kept).resolve():
             yield out / kept
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import signal
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fsci.case import Case, CaseError, load_case
+from fsci.case import Case, CaseError
+from fsci.case.resume import end_error, resumed_case
 from fsci.checkpoint import read_checkpoint, write_checkpoint
 from fsci.clock import Clock
 from fsci.history import HistoryWriter, read_history
@@ -47,12 +49,15 @@ def run_case(case: Case, out: Path, *, force: bool = False) -> int:
     return Run(case, out, comm).from_start()
 
 
-def resume_run(out: Path) -> int:
-    """Continue a run from the newest checkpoint of its folder; returns the exit code. Raises CaseError."""
+def resume_run(out: Path, changes: Sequence[tuple[str, str]] = ()) -> int:
+    """Continue a run from the newest checkpoint of its folder; returns the exit code. Raises CaseError.
+
+    `changes` are dotted names and values as YAML text; the case file of the folder is rewritten with them.
+    """
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD
-    case = load_case(out / "case.yaml")
+    case = resumed_case(out, changes)
     checkpoint: Any = None
     if comm.rank == 0:
         try:
@@ -63,6 +68,10 @@ def resume_run(out: Path) -> int:
     if isinstance(checkpoint, Exception):
         raise checkpoint
     state, _ = checkpoint
+    if (early := end_error(case, changes, state["clock"]["time"])) is not None:
+        raise early
+    if changes and comm.rank == 0:
+        write_text(out / "case.yaml", case.dump())
     return Run(case, out, comm).from_checkpoint(state)
 
 

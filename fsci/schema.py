@@ -18,7 +18,8 @@ meaning. Units are those of SI; with `units:` they are the corresponding ones of
 - A *number* may be written as arithmetic: `2*pi/360`.
 - An *expression* may contain variables too, x, y, z being reference coordinates and t the time. There are the operators
   `+ - * / ** ^`, comparisons, `and`, `or`, `not`, the constants `pi` and `e`, and the functions {functions}.
-  `where(condition, a, b)` is a where the condition holds, else b.
+  `where(condition, a, b)` is a where the condition holds, else b; `ramp(t, a, b)` rises from 0 at a to 1 at b, its
+  first two derivatives being zero at both ends. The functions of the section `curves` belong to them.
 - A *name* has letters, digits, `_` and `-`.
 - `<<: *other` takes over the settings of a section marked `&other`.
 """

@@ -31,7 +31,7 @@ solver:
     max_iterations: 20
 """
 MESH = "mesh: {shape: rectangle, size: [2, 1], cells: [4, 2]}"
-SECTIONS = "title, units, time, structure, fluid, coupling, contact, probes, output, verify, solver"
+SECTIONS = "title, units, time, curves, structure, fluid, coupling, contact, probes, output, verify, solver"
 SHAPES = "rectangle, disc, ring, box, beam, cylinder, tube, annulus, solid_torus, hollow_torus, hollow_sphere, "
 SHAPES += "sphere"
 CONSTANTS = "needs two constants, either E and nu, or lambda and mu, or mu and nu"
@@ -116,9 +116,9 @@ MISTAKES = [
     ("E: 1e6", "E: 1e6, mu: 3", f"9:17: law 'neo_hooke' {CONSTANTS}; given: E, nu, mu", "{law"),
     (
         "law: neo_hooke, E: 1e6, nu: 0.3",
-        "law: coup_neo_hooke, E: 1, nu: 0",
-        "9:49: 'nu' must be greater than 0 for the law 'coup_neo_hooke'",
-        "0",
+        "law: coup_neo_hooke, E: 1, nu: -0.1",
+        "9:49: 'nu' must be at least 0 for the law 'coup_neo_hooke'",
+        "-0.1",
     ),
     ("E: 1e6, nu: 0.3", "lambda: -3, mu: 3", "9:42: 'lambda' must be greater than -2/3 mu, -2, not -3", "-3"),
     (
@@ -198,6 +198,8 @@ MISTAKES = [
     ("[0, -9.81]", "[0, -9.81, 0]", "12:16: 'gravity' must have 2 entries in 2D, not 3", "[0, -9.81, 0]"),
     ("at: [2, 0.5]", "at: [2, 0.5, 0]", "16:37: 'at' must have 2 entries in 2D, not 3", "[2, 0.5, 0]"),
     (", density: 1000", "", "9:17: missing setting 'density' in 'material': gravity needs it", "{law"),
+    ("density: 1000", "density: 0", "9:60: 'density' must be greater than 0: gravity needs it", "0}"),
+    ("density: 1000", "density: -1", "9:60: 'density' must be at least 0, not -1", "-1"),
     (
         "dynamics: {rho_inf: 0.8}",
         "plane: stress",

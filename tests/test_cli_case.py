@@ -137,11 +137,13 @@ def test_run_refuses_a_bad_case_before_it_starts(beam, calls, capsys):
 
 def test_resume_and_plot(calls, capsys):
     assert execute(["resume", "out"]) == 3
+    assert execute(["resume", "out", "--set", "time.end=2"]) == 3
     Path("out").mkdir()
     assert execute(["plot", "out", "--movie", "--field", "velocity", "--time", "0.5", "--time", "1"]) == 0
     assert capsys.readouterr().out == "a.png\nb.png\n"
     assert calls == [
-        ("resume", (Path("out"),), {}),
+        ("resume", (Path("out"), []), {}),
+        ("resume", (Path("out"), [("time.end", "2")]), {}),
         ("plot", (Path("out"),), {"movie": True, "field": "velocity", "times": [0.5, 1.0]}),
     ]
 

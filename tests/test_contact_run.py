@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from programs import fsci
+from structure_setup import make_structure
 
+from fsci import shapes
+from fsci.build_contact import surface_of_body
 from fsci.case import CaseError, load_case
 from fsci.checkpoint import read_checkpoint
 from fsci.history import read_history
 from fsci.run import FINISHED, run_case
-from solvers.structure.materials import lame
+from solvers.blocks import Layout
+from solvers.structure.materials import NeoHooke, lame
 
 #: A rigid plate comes down on a block, slides and leaves it, twice.
 PLATE = """\
@@ -160,6 +166,28 @@ def test_resume_is_bitwise(text, end, tmp_path, plate, collision):
     for name in ("u", "v", "a"):
         for body, value in one["scheme"][name].items():
             assert np.array_equal(value, two["scheme"][name][body]), name
+
+
+def test_surfaces_together_are_one():
+    """Facets that are in two of them count once; nodes between them belong to both."""
+    mesh = shapes.rectangle((2, 1), (4, 1), order=2)
+    top = mesh.surfaces["top"]
+    parts = {"west": top[:3], "east": top[2:]}
+    mesh = replace(mesh, surfaces=mesh.surfaces | parts)
+    bodies = [make_structure(mesh, NeoHooke(1.0, 1.0)).bodies[0]]
+    layout = Layout(MPI.COMM_SELF, [bodies[0].size])
+    whole, together = (surface_of_body(MPI.COMM_SELF, layout, bodies, "body", *n) for n in (("top",), tuple(parts)))
+    assert np.array_equal(whole.points, together.points)
+    assert np.array_equal(np.sort(whole.facets, axis=0), np.sort(together.facets, axis=0))
+    assert together.name == "body.west.east"
+
+
+def test_several_surfaces_of_an_obstacle(plate, tmp_path):
+    """Sides of the plate that nothing comes near change nothing."""
+    sides = PLATE.replace("on: bottom\n", "on: [bottom, left, top]\n")
+    history = run(sides, tmp_path / "sides", ("time.end", "0.5"))
+    assert history["contact.press.z"].min() < -1.0
+    assert history["contact.press.z"] == pytest.approx(plate[1]["contact.press.z"][: len(history["time"])], rel=1e-9)
 
 
 @pytest.mark.parametrize("text", [PLATE.replace("1.01]", "3]"), COLLISION.replace("[1.2, 0.3]", "[9, 0.3]")])
@@ -337,6 +365,18 @@ MISTAKES = [
     ),
     ("  pairs:\n" + PRESS, "  pairs: {}", "15:10: 'pairs' needs at least one pair", "{}"),
     ("  pairs:\n" + PRESS + "\n", "", "9:1: missing setting 'pairs' in 'contact'", "contact"),
+    (
+        "body: block, on: top",
+        "body: block, on: [left, tpo]",
+        f"16:45: 'box' has no surface 'tpo'; did you mean 'top'? {BOX_SURFACES}",
+        "tpo",
+    ),
+    (
+        "master: {obstacle: plate}",
+        "master: {body: block, on: [left, top]}",
+        "16:52: a surface cannot touch itself: name another master",
+        "{body",
+    ),
     (
         "master: {obstacle: plate}",
         "master: {body: block, on: top}",

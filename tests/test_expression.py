@@ -50,6 +50,8 @@ POINTS = np.array([[0.0, 0.5, 2.0], [1.0, 1.0, -3.0], [0.0, 4.0, 9.0]])  # x, y,
         ("0 and 0 or 1", 1),
         ("0 and (0 or 1)", 0),
         ("not not 5", 1),
+        ("ramp(0, 1, 3) + 10*ramp(2, 1, 3) + 100*ramp(4, 1, 3)", 105),
+        ("ramp(1.5, 1, 3)", (10 - 15 / 4 + 6 / 16) / 64),
     ],
 )
 def test_constants(text, value):
@@ -60,6 +62,17 @@ def test_every_function_is_tested_above():
     table = next(mark for mark in test_constants.pytestmark if mark.name == "parametrize").args[1]
     tested = " ".join(text for text, _ in table)
     assert [name for name in FUNCTIONS if f"{name}(" not in tested] == []
+
+
+def test_functions_of_the_user():
+    functions = {"twice": lambda x: 2.0 * x}
+    assert Expression.parse("twice(3) + 1", functions).constant == 7.0
+    assert Expression.parse("twice(t)", functions).uses == {"t"}
+    assert Expression.parse("twice(t)", functions).at_times([1.0, 2.0]).tolist() == [2.0, 4.0]
+    with pytest.raises(ExpressionError, match="'twice' takes 1 argument, not 2"):
+        Expression.parse("twice(1, 2)", functions)
+    with pytest.raises(ExpressionError, match="did you mean 'twice'"):
+        Expression.parse("twyce(1)", functions)
 
 
 def test_numbers_are_expressions():

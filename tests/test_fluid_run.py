@@ -234,18 +234,6 @@ def test_mistakes_that_only_meshes_show(old, new, message, tmp_path):
     assert str(caught.value).startswith(f"{tmp_path}/case.yaml:{message}")
 
 
-def test_a_body_at_the_end_of_a_period(tmp_path):
-    ends = "    ends: {on: [x-, x+], periodic: true}\n  bodies:"
-    text = (
-        MOVING.replace("[x-, x+, y-, y+]", "[y-, y+]").replace("  bodies:", ends).replace("[0.3, 0.5]", "[0.15, 0.5]")
-    )
-    (tmp_path / "case.yaml").write_text(text)
-    with pytest.raises(CaseError) as caught:
-        run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out")
-    rule = "the body must be within the period along x, without the cells at its ends: 0.0666667 to 1.93333"
-    assert str(caught.value).startswith(f"{tmp_path}/case.yaml:16:5: {rule}")
-
-
 # ---------------------------------------------------------------------------------------------- surfaces and motions
 
 
@@ -291,7 +279,7 @@ def test_rigid_motion(dim):
         "displacement": ["t^2", "sin(t)", "1"][:dim],
         "rotation": {"centre": centre, "angle": "30*t + 5*t^3", **axis},
     }
-    motion = rigid_motion(points, Movement.model_validate(settings), 0.01)
+    motion = rigid_motion(points, Movement.model_validate(settings), 0.0, 0.01)
     t, h = 0.7, 1e-5
     rotation = SimpleNamespace(axis=axis.get("axis"), angle=30 * t + 5 * t**3)
     mesh = SimpleNamespace(points=points - centre)
@@ -300,6 +288,26 @@ def test_rigid_motion(dim):
     assert np.allclose(x, expected, atol=1e-13)
     difference = (motion(t + h)[0] - motion(t - h)[0]) / (2 * h)
     assert np.allclose(v, difference, atol=1e-8)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_rigid_motion_by_velocities(dim):
+    """The same motion by its rates: positions and velocities agree, in any order of times."""
+    points = np.random.default_rng(1).random((5, dim))
+    about = {"centre": [0.3, -0.2, 0.5][:dim], **({} if dim == 2 else {"axis": [1, 2, -1]})}
+    by_values = {
+        "displacement": ["(t - 1)^2 + 1/2 + max(t - 1.5, 0)", "sin(t) - sin(1)", "0"][:dim],
+        "rotation": {"angle": "30*(t - 1) + 5*(t^3 - 1)", **about},
+    }
+    by_rates = {
+        "velocity": ["2*(t - 1) + (t > 1.5)", "cos(t)", "0"][:dim],
+        "rotation": {"angular_velocity": "30 + 15*t^2", **about},
+    }
+    start, dt = 1.0, 0.25
+    exact, found = (rigid_motion(points, Movement.model_validate(s), start, dt) for s in (by_values, by_rates))
+    for t in (2.3, 1.0, 1.2, 7.9, 1.75):
+        assert np.allclose(found(t)[0] + np.eye(dim)[0] / 2, exact(t)[0], rtol=0.0, atol=1e-13)
+        assert np.allclose(found(t)[1], exact(t)[1], atol=1e-8)
 
 
 def _placed(mesh, rotation):

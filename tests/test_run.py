@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from programs import fsci, start_fsci
 
-from fsci.case import load_case
+from fsci.case import CaseError, load_case
 from fsci.history import read_history
-from fsci.run import FAILED, FINISHED, STOPPED, run_case
+from fsci.run import FAILED, FINISHED, STOPPED, resume_run, run_case
 from solvers.api import StepFailed
 
 CASE = """\
@@ -224,15 +224,39 @@ def test_resume_without_checkpoint(case, tmp_path):
     assert "Traceback" not in result.stderr
 
 
+def test_resume_with_other_settings(case, tmp_path):
+    """It goes on with them from the checkpoint, and the folder's case has them; what the state depends on stays."""
+    out = tmp_path / "out"
+    assert run_case(load_case(case, [("time.end", "0.2"), ("verify", "[]")]), out) == FINISHED
+    assert resume_run(out, [("time.end", "0.3"), ("time.step", "0.025"), ("output.checkpoint_every", "0")]) == FINISHED
+    history = read_history(out / "history.csv")
+    assert history["time"] == pytest.approx([0.05, 0.1, 0.15, 0.2, 0.225, 0.25, 0.275, 0.3])
+    assert (load_case(out).time.step, load_case(out).output.checkpoint_every) == (0.025, 0)
+
+    text = (out / "case.yaml").read_text()
+    for change, message in (
+        (("time.end", "0.25"), "--set time.end=0.25: 'end' must be later than 0.3, the time of the checkpoint"),
+        (
+            ("time.start", "1"),
+            "--set time.start=1: 'time.start' cannot change when a run is resumed; what can: title, ",
+        ),
+        (("structure.plane", "stress"), "--set structure.plane=stress: 'structure.plane' cannot change when"),
+        (("solver.newton.max_iteration", "3"), "--set solver.newton.max_iteration=3: unknown setting 'max_iteration'"),
+    ):
+        with pytest.raises(CaseError) as caught:
+            resume_run(out, [change])
+        assert str(caught.value).startswith(message)
+    assert (out / "case.yaml").read_text() == text
+
+
 def test_processes_agree(case, tmp_path):
     """1 and 2 processes, and a run that goes on with 2 where 1 stopped, agree to 1e-9."""
     alone, pair, mixed = tmp_path / "alone", tmp_path / "pair", tmp_path / "mixed"
     assert fsci("run", case, "-o", alone).returncode == FINISHED
     assert fsci("run", case, "-o", pair, processes=2).returncode == FINISHED
     assert fsci("run", case, "-o", mixed, "--set", "time.end=0.5", "--set", "verify=[]").returncode == FINISHED
-    text = (mixed / "case.yaml").read_text()
-    (mixed / "case.yaml").write_text(text.replace("end: 0.5", "end: 1.0"))
-    assert fsci("resume", mixed, processes=2).returncode == FINISHED
+    assert fsci("resume", mixed, "--set", "time.end=1.0", processes=2).returncode == FINISHED
+    assert load_case(mixed).time.end == 1.0
     one = final_state(alone)
     for other in (final_state(pair), final_state(mixed)):
         for name, values in one.items():

@@ -21,6 +21,7 @@ MATERIALS = {
     "st_venant_kirchhoff": StVenantKirchhoff(3.0, 5.0, 2.0),
     "neo_hooke": NeoHooke(3.0, 5.0, 2.0),
     "coup_neo_hooke": CoupNeoHooke(3.0, 5.0, 2.0),
+    "coup_neo_hooke, nu = 0": CoupNeoHooke(3.0, 0.0, 2.0),
     "mooney_rivlin": MooneyRivlin(1.0, 0.5, 7.0, 2.0),
     "varying": NeoHooke(lambda x, t: 3.0 + x[0], lambda x, t: 5.0 - x[1], 2.0),
 }
@@ -94,6 +95,20 @@ def test_small_strain_is_hookes_law(law, dim):
     strain[:dim, :dim] = (gradient + gradient.T) / 2
     hooke = 2 * mu * strain + lmbda * np.trace(strain) * np.eye(3)
     assert small_stress(MATERIALS[law], gradient) == pytest.approx(hooke, abs=3e-5 * np.abs(hooke).max())
+
+
+@pytest.mark.parametrize("lmbda", [0.0, 1e-9, 5.999e-4, 6.001e-4])
+def test_coup_neo_hooke_for_small_nu(lmbda):
+    """c/beta (J^(-2 beta) - 1) + c (I1 - 3) becomes neo_hooke with lambda = 0; P = mu (F - J^(-2 beta) F^-T)."""
+    mu, gradient = 3.0, np.array([[0.2, 0.3], [-0.1, 0.4]])
+    body = make_structure(block("quad", 1), CoupNeoHooke(mu, lmbda)).bodies[0]
+    body.set_displacement((body.points[:2, : body.owned].T @ gradient.T).ravel())
+    F = np.eye(2) + gradient
+    J, I1, beta = np.linalg.det(F), (F**2).sum() + 1.0, lmbda / (2.0 * mu)
+    P = mu * (F - J ** (-2.0 * beta) * np.linalg.inv(F).T)
+    assert body.stress()[0].reshape(3, 3)[:2, :2] == pytest.approx(P @ F.T / J, rel=1e-11)
+    volumetric = -2.0 * np.log(J) if lmbda == 0.0 else np.expm1(-2.0 * beta * np.log(J)) / beta
+    assert body.internal_energy() == pytest.approx(mu / 2.0 * (volumetric + I1 - 3.0), rel=1e-11)
 
 
 def test_plane_stress_uniaxial():

@@ -10,6 +10,7 @@ from pydantic import PrivateAttr
 
 from fsci.case.contact import Contact
 from fsci.case.coupling import Coupling
+from fsci.case.curve import Curve, CurveName
 from fsci.case.document import Document, override
 from fsci.case.errors import CaseError, Place
 from fsci.case.fluid import Fluid
@@ -31,6 +32,7 @@ class Case(Section):
     title: Text = setting("", "what it is about, for pictures and tables")
     units: Units = setting(Units, "units of all numbers")
     time: Time = setting(..., "time interval and steps")
+    curves: dict[CurveName, Curve] = setting(dict, "functions that expressions may call, by name")
     structure: Structure | None = setting(None, "elastic bodies")
     fluid: Fluid | None = setting(None, "incompressible flow")
     coupling: Coupling | None = setting(None, "how fluid and structure are solved together")

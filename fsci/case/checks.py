@@ -9,8 +9,9 @@ from fsci.case.contact import Contact, Side
 from fsci.case.coupling_checks import coupling_mistakes
 from fsci.case.errors import did_you_mean
 from fsci.case.fluid_checks import fluid_mistakes
+from fsci.case.material import has_mass
 from fsci.case.mesh import Shape
-from fsci.case.mesh_checks import Mistake, length_mistakes, mesh_mistakes, surface_mistakes
+from fsci.case.mesh_checks import Mistake, length_mistakes, mesh_mistakes, surfaces_mistakes
 from fsci.case.probe_checks import probe_mistakes, verify_mistakes
 from fsci.case.structure import Body, Structure
 from fsci.case.yaml_text import Keys
@@ -70,8 +71,7 @@ def _plane(case: Case, structure: Structure) -> Iterator[Mistake]:
 def _surfaces(body: Body, keys: Keys) -> Iterator[Mistake]:
     for kind in ("supports", "tractions", "pressures"):
         for i, item in enumerate(getattr(body, kind)):
-            for j, name in enumerate(item.on):
-                yield from surface_mistakes(body.mesh, name, (*keys, kind, i, "on", j))
+            yield from surfaces_mistakes(body.mesh, item.on, (*keys, kind, i, "on"))
 
 
 def _vectors(case: Case, body: Body, keys: Keys) -> Iterator[Mistake]:
@@ -88,6 +88,8 @@ def _needs(structure: Structure, body: Body, keys: Keys) -> Iterator[Mistake]:
     reason = "gravity" if body.gravity else "dynamics" if dynamic else ""
     if reason and body.material.density is None:
         yield (*keys, "material"), f"missing setting 'density' in 'material': {reason} needs it"
+    elif reason and not has_mass(body.material):
+        yield (*keys, "material", "density"), f"'density' must be greater than 0: {reason} needs it"
     if body.initial_velocity and not dynamic:
         yield (*keys, "initial_velocity"), "'initial_velocity' needs 'dynamics' in 'structure'"
 
@@ -98,11 +100,11 @@ def _contact(case: Case, contact: Contact) -> Iterator[Mistake]:
     for name, obstacle in contact.obstacles.items():
         keys: Keys = ("contact", "obstacles", name)
         yield from length_mistakes(obstacle.motion, case.dimension, (*keys, "motion"))
-        yield from surface_mistakes(obstacle.mesh, obstacle.on, (*keys, "on"))
+        yield from surfaces_mistakes(obstacle.mesh, obstacle.on, (*keys, "on"))
     for name, pair in contact.pairs.items():
         for side in ("slave", "master"):
             yield from _side(case, contact, getattr(pair, side), ("contact", "pairs", name, side))
-        if pair.slave == pair.master:
+        if pair.slave.body == pair.master.body and set(pair.slave.on or ()) & set(pair.master.on or ()):
             yield ("contact", "pairs", name, "master"), "a surface cannot touch itself: name another master"
 
 
@@ -115,4 +117,4 @@ def _side(case: Case, contact: Contact, side: Side, keys: Keys) -> Iterator[Mist
     elif side.body not in bodies:
         yield (*keys, "body"), f"unknown body '{side.body}'{did_you_mean(side.body, bodies)}"
     elif side.on is not None:
-        yield from surface_mistakes(bodies[side.body].mesh, side.on, (*keys, "on"))
+        yield from surfaces_mistakes(bodies[side.body].mesh, side.on, (*keys, "on"))

@@ -8,14 +8,14 @@ from pydantic import model_validator
 
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Name, Positive, Switch, Text, Vector
+from fsci.case.values import Name, Positive, Surfaces, Switch, Vector
 
 
 class Side(Section):
     """A surface of a body, or an obstacle."""
 
     body: Name | None = setting(None, "name of the body")
-    on: Text | None = setting(None, "name of its surface")
+    on: Surfaces | None = setting(None, "name of its surface, or list of names that are one surface together")
     obstacle: Name | None = setting(None, "name of the obstacle")
 
     @model_validator(mode="after")
@@ -49,7 +49,7 @@ class Obstacle(Section):
     """A rigid surface, at rest or moved as a whole."""
 
     mesh: Mesh = setting(..., "mesh file or built-in shape that has the surface")
-    on: Text = setting(..., "name of the surface")
+    on: Surfaces = setting(..., "name of the surface, or list of names that are one surface together")
     motion: Vector | None = setting(None, "displacement; default: at rest", unit="m")
 
 

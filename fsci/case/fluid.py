@@ -6,13 +6,11 @@ from typing import Annotated, Literal
 
 from pydantic import model_validator
 
-from fsci.case.errors import listed
 from fsci.case.grid import Grid
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import (
     Entries,
-    Formula,
     Name,
     Number,
     NumberVector,
@@ -28,9 +26,7 @@ from fsci.case.values import (
 
 FACES = ("x-", "x+", "y-", "y+", "z-", "z+")
 Face = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
-KINDS = ("velocity", "no_slip", "slip", "symmetry", "traction", "pressure", "outflow", "periodic")
-#: kinds of patches that say how high the pressure is
-OPEN = ("traction", "pressure", "outflow")
+KINDS = ("velocity", "no_slip", "slip", "symmetry", "traction", "outflow")
 
 
 class Patch(Section):
@@ -47,44 +43,26 @@ class Patch(Section):
     slip: Switch = setting(False, "true: nothing flows through, and there is no shear stress")
     symmetry: Switch = setting(False, "true: a plane of symmetry, the same as slip")
     traction: Vector | None = setting(None, "prescribed force per area", unit="Pa")
-    pressure: Formula | None = setting(
-        None, "prescribed pressure of a flow that enters or leaves along the normal of the face", unit="Pa"
-    )
     outflow: Switch = setting(False, "true: the flow leaves as if it went on unchanged, at pressure 0")
-    periodic: Switch = setting(
-        False, "true: the flow goes on at the opposite face; the patch is on both and has all of them"
-    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> Patch:
         given = [kind for kind in KINDS if getattr(self, kind) not in (None, False)]
-        words = listed(KINDS)
+        words = "'velocity', 'no_slip', 'slip', 'symmetry', 'traction' or 'outflow'"
         if not given:
             raise fault(f"a patch needs one of {words}")
         if len(given) > 1:
             raise fault(f"give only one of {words}", given[1])
-        if self.periodic:
-            self._check_period()
         return self
 
-    def _check_period(self) -> None:
-        if self.where is not None:
-            raise fault("a periodic patch has all of its faces: remove 'where'", "where")
-        for index, face in enumerate(self.on):
-            other = face[0] + ("+" if face[1] == "-" else "-")
-            if other not in self.on:
-                raise fault(f"'{face}' is periodic with '{other}': put both into 'on'", "on", index)
-
     @property
-    def kind(self) -> Literal["velocity", "no_slip", "slip", "traction", "pressure", "outflow", "periodic"]:
+    def kind(self) -> Literal["velocity", "no_slip", "slip", "traction", "outflow"]:
         """Which condition it is."""
         if self.velocity is not None:
             return "velocity"
         if self.traction is not None:
             return "traction"
-        if self.pressure is not None:
-            return "pressure"
-        return "no_slip" if self.no_slip else "outflow" if self.outflow else "periodic" if self.periodic else "slip"
+        return "no_slip" if self.no_slip else "outflow" if self.outflow else "slip"
 
 
 class Turn(Section):
@@ -94,14 +72,40 @@ class Turn(Section):
     axis: Annotated[tuple[Number, ...], Entries(3, 3)] | None = setting(
         None, "direction of the axis (3D only)", unit="1"
     )
-    angle: TimeFormula = setting(..., "angle, counterclockwise seen against the axis", unit="degrees")
+    angle: TimeFormula | None = setting(None, "angle, counterclockwise seen against the axis", unit="degrees")
+    angular_velocity: TimeFormula | None = setting(
+        None, "instead of the angle: its rate; the angle is 0 at the first time of the run", unit="degrees/s"
+    )
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Turn:
+        _one_of(self, "angle", "angular_velocity")
+        if self.angle is None and self.angular_velocity is None:
+            raise fault("a rotation needs 'angle' or 'angular_velocity'")
+        return self
 
 
 class Movement(Section):
-    """A rigid motion: the body is rotated about the centre, then displaced."""
+    """A rigid motion: the body is rotated about the centre, then displaced.
+
+    Velocities are integrated by Gauss's rule with eight points in each time step.
+    """
 
     displacement: TimeVector | None = setting(None, "displacement by components", unit="m")
+    velocity: TimeVector | None = setting(
+        None, "instead of the displacement: its rate; the displacement is 0 at the first time of the run", unit="m/s"
+    )
     rotation: Turn | None = setting(None, "rotation")
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Movement:
+        _one_of(self, "displacement", "velocity")
+        return self
+
+
+def _one_of(section: Section, first: str, second: str) -> None:
+    if getattr(section, first) is not None and getattr(section, second) is not None:
+        raise fault(f"give either '{first}' or '{second}', not both", second)
 
 
 class RigidBody(Section):

@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from fsci.case.case import Case
 from fsci.case.checks import mistakes
+from fsci.case.curve import functions
 from fsci.case.document import override, read_document
 from fsci.case.errors import CaseError
 from fsci.case.messages import problems
@@ -25,8 +26,10 @@ def load_case(path: str | Path, overrides: Iterable[tuple[str, str]] = ()) -> Ca
     document = read_document(path / "case.yaml" if path.is_dir() else path)
     for dotted, text in overrides:
         document = override(document, dotted, text)
+    data, folder = document.data, document.path.parent
+    curves = functions(data.get("curves"), folder) if isinstance(data, dict) else {}
     try:
-        case = Case.model_validate(document.data)
+        case = Case.model_validate(data, context={"functions": curves, "folder": folder})
     except ValidationError as error:
         raise CaseError(problems(error, document)) from None
     case._document = document

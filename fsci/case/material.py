@@ -7,8 +7,9 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import PoissonFormula, PositiveFormula, SpaceFormula, chosen
+from fsci.case.values import NotNegativeFormula, PoissonFormula, PositiveFormula, SpaceFormula, chosen
 
+DENSITY = "mass per reference volume; default: 0, which does for statics without gravity and probes of mass"
 PAIRS = ({"E", "nu"}, {"lambda", "mu"}, {"mu", "nu"})
 
 
@@ -17,7 +18,7 @@ class Elastic(Section):
 
     - st_venant_kirchhoff: W = lambda/2 (tr E)^2 + mu E:E with the Green-Lagrange strain E; for small strains.
     - neo_hooke: W = mu/2 (I1 - 3) - mu ln J + lambda/2 (ln J)^2.
-    - coup_neo_hooke: W = c/beta (J^(-2 beta) - 1) + c (I1 - 3), c = mu/2, beta = nu/(1 - 2 nu), nu above 0.
+    - coup_neo_hooke: W = c/beta (J^(-2 beta) - 1) + c (I1 - 3), c = mu/2, beta = nu/(1 - 2 nu), nu at least 0.
     """
 
     law: Literal["st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke"] = setting(..., "stored energy")
@@ -25,9 +26,7 @@ class Elastic(Section):
     nu: PoissonFormula | None = setting(None, "Poisson's ratio", unit="1")
     lmbda: SpaceFormula | None = setting(None, "first Lame constant", unit="Pa", name="lambda")
     mu: PositiveFormula | None = setting(None, "second Lame constant, the shear modulus", unit="Pa")
-    density: PositiveFormula | None = setting(
-        None, "mass per reference volume; needed for dynamics, gravity and probes of mass", unit="kg/m^3"
-    )
+    density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
 
     @model_validator(mode="after")
     def _two_constants(self) -> Elastic:
@@ -44,8 +43,8 @@ class Elastic(Section):
                 raise fault(f"must be greater than -2/3 mu, {-2 * mu / 3:g}, not {lmbda:g}", "lambda")
         for name in ("nu", "lambda"):
             value = constants[name]
-            if self.law == "coup_neo_hooke" and value and value.constant is not None and value.constant <= 0:
-                raise fault("must be greater than 0 for the law 'coup_neo_hooke'", name)
+            if self.law == "coup_neo_hooke" and value and value.constant is not None and value.constant < 0:
+                raise fault("must be at least 0 for the law 'coup_neo_hooke'", name)
         return self
 
 
@@ -56,9 +55,7 @@ class MooneyRivlin(Section):
     c10: SpaceFormula = setting(..., "factor of the first invariant", unit="Pa")
     c01: SpaceFormula = setting(..., "factor of the second invariant", unit="Pa")
     bulk: PositiveFormula = setting(..., "bulk modulus", unit="Pa")
-    density: PositiveFormula | None = setting(
-        None, "mass per reference volume; needed for dynamics, gravity and probes of mass", unit="kg/m^3"
-    )
+    density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
 
     @model_validator(mode="after")
     def _stiff(self) -> MooneyRivlin:
@@ -66,6 +63,11 @@ class MooneyRivlin(Section):
         if c10 is not None and c01 is not None and c10 + c01 <= 0:
             raise fault(f"the sum of c10 and c01 must be greater than 0, not {c10 + c01:g}", "c10")
         return self
+
+
+def has_mass(material: Elastic | MooneyRivlin) -> bool:
+    """It has a density, and not 0 everywhere."""
+    return material.density is not None and material.density.constant != 0.0
 
 
 LAWS = ("st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke", "mooney_rivlin")

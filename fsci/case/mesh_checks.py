@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from fsci.case.errors import did_you_mean
@@ -44,6 +44,12 @@ def surface_mistakes(mesh: Mesh, name: str, keys: Keys) -> Iterator[Mistake]:
         hint = did_you_mean(name, mesh.surfaces)
         hint = f"{hint} (available: {there})" if hint.startswith(";") else hint
         yield keys, f"'{mesh.shape}' has no surface '{name}'{hint}"  # type: ignore[attr-defined]
+
+
+def surfaces_mistakes(mesh: Mesh, names: Sequence[str], keys: Keys) -> Iterator[Mistake]:
+    """The same of a list of names."""
+    for i, name in enumerate(names):
+        yield from surface_mistakes(mesh, name, (*keys, i))
 
 
 def length_mistakes(vector: tuple[object, ...] | None, dimension: int | None, keys: Keys) -> Iterator[Mistake]:

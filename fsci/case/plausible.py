@@ -42,7 +42,7 @@ def _order_from_file(mesh: object) -> bool:
 def _material(case: Case, material: Material, keys: Keys) -> Iterator[tuple[Keys, str]]:
     units = case.units
     density = None if material.density is None else material.density.constant
-    if density is not None and not DENSITIES[0] <= density * units.density <= DENSITIES[1]:
+    if density and not DENSITIES[0] <= density * units.density <= DENSITIES[1]:
         unit = f"{units.mass}/{units.length}^3"
         value = f"{density:g} {unit} is {density * units.density:.3g} kg/m^3"
         yield (*keys, "density"), f"implausible density: {value}; check 'units'"

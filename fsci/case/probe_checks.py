@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from fsci.case.case import Case
 from fsci.case.errors import did_you_mean, listed
 from fsci.case.fluid import Fluid
+from fsci.case.material import has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, surface_mistakes
 from fsci.case.probes import RESERVED, Probe
 from fsci.case.structure import Structure
@@ -71,7 +72,7 @@ def _of_structure(structure: Structure, name: str, probe: Probe) -> Iterator[Mis
         yield from surface_mistakes(measured[0].mesh, probe.on, (*keys, "on"))
     if probe.quantity in ("velocity", "acceleration") and structure.dynamics is None:
         yield (*keys, "quantity"), f"quantity '{probe.quantity}' needs 'dynamics' in 'structure'"
-    if probe.quantity in NEEDS_MASS and any(body.material.density is None for body in measured):
+    if probe.quantity in NEEDS_MASS and not all(has_mass(body.material) for body in measured):
         yield (*keys, "quantity"), f"quantity '{probe.quantity}' needs the 'density' of the material"
 
 

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, GetCoreSchemaHandler, GetJsonSchemaHandler, PlainValidator, WithJsonSchema
+from pydantic import (
+    BeforeValidator,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    PlainValidator,
+    ValidationInfo,
+    WithJsonSchema,
+)
 from pydantic_core import CoreSchema
 from pydantic_core.core_schema import no_info_before_validator_function
 
@@ -35,14 +42,14 @@ def spoken(value: Any) -> str:
             return "a list"
 
 
-def _expression(value: Any, wanted: str, variables: str) -> Expression:
-    """An expression of the given variables, from a number or text."""
+def _expression(value: Any, wanted: str, variables: str, functions: Mapping[str, Any] | None = None) -> Expression:
+    """An expression of the given variables and the user's functions, from a number or text."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise fault(f"must be {wanted}, not {spoken(value)}")
     if isinstance(value, int | float) and not abs(value) < math.inf:
         raise fault("must be a finite number")
     try:
-        expression = Expression.parse(value)
+        expression = Expression.parse(value, functions)
     except ExpressionError as error:
         raise fault(f": {error.message}", column=error.column) from None
     if extra := sorted(expression.uses - set(variables)):
@@ -83,8 +90,9 @@ def _formula(variables: str, allowed: Callable[[float], bool] = lambda _: True, 
     """An expression of the given variables; if it is constant, its value must be allowed."""
     wanted = f"a number or an expression of {', '.join(variables)}"
 
-    def read(value: Any) -> Expression:
-        expression = value if isinstance(value, Expression) else _expression(value, wanted, variables)
+    def read(value: Any, info: ValidationInfo) -> Expression:
+        functions = (info.context or {}).get("functions")
+        expression = value if isinstance(value, Expression) else _expression(value, wanted, variables, functions)
         if expression.constant is not None and not allowed(expression.constant):
             raise fault(f"must be {words}, not {spoken(float(expression.constant))}")
         return expression
@@ -115,6 +123,11 @@ PositiveFormula = Annotated[
     Expression,
     _formula(_SPACE, lambda v: v > 0, "greater than 0"),
     _schema("expression of x, y, z, > 0", exclusiveMinimum=0),
+]
+NotNegativeFormula = Annotated[
+    Expression,
+    _formula(_SPACE, lambda v: v >= 0, "at least 0"),
+    _schema("expression of x, y, z, >= 0", minimum=0),
 ]
 PoissonFormula = Annotated[
     Expression,

@@ -101,7 +101,9 @@ class NeoHooke:
 class CoupNeoHooke:
     """W = c/beta (J^(-2 beta) - 1) + c (I_1 - 3), c = mu/2, beta = lambda/(2 mu) = nu/(1 - 2 nu).
 
-    The compressible neo-Hooke law of the code 4C and its predecessors. nu = 0 has no limit here: beta > 0.
+    The compressible neo-Hooke law of the code 4C and its predecessors. With L = ln J the first term is
+    -2 c L (1 - beta L + 2/3 (beta L)^2 - ...): below beta = 1e-4 this sum loses less to what it leaves out than the
+    formula to rounding, and nu = 0 is no special case.
     """
 
     mu: Parameter
@@ -111,8 +113,10 @@ class CoupNeoHooke:
 
     def energy(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
         J, I1 = ufl.det(F), ufl.tr(in_space(F).T * in_space(F))
-        c, beta = mu / 2, lmbda / (2 * mu)
-        return c / beta * (ufl.exp(-2 * beta * ufl.ln(J)) - 1) + c * (I1 - 3)
+        c, beta, L = mu / 2, lmbda / (2 * mu), ufl.ln(J)
+        small = -2 * L * (1 - beta * L + 2 / 3 * (beta * L) ** 2)
+        volumetric = ufl.conditional(ufl.lt(beta, 1e-4), small, (ufl.exp(-2 * beta * L) - 1) / beta)
+        return c * volumetric + c * (I1 - 3)
 
 
 @dataclass(frozen=True)

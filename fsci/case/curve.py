@@ -1,0 +1,126 @@
+"""Section `curves`: functions of one variable given by points, which expressions call by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BeforeValidator, PrivateAttr, ValidationInfo, model_validator
+
+from fsci.case.section import Section, fault, setting
+from fsci.case.values import Entries, Name, Number, Switch, Text
+from fsci.expression import RESERVED
+
+Array = NDArray[np.float64]
+Point = Annotated[tuple[Number, ...], Entries(2, 2)]
+
+
+class Curve(Section):
+    """A function that expressions call by its name: with `curves: {pulse: {table: [[0, 0], [1, 5]]}}`, `2*pulse(t)`.
+
+    Before the first point and after the last one it keeps their values.
+    """
+
+    table: Annotated[tuple[Point, ...], Entries(2, None)] | None = setting(
+        None, "points [t, value], one after the other"
+    )
+    csv: Text | None = setting(
+        None, "file with the points, relative to the case file: two columns, t and value, with or without a heading"
+    )
+    smooth: Switch = setting(
+        False, "true: a smooth line through the points, level at extrema and at both ends; else straight lines"
+    )
+
+    _points: Array = PrivateAttr()
+
+    @model_validator(mode="after")
+    def _read(self, info: ValidationInfo) -> Curve:
+        if (self.table is None) == (self.csv is None):
+            raise fault("a curve needs either 'table' or 'csv'")
+        if self.csv is not None:
+            self._points = _read_csv((info.context or {}).get("folder", Path()), self.csv)
+            if (late := _not_later(self._points)) is not None:
+                raise fault(f": '{self.csv}' must go on to later times, not from {late[0]:g} to {late[1]:g}", "csv")
+            return self
+        self._points = np.array(self.table)
+        if (late := _not_later(self._points)) is not None:
+            row = int(np.flatnonzero(np.diff(self._points[:, 0]) <= 0.0)[0]) + 1
+            raise fault(f"must be greater than {late[0]:g}, the one before, not {late[1]:g}", "table", row, 0)
+        return self
+
+    def __call__(self, t: ArrayLike) -> Array:
+        """Values at the times t, of the same shape."""
+        times, values = self._points.T
+        t = np.asarray(t, dtype=float)
+        if not self.smooth:
+            return np.asarray(np.interp(t, times, values))
+        from scipy.interpolate import PchipInterpolator
+
+        # one more point on both sides, so that the ends are level like what goes on from them
+        times, values = np.pad(times, 1, mode="reflect", reflect_type="odd"), np.pad(values, 1, mode="edge")
+        return np.asarray(PchipInterpolator(times, values)(np.clip(t, times[1], times[-2])))
+
+
+def _not_later(points: Array) -> tuple[float, float] | None:
+    """The first two neighbours whose times do not increase."""
+    wrong = np.flatnonzero(~(np.diff(points[:, 0]) > 0.0))
+    return (points[wrong[0], 0], points[wrong[0] + 1, 0]) if len(wrong) else None
+
+
+def _read_csv(folder: Path, name: str) -> Array:
+    try:
+        lines = (folder / name).read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise fault(f": '{name}' cannot be read: {reason}", "csv") from None
+    rows: list[tuple[float, float]] = []
+    headings = 0
+    for number, line in enumerate(lines, 1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        row = _numbers(line)
+        if row is None and not rows and not headings:
+            headings = 1
+        elif row is None:
+            raise fault(f": '{name}', line {number}: two numbers are expected, not '{line.strip()[:40]}'", "csv")
+        else:
+            rows.append(row)
+    if len(rows) < 2:
+        raise fault(f": '{name}' has {len(rows)} points, at least 2 are needed", "csv")
+    return np.array(rows)
+
+
+def _numbers(line: str) -> tuple[float, float] | None:
+    """Both numbers of a line; None if it has others."""
+    words = re.split(r"\s*[,;]\s*|\s+", line.strip())
+    try:
+        first, second = map(float, words)
+    except ValueError:
+        return None
+    return (first, second) if np.isfinite([first, second]).all() else None
+
+
+def _callable(name: str) -> str:
+    if name in RESERVED:
+        raise fault(f"must be another name: expressions know '{name}' already")
+    if "-" in name:
+        raise fault(f"must be a name without '-', which means minus in expressions, not '{name}'")
+    return name
+
+
+CurveName = Annotated[Name, BeforeValidator(lambda name: _callable(name) if isinstance(name, str) else name)]
+
+
+def functions(data: Any, folder: Path) -> dict[str, Callable[[ArrayLike], Array]]:
+    """The curves of a case's data by name. One that is wrong is zero here: the case reports it where it stands."""
+    found: dict[str, Callable[[ArrayLike], Array]] = {}
+    for name, value in data.items() if isinstance(data, dict) else ():
+        try:
+            found[name] = Curve.model_validate(value, context={"folder": folder})
+        except ValueError:
+            found[name] = np.zeros_like
+    return found
