@@ -13,6 +13,7 @@ from fsci.build import Numbers, columns
 from fsci.build_solver import build_tolerance
 from fsci.case import Case
 from fsci.case.fluid import Fluid as Section
+from fsci.case.probes import Reference
 from fsci.mesh import MeshError, build_mesh, require_surface
 from fsci.rigid_motion import rigid_motion
 from solvers.fluid import probes
@@ -142,6 +143,9 @@ def build_probes(case: Case, fluid: Fluid) -> Callable[[], Numbers]:
             found[name] = probes.on_patch(fluid, settings.quantity, patch)
         elif settings.quantity in ("force", "moment"):
             found[name] = forces.probe(settings.quantity, settings.body, settings.about)
+        elif settings.reference is not None:
+            scale = _coefficient(case, settings.reference, settings.quantity)
+            found[name] = forces.coefficient(settings.body, scale)
         else:
             found[name] = probes.of_fluid(fluid, settings.quantity)
     measure = columns(found)
@@ -151,6 +155,19 @@ def build_probes(case: Case, fluid: Fluid) -> Callable[[], Numbers]:
         return measure()
 
     return all_probes
+
+
+def _coefficient(case: Case, reference: Reference, quantity: str) -> Array:
+    """e / (1/2 rho U^2 L), with which the force gives a coefficient [1/N]."""
+    assert case.fluid is not None
+    dim = case.fluid.grid.dimension
+    drag = np.array(reference.drag or np.eye(dim)[0], dtype=float)
+    lift = reference.lift or ((-drag[1], drag[0]) if dim == 2 else np.eye(dim)[1])
+    direction = drag if quantity == "drag_coefficient" else np.array(lift, dtype=float)
+    density = reference.density or case.fluid.density
+    size = reference.length if dim == 2 else reference.area
+    assert size is not None
+    return direction / np.linalg.norm(direction) / (0.5 * density * reference.velocity**2 * size)
 
 
 def _at(case: Case, fluid: Fluid, name: str, key: str) -> probes.Probe:

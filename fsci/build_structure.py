@@ -201,14 +201,13 @@ def build_probes(case: Case, structure: Structure) -> Callable[[], Numbers]:
     by_name = {body.name: body for body in structure.bodies}
     found: dict[str, probes.Probe] = {}
     for name, settings in _probes(case):
-        if settings.at is not None:
+        if settings.pair is not None:
+            found[name] = _of_pair(case, structure, settings)
+        elif settings.at is not None:
             try:
                 found[name] = probes.at_point(structure, by_name[settings.body or ""], settings.quantity, settings.at)
             except probes.PointOutside as error:
                 raise case.error(("probes", name, "at"), str(error)) from None
-        elif settings.pair is not None:
-            assert case.contact is not None
-            found[name] = _gap(structure, list(case.contact.pairs).index(settings.pair))
         elif settings.on is not None:
             found[name] = probes.on_surface(structure, by_name[settings.body or ""], settings.quantity, settings.on)
         else:
@@ -217,10 +216,17 @@ def build_probes(case: Case, structure: Structure) -> Callable[[], Numbers]:
     return columns(found)
 
 
-def _gap(structure: Structure, pair: int) -> probes.Probe:
-    contact = structure.constraint
-    assert contact is not None
-    return lambda: {"": contact.distance(pair)}
+def _of_pair(case: Case, structure: Structure, settings: Probe) -> probes.Probe:
+    from solvers.contact.contact import Contact
+    from solvers.contact.probes import at_slave, first_contact
+
+    contact, pairs = structure.constraint, [] if case.contact is None else list(case.contact.pairs)
+    assert isinstance(contact, Contact)
+    index = pairs.index(settings.pair or "")
+    if settings.quantity == "first_contact":
+        return first_contact(contact, index)
+    extreme = settings.extreme or ("least" if settings.quantity == "gap" else "largest")
+    return at_slave(contact, index, settings.quantity, settings.at or extreme)
 
 
 def _probes(case: Case) -> list[tuple[str, Probe]]:

@@ -49,7 +49,9 @@ def evaluate_one(history: Mapping[str, Array], check: Check) -> dict[str, Any]:
         time, values = window(history["time"], history[check.value], check.start)
         if len(time) == 0:
             message = "no step in the time window"
-        elif not np.all(np.isfinite(values)):
+        elif check.statistic == "final" and not np.isfinite(values[-1]):
+            message = f"'{check.value}' is not finite at the end"
+        elif check.statistic != "final" and not np.all(np.isfinite(values)):
             message = f"'{check.value}' is not finite everywhere"
         else:
             value = STATISTICS[check.statistic](time, values)

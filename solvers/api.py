@@ -128,10 +128,6 @@ class Constraint(Stateful, Protocol):
         """Which nodes touch."""
         ...
 
-    def distance(self, index: int) -> float:
-        """Shortest distance [m] between the surfaces of a pair."""
-        ...
-
     def numbers(self) -> dict[str, float]:
         """Columns for the history."""
         ...

@@ -16,7 +16,7 @@ from fsci.build_contact import surface_of_body
 from fsci.case import CaseError, load_case
 from fsci.checkpoint import read_checkpoint
 from fsci.history import read_history
-from fsci.run import FINISHED, run_case
+from fsci.run import FINISHED, resume_run, run_case
 from solvers.blocks import Layout
 from solvers.structure.materials import NeoHooke, lame
 
@@ -66,6 +66,38 @@ probes:
   momentum: {quantity: momentum}
   right: {body: right, quantity: momentum}
   energy: {quantity: energy}
+solver: {newton: {residual: 1.0e-12}}
+"""
+
+
+#: A block that slides between walls comes down on a plate by 0.1 per time; it is 0.035 above it.
+PISTON = """\
+title: a block between walls
+time: {step: 0.1, end: 0.6}
+structure:
+  plane: strain
+  bodies:
+    block:
+      mesh: {shape: rectangle, size: [1, 1], cells: [3, 2]}
+      material: {law: st_venant_kirchhoff, E: 1000, nu: 0.25}
+      supports:
+        - {on: [left, right], symmetry: true}
+        - {on: top, displacement: [0, -0.1*t]}
+contact:
+  obstacles:
+    plate: {mesh: {shape: rectangle, size: [3, 1], cells: [4, 1], translate: [-1, -1.035]}, on: top}
+  pairs:
+    press: {slave: {body: block, on: bottom}, master: {obstacle: plate}}
+probes:
+  pressure: {quantity: pressure, pair: press}
+  least: {quantity: pressure, pair: press, extreme: least}
+  corner: {quantity: pressure, pair: press, at: [1, 0]}
+  gap: {quantity: gap, pair: press}
+  wide: {quantity: gap, pair: press, extreme: largest}
+  middle: {quantity: gap, pair: press, at: [0.3, 0.1]}
+  touch: {quantity: first_contact, pair: press}
+verify:
+  - {value: touch, reference: 0.4, absolute: 1e-12}
 solver: {newton: {residual: 1.0e-12}}
 """
 
@@ -398,6 +430,36 @@ MISTAKES = [
         "10:3: unknown setting 'friction' (available: pairs, obstacles, c_n, force_at, massless)",
         "friction",
     ),
+    (
+        "quantity: displacement, at: [0.4, 0.5, 1]",
+        "quantity: gap, pair: press, at: [0.4, 0.5, 1], extreme: least",
+        "19:65: give either 'at' or 'extreme', not both",
+        "least",
+    ),
+    (
+        "quantity: displacement, at: [0.4, 0.5, 1]",
+        "quantity: first_contact, pair: press, extreme: least",
+        "19:56: 'first_contact' is that of the whole pair: no 'extreme'",
+        "least",
+    ),
+    (
+        "quantity: displacement, at: [0.4, 0.5, 1]",
+        "quantity: pressure, pair: pres",
+        "19:35: unknown pair 'pres'; did you mean 'press'?",
+        "pres",
+    ),
+    (
+        "quantity: displacement, at: [0.4, 0.5, 1]",
+        "quantity: first_contact",
+        "19:19: quantity 'first_contact' needs 'pair: PAIR'",
+        "first",
+    ),
+    (
+        "quantity: displacement, at: [0.4, 0.5, 1]",
+        "quantity: gap, pair: press, on: top",
+        "19:41: give either 'pair' or 'on', not both",
+        "top",
+    ),
 ]  # fmt: skip
 
 
@@ -420,3 +482,29 @@ def test_message(old, new, message, at, tmp_path):
 def test_the_case_without_mistakes_loads(tmp_path):
     (tmp_path / "case.yaml").write_text(PLATE)
     assert load_case(tmp_path / "case.yaml").warnings == ()
+
+
+def test_probes_of_a_pair(tmp_path):
+    """Uniaxial strain: with the stretch s the pressure of St. Venant-Kirchhoff is (lambda + 2 mu)/2 (1 - s^2) s."""
+    history = run(PISTON, tmp_path)
+    t, (mu, lmbda) = history["time"], lame(1000, 0.25)
+    stretch = 1.0 - np.maximum(0.1 * t - 0.035, 0.0)
+    pressure = 0.5 * (lmbda + 2.0 * mu) * (1.0 - stretch**2) * stretch
+    for name in ("pressure", "least", "corner"):
+        assert history[name] == pytest.approx(pressure, rel=1e-9, abs=1e-9)
+    for name in ("gap", "wide", "middle"):
+        assert history[name] == pytest.approx(np.maximum(0.035 - 0.1 * t, 0.0), abs=1e-12)
+    assert np.array_equal(history["touch"], [np.nan] * 3 + [t[3]] * 3, equal_nan=True)
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["verify"][0]["ok"]
+
+
+def test_first_contact_is_remembered(tmp_path):
+    """By a run that goes on after the contact, and by one that stopped just in the step of it."""
+    (tmp_path / "case.yaml").write_text(PISTON)
+    for end in ("0.4", "0.5"):
+        out = tmp_path / end
+        assert run_case(load_case(tmp_path / "case.yaml", [("time.end", end), ("verify", "[]")]), out) == FINISHED
+        text = (out / "case.yaml").read_text().replace(f"end: {end}", "end: 0.6")
+        (out / "case.yaml").write_text(text)
+        assert resume_run(out) == FINISHED
+        assert read_history(out / "history.csv")["touch"][3:] == pytest.approx([0.4] * 3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solvers.contact.distance import shortest_distance
+from solvers.contact.distance import distances
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 
@@ -21,8 +21,8 @@ SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     ],
 )
 def test_to_a_square(point, distance):
-    found = shortest_distance(np.array([point]), SQUARE, np.array([[0, 1, 2, 3]]), "quad")
-    assert found == pytest.approx(distance, abs=1e-14)
+    found = distances(np.array([point]), SQUARE, np.array([[0, 1, 2, 3]]), "quad")
+    assert found == pytest.approx([distance], abs=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -30,11 +30,11 @@ def test_to_a_square(point, distance):
 )
 def test_to_a_segment(point, distance):
     x = np.array([[0.0, 0.0], [1.0, 0.0]])
-    assert shortest_distance(np.array([point]), x, np.array([[0, 1]]), "line") == pytest.approx(distance, abs=1e-14)
+    assert distances(np.array([point]), x, np.array([[0, 1]]), "line") == pytest.approx([distance], abs=1e-14)
 
 
-def test_the_nearest_of_all_points_and_facets_counts():
+def test_the_nearest_of_all_facets_counts():
     points = np.array([[0.5, 0.5, 0.7], [5.0, 5.0, 0.1], [0.5, 0.5, 2.0]])
     x = np.concatenate([SQUARE, SQUARE + np.array([0.0, 0.0, 2.5])])
     facets = np.array([[0, 1, 2, 3], [4, 5, 6, 7]])
-    assert shortest_distance(points, x, facets, "quad") == pytest.approx(0.5)
+    assert distances(points, x, facets, "quad") == pytest.approx([0.7, np.hypot(np.hypot(4.0, 4.0), 0.1), 0.5])

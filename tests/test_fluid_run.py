@@ -78,6 +78,8 @@ probes:
   u: {quantity: velocity, at: [0.9, 1.77]}
   p: {quantity: pressure, at: [0.13, 0.41]}
   force: {quantity: force}
+  drag: {quantity: drag_coefficient, body: square, reference: {velocity: 0.5, length: 0.3, density: 4, drag: [0, 2]}}
+  lift: {quantity: lift_coefficient, reference: {velocity: 0.5, length: 0.3, drag: [3, 4]}}
   moment: {quantity: moment}
   out: {quantity: flow_rate, through: east}
   mean: {quantity: pressure, on: west}
@@ -113,6 +115,8 @@ def test_probes_of_a_flow_known_in_closed_form(element, tmp_path):
         "p": 4 * 0.13 + 2 * 0.41 + 4,
         "force.x": -4 * 0.09,
         "force.y": -2 * 0.09,
+        "drag": -2 * 0.09 / (0.5 * 4 * 0.5**2 * 0.3),
+        "lift": (-4 * -0.8 - 2 * 0.6) * 0.09 / (0.5 * 2 * 0.5**2 * 0.3),
         "moment": 0.09 * (-2 * centre[0] + 4 * centre[1]),
         "out": 4,
         "mean": 6,

@@ -9,11 +9,12 @@ from fsci.case.errors import did_you_mean, listed
 from fsci.case.fluid import Fluid
 from fsci.case.material import has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, surface_mistakes
-from fsci.case.probes import RESERVED, Probe
+from fsci.case.probes import COEFFICIENTS, RESERVED, Probe, Reference
 from fsci.case.structure import Structure
 from fsci.case.verify import BODY_COLUMN, CONTACT_COLUMNS, COUPLING_COLUMNS, FIELD_COLUMNS, RUN_COLUMNS
 from fsci.case.yaml_text import Keys
 
+OF_BODIES = ("force", "moment", *COEFFICIENTS)
 NEEDS_MASS = ("momentum", "angular_momentum", "mass", "centre")
 
 
@@ -61,7 +62,7 @@ def _of_structure(structure: Structure, name: str, probe: Probe) -> Iterator[Mis
     keys, bodies = ("probes", name), structure.bodies
     if probe.minus is not None:
         yield (*keys, "minus"), "'minus' is for points of the fluid"
-    if probe.body is None and len(bodies) > 1 and probe.place:
+    if probe.body is None and len(bodies) > 1 and probe.place not in ("", "pair"):
         yield keys, f"missing setting 'body' in '{name}': there are several bodies ({', '.join(bodies)})"
         return
     if probe.body is not None and probe.body not in bodies:
@@ -79,7 +80,7 @@ def _of_structure(structure: Structure, name: str, probe: Probe) -> Iterator[Mis
 def _of_fluid(case: Case, fluid: Fluid, name: str, probe: Probe) -> Iterator[Mistake]:
     keys, grid = ("probes", name), fluid.grid
     bodies = [*fluid.bodies, *(case.elastic_bodies if case.coupling is not None else ())]
-    if probe.quantity not in ("force", "moment"):
+    if probe.quantity not in OF_BODIES:
         if probe.body is not None:
             yield (*keys, "body"), f"quantity '{probe.quantity}' of the fluid is not that of a body"
     elif probe.body is not None and probe.body not in bodies:
@@ -90,6 +91,8 @@ def _of_fluid(case: Case, fluid: Fluid, name: str, probe: Probe) -> Iterator[Mis
         patch = getattr(probe, place)
         if patch is not None and patch not in fluid.patches:
             yield (*keys, place), f"unknown patch '{patch}'{did_you_mean(patch, fluid.patches)}"
+    if probe.reference is not None:
+        yield from _reference(probe.reference, grid.dimension, (*keys, "reference"))
     yield from length_mistakes(probe.about, grid.dimension, (*keys, "about"))
     yield from length_mistakes(probe.minus, grid.dimension, (*keys, "minus"))
     for key in ("at", "minus"):
@@ -98,6 +101,27 @@ def _of_fluid(case: Case, fluid: Fluid, name: str, probe: Probe) -> Iterator[Mis
         if point is not None and not all(low <= x <= high for low, x, high in inside):
             place = ", ".join(f"{x:g}" for x in point)
             yield (*keys, key), f"the point ({place}) is outside of the fluid's box"
+
+
+def _reference(reference: Reference, dimension: int, keys: Keys) -> Iterator[Mistake]:
+    wanted, other = ("length", "area") if dimension == 2 else ("area", "length")
+    if getattr(reference, wanted) is None:
+        yield keys, f"coefficients in {dimension}D need the setting '{wanted}'"
+    if getattr(reference, other) is not None:
+        yield (*keys, other), f"coefficients in {dimension}D refer to '{wanted}', not '{other}'"
+    directions = [(key, getattr(reference, key)) for key in ("drag", "lift")]
+    for key, direction in directions:
+        yield from length_mistakes(direction, dimension, (*keys, key))
+        if direction is not None and not any(direction):
+            yield (*keys, key), f"the direction of the {key} must not be zero"
+    drag, lift = (direction for _, direction in directions)
+    if drag is not None and lift is None and dimension == 3:
+        yield keys, "the directions of drag and lift go together in 3D: give both"
+    elif lift is not None and len(lift) == dimension and any(lift):
+        along = drag if drag is not None and len(drag) == dimension else (1.0, 0.0, 0.0)[:dimension]
+        both = sum(a * b for a, b in zip(along, lift, strict=True))
+        if abs(both) > 1e-9 * sum(a * a for a in along) ** 0.5 * sum(b * b for b in lift) ** 0.5:
+            yield (*keys, "lift"), "the direction of the lift must be at a right angle to that of the drag"
 
 
 def verify_mistakes(case: Case) -> Iterator[Mistake]:

@@ -7,26 +7,46 @@ from typing import Literal
 from pydantic import model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Name, NumberVector, Text
+from fsci.case.values import Name, NumberVector, Positive, Text
 
 #: what can be measured where, by the setting that says where; "" is none of them
 STRUCTURE = {
     "at": ("displacement", "velocity", "acceleration"),
     "on": ("reaction", "traction", "displacement", "area"),
-    "pair": ("gap",),
+    "pair": ("gap", "pressure", "first_contact"),
     "": ("energy", "momentum", "angular_momentum", "mass", "volume", "centre"),
 }
 FLUID = {
     "at": ("velocity", "pressure"),
     "on": ("pressure",),
     "through": ("flow_rate",),
-    "": ("force", "moment", "kinetic_energy", "dissipation", "volume"),
+    "": ("force", "drag_coefficient", "lift_coefficient", "moment", "kinetic_energy", "dissipation", "volume"),
 }
 FIELDS = {"structure": STRUCTURE, "fluid": FLUID}
-PLACES = {"at": "'at: [..]'", "on": "'on: SURFACE'", "through": "'through: PATCH'", "pair": "'pair: PAIR'"}
+PLACES = {"pair": "'pair: PAIR'", "at": "'at: [..]'", "on": "'on: SURFACE'", "through": "'through: PATCH'"}
+COEFFICIENTS = ("drag_coefficient", "lift_coefficient")
 ENERGIES = ("kinetic", "internal", "work", "total")
+#: quantities of one column
+SCALARS = (
+    *("area", "gap", "first_contact", "mass", "volume", "pressure", "flow_rate", "kinetic_energy", "dissipation"),
+    *COEFFICIENTS,
+)
 #: columns of history.csv that cannot be names of probes
 RESERVED = ("step", "time", "dt", "iterations", "wall", "residual")
+
+
+class Reference(Section):
+    """What coefficients of drag and lift refer to: c = F . e / (1/2 density velocity^2 length), in 3D with the area."""
+
+    density: Positive | None = setting(None, "mass per volume; default: that of the fluid", unit="kg/m^3")
+    velocity: Positive = setting(..., "speed", unit="m/s")
+    length: Positive | None = setting(None, "length across the flow, such as a diameter (2D only)", unit="m")
+    area: Positive | None = setting(None, "area (3D only)", unit="m^2")
+    drag: NumberVector | None = setting(None, "direction of the drag; default: x", unit="1")
+    lift: NumberVector | None = setting(
+        None, "direction of the lift; default: in 2D that of the drag, turned counterclockwise by 90 degrees; in 3D y",
+        unit="1",
+    )  # fmt: skip
 
 
 class Probe(Section):
@@ -37,7 +57,9 @@ class Probe(Section):
     - with `at`, at a point (reference coordinates): displacement, velocity, acceleration
     - with `on`, on a surface: reaction (force of the supports), traction (integral of P N over the reference surface),
       displacement (mean over the area), area
-    - with `pair`, of a pair of contact: gap (shortest distance of slave nodes to the master)
+    - with `pair`, of a pair of contact: gap (distance of the slave nodes to the master) and pressure (at the slave
+      nodes), the `extreme` of all nodes, or at the node nearest to the point `at`; first_contact (time of the end of
+      the first step in which the pair touches, nan before)
     - with none of them, of the body: energy, momentum, angular_momentum, mass, volume, centre (of mass)
 
     Of the fluid:
@@ -45,8 +67,8 @@ class Probe(Section):
     - with `at`, at a point: velocity, pressure; nan while a body covers the point; with `minus` too, the difference
     - with `on`, on a patch: pressure (mean over the area)
     - with `through`, out of the box through a patch: flow_rate (volume per time)
-    - with none of them: force of the fluid on the `body` and its moment; kinetic_energy, dissipation (power) and
-      volume of all fluid
+    - with none of them: force of the fluid on the `body` and its moment; drag_coefficient and lift_coefficient of
+      that force, which need a `reference`; kinetic_energy, dissipation (power) and volume of all fluid
 
     Vectors have the columns NAME.x, NAME.y, NAME.z (the last one in 3D); energy, always of all bodies, has
     NAME.kinetic, NAME.internal, NAME.work (of loads and supports) and NAME.total (kinetic + internal); all others,
@@ -75,10 +97,13 @@ class Probe(Section):
         "pressure",
         "flow_rate",
         "force",
+        "drag_coefficient",
+        "lift_coefficient",
         "moment",
         "kinetic_energy",
         "dissipation",
         "gap",
+        "first_contact",
     ] = setting(..., "what is measured")
     at: NumberVector | None = setting(None, "point; of a structure, in reference coordinates", unit="m")
     on: Text | None = setting(None, "name of a surface, or of a patch of the fluid")
@@ -87,11 +112,15 @@ class Probe(Section):
     )
     through: Text | None = setting(None, "name of a patch of the fluid")
     pair: Name | None = setting(None, "name of a pair of contact")
+    extreme: Literal["largest", "least"] | None = setting(
+        None, "of all slave nodes of the pair; default: the least gap, the largest pressure"
+    )
+    reference: Reference | None = setting(None, "what coefficients refer to")
     about: NumberVector | None = setting(None, "point that a moment is about; default: the origin", unit="m")
 
     @property
     def place(self) -> str:
-        """The setting that says where: at, on, through or none."""
+        """The setting that says where: pair, at, on, through or none."""
         return next((name for name in PLACES if getattr(self, name) is not None), "")
 
     @property
@@ -102,10 +131,17 @@ class Probe(Section):
     @model_validator(mode="after")
     def _measurable(self) -> Probe:
         given = [name for name in PLACES if getattr(self, name) is not None]
+        if given[:2] == ["pair", "at"]:
+            given.remove("at")  # a node of the pair
         if len(given) > 1:
             raise fault(f"give either '{given[0]}' or '{given[1]}', not both", given[1])
         if self.about is not None and self.quantity != "moment":
             raise fault(f"'about' is for the quantity 'moment', not '{self.quantity}'", "about")
+        self._check_extreme()
+        if self.quantity in COEFFICIENTS and self.reference is None:
+            raise fault(f"quantity '{self.quantity}' needs the setting 'reference'")
+        if self.quantity not in COEFFICIENTS and self.reference is not None:
+            raise fault(f"'reference' is for coefficients of drag and lift, not for '{self.quantity}'", "reference")
         if self.minus is not None and self.place != "at":
             raise fault("'minus' is the second point of a difference: give the first one as 'at'", "minus")
         if self.fields:
@@ -118,12 +154,21 @@ class Probe(Section):
         wanted = f"needs {' or '.join(possible)}" if possible else whole
         raise fault(f"quantity '{self.quantity}' {wanted}", self.place or "quantity")
 
+    def _check_extreme(self) -> None:
+        if self.extreme is not None and self.place != "pair":
+            raise fault("'extreme' is for the nodes of a pair of contact: give 'pair'", "extreme")
+        if self.extreme is not None and self.at is not None:
+            raise fault("give either 'at' or 'extreme', not both", "extreme")
+        for key in ("at", "extreme"):
+            if self.quantity == "first_contact" and getattr(self, key) is not None:
+                raise fault(f"'first_contact' is that of the whole pair: no '{key}'", key)
+
     def columns(self, name: str, dimension: int) -> tuple[str, ...]:
         """The columns of history.csv that the probe called `name` fills."""
         match self.quantity:
             case "energy":
                 return tuple(f"{name}.{part}" for part in ENERGIES)
-            case "area" | "gap" | "mass" | "volume" | "pressure" | "flow_rate" | "kinetic_energy" | "dissipation":
+            case _ if self.quantity in SCALARS:
                 return (name,)
             case "angular_momentum" | "moment" if dimension == 2:
                 return (name,)

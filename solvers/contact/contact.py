@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.condense import Linearised, condense, expand, place_columns, recover
-from solvers.contact.distance import shortest_distance
+from solvers.contact.distance import distances
 from solvers.contact.held import lent_shares
 from solvers.contact.pair import KEEP_AFTER, Pair
 from solvers.contact.share import Shares
@@ -70,6 +70,8 @@ class Contact:
         self._scale = np.zeros(self.size)
         self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
         self._shares = Shares(comm)
+        self.time = np.nan  #: of the latest evaluation [s]
+        self.touched_at = np.full(len(self.pairs), np.nan)  #: when each pair first touched [s], as probes have noted it
         self.terms: Terms | None = None
         facets = [slave[pair.slave.facets] for pair, (slave, _) in zip(self.pairs, self._sides, strict=True)]
         self._lent = lent_shares(facets, self.nodes.held.all(axis=1) & (self._areas > 0.0))
@@ -120,6 +122,7 @@ class Contact:
     def evaluate(self, u: Array, t: float) -> None:
         """Mortar terms and active set at the displacements u, shape (N, dim), of the present iterate."""
         self.x = self.positions(u, t)
+        self.time = t
         self.terms = self._evaluate_pairs()
         self._gap = np.zeros(self.size) if self.terms is None else self._with_lent(self.terms.gap)
         if self.terms is None:
@@ -300,11 +303,11 @@ class Contact:
             return np.zeros(self.dim)
         return -(self.terms.D[slave, None] * self.z[slave]).sum(axis=0)
 
-    def distance(self, index: int) -> float:
-        """Shortest distance [m] of the slave nodes of a pair to its master, as of the latest `evaluate`."""
+    def distances(self, index: int) -> Array:
+        """Distances [m] of the slave nodes of a pair to its master, as of the latest `evaluate`."""
         slave, master = self._sides[index]
         surface = self.pairs[index].master
-        return shortest_distance(self.x[slave], self.x[master], surface.facets, surface.facet_type)
+        return distances(self.x[slave], self.x[master], surface.facets, surface.facet_type)
 
     def mean_gap(self) -> Array:
         """Mean gap [m] around each slave node, NaN where no master is near, shape (N,)."""
@@ -338,6 +341,7 @@ class Contact:
 
     def save(self) -> State:
         arrays = {"z": self.z, "x": self.x, "gap": self._gap, "active": self.active_set.active}
+        arrays["touched_at"] = self.touched_at
         return {name: array.copy() for name, array in arrays.items()}
 
     def restore(self, state: State) -> None:
@@ -345,6 +349,7 @@ class Contact:
         self.x[:] = state["x"]
         self._gap = state["gap"].copy()
         self.active_set.active[:] = state["active"]
+        self.touched_at[:] = state["touched_at"]
 
 
 def _index(surfaces: Sequence[Surface], wanted: Surface) -> int:

@@ -1,4 +1,4 @@
-"""The shortest distance between two surfaces, however far they are from each other: what a probe of the gap shows."""
+"""Distances of points to a surface, however far they are from it: what a probe of the gap shows."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from solvers.api import Array
 from solvers.tessellation import SIMPLICES
 
 
-def shortest_distance(points: Array, x: Array, facets: NDArray[np.int64], facet_type: str) -> float:
-    """Smallest distance [m] from points (n, dim) to facets with nodes at x, as flat pieces through their nodes."""
+def distances(points: Array, x: Array, facets: NDArray[np.int64], facet_type: str) -> Array:
+    """Distances [m] of points (n, dim) to facets with nodes at x, taken as flat pieces through their nodes."""
     simplices = np.array(SIMPLICES[facet_type])
     corners = x[facets[:, simplices].reshape(-1, simplices.shape[1])]
-    closest = np.inf
+    closest = np.full(len(points), np.inf)
     for simplex in corners:
         inside = _to_inside(points, simplex) if len(simplex) == 3 else np.full(len(points), np.inf)
         edges = [(a, b) for a in range(len(simplex)) for b in range(a)]
         to_edges = [_to_segment(points, simplex[a], simplex[b]) for a, b in edges]
-        closest = min(closest, float(np.minimum.reduce([inside, *to_edges]).min()))
+        closest = np.minimum.reduce([closest, inside, *to_edges])
     return closest
 
 

@@ -190,9 +190,7 @@ class Forces:
         centre = np.zeros(fluid.dim) if about is None else np.asarray(about, dtype=float)
 
         def measure() -> dict[str, float]:
-            if self._found is None:
-                self._found = fluid.force()
-            force = np.concatenate([self._found[name] for name in names])
+            force = self._on(names)
             if quantity == "force":
                 return _components(force.sum(axis=0))
             x = fluid.cut.motion.x[vertices]
@@ -201,6 +199,17 @@ class Forces:
             return _components(moment) if fluid.dim == 3 else {"": float(moment[2])}
 
         return measure
+
+    def coefficient(self, body: str | None, scale: Array) -> Probe:
+        """Force on a body (None: on all), times a vector [1/N]."""
+        names = [body] if body is not None else [b.surface.name for b in self.fluid.bodies]
+        return lambda: {"": float(self._on(names).sum(axis=0) @ scale)}
+
+    def _on(self, names: Sequence[str]) -> Array:
+        """Forces [N] on the vertices of bodies."""
+        if self._found is None:
+            self._found = self.fluid.force()
+        return np.concatenate([self._found[name] for name in names])
 
 
 # ------------------------------------------------------------------------------------------------------- the whole
