@@ -71,7 +71,7 @@ class Contact:
         self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
         self._shares = Shares(comm)
         self.time = np.nan  #: of the latest evaluation [s]
-        self.touched_at = np.full(len(self.pairs), np.nan)  #: when each pair first touched [s], as probes have noted it
+        self.touched_at = np.full(len(self.pairs), np.inf)  #: when each pair first touched [s], as probes have noted it
         self.terms: Terms | None = None
         facets = [slave[pair.slave.facets] for pair, (slave, _) in zip(self.pairs, self._sides, strict=True)]
         self._lent = lent_shares(facets, self.nodes.held.all(axis=1) & (self._areas > 0.0))

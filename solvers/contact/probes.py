@@ -47,8 +47,9 @@ def first_contact(contact: Contact, pair: int) -> Probe:
     """Time [s] of the end of the first step in which a pair touches, nan before."""
 
     def probe() -> dict[str, float]:
-        if np.isnan(contact.touched_at[pair]) and contact.resultant(pair).any():
+        if contact.touched_at[pair] == np.inf and contact.resultant(pair).any():
             contact.touched_at[pair] = contact.time
-        return {"": float(contact.touched_at[pair])}
+        time = float(contact.touched_at[pair])
+        return {"": time if time < np.inf else np.nan}
 
     return probe
