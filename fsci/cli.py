@@ -155,10 +155,12 @@ def _run(options: argparse.Namespace) -> int:
         case = load_case(options.case, options.overrides)
         for warning in case.warnings if first else ():
             print(f"warning: {warning}", file=sys.stderr)
+        from fsci.processes import ending_together
         from fsci.run import run_case
 
         out = options.out or Path("results") / case.folder.absolute().name
-        return int(run_case(case, out, force=options.force))
+        with ending_together(MPI.COMM_WORLD, CaseError):
+            return int(run_case(case, out, force=options.force))
     except CaseError as error:
         return _fail(str(error)) if first else 2
 
@@ -167,10 +169,12 @@ def _resume(options: argparse.Namespace) -> int:
     from mpi4py import MPI
 
     from fsci.case import CaseError
+    from fsci.processes import ending_together
     from fsci.run import resume_run
 
     try:
-        return int(resume_run(options.out, options.overrides))
+        with ending_together(MPI.COMM_WORLD, CaseError, FileNotFoundError):
+            return int(resume_run(options.out, options.overrides))
     except CaseError as error:
         return _fail(str(error)) if MPI.COMM_WORLD.rank == 0 else 2
     except FileNotFoundError as error:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-import signal
+import os
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +19,7 @@ from fsci.memory import require_memory
 from fsci.monitor import Monitor
 from fsci.output import FieldWriter, write_text
 from fsci.results_folder import keep_case, prepare_folder
+from fsci.stop import StopWatch
 from fsci.summary import RunRecord, memory_mb, summarize, write_summary
 from fsci.verify import evaluate
 from solvers.api import State, StepFailed, StepInfo
@@ -83,7 +85,6 @@ class Run:
     out: Path
     comm: Any
     record: RunRecord = field(default_factory=RunRecord)
-    stop_asked: bool = False
     probes: dict[str, float] = field(default_factory=dict)  #: latest values
     balances: dict[str, float] = field(default_factory=dict)  #: latest values
 
@@ -92,6 +93,7 @@ class Run:
         self.root = self.comm.rank == 0
         self.clock = Clock(time.start, time.end, time.step, time.retry.halvings, time.retry.recover_after)
         self.record.residual_steps = self.case.output.residuals
+        self.stop = StopWatch(self._give_up if self.root else None)
 
     # ------------------------------------------------------------------------------------------------- start
 
@@ -134,51 +136,43 @@ class Run:
     def _watched_loop(self) -> int:
         """The loop with live output, signals caught and the summary written whatever happens."""
         monitor = Monitor(enabled=self.root, live=self.comm.size == 1, log=self.out / "log.txt")
-        caught = {number: signal.signal(number, self._on_signal) for number in (signal.SIGTERM, signal.SIGINT)}
-        try:
-            with monitor as self.monitor:
-                clock = self.clock
-                monitor.start(
-                    self.case.title,
-                    self.simulation.dofs,
-                    self.comm.size,
-                    begin=clock.start,
-                    end=clock.end,
-                    time=clock.time,
-                )
+        with monitor as self.monitor:
+            clock = self.clock
+            monitor.start(
+                self.case.title,
+                self.simulation.dofs,
+                self.comm.size,
+                begin=clock.start,
+                end=clock.end,
+                time=clock.time,
+            )
+            self._keep()
+            with self.stop:
                 return self._loop()
-        finally:
-            for number, handler in caught.items():
-                signal.signal(number, handler)
-
-    def _on_signal(self, number: int, frame: Any) -> None:
-        self.stop_asked = True
 
     def _asked_to_stop(self) -> bool:
         """Any process got a signal, or there is a file STOP in the results folder."""
-        asked = self.stop_asked or (self.root and (self.out / "STOP").exists())
+        asked = self.stop.asked or (self.root and (self.out / "STOP").exists())
         return bool(self.comm.allreduce(int(asked)))
 
     def _loop(self) -> int:
         every = self.case.output.checkpoint_every
         while not self.clock.done:
             if self._asked_to_stop():
-                self._write_checkpoint()
                 return self._end("stopped", f"stopped at time {self.clock.time:g}; continue with fsci resume")
             try:
                 self._step()
             except StepFailed as failure:
                 return self._fail(failure)
             if every and self.clock.step % every == 0:
-                self._write_checkpoint()
-        self._write_checkpoint()
+                with self.stop.files:
+                    self._write_checkpoint()
         return self._end("finished", "")
 
     def _step(self) -> None:
         """One accepted step. Raises StepFailed if halving does not help."""
         before, clock = self.record.wall(), self.clock
         while True:
-            state = self.simulation.scheme.save()
             try:
                 dt = clock.dt
                 info = self.simulation.scheme.step(clock.time, dt)
@@ -186,17 +180,30 @@ class Run:
             except StepFailed as failure:
                 if not clock.halve():
                     self._keep_failure(failure)
-                    self.simulation.scheme.restore(state)
+                    self.simulation.scheme.restore(self.state)
                     raise
-                self.simulation.scheme.restore(state)
+                self.simulation.scheme.restore(self.state)
+                self.state = self.simulation.scheme.save()
                 self.record.retry()
                 self.monitor.retry(failure, clock.dt)
-        clock.accept()
-        self.record.accept(clock.step, info)
-        self._note(dt, info, before)
-        every = self.case.output.fields_every
-        if clock.done or (every and clock.step % every == 0):
-            self._write_fields()
+        with self.stop.files:
+            clock.accept()
+            self.record.accept(clock.step, info)
+            self._note(dt, info, before)
+            every = self.case.output.fields_every
+            if clock.done or (every and clock.step % every == 0):
+                self._write_fields()
+            self._keep()
+
+    def _keep(self) -> None:
+        """Keep the state of the last accepted step: a step that fails is taken back, a checkpoint may be asked for."""
+        from solvers.distributed import gather
+
+        with self.record.timer("checkpoint"):
+            self.state = self.simulation.scheme.save()
+            clock = self.clock
+            self.good = {"scheme": gather(self.comm, self.state), "clock": clock.save()}
+            self.good_at = {"step": clock.step, "time": clock.time, "title": self.case.title}
 
     def _note(self, dt: float, info: StepInfo, before: float) -> None:
         """One line in the history and on the screen."""
@@ -218,14 +225,11 @@ class Run:
                 self.fields.write(self.clock.step, self.clock.time, snapshots)
 
     def _write_checkpoint(self) -> None:
-        from solvers.distributed import gather
-
-        with self.record.timer("checkpoint"):
-            scheme = gather(self.comm, self.simulation.scheme.save())
-            if self.root:
-                state = {"scheme": scheme, "clock": self.clock.save(), "record": self.record.save()}
-                meta = {"step": self.clock.step, "time": self.clock.time, "title": self.case.title}
-                write_checkpoint(self.out / "checkpoint", state, meta)
+        """Write the state of the last accepted step."""
+        if self.root:
+            with self.record.timer("checkpoint"):
+                state = self.good | {"record": self.record.save()}
+                write_checkpoint(self.out / "checkpoint", state, self.good_at)
 
     def _keep_failure(self, failure: StepFailed) -> None:
         """Folder `failure`: the case, where it failed, and the fields of the iterate that failed."""
@@ -250,25 +254,38 @@ class Run:
     # --------------------------------------------------------------------------------------------------- end
 
     def _fail(self, failure: StepFailed) -> int:
-        from solvers.distributed import gather
-
-        self._write_checkpoint()
-        state = gather(self.comm, self.simulation.scheme.save())
         clock = self.clock
         if self.root:
-            meta = {"step": clock.step, "time": clock.time, "title": self.case.title}
-            write_checkpoint(self.out / "failure", {"scheme": state, "clock": clock.save()}, meta)
+            with self.stop.files:
+                write_checkpoint(self.out / "failure", self.good | {"clock": clock.save()}, self.good_at)
         message = f"step {clock.step + 1} from time {clock.time:g} failed with dt = {clock.dt:.3g}: {failure}"
         return self._end("failed", message)
 
     def _end(self, status: str, message: str) -> int:
-        """Summary and verification; the exit code is the same on all processes."""
-        memory = max(self.comm.allgather(memory_mb()))
-        code = None
-        if self.root:
-            self.history.close()
-            code = self._summarize(status, message, memory)
+        """Checkpoint, summary and verification; the exit code is the same on all processes."""
+        with self.stop.files:
+            self.stop.ended()
+            self._write_checkpoint()
+            memory = max(self.comm.allgather(memory_mb()))
+            code = None
+            if self.root:
+                self.history.close()
+                code = self._summarize(status, message, memory)
         return self.comm.bcast(code, root=0)
+
+    def _give_up(self) -> None:
+        """End all processes within a step, on a signal: what counts is the last accepted one."""
+        code = FAILED
+        try:
+            self._write_checkpoint()
+            message = f"stopped within a step, at time {self.good_at['time']:g}; continue with fsci resume"
+            code = self._summarize("stopped", message, memory_mb())
+        finally:
+            self.monitor.close()
+            sys.stdout.flush()
+            if self.comm.size > 1:
+                self.comm.Abort(code)
+            os._exit(code)
 
     def _summarize(self, status: str, message: str, memory: float) -> int:
         history = read_history(self.out / "history.csv")

@@ -1,0 +1,72 @@
+"""Ending a run on SIGTERM or SIGINT: after its step if that is soon, else at once with the last good state."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable
+from typing import Any
+
+SIGNALS = (signal.SIGTERM, signal.SIGINT)
+
+#: Time [s] that a step has to come to its end after a signal. `mpirun` kills its processes a second or more after it
+#: has passed a signal on.
+GRACE = 0.3
+
+
+class StopWatch:
+    """Catches signals while it is entered.
+
+    The loop looks at `asked` between steps. If it does not say `ended()` within GRACE, a thread calls `give_up`, which
+    writes what is to be kept and ends the process. Python calls a handler of signals only between two of its own
+    operations. The thread is woken through a pipe, also from within a long call that releases Python's lock.
+
+    `files` is held by whoever changes files or the state that they keep.
+    """
+
+    def __init__(self, give_up: Callable[[], None] | None):
+        """`give_up` is None on processes that write no files."""
+        self.asked = False
+        self.files = threading.RLock()
+        self._give_up, self._ended = give_up, threading.Event()
+
+    def __enter__(self) -> StopWatch:
+        self._read, self._write = os.pipe()
+        os.set_blocking(self._write, False)
+        self._handlers = {number: signal.signal(number, self._on_signal) for number in SIGNALS}
+        self._before = signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
+        self._thread = threading.Thread(target=self._watch, name="signals", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        signal.set_wakeup_fd(self._before)
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)
+        self.ended()
+        os.write(self._write, b"\0")
+        self._thread.join()
+        os.close(self._read)
+        os.close(self._write)
+
+    def ended(self) -> None:
+        """The loop writes by itself what is to be kept."""
+        self._ended.set()
+
+    def _on_signal(self, number: int, frame: Any) -> None:
+        self.asked = True
+
+    def _watch(self) -> None:
+        while True:
+            byte = os.read(self._read, 1)[0]
+            if byte == 0:
+                return
+            if byte in SIGNALS:
+                self.asked = True
+                break
+        if self._ended.wait(GRACE) or self._give_up is None:
+            return
+        with self.files:
+            if not self._ended.is_set():
+                self._give_up()
