@@ -87,6 +87,9 @@ class Run:
     record: RunRecord = field(default_factory=RunRecord)
     probes: dict[str, float] = field(default_factory=dict)  #: latest values
     balances: dict[str, float] = field(default_factory=dict)  #: latest values
+    state: State = field(default_factory=dict)  #: after the last accepted step
+    good: State = field(default_factory=dict)  #: the same as a checkpoint keeps it, whole on rank 0
+    good_at: State = field(default_factory=dict)  #: its step and time
 
     def __post_init__(self) -> None:
         time = self.case.time
