@@ -34,11 +34,10 @@ class Blocks:
         self.structure, self.into_structure = numbering.split(rows)
 
     def hold(self, field: Structure, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Rows of prescribed displacements become those of the identity, x is what they are to be (collective)."""
-        rows = (self.structure.getOwnershipRange()[0] + field.prescribed).astype(PETSc.IntType)
-        self.structure.zeroRows(rows, 1.0)
-        self.into_structure.zeroRows(rows, 0.0)
-        b.array[field.prescribed] = x.array[field.prescribed]
+        """Rows of prescribed displacements ask for what x has there (collective)."""
+        own = self.structure.getLocalSize()[0]
+        beside = [self.structure, self.into_structure]
+        self.structure, self.into_structure = field.held.impose_rows(beside, x.array[:own], b.array[:own])
 
     def nested(self) -> PETSc.Mat:
         """The matrix that still consists of the blocks."""

@@ -50,9 +50,10 @@ class Coupled:
         """
         structure = self.structure
         self.fluid.predict()
-        own_guess = not np.array_equal(structure.now.u[structure.free], structure.old.u[structure.free])
+        held, now = structure.held, structure.now
+        own_guess = not np.array_equal(held.free_part(now.u), held.free_part(structure.old.u))
         if not structure.comm.allreduce(own_guess, op=MPI.LOR):
-            structure.now.u[structure.free] = self.predictor.at(t)[structure.free]
+            now.u[:] = held.part(now.u) + held.free_part(self.predictor.at(t))
 
     def end_step(self, force: Array) -> None:
         """Accept the step; `force` [N] on the vertices is what the structure has carried."""

@@ -39,7 +39,7 @@ def build_structure(
         return Structure(comm, bodies, _time_scheme(case), settings, timer, contact)
     except SupportError as error:
         supports = case.elastic_bodies[error.body].supports
-        index = next(i for i, support in enumerate(supports) if error.surface in support.on)
+        index = next(i for i, support in enumerate(supports) if error.where in support.on)
         keys = ("structure", "bodies", error.body, "supports", index)
         raise case.error(keys, error.message) from None
 

@@ -103,7 +103,7 @@ def prepare(make, seed=5):
     structure.initialise(0.0, 0.1)
     structure.begin_step(0.0, 0.1)
     structure.now.u[:] = rng.uniform(-0.01, 0.01, structure.layout.size)
-    structure.now.u[structure.prescribed] = structure._target
+    structure.now.u[:] = structure.held.free_part(structure.now.u) + structure._target
     structure.residual()
     contact.z[:] = 30.0 * contact.terms.normals + rng.uniform(-5.0, 5.0, contact.z.shape)
     contact.z[contact.nodes.held] = 0.0
@@ -175,10 +175,10 @@ def test_condensed_step_is_that_of_the_saddle_point_system(name):
         ]
     )
     right = np.concatenate([-without, -contact.terms.gap[L.active], np.zeros(len(L.oblique_u))])
-    held = structure.prescribed
+    held = structure.held.dofs
     matrix[held] = 0.0
     matrix[held, held] = 1.0
-    right[held] = structure._target - structure.now.u[held]
+    right[held] = (structure._target - structure.now.u)[held]
     # rows and columns of equal size, so that the dense solution is accurate
     columns = 1.0 / np.abs(matrix).max(axis=0)
     rows = 1.0 / np.abs(matrix * columns).max(axis=1)

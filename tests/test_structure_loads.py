@@ -5,6 +5,7 @@ import pytest
 from structure_setup import CELL_TYPES, block, distort, make_structure
 
 from solvers.structure.body import Pressure, Traction
+from solvers.structure.loads import LineForce, PointForce
 from solvers.structure.materials import NeoHooke
 
 GRADIENT = np.array([[0.10, 0.15, 0.03], [-0.08, 0.12, 0.05], [0.04, -0.06, -0.10]])
@@ -71,3 +72,35 @@ def test_gravity_with_a_density_that_varies():
     x.array[0::2] = 1.0
     structure.mass.mult(x, y)
     assert body.external_force() == pytest.approx(y.array, abs=1e-14)
+
+
+@pytest.mark.parametrize("cell_type", ["tetra", "hexahedron27"])
+def test_line_force(cell_type):
+    """Along the edge y = z = 1, as on the lines of a surface: int 2 (1 + 2 x^3) = 3, int 2 x (1 + 2 x^3) = 9/5."""
+    mesh = block(cell_type, 2)
+    edge = np.flatnonzero((mesh.points[:, 1:] == 1.0).all(axis=1))
+    edge = edge[np.argsort(mesh.points[edge, 0])]
+    step = 1 if cell_type == "tetra" else 2
+    lines = np.stack([edge[:-1:step], edge[step::step], *([edge[1::2]] if step == 2 else [])], axis=1)
+    load = LineForce(lines, mesh.points[lines], (none, cubic, none))
+    body = make_structure(mesh, NeoHooke(3.0, 5.0, 2.0), line_forces=[load]).bodies[0]
+    body.set_time(2.0)
+    force, x = body.external_force().reshape(-1, 3), body.points[0, : body.owned]
+    assert (force.sum(axis=0), x @ force) == (
+        pytest.approx([0, 3, 0], abs=1e-13),
+        pytest.approx([0, 1.8, 0], abs=1e-13),
+    )
+    assert np.isin(body.nodes[: body.owned][np.abs(force).max(axis=1) > 0.0], edge).all()
+
+
+def test_point_forces():
+    """Each node carries the whole force, evaluated at its place."""
+    mesh = block("quad9", 2)
+    nodes = np.array([3, 17, 5])
+    load = PointForce(nodes, (cubic, none))
+    body = make_structure(mesh, NeoHooke(3.0, 5.0, 2.0), point_forces=[load]).bodies[0]
+    body.set_time(2.0)
+    force = body.external_force().reshape(-1, 2)[np.argsort(body.nodes[: body.owned])]
+    expected = np.zeros_like(force)
+    expected[nodes, 0] = 2.0 * (1.0 + 2.0 * mesh.points[nodes, 0] ** 3)
+    assert np.array_equal(force, expected)

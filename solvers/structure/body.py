@@ -14,8 +14,10 @@ from petsc4py import PETSc
 from solvers import fem
 from solvers.api import Array
 from solvers.structure import forms
-from solvers.structure.loads import DeadLoads, FollowerPressure, Pressure, Traction
+from solvers.structure.loads import DeadLoads, FollowerPressure, LineForce, PointForce, Pressure, Traction
 from solvers.structure.materials import Material, Parameter, Value, parameters
+from solvers.structure.springs import Spring, Springs
+from solvers.structure.supports import Roller, Support, Symmetry
 
 #: Cell type -> quadrature degree of (internal forces, mass): full integration of the affine cell.
 QUADRATURE = {
@@ -31,31 +33,19 @@ QUADRATURE = {
 
 
 @dataclass(frozen=True)
-class Support:
-    """Prescribed displacement components [m] on a surface; None leaves a component free."""
-
-    surface: str
-    displacement: tuple[Value | None, ...]
-
-
-@dataclass(frozen=True)
-class Symmetry:
-    """No displacement normal to an axis-aligned plane surface."""
-
-    surface: str
-
-
-@dataclass(frozen=True)
 class BodySettings:
     """What the user says of a body, besides its mesh. Vectors have one entry per dimension."""
 
     name: str
     material: Material
-    supports: Sequence[Support | Symmetry] = ()
+    supports: Sequence[Support | Symmetry | Roller] = ()
+    springs: Sequence[Spring] = ()
     gravity: tuple[Value, ...] | None = None  #: [m/s^2]
     body_force: tuple[Value, ...] | None = None  #: [N/m^3]
     tractions: Sequence[Traction] = ()
     pressures: Sequence[Pressure] = ()
+    point_forces: Sequence[PointForce] = ()
+    line_forces: Sequence[LineForce] = ()
     initial_displacement: tuple[Value, ...] | None = None  #: [m]
     initial_velocity: tuple[Value, ...] | None = None  #: [m/s]
 
@@ -75,6 +65,7 @@ class Body:
         self.parameters = {k: self._parameter(p) for k, p in parameters(settings.material).items()}
         self._compile()
         self._build_loads()
+        self._springs = Springs(self) if settings.springs else None
 
     @cached_property
     def _stress(self):
@@ -120,13 +111,17 @@ class Body:
 
     def _build_loads(self) -> None:
         settings = self.settings
-        self._dead = DeadLoads(self.domain, self.space)
+        self._dead = DeadLoads(self.domain, self.space, self.nodes[: self.owned])
         if settings.body_force:
             self._dead.add_volume(settings.body_force)
         if settings.gravity:
             self._dead.add_volume(settings.gravity, settings.material.density)
         for traction in settings.tractions:
-            self._dead.add_surface(traction.surface, traction.value)
+            self._dead.add_surface(traction)
+        for line in settings.line_forces:
+            self._dead.add_lines(line)
+        for point in settings.point_forces:
+            self._dead.add_points(point)
         self._dead_load: Array | None = None
         self._pressures = [FollowerPressure(self.domain, self.space, pressure) for pressure in settings.pressures]
 
@@ -163,8 +158,12 @@ class Body:
         return self._force.x.array[: self.size].copy()
 
     def internal_force(self) -> Array:
-        """int P : grad v dX [N], shape (size,)."""
-        return self._assemble([self._internal])
+        """int P : grad v dX, and the force on springs [N], shape (size,)."""
+        return self._assemble([self._internal]) + self.spring_force()
+
+    def spring_force(self) -> Array | float:
+        """What the body exerts on its springs [N], shape (size,); 0 without any (collective)."""
+        return 0.0 if self._springs is None else self._springs.force(self.u.x.array[: self.size])
 
     def external_force(self) -> Array:
         """Loads at the time of `set_time` and the present displacement [N], shape (size,)."""
@@ -194,6 +193,8 @@ class Body:
         for pressure in self._pressures:
             pressure.add_tangent(self.u.x.array, matrix)
         matrix.assemble()
+        if self._springs is not None:
+            matrix.axpy(1.0, self._springs.matrix, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
 
     def smallest_jacobian(self) -> tuple[float, str, tuple[float, ...]]:
         """(smallest det F at the cells' nodes, body name, reference position [m]) over all processes."""
@@ -211,5 +212,8 @@ class Body:
         return fem.average_at_nodes(self.domain, self._stress, components=9)[: self.owned]
 
     def internal_energy(self) -> float:
-        """int W dX [J]."""
-        return fem.assemble_scalar(self._energy, self.domain.comm)
+        """int W dX, and the energy of springs [J]."""
+        energy = fem.assemble_scalar(self._energy, self.domain.comm)
+        if self._springs is not None:
+            energy += self._springs.energy(self.u.x.array[: self.size], self.domain.comm)
+        return energy

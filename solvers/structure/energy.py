@@ -28,10 +28,8 @@ class EnergyBalance:
     def add_step(self, structure: Structure) -> None:
         """Work of the averaged external forces and of the supports over the accepted step."""
         du = structure.now.u - structure.old.u
-        held = structure.prescribed
         external, damping = structure.time.averaged_forces(structure)
-        reaction_work = structure.comm.allreduce(float(structure.residual_force[held] @ du[held]))
-        self.work += structure.dot(external, du) + reaction_work
+        self.work += structure.dot(external, du) + structure.dot(structure.residual_force, structure.held.part(du))
         self.damping += structure.dot(damping, du)
         self._measure(structure)
 

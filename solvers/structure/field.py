@@ -18,6 +18,7 @@ from solvers.newton import Tolerance, converge
 from solvers.rows import Numbering, change_rows, fetch_rows, gather, gather_at
 from solvers.structure.body import Body
 from solvers.structure.energy import EnergyBalance
+from solvers.structure.held import Held
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.supports import prescribe
 from solvers.structure.time import TimeScheme
@@ -73,17 +74,12 @@ class Structure:
         self.timer, self.constraint = timer or Timer(), constraint
         self.dim = bodies[0].dim
         self.layout = Layout(comm, [body.size for body in bodies])
-        self.supports = [prescribe(body) for body in bodies]
-        self.prescribed = np.concatenate(
-            [s.dofs + start for s, start in zip(self.supports, self.layout.offsets[:-1], strict=True)]
-        ).astype(np.int64)
-        self.free = np.ones(self.layout.size, dtype=bool)
-        self.free[self.prescribed] = False
+        self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
         self.energy = EnergyBalance()
         self.residual_force = np.zeros(self.layout.size)  #: left-hand side of the balance, supports included [N]
         self._surface_load = np.zeros(self.layout.size)
-        self._target = np.zeros(len(self.prescribed))
+        self._target = np.zeros(self.layout.size)
         self._increment = np.zeros(self.layout.size)
         self._diagonal = np.zeros(self.layout.size)
         self._tangents = [body.create_tangent() for body in bodies]
@@ -148,7 +144,7 @@ class Structure:
         if self.constraint is not None:
             self.constraint.begin_step()
         self._set_time(t + dt)
-        self._target = self.prescribed_displacement(t + dt)
+        self._target = self.held.displacement(t + dt)
         self.time.predict(self, dt)
 
     def load(self, force: Array) -> None:
@@ -180,10 +176,6 @@ class Structure:
     def end_step(self) -> None:
         """Accept the step."""
         self.energy.add_step(self)
-
-    def prescribed_displacement(self, t: float) -> Array:
-        """Displacement [m] of the prescribed dofs."""
-        return np.concatenate([support.displacement(t) for support in self.supports])
 
     def _set_time(self, t: float) -> None:
         for body in self.bodies:
@@ -227,7 +219,7 @@ class Structure:
             self._assemble_constraint()
         self.residual_force = self.time.balance(self)
         missed = 0.0 if self.constraint is None else self.constraint.violation(self.time.constraint_weight)
-        return float(np.hypot(self.norm(np.where(self.free, self.residual_force, 0.0)), missed))
+        return float(np.hypot(self.norm(self.held.free_part(self.residual_force)), missed))
 
     def tangent(self) -> PETSc.Mat:
         """d(balance)/du, supports not yet imposed; the next call overwrites the matrix."""
@@ -243,8 +235,7 @@ class Structure:
         if self.constrained:
             matrix = self.condense(matrix, self._b)
         self._x.array[:] = self.missing_displacement()
-        rows = (self.layout.start + self.prescribed).astype(PETSc.IntType)
-        matrix.zeroRowsColumns(rows, 1.0, self._x, self._b)
+        matrix = self.held.impose(matrix, self._x, self._b)
         if self._method == "iterative":
             attach_rigid_modes(matrix, self.bodies, self.now.u)
         try:
@@ -268,9 +259,7 @@ class Structure:
 
     def missing_displacement(self) -> Array:
         """What the supports still ask of owned dofs [m], zero at free ones."""
-        missing = np.zeros(self.layout.size)
-        missing[self.prescribed] = self._target - self.now.u[self.prescribed]
-        return missing
+        return self._target - self.held.part(self.now.u)
 
     def update(self, increment: Array, everything: Array | None = None) -> float:
         """Add an increment of the owned dofs; returns |du| / |u|.
@@ -282,7 +271,7 @@ class Structure:
             with self.timer("contact"):
                 self.constraint.recover(gather(self.comm, self._increment) if everything is None else everything)
         self.now.u += self._increment
-        self.now.u[self.prescribed] = self._target
+        self.now.u = self.held.free_part(self.now.u) + self._target
         size = self.norm(self.now.u)
         return self.norm(self._increment) / size if size > 0.0 else 0.0
 
@@ -313,7 +302,7 @@ class Structure:
 
     def settled(self) -> bool:
         """True once the prescribed displacements are reached and the active set stays as it is."""
-        reached = np.array_equal(self.now.u[self.prescribed], self._target)
+        reached = self.held.reached(self.now.u, self._target, self._extent)
         reached = reached and (self.constraint is None or self.constraint.settled)
         return self.comm.allreduce(reached, op=MPI.LAND)
 
@@ -322,11 +311,11 @@ class Structure:
         size = np.abs(self.now.u)
         for body, part in zip(self.bodies, self.split(size), strict=True):
             part += body.cell_size
-        return float(np.finfo(float).eps) * self.norm(np.where(self.free, self._diagonal * size, 0.0))
+        return float(np.finfo(float).eps) * self.norm(self.held.free_part(self._diagonal * size))
 
     def worst(self) -> tuple[float, ...] | None:
         """Reference position [m] of the node with the largest residual (collective)."""
-        size = np.where(self.free, np.nan_to_num(np.abs(self.residual_force), nan=np.inf), 0.0)
+        size = np.abs(self.held.free_part(np.nan_to_num(self.residual_force, nan=np.inf)))
         index = int(np.argmax(size)) if len(size) else 0
         largest = float(size[index]) if len(size) else -1.0
         _, rank = self.comm.allreduce((largest, self.comm.rank), op=MPI.MAXLOC)

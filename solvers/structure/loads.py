@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers import fem
@@ -39,51 +40,118 @@ class Pressure:
     value: Value
 
 
-class DeadLoads:
-    """Loads that do not depend on the deformation: forces per volume and per area of the reference configuration."""
+@dataclass(frozen=True)
+class PointForce:
+    """Dead load [N] at each of some nodes, by their numbers in the mesh."""
 
-    def __init__(self, domain: fem.Domain, space):
-        self._domain, self._space = domain, space
-        self._parts: list[tuple[fem.Entities, tuple[Value, ...], Array | float]] = []
+    nodes: NDArray[np.int64]
+    value: tuple[Value, ...]
+
+
+@dataclass(frozen=True)
+class LineForce:
+    """Dead load [N/m of reference length] on lines of a mesh in space."""
+
+    lines: NDArray[np.int64]  #: nodes of each line in the mesh: both ends, then the middle if there is one
+    points: Array  #: their reference positions [m], shape (lines, nodes, dim)
+    value: tuple[Value, ...]
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Values of a load at points, and how they become forces at nodes."""
+
+    value: tuple[Value, ...]
+    blocks: NDArray[
+        np.int32
+    ]  #: dof blocks, shape (entities, nodes); nodes of other processes have the one after the last
+    shape: Array  #: shape functions at the points, shape (points, nodes)
+    positions: Array  #: [m], shape (3, entities * points)
+    weights: Array  #: measure of each point, times the density if there is one, shape (entities, points)
+
+
+class DeadLoads:
+    """Loads that do not depend on the deformation: they belong to the reference configuration."""
+
+    def __init__(self, domain: fem.Domain, space, owned: NDArray[np.int64]):
+        """`owned`: numbers in the mesh of the owned nodes."""
+        self._domain, self._space, self._owned = domain, space, owned
+        self._blocks = fem.block_points(space).shape[1]
+        self._degree = domain.degree + LOAD_DEGREE
+        self._parts: list[_Part] = []
         self._values: list[Array] | None = None
-        self.force = np.zeros(fem.function(space).x.array.shape)  #: at the last time, as `update` gives it [N]
+        self.force = np.zeros(self._blocks * domain.dim)  #: at the time of `update` [N]
 
     def add_volume(self, value: tuple[Value, ...], density: Parameter = 1.0) -> None:
         """A force per mass, or per volume without the density [kg/m^3], which is that of the cell's midpoint."""
-        degree = self._domain.degree + LOAD_DEGREE
-        for cells in fem.cell_quadrature(self._domain, self._space, degree):
+        for cells in fem.cell_quadrature(self._domain, self._space, self._degree):
             rho: Any = density
             if callable(rho):
                 rho = rho(fem.cell_midpoints(self._domain), 0.0)[cells.cells][:, None]
-            self._parts.append((cells, value, rho))
+            self._parts.append(_Part(value, cells.blocks, cells.shape, cells.positions, cells.weights * rho))
 
-    def add_surface(self, surface: str, value: tuple[Value, ...]) -> None:
+    def add_surface(self, load: Traction) -> None:
         """A force per area of a named surface."""
-        degree = self._domain.degree + LOAD_DEGREE
-        for facets in fem.facet_quadrature(self._domain, self._space, surface, degree):
-            self._parts.append((facets, value, 1.0))
+        for facets in fem.facet_quadrature(self._domain, self._space, load.surface, self._degree):
+            self._parts.append(_Part(load.value, facets.blocks, facets.shape, facets.positions, facets.weights))
+
+    def add_lines(self, load: LineForce) -> None:
+        """A force per length. Every process integrates all lines and keeps what belongs to its nodes."""
+        xi, rule = np.polynomial.legendre.leggauss(self._degree // 2 + 1)
+        shape, slopes = _line_functions(xi, load.lines.shape[1])
+        tangents = np.einsum("pa,eai->epi", slopes, load.points)
+        positions = np.einsum("pa,eai->iep", shape, load.points).reshape(self._domain.dim, -1)
+        weights = rule * np.linalg.norm(tangents, axis=2)
+        self._parts.append(_Part(load.value, self._local(load.lines), shape, _in_space(positions), weights))
+
+    def add_points(self, load: PointForce) -> None:
+        """A force at nodes."""
+        blocks = self._local(load.nodes)
+        blocks = blocks[blocks < self._blocks][:, None]
+        at = fem.block_points(self._space)[:, blocks[:, 0]]
+        self._parts.append(_Part(load.value, blocks, np.ones((1, 1)), at, np.ones(blocks.shape)))
+
+    def _local(self, nodes: NDArray[np.int64]) -> NDArray[np.int32]:
+        """Owned blocks of nodes of the mesh; the one after the last block for those of other processes."""
+        order = np.argsort(self._owned)
+        place = np.searchsorted(self._owned, nodes, sorter=order)
+        block = order[np.minimum(place, len(order) - 1)] if len(order) else np.zeros(nodes.shape, dtype=np.int64)
+        mine = self._owned[block] == nodes if len(order) else np.zeros(nodes.shape, dtype=bool)
+        return np.where(mine, block, self._blocks).astype(np.int32)
 
     def update(self, t: float) -> bool:
         """Evaluate all loads at time t; False if none has changed.
 
         `force` [N] is at local dofs: those of other processes wait for `accumulate`.
         """
-        values = [np.stack([component(p.positions, t) for component in value]) for p, value, _ in self._parts]
+        values = [np.stack([component(part.positions, t) for component in part.value]) for part in self._parts]
         if self._values is not None and all(map(np.array_equal, values, self._values)):
             return False
         self._values = values
-        force = np.zeros((len(self.force) // self._domain.dim, self._domain.dim))
-        for (entities, _, factor), value in zip(self._parts, values, strict=True):
-            weights = entities.weights * factor
+        force = np.zeros((self._blocks + 1, self._domain.dim))
+        for part, value in zip(self._parts, values, strict=True):
             for axis, component in enumerate(value):
-                _add(force[:, axis], entities, weights * component.reshape(weights.shape))
-        self.force = force.ravel()
+                _add(force[:, axis], part.blocks, part.weights * component.reshape(part.weights.shape), part.shape)
+        self.force = force[: self._blocks].ravel()
         return True
 
 
-def _add(out: Array, entities: fem.Entities, values: Array) -> None:
+def _line_functions(xi: Array, nodes: int) -> tuple[Array, Array]:
+    """Shape functions of a line from -1 to 1 (ends, then the middle if it has one) and derivatives, (points, nodes)."""
+    one = np.ones_like(xi)
+    if nodes == 2:
+        return np.stack([(1 - xi) / 2, (1 + xi) / 2], axis=1), np.stack([-one / 2, one / 2], axis=1)
+    shape = np.stack([xi * (xi - 1) / 2, xi * (xi + 1) / 2, 1 - xi**2], axis=1)
+    return shape, np.stack([xi - 0.5, xi + 0.5, -2 * xi], axis=1)
+
+
+def _in_space(points: Array) -> Array:
+    return np.pad(points, ((0, 3 - len(points)), (0, 0)))
+
+
+def _add(out: Array, blocks: NDArray[np.int32], values: Array, shape: Array) -> None:
     """Add sum_q values_q N_a(x_q) to the node a of each entity, values of shape (entities, points)."""
-    np.add.at(out, entities.blocks, values @ entities.shape)
+    np.add.at(out, blocks, values @ shape)
 
 
 class FollowerPressure:
@@ -106,7 +174,7 @@ class FollowerPressure:
         for facets, p in zip(self._facets, self._values, strict=True):
             normal = facets.area_vectors(x)
             for axis in range(self._dim):
-                _add(force[:, axis], facets, -p * facets.rule * normal[:, :, axis])
+                _add(force[:, axis], facets.blocks, -p * facets.rule * normal[:, :, axis], facets.shape)
 
     def add_tangent(self, u: Array, matrix: PETSc.Mat) -> None:
         """Add d(int p n.v da)/du [N/m]; the matrix is not finished."""

@@ -52,7 +52,7 @@ def at_point(structure: Structure, body: Body, quantity: str, point: Sequence[fl
 def on_surface(structure: Structure, body: Body, quantity: str, surface: str) -> Probe:
     """Resultants and means over a named surface (reference area). Collective.
 
-    reaction: force [N] of the supports on the body; traction: int P N dA [N]; displacement: mean [m]; area [m^2].
+    reaction: force [N] of supports and springs; traction: int P N dA [N]; displacement: mean [m]; area [m^2].
     """
     if quantity == "reaction":
         return _reaction(structure, body, surface)
@@ -80,8 +80,8 @@ def _reaction(structure: Structure, body: Body, surface: str) -> Probe:
     blocks = np.unique(blocks[blocks < body.owned])
 
     def probe() -> dict[str, float]:
-        force = structure.split(structure.time.reaction(structure))[index].reshape(-1, body.dim)[blocks]
-        return _components(structure.comm.allreduce(force.sum(axis=0)))
+        force = structure.split(structure.time.reaction(structure))[index] - body.spring_force()
+        return _components(structure.comm.allreduce(force.reshape(-1, body.dim)[blocks].sum(axis=0)))
 
     return probe
 

@@ -1,32 +1,90 @@
-"""Supports of a body: which dofs are prescribed, and to what."""
+"""Supports of a body: which displacements are prescribed where, and to what.
+
+A support holds components along the axes (dofs), or along a direction that is not an axis. At a node with such a
+direction all conditions n_j.u = g_j are made orthonormal from the last support to the first (Gram-Schmidt): they hold
+P u = G g with the projection P on the span of the n_j. Where supports contradict each other, the last one counts.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers import fem
 from solvers.api import Array
-from solvers.structure.body import Body, Support, Symmetry
 from solvers.structure.materials import Value
+
+if TYPE_CHECKING:
+    from solvers.structure.body import Body
+
+#: Where something acts: a named surface, or nodes by their numbers in the mesh.
+Where = str | NDArray[np.int64]
+
+#: Sine of the angle below which two directions at a node are the same one.
+PARALLEL = 1e-6
+
+
+@dataclass(frozen=True)
+class Support:
+    """Prescribed displacement components [m]; None leaves a component free."""
+
+    where: Where
+    displacement: tuple[Value | None, ...]
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """No displacement normal to a plane surface."""
+
+    where: str
+
+
+@dataclass(frozen=True)
+class Roller:
+    """Prescribed displacement [m] along one direction, in the reference configuration; free across it."""
+
+    where: Where
+    direction: tuple[float, ...] | None  #: None: the outward normal of the surface, node by node
+    displacement: Value
 
 
 class SupportError(ValueError):
-    """A support cannot be applied; `surface` names where."""
+    """A support cannot be applied; `where` is that of the support."""
 
-    def __init__(self, body: str, surface: str, message: str):
-        super().__init__(f"body '{body}', surface '{surface}': {message}")
-        self.body, self.surface, self.message = body, surface, message
+    def __init__(self, body: str, where: Where, message: str):
+        place = f"surface '{where}'" if isinstance(where, str) else "nodes"
+        super().__init__(f"body '{body}', {place}: {message}")
+        self.body, self.where, self.message = body, where, message
+
+
+@dataclass(frozen=True)
+class Oblique:
+    """Owned nodes of a body with a condition along a direction that is not an axis."""
+
+    blocks: NDArray[np.int32]  #: local, sorted, shape (k,)
+    projections: Array  #: P, on the prescribed directions, shape (k, dim, dim)
+    conditions: tuple[tuple[Value, Array], ...]  #: g, and the points (3, m) where it is asked for
+    combine: sp.csr_matrix  #: G, shape (k * dim, number of conditions)
+
+    def displacement(self, t: float) -> Array:
+        """P u [m], shape (k, dim)."""
+        if not len(self.blocks):
+            return np.zeros(self.projections.shape[:2])
+        values = np.concatenate([value(points, t) for value, points in self.conditions])
+        return (self.combine @ values).reshape(len(self.blocks), -1)
 
 
 @dataclass(frozen=True)
 class Prescribed:
-    """Owned dofs of a body with a prescribed displacement."""
+    """Displacements of a body's owned nodes that supports prescribe."""
 
-    dofs: NDArray[np.int32]  #: local, sorted, shape (n,)
+    dofs: NDArray[np.int32]  #: along axes: local, sorted, shape (n,)
     entries: tuple[tuple[NDArray[np.int32], Value, Array], ...]  #: dofs, displacement [m] and their points (3, m)
+    oblique: Oblique
 
     def displacement(self, t: float) -> Array:
         """Values [m] at the dofs, shape (n,). Where supports overlap, the last one counts."""
@@ -36,39 +94,134 @@ class Prescribed:
         return values
 
 
+@dataclass(frozen=True)
+class _Condition:
+    """n.u = g at some owned nodes."""
+
+    blocks: NDArray[np.int32]
+    axis: int | None  #: of n, if it is one
+    directions: Array  #: n, shape (m, dim)
+    value: Value
+
+
 def prescribe(body: Body) -> Prescribed:
     """Collect the supports of a body (collective). Raises SupportError."""
+    conditions = [condition for support in body.settings.supports for condition in _conditions(body, support)]
+    turned = [c.blocks for c in conditions if c.axis is None]
+    oblique = np.unique(np.concatenate([np.empty(0, dtype=np.int32), *turned])).astype(np.int32)
     entries = []
-    for support in body.settings.supports:
-        blocks = fem.surface_blocks(body.domain, body.space, support.surface)
-        blocks = np.unique(blocks[blocks < body.owned])
-        for component, value in enumerate(_components(body, support, blocks)):
-            if value is not None:
-                entries.append((blocks * body.dim + component, value, body.points[:, blocks]))
+    for condition in conditions:
+        blocks = condition.blocks[~np.isin(condition.blocks, oblique)]
+        if condition.axis is not None:
+            entries.append((blocks * body.dim + condition.axis, condition.value, body.points[:, blocks]))
     dofs = np.unique(np.concatenate([np.empty(0, dtype=np.int32), *(e[0] for e in entries)]))
-    return Prescribed(dofs.astype(np.int32), tuple(entries))
+    return Prescribed(dofs.astype(np.int32), tuple(entries), _orthonormal(body, conditions, oblique))
 
 
-def _components(body: Body, support: Support | Symmetry, blocks) -> tuple[Value | None, ...]:
+def owned_blocks(body: Body, where: Where) -> NDArray[np.int32]:
+    """Owned dof blocks of a body on a named surface, or of nodes (collective)."""
+    if isinstance(where, str):
+        blocks = fem.surface_blocks(body.domain, body.space, where)
+        return np.unique(blocks[blocks < body.owned]).astype(np.int32)
+    return np.flatnonzero(np.isin(body.nodes[: body.owned], where)).astype(np.int32)
+
+
+def _conditions(body: Body, support: Support | Symmetry | Roller) -> list[_Condition]:
+    blocks = owned_blocks(body, support.where)
+    axes = np.eye(body.dim)
+
+    def along(direction: Array, value: Value) -> _Condition:
+        axis = next((i for i in range(body.dim) if np.array_equal(np.abs(direction), axes[i])), None)
+        if axis is not None and direction[axis] < 0.0:
+            return _Condition(blocks, axis, -direction, lambda x, t: -value(x, t))
+        return _Condition(blocks, axis, np.broadcast_to(direction, (len(blocks), body.dim)), value)
+
     if isinstance(support, Support):
-        return support.displacement
-    normal = symmetry_axis(body, support, blocks)
-    return tuple(_zero if axis == normal else None for axis in range(body.dim))
+        return [along(axes[i], value) for i, value in enumerate(support.displacement) if value is not None]
+    if isinstance(support, Symmetry):
+        return [along(symmetry_normal(body, support, blocks), _zero)]
+    if support.direction is not None:
+        direction = np.array(support.direction)
+        return [along(direction / np.linalg.norm(direction), support.displacement)]
+    assert isinstance(support.where, str), "nodes have no normal"
+    return [_Condition(blocks, None, _nodal_normals(body, support.where)[blocks], support.displacement)]
 
 
-def symmetry_axis(body: Body, support: Symmetry, blocks) -> int:
-    """The axis that the plane of symmetry is normal to (collective). Raises SupportError if it is not such a plane."""
+def _orthonormal(body: Body, conditions: list[_Condition], oblique: NDArray[np.int32]) -> Oblique:
+    """The conditions at nodes with an oblique one."""
+    dim = body.dim
+    asked, sources, number = [], [], 0
+    for condition in conditions:
+        here = np.flatnonzero(np.isin(condition.blocks, oblique))
+        blocks, directions = condition.blocks[here], np.broadcast_to(condition.directions, (len(condition.blocks), dim))
+        asked.append((condition.value, body.points[:, blocks]))
+        sources.append((np.searchsorted(oblique, blocks), directions[here], number + np.arange(len(here))))
+        number += len(here)
+
+    basis = np.zeros((len(oblique), dim, dim))  # orthonormal directions, one after the other
+    weights = sp.lil_matrix((len(oblique) * dim, number))  # h_i.u = sum_j weights_ij g_j
+    found = np.zeros(len(oblique), dtype=int)
+    for nodes, directions, columns in reversed(sources):
+        for node, direction, column in zip(nodes, directions, columns, strict=True):
+            along = basis[node] @ direction
+            rest = direction - along @ basis[node]
+            size = np.linalg.norm(rest)
+            if size < PARALLEL:
+                continue
+            row = node * dim + found[node]
+            weights[row] = -(sp.csr_matrix(along) @ weights[node * dim : (node + 1) * dim]) / size
+            weights[row, column] = 1.0 / size
+            basis[node, found[node]] = rest / size
+            found[node] += 1
+    spread = sp.block_diag([h.T for h in basis], format="csr") if len(oblique) else sp.csr_matrix((0, 0))
+    projections = np.einsum("kij,kil->kjl", basis, basis)
+    return Oblique(oblique, projections, tuple(asked), sp.csr_matrix(spread @ weights.tocsr()))
+
+
+def symmetry_normal(body: Body, support: Symmetry, blocks: NDArray[np.int32]) -> Array:
+    """Normal of the plane of symmetry, exactly an axis if it is one (collective). Raises SupportError if it is none."""
     points = body.points[: body.dim, blocks]
-    low = points.min(axis=1, initial=np.inf)
-    high = points.max(axis=1, initial=-np.inf)
-    gathered = body.domain.comm.allgather((low, high))
-    extent = np.max([h for _, h in gathered], axis=0) - np.min([low for low, _ in gathered], axis=0)
+    extent = _extent(body, points)
     axis = int(np.argmin(extent))
-    if not extent[axis] <= 1e-9 * np.max(extent):
-        raise SupportError(
-            body.name, support.surface, "symmetry needs a plane normal to x, y or z; this surface is not one"
-        )
-    return axis
+    if extent[axis] <= 1e-9 * np.max(extent):
+        return np.eye(body.dim)[axis]
+    area = sum((weighted.sum(axis=(0, 1)) for _, weighted in _normals_by_node(body, support.where)), np.zeros(body.dim))
+    normal = body.domain.comm.allreduce(area)
+    size = np.linalg.norm(normal)
+    if size > 0.0 and _extent(body, (normal / size @ points)[None])[0] <= 1e-9 * np.max(extent):
+        return np.asarray(normal / size)
+    raise SupportError(
+        body.name, support.where, "symmetry needs a plane, and this surface is curved; 'normal: true' holds such ones"
+    )
+
+
+def _extent(body: Body, values: Array) -> Array:
+    """Largest minus smallest value of each row over all processes."""
+    low, high = values.min(axis=1, initial=np.inf), values.max(axis=1, initial=-np.inf)
+    gathered = body.domain.comm.allgather((low, high))
+    return np.asarray(np.max([h for _, h in gathered], axis=0) - np.min([low for low, _ in gathered], axis=0))
+
+
+def _normals_by_node(body: Body, surface: str) -> list[tuple[NDArray[np.int32], Array]]:
+    """(blocks, int N^2 n dA) of facets of one number: squares, for the mean of a shape function may be zero or less."""
+    x = np.ascontiguousarray(body.points[: body.dim].T)
+    found = []
+    for facets in fem.facet_quadrature(body.domain, body.space, surface, 2 * body.domain.degree + 1):
+        weighted = np.einsum("p,pa,epd->ead", facets.rule, facets.shape**2, facets.area_vectors(x), optimize=True)
+        found.append((facets.blocks, weighted))
+    return found
+
+
+def _nodal_normals(body: Body, surface: str) -> Array:
+    """Outward unit normals in the reference configuration at owned nodes, zero off the surface, shape (owned, dim)."""
+    total = fem.function(body.space)
+    normals = total.x.array.reshape(-1, body.dim)
+    for blocks, weighted in _normals_by_node(body, surface):
+        np.add.at(normals, blocks, weighted)
+    fem.accumulate(total)
+    owned = normals[: body.owned]
+    size = np.linalg.norm(owned, axis=1, keepdims=True)
+    return np.divide(owned, size, out=np.zeros_like(owned), where=size > 0.0)
 
 
 def _zero(x: Array, t: float) -> Array:

@@ -157,18 +157,18 @@ class Dynamics:
 
     def _start_supports(self, structure: Structure, t: float, h: float) -> None:
         """One-sided differences, so that a support that starts to move does not ring."""
-        u = [structure.prescribed_displacement(t + k * h) for k in range(4)]
-        structure.now.v[structure.prescribed] = (-3.0 * u[0] + 4.0 * u[1] - u[2]) / (2.0 * h)
-        structure.now.a[structure.prescribed] = (2.0 * u[0] - 5.0 * u[1] + 4.0 * u[2] - u[3]) / h**2
+        held, now = structure.held, structure.now
+        u = [held.displacement(t + k * h) for k in range(4)]
+        now.v[:] = held.free_part(now.v) + (-3.0 * u[0] + 4.0 * u[1] - u[2]) / (2.0 * h)
+        now.a[:] = held.free_part(now.a) + (2.0 * u[0] - 5.0 * u[1] + 4.0 * u[2] - u[3]) / h**2
 
     def _solve_acceleration(self, structure: Structure) -> None:
         now, (x, b) = structure.now, self._work
         b.array[:] = now.external - now.internal - self._damping_force(now.v)
         x.array[:] = now.a
         x.array[self._massless] = 0.0
-        matrix = structure.mass.copy()
-        without_row = np.union1d(structure.prescribed, self._massless)
-        rows = (structure.layout.start + without_row).astype(PETSc.IntType)
+        matrix = structure.held.impose(structure.mass.copy(), x, b)
+        rows = (structure.layout.start + self._massless).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, x, b)
         ksp = PETSc.KSP().create(structure.comm)
         ksp.setOperators(matrix)
@@ -184,7 +184,7 @@ class Dynamics:
         """Displacement unchanged, or moved on with the velocity."""
         self._dt = dt
         if self.predictor == "constant_velocity":
-            structure.now.u[structure.free] += dt * structure.now.v[structure.free]
+            structure.now.u += dt * structure.held.free_part(structure.now.v)
 
     def balance(self, structure: Structure) -> Array:
         scheme, dt, now, old = self.scheme, self._dt, structure.now, structure.old

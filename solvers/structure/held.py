@@ -1,0 +1,127 @@
+"""What supports hold of all bodies together: parts of arrays, and their place in linear systems."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from solvers.api import Array
+from solvers.blocks import Layout
+from solvers.structure.supports import Prescribed
+
+
+class Held:
+    """The prescribed displacements of a structure: single dofs, and directions at nodes.
+
+    With P the projection on what is held, a displacement is u = (1 - P) u + u_p, and a linear system K du = b with
+    P du = m becomes
+
+        ((1 - P) K (1 - P) + d P) du = (1 - P) (b - K m) + d m.
+    """
+
+    def __init__(self, layout: Layout, supports: Sequence[Prescribed], dim: int):
+        self._layout, self._supports, self._dim = layout, supports, dim
+        starts = layout.offsets[:-1]
+        self.dofs = np.concatenate([s.dofs + start for s, start in zip(supports, starts, strict=True)]).astype(np.int64)
+        nodes = [dim * s.oblique.blocks + start for s, start in zip(supports, starts, strict=True)]
+        self._nodes = np.concatenate(nodes).astype(np.int64)[:, None] + np.arange(dim)  #: owned dofs, (k, dim)
+        self._projections = np.concatenate([s.oblique.projections for s in supports])
+        self.oblique = layout.comm.allreduce(len(self._nodes)) > 0  #: on any process
+
+    def part(self, array: Array) -> Array:
+        """P a, of owned dofs."""
+        held = np.zeros_like(array)
+        held[self.dofs] = array[self.dofs]
+        held[self._nodes] = np.einsum("kij,kj->ki", self._projections, array[self._nodes])
+        return held
+
+    def free_part(self, array: Array) -> Array:
+        """a - P a; exactly zero at held dofs, whatever is there."""
+        free = array.copy()
+        free[self.dofs] = 0.0
+        free[self._nodes] -= np.einsum("kij,kj->ki", self._projections, array[self._nodes])
+        return free
+
+    def displacement(self, t: float) -> Array:
+        """u_p [m] of owned dofs, zero where nothing is held."""
+        whole = np.zeros(self._layout.size)
+        whole[self.dofs] = np.concatenate([support.displacement(t) for support in self._supports])
+        whole[self._nodes] = np.concatenate([support.oblique.displacement(t) for support in self._supports])
+        return whole
+
+    def reached(self, u: Array, target: Array, size: float) -> bool:
+        """P u is the target: exactly at held dofs, as well as positions in a body of this size [m] are known elsewhere.
+
+        Of this process.
+        """
+        missed = np.einsum("kij,kj->ki", self._projections, u[self._nodes]) - target[self._nodes]
+        rounding = 4.0 * np.finfo(float).eps * (size + np.abs(u[self._nodes]).max(initial=0.0))
+        return np.array_equal(u[self.dofs], target[self.dofs]) and bool(np.all(np.abs(missed) <= rounding))
+
+    def impose(self, matrix: PETSc.Mat, x: PETSc.Vec, b: PETSc.Vec) -> PETSc.Mat:
+        """Make a symmetric system one for a solution with the held part of x; b changes, the matrix is used up."""
+        if self.oblique:
+            free, scale = self._free, _mean_diagonal(matrix)
+            missing = x.duplicate()
+            missing.array[:] = self._along(x.array)
+            b.axpy(-1.0, matrix * missing)
+            b.array[:] = b.array - self._along(b.array) + scale * missing.array
+            matrix = matrix.ptap(free)
+            matrix.axpy(scale, self._identity_minus(free), PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        matrix.zeroRowsColumns(self._rows, 1.0, x, b)
+        return matrix
+
+    def impose_rows(self, blocks: Sequence[PETSc.Mat], x: Array, b: Array) -> list[PETSc.Mat]:
+        """The same in rows only: the first of the blocks beside each other is the structure's own; x, b: owned dofs."""
+        changed = list(blocks)
+        if self.oblique:
+            scale = _mean_diagonal(blocks[0])
+            b[:] = b - self._along(b) + scale * self._along(x)
+            changed = [self._free.matMult(block) for block in blocks]
+            held = self._identity_minus(self._free)
+            changed[0].axpy(scale, held, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        for index, block in enumerate(changed):
+            block.zeroRows(self._rows, 1.0 if index == 0 else 0.0)
+        b[self.dofs] = x[self.dofs]
+        return changed
+
+    @property
+    def _rows(self) -> NDArray[np.int32]:
+        return (self._layout.start + self.dofs).astype(PETSc.IntType)
+
+    def _along(self, array: Array) -> Array:
+        """The part along oblique directions."""
+        part = np.zeros_like(array)
+        part[self._nodes] = np.einsum("kij,kj->ki", self._projections, array[self._nodes])
+        return part
+
+    @cached_property
+    def _free(self) -> PETSc.Mat:
+        """1 - P of the oblique directions, blocks of nodes; explicit ones elsewhere."""
+        matrix = PETSc.Mat().createAIJ([(self._layout.size, None)] * 2, nnz=(self._dim, 0), comm=self._layout.comm)
+        others = np.ones(self._layout.size, dtype=bool)
+        others[self._nodes] = False
+        for dof in (self._layout.start + np.flatnonzero(others)).tolist():
+            matrix.setValue(dof, dof, 1.0)
+        for dofs, projection in zip(self._layout.start + self._nodes, self._projections, strict=True):
+            rows = dofs.astype(PETSc.IntType)
+            matrix.setValues(rows, rows, np.eye(self._dim) - projection)
+        matrix.assemble()
+        return matrix
+
+    @staticmethod
+    def _identity_minus(matrix: PETSc.Mat) -> PETSc.Mat:
+        rest = matrix.copy()
+        rest.scale(-1.0)
+        rest.shift(1.0)
+        return rest
+
+
+def _mean_diagonal(matrix: PETSc.Mat) -> float:
+    """Mean size of the diagonal: what is imposed gets the scale of the rest."""
+    diagonal = matrix.getDiagonal()
+    return float(diagonal.norm(PETSc.NormType.NORM_1) / max(diagonal.getSize(), 1))
