@@ -16,7 +16,7 @@ from coupling.interface import DrySide, Interface, Wetted
 from coupling.monolithic import Monolithic
 from coupling.partitioned import Partitioned, Tolerance
 from fsci.build_contact import global_dofs
-from fsci.build_fluid import build_fluid, build_rigid_bodies
+from fsci.build_fluid import build_fluid, build_rigid_bodies, require_inside_period
 from fsci.build_solver import build_tolerance
 from fsci.case import Case
 from fsci.case.coupling_checks import closed_in
@@ -120,6 +120,7 @@ def _skin(case: Case, comm: MPI.Comm, body: Body) -> Skin:
     found = comm.bcast(found, root=0)
     if isinstance(found, Exception):
         raise found
+    require_inside_period(case, ("structure", "bodies", body.name), found.points)
     return found
 
 

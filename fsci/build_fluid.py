@@ -74,10 +74,11 @@ def _body_force(settings: Section) -> tuple[Value, ...] | None:
 
 
 def _patches(settings: Section) -> list[Patch]:
-    return [
-        Patch(name, patch.on, patch.kind, patch.velocity or patch.traction, patch.where)
-        for name, patch in settings.patches.items()
-    ]
+    found = []
+    for name, patch in settings.patches.items():
+        value = patch.velocity or patch.traction or (None if patch.pressure is None else (patch.pressure,))
+        found.append(Patch(name, patch.on, patch.kind, value, patch.where))
+    return found
 
 
 # ---------------------------------------------------------------------------------------------------------- bodies
@@ -99,9 +100,23 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
     surface = Surface(name, facets, len(points))
     movement = case.fluid.bodies[name].motion
     if movement is None:
+        require_inside_period(case, ("fluid", "bodies", name), points)
         return Body(surface, lambda t: Motion(points, np.zeros_like(points)), rests=True)
     moved = rigid_motion(points, movement, case.time.start, case.time.step)
+    require_inside_period(case, ("fluid", "bodies", name), moved(case.time.start)[0])
     return Body(surface, lambda t: Motion(*moved(t)))
+
+
+def require_inside_period(case: Case, keys: tuple[str | int, ...], points: Array) -> None:
+    """Bodies stay out of the first and the last layer of cells of a period. Raises CaseError."""
+    assert case.fluid is not None
+    for axis in sorted({face[0] for patch in case.fluid.patches.values() if patch.periodic for face in patch.on}):
+        index = "xyz".index(axis)
+        planes = case.fluid.grid.edges(index)
+        if points[:, index].min() < planes[1] or points[:, index].max() > planes[-2]:
+            room = f"{planes[1]:g} to {planes[-2]:g}"
+            message = f"the body must be within the period along {axis}, without the cells at its ends: {room}"
+            raise case.error(keys, message)
 
 
 def _surface(case: Case, name: str) -> tuple[Array, NDArray[np.int64]]:

@@ -13,20 +13,24 @@ from solvers.fluid.patches import Patch
 from solvers.fluid.probes import mass_balance
 
 
-def scene(dim, element, comm, *, closed=False):
-    """A moving and a resting body in a channel, or in a closed box."""
+def scene(dim, element, comm, box="channel"):
+    """A moving and a resting body in a channel, in a closed box, or in a periodic one that is open above."""
     inflow = field(*[lambda x, y, *zt: 4 * y * (1 - y), 0, 0][:dim])
     swirl = field(*[lambda x, y, *zt: y * y - 1 / 3, lambda x, y, *zt: 0.1 * x * x, 0][:dim])
     sides = ("y-", "y+", "z-", "z+")[: 2 * dim - 2]
-    patches = (
-        [Patch("box", ("x-", "x+", *sides), "velocity", swirl)]
-        if closed
-        else [
+    patches = {
+        "channel": [
             Patch("in", ("x-",), "velocity", inflow),
             Patch("out", ("x+",), "outflow"),
             Patch("sides", sides, "slip"),
-        ]
-    )
+        ],
+        "closed": [Patch("box", ("x-", "x+", *sides), "velocity", swirl)],
+        "periodic": [
+            Patch("ends", ("x-", "x+"), "periodic"),
+            Patch("sides", ("y-", *sides[2:]), "no_slip"),
+            Patch("top", ("y+",), "pressure", (lambda x, t: 0.1 * x[0] * (1.6 - x[0]),)),
+        ],
+    }[box]
     disc = (circle((0.4, 0.45), 0.17, 40), loop(40)) if dim == 2 else sphere((0.4, 0.45, 0.5), 0.2, 2)
     v = np.array([0.7, 0.2, -0.1])[:dim]
     bodies = [
@@ -47,8 +51,8 @@ def everything(fluid):
     return [gather_nodal(fluid.comm, Nodal(fluid.flow[n.dofs[: n.owned]], n.numbers[: n.owned])) for n in nodes]
 
 
-def main(dim, element, closed, out):
-    fluid = scene(dim, element, MPI.COMM_WORLD, closed=closed)
+def main(dim, element, box, out):
+    fluid = scene(dim, element, MPI.COMM_WORLD, box)
     for number in range(4):
         step(fluid, 0.03 * number, 0.03)
     force = fluid.force()
@@ -59,4 +63,4 @@ def main(dim, element, closed, out):
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), sys.argv[2], sys.argv[3] == "closed", Path(sys.argv[4]))
+    main(int(sys.argv[1]), sys.argv[2], sys.argv[3], Path(sys.argv[4]))

@@ -34,7 +34,7 @@ verify:
   - {value: force.x, statistic: max, reference: 1, relative: 0.1}
 """
 GRID = "cells: [40, 10]"
-KINDS = "'velocity', 'no_slip', 'slip', 'symmetry', 'traction' or 'outflow'"
+KINDS = "'velocity', 'no_slip', 'slip', 'symmetry', 'traction', 'pressure', 'outflow' or 'periodic'"
 FACES = "'x-', 'x+', 'y-', 'y+', 'z-' or 'z+'"
 
 #: what is replaced, by what, the message with line and column, the text that stands there
@@ -100,6 +100,20 @@ MISTAKES = [
     ("[y-, y+]", "y-", "7:3: no patch is on the face 'y+' of the box", "patches"),
     ('["4*y*(1 - y)", 0]', "[1, 0, 0]", "8:31: 'velocity' must have 2 entries in 2D, not 3", "[1"),
     ("on: x-", "on: x-, where: y - t", "8:28: 'where' must not depend on t", "y - t"),
+    ("outflow: true", "pressure: [1, 0]", "9:32: 'pressure' must be a number or an expression", "[1"),
+    ("outflow: true", "periodic: true", "9:18: 'x+' is periodic with 'x-': put both into 'on'", "x+"),
+    (
+        "on: [y-, y+], no_slip: true",
+        "on: [y-, y+], where: x, periodic: true",
+        "10:34: a periodic patch has all of its faces: remove 'where'",
+        "x, p",
+    ),
+    (
+        "on: [y-, y+], no_slip: true",
+        "on: [y-, y+], no_slip: true}\n    ends: {on: [x-, x+], periodic: true",
+        "8:17: the face 'x-' is periodic by the patch 'ends'",
+        "x-",
+    ),
     # bodies
     ("    cylinder:", "    fluid:", "12:5: a body cannot be called 'fluid': the files of the flow are", "fluid"),
     (
@@ -264,7 +278,14 @@ def test_doubts(old, new, warning):
 def test_a_flow_that_nothing_drives():
     still = CASE[: CASE.index("      motion")].replace('velocity: ["4*y*(1 - y)", 0]', "outflow: true")
     assert load(still).warnings == (
-        "case.yaml:7:3: nothing drives the flow: no velocity, traction, force or moving body",
+        "case.yaml:7:3: nothing drives the flow: no velocity, traction, pressure, force or moving body",
+    )
+
+
+def test_a_steady_flow_without_a_velocity_of_its_own():
+    periodic = CASE[: CASE.index("    inlet")] + "    all: {on: [x-, x+, y-, y+], periodic: true}\n  scheme: steady\n"
+    assert str(problems(periodic)[0]).startswith(
+        "case.yaml:9:11: a steady flow that is periodic in all directions has no velocity of its own"
     )
 
 

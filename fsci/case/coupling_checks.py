@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from fsci.case.case import Case
 from fsci.case.coupling import Coupling
-from fsci.case.errors import did_you_mean
+from fsci.case.errors import did_you_mean, listed
+from fsci.case.fluid import OPEN
 from fsci.case.mesh_checks import Mistake, surface_mistakes
 from fsci.case.yaml_text import Keys
 
@@ -35,9 +36,9 @@ def coupling_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
     if static and not steady:
         yield ("fluid", "scheme"), "a flow in time needs 'dynamics' in 'structure', or choose the scheme steady"
     kinds = {patch.kind for patch in case.fluid.patches.values()}
-    if (steady or coupling.scheme == "partitioned") and not kinds & {"traction", "outflow"}:
+    if (steady or coupling.scheme == "partitioned") and not kinds & set(OPEN):
         where, why = closed_in(case)
-        yield where, f"the boundary closes the fluid in, and {why}, or a patch with 'traction' or 'outflow'"
+        yield where, f"the boundary closes the fluid in, and {why}, or a patch with {listed(OPEN)}"
 
 
 def closed_in(case: Case) -> Mistake:

@@ -6,11 +6,13 @@ from typing import Annotated, Literal
 
 from pydantic import model_validator
 
+from fsci.case.errors import listed
 from fsci.case.grid import Grid
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import (
     Entries,
+    Formula,
     Name,
     Number,
     NumberVector,
@@ -26,7 +28,9 @@ from fsci.case.values import (
 
 FACES = ("x-", "x+", "y-", "y+", "z-", "z+")
 Face = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
-KINDS = ("velocity", "no_slip", "slip", "symmetry", "traction", "outflow")
+KINDS = ("velocity", "no_slip", "slip", "symmetry", "traction", "pressure", "outflow", "periodic")
+#: kinds of patches that say how high the pressure is
+OPEN = ("traction", "pressure", "outflow")
 
 
 class Patch(Section):
@@ -43,26 +47,44 @@ class Patch(Section):
     slip: Switch = setting(False, "true: nothing flows through, and there is no shear stress")
     symmetry: Switch = setting(False, "true: a plane of symmetry, the same as slip")
     traction: Vector | None = setting(None, "prescribed force per area", unit="Pa")
+    pressure: Formula | None = setting(
+        None, "prescribed pressure of a flow that enters or leaves along the normal of the face", unit="Pa"
+    )
     outflow: Switch = setting(False, "true: the flow leaves as if it went on unchanged, at pressure 0")
+    periodic: Switch = setting(
+        False, "true: the flow goes on at the opposite face; the patch is on both and has all of them"
+    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> Patch:
         given = [kind for kind in KINDS if getattr(self, kind) not in (None, False)]
-        words = "'velocity', 'no_slip', 'slip', 'symmetry', 'traction' or 'outflow'"
+        words = listed(KINDS)
         if not given:
             raise fault(f"a patch needs one of {words}")
         if len(given) > 1:
             raise fault(f"give only one of {words}", given[1])
+        if self.periodic:
+            self._check_period()
         return self
 
+    def _check_period(self) -> None:
+        if self.where is not None:
+            raise fault("a periodic patch has all of its faces: remove 'where'", "where")
+        for index, face in enumerate(self.on):
+            other = face[0] + ("+" if face[1] == "-" else "-")
+            if other not in self.on:
+                raise fault(f"'{face}' is periodic with '{other}': put both into 'on'", "on", index)
+
     @property
-    def kind(self) -> Literal["velocity", "no_slip", "slip", "traction", "outflow"]:
+    def kind(self) -> Literal["velocity", "no_slip", "slip", "traction", "pressure", "outflow", "periodic"]:
         """Which condition it is."""
         if self.velocity is not None:
             return "velocity"
         if self.traction is not None:
             return "traction"
-        return "no_slip" if self.no_slip else "outflow" if self.outflow else "slip"
+        if self.pressure is not None:
+            return "pressure"
+        return "no_slip" if self.no_slip else "outflow" if self.outflow else "periodic" if self.periodic else "slip"
 
 
 class Turn(Section):

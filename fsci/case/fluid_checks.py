@@ -37,9 +37,21 @@ def _patches(fluid: Fluid) -> Iterator[Mistake]:
                 yield (*keys, "on", i), f"a box in {dimension}D has no face '{face}'"
         yield from length_mistakes(patch.velocity, dimension, (*keys, "velocity"))
         yield from length_mistakes(patch.traction, dimension, (*keys, "traction"))
+        yield from _periods(fluid, name)
+    ends = {face[0] for patch in fluid.patches.values() if patch.periodic for face in patch.on}
+    if fluid.scheme == "steady" and len(ends) == dimension and not fluid.bodies:
+        yield ("fluid", "scheme"), "a steady flow that is periodic in all directions has no velocity of its own"
     if bare := [face for face in faces if not any(face in patch.on for patch in fluid.patches.values())]:
         verb = "face" if len(bare) == 1 else "faces"
         yield ("fluid", "patches"), f"no patch is on the {verb} {listed(bare, 'and')} of the box"
+
+
+def _periods(fluid: Fluid, name: str) -> Iterator[Mistake]:
+    """Nothing else is on the faces of a period."""
+    for i, face in enumerate(fluid.patches[name].on):
+        for other, patch in fluid.patches.items():
+            if patch.periodic and other != name and face in patch.on:
+                yield ("fluid", "patches", name, "on", i), f"the face '{face}' is periodic by the patch '{other}'"
 
 
 def _motion(fluid: Fluid, body: RigidBody, keys: Keys) -> Iterator[Mistake]:

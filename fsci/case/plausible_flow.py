@@ -26,7 +26,7 @@ def flow_doubts(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
         value = f"{fluid.density:g} {unit} is {density:.3g} kg/m^3"
         yield ("fluid", "density"), f"implausible density: {value}; check 'units'"
     if case.coupling is None and not _driven(fluid):
-        yield ("fluid", "patches"), "nothing drives the flow: no velocity, traction, force or moving body"
+        yield ("fluid", "patches"), "nothing drives the flow: no velocity, traction, pressure, force or moving body"
     yield from _thin_bodies(case, fluid)
     if fluid.scheme == "steady":
         return
@@ -58,7 +58,7 @@ def _thin_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
 def _driven(fluid: Fluid) -> bool:
     loads = (fluid.gravity, fluid.body_force, fluid.initial_velocity)
     moved = any(body.motion is not None for body in fluid.bodies.values())
-    return any(loads) or moved or any(patch.velocity or patch.traction for patch in fluid.patches.values())
+    return any(loads) or moved or any(p.velocity or p.traction or p.pressure for p in fluid.patches.values())
 
 
 def _cells_per_step(case: Case, fluid: Fluid, patch: Patch) -> float:

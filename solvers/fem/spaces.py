@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import basix
 import numpy as np
 import ufl
-from dolfinx import fem
+from dolfinx import cpp, fem
 from numpy.typing import NDArray
 
 from solvers.api import Array
@@ -51,6 +51,36 @@ def flow_space(domain: Domain, velocity_degree: int) -> fem.FunctionSpace:
 def cell_blocks(space: fem.FunctionSpace) -> NDArray[np.int32]:
     """Local dof blocks of each local cell, shape (cells, blocks per cell); a process may have no cells."""
     return np.asarray(space.dofmap.list.array).reshape(-1, space.dofmap.dof_layout.num_dofs)
+
+
+def identify_blocks(
+    space: fem.FunctionSpace, blocks: NDArray[np.int32], masters: NDArray[np.int64], owners: NDArray[np.int32]
+) -> tuple[fem.FunctionSpace, NDArray[np.int32]]:
+    """A space whose cells have other dof blocks in the place of some: (space, their local numbers) (collective).
+
+    `blocks` are local; `masters` are the global numbers of what replaces them, and `owners` the processes that own
+    these. All other numbers stay; the replaced blocks remain, and no cell has them.
+    """
+    dofmap = space.dofmap
+    index_map = dofmap.index_map
+    first, last = index_map.local_range
+    ghosts = np.asarray(index_map.ghosts, dtype=np.int64)
+    new = np.setdiff1d(masters[(masters < first) | (masters >= last)], ghosts)
+    all_ghosts = np.concatenate([ghosts, new])
+    order = np.argsort(all_ghosts, kind="stable")
+    owned = (masters >= first) & (masters < last)
+    local = np.where(owned, masters - first, 0)
+    local[~owned] = (last - first) + order[np.searchsorted(all_ghosts[order], masters[~owned])]
+    owner_of = dict(zip(masters.tolist(), owners.tolist(), strict=True))
+    all_owners = [*np.asarray(index_map.owners).tolist(), *(owner_of[ghost] for ghost in new.tolist())]
+    extended = cpp.common.IndexMap(space.mesh.comm, int(last - first), all_ghosts, np.array(all_owners, dtype=np.int32))
+    place = np.arange(int(index_map.size_local + index_map.num_ghosts), dtype=np.int32)
+    place[blocks] = local
+    cells = place[dofmap.list.array].reshape(-1, dofmap.dof_layout.num_dofs)
+    links = cpp.graph.AdjacencyList_int32(cells)
+    identified = cpp.fem.DofMap(dofmap.dof_layout, extended, dofmap.index_map_bs, links, dofmap.bs)
+    found = cpp.fem.FunctionSpace(space.mesh._mesh, space.element, identified)
+    return fem.FunctionSpace(space.mesh, space.ufl_element(), found), local.astype(np.int32)
 
 
 def component_dofs(

@@ -15,10 +15,10 @@ from solvers import fem, linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.distributed import Nodal
 from solvers.fluid import time
-from solvers.fluid.cut import Cut, Cutter
+from solvers.fluid.cut import NOTHING, Cut, Cutter
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.history import History, Past
-from solvers.fluid.patches import Boundary, Patch
+from solvers.fluid.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.pressure_level import hold_pressure, spread_excess
 from solvers.fluid.space import Nodes, Unknowns
 from solvers.fluid.surface import Motion, Surface, offsets, together, wetness
@@ -68,7 +68,7 @@ class Fluid:
         self.bodies = list(bodies)
         self.grid = DistributedGrid(comm, grid)
         self.dim = grid.dim
-        self.unknowns = Unknowns(self.grid, settings.degree)
+        self.unknowns = Unknowns(self.grid, settings.degree, periodic_axes(patches))
         self.boundary = Boundary(self.grid, self.unknowns, patches)
         self._iterative = linear.choose_flow(solver.linear, self.dim, self.dofs()) == "iterative"
         self.system = FlowSystem(
@@ -176,6 +176,7 @@ class Fluid:
         with self.timer("weights"):
             self.system.set_cut(cut)
             self._check_strip(cut)
+            self._check_period(cut)
             self.flow[~self.system.active_dofs] = 0.0
             self.held = np.zeros(self.unknowns.owned, dtype=bool)
             prescribed = self.boundary.dofs[self.boundary.dofs < self.unknowns.owned]
@@ -199,6 +200,16 @@ class Fluid:
         if self.comm.allreduce(missing, op=MPI.LOR):
             reason = "a body moved farther in one step than the flow behind it is known: take a smaller time step"
             raise StepFailed(self.name, reason)
+
+    def _check_period(self, cut: Cut) -> None:
+        """Bodies stay within the period: their surfaces know nothing of the cells at the other end."""
+        changed = cut.fraction < 1.0 - NOTHING
+        changed[np.concatenate([cut.cut, cut.strip])] = True
+        places = np.unravel_index(self.grid.numbers[changed], self.grid.grid.shape, order="F")
+        for axis in self.unknowns.periodic:
+            at_end = np.isin(places[axis], [0, self.grid.grid.shape[axis] - 1]).any()
+            if self.comm.allreduce(bool(at_end), op=MPI.LOR):
+                raise StepFailed(self.name, f"a body reaches the periodic faces {'xyz'[axis]}- and {'xyz'[axis]}+")
 
     def _hold_pressure(self) -> None:
         elastic = np.concatenate([np.full(b.surface.vertices, b.motion is None) for b in self.bodies] + [[]]) > 0.0

@@ -180,6 +180,11 @@ def traction(t: Expr, v: Expr) -> Expr:
     return -dot(t, v)
 
 
+def pressure(flow: Flow, p: Expr, v: Expr) -> Expr:
+    """Integrand of <p, n . v> on an outer face with the given pressure [Pa]: n . sigma n = -p."""
+    return p * dot(ufl.FacetNormal(flow.mesh), v)
+
+
 def outflow(flow: Flow, u: Expr, v: Expr) -> Expr:
     """Integrand on an outer face that a parallel flow leaves unharmed: mu d_n u - p n = 0, and no energy comes back.
 

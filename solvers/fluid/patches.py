@@ -17,7 +17,10 @@ from solvers.fluid.space import Unknowns
 #: A component as function of positions (dim, n) [m] and time [s].
 Value = Callable[[Array, float], Array]
 
-Kind = Literal["velocity", "no_slip", "slip", "traction", "outflow"]
+Kind = Literal["velocity", "no_slip", "slip", "traction", "pressure", "outflow", "periodic"]
+
+#: Kinds of patches that let the fluid through as it likes, so that they say how high the pressure is.
+OPEN = ("traction", "pressure", "outflow")
 
 
 @dataclass(frozen=True)
@@ -25,13 +28,14 @@ class Patch:
     """Part of the box's boundary with one condition.
 
     velocity: all components; no_slip: zero; slip: no flow through, no shear; traction [Pa]: sigma n;
-    outflow: what a parallel flow does, without energy coming back in.
+    pressure [Pa]: n . sigma n = -p, no velocity along the face; outflow: what a parallel flow does, without energy
+    coming back in; periodic: the flow goes on at the opposite face, which belongs to the patch, too.
     """
 
     name: str
     faces: tuple[str, ...]
     kind: Kind
-    value: tuple[Value, ...] | None = None  #: velocity or traction
+    value: tuple[Value, ...] | None = None  #: velocity, traction or pressure
     where: Value | None = None  #: positive on the part of the faces that belongs to it; default: all
 
     def __post_init__(self) -> None:
@@ -44,6 +48,13 @@ class UncoveredFaces(ValueError):
     def __init__(self, faces: Sequence[str]):
         super().__init__("no condition is given on part of the box: " + ", ".join(faces))
         self.faces = tuple(faces)
+
+
+def periodic_axes(patches: Sequence[Patch]) -> tuple[int, ...]:
+    """Directions (0, 1, 2) along which the flow repeats."""
+    faces = {face for patch in patches if patch.kind == "periodic" for face in patch.faces}
+    assert all(face[0] + other in faces for face in faces for other in "-+"), "both ends of a period"
+    return tuple(sorted({"xyz".index(face[0]) for face in faces}))
 
 
 class Boundary:
@@ -65,6 +76,9 @@ class Boundary:
         #: local faces and their cells, by patch
         self.facets = [facets[patch_of == number] for number in range(len(patches))]
         self.cells = [self._cells[patch_of == number] for number in range(len(patches))]
+        last = np.any([grid.on_face(midpoints, f"{axis}+") for axis in "xyz"[: grid.dim]], axis=0)
+        #: of these, those that count as the section of a flow: of a period only its end
+        self.at_end = [last[patch_of == n] | (patch.kind != "periodic") for n, patch in enumerate(patches)]
         self._imposed = np.full(unknowns.local, -1)
         for number, patch in enumerate(patches):
             for component in self._held(grid, patch, midpoints[patch_of == number]):
@@ -88,18 +102,21 @@ class Boundary:
         """(which facets of the patch, component that they hold)."""
         if patch.kind in ("velocity", "no_slip"):
             return [(np.ones(len(midpoints), dtype=bool), axis) for axis in range(grid.dim)]
+        on = [(grid.on_face(midpoints, face), "xyz".index(face[0])) for face in patch.faces]
         if patch.kind == "slip":
-            return [(grid.on_face(midpoints, face), "xyz".index(face[0])) for face in patch.faces]
+            return on
+        if patch.kind == "pressure":
+            return [(face, axis) for face, normal in on for axis in range(grid.dim) if axis != normal]
         return []
 
     def closed(self) -> bool:
         """The velocity is prescribed all round, so that the pressure has no level."""
-        return all(patch.kind not in ("traction", "outflow") for patch in self.patches)
+        return all(patch.kind not in OPEN for patch in self.patches)
 
     def open_cells(self) -> NDArray[np.int32]:
         """Local cells at the rest of the boundary."""
         kinds = [patch.kind for patch in self.patches]
-        cells = [c for c, kind in zip(self.cells, kinds, strict=True) if kind in ("traction", "outflow")]
+        cells = [c for c, kind in zip(self.cells, kinds, strict=True) if kind in OPEN]
         return np.concatenate([np.empty(0, dtype=np.int32), *cells]).astype(np.int32)
 
     def velocity(self, t: float) -> Array:

@@ -36,7 +36,8 @@ def hold_pressure(system: FlowSystem, elastic: Mask, *, known_by_bodies: bool) -
     if not (closed or system.with_bodies):
         return []
     assert system.cut is not None
-    pockets = find_pockets(system.grid, system.cut, system.boundary.open_cells(), elastic)
+    open_cells, periodic = system.boundary.open_cells(), system.unknowns.periodic
+    pockets = find_pockets(system.grid, system.cut, open_cells, elastic, periodic)
     pockets = [pocket for pocket in pockets if not (pocket.elastic and known_by_bodies)]
     sizes = system.pressure_sizes() if pockets else np.empty(0)
     return [_hold(system, pocket, sizes, keep_level=not (closed and pocket.largest)) for pocket in pockets]

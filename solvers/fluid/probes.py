@@ -64,14 +64,15 @@ def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> P
 def interpolation(fluid: Fluid, nodes: Nodes, degree: int, x: Array) -> tuple[np.ndarray, Array]:
     """(dofs of shape (n, components), shape functions (n,)) at a point, of the nodes that this process owns."""
     number, weight, stride = np.zeros(1, dtype=np.int64), np.ones(1), 1
-    for edge, coordinate in zip(fluid.grid.grid.edges, x, strict=True):
+    counts = fluid.unknowns.lattice_shape(degree)
+    for edge, coordinate, count in zip(fluid.grid.grid.edges, x, counts, strict=True):
         cell = int(np.clip(np.searchsorted(edge, coordinate) - 1, 0, len(edge) - 2))
         s, places = (coordinate - edge[cell]) / (edge[cell + 1] - edge[cell]), np.arange(degree + 1) / degree
         shape = [np.prod((s - np.delete(places, i)) / (at - np.delete(places, i))) for i, at in enumerate(places)]
-        steps = degree * cell + np.arange(degree + 1)
+        steps = (degree * cell + np.arange(degree + 1)) % count
         number = np.add.outer(stride * steps, number).ravel()
         weight = np.multiply.outer(np.array(shape), weight).ravel()
-        stride *= degree * (len(edge) - 1) + 1
+        stride *= count
     owned = nodes.numbers[: nodes.owned]
     order = np.argsort(owned)
     at = np.minimum(np.searchsorted(owned[order], number), max(len(owned) - 1, 0))
@@ -139,12 +140,13 @@ def flow_rate(fluid: Fluid) -> Callable[[Sequence[str]], float]:
 
 
 def _facets(fluid: Fluid, patches: Sequence[str]) -> np.ndarray:
-    """Local faces of patches with fluid behind them, sorted."""
+    """Local faces of patches with fluid behind them, sorted; of periodic ones those at the end of the box."""
     boundary = fluid.boundary
     wet = np.zeros(len(fluid.grid.numbers), dtype=bool)
     wet[np.concatenate([fluid.cut.uncut, fluid.cut.cut])] = True
     chosen = [i for i, patch in enumerate(boundary.patches) if patch.name in patches]
-    return np.sort(np.concatenate([boundary.facets[i][wet[boundary.cells[i]]] for i in chosen]))
+    counted = [wet[boundary.cells[i]] & boundary.at_end[i] for i in chosen]
+    return np.sort(np.concatenate([boundary.facets[i][mask] for i, mask in zip(chosen, counted, strict=True)]))
 
 
 def mass_balance(fluid: Fluid) -> Callable[[], dict[str, float]]:
@@ -154,7 +156,7 @@ def mass_balance(fluid: Fluid) -> Callable[[], dict[str, float]]:
     the volume that passes through their surfaces: an error of the grid.
     """
     rate = flow_rate(fluid)
-    everywhere = [patch.name for patch in fluid.boundary.patches]
+    everywhere = [patch.name for patch in fluid.boundary.patches if patch.kind != "periodic"]
 
     def balance() -> dict[str, float]:
         cut = fluid.cut

@@ -34,19 +34,21 @@ def _flow(fluid: Fluid) -> Snapshot | None:
     mesh = grid.grid.mesh()
     active = fraction[:, 0] > 0.0
     nodes, cells = np.unique(mesh.cells[active], return_inverse=True)
-    corners = _corners(fluid)
-    fields = {"velocity": _in_space(velocity[corners][nodes]), "pressure": pressure[nodes, 0]}
+    at_corners = [values[_corners(fluid, degree)] for values, degree in ((velocity, unknowns.degree), (pressure, 1))]
+    fields = {"velocity": _in_space(at_corners[0][nodes]), "pressure": at_corners[1][nodes, 0]}
     cells = cells.reshape(-1, mesh.cells.shape[1])
     inside = {"fluid_fraction": fraction[active, 0]}
     return Snapshot("fluid", _in_space(mesh.points[nodes]), cells, mesh.cell_type, fields, inside)
 
 
-def _corners(fluid: Fluid) -> np.ndarray:
-    """Number of each corner of the cells, x fastest, in the lattice of the velocity's nodes."""
-    degree, shape = fluid.unknowns.degree, fluid.grid.grid.shape
-    lattice = np.arange(int(np.prod([degree * n + 1 for n in shape])))
-    lattice = lattice.reshape([degree * n + 1 for n in shape], order="F")
-    return lattice[(slice(None, None, degree),) * len(shape)].ravel(order="F")
+def _corners(fluid: Fluid, degree: int) -> np.ndarray:
+    """Number of each corner of the cells, x fastest, in the lattice of nodes of this degree."""
+    counts = fluid.unknowns.lattice_shape(degree)
+    lattice = np.arange(int(np.prod(counts))).reshape(counts, order="F")
+    places = [
+        degree * np.arange(n + 1) % count for n, count in zip(fluid.grid.grid.shape, counts, strict=True)
+    ]  # fmt: skip
+    return lattice[np.ix_(*places)].ravel(order="F")
 
 
 def _bodies(fluid: Fluid) -> list[Snapshot]:

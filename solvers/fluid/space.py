@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from solvers import fem
 from solvers.api import Array
 from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.periodic import LatticeNodes, join_ends
 
 Dofs = NDArray[np.int32]
 
@@ -26,11 +28,18 @@ class Nodes:
 
 
 class Unknowns:
-    """Q1-Q1 (degree 1) or Q2-Q1 (degree 2): velocity and pressure in one function space."""
+    """Q1-Q1 (degree 1) or Q2-Q1 (degree 2): velocity and pressure in one function space.
 
-    def __init__(self, grid: DistributedGrid, degree: int):
-        self.grid, self.degree, self.dim = grid, degree, grid.dim
+    Along `periodic` axes (0, 1, 2) the nodes at the end of the box are those at its beginning: cells at the end have
+    their unknowns. So nothing that is assembled by cells knows of the period.
+    """
+
+    def __init__(self, grid: DistributedGrid, degree: int, periodic: Sequence[int] = ()):
+        self.grid, self.degree, self.dim, self.periodic = grid, degree, grid.dim, tuple(periodic)
         self.space = fem.flow_space(grid.domain, degree)
+        nodes = [self._lattice_nodes(range(self.dim), degree), self._lattice_nodes([self.dim], 1)]
+        if self.periodic:
+            self.space, nodes = join_ends(grid.comm, self.space, nodes)
         self.block_size = int(self.space.dofmap.index_map_bs)
         #: dof blocks of each local cell
         self.cell_blocks: Dofs = fem.cell_blocks(self.space)
@@ -47,22 +56,34 @@ class Unknowns:
         #: velocity dofs of each local cell, shape (cells, functions, dim), and pressure dofs, (cells, functions)
         self.cell_velocity: Dofs = np.stack(by_component[: self.dim], axis=2)
         self.cell_pressure: Dofs = by_component[self.dim]
-        self.velocity = self._nodes(range(self.dim), degree)
-        self.pressure = self._nodes([self.dim], 1)
+        self.velocity, self.pressure = (self._nodes(some) for some in nodes)
 
-    def _nodes(self, components, degree: int) -> Nodes:
+    # ------------------------------------------------------------------------------------------- nodes of the lattice
+
+    def lattice_shape(self, degree: int) -> tuple[int, ...]:
+        """Nodes of this degree per direction; along a periodic axis the last one is the first."""
+        return tuple(degree * n + (axis not in self.periodic) for axis, n in enumerate(self.grid.grid.shape))
+
+    def _lattice_nodes(self, components: Sequence[int], degree: int) -> LatticeNodes:
         dofs, points = fem.component_dofs(self.grid.domain, self.space, components, degree)
-        return Nodes(dofs, points, self._lattice(points, degree), int(np.count_nonzero(dofs[:, 0] < self.owned)))
-
-    def _lattice(self, points: Array, degree: int) -> NDArray[np.int64]:
-        """Number of each point in the lattice of nodes of this degree, x fastest."""
-        number, stride = np.zeros(len(points), dtype=np.int64), 1
-        for axis, edge in enumerate(self.grid.grid.edges):
+        number, stride = np.zeros(len(dofs), dtype=np.int64), 1
+        at_start, at_end = np.zeros((2, len(dofs)), dtype=bool)
+        points = points.copy()
+        for axis, (edge, count) in enumerate(zip(self.grid.grid.edges, self.lattice_shape(degree), strict=True)):
             lattice = np.interp(np.arange(degree * (len(edge) - 1) + 1) / degree, np.arange(len(edge)), edge)
-            between = 0.5 * (lattice[1:] + lattice[:-1])
-            number += stride * np.searchsorted(between, points[:, axis])
-            stride *= len(lattice)
-        return number
+            place = np.searchsorted(0.5 * (lattice[1:] + lattice[:-1]), points[:, axis])
+            if axis in self.periodic:
+                at_start |= place == 0
+                at_end |= place == count
+                points[place == count, axis] = edge[0]
+            number += stride * (place % count)
+            stride *= count
+        return LatticeNodes(dofs, points, number, at_start, at_end)
+
+    def _nodes(self, nodes: LatticeNodes) -> Nodes:
+        keep = np.unique(nodes.dofs[:, 0], return_index=True)[1] if self.periodic else slice(None)
+        dofs = nodes.dofs[keep]
+        return Nodes(dofs, nodes.points[keep], nodes.numbers[keep], int(np.count_nonzero(dofs[:, 0] < self.owned)))
 
     def size(self) -> int:
         """Dofs on all processes."""

@@ -127,10 +127,11 @@ class FlowSystem:
         patches = self.boundary.patches
         self._tractions = []
         for number, patch in enumerate(patches):
-            if patch.kind == "traction":
+            if patch.kind in ("traction", "pressure"):
                 t = fem.function(self.unknowns.space)
-                form = fem.Integral(domain, forms.traction(self.unknowns.parts(t)[0], v) * ds)
-                self._tractions.append((number, t, form))
+                given = self.unknowns.parts(t)[0]
+                term = forms.traction(given, v) if patch.kind == "traction" else forms.pressure(self.terms, given[0], v)
+                self._tractions.append((number, t, fem.Integral(domain, term * ds)))
         self._outflow = [number for number, patch in enumerate(patches) if patch.kind == "outflow"]
         if self._outflow:
             form = forms.outflow(self.terms, u, v) * ds
