@@ -11,6 +11,7 @@ from fsci.build import Numbers, columns
 from fsci.build_solver import build_tolerance
 from fsci.case import Case
 from fsci.case.probes import Probe
+from fsci.case.structure import NO_MIXED_SIMPLICES
 from fsci.mesh import MeshError, build_mesh, extract_region, require_surface
 from solvers import fem
 from solvers.api import Constraint
@@ -71,7 +72,8 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
         domain,
         BodySettings(
             name=name,
-            material=_material(settings.material, case.structure.plane if domain.dim == 2 else "strain"),
+            material=_material(settings, case.structure.plane if domain.dim == 2 else "strain"),
+            element=settings.element,
             supports=tuple(entry for support in settings.supports for entry in _supports(support)),
             tractions=tuple(Traction(on, load.value) for load in settings.tractions for on in load.on),
             pressures=tuple(Pressure(on, load.value) for load in settings.pressures for on in load.on),
@@ -105,6 +107,9 @@ def _checked_mesh(case: Case, name: str):
         if settings.region is not None:
             keys = ("structure", "bodies", name, "region")
             mesh = extract_region(mesh, settings.region)
+        if settings.element == "mixed" and mesh.cell_type[:4] in ("tria", "tetr"):
+            keys = ("structure", "bodies", name, "element")
+            raise MeshError(NO_MIXED_SIMPLICES)
         for keys, surface in _named_surfaces(case, name):  # noqa: B007
             require_surface(mesh, surface)
     except MeshError as error:
@@ -147,8 +152,14 @@ def _supports(support) -> list[Support | Symmetry]:
     return [Support(surface, support.displacement) for surface in support.on]
 
 
-def _material(settings, plane: str) -> materials.Material:
+def _material(body, plane: str) -> materials.Material:
+    settings = body.material
     density = _parameter(settings.density) if settings.density is not None else 0.0
+    if body.kinematics == "linear":
+        mu, lmbda = _lame(settings)
+        if plane == "stress":
+            return materials.PlaneStressLinearElastic(mu, _combine(materials.plane_stress_lambda, mu, lmbda), density)
+        return materials.LinearElastic(mu, lmbda, density)
     if settings.law == "mooney_rivlin":
         c10, c01, bulk = (_parameter(p) for p in (settings.c10, settings.c01, settings.bulk))
         return materials.MooneyRivlin(c10, c01, bulk, density)
@@ -165,7 +176,11 @@ def _material(settings, plane: str) -> materials.Material:
 
 
 def _lame(settings) -> tuple[Parameter, Parameter]:
-    """(mu, lambda) from the pair of constants that the case gives."""
+    """(mu, lambda) at small strain from the constants that the case gives."""
+    if settings.law == "mooney_rivlin":
+        c10, c01, bulk = (_parameter(p) for p in (settings.c10, settings.c01, settings.bulk))
+        mu = _combine(lambda c10, c01: 2 * (c10 + c01), c10, c01)
+        return mu, _combine(lambda bulk, mu: bulk - 2 * mu / 3, bulk, mu)
     if settings.E is not None:
         E, nu = _parameter(settings.E), _parameter(settings.nu)
         pair = [_combine(lambda E, nu, i=i: materials.lame(E, nu)[i], E, nu) for i in (0, 1)]

@@ -122,6 +122,25 @@ MISTAKES = [
     ),
     ("E: 1e6, nu: 0.3", "lambda: -3, mu: 3", "9:42: 'lambda' must be greater than -2/3 mu, -2, not -3", "-3"),
     (
+        "cells: [4, 2]}",
+        "cells: [4, 2], cell: tri}\n      element: mixed",
+        "9:16: 'mixed' is for quadrilaterals and hexahedra; take 'displacement' and second order for triangles and "
+        "tetrahedra",
+        "mixed",
+    ),
+    (
+        MESH,
+        MESH + "\n      element: bbar",
+        "9:16: 'element' must be 'displacement' or 'mixed', not 'bbar'",
+        "bbar",
+    ),
+    (
+        MESH,
+        MESH + "\n      kinematics: small",
+        "9:19: 'kinematics' must be 'finite' or 'linear', not 'small'",
+        "small",
+    ),
+    (
         "rho_inf: 0.8",
         "rho_inf: 0.8, beta: 0.3",
         "5:34: give either 'rho_inf' or the four of alpha_m, alpha_f, beta and gamma",

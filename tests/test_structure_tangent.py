@@ -111,6 +111,14 @@ def test_coup_neo_hooke_for_small_nu(lmbda):
     assert body.internal_energy() == pytest.approx(mu / 2.0 * (volumetric + I1 - 3.0), rel=1e-11)
 
 
+def test_coup_neo_hooke_without_lateral_contraction():
+    """nu = 0, also in a part of the body only: the tangent is that of the forces; a stretched bar keeps its width."""
+    law = CoupNeoHooke(3.0, lambda x, t: np.where(x[0] < 0.5, 0.0, 2.0), 2.0)
+    assert tangent_error(make_structure(distort(block("quad", 2), 0.05), law)) < 1e-6
+    stretch = small_stress(CoupNeoHooke(3.0, 0.0), [[1e-6, 0.0], [0.0, 0.0]])
+    assert stretch == pytest.approx(np.diag([6e-6, 0.0, 0.0]), abs=1e-10)
+
+
 def test_plane_stress_uniaxial():
     """sigma_33 = 0, and Young's modulus and Poisson's ratio are those of a free strip."""
     mu, lmbda = lame(E := 10.0, nu := 0.3)

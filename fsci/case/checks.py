@@ -13,7 +13,7 @@ from fsci.case.material import has_mass
 from fsci.case.mesh import Shape
 from fsci.case.mesh_checks import Mistake, length_mistakes, mesh_mistakes, surfaces_mistakes
 from fsci.case.probe_checks import probe_mistakes, verify_mistakes
-from fsci.case.structure import Body, Structure
+from fsci.case.structure import NO_MIXED_SIMPLICES, Body, Structure
 from fsci.case.yaml_text import Keys
 
 VECTORS = ("gravity", "body_force", "initial_displacement", "initial_velocity")
@@ -53,6 +53,7 @@ def _structure(case: Case, structure: Structure) -> Iterator[Mistake]:
         yield from mesh_mistakes(body.mesh, case.dimension, case.folder, (*keys, "mesh"))
         if isinstance(body.mesh, Shape) and body.region is not None:
             yield (*keys, "region"), "'region' is for mesh files; a built-in shape is one region"
+        yield from _element(case, structure, body, keys)
         yield from _surfaces(body, keys)
         yield from _vectors(case, body, keys)
         yield from _needs(structure, body, keys)
@@ -63,9 +64,18 @@ def _plane(case: Case, structure: Structure) -> Iterator[Mistake]:
         yield ("structure", "plane"), "'plane' is for 2D, but the mesh is 3D"
     elif structure.plane == "stress":
         for name, body in structure.bodies.items():
-            if body.material.law != "st_venant_kirchhoff":
+            if body.material.law != "st_venant_kirchhoff" and body.kinematics == "finite":
                 keys = ("structure", "bodies", name, "material", "law")
                 yield keys, f"plane stress needs the law 'st_venant_kirchhoff', not '{body.material.law}'"
+
+
+def _element(case: Case, structure: Structure, body: Body, keys: Keys) -> Iterator[Mistake]:
+    if body.element != "mixed":
+        return
+    if case.dimension == 2 and structure.plane == "stress":
+        yield (*keys, "element"), "'mixed' is not for plane stress, which does not lock; take 'displacement'"
+    elif isinstance(body.mesh, Shape) and body.mesh.cell in ("tri", "tet"):
+        yield (*keys, "element"), NO_MIXED_SIMPLICES
 
 
 def _surfaces(body: Body, keys: Keys) -> Iterator[Mistake]:

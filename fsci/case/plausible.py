@@ -8,11 +8,15 @@ from fsci.case.case import Case
 from fsci.case.material import Elastic, Material
 from fsci.case.mesh import FileMesh, Shape
 from fsci.case.plausible_flow import flow_doubts
+from fsci.case.structure import Body
 from fsci.case.yaml_text import Keys
 from fsci.estimate import aspect
 
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from aerogel to osmium, with a margin
 STIFFNESSES = (1.0, 2e12)  #: [Pa] Young's modulus from the softest gel to diamond, with a margin
+
+#: Poisson's ratio from which on the error of first-order cells in bending is more than twice that at 0.3.
+LOCKING = 0.45
 
 
 def doubts(case: Case) -> Iterator[tuple[Keys, str]]:
@@ -23,16 +27,20 @@ def doubts(case: Case) -> Iterator[tuple[Keys, str]]:
     for name, body in case.elastic_bodies.items():
         keys: Keys = ("structure", "bodies", name)
         yield from _material(case, body.material, (*keys, "material"))
-        nu = poisson(body.material)
-        if nu is not None and nu > 0.495 and body.mesh.order == 1 and not _order_from_file(body.mesh):
-            yield (
-                (*keys, "mesh"),
-                f"first-order cells lock for nearly incompressible material (nu = {nu:.4g}); take 'order: 2'",
-            )
+        yield from _locking(body, (*keys, "mesh"))
         if isinstance(body.mesh, Shape) and (ratio := aspect(body.mesh)) > 50:
             yield (*keys, "mesh", "cells"), f"the cells are {ratio:.0f} times longer than wide"
     if case.fluid is not None:
         yield from flow_doubts(case, case.fluid)
+
+
+def _locking(body: Body, keys: Keys) -> Iterator[tuple[Keys, str]]:
+    nu = poisson(body.material)
+    if nu is None or nu < LOCKING or body.element == "mixed" or body.mesh.order > 1 or _order_from_file(body.mesh):
+        return
+    simplices = isinstance(body.mesh, Shape) and body.mesh.cell in ("tri", "tet")
+    remedy = "'order: 2'" if simplices else "'element: mixed' or 'order: 2'"
+    yield keys, f"first-order cells lock for nearly incompressible material (nu = {nu:.4g}); take {remedy}"
 
 
 def _order_from_file(mesh: object) -> bool:

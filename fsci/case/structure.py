@@ -95,12 +95,26 @@ class Pressure(Section):
     value: Formula = setting(..., "pressure; a positive one pushes against the surface", unit="Pa")
 
 
+#: Why a body of triangles or tetrahedra cannot have mixed elements.
+NO_MIXED_SIMPLICES = (
+    "'mixed' is for quadrilaterals and hexahedra; take 'displacement' and second order for triangles and tetrahedra"
+)
+
+
 class Body(Section):
     """One elastic body."""
 
     mesh: Mesh = setting(..., "mesh file or built-in shape")
     region: Text | None = setting(None, "name of the group of cells in the mesh file that is the body")
     material: Material = setting(..., "hyperelastic law")
+    element: Literal["displacement", "mixed"] = setting(
+        "displacement",
+        "mixed: volume ratio and pressure are constant (order 1) or linear (order 2) in each cell, which does not lock "
+        "where the volume hardly changes; quadrilaterals and hexahedra only",
+    )
+    kinematics: Literal["finite", "linear"] = setting(
+        "finite", "linear: small displacements, Hooke's law with the constants of the material at small strain"
+    )
     supports: tuple[Support, ...] = setting(tuple, "where the body is held")
     gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
     body_force: Vector | None = setting(None, "force per reference volume", unit="N/m^3")

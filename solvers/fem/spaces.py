@@ -33,6 +33,14 @@ def cellwise_space(domain: Domain) -> fem.FunctionSpace:
         return fem.FunctionSpace(domain.mesh, ("Discontinuous Lagrange", 0))
 
 
+def pressure_space(domain: Domain) -> fem.FunctionSpace:
+    """Scalars that jump from cell to cell: constant in first-order cells, linear in those of second order."""
+    simplex = domain.mesh.ufl_cell().cellname() in ("triangle", "tetrahedron")
+    family = "Discontinuous Lagrange" if simplex or domain.degree == 1 else "DPC"
+    with quiet():
+        return fem.FunctionSpace(domain.mesh, (family, domain.degree - 1))
+
+
 def flow_space(domain: Domain, velocity_degree: int) -> fem.FunctionSpace:
     """Velocity and pressure as one function with dim + 1 components, pressure last and of first degree.
 

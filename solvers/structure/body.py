@@ -14,6 +14,7 @@ from petsc4py import PETSc
 from solvers import fem
 from solvers.api import Array
 from solvers.structure import forms
+from solvers.structure.elements import Displacement, Element, Formulation, Mixed
 from solvers.structure.loads import DeadLoads, FollowerPressure, LineForce, PointForce, Pressure, Traction
 from solvers.structure.materials import Material, Parameter, Value, parameters
 from solvers.structure.springs import Spring, Springs
@@ -38,6 +39,7 @@ class BodySettings:
 
     name: str
     material: Material
+    element: Formulation = "displacement"
     supports: Sequence[Support | Symmetry | Roller] = ()
     springs: Sequence[Spring] = ()
     gravity: tuple[Value, ...] | None = None  #: [m/s^2]
@@ -70,13 +72,17 @@ class Body:
     @cached_property
     def _stress(self):
         """Compiled only when a picture or file asks for it."""
-        sigma = forms.cauchy_stress(self.u, self.settings.material, self.parameters)
-        return fem.compile_expression(sigma, fem.reference_nodes(self.domain))
+        return fem.compile_expression(forms.cauchy_stress(self.u, self.element), fem.reference_nodes(self.domain))
 
     @cached_property
     def cell_size(self) -> float:
         """Typical edge [m] of a cell."""
         return fem.mean_cell_size(self.domain)
+
+    @property
+    def linear(self) -> bool:
+        """Small displacements: strain and loads belong to the reference configuration."""
+        return self.settings.material.linear
 
     @property
     def dim(self) -> int:
@@ -95,15 +101,20 @@ class Body:
         cellwise.x.array[:] = value(fem.cell_midpoints(self.domain), 0.0)
         return cellwise
 
+    def _element(self, dx: ufl.Measure) -> Element:
+        material = self.settings.material
+        if self.settings.element == "mixed":
+            return Mixed(self.domain, self.u, material, self.parameters, dx)
+        return Displacement(material, self.parameters)
+
     def _compile(self) -> None:
         v, du = ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
         dx = fem.volume_measure(self.domain, self.stiffness_degree)
         mass_dx = fem.volume_measure(self.domain, self.mass_degree)
-        energy = forms.stored_energy(self.u, self.settings.material, self.parameters, dx)
-        internal = ufl.derivative(energy, self.u, v)
-        self._energy = fem.compile_form(energy)
-        self._internal = fem.compile_form(internal)
-        self._tangent = fem.compile_form(ufl.derivative(internal, self.u, du))
+        self.element = self._element(dx)
+        self._energy = fem.compile_form(forms.stored_energy(self.u, self.element, dx))
+        self._internal = fem.compile_form(forms.internal_force(self.u, self.element, v, dx))
+        self._tangent = fem.compile_form(forms.tangent(self.u, self.element, v, du, dx))
         self._mass = fem.compile_form(forms.inertia(du, v, self.density, mass_dx))
         self._force = fem.function(self.space)
         nodes = fem.reference_nodes(self.domain)
@@ -135,6 +146,7 @@ class Body:
         """Set the displacement from owned dofs [m], shape (size,)."""
         self.u.x.array[: self.size] = owned
         self.u.x.scatter_forward()
+        self.element.update()
 
     def set_time(self, t: float) -> None:
         """Evaluate the loads at time t."""
@@ -172,8 +184,13 @@ class Body:
             return self._dead_load.copy()
         self._force.x.array[:] = 0.0
         for pressure in self._pressures:
-            pressure.add_force(self.u.x.array, self._force.x.array)
+            pressure.add_force(self._shape, self._force.x.array)
         return self._dead_load + self._summed()
+
+    @property
+    def _shape(self) -> Array:
+        """The displacement of the surface that pressures act on."""
+        return np.zeros_like(self.u.x.array) if self.linear else self.u.x.array
 
     def mass(self) -> PETSc.Mat:
         """Consistent mass matrix [kg]."""
@@ -188,16 +205,23 @@ class Body:
 
     def assemble_tangent(self, matrix: PETSc.Mat) -> None:
         """d(internal - external force)/du [N/m]."""
+        self.element.linearise()
         matrix.zeroEntries()
         fem.assemble_matrix(matrix, self._tangent)
-        for pressure in self._pressures:
-            pressure.add_tangent(self.u.x.array, matrix)
+        for pressure in () if self.linear else self._pressures:
+            pressure.add_tangent(self._shape, matrix)
         matrix.assemble()
         if self._springs is not None:
             matrix.axpy(1.0, self._springs.matrix, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        self.element.complete_tangent(matrix)
 
     def smallest_jacobian(self) -> tuple[float, str, tuple[float, ...]]:
-        """(smallest det F at the cells' nodes, body name, reference position [m]) over all processes."""
+        """(smallest det F at the cells' nodes, body name, reference position [m]) over all processes.
+
+        Infinite for small displacements: their energy does not know det F.
+        """
+        if self.linear:
+            return np.inf, self.name, ()
         values = fem.evaluate_cells(self.domain, self._jacobian)
         cell = int(np.argmin(values.min(axis=1))) if values.size else 0
         low = float(values[cell].min()) if values.size else np.inf

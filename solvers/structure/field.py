@@ -140,6 +140,8 @@ class Structure:
     def begin_step(self, t: float, dt: float) -> None:
         """Remember the state at t and predict the one at t + dt."""
         self.old = self.now.copy()
+        for body in self.bodies:
+            body.element.begin_step()
         self._time = t + dt
         if self.constraint is not None:
             self.constraint.begin_step()

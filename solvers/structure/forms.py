@@ -11,9 +11,14 @@ Source: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import ufl
 
-from solvers.structure.materials import Material, Tensor, in_space
+from solvers.structure.materials import Tensor, in_space
+
+if TYPE_CHECKING:
+    from solvers.structure.elements import Element
 
 
 def deformation_gradient(u: Tensor) -> Tensor:
@@ -21,15 +26,26 @@ def deformation_gradient(u: Tensor) -> Tensor:
     return ufl.Identity(len(u)) + ufl.grad(u)
 
 
-def stored_energy(u: Tensor, material: Material, parameters: dict[str, Tensor], dx: ufl.Measure) -> ufl.Form:
+def stored_energy(u: Tensor, element: Element, dx: ufl.Measure) -> ufl.Form:
     """int W(F) dX [J]."""
-    return material.energy(deformation_gradient(u), **parameters) * dx
+    return element.energy(deformation_gradient(u)) * dx
 
 
-def first_piola_kirchhoff(u: Tensor, material: Material, parameters: dict[str, Tensor]) -> Tensor:
+def internal_force(u: Tensor, element: Element, v: Tensor, dx: ufl.Measure) -> ufl.Form:
+    """int P : grad v dX."""
+    return ufl.derivative(element.potential(deformation_gradient(u)) * dx, u, v)
+
+
+def tangent(u: Tensor, element: Element, v: Tensor, du: Tensor, dx: ufl.Measure) -> ufl.Form:
+    """The derivative of `internal_force` in u, but for what the element adds to the assembled matrix."""
+    energy = element.tangent_potential(deformation_gradient(u)) * dx
+    return ufl.derivative(ufl.derivative(energy, u, v), u, du)
+
+
+def first_piola_kirchhoff(u: Tensor, element: Element) -> Tensor:
     """P = dW/dF [Pa]."""
     F = ufl.variable(deformation_gradient(u))
-    return ufl.diff(material.energy(F, **parameters), F)
+    return ufl.diff(element.potential(F), F)
 
 
 def inertia(a: Tensor, v: Tensor, rho: Tensor, dx: ufl.Measure) -> ufl.Form:
@@ -37,12 +53,15 @@ def inertia(a: Tensor, v: Tensor, rho: Tensor, dx: ufl.Measure) -> ufl.Form:
     return rho * ufl.inner(a, v) * dx
 
 
-def cauchy_stress(u: Tensor, material: Material, parameters: dict[str, Tensor]) -> Tensor:
-    """sigma = P F^T / J [Pa], 3x3 in 2D too: sigma_33 is zero in plane stress, else it follows from F_33 = 1."""
-    F = deformation_gradient(u)
+def cauchy_stress(u: Tensor, element: Element) -> Tensor:
+    """sigma = P F^T / J [Pa], 3x3 in 2D too: sigma_33 is zero in plane stress, else it follows from F_33 = 1.
+
+    For small displacements P and sigma are the same.
+    """
+    material, F = element.material, deformation_gradient(u)
     F = ufl.variable(F if material.plane_stress else in_space(F))
-    P = ufl.diff(material.energy(F, **parameters), F)
-    sigma = P * F.T / ufl.det(F)
+    P = ufl.diff(element.potential(F), F)
+    sigma = P if material.linear else P * F.T / ufl.det(F)
     if sigma.ufl_shape == (3, 3):
         return sigma
     return ufl.as_tensor([[sigma[0, 0], sigma[0, 1], 0], [sigma[1, 0], sigma[1, 1], 0], [0, 0, 0]])

@@ -25,6 +25,8 @@ class Material(Protocol):
 
     #: the energy is one of two dimensions with S_33 = 0
     plane_stress: ClassVar[bool]
+    #: the energy is one of small displacements: a function of sym(F) - I that does not tell rotation from strain
+    linear: ClassVar[bool]
 
     @property
     def density(self) -> Parameter:
@@ -34,6 +36,16 @@ class Material(Protocol):
     @property
     def energy(self) -> Callable[..., Tensor]:
         """Stored energy W(F, parameters by name)."""
+        ...
+
+    @property
+    def volumetric(self) -> Callable[..., Tensor]:
+        """Its part of a pure change of volume, U(J, parameters by name) = W(J^(1/3) I)."""
+        ...
+
+    @property
+    def distortional(self) -> Callable[..., Tensor]:
+        """The rest of it, W(F) - U(det F)."""
         ...
 
 
@@ -47,6 +59,11 @@ def in_space(F: Tensor) -> Tensor:
     if F.ufl_shape == (3, 3):
         return F
     return ufl.as_tensor([[F[0, 0], F[0, 1], 0], [F[1, 0], F[1, 1], 0], [0, 0, 1]])
+
+
+def volume_ratio(F: Tensor, material: Material) -> Tensor:
+    """det F, for small displacements 1 + div u."""
+    return 1 + ufl.tr(F) - F.ufl_shape[0] if material.linear else ufl.det(F)
 
 
 def lame(E: float, nu: float) -> tuple[float, float]:
@@ -67,10 +84,17 @@ class StVenantKirchhoff:
     lmbda: Parameter
     density: Parameter = 0.0
     plane_stress: ClassVar[bool] = False
+    linear: ClassVar[bool] = False
 
     def energy(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
         E = (F.T * F - ufl.Identity(F.ufl_shape[0])) / 2
         return lmbda / 2 * ufl.tr(E) ** 2 + mu * ufl.inner(E, E)
+
+    def volumetric(self, J: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
+        return 3 / 8 * (3 * lmbda + 2 * mu) * (_cube_root(J) ** 2 - 1) ** 2
+
+    def distortional(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
+        return self.energy(F, mu, lmbda) - self.volumetric(ufl.det(F), mu, lmbda)
 
 
 @dataclass(frozen=True)
@@ -78,6 +102,56 @@ class PlaneStressStVenantKirchhoff(StVenantKirchhoff):
     """The same energy in two dimensions with the lambda of `plane_stress_lambda`."""
 
     plane_stress: ClassVar[bool] = True
+
+
+@dataclass(frozen=True)
+class LinearElastic:
+    """W = lambda/2 (tr e)^2 + mu e:e with the strain e = sym(grad u) of small displacements (Hooke's law)."""
+
+    mu: Parameter
+    lmbda: Parameter
+    density: Parameter = 0.0
+    plane_stress: ClassVar[bool] = False
+    linear: ClassVar[bool] = True
+
+    def energy(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
+        e = ufl.sym(F) - ufl.Identity(F.ufl_shape[0])
+        return lmbda / 2 * ufl.tr(e) ** 2 + mu * ufl.inner(e, e)
+
+    def volumetric(self, J: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
+        """The volume ratio of small displacements is J = 1 + tr e."""
+        return (lmbda / 2 + mu / 3) * (J - 1) ** 2
+
+    def distortional(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
+        e = ufl.sym(F) - ufl.Identity(F.ufl_shape[0])
+        return mu * (ufl.inner(e, e) - ufl.tr(e) ** 2 / 3)
+
+
+@dataclass(frozen=True)
+class PlaneStressLinearElastic(LinearElastic):
+    """The same energy in two dimensions with the lambda of `plane_stress_lambda`."""
+
+    plane_stress: ClassVar[bool] = True
+
+
+#: Below this exponent `_inverse_power` is a series: what it leaves out is less than 1e-14 of it for J from 0.01 to 100.
+_SMALL = 1e-3
+
+
+def _inverse_power(J: Tensor, n: Tensor) -> Tensor:
+    """(J^-n - 1)/n, for small n >= 0 by its series about the limit -ln J."""
+    x = -n * ufl.ln(J)
+    series = -ufl.ln(J) * (1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5))))
+    return ufl.conditional(ufl.lt(n, _SMALL), series, (ufl.exp(x) - 1) / ufl.max_value(n, _SMALL))
+
+
+def _cube_root(J: Tensor) -> Tensor:
+    return ufl.exp(ufl.ln(J) / 3)
+
+
+def _neo_hooke_distortion(F: Tensor, mu: Tensor) -> Tensor:
+    """mu/2 (I_1 - 3 J^(2/3))."""
+    return mu / 2 * (ufl.tr(in_space(F).T * in_space(F)) - 3 * _cube_root(ufl.det(F)) ** 2)
 
 
 @dataclass(frozen=True)
@@ -91,32 +165,41 @@ class NeoHooke:
     lmbda: Parameter
     density: Parameter = 0.0
     plane_stress: ClassVar[bool] = False
+    linear: ClassVar[bool] = False
 
     def energy(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
         J, I1 = ufl.det(F), ufl.tr(in_space(F).T * in_space(F))
         return mu / 2 * (I1 - 3) - mu * ufl.ln(J) + lmbda / 2 * ufl.ln(J) ** 2
 
+    def volumetric(self, J: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
+        return 3 * mu / 2 * (_cube_root(J) ** 2 - 1) - mu * ufl.ln(J) + lmbda / 2 * ufl.ln(J) ** 2
+
+    def distortional(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
+        return _neo_hooke_distortion(F, mu)
+
 
 @dataclass(frozen=True)
 class CoupNeoHooke:
-    """W = c/beta (J^(-2 beta) - 1) + c (I_1 - 3), c = mu/2, beta = lambda/(2 mu) = nu/(1 - 2 nu).
+    """W = c/beta (J^(-2 beta) - 1) + c (I_1 - 3), c = mu/2, beta = lambda/(2 mu) = nu/(1 - 2 nu) >= 0.
 
-    The compressible neo-Hooke law of the code 4C and its predecessors. With L = ln J the first term is
-    -2 c L (1 - beta L + 2/3 (beta L)^2 - ...): below beta = 1e-4 this sum loses less to what it leaves out than the
-    formula to rounding, and nu = 0 is no special case.
+    The compressible neo-Hooke law of the code 4C and its predecessors. For nu = 0 the first term is its limit -mu ln J.
     """
 
     mu: Parameter
     lmbda: Parameter
     density: Parameter = 0.0
     plane_stress: ClassVar[bool] = False
+    linear: ClassVar[bool] = False
 
     def energy(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
         J, I1 = ufl.det(F), ufl.tr(in_space(F).T * in_space(F))
-        c, beta, L = mu / 2, lmbda / (2 * mu), ufl.ln(J)
-        small = -2 * L * (1 - beta * L + 2 / 3 * (beta * L) ** 2)
-        volumetric = ufl.conditional(ufl.lt(beta, 1e-4), small, (ufl.exp(-2 * beta * L) - 1) / beta)
-        return c * volumetric + c * (I1 - 3)
+        return mu * _inverse_power(J, lmbda / mu) + mu / 2 * (I1 - 3)
+
+    def volumetric(self, J: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
+        return mu * _inverse_power(J, lmbda / mu) + 3 * mu / 2 * (_cube_root(J) ** 2 - 1)
+
+    def distortional(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
+        return _neo_hooke_distortion(F, mu)
 
 
 @dataclass(frozen=True)
@@ -131,10 +214,17 @@ class MooneyRivlin:
     bulk: Parameter
     density: Parameter = 0.0
     plane_stress: ClassVar[bool] = False
+    linear: ClassVar[bool] = False
 
     def energy(self, F: Tensor, c10: Tensor, c01: Tensor, bulk: Tensor) -> Tensor:
+        return self.distortional(F, c10, c01, bulk) + self.volumetric(ufl.det(F), c10, c01, bulk)
+
+    def volumetric(self, J: Tensor, c10: Tensor, c01: Tensor, bulk: Tensor) -> Tensor:
+        return bulk / 2 * (J - 1) ** 2
+
+    def distortional(self, F: Tensor, c10: Tensor, c01: Tensor, bulk: Tensor) -> Tensor:
         C = in_space(F).T * in_space(F)
         J, I1 = ufl.det(F), ufl.tr(C)
         I2 = (I1**2 - ufl.tr(C * C)) / 2
         scale = ufl.exp(-2 / 3 * ufl.ln(J))
-        return c10 * (scale * I1 - 3) + c01 * (scale**2 * I2 - 3) + bulk / 2 * (J - 1) ** 2
+        return c10 * (scale * I1 - 3) + c01 * (scale**2 * I2 - 3)

@@ -1,0 +1,191 @@
+"""Elements: what a body's energy becomes when it is integrated cell by cell.
+
+The plain element integrates W(F) as it is. Where the material hardly changes its volume, its cells are then too stiff
+("locking"): every quadrature point asks for det F = 1, more conditions than the nodes of a cell can fulfil. The mixed
+element asks for less. The nodal displacements remain the only unknowns in both.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Protocol
+
+import numpy as np
+import ufl
+from petsc4py import PETSc
+
+from solvers import fem
+from solvers.api import Array
+from solvers.structure import forms
+from solvers.structure.materials import Material, Tensor, volume_ratio
+
+Formulation = Literal["displacement", "mixed"]
+
+
+class Element(Protocol):
+    """Energy and stress of a body in its cells."""
+
+    material: Material
+
+    def energy(self, F: Tensor) -> Tensor:
+        """Energy per reference volume [J/m^3]."""
+        ...
+
+    def potential(self, F: Tensor) -> Tensor:
+        """The density [J/m^3] whose derivative in F, all else held fixed, is the stress P."""
+        ...
+
+    def tangent_potential(self, F: Tensor) -> Tensor:
+        """The density [J/m^3] whose second derivative in F gives the tangent, but for `complete_tangent`."""
+        ...
+
+    def begin_step(self) -> None:
+        """Newton's method starts anew."""
+        ...
+
+    def update(self) -> None:
+        """The displacement has changed."""
+        ...
+
+    def linearise(self) -> None:
+        """A tangent at the present displacement is about to be assembled."""
+        ...
+
+    def complete_tangent(self, matrix: PETSc.Mat) -> None:
+        """Add to the assembled tangent what fixed quantities contribute by their derivatives [N/m]."""
+        ...
+
+
+class Displacement:
+    """The plain element: energy W(F)."""
+
+    def __init__(self, material: Material, parameters: dict[str, Tensor]):
+        self.material, self.parameters = material, parameters
+
+    def energy(self, F: Tensor) -> Tensor:
+        return self.material.energy(F, **self.parameters)
+
+    potential = tangent_potential = energy
+
+    def begin_step(self) -> None:
+        pass
+
+    def update(self) -> None:
+        pass
+
+    def linearise(self) -> None:
+        pass
+
+    def complete_tangent(self, matrix: PETSc.Mat) -> None:
+        pass
+
+
+class Mixed:
+    """Volume ratio theta and pressure p with values of their own in each cell, eliminated cell by cell (Hu-Washizu).
+
+    Stationary in u, theta and p is
+
+        int D(F) + U(theta) + p (J - theta) dX,   D(F) = W(F) - U(J),   U(J) = W(J^(1/3) I).
+
+    theta, p and their test functions q are constant in first-order cells (mean dilatation, B-bar for small strain) and
+    linear in second-order ones (Q2/P1). theta and p follow from u,
+
+        int theta q dX = int J q dX,   int p q dX = int U'(theta) q dX,
+
+    and the tangent is the second derivative of int D(F) + p J dX at fixed p and, from the derivative of p, one product
+    per cell:
+
+        B^T M^-1 C M^-1 B,   q^T B du = int q dJ/du . du dX,   M = int q r dX,   C = int U''(theta) q r dX.
+
+    Newton's method is that of the three fields: p in the tangent is the one of the last iterate and its linear change.
+    With p = U'(theta) instead, an iterate could turn a cell by no more than about sqrt(mu/lambda): what a straight path
+    of the nodes adds to the volume is of second order, but its pressure is not small.
+
+    Source: Simo, Taylor & Pister, Computer Methods in Applied Mechanics and Engineering 51 (1985) 177-208; Bonet &
+    Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (2008), section 8.6.5 (mean dilatation).
+    """
+
+    def __init__(
+        self, domain: fem.Domain, u: Tensor, material: Material, parameters: dict[str, Tensor], dx: ufl.Measure
+    ):
+        self.material, self.parameters = material, parameters
+        space = fem.pressure_space(domain)
+        self._u, self._ratio, self._pressure = u, fem.function(space), fem.function(space)
+        self._tangent_pressure = fem.function(space)
+        q, r, du = ufl.TestFunction(space), ufl.TrialFunction(space), ufl.TrialFunction(u.function_space)
+        theta = ufl.variable(self._ratio)
+        self._volumetric = material.volumetric(theta, **parameters)
+        pressure = ufl.diff(self._volumetric, theta)
+        J = volume_ratio(forms.deformation_gradient(u), material)
+        self._ratio_right = fem.compile_form(J * q * dx)
+        self._pressure_right = fem.compile_form(pressure * q * dx)
+        self._modulus = fem.compile_form(ufl.diff(pressure, theta) * q * r * dx)
+        self._change = fem.compile_form(q * ufl.derivative(J, u, du) * dx)
+        #: owned unknowns of q in each cell, as the columns of a matrix are ordered
+        self._cells = np.sort(fem.cell_blocks(space)[: fem.owned_cells(domain)], axis=1)
+        mass = fem.compile_form(q * r * dx)
+        self._inverse_mass = np.linalg.inv(self._blocks(fem.create_matrix(mass), mass))
+        self._C, self._B = fem.create_matrix(self._modulus), fem.create_matrix(self._change)
+        self._CB: PETSc.Mat | None = None
+        self._BCB: PETSc.Mat | None = None
+        #: displacement and pressure of the last tangent of the step
+        self._last: tuple[Array, Array] | None = None
+
+    def energy(self, F: Tensor) -> Tensor:
+        return self.material.distortional(F, **self.parameters) + self._volumetric
+
+    def potential(self, F: Tensor) -> Tensor:
+        return self.material.distortional(F, **self.parameters) + self._pressure * volume_ratio(F, self.material)
+
+    def tangent_potential(self, F: Tensor) -> Tensor:
+        distortion = self.material.distortional(F, **self.parameters)
+        return distortion + self._tangent_pressure * volume_ratio(F, self.material)
+
+    def begin_step(self) -> None:
+        self._last = None
+
+    def update(self) -> None:
+        for function, right in ((self._ratio, self._ratio_right), (self._pressure, self._pressure_right)):
+            function.x.array[:] = 0.0
+            fem.assemble_vector(right, function.x.array)
+            function.x.array[self._cells] = np.einsum("cij,cj->ci", self._inverse_mass, function.x.array[self._cells])
+            function.x.scatter_forward()
+
+    def _blocks(self, matrix: PETSc.Mat, form: Any) -> Array:
+        """A form of q and r by cells, shape (cells, n, n); `matrix` holds it, too."""
+        _assemble(matrix, form)
+        return matrix.getValuesCSR()[2].reshape(-1, self._cells.shape[1])[self._cells]
+
+    def linearise(self) -> None:
+        present = self._pressure.x.array.copy()
+        self._tangent_pressure.x.array[:] = present
+        if self._last is not None and self._CB is not None:
+            u, p = self._last
+            change, result = self._CB.createVecs()
+            change.array[:] = (self._u.x.array - u)[: change.local_size]
+            self._CB.mult(change, result)
+            self._tangent_pressure.x.array[: result.local_size] = p[: result.local_size] + result.array
+            self._tangent_pressure.x.scatter_forward()
+        self._last = self._u.x.array.copy(), present
+        self._multiply()
+
+    def _multiply(self) -> None:
+        """M^-1 C M^-1 B and B^T M^-1 C M^-1 B."""
+        C = self._inverse_mass @ self._blocks(self._C, self._modulus) @ self._inverse_mass
+        rows = np.empty((self._cells.size, self._cells.shape[1]))
+        rows[self._cells] = C
+        indptr, indices, _ = self._C.getValuesCSR()
+        self._C.setValuesCSR(indptr, indices, rows.ravel())
+        self._C.assemble()
+        _assemble(self._B, self._change)
+        self._CB = self._C.matMult(self._B, result=self._CB)
+        self._BCB = self._B.transposeMatMult(self._CB, result=self._BCB)
+
+    def complete_tangent(self, matrix: PETSc.Mat) -> None:
+        """The sparsity of B^T C B is that of the tangent."""
+        matrix.axpy(1.0, self._BCB, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+
+
+def _assemble(matrix: PETSc.Mat, form: Any) -> None:
+    matrix.zeroEntries()
+    fem.assemble_matrix(matrix, form)
+    matrix.assemble()
