@@ -18,14 +18,14 @@ from petsc4py import PETSc
 from coupling.blocks import Blocks
 from coupling.coupled import Coupled
 from solvers import linear
-from solvers.api import State, StepFailed, StepInfo
+from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.fluid.field import Fluid
 from solvers.fluid.shape import shape_derivatives
 from solvers.lagged import LaggedFactors
 from solvers.newton import Tolerance, converge
+from solvers.rounding import rounding_error
 from solvers.rows import Numbering, from_entries
 from solvers.structure.field import Structure
-
 
 class Monolithic:
     """A Scheme, and the system that Newton's method solves."""
@@ -44,6 +44,9 @@ class Monolithic:
         self._krylov: PETSc.KSP | None = None
         self._preconditioned_by: PETSc.Mat | None = None
         self._fresh_iterations = self._linear_iterations = 0
+        #: rounding errors of the residuals of structure and fluid [N], as far as this step knows
+        self._noise: Array | None = None
+        self._prepared: Blocks | None = None  #: the matrix at the present iterate, if it is there already
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -51,6 +54,7 @@ class Monolithic:
         coupled = self.coupled
         coupled.begin_step(t, dt)
         self._largest, self._krylov, self._linear_iterations = np.zeros(2), None, 0
+        self._noise = self._prepared = None
         self._direct.begin_step()
         unmoved = 0.0
         if not coupled.fluid.settings.steady:
@@ -75,15 +79,16 @@ class Monolithic:
         structure.load(interface.spread(self._force))
         found = np.array([structure.residual(), of_fluid])
         self._largest = np.maximum(self._largest, found)
-        noise = np.array([structure.round_off(), fluid.round_off()])
-        relative = np.divide(found, self._largest, out=np.zeros(2), where=found > noise)
+        self._found = found
+        above = found > (np.zeros(2) if self._noise is None else self._noise)
+        relative = np.divide(found, self._largest, out=np.zeros(2), where=above)
         self._farther = structure if relative[0] > relative[1] else fluid
         return float(relative.max() * self._largest.sum())
 
     def advance(self) -> float:
         """One Newton step; the larger of both fields' relative increments."""
         structure, fluid = self.coupled.structure, self.coupled.fluid
-        blocks = self._blocks()
+        blocks, self._prepared = self._prepared or self._blocks(), None
         b, x = blocks.create_vectors()
         own = structure.layout.size
         b.array[:own] = -structure.residual_force
@@ -137,6 +142,11 @@ class Monolithic:
             PETSc.garbage_cleanup(K.comm)  # the K of earlier iterates, on a communicator that no solver has
             K = K.copy()
             K.axpy(1.0, mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+            # what each field hears of the other is rounded too: positions and velocities of the surface, and the force
+            fluid.add_rounding(fluid.rounding_of(into_fluid, structure.rounded()))
+            structure.add_rounding(rounding_error(into_structure, fluid.flow[: fluid.unknowns.owned]))
+            structure.add_rounding(rounding_error(mass, structure.rounded()))
+            self._noise = np.array([structure.round_off(), fluid.round_off()])
             return Blocks(K, into_structure, into_fluid, A)
 
     def _coupling_blocks(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
@@ -178,8 +188,11 @@ class Monolithic:
         return self.coupled.structure.settled()
 
     def round_off(self) -> float:
-        """Rounding errors of both fields are left out of `residual` already."""
-        return 0.0
+        """No residual is too large if those of both fields are rounding errors; other ones are left out already."""
+        if self._noise is None:
+            self._prepared = self._blocks()
+        assert self._noise is not None
+        return math.inf if (self._found <= self._noise).all() else 0.0
 
     def worst(self) -> tuple[float, ...] | None:
         """Where the field that is farther off has its largest residual [m] (collective)."""

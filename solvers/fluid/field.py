@@ -25,6 +25,7 @@ from solvers.fluid.surface import Motion, Surface, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
 from solvers.lagged import LaggedFactors
 from solvers.newton import Tolerance, converge
+from solvers.rounding import rounding_error
 from solvers.timing import Timer
 
 #: Share of the largest residual of a steady flow below which Newton's method takes over from Picard's.
@@ -92,6 +93,8 @@ class Fluid:
         self._krylov: PETSc.KSP | None = None
         self.linear_iterations = 0  #: of the last linear system
         self._direct = LaggedFactors(comm, fresh=math.inf if settings.steady else 1)
+        self.rounding: Array | None = None  #: rounding error of `residual_rows`, as far as this step knows
+        self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is there already
 
     # ------------------------------------------------------------------------------------------------- the state
 
@@ -148,6 +151,7 @@ class Fluid:
         self.flow[self.boundary.dofs] = self.boundary.velocity(t + dt)
         self.system.set_scales(self.history.old.velocity)
         self._fresh, self._largest = True, 0.0
+        self.rounding = self._tangent = None  # a run that is resumed here knows nothing of the last step's
         self._direct.begin_step()
         if not self._coupled:
             self.predict()
@@ -257,7 +261,7 @@ class Fluid:
 
     def advance(self) -> float:
         """One Newton step; the increment relative to the solution."""
-        matrix = self.linearise()
+        matrix, self._tangent = self._tangent or self.linearise(), None
         b, x = matrix.createVecs()
         b.array[:] = -self.residual_rows
         try:
@@ -272,7 +276,12 @@ class Fluid:
         with self.timer("assembly"):
             matrix = self.system.tangent(self.held, picard=self._far())
         self._diagonal = np.abs(matrix.getDiagonal().array)
+        self.rounding = self.rounding_of(matrix, self.flow[: self.unknowns.owned])
         return matrix
+
+    def rounding_of(self, matrix: PETSc.Mat, values: Array) -> Array:
+        """Rounding error of the rows A x; entries are sums over the 2^dim cells at a node, which may cancel."""
+        return 2.0**self.dim * rounding_error(matrix, values)
 
     def update(self, increment: Array) -> float:
         """Add an increment of the owned dofs; its size relative to the flow."""
@@ -306,12 +315,17 @@ class Fluid:
         """Nothing is imposed that an iterate does not fulfil."""
         return True
 
+    def add_rounding(self, error: Array) -> None:
+        """Rounding errors that another field brings into the equations, after `linearise`, at owned dofs."""
+        assert self.rounding is not None
+        self.rounding = self.rounding + error
+
     def round_off(self) -> float:
-        """Rounding error of the residual, eps |u| and eps |p| seen through the diagonal of the tangent."""
-        if not hasattr(self, "_diagonal"):
-            return 0.0
-        size = np.where(self.held, 0.0, self._diagonal * np.abs(self.flow[: self.unknowns.owned]))
-        return 8.0 * float(np.finfo(float).eps) * self._norm(size)
+        """Norm [N] of the rounding error of the residual where the flow was linearised last in this step."""
+        if self.rounding is None:
+            self._tangent = self.linearise()
+        assert self.rounding is not None
+        return self._norm(np.where(self.held, 0.0, self.rounding))
 
     def worst(self) -> tuple[float, ...] | None:
         """Position [m] of the node with the largest momentum residual (collective)."""

@@ -15,6 +15,7 @@ from solvers.api import Array, Constraint, State, StepFailed, StepInfo
 from solvers.blocks import Layout, block_diagonal
 from solvers.distributed import Nodal
 from solvers.newton import Tolerance, converge
+from solvers.rounding import rounding_error
 from solvers.rows import Numbering, change_rows, fetch_rows, gather, gather_at
 from solvers.structure.body import Body
 from solvers.structure.energy import EnergyBalance
@@ -81,7 +82,8 @@ class Structure:
         self._surface_load = np.zeros(self.layout.size)
         self._target = np.zeros(self.layout.size)
         self._increment = np.zeros(self.layout.size)
-        self._diagonal = np.zeros(self.layout.size)
+        self.rounding: Array | None = None  #: rounding error of `residual_force` [N], as far as this step knows
+        self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is there already
         self._tangents = [body.create_tangent() for body in bodies]
         self._combined: PETSc.Mat | None = None
         self._b, self._x = self.layout.vector(), self.layout.vector()
@@ -143,6 +145,7 @@ class Structure:
         for body in self.bodies:
             body.element.begin_step()
         self._time = t + dt
+        self.rounding = self._tangent = None  # a run that is resumed here knows nothing of the last step's
         if self.constraint is not None:
             self.constraint.begin_step()
         self._set_time(t + dt)
@@ -232,7 +235,7 @@ class Structure:
 
     def advance(self) -> float:
         """One Newton step; returns |du| / |u|."""
-        matrix = self.linearise()
+        matrix, self._tangent = self._tangent or self.linearise(), None
         self._b.array[:] = -self.residual_force
         if self.constrained:
             matrix = self.condense(matrix, self._b)
@@ -251,8 +254,15 @@ class Structure:
         """The tangent at the present iterate, supports not yet imposed; the next call overwrites it."""
         with self.timer("assembly"):
             matrix = self.tangent()
-        self._diagonal = matrix.getDiagonal().array.copy()
+        self.rounding = rounding_error(matrix, self.rounded())
         return matrix
+
+    def rounded(self) -> Array:
+        """What is rounded at owned dofs [m]: eps |u| in u, and eps in F = I + grad u, which is eps h in u."""
+        size = np.abs(self.now.u)
+        for body, part in zip(self.bodies, self.split(size), strict=True):
+            part += body.cell_size
+        return size
 
     @property
     def constrained(self) -> bool:
@@ -308,12 +318,17 @@ class Structure:
         reached = reached and (self.constraint is None or self.constraint.settled)
         return self.comm.allreduce(reached, op=MPI.LAND)
 
+    def add_rounding(self, error: Array) -> None:
+        """Rounding errors that another field brings into the balance, after `linearise`, at owned dofs."""
+        assert self.rounding is not None
+        self.rounding = self.rounding + error
+
     def round_off(self) -> float:
-        """Rounding error of the residual: eps |u| in u and eps in F = I + grad u, seen through the stiffness."""
-        size = np.abs(self.now.u)
-        for body, part in zip(self.bodies, self.split(size), strict=True):
-            part += body.cell_size
-        return float(np.finfo(float).eps) * self.norm(self.held.free_part(self._diagonal * size))
+        """Norm [N] of the rounding error of the balance where it was linearised last in this step."""
+        if self.rounding is None:
+            self._tangent = self.linearise()
+        assert self.rounding is not None
+        return self.norm(self.held.free_part(self.rounding))
 
     def worst(self) -> tuple[float, ...] | None:
         """Reference position [m] of the node with the largest residual (collective)."""
