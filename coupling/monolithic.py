@@ -27,6 +27,7 @@ from solvers.rounding import rounding_error
 from solvers.rows import Numbering, from_entries
 from solvers.structure.field import Structure
 
+
 class Monolithic:
     """A Scheme, and the system that Newton's method solves."""
 
