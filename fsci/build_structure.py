@@ -11,8 +11,7 @@ from fsci.build import Numbers, columns
 from fsci.build_solver import build_tolerance
 from fsci.case import Case
 from fsci.case.probes import Probe
-from fsci.case.structure import NO_MIXED_SIMPLICES
-from fsci.mesh import MeshError, build_mesh, extract_region, require_surface
+from fsci.case_meshes import VECTORS, read_body
 from solvers import fem
 from solvers.api import Constraint
 from solvers.structure import materials, probes
@@ -66,8 +65,7 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
     assert case.structure is not None
     settings = case.elastic_bodies[name]
     domain = fem.distribute(comm, _mesh(case, name, comm))
-    vectors = {key: getattr(settings, key) for key in _VECTORS}
-    _check_lengths(case, name, domain.dim)
+    vectors = {key: getattr(settings, key) for key in VECTORS}
     return Body(
         domain,
         BodySettings(
@@ -82,68 +80,18 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
     )
 
 
-_VECTORS = ("gravity", "body_force", "initial_displacement", "initial_velocity")
-
-
 def _mesh(case: Case, name: str, comm: MPI.Comm) -> Any:
     """The body's mesh on rank 0, with every surface that the case names; None elsewhere."""
     error, mesh = None, None
     if comm.rank == 0:
         try:
-            mesh = _checked_mesh(case, name)
+            mesh = read_body(case, name)
         except Exception as raised:  # every process must hear of it
             error = raised
     error = comm.bcast(error, root=0)
     if error is not None:
         raise error
     return mesh
-
-
-def _checked_mesh(case: Case, name: str):
-    settings = case.elastic_bodies[name]
-    keys: tuple[str | int, ...] = ("structure", "bodies", name, "mesh")
-    try:
-        mesh = build_mesh(settings.mesh, case.folder)
-        if settings.region is not None:
-            keys = ("structure", "bodies", name, "region")
-            mesh = extract_region(mesh, settings.region)
-        if settings.element == "mixed" and mesh.cell_type[:4] in ("tria", "tetr"):
-            keys = ("structure", "bodies", name, "element")
-            raise MeshError(NO_MIXED_SIMPLICES)
-        for keys, surface in _named_surfaces(case, name):  # noqa: B007
-            require_surface(mesh, surface)
-    except MeshError as error:
-        raise case.error(keys, str(error)) from None
-    return mesh
-
-
-def _named_surfaces(case: Case, name: str):
-    """(where, surface name) of every surface of a body that the case mentions."""
-    body = case.elastic_bodies[name]
-    for section in ("supports", "tractions", "pressures"):
-        for index, entry in enumerate(getattr(body, section)):
-            for surface in entry.on:
-                yield ("structure", "bodies", name, section, index, "on"), surface
-    for pair_name, pair in ({} if case.contact is None else case.contact.pairs).items():
-        for role, side in (("slave", pair.slave), ("master", pair.master)):
-            for surface in side.on or () if side.body == name else ():
-                yield ("contact", "pairs", pair_name, role, "on"), surface
-    for probe_name, probe in _probes(case):
-        if probe.on is not None and probe.body == name:
-            yield ("probes", probe_name, "on"), probe.on
-
-
-def _check_lengths(case: Case, name: str, dim: int) -> None:
-    """Vectors have as many entries as the mesh has dimensions; for files only the mesh tells."""
-    body = case.elastic_bodies[name]
-    base = ("structure", "bodies", name)
-    vectors: list[tuple[tuple[str | int, ...], Any]] = [((*base, key), getattr(body, key)) for key in _VECTORS]
-    vectors += [((*base, "tractions", i, "value"), load.value) for i, load in enumerate(body.tractions)]
-    vectors += [((*base, "supports", i, "displacement"), s.displacement) for i, s in enumerate(body.supports)]
-    vectors += [(("probes", key, "at"), p.at) for key, p in _probes(case) if p.body == name]
-    for keys, vector in vectors:
-        if vector is not None and len(vector) != dim:
-            raise case.error(keys, f"'{keys[-1]}' has {len(vector)} entries, but the mesh is of {dim} dimensions")
 
 
 def _supports(support) -> list[Support | Symmetry]:
