@@ -8,14 +8,18 @@ from typing import Any, Literal
 from mpi4py import MPI
 
 from fsci.build import Numbers, columns
+from fsci.build_loads import Places, build_loads, find_places
 from fsci.build_solver import build_tolerance
 from fsci.case import Case
+from fsci.case.checks import load_vectors
 from fsci.case.probes import Probe
-from fsci.case_meshes import VECTORS, read_body
+from fsci.case.structure import NO_MIXED_SIMPLICES
+from fsci.mesh import MeshError, build_mesh, extract_region, require_surface
 from solvers import fem
 from solvers.api import Constraint
+from solvers.mesh import Mesh
 from solvers.structure import materials, probes
-from solvers.structure.body import Body, BodySettings, Pressure, Support, Symmetry, Traction
+from solvers.structure.body import Body, BodySettings
 from solvers.structure.field import SolverSettings, Structure
 from solvers.structure.materials import Parameter, Value
 from solvers.structure.supports import SupportError
@@ -39,7 +43,7 @@ def build_structure(
         return Structure(comm, bodies, _time_scheme(case), settings, timer, contact)
     except SupportError as error:
         supports = case.elastic_bodies[error.body].supports
-        index = next(i for i, support in enumerate(supports) if error.where in support.on)
+        index = next(i for i, support in enumerate(supports) if error.where in (support.on or ()))
         keys = ("structure", "bodies", error.body, "supports", index)
         raise case.error(keys, error.message) from None
 
@@ -64,40 +68,79 @@ def _time_scheme(case: Case) -> TimeScheme:
 def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
     assert case.structure is not None
     settings = case.elastic_bodies[name]
-    domain = fem.distribute(comm, _mesh(case, name, comm))
-    vectors = {key: getattr(settings, key) for key in VECTORS}
+    mesh, places = _mesh(case, name, comm)
+    domain = fem.distribute(comm, mesh)
+    vectors = {key: getattr(settings, key) for key in _VECTORS}
+    _check_lengths(case, name, domain.dim)
     return Body(
         domain,
         BodySettings(
             name=name,
             material=_material(settings, case.structure.plane if domain.dim == 2 else "strain"),
             element=settings.element,
-            supports=tuple(entry for support in settings.supports for entry in _supports(support)),
-            tractions=tuple(Traction(on, load.value) for load in settings.tractions for on in load.on),
-            pressures=tuple(Pressure(on, load.value) for load in settings.pressures for on in load.on),
+            **build_loads(settings, places),
             **vectors,
         ),
     )
 
 
-def _mesh(case: Case, name: str, comm: MPI.Comm) -> Any:
-    """The body's mesh on rank 0, with every surface that the case names; None elsewhere."""
-    error, mesh = None, None
+_VECTORS = ("gravity", "body_force", "initial_displacement", "initial_velocity")
+
+
+def _mesh(case: Case, name: str, comm: MPI.Comm) -> tuple[Mesh | None, Places]:
+    """The body's mesh on rank 0, with all surfaces that the case names, and where loads act on every process."""
+    error, mesh, places = None, None, {}
     if comm.rank == 0:
         try:
-            mesh = read_body(case, name)
+            mesh = _checked_mesh(case, name)
+            places = find_places(case, name, mesh)
         except Exception as raised:  # every process must hear of it
             error = raised
-    error = comm.bcast(error, root=0)
+    error, places = comm.bcast((error, places), root=0)
     if error is not None:
         raise error
+    return mesh, places
+
+
+def _checked_mesh(case: Case, name: str) -> Mesh:
+    settings = case.elastic_bodies[name]
+    keys: tuple[str | int, ...] = ("structure", "bodies", name, "mesh")
+    try:
+        mesh = build_mesh(settings.mesh, case.folder)
+        if settings.region is not None:
+            keys = ("structure", "bodies", name, "region")
+            mesh = extract_region(mesh, settings.region)
+        if settings.element == "mixed" and mesh.cell_type[:4] in ("tria", "tetr"):
+            keys = ("structure", "bodies", name, "element")
+            raise MeshError(NO_MIXED_SIMPLICES)
+        for keys, surface in _named_surfaces(case, name):  # noqa: B007
+            require_surface(mesh, surface)
+    except MeshError as error:
+        raise case.error(keys, str(error)) from None
     return mesh
 
 
-def _supports(support) -> list[Support | Symmetry]:
-    if support.symmetry:
-        return [Symmetry(surface) for surface in support.on]
-    return [Support(surface, support.displacement) for surface in support.on]
+def _named_surfaces(case: Case, name: str):
+    """(where, surface name) of every surface that contact and probes of a body name."""
+    for pair_name, pair in ({} if case.contact is None else case.contact.pairs).items():
+        for role, side in (("slave", pair.slave), ("master", pair.master)):
+            for surface in side.on or () if side.body == name else ():
+                yield ("contact", "pairs", pair_name, role, "on"), surface
+    for probe_name, probe in _probes(case):
+        if probe.on is not None and probe.body == name:
+            yield ("probes", probe_name, "on"), probe.on
+
+
+def _check_lengths(case: Case, name: str, dim: int) -> None:
+    """Vectors have as many entries as the mesh has dimensions; for files only the mesh tells."""
+    body = case.elastic_bodies[name]
+    base = ("structure", "bodies", name)
+    vectors: list[tuple[tuple[str | int, ...], Any]] = [((*base, key), getattr(body, key)) for key in _VECTORS]
+    vectors += [((*base, *keys), vector) for keys, vector in load_vectors(body)]
+    vectors += [(("probes", key, "at"), p.at) for key, p in _probes(case) if p.body == name]
+    for keys, vector in vectors:
+        if vector is not None and len(vector) != dim:
+            raise case.error(keys, f"'{keys[-1]}' has {len(vector)} entries, but the mesh is of {dim} dimensions")
 
 
 def _material(body, plane: str) -> materials.Material:

@@ -94,8 +94,12 @@ def extract_region(mesh: Mesh, name: str) -> Mesh:
     corners = CORNERS[FACET_TYPE[mesh.cell_type]]
     surfaces = {key: find_facets(part, index[facets])[:, :corners] for key, facets in mesh.surfaces.items()}
     regions = {key: np.flatnonzero(np.isin(chosen, of)) for key, of in mesh.regions.items()}
+    lines = {key: index[of][(index[of] >= 0).all(axis=1)] for key, of in mesh.lines.items()}
+    nodes = {key: index[of][index[of] >= 0] for key, of in mesh.nodes.items()}
     return replace(
         part,
+        lines={key: of for key, of in lines.items() if len(of)},
+        nodes={key: of for key, of in nodes.items() if len(of)},
         surfaces={key: facets for key, facets in surfaces.items() if len(facets)},
         regions={key: of for key, of in regions.items() if len(of)},
     )

@@ -110,7 +110,14 @@ def _mesh(content: Content) -> Mesh:
 
     index = np.full(len(content.points), -1)
     index[used] = np.arange(len(used))
-    return replace(mesh, regions=_regions(content, dim, place), surfaces=_surfaces(content, mesh, index), note=note)
+    return replace(
+        mesh,
+        regions=_regions(content, dim, place),
+        surfaces=_surfaces(content, mesh, index),
+        lines=_lines(content, index) if dim == 3 else {},
+        nodes=_nodes(content, index),
+        note=note,
+    )
 
 
 def _completed(content: Content) -> tuple[Content, str]:
@@ -176,6 +183,28 @@ def _surfaces(content: Content, mesh: Mesh, index: Indices) -> dict[str, Indices
             inside = np.isin(boundary, index[nodes]).all(axis=1)
             surfaces.setdefault(name, boundary[inside])
     return {name: facets for name, facets in surfaces.items() if len(facets)}
+
+
+def _lines(content: Content, index: Indices) -> dict[str, Indices]:
+    """Groups of lines, those that lie in the mesh; `index` takes the file's nodes to the mesh's."""
+    parts: dict[str, list[Indices]] = {}
+    for name, block, cells in content.groups:
+        if FIRST_ORDER.get(content.blocks[block].cell_type) == "line":
+            parts.setdefault(name, []).append(index[content.blocks[block].nodes[cells]])
+    lines = {name: np.unique(np.concatenate(nodes), axis=0) for name, nodes in parts.items()}
+    inside = {name: nodes[(nodes >= 0).all(axis=1)] for name, nodes in lines.items()}
+    return {name: nodes for name, nodes in inside.items() if len(nodes)}
+
+
+def _nodes(content: Content, index: Indices) -> dict[str, Indices]:
+    """Groups of points and sets of them, those that are nodes of the mesh; `index` as above."""
+    parts = {name: [nodes] for name, nodes in content.point_sets.items()}
+    for name, block, cells in content.groups:
+        if content.blocks[block].cell_type == "vertex":
+            parts.setdefault(name, []).append(content.blocks[block].nodes[cells, 0])
+    found = {name: np.unique(index[np.concatenate(nodes)]) for name, nodes in parts.items()}
+    inside = {name: nodes[nodes >= 0] for name, nodes in found.items()}
+    return {name: nodes for name, nodes in inside.items() if len(nodes)}
 
 
 def _read_gmsh(path: Path, order: int | None, parameters: Mapping[str, float]) -> Content:
@@ -274,6 +303,8 @@ def _gmsh_type(kind: int) -> tuple[str, Indices]:
     names |= {8: "line3", 9: "triangle6", 10: "quad9", 11: "tetra10", 12: "hexahedron27"}
     names |= {16: "quad8", 17: "hexahedron20"}
     name, dim, _, count, positions, _ = gmsh.model.mesh.getElementProperties(kind)
+    if name == "Point":
+        return "vertex", np.arange(count)
     if kind not in names:
         return name, np.arange(count)
     ours = reference_nodes(FULL.get(names[kind], names[kind]))[:count]

@@ -22,4 +22,8 @@ class Mesh:
         default_factory=dict
     )  #: name -> corner nodes, shape (facets, corners)
     regions: dict[str, NDArray[np.int64]] = field(default_factory=dict)  #: name -> cell indices
+    lines: dict[str, NDArray[np.int64]] = field(
+        default_factory=dict
+    )  #: in space: name -> nodes of lines, shape (lines, 2 or 3): both ends, then the middle
+    nodes: dict[str, NDArray[np.int64]] = field(default_factory=dict)  #: name of points -> their nodes
     note: str = ""  #: what was changed when the mesh was read, for the user

@@ -49,7 +49,7 @@ MISTAKES = [
     ("solver:", "coupling: {}\nsolver:", "20:11: 'coupling' needs the section 'fluid'", "{}"),
     (", end: 1}", "}", "3:1: missing setting 'end' in 'time'", "time"),
     ("time: {step: 0.1, end: 1}\n", "", "1:1: missing setting 'time'", "title"),
-    ("{on: left, d", "{d", "11:11: missing setting 'on' in entry 1 of 'supports'", "{displacement"),
+    ("{on: left, d", "{d", "11:11: entry 1 of 'supports' needs 'on: NAME' or 'at: [..]'", "{displacement"),
     (
         "  energy:",
         "  my energy:",
@@ -153,7 +153,12 @@ MISTAKES = [
         "0.3",
     ),
     ("[0, 0]}", "[0, 0], symmetry: true}", "11:54: give either 'displacement' or 'symmetry: true', not both", "true"),
-    (", displacement: [0, 0]", "", "11:11: a support needs 'displacement' or 'symmetry: true'", "{on: left}"),
+    (
+        ", displacement: [0, 0]",
+        "",
+        "11:11: a support needs 'displacement', 'direction', 'normal: true' or 'symmetry: true'",
+        "{on: left}",
+    ),
     ("at: [2, 0.5]", "at: [2, 0], on: top", "16:49: give either 'at' or 'on', not both", "top"),
     (", at: [2, 0.5]", "", "16:19: quantity 'displacement' needs 'at: [..]' or 'on: SURFACE'", "displacement"),
     ("quantity: energy", "quantity: reaction, at: [0, 0]", "17:36: quantity 'reaction' needs 'on: SURFACE'", "[0, 0]"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from fsci.case.case import Case
 from fsci.case.contact import Contact, Side
@@ -79,18 +80,31 @@ def _element(case: Case, structure: Structure, body: Body, keys: Keys) -> Iterat
 
 
 def _surfaces(body: Body, keys: Keys) -> Iterator[Mistake]:
-    for kind in ("supports", "tractions", "pressures"):
+    for kind in ("supports", "springs", "tractions", "pressures"):
         for i, item in enumerate(getattr(body, kind)):
-            yield from surfaces_mistakes(body.mesh, item.on, (*keys, kind, i, "on"))
+            yield from surfaces_mistakes(body.mesh, item.on or (), (*keys, kind, i, "on"))
+    for kind, word in (("line_forces", "lines"), ("point_forces", "points")):
+        for i, item in enumerate(getattr(body, kind)):
+            if item.on is not None and isinstance(body.mesh, Shape):
+                hint = "; give its position with 'at'" if word == "points" else ""
+                yield (*keys, kind, i, "on"), f"a built-in shape has no {word} with names{hint}"
 
 
 def _vectors(case: Case, body: Body, keys: Keys) -> Iterator[Mistake]:
     for name in VECTORS:
         yield from length_mistakes(getattr(body, name), case.dimension, (*keys, name))
-    for i, support in enumerate(body.supports):
-        yield from length_mistakes(support.displacement, case.dimension, (*keys, "supports", i, "displacement"))
-    for i, traction in enumerate(body.tractions):
-        yield from length_mistakes(traction.value, case.dimension, (*keys, "tractions", i, "value"))
+    for place, vector in load_vectors(body):
+        yield from length_mistakes(vector, case.dimension, (*keys, *place))
+
+
+def load_vectors(body: Body) -> Iterator[tuple[Keys, tuple[Any, ...]]]:
+    """Path from a body and value of all vectors of its supports, springs and loads."""
+    for kind in ("supports", "springs", "tractions", "line_forces", "point_forces"):
+        for i, item in enumerate(getattr(body, kind)):
+            for name in ("at", "displacement", "direction", "value"):
+                vector = getattr(item, name, None)
+                if isinstance(vector, tuple):
+                    yield (kind, i, name), vector
 
 
 def _needs(structure: Structure, body: Body, keys: Keys) -> Iterator[Mistake]:

@@ -55,8 +55,8 @@ class Probe(Section):
     Of the structure:
 
     - with `at`, at a point (reference coordinates): displacement, velocity, acceleration
-    - with `on`, on a surface: reaction (force of the supports), traction (integral of P N over the reference surface),
-      displacement (mean over the area), area
+    - with `on`, on a surface: reaction (force of supports and springs), traction (integral of P N over the reference
+      surface), displacement (mean over the area), area
     - with `pair`, of a pair of contact: gap (distance of the slave nodes to the master) and pressure (at the slave
       nodes), the `extreme` of all nodes, or at the node nearest to the point `at`; first_contact (time of the end of
       the first step in which the pair touches, nan before)

@@ -6,19 +6,17 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, model_validator
 
+from fsci.case.loads import LineForce, PointForce, Pressure, Traction
 from fsci.case.material import Material
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
+from fsci.case.supports import Spring, Support
 from fsci.case.values import (
-    Entries,
-    Formula,
     Name,
     NotNegative,
     Number,
     Positive,
     Share,
-    Surfaces,
-    Switch,
     Text,
     Vector,
 )
@@ -63,38 +61,6 @@ class Dynamics(Section):
         return data if given or data.get("rho_inf") is not None else data | {"rho_inf": 1.0}
 
 
-class Support(Section):
-    """Surfaces whose displacement is prescribed, or that are planes of symmetry."""
-
-    on: Surfaces = setting(..., "name of a surface, or list of names")
-    displacement: Annotated[tuple[Formula | None, ...], Entries(2, 3)] | None = setting(
-        None, "displacement by components; null leaves one free", unit="m"
-    )
-    symmetry: Switch = setting(False, "true: only the component normal to the plane (along an axis) is held")
-
-    @model_validator(mode="after")
-    def _one_kind(self) -> Support:
-        if self.displacement is not None and self.symmetry:
-            raise fault("give either 'displacement' or 'symmetry: true', not both", "symmetry")
-        if self.displacement is None and not self.symmetry:
-            raise fault("a support needs 'displacement' or 'symmetry: true'")
-        return self
-
-
-class Traction(Section):
-    """A dead load: it keeps its direction and acts on the reference area."""
-
-    on: Surfaces = setting(..., "name of a surface, or list of names")
-    value: Vector = setting(..., "force per reference area", unit="Pa")
-
-
-class Pressure(Section):
-    """A follower load: it stays normal to the deformed surface."""
-
-    on: Surfaces = setting(..., "name of a surface, or list of names")
-    value: Formula = setting(..., "pressure; a positive one pushes against the surface", unit="Pa")
-
-
 #: Why a body of triangles or tetrahedra cannot have mixed elements.
 NO_MIXED_SIMPLICES = (
     "'mixed' is for quadrilaterals and hexahedra; take 'displacement' and second order for triangles and tetrahedra"
@@ -116,10 +82,13 @@ class Body(Section):
         "finite", "linear: small displacements, Hooke's law with the constants of the material at small strain"
     )
     supports: tuple[Support, ...] = setting(tuple, "where the body is held")
+    springs: tuple[Spring, ...] = setting(tuple, "where it is held elastically")
     gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
     body_force: Vector | None = setting(None, "force per reference volume", unit="N/m^3")
     tractions: tuple[Traction, ...] = setting(tuple, "dead loads on surfaces")
     pressures: tuple[Pressure, ...] = setting(tuple, "follower loads on surfaces")
+    line_forces: tuple[LineForce, ...] = setting(tuple, "dead loads along lines, 3D only")
+    point_forces: tuple[PointForce, ...] = setting(tuple, "dead loads at points")
     initial_displacement: Vector | None = setting(None, "displacement at the start", unit="m")
     initial_velocity: Vector | None = setting(None, "velocity at the start", unit="m/s")
 

@@ -73,9 +73,11 @@ class Springs:
 
     def _add(self, body: Body, blocks, values: Array) -> None:
         """Add matrices (entities, nodes, dim, nodes, dim) at the dofs of (entities, nodes)."""
+        size = body.dim * blocks.shape[1]
         dofs = body.dim * blocks[:, :, None] + np.arange(body.dim, dtype=np.int32)
-        rows = dofs.reshape(len(dofs), -1).astype(PETSc.IntType)
-        self.matrix.setValuesLocalRCV(rows, rows, values.reshape(len(rows), rows.shape[1], -1), addv=True)
+        rows = dofs.reshape(len(blocks), size).astype(PETSc.IntType)
+        if len(blocks):  # petsc4py divides by it
+            self.matrix.setValuesLocalRCV(rows, rows, values.reshape(len(blocks), size, size), addv=True)
 
 
 def _tensor(spring: Spring, normals: Array) -> Array:

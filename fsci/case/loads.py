@@ -1,0 +1,38 @@
+"""Loads of a body, except those on its volume."""
+
+from __future__ import annotations
+
+from fsci.case.section import Section, setting
+from fsci.case.supports import AT, Placed
+from fsci.case.values import Formula, NumberVector, Surfaces, Vector
+
+
+class Traction(Section):
+    """A dead load: it keeps its direction and acts on the reference area."""
+
+    on: Surfaces = setting(..., "name of a surface, or list of names")
+    value: Vector = setting(..., "force per reference area", unit="Pa")
+
+
+class Pressure(Section):
+    """A follower load: it stays normal to the deformed surface."""
+
+    on: Surfaces = setting(..., "name of a surface, or list of names")
+    value: Formula = setting(..., "pressure; a positive one pushes against the surface", unit="Pa")
+
+
+class LineForce(Section):
+    """A dead load along lines of a mesh in space."""
+
+    on: Surfaces = setting(..., "name of a line of a mesh file, or list of names")
+    value: Vector = setting(..., "force per reference length", unit="N/m")
+
+
+class PointForce(Placed):
+    """A dead load at points. Near them the deformation of a solid grows without bound as cells get smaller."""
+
+    on: Surfaces | None = setting(
+        None, "name of points of a mesh file, or list of names: each of them carries the force"
+    )
+    at: NumberVector | None = setting(None, AT, unit="m")
+    value: Vector = setting(..., "force; in 2D per depth", unit="N")
