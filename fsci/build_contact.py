@@ -8,8 +8,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fsci.case import Case
-from fsci.mesh import MeshError, build_mesh, require_surface
+from fsci.case import Case, CaseError
+from fsci.case_meshes import read_obstacle
 from solvers.blocks import Layout
 from solvers.contact.contact import Contact
 from solvers.contact.pair import Pair
@@ -96,15 +96,11 @@ def _obstacle(case: Case, comm: MPI.Comm, name: str) -> Surface:
     settings = case.contact.obstacles[name]
     found, error = None, None
     if comm.rank == 0:
-        keys: tuple[str | int, ...] = ("contact", "obstacles", name, "mesh")
         try:
-            mesh = build_mesh(settings.mesh, case.folder)
-            keys = ("contact", "obstacles", name, "on")
-            for surface in settings.on:
-                require_surface(mesh, surface)
+            mesh = read_obstacle(case, name)
             found = (*_cut_out(mesh, settings.on)[:2], FACET_TYPE[mesh.cell_type])
-        except MeshError as problem:
-            error = case.error(keys, str(problem))
+        except CaseError as problem:
+            error = problem
     error = comm.bcast(error, root=0)
     if error is not None:
         raise error

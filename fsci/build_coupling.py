@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,35 +16,23 @@ from coupling.interface import DrySide, Interface, Wetted
 from coupling.monolithic import Monolithic
 from coupling.partitioned import Partitioned, Tolerance
 from fsci.build_contact import global_dofs
-from fsci.build_fluid import build_fluid, build_rigid_bodies, require_inside_period
+from fsci.build_fluid import build_fluid, build_rigid_bodies
 from fsci.build_solver import build_tolerance
 from fsci.case import Case
 from fsci.case.coupling_checks import closed_in
-from fsci.dry_side import DrySideError, close, find_ends
-from fsci.mesh import MeshError, require_surface
+from fsci.case_meshes import require_inside_period
+from fsci.dry_side import find_ends
+from fsci.skin import Skin, cut_out_skin
 from solvers.api import Scheme
 from solvers.blocks import Layout
 from solvers.fluid.field import Body as Bather
-from solvers.fluid.probes import winding
+from solvers.fluid.inside import winding
 from solvers.fluid.surface import Motion, Surface
 from solvers.structure.body import Body
 from solvers.structure.field import Structure
-from solvers.tessellation import tessellate
 from solvers.timing import Timer
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Skin:
-    """The boundary of an elastic body as the fluid sees it; the same on every process."""
-
-    name: str
-    points: Array  #: reference positions [m], shape (n, dim)
-    facets: NDArray[np.int64]
-    nodes: NDArray[np.int64]  #: numbers in the mesh
-    wet: NDArray[np.bool_] | None  #: facets that the case names; None: it names none
-    corners: Array | None  #: of the line that closes the solid behind a wetted surface [m]; None: it is closed
 
 
 def build_coupled(
@@ -112,41 +100,15 @@ def _skin(case: Case, comm: MPI.Comm, body: Body) -> Skin:
     found: Any = None
     if comm.rank == 0:
         try:
-            found = _cut_out(case, body)
-        except MeshError as error:
-            found = case.error(("coupling", "wetted", body.name), str(error))
-        except DrySideError as error:
-            found = case.error(("coupling", "dry_side", body.name), str(error))
+            assert body.domain.source is not None
+            found = cut_out_skin(case, body.name, body.domain.source)
+        except Exception as raised:  # every process must hear of it
+            found = raised
     found = comm.bcast(found, root=0)
     if isinstance(found, Exception):
         raise found
     require_inside_period(case, ("structure", "bodies", body.name), found.points)
     return found
-
-
-def _cut_out(case: Case, body: Body) -> Skin:
-    """On rank 0. Raises MeshError and DrySideError."""
-    mesh = body.domain.source
-    assert mesh is not None
-    assert case.coupling is not None
-    names = case.coupling.wetted.get(body.name)
-    for name in names or ():
-        require_surface(mesh, name)
-    if body.name in case.coupling.dry_side:
-        assert case.fluid is not None
-        facets, nodes = tessellate(mesh, names)
-        given, box = case.coupling.dry_side[body.name], (case.fluid.grid.start, case.fluid.grid.to)
-        middles = mesh.points[mesh.cells].mean(axis=1)
-        low, high = (np.array(corner) for corner in box)
-        corners = close(mesh.points[nodes], facets, middles, np.array(given), (low, high))
-        return Skin(body.name, mesh.points[nodes], facets, nodes, np.ones(len(facets), dtype=bool), corners)
-    facets, nodes = tessellate(mesh)
-    wet = None
-    if names is not None:
-        some, some_nodes = tessellate(mesh, names)
-        chosen = {tuple(facet) for facet in np.sort(some_nodes[some], axis=1).tolist()}
-        wet = np.array([tuple(facet) in chosen for facet in np.sort(nodes[facets], axis=1).tolist()])
-    return Skin(body.name, mesh.points[nodes], facets, nodes, wet, None)
 
 
 def _dry_side(skin: Skin, corners: Array) -> DrySide:

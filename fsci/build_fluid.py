@@ -14,16 +14,16 @@ from fsci.build_solver import build_tolerance
 from fsci.case import Case
 from fsci.case.fluid import Fluid as Section
 from fsci.case.probes import Reference
-from fsci.mesh import MeshError, build_mesh, require_surface
+from fsci.case_meshes import read_rigid_body, require_inside_period
 from fsci.rigid_motion import rigid_motion
 from solvers.fluid import probes
 from solvers.fluid.field import Body, Fluid, SolverSettings
 from solvers.fluid.forms import ELASTIC, Penalties
 from solvers.fluid.grid import Grid
+from solvers.fluid.inside import PointInBody
 from solvers.fluid.patches import Patch, UncoveredFaces, Value
 from solvers.fluid.surface import Motion, Surface
 from solvers.fluid.system import FlowSettings
-from solvers.tessellation import is_closed, tessellate
 from solvers.timing import Timer
 
 Array = NDArray[np.float64]
@@ -90,7 +90,7 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
     found: Any = None
     if comm.rank == 0:
         try:
-            found = _surface(case, name)
+            found = read_rigid_body(case, name)[1:]
         except Exception as raised:  # every process must hear of it
             found = raised
     found = comm.bcast(found, root=0)
@@ -105,39 +105,6 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
     moved = rigid_motion(points, movement, case.time.start, case.time.step)
     require_inside_period(case, ("fluid", "bodies", name), moved(case.time.start)[0])
     return Body(surface, lambda t: Motion(*moved(t)))
-
-
-def require_inside_period(case: Case, keys: tuple[str | int, ...], points: Array) -> None:
-    """Bodies stay out of the first and the last layer of cells of a period. Raises CaseError."""
-    assert case.fluid is not None
-    for axis in sorted({face[0] for patch in case.fluid.patches.values() if patch.periodic for face in patch.on}):
-        index = "xyz".index(axis)
-        planes = case.fluid.grid.edges(index)
-        if points[:, index].min() < planes[1] or points[:, index].max() > planes[-2]:
-            room = f"{planes[1]:g} to {planes[-2]:g}"
-            message = f"the body must be within the period along {axis}, without the cells at its ends: {room}"
-            raise case.error(keys, message)
-
-
-def _surface(case: Case, name: str) -> tuple[Array, NDArray[np.int64]]:
-    """(points [m], segments or triangles) of a body's closed surface."""
-    assert case.fluid is not None
-    settings, dim = case.fluid.bodies[name], case.fluid.grid.dimension
-    base: tuple[str | int, ...] = ("fluid", "bodies", name)
-    keys = (*base, "mesh")
-    try:
-        mesh = build_mesh(settings.mesh, case.folder)
-        if mesh.points.shape[1] != dim:
-            raise MeshError(f"the mesh is {mesh.points.shape[1]}D, but the grid is {dim}D")
-        keys = (*base, "on")
-        for surface in settings.on or ():
-            require_surface(mesh, surface)
-        facets, nodes = tessellate(mesh, settings.on)
-        if not is_closed(facets):
-            raise MeshError("these surfaces do not enclose the body: name all of them")
-    except (MeshError, ValueError) as error:
-        raise case.error(keys, str(error)) from None
-    return mesh.points[nodes], facets
 
 
 # ---------------------------------------------------------------------------------------------------------- probes
@@ -189,5 +156,5 @@ def _at(case: Case, fluid: Fluid, name: str, key: str) -> probes.Probe:
     settings = case.probes[name]
     try:
         return probes.at_point(fluid, settings.quantity, getattr(settings, key), case.time.start)
-    except probes.PointInBody as error:
+    except PointInBody as error:
         raise case.error(("probes", name, key), str(error)) from None

@@ -6,49 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from fsci.case import Case
 from fsci.case.structure import Body as Section
 from fsci.case.supports import Spring as SpringSection
 from fsci.case.supports import Support as SupportSection
-from fsci.mesh import MeshError, require_surface
-from fsci.places import find_group, find_lines, find_node
-from solvers.mesh import Mesh
+from fsci.places import Places
 from solvers.structure.body import Spring, Support, Symmetry
 from solvers.structure.loads import LineForce, PointForce, Pressure, Traction
 from solvers.structure.supports import Roller
-
-#: (setting of the body, number of the entry) -> where it acts: a surface, nodes, or (nodes, positions) of lines
-Places = dict[tuple[str, int], list[Any]]
-
-KINDS = {"supports": ("surface", "line", "points"), "springs": ("surface", "points"), "point_forces": ("points",)}
-
-
-def find_places(case: Case, name: str, mesh: Mesh) -> Places:
-    """Where supports, springs and loads of a body act. Raises CaseError."""
-    body, places = case.elastic_bodies[name], {}
-    for section in (*KINDS, "tractions", "pressures", "line_forces"):
-        for index, entry in enumerate(getattr(body, section)):
-            at = getattr(entry, "at", None)
-            key = "on" if at is None else "at"
-            try:
-                found = (
-                    [find_node(mesh, at)] if at is not None else [_find(mesh, section, entry, on) for on in entry.on]
-                )
-            except MeshError as error:
-                raise case.error(("structure", "bodies", name, section, index, key), str(error)) from None
-            places[section, index] = found
-    return places
-
-
-def _find(mesh: Mesh, section: str, entry: Any, name: str) -> Any:
-    if section in ("tractions", "pressures"):
-        require_surface(mesh, name)
-        return name
-    if section == "line_forces":
-        lines = find_lines(mesh, name)
-        return lines, mesh.points[lines]
-    flat = getattr(entry, "normal", False) or getattr(entry, "symmetry", False)
-    return find_group(mesh, name, ("surface",) if flat else KINDS[section])
 
 
 def build_loads(body: Section, places: Places) -> dict[str, tuple[Any, ...]]:

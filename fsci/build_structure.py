@@ -8,13 +8,12 @@ from typing import Any, Literal
 from mpi4py import MPI
 
 from fsci.build import Numbers, columns
-from fsci.build_loads import Places, build_loads, find_places
+from fsci.build_loads import build_loads
 from fsci.build_solver import build_tolerance
 from fsci.case import Case
-from fsci.case.checks import load_vectors
 from fsci.case.probes import Probe
-from fsci.case.structure import NO_MIXED_SIMPLICES
-from fsci.mesh import MeshError, build_mesh, extract_region, require_surface
+from fsci.case_meshes import VECTORS, read_body
+from fsci.places import Places, find_places
 from solvers import fem
 from solvers.api import Constraint
 from solvers.mesh import Mesh
@@ -70,8 +69,7 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
     settings = case.elastic_bodies[name]
     mesh, places = _mesh(case, name, comm)
     domain = fem.distribute(comm, mesh)
-    vectors = {key: getattr(settings, key) for key in _VECTORS}
-    _check_lengths(case, name, domain.dim)
+    vectors = {key: getattr(settings, key) for key in VECTORS}
     return Body(
         domain,
         BodySettings(
@@ -84,15 +82,12 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
     )
 
 
-_VECTORS = ("gravity", "body_force", "initial_displacement", "initial_velocity")
-
-
 def _mesh(case: Case, name: str, comm: MPI.Comm) -> tuple[Mesh | None, Places]:
     """The body's mesh on rank 0, with all surfaces that the case names, and where loads act on every process."""
     error, mesh, places = None, None, {}
     if comm.rank == 0:
         try:
-            mesh = _checked_mesh(case, name)
+            mesh = read_body(case, name)
             places = find_places(case, name, mesh)
         except Exception as raised:  # every process must hear of it
             error = raised
@@ -100,47 +95,6 @@ def _mesh(case: Case, name: str, comm: MPI.Comm) -> tuple[Mesh | None, Places]:
     if error is not None:
         raise error
     return mesh, places
-
-
-def _checked_mesh(case: Case, name: str) -> Mesh:
-    settings = case.elastic_bodies[name]
-    keys: tuple[str | int, ...] = ("structure", "bodies", name, "mesh")
-    try:
-        mesh = build_mesh(settings.mesh, case.folder)
-        if settings.region is not None:
-            keys = ("structure", "bodies", name, "region")
-            mesh = extract_region(mesh, settings.region)
-        if settings.element == "mixed" and mesh.cell_type[:4] in ("tria", "tetr"):
-            keys = ("structure", "bodies", name, "element")
-            raise MeshError(NO_MIXED_SIMPLICES)
-        for keys, surface in _named_surfaces(case, name):  # noqa: B007
-            require_surface(mesh, surface)
-    except MeshError as error:
-        raise case.error(keys, str(error)) from None
-    return mesh
-
-
-def _named_surfaces(case: Case, name: str):
-    """(where, surface name) of every surface that contact and probes of a body name."""
-    for pair_name, pair in ({} if case.contact is None else case.contact.pairs).items():
-        for role, side in (("slave", pair.slave), ("master", pair.master)):
-            for surface in side.on or () if side.body == name else ():
-                yield ("contact", "pairs", pair_name, role, "on"), surface
-    for probe_name, probe in _probes(case):
-        if probe.on is not None and probe.body == name:
-            yield ("probes", probe_name, "on"), probe.on
-
-
-def _check_lengths(case: Case, name: str, dim: int) -> None:
-    """Vectors have as many entries as the mesh has dimensions; for files only the mesh tells."""
-    body = case.elastic_bodies[name]
-    base = ("structure", "bodies", name)
-    vectors: list[tuple[tuple[str | int, ...], Any]] = [((*base, key), getattr(body, key)) for key in _VECTORS]
-    vectors += [((*base, *keys), vector) for keys, vector in load_vectors(body)]
-    vectors += [(("probes", key, "at"), p.at) for key, p in _probes(case) if p.body == name]
-    for keys, vector in vectors:
-        if vector is not None and len(vector) != dim:
-            raise case.error(keys, f"'{keys[-1]}' has {len(vector)} entries, but the mesh is of {dim} dimensions")
 
 
 def _material(body, plane: str) -> materials.Material:

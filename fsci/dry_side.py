@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coupling.coupled import Coupled
 from solvers.api import Snapshot
-from solvers.fluid.probes import winding
+from solvers.fluid.inside import winding
 from solvers.fluid.surface import Motion
+
+if TYPE_CHECKING:
+    from coupling.coupled import Coupled
 
 Array = NDArray[np.float64]
 Facets = NDArray[np.int64]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.mesh import MeshError
+from fsci.case import Case
+from fsci.mesh import MeshError, require_surface
 from fsci.mesh_files import unknown
 from solvers.mesh import Mesh
 
@@ -16,6 +18,40 @@ Where = str | NDArray[np.int64]
 
 #: Distance, in sizes of the body, within which a node is the one that is meant.
 TOLERANCE = 1e-6
+
+
+#: (setting of the body, number of the entry) -> where it acts: a surface, nodes, or (nodes, positions) of lines
+Places = dict[tuple[str, int], list[Any]]
+
+KINDS = {"supports": ("surface", "line", "points"), "springs": ("surface", "points"), "point_forces": ("points",)}
+
+
+def find_places(case: Case, name: str, mesh: Mesh) -> Places:
+    """Where supports, springs and loads of a body act. Raises CaseError."""
+    body, places = case.elastic_bodies[name], {}
+    for section in (*KINDS, "tractions", "pressures", "line_forces"):
+        for index, entry in enumerate(getattr(body, section)):
+            at = getattr(entry, "at", None)
+            key = "on" if at is None else "at"
+            try:
+                found = (
+                    [find_node(mesh, at)] if at is not None else [_find(mesh, section, entry, on) for on in entry.on]
+                )
+            except MeshError as error:
+                raise case.error(("structure", "bodies", name, section, index, key), str(error)) from None
+            places[section, index] = found
+    return places
+
+
+def _find(mesh: Mesh, section: str, entry: Any, name: str) -> Any:
+    if section in ("tractions", "pressures"):
+        require_surface(mesh, name)
+        return name
+    if section == "line_forces":
+        lines = find_lines(mesh, name)
+        return lines, mesh.points[lines]
+    flat = getattr(entry, "normal", False) or getattr(entry, "symmetry", False)
+    return find_group(mesh, name, ("surface",) if flat else KINDS[section])
 
 
 def find_node(mesh: Mesh, at: Sequence[float]) -> NDArray[np.int64]:

@@ -18,7 +18,7 @@ from fsci.picture import plot_run
 from fsci.rigid_motion import rigid_motion
 from fsci.run import FINISHED, run_case
 from fsci.scene import UPRIGHT
-from solvers.fluid.probes import winding
+from solvers.fluid.inside import winding
 from solvers.fluid.snapshot import vertex_areas
 from solvers.fluid.surface import Motion, normals
 from solvers.tessellation import is_closed, tessellate

@@ -6,13 +6,12 @@ from dataclasses import dataclass, field
 
 import basix
 import numpy as np
-import ufl
-from dolfinx import cpp
 from dolfinx import mesh as dolfinx_mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.fem.calls import calls
 from solvers.mesh import Mesh
 from solvers.mesh_topology import CORNERS, FACET_TYPE
 
@@ -97,8 +96,7 @@ def distribute(comm: MPI.Comm, mesh: Mesh | None) -> Domain:
         cells, points = np.ascontiguousarray(mesh.cells[:, np.argsort(vtk)], dtype=np.int64), mesh.points
     else:
         cells, points = np.empty((0, len(vtk)), dtype=np.int64), np.empty((0, dim))
-    element = ufl.VectorElement("Lagrange", ufl.Cell(name, geometric_dimension=dim), degree)
-    distributed = dolfinx_mesh.create_mesh(comm, cells, points, ufl.Mesh(element))
+    distributed = calls.create_mesh(comm, cells, points, name, degree)
     domain = Domain(distributed, cell_type, degree, nodes, source=mesh)
     return Domain(**{**vars(domain), "surfaces": _find_surfaces(domain, named)})
 
@@ -109,9 +107,8 @@ def _find_surfaces(domain: Domain, named: dict[str, NDArray[np.int64]]) -> dict[
     dim = mesh.topology.dim
     mesh.topology.create_connectivity(dim - 1, dim)
     exterior = np.sort(exterior_facets(domain))
-    geometry = cpp.mesh.entities_to_geometry(mesh._mesh, dim - 1, exterior, False)
-    corners = input_nodes(domain)[geometry].reshape(len(exterior), CORNERS[FACET_TYPE[domain.cell_type]])
-    corners = np.sort(corners, axis=1)
+    corners = input_nodes(domain)[calls.facet_nodes(mesh, exterior)]
+    corners = np.sort(corners.reshape(len(exterior), CORNERS[FACET_TYPE[domain.cell_type]]), axis=1)
     facet_of = {tuple(corner): facet for corner, facet in zip(corners.tolist(), exterior, strict=True)}
     found = {}
     for name, facets in named.items():
@@ -125,7 +122,7 @@ def exterior_facets(domain: Domain) -> NDArray[np.int32]:
     mesh = domain.mesh
     mesh.topology.create_entities(mesh.topology.dim - 1)
     mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
-    return np.asarray(cpp.mesh.exterior_facet_indices(mesh.topology), dtype=np.int32)
+    return calls.exterior_facets(mesh)
 
 
 def input_nodes(domain: Domain) -> NDArray[np.int64]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import ufl
-from dolfinx import cpp, fem, jit
+from dolfinx import fem
 from dolfinx import mesh as dolfinx_mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array
+from solvers.fem.calls import calls
 from solvers.fem.domain import Domain
 from solvers.fem.quiet import quiet
 
@@ -18,10 +21,10 @@ from solvers.fem.quiet import quiet
 COMPILE_OPTIONS = {"cffi_extra_compile_args": ["-O3", "-march=native"], "timeout": 300}
 
 
-def compile_form(form: ufl.Form) -> fem.FormMetaClass:
+def compile_form(form: ufl.Form) -> Any:
     """Compile a UFL form for this machine (cached on disk)."""
     with quiet():
-        return fem.form(form, jit_params=COMPILE_OPTIONS)
+        return calls.compile_form(form, COMPILE_OPTIONS)
 
 
 class Integral:
@@ -31,29 +34,12 @@ class Integral:
     """
 
     def __init__(self, domain: Domain, form: ufl.Form):
-        self.domain = domain
         with quiet():
-            self._compiled, self._module, _ = jit.ffcx_jit(domain.comm, form, jit_params=COMPILE_OPTIONS)
-        coefficients = form.coefficients()
-        order = [self._compiled.original_coefficient_position[i] for i in range(self._compiled.num_coefficients)]
-        self._coefficients = [coefficients[i]._cpp_object for i in order]
-        self._constants = [constant._cpp_object for constant in form.constants()]
-        self._spaces = [argument.ufl_function_space()._cpp_object for argument in form.arguments()]
+            self._compiled = calls.Compiled(domain.mesh, form, COMPILE_OPTIONS)
 
-    def on(self, **entities: NDArray[np.int32]) -> cpp.fem.Form_float64:
+    def on(self, **entities: NDArray[np.int32]) -> Any:
         """The form over sorted local entities; measures must carry the subdomain number 1."""
-        mesh = self.domain.mesh
-        types = {"cell": self.domain.dim, "exterior_facet": self.domain.dim - 1, "interior_facet": self.domain.dim - 1}
-        tags = {
-            getattr(cpp.fem.IntegralType, name): cpp.mesh.MeshTags_int32(
-                mesh._mesh, types[name], np.asarray(local, dtype=np.int32), np.ones(len(local), dtype=np.int32)
-            )
-            for name, local in entities.items()
-        }
-        pointer = self._module.ffi.cast("uintptr_t", self._module.ffi.addressof(self._compiled))
-        return cpp.fem.create_form_float64(
-            int(pointer), self._spaces, self._coefficients, self._constants, tags, mesh._mesh
-        )
+        return self._compiled.on(entities)
 
 
 def measure(domain: Domain, kind: str, degree: int) -> ufl.Measure:
@@ -80,7 +66,7 @@ def constant(domain: Domain, value: float) -> fem.Constant:
     return fem.Constant(domain.mesh, PETSc.ScalarType(value))
 
 
-def assemble_scalar(form: fem.FormMetaClass, comm: MPI.Comm) -> float:
+def assemble_scalar(form: Any, comm: MPI.Comm) -> float:
     """Sum of a functional over all processes."""
     return comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM)
 
@@ -91,24 +77,22 @@ def mean_cell_size(domain: Domain) -> float:
     return float((volume / domain.mesh.topology.index_map(domain.dim).size_global) ** (1.0 / domain.dim))
 
 
-def assemble_vector(form: fem.FormMetaClass, out: Array) -> None:
+def assemble_vector(form: Any, out: Array) -> None:
     """Add a linear form to a local array (owned and ghost dofs); ghost contributions stay where they are."""
-    cpp.fem.assemble_vector(out, form, cpp.fem.pack_constants(form), cpp.fem.pack_coefficients(form))
+    calls.assemble_vector(form, out)
 
 
-def create_matrix(form: fem.FormMetaClass) -> PETSc.Mat:
+def create_matrix(form: Any) -> PETSc.Mat:
     """An empty matrix with the sparsity of a bilinear form."""
-    return fem.petsc.create_matrix(form)
+    return calls.create_matrix(form)
 
 
-def assemble_matrix(matrix: PETSc.Mat, form: fem.FormMetaClass) -> None:
+def assemble_matrix(matrix: PETSc.Mat, form: Any) -> None:
     """Add a bilinear form to a matrix, without finishing it (`matrix.assemble()`)."""
-    cpp.fem.petsc.assemble_matrix(
-        matrix, form, cpp.fem.pack_constants(form), cpp.fem.pack_coefficients(form), [], False
-    )
+    calls.assemble_matrix(matrix, form)
 
 
 def compile_expression(expression: ufl.core.expr.Expr, points: Array) -> fem.Expression:
     """Compile a UFL expression for evaluation at reference points of cells."""
     with quiet():
-        return fem.Expression(expression, points, jit_params=COMPILE_OPTIONS)
+        return calls.compile_expression(expression, points, COMPILE_OPTIONS)

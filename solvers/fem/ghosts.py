@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from dolfinx import cpp, fem, la
+from dolfinx import fem, la
 
 from solvers.api import Array
+from solvers.fem.calls import calls
 
 
 def sum_ghosts(space: fem.FunctionSpace, values: Array) -> Array:
     """Values per local block with those of all processes added up, the same wherever a block is known (collective)."""
     total: Any = la.vector(space.dofmap.index_map, 1)
     total.array[:] = values
-    total.scatter_reverse(cpp.la.ScatterMode.add)
+    calls.add_from_ghosts(total)
     total.scatter_forward()
     return total.array.copy()
 
@@ -22,7 +23,7 @@ def add_ghosts(space: fem.FunctionSpace, local: Array) -> None:
     """Add what processes hold at ghost dofs to the owners' entries of a local array (collective)."""
     vector: Any = la.vector(space.dofmap.index_map, space.dofmap.index_map_bs)
     vector.array[:] = local
-    vector.scatter_reverse(cpp.la.ScatterMode.add)
+    calls.add_from_ghosts(vector)
     local[:] = vector.array
 
 
@@ -36,4 +37,4 @@ def share_owned(space: fem.FunctionSpace, local: Array) -> Array:
 
 def accumulate(function: fem.Function) -> None:
     """Send what processes added to ghost dofs to the owners."""
-    function.x.scatter_reverse(cpp.la.ScatterMode.add)
+    calls.add_from_ghosts(function.x)

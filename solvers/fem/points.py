@@ -8,6 +8,7 @@ from dolfinx import fem
 from dolfinx import mesh as dolfinx_mesh
 
 from solvers.api import Array
+from solvers.fem.calls import calls
 from solvers.fem.domain import CELLS, Domain, input_cells, owned_cells
 from solvers.fem.ghosts import accumulate
 from solvers.fem.spaces import cell_blocks, function, scalar_space
@@ -40,7 +41,7 @@ def tabulate(domain: Domain, reference: Array) -> Array:
 def evaluate_cells(domain: Domain, expression: fem.Expression) -> Array:
     """Values at the expression's points in all owned cells, shape (cells, points * components)."""
     cells = np.arange(domain.mesh.topology.index_map(domain.dim).size_local, dtype=np.int32)
-    return expression.eval(cells)
+    return calls.evaluate(expression, domain.mesh, cells)
 
 
 def average_at_nodes(domain: Domain, expression: fem.Expression, *, components: int) -> Array:

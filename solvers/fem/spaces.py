@@ -3,67 +3,72 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import basix
 import numpy as np
-import ufl
-from dolfinx import cpp, fem
+from dolfinx import fem
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.fem.calls import calls
 from solvers.fem.domain import CELLS, Domain, input_nodes
 from solvers.fem.quiet import quiet
 
 
-def vector_space(domain: Domain) -> fem.FunctionSpace:
+def cell_of(domain: Domain) -> str:
+    """UFL's name of the cells."""
+    return CELLS[domain.cell_type][0]
+
+
+def vector_space(domain: Domain) -> Any:
     """Isoparametric vector Lagrange space: one dof block per node."""
     with quiet():
-        return fem.VectorFunctionSpace(domain.mesh, ("Lagrange", domain.degree))
+        return calls.function_space(domain.mesh, calls.lagrange_element(cell_of(domain), domain.degree, (domain.dim,)))
 
 
-def scalar_space(domain: Domain) -> fem.FunctionSpace:
+def scalar_space(domain: Domain) -> Any:
     """Isoparametric scalar Lagrange space: one dof per node."""
     with quiet():
-        return fem.FunctionSpace(domain.mesh, ("Lagrange", domain.degree))
+        return calls.function_space(domain.mesh, calls.lagrange_element(cell_of(domain), domain.degree))
 
 
-def cellwise_space(domain: Domain) -> fem.FunctionSpace:
+def cellwise_space(domain: Domain) -> Any:
     """One number per cell."""
     with quiet():
-        return fem.FunctionSpace(domain.mesh, ("Discontinuous Lagrange", 0))
+        return calls.function_space(domain.mesh, calls.discontinuous_element(cell_of(domain), 0))
 
 
-def pressure_space(domain: Domain) -> fem.FunctionSpace:
+def pressure_space(domain: Domain) -> Any:
     """Scalars that jump from cell to cell: constant in first-order cells, linear in those of second order."""
-    simplex = domain.mesh.ufl_cell().cellname() in ("triangle", "tetrahedron")
-    family = "Discontinuous Lagrange" if simplex or domain.degree == 1 else "DPC"
     with quiet():
-        return fem.FunctionSpace(domain.mesh, (family, domain.degree - 1))
+        element = calls.discontinuous_element(cell_of(domain), domain.degree - 1)
+        return calls.function_space(domain.mesh, element)
 
 
-def flow_space(domain: Domain, velocity_degree: int) -> fem.FunctionSpace:
+def flow_space(domain: Domain, velocity_degree: int) -> Any:
     """Velocity and pressure as one function with dim + 1 components, pressure last and of first degree.
 
     Equal order: one block of dim + 1 unknowns per node, side by side in the matrix; otherwise a mixed element.
     """
-    cell = domain.mesh.ufl_cell()
+    cell = cell_of(domain)
     if velocity_degree == 1:
-        element = ufl.VectorElement("Lagrange", cell, 1, dim=domain.dim + 1)
+        element = calls.lagrange_element(cell, 1, (domain.dim + 1,))
     else:
-        velocity = ufl.VectorElement("Lagrange", cell, velocity_degree)
-        element = ufl.MixedElement([velocity, ufl.FiniteElement("Lagrange", cell, 1)])
+        velocity = calls.lagrange_element(cell, velocity_degree, (domain.dim,))
+        element = calls.mixed_element([velocity, calls.lagrange_element(cell, 1)])
     with quiet():
-        return fem.FunctionSpace(domain.mesh, element)
+        return calls.function_space(domain.mesh, element)
 
 
-def cell_blocks(space: fem.FunctionSpace) -> NDArray[np.int32]:
+def cell_blocks(space: Any) -> NDArray[np.int32]:
     """Local dof blocks of each local cell, shape (cells, blocks per cell); a process may have no cells."""
-    return np.asarray(space.dofmap.list.array).reshape(-1, space.dofmap.dof_layout.num_dofs)
+    return calls.cell_blocks(space)
 
 
 def identify_blocks(
-    space: fem.FunctionSpace, blocks: NDArray[np.int32], masters: NDArray[np.int64], owners: NDArray[np.int32]
-) -> tuple[fem.FunctionSpace, NDArray[np.int32]]:
+    space: Any, blocks: NDArray[np.int32], masters: NDArray[np.int64], owners: NDArray[np.int32]
+) -> tuple[Any, NDArray[np.int32]]:
     """A space whose cells have other dof blocks in the place of some: (space, their local numbers) (collective).
 
     `blocks` are local; `masters` are the global numbers of what replaces them, and `owners` the processes that own
@@ -81,18 +86,14 @@ def identify_blocks(
     local[~owned] = (last - first) + order[np.searchsorted(all_ghosts[order], masters[~owned])]
     owner_of = dict(zip(masters.tolist(), owners.tolist(), strict=True))
     all_owners = [*np.asarray(index_map.owners).tolist(), *(owner_of[ghost] for ghost in new.tolist())]
-    extended = cpp.common.IndexMap(space.mesh.comm, int(last - first), all_ghosts, np.array(all_owners, dtype=np.int32))
     place = np.arange(int(index_map.size_local + index_map.num_ghosts), dtype=np.int32)
     place[blocks] = local
-    cells = place[dofmap.list.array].reshape(-1, dofmap.dof_layout.num_dofs)
-    links = cpp.graph.AdjacencyList_int32(cells)
-    identified = cpp.fem.DofMap(dofmap.dof_layout, extended, dofmap.index_map_bs, links, dofmap.bs)
-    found = cpp.fem.FunctionSpace(space.mesh._mesh, space.element, identified)
-    return fem.FunctionSpace(space.mesh, space.ufl_element(), found), local.astype(np.int32)
+    with_ghosts = calls.replace_dofs(space, place[cell_blocks(space)], all_ghosts, np.array(all_owners, dtype=np.int32))
+    return with_ghosts, local.astype(np.int32)
 
 
 def component_dofs(
-    domain: Domain, space: fem.FunctionSpace, components: Sequence[int], degree: int
+    domain: Domain, space: Any, components: Sequence[int], degree: int
 ) -> tuple[NDArray[np.int32], Array]:
     """Local unrolled dofs (nodes, components) of components of a `flow_space` on straight cells, and their points.
 
@@ -108,12 +109,12 @@ def component_dofs(
     cell = getattr(basix.CellType, CELLS[domain.cell_type][0])
     element = basix.create_element(basix.ElementFamily.P, cell, degree, basix.LagrangeVariant.gll_warped)
     shapes, _ = tabulate_lagrange(domain, 1, element.points)
-    corners = domain.mesh.geometry.x[domain.mesh.geometry.dofmap.array].reshape(-1, shapes.shape[1], 3)
+    corners = domain.mesh.geometry.x[calls.geometry_nodes(domain.mesh)].reshape(-1, shapes.shape[1], 3)
     points = np.einsum("qa,cai->cqi", shapes, corners[:, :, : domain.dim]).reshape(-1, domain.dim)
     return np.stack([dofs.ravel()[place] for dofs in by_cell], axis=1), points[place]
 
 
-def component_cell_dofs(space: fem.FunctionSpace, component: int) -> NDArray[np.int32]:
+def component_cell_dofs(space: Any, component: int) -> NDArray[np.int32]:
     """Local dofs of one component of a `flow_space` in each local cell, in the order of the scalar element."""
     if space.dofmap.index_map_bs > 1:
         part = space.sub(component)
@@ -134,7 +135,7 @@ def tabulate_lagrange(domain: Domain, degree: int, points: Array) -> tuple[Array
     return table[0], np.moveaxis(table[1:], 0, -1)
 
 
-def facet_dofs(space: fem.FunctionSpace, component: int, facets: NDArray[np.int32]) -> NDArray[np.int32]:
+def facet_dofs(space: Any, component: int, facets: NDArray[np.int32]) -> NDArray[np.int32]:
     """Local dofs of one component of a `flow_space` on facets, on every process that knows them (collective)."""
     dim = space.mesh.topology.dim
     if space.dofmap.index_map_bs > 1:
@@ -144,17 +145,10 @@ def facet_dofs(space: fem.FunctionSpace, component: int, facets: NDArray[np.int3
     return np.asarray(fem.locate_dofs_topological(part, dim - 1, facets), dtype=np.int32)
 
 
-def quadrature_space(domain: Domain, degree: int, shape: tuple[int, ...] = ()) -> fem.FunctionSpace:
+def quadrature_space(domain: Domain, degree: int, shape: tuple[int, ...] = ()) -> Any:
     """Values at the points of the quadrature rule of a degree; shape () for scalars, (n,) vectors, (n, m) tensors."""
-    cell = domain.mesh.ufl_cell()
-    if not shape:
-        element = ufl.FiniteElement("Quadrature", cell, degree, quad_scheme="default")
-    elif len(shape) == 1:
-        element = ufl.VectorElement("Quadrature", cell, degree, dim=shape[0], quad_scheme="default")
-    else:
-        element = ufl.TensorElement("Quadrature", cell, degree, shape=shape, quad_scheme="default")
     with quiet():
-        return fem.FunctionSpace(domain.mesh, element)
+        return calls.function_space(domain.mesh, calls.quadrature_element(cell_of(domain), degree, shape))
 
 
 def quadrature_points(domain: Domain, degree: int) -> tuple[Array, Array]:
@@ -162,25 +156,25 @@ def quadrature_points(domain: Domain, degree: int) -> tuple[Array, Array]:
     return basix.make_quadrature(getattr(basix.CellType, CELLS[domain.cell_type][0]), degree)
 
 
-def function(space: fem.FunctionSpace) -> fem.Function:
+def function(space: Any) -> fem.Function:
     """A finite element function, zero at first."""
     return fem.Function(space)
 
 
-def node_of_block(domain: Domain, space: fem.FunctionSpace) -> NDArray[np.int64]:
+def node_of_block(domain: Domain, space: Any) -> NDArray[np.int64]:
     """Mesh-file number of the node behind each local dof block (owned blocks first, then ghosts)."""
     blocks = cell_blocks(space)
-    geometry = domain.mesh.geometry.dofmap.array.reshape(blocks.shape)
+    geometry = calls.geometry_nodes(domain.mesh).reshape(blocks.shape)
     nodes = np.full(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, -1, dtype=np.int64)
     nodes[blocks] = input_nodes(domain)[geometry]
     return nodes
 
 
-def surface_blocks(domain: Domain, space: fem.FunctionSpace, name: str) -> NDArray[np.int32]:
+def surface_blocks(domain: Domain, space: Any, name: str) -> NDArray[np.int32]:
     """Local dof blocks on a named surface, on every process that knows the node (a collective call)."""
     return fem.locate_dofs_topological(space, domain.mesh.topology.dim - 1, domain.surfaces[name])
 
 
-def block_points(space: fem.FunctionSpace) -> Array:
+def block_points(space: Any) -> Array:
     """Reference position of each local dof block, shape (3, blocks)."""
     return np.ascontiguousarray(space.tabulate_dof_coordinates().T)

@@ -61,7 +61,7 @@ class Flow:
     def sizes(self) -> list[Expr]:
         """Edge lengths [m] of an axis-aligned cell."""
         jacobian = ufl.Jacobian(self.mesh)
-        return [jacobian[i, i] for i in range(self.mesh.geometric_dimension())]
+        return [jacobian[i, i] for i in range(ufl.Jacobian(self.mesh).ufl_shape[0])]
 
 
 @dataclass(frozen=True)

@@ -16,20 +16,12 @@ from solvers.api import Array
 from solvers.fluid import forms
 from solvers.fluid.balances import leak
 from solvers.fluid.field import Fluid
+from solvers.fluid.inside import INSIDE, require_outside, winding
 from solvers.fluid.space import Nodes
-from solvers.fluid.surface import Motion, together
 
 Probe = Callable[[], dict[str, float]]
 
 AXES = ("x", "y", "z")
-
-
-#: winding number above which a point is in a body; in a dent of the surface it is more than 0.5
-INSIDE = 1.0 - 1e-6
-
-
-class PointInBody(ValueError):
-    """There is no fluid at a probe's point."""
 
 
 # ---------------------------------------------------------------------------------------------------------- points
@@ -43,10 +35,7 @@ def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> P
     x = np.asarray(point, dtype=float)
     known = [body for body in fluid.bodies if body.motion is not None]
     motions = [body.motion(t) for body in known if body.motion is not None]
-    facets, motion = together([body.surface for body in known], motions, fluid.dim)
-    if winding(x, motion, facets) > INSIDE:
-        inside = next(b for b, m in zip(known, motions, strict=True) if winding(x, m, b.surface.facets) > INSIDE)
-        raise PointInBody(f"there is no fluid at {tuple(x.tolist())}: the point is in body '{inside.surface.name}'")
+    require_outside(x, [body.surface for body in known], motions)
     unknowns = fluid.unknowns
     nodes, degree = (unknowns.velocity, unknowns.degree) if quantity == "velocity" else (unknowns.pressure, 1)
     dofs, weights = interpolation(fluid, nodes, degree, x)
@@ -78,26 +67,6 @@ def interpolation(fluid: Fluid, nodes: Nodes, degree: int, x: Array) -> tuple[np
     at = np.minimum(np.searchsorted(owned[order], number), max(len(owned) - 1, 0))
     mine = owned[order[at]] == number if len(owned) else np.zeros(len(number), dtype=bool)
     return nodes.dofs[order[at[mine]]], weight[mine]
-
-
-def winding(x: Array, motion: Motion, facets: np.ndarray) -> float:
-    """How often closed surfaces go round a point: 1 in a body, 0 outside, less than 1 on the surface.
-
-    The sum of the angles of segments, or of the solid angles of triangles (van Oosterom, Strackee, IEEE Trans. Biomed.
-    Eng. 30 (1983) 125-126), as part of the full one; a facet in line with the point has none, whatever its rounding.
-    """
-    corners = motion.x[facets] - x
-    lengths = np.linalg.norm(corners, axis=2)
-    if len(x) == 2:
-        a, b = corners[:, 0], corners[:, 1]
-        across, along = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)
-    else:
-        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-        la, lb, lc = lengths.T
-        across = np.linalg.det(corners)
-        along = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
-    seen = np.abs(across) > 1e-9 * lengths.prod(axis=1)
-    return float(np.arctan2(across[seen], along[seen]).sum() / (2.0 * np.pi))
 
 
 def difference(first: Probe, second: Probe) -> Probe:

@@ -1,0 +1,132 @@
+"""The meshes of a case with what the case names in them: all that they alone can tell is wrong, for `check` and a run.
+
+Nothing here needs a finite element.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsci.case import Case
+from fsci.case.checks import load_vectors
+from fsci.case.structure import NO_MIXED_SIMPLICES
+from fsci.mesh import MeshError, build_mesh, extract_region, require_surface
+from fsci.places import find_places
+from solvers.mesh import Mesh
+from solvers.mesh_topology import surface_facets
+from solvers.tessellation import is_closed, tessellate
+
+Array = NDArray[np.float64]
+Keys = tuple[str | int, ...]
+
+VECTORS = ("gravity", "body_force", "initial_displacement", "initial_velocity")
+
+
+def read_body(case: Case, name: str) -> Mesh:
+    """The mesh of an elastic body, or its region, with everything in it that the case names. Raises CaseError."""
+    settings = case.elastic_bodies[name]
+    keys: Keys = ("structure", "bodies", name, "mesh")
+    try:
+        mesh = build_mesh(settings.mesh, case.folder)
+        if settings.region is not None:
+            keys = ("structure", "bodies", name, "region")
+            mesh = extract_region(mesh, settings.region)
+        _require_dimension(case, name, mesh)
+        if settings.element == "mixed" and mesh.cell_type[:4] in ("tria", "tetr"):
+            keys = ("structure", "bodies", name, "element")
+            raise MeshError(NO_MIXED_SIMPLICES)
+        for keys, surface in _named_surfaces(case, name):
+            require_surface(mesh, surface)
+            if keys[0] == "contact":
+                surface_facets(mesh, surface)
+    except (MeshError, ValueError) as error:
+        raise case.error(keys, str(error)) from None
+    _check_lengths(case, name, mesh.points.shape[1])
+    find_places(case, name, mesh)
+    return mesh
+
+
+def _require_dimension(case: Case, name: str, mesh: Mesh) -> None:
+    dim = mesh.points.shape[1]
+    if case.dimension not in (None, dim):
+        other = "the grid" if case.fluid is not None else "another body"
+        raise case.error(("structure", "bodies", name, "mesh"), f"the mesh is {dim}D, but {other} is {case.dimension}D")
+
+
+def _named_surfaces(case: Case, name: str) -> Iterator[tuple[Keys, str]]:
+    """(where, surface name) of every surface that contact and probes of a body name."""
+    for pair_name, pair in ({} if case.contact is None else case.contact.pairs).items():
+        for role, side in (("slave", pair.slave), ("master", pair.master)):
+            for surface in side.on or () if side.body == name else ():
+                yield ("contact", "pairs", pair_name, role, "on"), surface
+    for probe_name, probe in case.probes.items():
+        if probe.field == "structure" and probe.on is not None and probe.body == name:
+            yield ("probes", probe_name, "on"), probe.on
+
+
+def _check_lengths(case: Case, name: str, dim: int) -> None:
+    """Vectors have as many entries as the mesh has dimensions; for files only the mesh tells."""
+    body = case.elastic_bodies[name]
+    base = ("structure", "bodies", name)
+    vectors: list[tuple[Keys, Any]] = [((*base, key), getattr(body, key)) for key in VECTORS]
+    vectors += [((*base, *place), vector) for place, vector in load_vectors(body)]
+    probes = [(key, p) for key, p in case.probes.items() if p.field == "structure" and p.body == name]
+    vectors += [(("probes", key, "at"), p.at) for key, p in probes]
+    for keys, vector in vectors:
+        if vector is not None and len(vector) != dim:
+            raise case.error(keys, f"'{keys[-1]}' has {len(vector)} entries, but the mesh is of {dim} dimensions")
+
+
+def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int64]]:
+    """(mesh, points [m], segments or triangles) of a rigid body's closed surface. Raises CaseError."""
+    assert case.fluid is not None
+    settings, dim = case.fluid.bodies[name], case.fluid.grid.dimension
+    base: Keys = ("fluid", "bodies", name)
+    keys = (*base, "mesh")
+    try:
+        mesh = build_mesh(settings.mesh, case.folder)
+        if mesh.points.shape[1] != dim:
+            raise MeshError(f"the mesh is {mesh.points.shape[1]}D, but the grid is {dim}D")
+        keys = (*base, "on")
+        for surface in settings.on or ():
+            require_surface(mesh, surface)
+        facets, nodes = tessellate(mesh, settings.on)
+        if not is_closed(facets):
+            raise MeshError("these surfaces do not enclose the body: name all of them")
+    except (MeshError, ValueError) as error:
+        raise case.error(keys, str(error)) from None
+    return mesh, mesh.points[nodes], facets
+
+
+def read_obstacle(case: Case, name: str) -> Mesh:
+    """The mesh of an obstacle, with the surface that the case names. Raises CaseError."""
+    assert case.contact is not None
+    settings = case.contact.obstacles[name]
+    keys: Keys = ("contact", "obstacles", name, "mesh")
+    try:
+        mesh = build_mesh(settings.mesh, case.folder)
+        if case.dimension not in (None, mesh.points.shape[1]):
+            raise MeshError(f"the mesh is {mesh.points.shape[1]}D, but the bodies are {case.dimension}D")
+        keys = ("contact", "obstacles", name, "on")
+        for surface in settings.on:
+            require_surface(mesh, surface)
+            surface_facets(mesh, surface)
+    except (MeshError, ValueError) as error:
+        raise case.error(keys, str(error)) from None
+    return mesh
+
+
+def require_inside_period(case: Case, keys: Keys, points: Array) -> None:
+    """Bodies stay out of the first and the last layer of cells of a period. Raises CaseError."""
+    assert case.fluid is not None
+    for axis in sorted({face[0] for patch in case.fluid.patches.values() if patch.periodic for face in patch.on}):
+        index = "xyz".index(axis)
+        planes = case.fluid.grid.edges(index)
+        if points[:, index].min() < planes[1] or points[:, index].max() > planes[-2]:
+            room = f"{planes[1]:g} to {planes[-2]:g}"
+            message = f"the body must be within the period along {axis}, without the cells at its ends: {room}"
+            raise case.error(keys, message)

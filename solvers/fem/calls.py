@@ -1,0 +1,15 @@
+"""The calls that differ between generations of DOLFINx, chosen by what is installed.
+
+Both modules have the same functions. A generation is told by what it can do, not by its number.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+if find_spec("basix.ufl") is None:
+    from solvers.fem import pybind as calls
+else:
+    from solvers.fem import nanobind as calls  # type: ignore[no-redef]
+
+__all__ = ["calls"]

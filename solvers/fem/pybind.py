@@ -1,0 +1,162 @@
+"""The calls of DOLFINx up to the generation with UFL's own elements and pybind11. See `solvers.fem.calls`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import cpp, fem, jit
+from dolfinx import mesh as dolfinx_mesh
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from solvers.api import Array
+
+Indices = NDArray[np.int32]
+
+# ------------------------------------------------------------------------------------------------------------ elements
+
+
+def lagrange_element(cell: str, degree: int, shape: tuple[int, ...] = ()) -> Any:
+    """Continuous Lagrange element of a UFL cell, of scalars or vectors."""
+    if not shape:
+        return ufl.FiniteElement("Lagrange", cell, degree)
+    return ufl.VectorElement("Lagrange", cell, degree, dim=shape[0])
+
+
+def discontinuous_element(cell: str, degree: int) -> Any:
+    """Polynomials of a complete degree in each cell alone."""
+    simplex = cell in ("triangle", "tetrahedron")
+    family = "Discontinuous Lagrange" if simplex or degree == 0 else "DPC"
+    return ufl.FiniteElement(family, cell, degree)
+
+
+def mixed_element(elements: list[Any]) -> Any:
+    """Several elements side by side."""
+    return ufl.MixedElement(elements)
+
+
+def quadrature_element(cell: str, degree: int, shape: tuple[int, ...] = ()) -> Any:
+    """Values at the points of the default rule of a degree: scalars, vectors or tensors."""
+    if not shape:
+        return ufl.FiniteElement("Quadrature", cell, degree, quad_scheme="default")
+    if len(shape) == 1:
+        return ufl.VectorElement("Quadrature", cell, degree, dim=shape[0], quad_scheme="default")
+    return ufl.TensorElement("Quadrature", cell, degree, shape=shape, quad_scheme="default")
+
+
+# -------------------------------------------------------------------------------------------------------------- meshes
+
+
+def create_mesh(comm: MPI.Comm, cells: NDArray[np.int64], points: Array, cell: str, degree: int) -> dolfinx_mesh.Mesh:
+    """A distributed mesh; processes know the cells behind the facets between them."""
+    element = ufl.VectorElement("Lagrange", ufl.Cell(cell, geometric_dimension=points.shape[1]), degree)
+    return dolfinx_mesh.create_mesh(comm, cells, points, ufl.Mesh(element))
+
+
+def geometry_nodes(mesh: dolfinx_mesh.Mesh) -> Indices:
+    """Local geometry nodes of all local cells, one cell after the other."""
+    return np.asarray(mesh.geometry.dofmap.array)
+
+
+def facet_nodes(mesh: dolfinx_mesh.Mesh, facets: Indices) -> Indices:
+    """Local geometry nodes at the corners of facets, shape (facets, corners)."""
+    return np.asarray(cpp.mesh.entities_to_geometry(mesh._mesh, mesh.topology.dim - 1, facets, False))
+
+
+def exterior_facets(mesh: dolfinx_mesh.Mesh) -> Indices:
+    """Facets of this process on the boundary of the mesh."""
+    return np.asarray(cpp.mesh.exterior_facet_indices(mesh.topology), dtype=np.int32)
+
+
+# -------------------------------------------------------------------------------------------------------------- spaces
+
+
+def function_space(mesh: dolfinx_mesh.Mesh, element: Any) -> Any:
+    """The space of an element on a mesh."""
+    return fem.FunctionSpace(mesh, element)
+
+
+def cell_blocks(space: Any) -> Indices:
+    """Local dof blocks of all local cells, shape (cells, blocks per cell)."""
+    return np.asarray(space.dofmap.list.array).reshape(-1, space.dofmap.dof_layout.num_dofs)
+
+
+def replace_dofs(space: Any, cells: Indices, ghosts: NDArray[np.int64], owners: Indices) -> Any:
+    """The space with other dof blocks in its cells: owned blocks keep their numbers, ghosts come with their owners."""
+    dofmap, own = space.dofmap, int(space.dofmap.index_map.size_local)
+    index_map = cpp.common.IndexMap(space.mesh.comm, own, ghosts, owners)
+    links = cpp.graph.AdjacencyList_int32(cells)
+    replaced = cpp.fem.DofMap(dofmap.dof_layout, index_map, dofmap.index_map_bs, links, dofmap.bs)
+    found = cpp.fem.FunctionSpace(space.mesh._mesh, space.element, replaced)
+    return fem.FunctionSpace(space.mesh, space.ufl_element(), found)
+
+
+def add_from_ghosts(vector: Any) -> None:
+    """Send what a distributed vector holds at ghosts to their owners, who add it."""
+    vector.scatter_reverse(cpp.la.ScatterMode.add)
+
+
+# --------------------------------------------------------------------------------------------------------------- forms
+
+
+def compile_form(form: ufl.Form, options: dict[str, Any]) -> Any:
+    """A form over the entities of its measures."""
+    return fem.form(form, jit_params=options)
+
+
+class Compiled:
+    """A form of which entities, with the subdomain number 1, are chosen later."""
+
+    def __init__(self, mesh: dolfinx_mesh.Mesh, form: ufl.Form, options: dict[str, Any]):
+        self._mesh = mesh
+        self._compiled, self._module, _ = jit.ffcx_jit(mesh.comm, form, jit_params=options)
+        coefficients = form.coefficients()
+        order = [self._compiled.original_coefficient_position[i] for i in range(self._compiled.num_coefficients)]
+        self._coefficients = [coefficients[i]._cpp_object for i in order]
+        self._constants = [constant._cpp_object for constant in form.constants()]
+        self._spaces = [argument.ufl_function_space()._cpp_object for argument in form.arguments()]
+
+    def on(self, entities: dict[str, Indices]) -> Any:
+        """The form over local cells or facets, by the name of the integral type."""
+        mesh = self._mesh
+        types = {name: mesh.topology.dim - ("facet" in name) for name in entities}
+        tags = {
+            getattr(cpp.fem.IntegralType, name): cpp.mesh.MeshTags_int32(
+                mesh._mesh, types[name], np.asarray(local, dtype=np.int32), np.ones(len(local), dtype=np.int32)
+            )
+            for name, local in entities.items()
+        }
+        pointer = self._module.ffi.cast("uintptr_t", self._module.ffi.addressof(self._compiled))
+        return cpp.fem.create_form_float64(
+            int(pointer), self._spaces, self._coefficients, self._constants, tags, mesh._mesh
+        )
+
+
+def assemble_vector(form: Any, out: Array) -> None:
+    """Add a linear form to an array over local dofs."""
+    cpp.fem.assemble_vector(out, form, cpp.fem.pack_constants(form), cpp.fem.pack_coefficients(form))
+
+
+def create_matrix(form: Any) -> PETSc.Mat:
+    """An empty matrix with the sparsity of a bilinear form."""
+    return fem.petsc.create_matrix(form)
+
+
+def assemble_matrix(matrix: PETSc.Mat, form: Any) -> None:
+    """Add a bilinear form to a matrix, without finishing it."""
+    cpp.fem.petsc.assemble_matrix(
+        matrix, form, cpp.fem.pack_constants(form), cpp.fem.pack_coefficients(form), [], False
+    )
+
+
+def compile_expression(expression: Any, points: Array, options: dict[str, Any]) -> Any:
+    """An expression at reference points of cells."""
+    return fem.Expression(expression, points, jit_params=options)
+
+
+def evaluate(expression: Any, mesh: dolfinx_mesh.Mesh, cells: Indices) -> Array:
+    """Values in cells, shape (cells, points * components)."""
+    return expression.eval(cells)
