@@ -114,6 +114,19 @@ def test_all_schemes_agree(whole, monolithic):
     assert np.abs(history["force.x"] - expected["force.x"]).max() < 1e-5 * np.abs(expected["force.x"]).max()
 
 
+def test_directions_that_span_the_plane_hold_all(whole, tmp_path):
+    """A foot held along two directions that are no axes is the clamped one, whatever couples fluid and structure."""
+    scheme, _, expected = whole
+    clamp = "{on: bottom, displacement: [0, 0]}"
+    pair = "{on: bottom, direction: [1, 1]}, {on: bottom, direction: [1, -2]}"
+    text = with_scheme(scheme)
+    assert clamp in text
+    history = run(text.replace(clamp, pair), tmp_path / "pair", ("time.end", "0.06"), ("verify", "[]"))
+    for name in ("tip.x", "tip.y", "force.x", "structure.energy"):
+        scale = np.abs(expected[name]).max()
+        assert np.abs(history[name] - expected[name][:3]).max() < 1e-6 * scale + 1e-12, name
+
+
 def test_balances_are_in_the_history(whole):
     _, _, history = whole
     columns = {"interface.force", "interface.momentum", "interface.work", "structure.energy", "fluid.mass"}

@@ -130,6 +130,21 @@ MISTAKES = [
     ),
     ('[0, "0.1*sin(t)"]', "[x, 0]", "14:31: entry 1 of 'displacement' must not depend on x", "x"),
     ('[0, "0.1*sin(t)"]', "[t, 0, 0]", "14:30: 'displacement' must have 2 entries in 2D, not 3", "[t"),
+    ("angle: 90*t}", "}", "14:59: a rotation needs 'angle' or 'angular_velocity'", "{centre"),
+    (
+        "angle: 90*t",
+        "angle: 90*t, angular_velocity: 90",
+        "14:109: give either 'angle' or 'angular_velocity', not both",
+        "90",
+    ),
+    (
+        "displacement: [",
+        "velocity: [0, t], displacement: [",
+        "14:26: give either 'displacement' or 'velocity', not both",
+        "[0, t]",
+    ),
+    ("displacement: [0", "velocity: [0, 0", "14:26: 'velocity' must have 2 entries in 2D, not 3", "[0"),
+    ('displacement: [0, "0.1*sin(t)"]', "velocity: [x, 0]", "14:27: entry 1 of 'velocity' must not depend on x", "x"),
     ("angle: 90*t", "axis: [0, 0, 1], angle: 1", "14:59: a rotation in 2D has no 'axis'", "{centre"),
     ("{centre: [1, 0.5]", "{centre: [1]", "14:68: 'centre' must have 2 or 3 entries, not 1", "[1]"),
     # probes

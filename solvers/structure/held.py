@@ -34,23 +34,22 @@ class Held:
 
     def part(self, array: Array) -> Array:
         """P a, of owned dofs."""
-        held = np.zeros_like(array)
+        held = self._along(array)
         held[self.dofs] = array[self.dofs]
-        held[self._nodes] = np.einsum("kij,kj->ki", self._projections, array[self._nodes])
         return held
 
     def free_part(self, array: Array) -> Array:
         """a - P a; exactly zero at held dofs, whatever is there."""
-        free = array.copy()
+        free = array - self._along(array) if self.oblique else array.copy()
         free[self.dofs] = 0.0
-        free[self._nodes] -= np.einsum("kij,kj->ki", self._projections, array[self._nodes])
         return free
 
     def displacement(self, t: float) -> Array:
         """u_p [m] of owned dofs, zero where nothing is held."""
         whole = np.zeros(self._layout.size)
         whole[self.dofs] = np.concatenate([support.displacement(t) for support in self._supports])
-        whole[self._nodes] = np.concatenate([support.oblique.displacement(t) for support in self._supports])
+        if self.oblique:
+            whole[self._nodes] = np.concatenate([support.oblique.displacement(t) for support in self._supports])
         return whole
 
     def reached(self, u: Array, target: Array, size: float) -> bool:
@@ -58,9 +57,13 @@ class Held:
 
         Of this process.
         """
-        missed = np.einsum("kij,kj->ki", self._projections, u[self._nodes]) - target[self._nodes]
+        if not np.array_equal(u[self.dofs], target[self.dofs]):
+            return False
+        if not self.oblique:
+            return True
+        missed = (self._along(u) - target)[self._nodes]
         rounding = 4.0 * np.finfo(float).eps * (size + np.abs(u[self._nodes]).max(initial=0.0))
-        return np.array_equal(u[self.dofs], target[self.dofs]) and bool(np.all(np.abs(missed) <= rounding))
+        return bool(np.all(np.abs(missed) <= rounding))
 
     def impose(self, matrix: PETSc.Mat, x: PETSc.Vec, b: PETSc.Vec) -> PETSc.Mat:
         """Make a symmetric system one for a solution with the held part of x; b changes, the matrix is used up."""
@@ -96,7 +99,8 @@ class Held:
     def _along(self, array: Array) -> Array:
         """The part along oblique directions."""
         part = np.zeros_like(array)
-        part[self._nodes] = np.einsum("kij,kj->ki", self._projections, array[self._nodes])
+        if self.oblique:
+            part[self._nodes] = np.einsum("kij,kj->ki", self._projections, array[self._nodes])
         return part
 
     @cached_property
