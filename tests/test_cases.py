@@ -57,7 +57,7 @@ def test_first_steps(folder, tmp_path):
 
 @pytest.mark.parametrize(
     "name",
-    ["csm1", "csm2", "csm3", "cavity"]
+    ["csm1", "csm2", "csm3", "cavity", "cook_membrane"]
     + [
         pytest.param(name, marks=pytest.mark.slow)
         for name in (

@@ -9,7 +9,7 @@ import platform
 from collections.abc import Callable
 from pathlib import Path
 
-from fsci.bench import contact, flag, fluid, hertz, linear, moments, static
+from fsci.bench import contact, cook, flag, fluid, hertz, linear, moments, static
 from fsci.bench.table import Row, show
 from fsci.summary import plain, versions
 
@@ -17,6 +17,7 @@ from fsci.summary import plain, versions
 BENCHMARKS: dict[str, tuple[str, Callable[[], list[Row]]]] = {
     "static": ("one load step of a neo-Hookean cube, 25 x 25 x 25 hex8, as `fsci run` computes it", static.run),
     "linear": ("one linear system of a body under load: direct against iterative, by size", linear.run),
+    "cook": ("Cook's membrane, nearly incompressible: error against time, by element and mesh", cook.run),
     "flag": ("CSM3: milliseconds of one time step, by mesh", flag.run_steps),
     "flag_accuracy": ("CSM3, 2 s: error against wall time, by mesh and time step", flag.run_accuracy),
     "kernel": ("mortar integrals of a pair of facets, by their types", contact.run_kernel),

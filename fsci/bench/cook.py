@@ -1,0 +1,80 @@
+"""Cook's membrane, nearly incompressible: what accuracy costs with each element."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from time import process_time
+
+import numpy as np
+from mpi4py import MPI
+
+from fsci import shapes
+from fsci.bench.table import Row
+from solvers import fem
+from solvers.mesh import Mesh
+from solvers.structure.body import Body, BodySettings, Support, Traction
+from solvers.structure.elements import Formulation
+from solvers.structure.field import SolverSettings, Structure
+from solvers.structure.materials import LinearElastic, lame
+from solvers.structure.time import Statics
+
+#: cell, order, element, cells along an edge
+MESHES: tuple[tuple[str, int, Formulation, tuple[int, ...]], ...] = (
+    ("quad", 1, "displacement", (8, 16, 32, 64)),
+    ("quad", 1, "mixed", (8, 16, 32, 64)),
+    ("tri", 2, "displacement", (4, 8, 16, 32)),
+    ("quad", 2, "displacement", (4, 8, 16, 32)),
+    ("quad", 2, "mixed", (4, 8, 16, 32)),
+)
+FINEST = 96
+
+
+def run() -> list[Row]:
+    """Rise of the upper right corner, its error against the finest mesh, and processor time of assembly and solution."""
+    finest, _ = solve(membrane("quad", 2, FINEST), "mixed")
+    rows: list[Row] = []
+    for cell, order, element, numbers in MESHES:
+        solve(membrane(cell, order, 2), element)  # compiles the forms, which is not what is measured
+        for cells in numbers:
+            mesh = membrane(cell, order, cells)
+            rise, seconds = solve(mesh, element)
+            nodes = {("quad", 1): "quad4", ("quad", 2): "quad9", ("tri", 2): "tri6"}[cell, order]
+            rows.append(
+                {
+                    "cell": nodes,
+                    "element": element,
+                    "cells": cells,
+                    "dofs": mesh.points.size,
+                    "corner u_y": round(rise, 3),
+                    "error [%]": 100 * (1 - rise / finest),
+                    "time [ms]": 1e3 * seconds,
+                }
+            )
+    return rows
+
+
+def membrane(cell: str, order: int, cells: int) -> Mesh:
+    """The panel with the corners (0, 0), (48, 44), (48, 60), (0, 44)."""
+    mesh = shapes.rectangle([1, 1], [cells, cells], order=order, cell=cell)
+    s, t = mesh.points.T
+    return replace(mesh, points=np.column_stack([48 * s, 44 * s * (1 - t) + (44 + 16 * s) * t]))
+
+
+def solve(mesh: Mesh, element: Formulation) -> tuple[float, float]:
+    """(vertical displacement of the upper right corner, processor seconds) for E = 70, nu = 0.4999, a shear of 6.25."""
+    held, sheared = Support("left", (constant(0.0),) * 2), Traction("right", (constant(0.0), constant(6.25)))
+    material = LinearElastic(*lame(70.0, 0.4999))
+    settings = BodySettings("panel", material, element=element, supports=[held], tractions=[sheared])
+    body = Body(fem.distribute(MPI.COMM_SELF, mesh), settings)
+    structure = Structure(MPI.COMM_SELF, [body], Statics(), SolverSettings(linear="direct"))
+    structure.initialise(0.0, 1.0)
+    structure.begin_step(0.0, 1.0)
+    begin = process_time()
+    structure.solve()
+    seconds = process_time() - begin
+    corner = int(np.argmax(body.points[0] + body.points[1]))
+    return float(body.u.x.array.reshape(-1, 2)[corner, 1]), seconds
+
+
+def constant(value: float):
+    return lambda x, t: np.full(x.shape[1], value)
