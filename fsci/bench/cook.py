@@ -30,7 +30,7 @@ FINEST = 96
 
 
 def run() -> list[Row]:
-    """Rise of the upper right corner, its error against the finest mesh, and processor time of assembly and solution."""
+    """Rise of the upper right corner, its error against the finest mesh, processor time of assembly and solution."""
     finest, _ = solve(membrane("quad", 2, FINEST), "mixed")
     rows: list[Row] = []
     for cell, order, element, numbers in MESHES:
