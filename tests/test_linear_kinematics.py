@@ -28,7 +28,7 @@ def test_patch(cell_type):
         return lambda x, t: t * (0.3 + gradient[i] @ x[:dim])
 
     structure = make_structure(mesh, LinearElastic(80.0, 120.0), supports=held_everywhere(mesh, displacement))
-    assert load_step(structure).iterations == 1
+    assert load_step(structure).residuals[1] < 1e-11
     body = structure.bodies[0]
     exact = 0.3 + body.points[:dim].T @ gradient.T
     assert np.abs(body.u.x.array.reshape(-1, dim) - exact).max() < 1e-12
@@ -53,7 +53,8 @@ def test_tube_under_pressure(order, element, nu, bound):
         supports=[Symmetry("start"), Symmetry("end")],
         pressures=[Pressure("inner", constant(p))],
     )
-    assert load_step(structure).iterations == 1
+    residuals = load_step(structure).residuals
+    assert residuals[1] < 1e-10 * residuals[0]
     body = structure.bodies[0]
     r = np.hypot(*body.points[:2])
     exact = (1 + nu) * p * a**2 / (E * (b**2 - a**2)) * ((1 - 2 * nu) * r + b**2 / r)
@@ -100,7 +101,8 @@ def test_energy_is_kept_exactly():
     structure.initialise(0.0, 0.05)
     for step in range(20):
         structure.begin_step(0.05 * step, 0.05)
-        assert structure.solve().iterations == 1
+        residuals = structure.solve().residuals
+        assert residuals[1] < 1e-10 * residuals[0]
         structure.end_step()
     assert structure.energy.internal > 0.1 * structure.energy.initial
     assert abs(structure.energy.error) < 1e-10 * structure.energy.initial
