@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -102,30 +103,41 @@ class Run:
 
     def from_start(self) -> int:
         """Compute from the initial state."""
-        simulation = self._build()
-        with self.record.timer("start"):
-            simulation.initialise(self.clock.time, self.clock.dt)
-        if self.root:
-            self.history = HistoryWriter(self.out / "history.csv")
-            self.fields = FieldWriter(self.out / "fields")
-        self._write_fields()
-        return self._watched_loop()
+        with self._shown():
+            simulation = self._build()
+            with self.record.timer("start"):
+                simulation.initialise(self.clock.time, self.clock.dt)
+            if self.root:
+                self.history = HistoryWriter(self.out / "history.csv")
+                self.fields = FieldWriter(self.out / "fields")
+            self._write_fields()
+            return self._watched_loop()
 
     def from_checkpoint(self, state: State) -> int:
         """Compute from a checkpoint."""
         from solvers.distributed import scatter
 
-        simulation = self._build()
-        self.clock.restore(state["clock"])
-        self.record.restore(state["record"])
-        with self.record.timer("start"):
-            simulation.initialise(self.case.time.start, self.case.time.step)
-            simulation.scheme.restore(scatter(self.comm, state["scheme"], simulation.scheme.save()))
-        if self.root:
-            (self.out / "STOP").unlink(missing_ok=True)
-            self.history = HistoryWriter(self.out / "history.csv", resume_after=self.clock.step)
-            self.fields = FieldWriter.resume(self.out / "fields", self.clock.time)
-        return self._watched_loop()
+        with self._shown():
+            simulation = self._build()
+            self.clock.restore(state["clock"])
+            self.record.restore(state["record"])
+            with self.record.timer("start"):
+                simulation.initialise(self.case.time.start, self.case.time.step)
+                simulation.scheme.restore(scatter(self.comm, state["scheme"], simulation.scheme.save()))
+            if self.root:
+                (self.out / "STOP").unlink(missing_ok=True)
+                self.history = HistoryWriter(self.out / "history.csv", resume_after=self.clock.step)
+                self.fields = FieldWriter.resume(self.out / "fields", self.clock.time)
+            return self._watched_loop()
+
+    @contextmanager
+    def _shown(self) -> Iterator[None]:
+        """What happens is shown, and said in the log."""
+        from solvers import fem
+
+        self.monitor = Monitor(enabled=self.root, live=self.comm.size == 1, log=self.out / "log.txt")
+        with self.monitor, fem.listening(self.monitor.say):
+            yield
 
     def _build(self) -> Simulation:
         from fsci.build import build
@@ -137,21 +149,12 @@ class Run:
     # -------------------------------------------------------------------------------------------------- loop
 
     def _watched_loop(self) -> int:
-        """The loop with live output, signals caught and the summary written whatever happens."""
-        monitor = Monitor(enabled=self.root, live=self.comm.size == 1, log=self.out / "log.txt")
-        with monitor as self.monitor:
-            clock = self.clock
-            monitor.start(
-                self.case.title,
-                self.simulation.dofs,
-                self.comm.size,
-                begin=clock.start,
-                end=clock.end,
-                time=clock.time,
-            )
-            self._keep()
-            with self.stop:
-                return self._loop()
+        """The loop with signals caught."""
+        clock, title, dofs = self.clock, self.case.title, self.simulation.dofs
+        self.monitor.start(title, dofs, self.comm.size, begin=clock.start, end=clock.end, time=clock.time)
+        self._keep()
+        with self.stop:
+            return self._loop()
 
     def _asked_to_stop(self) -> bool:
         """Any process got a signal, or there is a file STOP in the results folder."""

@@ -4,6 +4,7 @@ A node is a point of the mesh file, numbered as there on every process; a dof bl
 Elements are isoparametric, so that the nodes of the mesh and of the displacement are the same points.
 """
 
+from solvers.fem.compiling import listening
 from solvers.fem.domain import (
     CELLS,
     VTK_POINTS,
@@ -26,6 +27,8 @@ from solvers.fem.forms import (
     assemble_vector,
     compile_expression,
     compile_form,
+    compile_forms,
+    compile_integrals,
     constant,
     create_matrix,
     mean_cell_size,
@@ -77,6 +80,8 @@ __all__ = [
     "cellwise_space",
     "compile_expression",
     "compile_form",
+    "compile_forms",
+    "compile_integrals",
     "component_cell_dofs",
     "component_dofs",
     "constant",
@@ -93,6 +98,7 @@ __all__ = [
     "input_cells",
     "input_nodes",
     "interior_facets",
+    "listening",
     "locate_point",
     "mean_cell_size",
     "measure",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,32 +15,54 @@ from petsc4py import PETSc
 
 from solvers.api import Array
 from solvers.fem.calls import calls
+from solvers.fem.compiling import compiling
 from solvers.fem.domain import Domain
-from solvers.fem.quiet import quiet
 
-#: A process that waits for another one to compile the same form is patient.
-COMPILE_OPTIONS = {"cffi_extra_compile_args": ["-O3", "-march=native"], "timeout": 300}
+COMPILE_OPTIONS = {"cffi_extra_compile_args": ["-O3", "-march=native"]}
 
 
-def compile_form(form: ufl.Form) -> Any:
-    """Compile a UFL form for this machine (cached on disk)."""
-    with quiet():
+def compile_form(form: ufl.Form, what: str = "a form") -> Any:
+    """Compile a UFL form for this machine (cached on disk); `what` it is, for messages."""
+    with compiling(what):
         return calls.compile_form(form, COMPILE_OPTIONS)
+
+
+def compile_forms(forms: Sequence[ufl.Form], owner: str) -> list[Any]:
+    """Compile the forms of an owner, counted in messages."""
+    return [compile_form(form, _counted(number, len(forms), owner)) for number, form in enumerate(forms, 1)]
+
+
+def _counted(number: int, count: int, owner: str) -> str:
+    return f"form {number} of {count} of {owner}"
 
 
 class Integral:
     """A compiled form whose integration domain may change without looking at the form again.
 
     `on` takes the local cells or facets of every integral type that the form has: cell, exterior_facet, interior_facet.
+    It is compiled by `compile_integrals`, or when it is used first.
     """
 
     def __init__(self, domain: Domain, form: ufl.Form):
-        with quiet():
-            self._compiled = calls.Compiled(domain.mesh, form, COMPILE_OPTIONS)
+        self._domain, self._form = domain, form
+        self._compiled: Any = None
+
+    def compile(self, what: str = "a form") -> None:
+        """Compile it if it is not yet (collective); `what` it is, for messages."""
+        if self._compiled is None:
+            with compiling(what):
+                self._compiled = calls.Compiled(self._domain.mesh, self._form, COMPILE_OPTIONS)
 
     def on(self, **entities: NDArray[np.int32]) -> Any:
         """The form over sorted local entities; measures must carry the subdomain number 1."""
+        self.compile()
         return self._compiled.on(entities)
+
+
+def compile_integrals(integrals: Sequence[Integral], owner: str) -> None:
+    """Compile all integrals of an owner (collective), counted in messages."""
+    for number, integral in enumerate(integrals, 1):
+        integral.compile(_counted(number, len(integrals), owner))
 
 
 def measure(domain: Domain, kind: str, degree: int) -> ufl.Measure:
@@ -94,5 +117,5 @@ def assemble_matrix(matrix: PETSc.Mat, form: Any) -> None:
 
 def compile_expression(expression: ufl.core.expr.Expr, points: Array) -> fem.Expression:
     """Compile a UFL expression for evaluation at reference points of cells."""
-    with quiet():
+    with compiling("an expression"):
         return calls.compile_expression(expression, points, COMPILE_OPTIONS)

@@ -52,7 +52,10 @@ def quadrature_element(cell: str, degree: int, shape: tuple[int, ...] = ()) -> A
 
 def create_mesh(comm: MPI.Comm, cells: NDArray[np.int64], points: Array, cell: str, degree: int) -> dolfinx_mesh.Mesh:
     """A distributed mesh; processes know the cells behind the facets between them."""
-    element = ufl.VectorElement("Lagrange", ufl.Cell(cell, geometric_dimension=points.shape[1]), degree)
+    # FFCx writes the variant into this element when it compiles the first form. The signatures of later ones, by which
+    # the cache finds them, would depend on whether the first was in the cache.
+    kind = ufl.Cell(cell, geometric_dimension=points.shape[1])
+    element = ufl.VectorElement("Lagrange", kind, degree, variant="equispaced")
     return dolfinx_mesh.create_mesh(comm, cells, points, ufl.Mesh(element))
 
 

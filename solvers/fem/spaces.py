@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.fem.calls import calls
+from solvers.fem.compiling import compiling
 from solvers.fem.domain import CELLS, Domain, input_nodes
-from solvers.fem.quiet import quiet
 
 
 def cell_of(domain: Domain) -> str:
@@ -23,25 +23,25 @@ def cell_of(domain: Domain) -> str:
 
 def vector_space(domain: Domain) -> Any:
     """Isoparametric vector Lagrange space: one dof block per node."""
-    with quiet():
+    with compiling("an element"):
         return calls.function_space(domain.mesh, calls.lagrange_element(cell_of(domain), domain.degree, (domain.dim,)))
 
 
 def scalar_space(domain: Domain) -> Any:
     """Isoparametric scalar Lagrange space: one dof per node."""
-    with quiet():
+    with compiling("an element"):
         return calls.function_space(domain.mesh, calls.lagrange_element(cell_of(domain), domain.degree))
 
 
 def cellwise_space(domain: Domain) -> Any:
     """One number per cell."""
-    with quiet():
+    with compiling("an element"):
         return calls.function_space(domain.mesh, calls.discontinuous_element(cell_of(domain), 0))
 
 
 def pressure_space(domain: Domain) -> Any:
     """Scalars that jump from cell to cell: constant in first-order cells, linear in those of second order."""
-    with quiet():
+    with compiling("an element"):
         element = calls.discontinuous_element(cell_of(domain), domain.degree - 1)
         return calls.function_space(domain.mesh, element)
 
@@ -57,7 +57,7 @@ def flow_space(domain: Domain, velocity_degree: int) -> Any:
     else:
         velocity = calls.lagrange_element(cell, velocity_degree, (domain.dim,))
         element = calls.mixed_element([velocity, calls.lagrange_element(cell, 1)])
-    with quiet():
+    with compiling("an element"):
         return calls.function_space(domain.mesh, element)
 
 
@@ -147,7 +147,7 @@ def facet_dofs(space: Any, component: int, facets: NDArray[np.int32]) -> NDArray
 
 def quadrature_space(domain: Domain, degree: int, shape: tuple[int, ...] = ()) -> Any:
     """Values at the points of the quadrature rule of a degree; shape () for scalars, (n,) vectors, (n, m) tensors."""
-    with quiet():
+    with compiling("an element"):
         return calls.function_space(domain.mesh, calls.quadrature_element(cell_of(domain), degree, shape))
 
 

@@ -121,6 +121,13 @@ class FlowSystem:
         self._residuals = [fem.Integral(domain, form) for form in cell_forms]
         self._tangents = [fem.Integral(domain, ufl.derivative(form, self.flow, trial)) for form in cell_forms]
         self._compile_outer_faces(v, u, trial)
+        fem.compile_integrals(self._integrals(), "the flow")
+
+    def _integrals(self) -> list[fem.Integral]:
+        found = [*self._residuals, *self._tangents, *(form for *_, form in self._tractions)]
+        found += [self._outflow_form, self._outflow_tangent] if self._outflow else []
+        ghost = [self._ghost_penalty, self._ghost_history] if self.with_bodies else []
+        return found + [form for form in ghost if form is not None]
 
     def _compile_outer_faces(self, v, u, trial) -> None:
         domain, ds = self.grid.domain, fem.measure(self.grid.domain, "ds", 2 * self.settings.degree + 1)

@@ -112,10 +112,14 @@ class Body:
         dx = fem.volume_measure(self.domain, self.stiffness_degree)
         mass_dx = fem.volume_measure(self.domain, self.mass_degree)
         self.element = self._element(dx)
-        self._energy = fem.compile_form(forms.stored_energy(self.u, self.element, dx))
-        self._internal = fem.compile_form(forms.internal_force(self.u, self.element, v, dx))
-        self._tangent = fem.compile_form(forms.tangent(self.u, self.element, v, du, dx))
-        self._mass = fem.compile_form(forms.inertia(du, v, self.density, mass_dx))
+        wanted = [
+            forms.stored_energy(self.u, self.element, dx),
+            forms.internal_force(self.u, self.element, v, dx),
+            forms.tangent(self.u, self.element, v, du, dx),
+            forms.inertia(du, v, self.density, mass_dx),
+        ]
+        compiled = fem.compile_forms(wanted, f"body '{self.name}'")
+        self._energy, self._internal, self._tangent, self._mass = compiled
         self._force = fem.function(self.space)
         nodes = fem.reference_nodes(self.domain)
         self._jacobian = fem.compile_expression(ufl.det(forms.deformation_gradient(self.u)), nodes)
