@@ -18,6 +18,7 @@ from solvers.timing import Timer
 
 if TYPE_CHECKING:
     from solvers.contact.contact import Contact
+    from solvers.contact.results import PartFields
     from solvers.structure.body import Body
 
 Numbers = dict[str, float]
@@ -73,7 +74,7 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     return Simulation(
         scheme=Alone(structure),
         initialise=structure.initialise,
-        snapshots=lambda: snapshots(structure, None if contact is None else contact.fields()),
+        snapshots=lambda: snapshots(structure, _contact_fields(contact)),
         probes=build_probes(case, structure),
         balances=lambda: {"structure.energy": structure.energy.error},
         dofs={"structure": structure.dofs()},
@@ -86,6 +87,14 @@ def _contact(case: Case, comm: MPI.Comm, bodies: list[Body]) -> Contact | None:
     from fsci.build_contact import build_contact
 
     return build_contact(case, comm, bodies)
+
+
+def _contact_fields(contact: Contact | None) -> PartFields | None:
+    if contact is None:
+        return None
+    from solvers.contact.results import surface_fields
+
+    return surface_fields(contact)
 
 
 def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
@@ -105,8 +114,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     probes = [build_structure.build_probes(case, structure), build_fluid.build_probes(case, fluid)]
 
     def snapshots() -> list[Snapshot]:
-        contact_fields = None if contact is None else contact.fields()
-        return of_structure(structure, contact_fields) + of_fluid(fluid) + outlines(coupled)
+        return of_structure(structure, _contact_fields(contact)) + of_fluid(fluid) + outlines(coupled)
 
     return Simulation(
         scheme=scheme,

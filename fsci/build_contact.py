@@ -17,7 +17,7 @@ from solvers.contact.surface import Surface
 from solvers.mesh import Mesh
 from solvers.mesh_topology import FACET_TYPE, surface_facets
 from solvers.structure.body import Body
-from solvers.structure.supports import owned_blocks, prescribe
+from solvers.structure.supports import owned_blocks, prescribe, symmetric_dofs
 
 
 def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact:
@@ -61,14 +61,30 @@ def surface_of_body(comm: MPI.Comm, layout: Layout, bodies: Sequence[Body], body
     mesh = body.domain.source
     points, facets, nodes = comm.bcast(None if mesh is None else _cut_out(mesh, names), root=0)
     dofs = global_dofs(comm, layout, index, body, nodes)
-    held = np.zeros(len(nodes) * body.dim, dtype=bool)
-    prescribed = prescribe(body).dofs + layout.start + layout.offsets[index]
-    for part in comm.allgather(prescribed):
-        held |= np.isin(dofs.ravel(), part)
-    facet_type = FACET_TYPE[body.domain.cell_type]
+    start = layout.start + layout.offsets[index]
     return Surface(
-        ".".join([body_name, *names]), points, facets, facet_type, dofs, held.reshape(dofs.shape), body_name, nodes
+        ".".join([body_name, *names]),
+        points,
+        facets,
+        FACET_TYPE[body.domain.cell_type],
+        dofs,
+        held=_held(comm, start, body, dofs),
+        symmetric=np.isin(dofs, np.concatenate(comm.allgather(start + symmetric_dofs(body)))),
+        body=body_name,
+        mesh_nodes=nodes,
     )
+
+
+def _held(comm: MPI.Comm, start: int, body: Body, dofs: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Projections on what supports hold at nodes with these global dofs, shape (n, dim, dim) (collective)."""
+    supports = prescribe(body)
+    along_axes = np.isin(dofs, np.concatenate(comm.allgather(start + supports.dofs)))
+    found = along_axes[:, :, None] * np.eye(body.dim)
+    oblique = supports.oblique
+    for first, projections in comm.allgather((start + body.dim * oblique.blocks, oblique.projections)):
+        for dof, projection in zip(first, projections, strict=True):
+            found[dofs[:, 0] == dof] = projection
+    return found
 
 
 def _cut_out(mesh: Mesh, names: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from solvers.rows import RowChanges
+    from solvers.rows import RowTransformation
 
 Array = NDArray[np.float64]
 
@@ -116,16 +116,16 @@ class Constraint(Stateful, Protocol):
         """Norm [N] of what the constraints miss."""
         ...
 
-    def condense(self, weight: float, fetch: Callable[[NDArray[np.int64]], Any], R: Array) -> RowChanges:
-        """Change of the linearised balance; `fetch(rows)` gives rows of the tangent, R the balance without `force`."""
+    def condense(self, weight: float) -> RowTransformation:
+        """What takes the multipliers out of the linearised balance without `force`, whose weight in it is given."""
         ...
 
-    def recover(self, du: Array) -> None:
-        """Multipliers from the increment of all unknowns."""
+    def recover(self, balance: Array, du: Array) -> None:
+        """Multipliers from that balance (of replaced rows) and the increment [m] at the dofs, shapes (N * dim,)."""
         ...
 
     def active(self) -> NDArray[np.bool_]:
-        """Which nodes touch."""
+        """Which multipliers are in contact."""
         ...
 
     def numbers(self) -> dict[str, float]:

@@ -14,8 +14,38 @@ from solvers.api import Array
 
 
 @dataclass(frozen=True)
+class RowTransformation:
+    """A change of a linear system J du = b in the rows of n dofs: [L (J + S) + A] du = L b + c; same on every process.
+
+    L differs from the identity in columns of replaced rows only.
+    """
+
+    dofs: NDArray[np.int64]  #: global dof of each of the n, -1 where it is no unknown
+    rows: sp.csr_matrix  #: L, shape (n, n)
+    stiffness: sp.csr_matrix  #: S, shape (n, n)
+    added: sp.csr_matrix  #: A, shape (n, n)
+    right: Array  #: c, shape (n,)
+    replaced: NDArray[np.bool_]  #: whose rows are not what they were with something added, shape (n,)
+
+
+@dataclass(frozen=True)
+class TakenRows:
+    """Rows of J and b as they were before the transformation, where they are needed again."""
+
+    at: NDArray[np.int64]  #: which of the n dofs
+    rows: sp.csr_matrix  #: columns are all unknowns
+    right: Array
+
+    def balance(self, du: Array, n: int) -> Array:
+        """J du - b at the n dofs, zero where the rows were not taken; du of all unknowns."""
+        found = np.zeros(n)
+        found[self.at] = self.rows @ du - self.right
+        return found
+
+
+@dataclass(frozen=True)
 class RowChanges:
-    """A change of a linear system, the same on every process; columns are all unknowns."""
+    """Rows of a linear system to replace and to add to, the same on every process; columns are all unknowns."""
 
     replaced: NDArray[np.int64]  #: global rows to replace, each once
     replaced_rows: sp.csr_matrix
@@ -23,6 +53,43 @@ class RowChanges:
     added: NDArray[np.int64]  #: global rows to add to, each once
     added_rows: sp.csr_matrix
     added_right: Array
+
+
+def transform_rows(
+    matrix: PETSc.Mat, b: PETSc.Vec, change: RowTransformation, numbering: Numbering | None = None
+) -> tuple[PETSc.Mat, TakenRows]:
+    """The changed matrix, and the old rows that it consists of; `b` changes in place, `matrix` is used up. Collective.
+
+    numbering: places the unknowns of a system of two blocks, of which the dofs belong to the first.
+    """
+    comm, (start, end) = matrix.comm.tompi4py(), matrix.getOwnershipRange()
+    unknowns, dofs = matrix.size[1], change.dofs
+    at = np.flatnonzero(change.replaced)
+    J = fetch_rows(matrix, dofs[at]) if numbering is None else numbering.fetch_rows(matrix, dofs[at])
+    taken = TakenRows(at, J, gather_at(comm, b.array[: end - start], start, dofs[at]))
+
+    others = np.flatnonzero(~change.replaced & (dofs >= 0))
+    stiffness, added = (place_columns(part, dofs, unknowns) for part in (change.stiffness, change.added))
+    J = J + stiffness[at]
+    rows, right = change.rows[:, at], change.right + change.rows[:, at] @ taken.right
+    total = rows @ J + added
+    changes = RowChanges(
+        replaced=dofs[at],
+        replaced_rows=total[at],
+        replaced_right=right[at],
+        added=dofs[others],
+        added_rows=(total + stiffness)[others],
+        added_right=right[others],
+    )
+    return change_rows(matrix, b, changes if numbering is None else numbering.place(changes)), taken
+
+
+def place_columns(matrix: sp.csr_matrix, columns: NDArray[np.int64], unknowns: int) -> sp.csr_matrix:
+    """Columns to their place among the unknowns; columns that are no unknowns (-1) drop out."""
+    entries = matrix.tocoo()
+    target = columns[entries.col]
+    keep = target >= 0
+    return sp.csr_matrix((entries.data[keep], (entries.row[keep], target[keep])), shape=(matrix.shape[0], unknowns))
 
 
 def fetch_rows(matrix: PETSc.Mat, rows: NDArray[np.int64]) -> sp.csr_matrix:

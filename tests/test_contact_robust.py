@@ -8,7 +8,9 @@ from contact_setup import brick, make_body, make_contact, pressed, solve_step
 from structure_setup import block, constant, vector
 from test_contact_patch import check, deformation
 
-import solvers.contact.pair
+import solvers.contact.mortar
+import solvers.contact.patch
+import solvers.contact.search
 from fsci import shapes
 from solvers.contact.surface import Surface
 from solvers.structure.body import Support
@@ -139,8 +141,8 @@ def test_a_pair_that_never_meets_costs_nothing(monkeypatch):
     def forbidden(*arguments, **settings):
         raise AssertionError("work for a pair that is far away")
 
-    for name in ("mortar", "nodal_normals"):
-        monkeypatch.setattr(solvers.contact.pair, name, forbidden)
+    monkeypatch.setattr(solvers.contact.mortar, "mortar", forbidden)
+    monkeypatch.setattr(solvers.contact.patch, "nodal_normals", forbidden)
     monkeypatch.setattr(contact, "condense", forbidden)
     monkeypatch.setattr(solvers.contact.search, "_update", forbidden)
     assert max(steps(structure, 3, 0.1)) <= 1

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from contact_setup import brick, make_body, make_contact
 
 from solvers.contact.surface import Surface
@@ -103,50 +104,38 @@ def prepare(make, seed=5):
     structure.initialise(0.0, 0.1)
     structure.begin_step(0.0, 0.1)
     structure.now.u[:] = rng.uniform(-0.01, 0.01, structure.layout.size)
-    structure.now.u[:] = structure.held.free_part(structure.now.u) + structure._target
+    structure.now.u = structure.held.free_part(structure.now.u) + structure._target
     structure.residual()
-    contact.z[:] = 30.0 * contact.terms.normals + rng.uniform(-5.0, 5.0, contact.z.shape)
-    contact.z[contact.nodes.held] = 0.0
+    pressure = rng.uniform(25.0, 35.0, len(contact.z))
+    contact.z[:] = pressure[:, None] * contact.terms.normals
     for _ in range(2):  # the first one takes the multipliers of inactive nodes away
         structure.residual()
     assert contact.active_set.active.sum() >= 3
     return structure, contact, rng
 
 
+def dense(matrix):
+    indptr, indices, data = matrix.getValuesCSR()
+    return sp.csr_matrix((data, indices, indptr), shape=matrix.size).toarray()
+
+
 class Linearisation:
-    """Dense derivatives of balance, gap and tangential rows with respect to displacements and active multipliers."""
+    """Dense derivatives of balance and law with respect to displacements and what multipliers can change (zeta)."""
 
     def __init__(self, structure, contact):
-        terms, dim = contact.terms, contact.dim
-        self.active = np.flatnonzero(contact.active_set.active)
-        weight, n = structure.time.constraint_weight, contact.size * dim
-        rows = (dim * self.active[:, None] + np.arange(dim)).ravel()
-        indptr, indices, data = structure.tangent().getValuesCSR()
-        size = len(indptr) - 1
-        tangent = np.zeros((size, size))
-        np.add.at(tangent, (np.repeat(np.arange(size), np.diff(indptr)), indices), data)
-
+        terms = contact._linearise(structure.time.constraint_weight)
         dofs = contact.nodes.dofs.ravel()
-        place = np.zeros((n, size))
+        place = np.zeros((len(dofs), structure.layout.size))
         place[np.flatnonzero(dofs >= 0), dofs[dofs >= 0]] = 1.0
-        slave_force = -np.diag(np.repeat(terms.D, dim))
-        if contact.transformation is not None:
-            slave_force = np.linalg.solve(contact.transformation.toarray().T, slave_force)
-        force = slave_force + np.kron(terms.M.toarray().T, np.eye(dim))
-
-        normals = terms.normals[self.active]
-        self.tangents = np.array([np.linalg.svd(normal[None])[2][1:] for normal in normals])  # (m, dim - 1, dim)
-        m = len(self.active)
-        along = np.zeros((m * (dim - 1), m * dim))
-        for i in range(m):
-            along[i * (dim - 1) : (i + 1) * (dim - 1), i * dim : (i + 1) * dim] = self.tangents[i]
-        z_n = np.einsum("nd,nd->n", contact.z[self.active], normals)
-
-        self.balance_u = tangent - weight * place.T @ terms.dforce.toarray() @ place
-        self.balance_z = -weight * place.T @ force[:, rows]
-        self.gap_u = terms.dgap.toarray()[self.active] @ place
-        self.oblique_u = -along @ (np.repeat(z_n, dim)[:, None] * terms.dnormals.toarray()[rows]) @ place
-        self.oblique_z = along
+        on_balance = -terms.weight * place.T
+        force = on_balance @ terms.force.toarray()
+        self.active = contact._touching_now()
+        self.basis = terms.basis.toarray()
+        self.balance_u = dense(structure.tangent()) + on_balance @ terms.dforce.toarray() @ place
+        self.balance_u += force @ terms.turning.toarray() @ place
+        self.balance_z = force @ self.basis
+        self.law_u, self.law_z = terms.by_displacement.toarray() @ place, terms.by_multiplier.toarray()
+        self.law, self.place, self.turning = terms.residual, place, terms.turning.toarray()
 
 
 def compare(found, wanted, tolerance):
@@ -158,23 +147,17 @@ def compare(found, wanted, tolerance):
 def test_condensed_step_is_that_of_the_saddle_point_system(name):
     structure, contact, _ = prepare(STATES[name])
     if name.startswith("slave and master"):
-        active = np.flatnonzero(contact.active_set.active)
-        assert contact.terms.M[active][:, active].nnz > 0
+        touched = contact.multipliers.node[contact.active_set.active]
+        assert contact.terms.M[contact.active_set.active][:, touched].nnz > 0
     L = Linearisation(structure, contact)
-    m, size = len(L.active), structure.layout.size
+    size = structure.layout.size
     force = np.zeros(size)
     dofs = contact.nodes.dofs.ravel()
     np.add.at(force, dofs[dofs >= 0], contact.force().ravel()[dofs >= 0])
     without = structure.residual_force + structure.time.constraint_weight * force
 
-    matrix = np.block(
-        [
-            [L.balance_u, L.balance_z],
-            [L.gap_u, np.zeros((m, m * contact.dim))],
-            [L.oblique_u, L.oblique_z],
-        ]
-    )
-    right = np.concatenate([-without, -contact.terms.gap[L.active], np.zeros(len(L.oblique_u))])
+    matrix = np.block([[L.balance_u, L.balance_z], [L.law_u, L.law_z]])
+    right = np.concatenate([-without, -L.law])
     held = structure.held.dofs
     matrix[held] = 0.0
     matrix[held, held] = 1.0
@@ -186,33 +169,33 @@ def test_condensed_step_is_that_of_the_saddle_point_system(name):
 
     structure.advance()
     compare(structure._increment, solution[:size], 1e-10)
-    compare(contact.z[L.active].ravel(), solution[size:], 1e-10)
+    z = L.basis @ solution[size:] + L.turning @ L.place @ solution[:size]
+    compare(contact.z[L.active].ravel(), z, 1e-10)
 
 
 @pytest.mark.parametrize("name", STATES)
 def test_linearisation_is_the_derivative_of_the_residual(name):
+    """Multipliers are pressures times normals here, and turn with them."""
     structure, contact, rng = prepare(STATES[name])
     L = Linearisation(structure, contact)
-    u, z = structure.now.u.copy(), contact.z.copy()
-    du, dz = rng.uniform(-1, 1, u.shape), 1e3 * rng.uniform(-1, 1, (len(L.active), contact.dim))
+    u = structure.now.u.copy()
+    pressure = np.einsum("nd,nd->n", contact.z, contact.terms.normals)[L.active]
+    du, dp = rng.uniform(-1, 1, u.shape), 1e3 * rng.uniform(-1, 1, len(L.active))
 
     def residual(step):
         structure.now.u[:] = u + step * du
-        contact.z[:] = z
-        contact.z[L.active] += step * dz
         structure.residual()
-        assert np.array_equal(np.flatnonzero(contact.active_set.active), L.active)
-        now, normals = contact.z[L.active], contact.terms.normals[L.active]
-        oblique = now - np.einsum("nd,nd->n", now, normals)[:, None] * normals
-        along = np.einsum("mtd,md->mt", L.tangents, oblique).ravel()
-        return structure.residual_force.copy(), contact.terms.gap[L.active].copy(), along
+        contact.z[L.active] = (pressure + step * dp)[:, None] * contact.terms.normals[L.active]
+        structure.residual()
+        assert np.array_equal(contact._touching_now(), L.active)
+        law = L.basis.T @ contact._law_rows(structure.time.constraint_weight)[2]
+        return structure.residual_force.copy(), law
 
     step = 1e-6
     ahead, behind = residual(step), residual(-step)
     difference = [(a - b) / (2 * step) for a, b in zip(ahead, behind, strict=True)]
-    compare(L.balance_u @ du + L.balance_z @ dz.ravel(), difference[0], 1e-6)
-    compare(L.gap_u @ du, difference[1], 1e-6)
-    compare(L.oblique_u @ du + L.oblique_z @ dz.ravel(), difference[2], 1e-6)
+    compare(L.balance_u @ du + L.balance_z @ dp, difference[0], 1e-6)
+    compare(L.law_u @ du + L.law_z @ dp, difference[1], 1e-6)
     # the contact part alone: it must not hide behind the stiffness of the bodies
-    contact_part = L.balance_z @ dz.ravel()
+    contact_part = L.balance_z @ dp
     assert np.abs(contact_part).max() > 1e-4 * np.abs(difference[0]).max()

@@ -1,59 +1,57 @@
-"""The primal-dual active set: which slave nodes are in contact."""
+"""The active set: which multipliers are in contact, and whether they stick; a guard against circles."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array, StepFailed
+from solvers.api import StepFailed
+from solvers.contact.law.law import OPEN, Statuses
 
 #: How often a step may come back to an active set it has left before it is given up.
 MAX_RETURNS = 6
 
-#: What c_n is multiplied by at every return: with a large one, iterates step over the solution to and fro.
+#: What the complementarity parameter is multiplied by at every return: with a large one, iterates step over the
+#: solution to and fro.
 ON_RETURN = 0.1
 
 
 class ActiveSet:
-    """Active where z_n - c_n s g > 0 with the pressure z_n, the mean gap g and the nodal stiffness per area s.
+    """Statuses of all multipliers as the laws choose them, iterate by iterate.
 
-    This is the semi-smooth Newton reading of z_n >= 0, g >= 0, z_n g = 0; the solution does not depend on c_n > 0.
+    Choosing anew in every iterate is the semi-smooth Newton reading of the complementarity conditions.
     Source: Alart & Curnier (1991); Hueber & Wohlmuth, Comput. Methods Appl. Mech. Engng 194 (2005).
     """
 
-    def __init__(self, size: int, c_n: float = 1.0):
-        self.c_n = c_n
-        self.active = np.zeros(size, dtype=bool)
-        self.changed = False  #: by the latest update
-        self.changes = 0  #: updates in this step that changed the set
-        self._c_n = c_n  # of this step
+    def __init__(self, size: int):
+        self.status: Statuses = np.full(size, OPEN, dtype=np.int8)
+        self.changed = False  #: by the latest choice
+        self.changes = 0  #: choices in this step that changed the set
+        self.damping = 1.0  #: factor of the complementarity parameter in this step
         self._seen: list[bytes] = []
         self._returns = 0
 
+    @property
+    def active(self) -> NDArray[np.bool_]:
+        """In contact."""
+        return self.status != OPEN
+
     def begin_step(self) -> None:
         """Forget what was seen in the last step; the set itself stays."""
-        self.changed, self.changes = False, 0
-        self._c_n = self.c_n
-        self._seen, self._returns = [self.active.tobytes()], 0
+        self.changed, self.changes, self.damping = False, 0, 1.0
+        self._seen, self._returns = [self.status.tobytes()], 0
 
-    def clear(self) -> None:
-        """No node is near the other side."""
-        self._take(np.zeros_like(self.active))
-
-    def update(self, pressure: Array, gap: Array, stiffness: Array, covered: NDArray[np.bool_]) -> None:
-        """Choose the active nodes among the covered ones. Raises StepFailed if the set goes in circles."""
-        self._take(covered & (pressure - self._c_n * stiffness * gap > 0.0))
-
-    def _take(self, chosen: NDArray[np.bool_]) -> None:
-        self.changed = bool(np.any(chosen != self.active))
+    def choose(self, status: Statuses) -> None:
+        """Take the statuses of this iterate. Raises StepFailed if the set goes in circles."""
+        self.changed = bool(np.any(status != self.status))
         self.changes += self.changed
         if self.changed:
-            known = chosen.tobytes()
+            known = status.tobytes()
             if known in self._seen:
                 self._returns += 1
-                self._c_n *= ON_RETURN
+                self.damping *= ON_RETURN
             if self._returns > MAX_RETURNS:
-                flickering = int(np.sum(chosen != self.active))
+                flickering = int(np.sum(status != self.status))
                 raise StepFailed("contact", f"the active set goes in circles: {flickering} nodes cannot decide")
             self._seen.append(known)
-        self.active[:] = chosen
+        self.status = status.copy()

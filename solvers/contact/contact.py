@@ -1,8 +1,8 @@
-"""Frictionless contact between surfaces: multipliers, active set and the terms of one iterate."""
+"""Contact between surfaces: multipliers, active set and the terms of one iterate."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,14 +11,18 @@ from numpy.typing import NDArray
 
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
-from solvers.contact.condense import Linearised, condense, expand, place_columns, recover
+from solvers.contact.blocks import block_diagonal, components, expand
+from solvers.contact.condense import Condensed, Linearised, condense, recover
+from solvers.contact.directions import Directions, find_directions, free_normals
 from solvers.contact.distance import distances
-from solvers.contact.held import lent_shares
-from solvers.contact.pair import KEEP_AFTER, Pair
+from solvers.contact.interface import Interface, describe_interface
+from solvers.contact.law.law import OPEN, Law, Point, Slopes, Statuses
+from solvers.contact.lent import lent_shares
+from solvers.contact.mortar import KEEP_AFTER
+from solvers.contact.pair import Pair
 from solvers.contact.share import Shares
-from solvers.contact.surface import Nodes, Surface, nodal_areas, number_nodes
-from solvers.contact.terms import Sides, Terms, total_terms
-from solvers.rows import RowChanges
+from solvers.contact.terms import Terms, find_normals, total_terms
+from solvers.rows import RowTransformation
 
 #: Share of a slave node's area that must see a master, and the share with which a node that did in this step still may.
 LEAST_COVERED, LEAST_KEPT = 0.02, 0.01
@@ -28,7 +32,7 @@ TOUCHING = 1e-12
 
 
 class Contact:
-    """All pairs together. Positions and multipliers are arrays over `nodes`, the same on every process.
+    """All pairs together: arrays over `nodes` (N) and over `multipliers` (C), the same on every process.
 
     z are the multipliers [Pa]: the negative traction on the slave, z_n = n.z >= 0 the contact pressure.
 
@@ -46,63 +50,64 @@ class Contact:
         c_n: float = 1.0,
         keep_overlap: bool = False,
     ):
-        surfaces: list[Surface] = []
-        for pair in pairs:
-            surfaces += [s for s in (pair.slave, pair.master) if not any(s is known for known in surfaces)]
-        self.comm, self.pairs, self.surfaces = comm, list(pairs), surfaces
+        self.comm, self.c_n = comm, c_n
         self.names = tuple(names) or tuple(f"pair{i}" for i in range(len(pairs)))
-        self.nodes: Nodes = number_nodes(surfaces)
-        numbers = self.nodes.of_surface
-        self._sides: list[Sides] = [
-            (numbers[_index(surfaces, pair.slave)], numbers[_index(surfaces, pair.master)]) for pair in pairs
-        ]
+        self.interface: Interface = describe_interface(pairs)
+        self.pairs, self.nodes, self.multipliers = (
+            self.interface.pairs,
+            self.interface.nodes,
+            self.interface.multipliers,
+        )
         self.size, self.dim = self.nodes.points.shape
-        self.z = np.zeros((self.size, self.dim))
+        count = len(self.multipliers.node)
+        self.z = np.zeros((count, self.dim))
         self.x = self.nodes.points.copy()
         self._x_old = self.x.copy()
-        self.active_set = ActiveSet(self.size, c_n)
+        self.active_set = ActiveSet(count)
         self._keep_overlap = keep_overlap
-        self._gap = np.zeros(self.size)  # weighted gap at the latest evaluation
-        self._overlap = np.zeros(self.size)  # how much of it may stay negative, <= 0
-        self._seen = np.zeros(self.size, dtype=bool)  # nodes that could have a constraint in this step
+        self._gap = np.zeros(count)  # weighted gap at the latest evaluation
+        self._overlap = np.zeros(count)  # how much of it may stay negative, <= 0
+        self._seen = np.zeros(count, dtype=bool)  # multipliers that could have a constraint in this step
         self._evaluations = 0
-        self._areas = nodal_areas(self.size, [pair.slave for pair in pairs], [slave for slave, _ in self._sides])
-        self._scale = np.zeros(self.size)
+        self._stiffness = np.zeros(count)
         self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
+        self._blocked = np.zeros(count, dtype=bool)
+        self._lent: sp.csr_matrix | None = None
         self._shares = Shares(comm)
         self.time = np.nan  #: of the latest evaluation [s]
         self.touched_at = np.full(len(self.pairs), np.inf)  #: when each pair first touched [s], as probes have noted it
         self.terms: Terms | None = None
-        facets = [slave[pair.slave.facets] for pair, (slave, _) in zip(self.pairs, self._sides, strict=True)]
-        self._lent = lent_shares(facets, self.nodes.held.all(axis=1) & (self._areas > 0.0))
-        #: rows of slave nodes in the basis of the multipliers, if that is not the nodal one (tri6)
-        self.transformation = self._transformation()
-
-    def _with_lent(self, rows):
-        """Rows (of gap, D, M, ...) of nodes plus those of the functions that are lent to them."""
-        return rows if self._lent is None else rows + self._lent.T @ rows
-
-    def _transformation(self) -> sp.csr_matrix | None:
-        if all(pair.slave.facet_type != "triangle6" for pair in self.pairs):
-            return None
-        total = sp.identity(self.size, format="lil")
-        for pair, (slave, _) in zip(self.pairs, self._sides, strict=True):
-            total[np.ix_(slave, slave)] = pair.transformation.toarray()
-        return expand(total.tocsr(), self.dim)
 
     # ------------------------------------------------------------------------------------------------- steps
 
     def start(self, u: Array, stiffness: Array, t: float) -> None:
         """Take the positions at the start and the diagonal of the stiffness [N/m]; both of shape (N, dim)."""
-        slaves = self._areas > 0.0
-        self._scale[slaves] = stiffness.mean(axis=1)[slaves] / self._areas[slaves]
+        at_node, areas = stiffness.mean(axis=1)[self.multipliers.node], self.multipliers.areas
+        self._stiffness = np.divide(at_node, areas, out=np.zeros_like(areas), where=areas > 0.0)
         self.x = self.positions(u, t)
         self._x_old = self.x.copy()
+        self._blocked = self._find_blocked()
+        self._lent = lent_shares([p.multipliers[p.facets] for p in self.multipliers.patches], self._blocked)
+
+    def _find_blocked(self) -> NDArray[np.bool_]:
+        """Multipliers that supports (or an earlier one in all directions) leave no direction to act in."""
+        node, held, slaves = self.multipliers.node, self.nodes.held, self.multipliers.areas > 0.0
+        if not held[node[slaves]].any() and self.multipliers.alone.all():
+            return np.zeros(len(node), dtype=bool)
+        normals = find_normals(self.multipliers, self.x).values
+        blocked = slaves & self.nodes.fixed[node]
+        own = np.arange(len(node))  # as if every multiplier had its node for itself
+        feels = np.abs(free_normals(normals, own, held[node])).max(axis=1) > 0.0
+        whole = slaves & (self.interface.spans == "space")
+        first = np.zeros(len(node), dtype=bool)
+        first[np.flatnonzero(whole)[np.unique(node[whole], return_index=True)[1]]] = True
+        blocked |= slaves & ~whole & ~feels
+        return blocked | (slaves & np.isin(node, node[whole]) & ~first)
 
     def positions(self, u: Array, t: float) -> Array:
         """Current positions [m] of all nodes from the displacements of the deformable ones, shape (N, dim)."""
         x = self.nodes.points + u
-        for surface, numbers in zip(self.surfaces, self.nodes.of_surface, strict=True):
+        for surface, numbers in zip(self.interface.surfaces, self.nodes.of_surface, strict=True):
             if surface.motion is not None:
                 x[numbers] = surface.motion(t)
         return x
@@ -116,150 +121,189 @@ class Contact:
         self._evaluations = 0
         self.active_set.begin_step()
         self._shares.begin_step()
-        for pair in self.pairs:
-            pair.begin_step()
+        for mortar in self.interface.mortars:
+            mortar.begin_step()
 
     def evaluate(self, u: Array, t: float) -> None:
         """Mortar terms and active set at the displacements u, shape (N, dim), of the present iterate."""
         self.x = self.positions(u, t)
         self.time = t
-        self.terms = self._evaluate_pairs()
-        self._gap = np.zeros(self.size) if self.terms is None else self._with_lent(self.terms.gap)
-        if self.terms is None:
-            self.active_set.clear()
-        else:
-            covered = self._may_touch(self.terms)
-            D = self._with_lent(self.terms.D)
-            mean_gap = np.divide(self._gap - self._overlap, D, out=np.ones(self.size), where=covered)
-            pressure = np.einsum("nd,nd->n", self.z, self.terms.normals)
-            self.active_set.update(pressure, mean_gap - self._touching, self._scale, covered)
+        self.terms = self._evaluate_mortars()
+        status = np.full(len(self.z), OPEN, dtype=np.int8)
+        self._gap = np.zeros(len(self.z)) if self.terms is None else self._with_lent(self.terms.gap)
+        if self.terms is not None:
+            self._covers = self._may_touch(self.terms)
+            for law, which in self.interface.laws:
+                status[which] = law.status(self._point(which))
+            self._drop_dependent(status)
+        self.active_set.choose(status)
         self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
+
+    def _point(self, which: NDArray[np.int64]) -> Point:
+        """What a law is told of its multipliers."""
+        assert self.terms is not None
+        stiffness = self._stiffness[which]
+        return Point(
+            z=self.z[which],
+            normals=self.terms.normals[which],
+            D=self._D[which],
+            gap=(self._gap - self._overlap)[which],
+            covered=self._covers[which],
+            stiffness=stiffness,
+            c=self.c_n * self.active_set.damping * stiffness,
+            touching=self._touching,
+        )
+
+    def _drop_dependent(self, status: Statuses) -> None:
+        """Of several multipliers at a node whose normals depend on each other the later ones are not in contact."""
+        assert self.terms is not None
+        several = np.flatnonzero((status != OPEN) & ~self.multipliers.alone & (self.interface.spans == "normal"))
+        left = free_normals(self.terms.normals[several], self.multipliers.node[several], self.nodes.held)
+        status[several[~left.any(axis=1)]] = OPEN
 
     def _set_multipliers(self, own: Array) -> None:
         self.z[:] = own if self._lent is None else own + self._lent @ own
 
+    def _with_lent(self, rows):
+        """Rows (of gap, D, ...) of multipliers plus those of the functions that are lent to them."""
+        return rows if self._lent is None else rows + self._lent.T @ rows
+
     def _may_touch(self, terms: Terms) -> NDArray[np.bool_]:
-        """Nodes that can have a constraint. As for facet pairs: from some evaluation on none of them goes again."""
+        """Multipliers that can have a constraint. As for facet pairs: from some evaluation on none of them goes."""
+        self._D = self._with_lent(terms.D)
         found = self._covered(terms)
         found |= self._seen & self._covered(terms, LEAST_KEPT)
         self._evaluations += 1
         if self._evaluations >= KEEP_AFTER:
             self._seen |= found
-        return found & ~self.nodes.held.all(axis=1)
+        return found & ~self._blocked
 
     def _covered(self, terms: Terms, least: float = LEAST_COVERED) -> NDArray[np.bool_]:
-        """Nodes that see enough of a master for a constraint: less is a sliver that comes and goes."""
-        return terms.D > least * np.maximum(self._areas, np.finfo(float).tiny)
+        """Multipliers that see enough of a master for a constraint: less is a sliver that comes and goes."""
+        return terms.D > least * np.maximum(self.multipliers.areas, np.finfo(float).tiny)
 
-    def _evaluate_pairs(self) -> Terms | None:
+    def _evaluate_mortars(self) -> Terms | None:
         """Terms of all pairs, each process doing its share of the slave facets; None if no facets are near."""
-        pieces = []
-        for index, (pair, (slave, master)) in enumerate(zip(self.pairs, self._sides, strict=True)):
-            facet_pairs, motion = pair.near(self.x[slave], self.x[master], self._x_old[slave], self._x_old[master])
+        near = [mortar.near(self.x, self._x_old) for mortar in self.interface.mortars]
+        if all(len(facet_pairs) == 0 for facet_pairs, _ in near):
+            return None
+        normals = find_normals(self.multipliers, self.x)
+        patches = self.multipliers.patches
+        pieces, met = [], False
+        for index, (mortar, (facet_pairs, motion)) in enumerate(zip(self.interface.mortars, near, strict=True)):
             if len(facet_pairs) == 0:
                 continue
-            mine = self._shares.mine(index, facet_pairs, len(pair.slave.facets))
-            found = pair.evaluate(self.x[slave], self.x[master], mine, motion, self.z[slave])
-            pair.keep(self._shares.together(found.used))
-            area = self._shares.combine(index, found.area)
-            if area.any():
-                pieces.append(((slave, master), found))
-        return total_terms(pieces, self._shares, self.size, self.dim) if pieces else None
+            at = normals.of_patch[next(k for k, patch in enumerate(patches) if patch is mortar.patch)]
+            mine = self._shares.mine(index, facet_pairs, len(mortar.facets))
+            found = mortar.evaluate(self.x, *at, mine, motion, self.z[mortar.patch.multipliers])
+            mortar.keep(self._shares.together(found.used))
+            met |= bool(self._shares.combine(index, found.area).any())
+            pieces.append((mortar, found))
+        sizes = len(self.pairs), len(self.z), self.size
+        return total_terms(pieces, normals, self._shares, sizes) if met else None
 
     # ------------------------------------------------------------------------------------- what the balance needs
 
+    def _force_matrix(self) -> sp.csr_matrix:
+        """Forces on the nodes per unit multiplier [m^(dim-1)], shape (N, C)."""
+        assert self.terms is not None
+        count = len(self.z)
+        on_slave = sp.csr_matrix((-self.terms.D, (self.multipliers.node, np.arange(count))), shape=(self.size, count))
+        if self.interface.basis is not None:
+            on_slave = self.interface.basis[1].T @ on_slave
+        return (on_slave + self.terms.M.T).tocsr()
+
     def force(self) -> Array:
         """Contact force [N] on all nodes for the present multipliers, shape (N, dim)."""
-        if self.terms is None:
-            return np.zeros_like(self.z)
-        on_slave = -self.terms.D[:, None] * self.z
-        if self.transformation is not None:
-            on_slave = sp.linalg.spsolve(self.transformation.T.tocsc(), on_slave.ravel()).reshape(on_slave.shape)
-        return on_slave + self.terms.M.T @ self.z
+        return np.zeros((self.size, self.dim)) if self.terms is None else self._force_matrix() @ self.z
 
     def violation(self, weight: float) -> float:
-        """Norm [N] of what the active nodes miss: the closed gap, and a traction along the normal."""
-        active = self.active_set.active
-        if self.terms is None or not active.any():
+        """Norm [N] of what the multipliers in contact miss of their laws."""
+        if self.terms is None:
             return 0.0
-        normals, z, D = self.terms.normals[active], self.z[active], self.terms.D[active]
-        oblique = z - np.einsum("nd,nd->n", z, normals)[:, None] * normals
-        closing = self._scale[active] * (self._gap - self._overlap)[active]
-        return float(np.sqrt(np.sum(closing**2) + np.sum((weight * D[:, None] * oblique) ** 2)))
+        missed = [
+            law.residual(self._point(which), self.active_set.status[which], weight) for law, which in self._in_contact()
+        ]
+        return float(np.sqrt(sum(np.sum(part**2) for part in missed)))
 
-    def condense(self, weight: float, fetch: Callable[[NDArray[np.int64]], sp.csr_matrix], R: Array) -> RowChanges:
-        """The linearised balance without multipliers.
+    def _in_contact(self) -> list[tuple[Law, NDArray[np.int64]]]:
+        parts = [(law, which[self.active_set.active[which]]) for law, which in self.interface.laws]
+        return [(law, which) for law, which in parts if len(which)]
 
-        `weight` is that of the new contact force in the balance, `fetch(rows)` gives rows of the tangent without
-        contact, R is the balance without the new contact force at all nodes, shape (N, dim).
+    def condense(self, weight: float) -> RowTransformation:
+        """What makes rows without multipliers of the linearised balance without the new contact force.
+
+        weight: of that force in the balance.
         """
-        assert self.terms is not None
-        columns = self.nodes.dofs.ravel()
-        slaves = self._condensed_nodes()
-        place = self._dofs_of(slaves)
-        J = fetch(columns[place])
-        stiffness = place_columns(-weight * self.terms.dforce, columns, J.shape[1])
-        J = J + stiffness[place]
-        right = R.ravel()[place]
-        if self.transformation is not None:
-            basis = self.transformation[place][:, place].T
-            J, right = basis @ J, basis @ right
-        active = self.active_set.active[slaves].repeat(self.dim)
         self._linearised = self._linearise(weight)
-        self._rows, self._right = J[active], right[active]
-        self._condensed = condense(self._linearised, self._rows, self._right, columns)
-        others = np.flatnonzero(self.nodes.deformable.repeat(self.dim))
-        others = np.setdiff1d(others, place)
-        kept = place[~active]
-        return RowChanges(
-            replaced=np.concatenate([columns[place[active]], columns[kept]]),
-            replaced_rows=sp.vstack(
-                [self._condensed.slave_rows, J[~active] + self._condensed.added_rows[kept]], format="csr"
-            ),
-            replaced_right=np.concatenate(
-                [self._condensed.slave_right, self._condensed.added_right[kept] - right[~active]]
-            ),
-            added=columns[others],
-            added_rows=(stiffness + self._condensed.added_rows)[others],
-            added_right=self._condensed.added_right[others],
+        self._condensed: Condensed = condense(self._linearised)
+        changed = np.zeros(self.size, dtype=bool)
+        changed[self.multipliers.node[self.active_set.active]] = True
+        if self.interface.basis is not None:
+            changed[self.multipliers.node[self.multipliers.areas > 0.0]] = True
+        return RowTransformation(
+            dofs=self.nodes.dofs.ravel(),
+            rows=self._condensed.rows,
+            stiffness=self._condensed.stiffness,
+            added=self._condensed.added,
+            right=self._condensed.right,
+            replaced=changed.repeat(self.dim),
         )
 
-    def _condensed_nodes(self) -> NDArray[np.int64]:
-        """Active nodes, and all slave nodes if their rows change basis."""
-        if self.transformation is None:
-            return np.flatnonzero(self.active_set.active)
-        return np.flatnonzero(self._areas > 0.0)
-
-    def _dofs_of(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-        return (self.dim * nodes[:, None] + np.arange(self.dim)).ravel()
-
-    def recover(self, du: Array) -> None:
-        """Multipliers of the active nodes from the increment of all unknowns."""
+    def recover(self, balance: Array, du: Array) -> None:
+        """Multipliers in contact from J du + R, the linearised balance, and du [m] at the nodes, shapes (N * dim,)."""
         own = np.zeros_like(self.z)
-        own[self._linearised.active] = recover(self._linearised, self._condensed, self._rows @ du + self._right)
+        found = recover(self._linearised, self._condensed, balance, du)
+        own[self._touching_now()] = found.reshape(-1, self.dim)
         self._set_multipliers(own)
+
+    def _touching_now(self) -> NDArray[np.int64]:
+        return np.concatenate([which for _, which in self._in_contact()] or [np.empty(0, dtype=np.int64)])
 
     def _linearise(self, weight: float) -> Linearised:
         assert self.terms is not None
-        active = np.flatnonzero(self.active_set.active)
-        normals = self.terms.normals[active]
-        rows = self._dofs_of(active)
-        on_master = expand(self._with_lent(self.terms.M)[active], self.dim).T.tocsr()
-        if self.transformation is not None:
-            on_master = (self.transformation.T @ on_master).tocsr()
+        dim, active = self.dim, self._touching_now()
+        to_all = sp.identity(len(self.z), format="csr") if self._lent is None else self._with_own()
+        directions: Directions = find_directions(
+            self.z[active],
+            self.terms.normals[active],
+            self.multipliers.node[active],
+            self.nodes.held,
+            self.interface.spans[active],
+        )
+        turning = directions.turning @ self.terms.dnormals[components(active, dim)]
+        by_z, by_u, residual = self._law_rows(weight)
+        P = directions.basis
         return Linearised(
             weight=weight,
-            active=active,
-            normals=normals,
-            pressure=np.einsum("nd,nd->n", self.z[active], normals),
-            D=self.terms.D[active],
-            free=~self.nodes.held[active].ravel(),
-            on_master=on_master,
-            gap=(self._gap - self._overlap)[active],
-            scale=self._scale[active],
-            dgap=self._with_lent(self.terms.dgap)[active],
-            dnormals=self.terms.dnormals[rows],
+            force=expand((self._force_matrix() @ to_all)[:, active], dim),
+            dforce=self.terms.dforce,
+            basis=P,
+            turning=turning,
+            felt=directions.felt,
+            by_multiplier=(P.T @ by_z @ P).tocsr(),
+            by_displacement=(P.T @ (by_u + by_z @ turning)).tocsr(),
+            residual=P.T @ (residual - by_z @ self.z[active].ravel()),
+            transformation=None if self.interface.basis is None else expand(self.interface.basis[0], dim),
         )
+
+    def _with_own(self) -> sp.csr_matrix:
+        return (sp.identity(len(self.z)) + self._lent).tocsr()
+
+    def _law_rows(self, weight: float) -> tuple[sp.csr_matrix, sp.csr_matrix, Array]:
+        """(by z, by u, residual) of all multipliers in contact, law by law."""
+        assert self.terms is not None
+        n = self.dim * self.size
+        dgap = self._with_lent(self.terms.dgap)
+        by_z, by_u, residual = [], [sp.csr_matrix((0, n))], [np.zeros(0)]
+        for law, which in self._in_contact():
+            slopes = Slopes(gap=dgap[which], normals=self.terms.dnormals[components(which, self.dim)])
+            rows = law.rows(self._point(which), slopes, self.active_set.status[which], weight)
+            by_z.append(block_diagonal(rows.by_z))
+            by_u.append(rows.by_u)
+            residual.append(rows.residual.ravel())
+        blocks = sp.block_diag(by_z, format="csr") if by_z else sp.csr_matrix((0, 0))
+        return blocks, sp.vstack(by_u, format="csr"), np.concatenate(residual)
 
     def dofs(self) -> NDArray[np.int64]:
         """Global dofs of all nodes, -1 where rigid, shape (N, dim)."""
@@ -267,7 +311,7 @@ class Contact:
 
     def multiplier_dofs(self) -> NDArray[np.int64]:
         """Global dofs of the slave nodes, each once."""
-        return self.nodes.dofs[self._areas > 0.0].ravel()
+        return self.nodes.dofs[np.unique(self.multipliers.node[self.multipliers.areas > 0.0])].ravel()
 
     @property
     def near(self) -> bool:
@@ -282,13 +326,13 @@ class Contact:
     # ------------------------------------------------------------------------------------------- results and state
 
     def active(self) -> NDArray[np.bool_]:
-        """Which nodes touch, shape (N,)."""
-        return self.active_set.active.copy()
+        """Which multipliers are in contact, shape (C,)."""
+        return self.active_set.active
 
     def numbers(self) -> dict[str, float]:
         """Columns for the history."""
         found = {
-            "contact.active": float(self.active_set.active.sum()),
+            "contact.active": float(len(np.unique(self.multipliers.node[self.active_set.active]))),
             "contact.changes": float(self.active_set.changes),
         }
         for index, name in enumerate(self.names):
@@ -298,59 +342,33 @@ class Contact:
 
     def resultant(self, index: int) -> Array:
         """Contact force [N] of a pair on its slave side, shape (dim,)."""
-        slave, _ = self._sides[index]
-        if self.terms is None:
-            return np.zeros(self.dim)
-        return -(self.terms.D[slave, None] * self.z[slave]).sum(axis=0)
+        return np.zeros(self.dim) if self.terms is None else -self.terms.D_of_pair[index] @ self.z
 
     def distances(self, index: int) -> Array:
         """Distances [m] of the slave nodes of a pair to its master, as of the latest `evaluate`."""
-        slave, master = self._sides[index]
-        surface = self.pairs[index].master
-        return distances(self.x[slave], self.x[master], surface.facets, surface.facet_type)
+        pair = self.pairs[index]
+        slave, master = (self.interface.nodes_of(surface) for surface in (pair.slave, pair.master))
+        return distances(self.x[slave], self.x[master], pair.master.facets, pair.master.facet_type)
 
     def mean_gap(self) -> Array:
-        """Mean gap [m] around each slave node, NaN where no master is near, shape (N,)."""
+        """Mean gap [m] at each multiplier, NaN where no master is near, shape (C,)."""
         if self.terms is None:
-            return np.full(self.size, np.nan)
+            return np.full(len(self.z), np.nan)
         covered = self._covered(self.terms)
-        return np.divide(self.terms.gap, self.terms.D, out=np.full(self.size, np.nan), where=covered)
-
-    def fields(self) -> dict[str, dict[str, tuple[NDArray[np.int64], Array]]]:
-        """Nodal results on slave surfaces: body -> name -> (nodes in its mesh, values).
-
-        contact_traction [Pa] acts on the slave, contact_pressure is its normal part, contact_gap [m] the mean gap.
-        """
-        gap, active = self.mean_gap(), self.active_set.active
-        normals = np.zeros_like(self.z) if self.terms is None else self.terms.normals
-        found: dict[str, dict[str, tuple[NDArray[np.int64], Array]]] = {}
-        for pair, (slave, _) in zip(self.pairs, self._sides, strict=True):
-            if pair.slave.mesh_nodes is None:
-                continue
-            values = {
-                "contact_pressure": np.einsum("nd,nd->n", self.z[slave], normals[slave]),
-                "contact_traction": -self.z[slave],
-                "contact_gap": gap[slave],
-                "contact_active": active[slave].astype(float),
-            }
-            of_body = found.setdefault(pair.slave.body, {})
-            for name, array in values.items():
-                nodes, before = of_body.get(name, (np.empty(0, dtype=np.int64), array[:0]))
-                of_body[name] = np.concatenate([nodes, pair.slave.mesh_nodes]), np.concatenate([before, array])
-        return found
+        return np.divide(self.terms.gap, self.terms.D, out=np.full(len(self.z), np.nan), where=covered)
 
     def save(self) -> State:
-        arrays = {"z": self.z, "x": self.x, "gap": self._gap, "active": self.active_set.active}
-        arrays["touched_at"] = self.touched_at
-        return {name: array.copy() for name, array in arrays.items()}
+        return {
+            "z": self.z.copy(),
+            "x": self.x.copy(),
+            "gap": self._gap.copy(),
+            "status": self.active_set.status.copy(),
+            "touched_at": self.touched_at.copy(),
+        }
 
     def restore(self, state: State) -> None:
         self.z[:] = state["z"]
         self.x[:] = state["x"]
         self._gap = state["gap"].copy()
-        self.active_set.active[:] = state["active"]
+        self.active_set.status = state["status"].copy()
         self.touched_at[:] = state["touched_at"]
-
-
-def _index(surfaces: Sequence[Surface], wanted: Surface) -> int:
-    return next(i for i, surface in enumerate(surfaces) if surface is wanted)

@@ -39,8 +39,8 @@ def pressures(contact: Contact, pair: int) -> Array:
     slave = contact.pairs[pair].slave
     if contact.terms is None:
         return np.zeros(len(slave.points))
-    nodes = next(n for surface, n in zip(contact.surfaces, contact.nodes.of_surface, strict=True) if surface is slave)
-    return np.einsum("nd,nd->n", contact.z[nodes], contact.terms.normals[nodes])
+    which = contact.interface.multipliers_of(slave)
+    return np.einsum("nd,nd->n", contact.z[which], contact.terms.normals[which])
 
 
 def first_contact(contact: Contact, pair: int) -> Probe:

@@ -51,3 +51,10 @@ class Shares:
             return part
         parts = self.comm.allgather(part)
         return sum(parts[1:], parts[0])
+
+    def total_of(self, *parts: Any) -> tuple[Any, ...]:
+        """`total` of several in one message."""
+        if self.comm.size == 1:
+            return parts
+        gathered = self.comm.allgather(parts)
+        return tuple(sum(found[1:], found[0]) for found in zip(*gathered, strict=True))

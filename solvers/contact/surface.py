@@ -34,8 +34,9 @@ class Surface:
     facets: NDArray[np.int64]  #: nodes of each facet in VTK order, outward oriented, shape (k, nodes per facet)
     facet_type: str  #: line, line3, triangle, triangle6, quad, quad9
     dofs: NDArray[np.int64] | None  #: global dofs of each node, shape (n, dim); None if rigid
-    held: NDArray[np.bool_] | None = None  #: which of them are prescribed, shape (n, dim)
+    held: Array | None = None  #: projections on the directions that supports prescribe, shape (n, dim, dim)
     body: str = ""  #: whose surface it is
+    symmetric: NDArray[np.bool_] | None = None  #: held by planes of symmetry: normals have no such component, (n, dim)
     mesh_nodes: NDArray[np.int64] | None = None  #: number of each node in the mesh of the body
     motion: Callable[[float], Array] | None = None  #: rigid: positions [m] at a time, shape (n, dim)
 
@@ -51,7 +52,7 @@ class Nodes:
 
     points: Array  #: reference positions [m], shape (N, dim)
     dofs: NDArray[np.int64]  #: global dofs, -1 where rigid, shape (N, dim)
-    held: NDArray[np.bool_]  #: prescribed dofs (all of a rigid node), shape (N, dim)
+    held: Array  #: projections on what is prescribed (all of a rigid node), shape (N, dim, dim)
     of_surface: tuple[NDArray[np.int64], ...]  #: node numbers of each surface
 
     @property
@@ -63,6 +64,11 @@ class Nodes:
         """Shape (N,)."""
         return self.dofs[:, 0] >= 0
 
+    @property
+    def fixed(self) -> NDArray[np.bool_]:
+        """Held in all directions, shape (N,)."""
+        return np.einsum("nii->n", self.held) > self.dim - 0.5
+
 
 def number_nodes(surfaces: Sequence[Surface]) -> Nodes:
     """Number the nodes of the surfaces together: nodes with the same dofs are the same node."""
@@ -72,7 +78,8 @@ def number_nodes(surfaces: Sequence[Surface]) -> Nodes:
     for surface in surfaces:
         n, dim = surface.points.shape
         own = np.full((n, dim), -1) if surface.dofs is None else surface.dofs
-        fixed = np.ones((n, dim), dtype=bool) if surface.dofs is None else surface.held
+        whole = np.broadcast_to(np.eye(dim), (n, dim, dim))
+        fixed = whole if surface.dofs is None else surface.held
         number = np.empty(n, dtype=np.int64)
         new = []
         for i, first in enumerate(own[:, 0].tolist()):
@@ -86,20 +93,16 @@ def number_nodes(surfaces: Sequence[Surface]) -> Nodes:
             count += 1
         points.append(surface.points[new])
         dofs.append(own[new])
-        held.append(np.zeros((len(new), dim), dtype=bool) if fixed is None else fixed[new])
+        held.append(np.zeros((len(new), dim, dim)) if fixed is None else fixed[new])
         numbers.append(number)
     return Nodes(np.concatenate(points), np.concatenate(dofs), np.concatenate(held), tuple(numbers))
 
 
-def nodal_areas(size: int, slaves: Sequence[Surface], numbers: Sequence[NDArray[np.int64]]) -> Array:
-    """Reference area of the slave surfaces around each of all nodes [m^(dim-1)], shape (size,); zero elsewhere.
-
-    numbers: of the nodes of each slave surface. Every node of a facet has an equal part of it.
-    """
-    areas = np.zeros(size)
-    for slave, nodes in zip(slaves, numbers, strict=True):
-        share = _facet_measures(slave.corners) / slave.facets.shape[1]
-        np.add.at(areas, nodes[slave.facets], share[:, None])
+def nodal_areas(surface: Surface) -> Array:
+    """Reference area around each node [m^(dim-1)], shape (n,). Every node of a facet has an equal part of it."""
+    areas = np.zeros(len(surface.points))
+    share = _facet_measures(surface.corners) / surface.facets.shape[1]
+    np.add.at(areas, surface.facets, share[:, None])
     return areas
 
 
@@ -109,3 +112,8 @@ def _facet_measures(corners: Array) -> Array:
         return np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
     diagonals = corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1]
     return 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)
+
+
+def longest_edge(corners: Array) -> float:
+    """Of facets given by their corners, shape (k, corners, dim) [m]."""
+    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())

@@ -1,4 +1,4 @@
-"""The mortar integrals of all pairs in one numbering of nodes."""
+"""The mortar integrals of all pairs in one numbering of nodes and multipliers."""
 
 from __future__ import annotations
 
@@ -10,45 +10,76 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.contact.pair import PairTerms
+from solvers.contact.blocks import components
+from solvers.contact.mortar import Mortar, MortarTerms
+from solvers.contact.patch import Multipliers
 from solvers.contact.share import Shares
 
-#: Node numbers of the slave and of the master surface of a pair
-Sides = tuple[NDArray[np.int64], NDArray[np.int64]]
+
+@dataclass(frozen=True)
+class Normals:
+    """Averaged unit normals at the multipliers."""
+
+    values: Array  #: shape (C, dim)
+    slopes: sp.csr_matrix  #: derivatives with respect to all nodes, shape (dim * C, dim * N)
+    of_patch: tuple[tuple[Array, sp.csr_matrix], ...]  #: the same by patch, in its own numbers
 
 
 @dataclass(frozen=True)
 class Terms:
     """Mortar integrals of all pairs at one iterate; columns are interface dofs (dim * node + component)."""
 
-    D: Array  #: shape (N,), zero for nodes that are no slaves or see no master
-    M: sp.csr_matrix  #: shape (N, N)
-    gap: Array  #: weighted gap [m^dim], shape (N,)
-    normals: Array  #: of slave nodes, shape (N, dim)
-    dgap: sp.csr_matrix  #: shape (N, dim * N)
+    D: Array  #: shape (C,), zero where no master is seen
+    D_of_pair: Array  #: the part of D that each pair has, shape (pairs, C)
+    M: sp.csr_matrix  #: shape (C, N)
+    gap: Array  #: weighted gap [m^dim], shape (C,)
+    normals: Array  #: shape (C, dim)
+    dgap: sp.csr_matrix  #: shape (C, dim * N)
     dforce: sp.csr_matrix  #: derivative of the contact force at fixed multipliers, shape (dim * N,) * 2
-    dnormals: sp.csr_matrix  #: shape (dim * N, dim * N)
+    dnormals: sp.csr_matrix  #: shape (dim * C, dim * N)
 
 
-def total_terms(pieces: Sequence[tuple[Sides, PairTerms]], shares: Shares, N: int, dim: int) -> Terms:
-    """Sum over pairs, given with their sides, and over processes, in the numbering of all N nodes (collective)."""
-    n = N * dim
-    D, gap, normals = np.zeros(N), np.zeros(N), np.zeros((N, dim))
-    matrices: dict[str, list[sp.csr_matrix]] = {"M": [], "dgap": [], "dforce": []}
-    dnormals = []
-    for (slave, master), found in pieces:
-        columns = (dim * np.concatenate([slave, master])[:, None] + np.arange(dim)).ravel()
-        D[slave] += shares.total(found.D)
-        gap[slave] += shares.total(found.gap)
-        normals[slave] = found.normals
-        dnormals.append(_renumber(found.dnormals, columns[: dim * len(slave)], columns, (n, n)))
-        matrices["M"].append(_renumber(found.M, slave, master, (N, N)))
-        matrices["dgap"].append(_renumber(found.dgap, slave, columns, (N, n)))
-        matrices["dforce"].append(_renumber(found.dforce, columns, columns, (n, n)))
-    summed = {name: shares.total(sum(parts[1:], parts[0])) for name, parts in matrices.items()}
-    return Terms(D=D, gap=gap, normals=normals, dnormals=sum(dnormals[1:], dnormals[0]), **summed)
+def find_normals(multipliers: Multipliers, x: Array) -> Normals:
+    """Normals of all patches at positions x [m] of all nodes, shape (N, dim)."""
+    (N, dim), C = x.shape, len(multipliers.node)
+    values, slopes = np.zeros((C, dim)), sp.csr_matrix((dim * C, dim * N))
+    of_patch = []
+    for patch in multipliers.patches:
+        normals, derivative = patch.normals(x[patch.nodes])
+        values[patch.multipliers] = normals
+        rows, columns = components(patch.multipliers, dim), components(patch.nodes, dim)
+        slopes = slopes + renumber(derivative, rows, columns, slopes.shape)
+        of_patch.append((normals, derivative))
+    return Normals(values, slopes, tuple(of_patch))
 
 
-def _renumber(matrix: sp.csr_matrix, rows: NDArray, columns: NDArray, shape: tuple[int, int]) -> sp.csr_matrix:
+def total_terms(
+    pieces: Sequence[tuple[Mortar, MortarTerms]],
+    normals: Normals,
+    shares: Shares,
+    sizes: tuple[int, int, int],
+) -> Terms:
+    """Sum over mortars and processes; sizes: pairs, multipliers C and nodes N (collective)."""
+    pairs, C, N = sizes
+    dim = normals.values.shape[1]
+    D, gap, D_of_pair = np.zeros(C), np.zeros(C), np.zeros((pairs, C))
+    M, dgap = sp.csr_matrix((C, N)), sp.csr_matrix((C, dim * N))
+    dforce = sp.csr_matrix((dim * N, dim * N))
+    for mortar, found in pieces:
+        slave, multiplier, master = mortar.patch.nodes, mortar.patch.multipliers, mortar.masters.nodes
+        columns = components(np.concatenate([slave, master]), dim)
+        D[multiplier] += found.D
+        gap[multiplier] += found.gap
+        for pair in np.unique(mortar.masters.pair):
+            D_of_pair[pair, multiplier] += found.M @ (mortar.masters.pair == pair).astype(float)
+        M = M + renumber(found.M, multiplier, master, M.shape)
+        dgap = dgap + renumber(found.dgap, multiplier, columns, dgap.shape)
+        dforce = dforce + renumber(found.dforce, columns, columns, dforce.shape)
+    D, gap, D_of_pair, M, dgap, dforce = shares.total_of(D, gap, D_of_pair, M, dgap, dforce)
+    return Terms(D, D_of_pair, M, gap, normals.values, dgap, dforce, normals.slopes)
+
+
+def renumber(matrix: sp.csr_matrix, rows: NDArray, columns: NDArray, shape: tuple[int, int]) -> sp.csr_matrix:
+    """The entries of a matrix at other rows and columns."""
     entries = matrix.tocoo()
     return sp.csr_matrix((entries.data, (rows[entries.row], columns[entries.col])), shape=shape)

@@ -36,6 +36,9 @@ struct MortarInput {
     bool is_kept(std::size_t pair) const { return kept && kept[pair]; }
 };
 
+// Distance of a master behind another one, in diameters of the slave facet, from which on it is hidden by it.
+constexpr double thinnest_layer = 0.05;
+
 // Sums over facets. Column nodes: the slave's, then the master's; those of d*_normal: the slave's.
 template <int dim>
 struct MortarSums {
@@ -142,6 +145,7 @@ class FacetAssembly {
         pairs_.reserve(last - first);
         masters_.clear();
         const FacetBall<Slave> ball(slave_.x);
+        radius_ = ball.radius;
         if constexpr (dim == 3) {
             const PlaneFrame<Slave> frame(slave_.x);
             scale_ = frame.area;
@@ -149,21 +153,20 @@ class FacetAssembly {
             collect(first, last, ball, [&](const FacetNodes<Master>& master, const int* nodes, std::size_t number) {
                 if (frame.template apart<n, m>(slave_.x, master.x)) return;
                 Pair& pair = pairs_.emplace_back(master, frame, slave_.x, master.x);
-                if (!in_.elements)
-                    visit_cells(pair.geometry, [&](const auto& on_slave, const auto& on_master, const T& weight) {
-                        pair.integrals.add(on_slave, on_master, weight, slave_, pair.nodes);
-                    });
+                if (!in_.elements) add_segments(pair, [](double, const auto&) { return true; });
                 keep_if_met(nodes, number);
             });
         } else {
             collect(first, last, ball, [&](const FacetNodes<Master>& master, const int* nodes, std::size_t number) {
                 Pair& pair = pairs_.emplace_back(master, slave_.normal, slave_.x, master.x);
-                if (!in_.elements)
-                    visit_segment(pair.geometry, [&](const auto& point) { pair.integrals.add(point, pair.geometry); });
+                if (!in_.elements) add_segments(pair, [](double, const auto&) { return true; });
                 keep_if_met(nodes, number);
             });
         }
-        if (in_.elements) add_element_points(element_rule<Slave>());
+        if (in_.elements)
+            add_element_points(element_rule<Slave>());
+        else
+            hide_behind_each_other();
         if (!is_near()) pairs_.clear();
     }
 
@@ -211,7 +214,90 @@ class FacetAssembly {
         }
     }
 
-    // Every fixed point goes to the nearest master it meets.
+    // Adds the points of a pair for which wanted(gap, place on the slave) holds. The place is that in the plane in 3D.
+    template <typename Wanted>
+    void add_segments(Pair& pair, Wanted&& wanted) {
+        if constexpr (dim == 3)
+            visit_cells(pair.geometry, [&](const auto& on_slave, const auto& on_master, const T& weight) {
+                double place[2] = {};
+                for (int i = 0; i < n; ++i)
+                    for (int a = 0; a < 2; ++a) place[a] += on_slave.N[i] * value_of(pair.geometry.slave[i][a]);
+                if (wanted(gap_at(on_slave, on_master, slave_, pair.nodes), place))
+                    pair.integrals.add(on_slave, on_master, weight, slave_, pair.nodes);
+            });
+        else
+            visit_segment(pair.geometry, [&](const auto& point) {
+                const double xi = value_of(point.slave), eta = value_of(point.master);
+                if (wanted(gap_at(xi, eta, slave_, pair.nodes), &xi)) pair.integrals.add(point, pair.geometry);
+            });
+    }
+
+    // Whether a pair's master also lies over this place of the slave, and before the gap by more than a layer.
+    bool is_nearer(const Pair& pair, double gap, const double* place) const {
+        if constexpr (dim == 3) {
+            double nodes[m][2], x[1][2] = {{place[0], place[1]}}, on_plane[n][2], x_s[1][2] = {{place[0], place[1]}};
+            for (int l = 0; l < m; ++l)
+                for (int a = 0; a < 2; ++a) nodes[l][a] = value_of(pair.geometry.master[l][a]);
+            for (int i = 0; i < n; ++i)
+                for (int a = 0; a < 2; ++a) on_plane[i][a] = value_of(pair.geometry.slave[i][a]);
+            PointOn<Master, double> on_master;
+            PointOn<Slave, double> on_slave;
+            bool found;
+            MapBack<Master, double>(nodes).find(x, 1, &on_master, &found);
+            if (!found || !Master::inside(on_master.xi, 0.0)) return false;
+            MapBack<Slave, double>(on_plane).find(x_s, 1, &on_slave, &found);
+            return found && gap_at(on_slave, on_master, slave_, pair.nodes) < gap - thinnest_layer * 2.0 * radius_;
+        } else {
+            T eta = 0.0;
+            if (!pair.geometry.project_to_master(T(*place), eta)) return false;
+            const double at = value_of(eta);
+            return Master::inside(&at, 0.0) && gap_at(*place, at, slave_, pair.nodes) < gap - thinnest_layer * 2.0 * radius_;
+        }
+    }
+
+    // Facets that have a node in common lie side by side; others may lie behind each other if their boxes overlap.
+    bool may_hide(const Pair& a, const Pair& b) const {
+        for (int l : a.place)
+            if (std::find(std::begin(b.place), std::end(b.place), l) != std::end(b.place)) return false;
+        if constexpr (dim == 3)
+            for (int axis = 0; axis < 2; ++axis) {
+                double low[2], high[2];
+                for (int side = 0; side < 2; ++side) {
+                    const Pair& pair = side ? b : a;
+                    low[side] = high[side] = value_of(pair.geometry.master[0][axis]);
+                    for (int l = 1; l < m; ++l) {
+                        low[side] = std::min(low[side], value_of(pair.geometry.master[l][axis]));
+                        high[side] = std::max(high[side], value_of(pair.geometry.master[l][axis]));
+                    }
+                }
+                if (high[0] <= low[1] + slack || high[1] <= low[0] + slack) return false;
+            }
+        return true;
+    }
+
+    // Of masters behind each other the first one that the slave meets counts, point by point. Masters at nearly the same
+    // place (bodies side by side that bulge into each other) both count: to choose between them would be arbitrary, and
+    // the choice would change from iterate to iterate.
+    void hide_behind_each_other() {
+        std::vector<std::vector<std::size_t>> rivals(pairs_.size());
+        for (std::size_t p = 0; p < pairs_.size(); ++p)
+            for (std::size_t q = 0; q < p; ++q)
+                if (may_hide(pairs_[p], pairs_[q])) {
+                    rivals[p].push_back(q);
+                    rivals[q].push_back(p);
+                }
+        for (std::size_t p = 0; p < pairs_.size(); ++p) {
+            if (rivals[p].empty()) continue;
+            pairs_[p].integrals = {};
+            add_segments(pairs_[p], [&](double gap, const double* place) {
+                return std::none_of(rivals[p].begin(), rivals[p].end(),
+                                    [&](std::size_t q) { return is_nearer(pairs_[q], gap, place); });
+            });
+        }
+        std::erase_if(pairs_, [](const Pair& pair) { return value_of(pair.integrals.cover) == 0.0; });
+    }
+
+    // Every fixed point goes to the first master that it meets.
     void add_element_points(const std::vector<RulePoint>& rule) {
         const std::size_t n_points = rule.size();
         std::vector<PointType> points(pairs_.size() * n_points);
@@ -223,14 +309,22 @@ class FacetAssembly {
             double nearest = 0.0;
             for (std::size_t p = 0; p < pairs_.size(); ++p) {
                 if (!found[p * n_points + q]) continue;
-                const double distance = distance_at(points[p * n_points + q], slave_, pairs_[p].nodes);
-                if (best < pairs_.size() && distance >= nearest) continue;
+                const double gap = gap_at_point(pairs_[p], points[p * n_points + q]);
+                if (!in_.is_kept(pairs_[p].number) && gap < -in_.reach) continue;
+                if (best < pairs_.size() && gap >= nearest) continue;
                 best = p;
-                nearest = distance;
+                nearest = gap;
             }
             if (best < pairs_.size()) add_point(pairs_[best], points[best * n_points + q]);
         }
         std::erase_if(pairs_, [](const Pair& pair) { return value_of(pair.integrals.cover) == 0.0; });
+    }
+
+    double gap_at_point(const Pair& pair, const PointType& point) const {
+        if constexpr (dim == 3)
+            return gap_at(point.slave, point.master, slave_, pair.nodes);
+        else
+            return gap_at(value_of(point.slave), value_of(point.master), slave_, pair.nodes);
     }
 
     void add_point(Pair& pair, const PointType& point) {
@@ -277,7 +371,7 @@ class FacetAssembly {
     std::vector<Pair> pairs_;
     std::vector<int> masters_;                         // distinct master nodes of all pairs
     std::vector<double> coupling_;                     // int N~_k N^m_l over all pairs, n x masters
-    double gap_[n], scale_ = 1.0, scale_slopes_[3 * n];  // int N~_k g; |g_1 x g_2| and its derivative (3D)
+    double radius_ = 0.0, gap_[n], scale_ = 1.0, scale_slopes_[3 * n];  // int N~_k g; |g_1 x g_2| and its derivative (3D)
 
     // local derivatives, one row per function; columns: slave normals, slave nodes, masters
     std::vector<double> d_diagonal_, d_gap_, d_y_, d_force_;

@@ -113,19 +113,22 @@ struct PairIntegrals {
     }
 };
 
-// How far apart the two facets are at a point, to choose among several masters.
+// The gap g at a point, in plain numbers: to choose among several masters.
 template <typename Slave, typename Master, typename T>
-double distance_at(const Point<Slave, Master, T>& point, const FacetNodes<Slave>& slave,
-                   const FacetNodes<Master>& master) {
-    const SurfacePoint<Slave> xs(point.slave.N, point.slave.dN, slave.x);
-    const SurfacePoint<Master> xm(point.master.N, point.master.dN, master.x);
-    return std::hypot(xm.x[0] - xs.x[0], xm.x[1] - xs.x[1], xm.x[2] - xs.x[2]);
+double gap_at(const PointOn<Slave, T>& on_slave, const PointOn<Master, T>& on_master, const FacetNodes<Slave>& slave,
+              const FacetNodes<Master>& master) {
+    const SurfacePoint<Slave> xs(on_slave.N, on_slave.dN, slave.x);
+    const SurfacePoint<Slave> field(on_slave.N, on_slave.dN, slave.normal);
+    const SurfacePoint<Master> xm(on_master.N, on_master.dN, master.x);
+    const double r[3] = {xm.x[0] - xs.x[0], xm.x[1] - xs.x[1], xm.x[2] - xs.x[2]};
+    return dot(field.x, r) / std::sqrt(dot(field.x, field.x));
 }
-template <typename Slave, typename Master, typename T>
-double distance_at(const LinePoint<T>& point, const FacetNodes<Slave>& slave, const FacetNodes<Master>& master) {
-    const FieldPoint<Slave, double> xs(slave.x, value_of(point.slave));
-    const FieldPoint<Master, double> xm(master.x, value_of(point.master));
-    return std::hypot(xm.value[0] - xs.value[0], xm.value[1] - xs.value[1]);
+template <typename Slave, typename Master>
+double gap_at(double on_slave, double on_master, const FacetNodes<Slave>& slave, const FacetNodes<Master>& master) {
+    const FieldPoint<Slave, double> xs(slave.x, on_slave), field(slave.normal, on_slave);
+    const FieldPoint<Master, double> xm(master.x, on_master);
+    const double r[2] = {xm.value[0] - xs.value[0], xm.value[1] - xs.value[1]};
+    return (field.value[0] * r[0] + field.value[1] * r[1]) / std::hypot(field.value[0], field.value[1]);
 }
 
 }  // namespace mortar

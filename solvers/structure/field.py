@@ -16,7 +16,7 @@ from solvers.blocks import Layout, block_diagonal
 from solvers.distributed import Nodal
 from solvers.newton import Tolerance, converge
 from solvers.rounding import rounding_error
-from solvers.rows import Numbering, change_rows, fetch_rows, gather, gather_at
+from solvers.rows import Numbering, TakenRows, gather, gather_at, transform_rows
 from solvers.structure.body import Body
 from solvers.structure.energy import EnergyBalance
 from solvers.structure.held import Held
@@ -86,6 +86,7 @@ class Structure:
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is there already
         self._tangents = [body.create_tangent() for body in bodies]
         self._combined: PETSc.Mat | None = None
+        self._taken: TakenRows
         self._b, self._x = self.layout.vector(), self.layout.vector()
         self._method = linear.choose(settings.linear, self.dim, self.dofs())
         # the tangent of a follower pressure has an unsymmetric boundary term
@@ -281,11 +282,17 @@ class Structure:
         self._increment = increment.copy()
         if self.constraint is not None and self.constrained:
             with self.timer("contact"):
-                self.constraint.recover(gather(self.comm, self._increment) if everything is None else everything)
+                self._recover(gather(self.comm, self._increment) if everything is None else everything)
         self.now.u += self._increment
         self.now.u = self.held.free_part(self.now.u) + self._target
         size = self.norm(self.now.u)
         return self.norm(self._increment) / size if size > 0.0 else 0.0
+
+    def _recover(self, du: Array) -> None:
+        assert self.constraint is not None
+        dofs = self.constraint.dofs().ravel()
+        at_nodes = np.where(dofs >= 0, du[np.maximum(dofs, 0)], 0.0)
+        self.constraint.recover(self._taken.balance(du, len(dofs)), at_nodes)
 
     def condense(self, matrix: PETSc.Mat, right: PETSc.Vec, numbering: Numbering | None = None) -> PETSc.Mat:
         """The linear system without the multipliers of the constraint; `right` changes in place.
@@ -294,19 +301,10 @@ class Structure:
         """
         assert self.constraint is not None
         weight = self.time.constraint_weight
-        without = self.residual_force + weight * self.now.constraint
+        right.array[: self.layout.size] = -(self.residual_force + weight * self.now.constraint)
         with self.timer("contact"):
-            if numbering is None:
-                right.array[:] = -without
-                changes = self.constraint.condense(
-                    weight, lambda rows: fetch_rows(matrix, rows), self.at_constraint(without)
-                )
-                return change_rows(matrix, right, changes)
-            right.array[: self.layout.size] = -without
-            changes = self.constraint.condense(
-                weight, lambda rows: numbering.fetch_rows(matrix, rows), self.at_constraint(without)
-            )
-            return change_rows(matrix, right, numbering.place(changes))
+            matrix, self._taken = transform_rows(matrix, right, self.constraint.condense(weight), numbering)
+        return matrix
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""

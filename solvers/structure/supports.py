@@ -118,6 +118,18 @@ def prescribe(body: Body) -> Prescribed:
     return Prescribed(dofs.astype(np.int32), tuple(entries), _orthonormal(body, conditions, oblique))
 
 
+def symmetric_dofs(body: Body) -> NDArray[np.int32]:
+    """Owned dofs that planes of symmetry normal to an axis hold, local (collective). Raises SupportError."""
+    found = [np.empty(0, dtype=np.int32)]
+    for support in body.settings.supports:
+        if isinstance(support, Symmetry):
+            blocks = owned_blocks(body, support.where)
+            normal = np.abs(symmetry_normal(body, support, blocks))
+            if normal.max() == 1.0:
+                found.append(blocks * body.dim + int(np.argmax(normal)))
+    return np.unique(np.concatenate(found)).astype(np.int32)
+
+
 def owned_blocks(body: Body, where: Where) -> NDArray[np.int32]:
     """Owned dof blocks of a body on a named surface, or of nodes (collective)."""
     if isinstance(where, str):

@@ -1,0 +1,126 @@
+"""Directions of force: those that multipliers have, and those in which their nodes feel them.
+
+What a support holds feels nothing: a multiplier acts there on the support. So a node held in some components feels the
+normal traction in the others only, and one with several multipliers (an edge in a corner) each in a direction of its
+own. A multiplier whose node has no such direction left cannot be: it would contradict the support or another one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from solvers.api import Array
+
+#: Least sine of the angle between a normal and what is taken already (supports, other normals): below, a node that is
+#: to close its gap would have to move a hundred times as far.
+LEAST_FREE = 1e-2
+
+
+@dataclass(frozen=True)
+class Directions:
+    """For m multipliers with K degrees of freedom zeta: z = P zeta + Z du, felt in the directions Q of the nodes."""
+
+    basis: sp.csr_matrix  #: P, shape (dim * m, K)
+    felt: sp.csr_matrix  #: Q, orthonormal, shape (dim * N, K)
+    turning: sp.csr_matrix  #: Z = turning @ (derivatives of the normals), shape (dim * m, dim * m)
+    of_multiplier: NDArray[np.int64]  #: multiplier that each zeta belongs to, shape (K,)
+
+
+def free_normals(normals: Array, node: NDArray[np.int64], held: Array) -> Array:
+    """What each multiplier's node can feel of its normal when those before it have their share, shape (m, dim).
+
+    Made unit; zero where (almost) nothing is left. held: projections on what supports hold, shape (N, dim, dim).
+    """
+    left = normals - np.einsum("nij,nj->ni", held[node], normals)
+    order = _order_at_node(node)
+    for k in range(order.max(initial=0) + 1):
+        later, mine = order > k, np.flatnonzero(order == k)
+        size = np.linalg.norm(left[mine], axis=1)
+        unit = left[mine] / np.maximum(size, LEAST_FREE)[:, None]
+        unit[size < LEAST_FREE] = 0.0
+        left[mine] = unit
+        if later.any():
+            first = np.zeros(held.shape[:2])
+            first[node[mine]] = unit
+            taken = first[node[later]]
+            left[later] -= np.einsum("nd,nd->n", left[later], taken)[:, None] * taken
+    return left
+
+
+def _order_at_node(node: NDArray[np.int64]) -> NDArray[np.int64]:
+    """0 for the first multiplier of a node, 1 for the second, ..."""
+    order = np.argsort(node, kind="stable")
+    ordered = node[order]
+    first = np.searchsorted(ordered, ordered)
+    found = np.empty(len(node), dtype=np.int64)
+    found[order] = np.arange(len(node)) - first
+    return found
+
+
+def find_directions(
+    z: Array, normals: Array, node: NDArray[np.int64], held: Array, spans: NDArray[np.str_]
+) -> Directions:
+    """Directions of multipliers z at nodes with normals; held: as above.
+
+    spans: of each multiplier 'normal' (n alone), 'surface' (n, and what is free along the surface) or 'space' (all that
+    is free, whatever the normal).
+    """
+    m, dim = normals.shape
+    holds = np.rint(np.einsum("nii->n", held[node])).astype(int)
+    whole = (spans == "space") | ((spans == "surface") & (holds == 0))
+    partly = (spans == "surface") & (holds == 1) & (dim == 3)
+    alone = ~(whole | partly)
+    wide = whole | partly
+
+    pressure = np.einsum("nd,nd->n", z, normals)
+    turn = pressure[:, None, None] * np.eye(dim) * ~whole[:, None, None]
+    P, Q = np.zeros((m, dim, dim)), np.zeros((m, dim, dim))
+    used = np.zeros((m, dim), dtype=bool)
+    used[wide] = np.arange(dim) < (dim - holds[wide])[:, None]
+    Q[wide] = _free_directions(held[node][wide]) * used[wide][:, None, :]
+    P[whole] = Q[whole]
+    P[alone, :, 0] = normals[alone]
+    Q[alone, :, 0] = free_normals(normals[alone], node[alone], held)
+    used[alone, 0] = True
+    if partly.any():
+        _span_partly(np.flatnonzero(partly), z, normals, held[node], P, turn)
+
+    def columns(blocks: Array, rows: NDArray[np.int64], count: int) -> sp.csr_matrix:
+        at = np.cumsum(used.ravel()).reshape(used.shape) - 1
+        multiplier, column = np.nonzero(used)
+        entries = blocks[multiplier, :, column]
+        row = dim * rows[multiplier][:, None] + np.arange(dim)
+        place = np.repeat(at[multiplier, column][:, None], dim, axis=1)
+        return sp.csr_matrix((entries.ravel(), (row.ravel(), place.ravel())), shape=(count, int(used.sum())))
+
+    return Directions(
+        basis=columns(P, np.arange(m), dim * m),
+        felt=columns(Q, node, dim * len(held)),
+        turning=sp.bsr_matrix((turn, np.arange(m), np.arange(m + 1)), shape=(dim * m, dim * m)).tocsr(),
+        of_multiplier=np.nonzero(used)[0],
+    )
+
+
+def _free_directions(held: Array) -> Array:
+    """Orthonormal columns, those that are free first, shape (m, dim, dim); the axes where nothing is held."""
+    found = np.broadcast_to(np.eye(held.shape[1]), held.shape).copy()
+    some = np.einsum("nii->n", held) > 0.5
+    found[some] = np.linalg.eigh(held[some])[1]  # eigenvalues 0 come first, then 1
+    return found
+
+
+def _span_partly(which: NDArray[np.int64], z: Array, normals: Array, held: Array, P: Array, turn: Array) -> None:
+    """n and t = e x n, made unit, span what a multiplier has where the direction e is held; both turn with n."""
+    n = normals[which]
+    e = np.linalg.eigh(held[which])[1][:, :, -1]
+    t = np.cross(e, n)
+    size = np.linalg.norm(t, axis=1)
+    t /= size[:, None]
+    P[which, :, 0], P[which, :, 1] = n, t
+    spin = np.cross(e[:, None, :], np.eye(3)).transpose(0, 2, 1) / size[:, None, None]  # e x, as a matrix
+    along = np.einsum("nd,nd->n", z[which], t)[:, None, None]
+    turn[which] += along * (np.eye(3) - t[:, :, None] * t[:, None, :]) @ spin

@@ -1,0 +1,133 @@
+"""What does not change in a run: surfaces, multipliers and their laws, and which slave meets which masters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from solvers.contact.law.law import Law
+from solvers.contact.mortar import Mortar, join_masters
+from solvers.contact.pair import Pair
+from solvers.contact.patch import Multipliers, number_multipliers
+from solvers.contact.surface import Nodes, Surface, longest_edge, number_nodes
+
+#: T with N~ = N T over all nodes, and its inverse
+Basis = tuple[sp.csr_matrix, sp.csr_matrix]
+
+
+@dataclass(frozen=True)
+class Interface:
+    """All pairs together."""
+
+    pairs: tuple[Pair, ...]
+    surfaces: tuple[Surface, ...]  #: each once
+    nodes: Nodes
+    multipliers: Multipliers
+    laws: tuple[tuple[Law, NDArray[np.int64]], ...]  #: each with its multipliers
+    spans: NDArray[np.str_]  #: directions that each multiplier may have: normal, surface, space
+    mortars: tuple[Mortar, ...]
+    patch_of: dict[int, int]  #: patch of each slave surface, by its id
+    basis: Basis | None  #: that multipliers are dual to, where it is not the nodal one (tri6)
+
+    def nodes_of(self, surface: Surface) -> NDArray[np.int64]:
+        """Among all nodes."""
+        return self.nodes.of_surface[_index(self.surfaces, surface)]
+
+    def multipliers_of(self, slave: Surface) -> NDArray[np.int64]:
+        """Multipliers at the nodes of a slave surface."""
+        patch = self.multipliers.patches[self.patch_of[id(slave)]]
+        return patch.multipliers[np.searchsorted(patch.nodes, self.nodes_of(slave))]
+
+
+def describe_interface(pairs: Sequence[Pair]) -> Interface:
+    """Number nodes and multipliers, and bring together what belongs to one slave surface."""
+    surfaces = _distinct([surface for pair in pairs for surface in (pair.slave, pair.master)])
+    slaves = _distinct([pair.slave for pair in pairs])
+    nodes = number_nodes(surfaces)
+    numbers = {id(surface): found for surface, found in zip(surfaces, nodes.of_surface, strict=True)}
+    law_of_slave = [next(pair.law for pair in pairs if pair.slave is slave) for slave in slaves]
+    multipliers = number_multipliers(slaves, [numbers[id(slave)] for slave in slaves], nodes, law_of_slave)
+    laws = _multipliers_by_law(multipliers, law_of_slave)
+    mortars = [
+        mortar for k, slave in enumerate(slaves) for mortar in _mortars_of(slave, k, pairs, numbers, multipliers)
+    ]
+    return Interface(
+        pairs=tuple(pairs),
+        surfaces=tuple(surfaces),
+        nodes=nodes,
+        multipliers=multipliers,
+        laws=tuple(laws),
+        spans=_spans(multipliers, laws),
+        mortars=tuple(mortars),
+        patch_of={id(slave): patch for slave, patch in zip(slaves, multipliers.patch_of_surface, strict=True)},
+        basis=_nodal_basis(multipliers, len(nodes.points)),
+    )
+
+
+def _multipliers_by_law(multipliers: Multipliers, law_of_slave: Sequence[Law]) -> list[tuple[Law, NDArray[np.int64]]]:
+    law_of_patch = dict(zip(multipliers.patch_of_surface, law_of_slave, strict=True))
+    found: list[tuple[Law, list[NDArray[np.int64]]]] = []
+    for k, patch in enumerate(multipliers.patches):
+        parts = next((parts for law, parts in found if law == law_of_patch[k]), None)
+        if parts is None:
+            found.append((law_of_patch[k], parts := []))
+        parts.append(patch.multipliers)
+    return [(law, np.sort(np.concatenate(parts))) for law, parts in found]
+
+
+def _spans(multipliers: Multipliers, laws: Sequence[tuple[Law, NDArray[np.int64]]]) -> NDArray[np.str_]:
+    """Several multipliers at a node go along their normals."""
+    spans = np.full(len(multipliers.node), "normal", dtype="<U7")
+    for law, which in laws:
+        spans[which] = law.span
+    spans[~multipliers.alone & (spans == "surface")] = "normal"
+    return spans
+
+
+def _mortars_of(
+    slave: Surface,
+    index: int,
+    pairs: Sequence[Pair],
+    numbers: dict[int, NDArray[np.int64]],
+    multipliers: Multipliers,
+) -> list[Mortar]:
+    patch = multipliers.patches[multipliers.patch_of_surface[index]]
+    facets = np.searchsorted(patch.nodes, numbers[id(slave)])[slave.facets]
+    edge = longest_edge(slave.corners)
+    found = []
+    for integration in ("segments", "elements"):
+        mine = [i for i, pair in enumerate(pairs) if pair.slave is slave and pair.integration == integration]
+        masters = [pairs[i].master for i in mine]
+        for joined in join_masters(masters, [numbers[id(master)] for master in masters], mine):
+            found.append(Mortar(patch, facets, edge, joined, integration))
+    return found
+
+
+def _nodal_basis(multipliers: Multipliers, size: int) -> Basis | None:
+    curved = [patch for patch in multipliers.patches if patch.facet_type == "triangle6"]
+    if not curved:
+        return None
+    both = []
+    for which in (0, 1):
+        total = sp.identity(size, format="lil")
+        for patch in curved:
+            entries = patch.basis()[which].tocoo()
+            total[patch.nodes[entries.row], patch.nodes[entries.col]] = entries.data
+        both.append(total.tocsr())
+    return both[0], both[1]
+
+
+def _index(surfaces: Sequence[Surface], wanted: Surface) -> int:
+    return next(i for i, surface in enumerate(surfaces) if surface is wanted)
+
+
+def _distinct(surfaces: Sequence[Surface]) -> list[Surface]:
+    found: list[Surface] = []
+    for surface in surfaces:
+        if not any(surface is known for known in found):
+            found.append(surface)
+    return found

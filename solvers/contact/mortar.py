@@ -1,0 +1,168 @@
+"""One slave surface against all its masters: search, mortar integrals, and their full derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.contact.patch import Patch
+from solvers.contact.search import Search
+from solvers.contact.surface import KERNEL_TYPES, Surface
+from solvers.kernels import mortar
+
+#: Slave facets take part when a master is nearer than this share of the longest edge (and the motion of the step).
+NEAR = 0.3
+
+#: Evaluations of a step after which facet pairs that are in use stay in use. With 12 instead of 3 the two tori need up
+#: to 14 Newton steps instead of 6.
+KEEP_AFTER = 3
+
+Integration = Literal["segments", "elements"]
+
+
+@dataclass(frozen=True)
+class MortarTerms:
+    """Mortar integrals; columns are dofs of the patch, then of the masters (dim * node + component)."""
+
+    D: Array  #: diagonal of D [m^(dim-1)], shape (ns,)
+    M: sp.csr_matrix  #: coupling [m^(dim-1)], shape (ns, nm)
+    gap: Array  #: weighted gap [m^dim], positive where open, shape (ns,)
+    dgap: sp.csr_matrix  #: shape (ns, dim * (ns + nm))
+    dforce: sp.csr_matrix  #: derivative of the contact force at fixed multipliers, shape (dim * (ns + nm),) * 2
+    area: Array  #: covered area of each slave facet [m^(dim-1)], shape (k,)
+    used: NDArray[np.int32]  #: facet pairs that took part, shape (p, 2)
+
+
+@dataclass(frozen=True)
+class Masters:
+    """The masters of a slave surface as one surface; every one of them keeps its own nodes."""
+
+    facets: NDArray[np.int64]
+    facet_type: str
+    nodes: NDArray[np.int64]  #: among all nodes, shape (nm,)
+    pair: NDArray[np.int64]  #: pair that each node belongs to, shape (nm,)
+
+
+def join_masters(
+    surfaces: Sequence[Surface], nodes: Sequence[NDArray[np.int64]], pairs: Sequence[int]
+) -> list[Masters]:
+    """One for each kind of facets; triangles beside quadrilaterals become quadrilaterals with two corners in one."""
+    kinds = {surface.facet_type for surface in surfaces}
+    as_quads = {"triangle", "quad"} <= kinds
+    found = []
+    for kind in sorted(kinds - {"triangle"} if as_quads else kinds):
+        facets, numbers, owner, first = [], [], [], 0
+        for surface, number, pair in zip(surfaces, nodes, pairs, strict=True):
+            widen = as_quads and kind == "quad" and surface.facet_type == "triangle"
+            if surface.facet_type != kind and not widen:
+                continue
+            facets.append(first + (surface.facets[:, [0, 1, 2, 2]] if widen else surface.facets))
+            numbers.append(number)
+            owner.append(np.full(len(number), pair))
+            first += len(number)
+        joined = np.ascontiguousarray(np.concatenate(facets), dtype=np.int64)
+        found.append(Masters(joined, kind, np.concatenate(numbers), np.concatenate(owner)))
+    return found
+
+
+class Mortar:
+    """A slave surface, given by facets of a patch, and its masters."""
+
+    def __init__(
+        self, patch: Patch, facets: NDArray[np.int64], edge: float, masters: Masters, integration: Integration
+    ):
+        self.patch, self.masters, self.integration = patch, masters, integration
+        self._search = Search(facets, masters.facets)
+        self._types = KERNEL_TYPES[patch.facet_type], KERNEL_TYPES[masters.facet_type]
+        self.facets = np.ascontiguousarray(facets, dtype=np.int64)
+        self._edge = edge
+        self.begin_step()
+
+    def begin_step(self) -> None:
+        """Facet pairs are chosen anew."""
+        self._evaluations = 0
+        self._kept = np.empty(0, dtype=np.int64)
+
+    def _codes(self, facet_pairs: NDArray[np.int32]) -> NDArray[np.int64]:
+        """One number for each facet pair, in the same order."""
+        return facet_pairs[:, 0].astype(np.int64) * len(self.masters.facets) + facet_pairs[:, 1]
+
+    def keep(self, used: NDArray[np.int32]) -> None:
+        """Facet pairs in use (of all processes) stay in use until the next step, from some evaluation on.
+
+        Whether facets see each other is a hard decision: were it taken anew each time, Newton's last iterates could
+        jump to and fro between two sets of pairs. Pairs still come in, but none goes.
+        """
+        self._evaluations += 1
+        if self._evaluations >= KEEP_AFTER:
+            self._kept = np.union1d(self._kept, self._codes(used))
+
+    def near(self, x: Array, x_previous: Array) -> tuple[NDArray[np.int32], float]:
+        """Facet pairs that may meet, and the largest motion [m] of a node in this step; x of all nodes."""
+        slave, master = self.patch.nodes, self.masters.nodes
+        motion = max(float(np.abs(x[nodes] - x_previous[nodes]).max(initial=0.0)) for nodes in (slave, master))
+        found = self._search.pairs(x[slave], x[master], self._edge + motion, x_previous[slave], x_previous[master])
+        codes = self._codes(found)
+        if np.isin(self._kept, codes).all():
+            return found, motion
+        together = np.union1d(codes, self._kept)
+        count = len(self.masters.facets)
+        return np.stack([together // count, together % count], axis=1).astype(np.int32), motion
+
+    def evaluate(
+        self,
+        x: Array,
+        normals: Array,
+        dnormals: sp.csr_matrix,
+        facet_pairs: NDArray[np.int32],
+        motion: float,
+        z: Array,
+    ) -> MortarTerms:
+        """All terms at the positions x [m] of all nodes; normals and multipliers z [Pa] are those of the patch."""
+        slave, master = self.patch.nodes, self.masters.nodes
+        ns, nm, dim = len(slave), len(master), x.shape[1]
+        result = mortar(
+            np.ascontiguousarray(x[slave]),
+            self.facets,
+            self._types[0],
+            np.ascontiguousarray(x[master]),
+            self.masters.facets,
+            self._types[1],
+            normals,
+            facet_pairs,
+            np.ascontiguousarray(z),
+            method=self.integration,
+            reach=self._edge + motion,
+            near=NEAR * self._edge + motion,
+            kept=np.isin(self._codes(facet_pairs), self._kept).astype(np.uint8),
+        )
+        columns = dim * (ns + nm)
+
+        def total(direct, by_normals, rows) -> sp.csr_matrix:
+            derivative = sp.csr_matrix(direct, shape=(rows, columns))
+            through = sp.csr_matrix(by_normals, shape=(rows, dim * ns)) @ dnormals
+            return derivative + _widen(through, columns) if through.nnz else derivative
+
+        dforce = total(result.dforce, result.dforce_dn, columns)
+        if self._types[0] == "tri6":
+            back = sp.kron(self.patch.basis()[1].T, sp.identity(dim))
+            dforce = (sp.block_diag([back, sp.identity(dim * nm)]) @ dforce).tocsr()
+        return MortarTerms(
+            D=result.D,
+            M=sp.csr_matrix(result.M, shape=(ns, nm)),
+            gap=result.gap,
+            dgap=total(result.dgap, result.dgap_dn, ns),
+            dforce=dforce,
+            area=result.area,
+            used=facet_pairs[result.used.astype(bool)],
+        )
+
+
+def _widen(matrix: sp.csr_matrix, columns: int) -> sp.csr_matrix:
+    return sp.csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape=(matrix.shape[0], columns))
