@@ -6,7 +6,7 @@ A part that the case does not mention is not imported.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -53,6 +53,7 @@ class Simulation:
     probes: Callable[[], Numbers]  #: column -> value
     balances: Callable[[], Numbers]  #: column -> value
     dofs: dict[str, int]
+    notes: list[str] = field(default_factory=list)  #: on rank 0: what was changed when meshes were read
 
 
 def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
@@ -78,6 +79,7 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         probes=build_probes(case, structure),
         balances=lambda: {"structure.energy": structure.energy.error},
         dofs={"structure": structure.dofs()},
+        notes=_notes(bodies),
     )
 
 
@@ -123,6 +125,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         probes=lambda: {column: value for measure in probes for column, value in measure().items()},
         balances=lambda: {"structure.energy": structure.energy.error, **mass(), **coupled.balance.numbers()},
         dofs={"fluid": fluid.dofs(), "structure": structure.dofs()},
+        notes=_notes(bodies),
     )
 
 
@@ -140,6 +143,11 @@ def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         balances=mass_balance(fluid),
         dofs={"fluid": fluid.dofs()},
     )
+
+
+def _notes(bodies: list[Body]) -> list[str]:
+    meshes = [(body.name, body.domain.source) for body in bodies]
+    return [f"mesh of body '{name}': {mesh.note}" for name, mesh in meshes if mesh is not None and mesh.note]
 
 
 def columns(probes: dict[str, Callable[[], Numbers]]) -> Callable[[], Numbers]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import ceil
 
 from fsci.case import Case
@@ -10,12 +10,16 @@ from fsci.case.fluid import Fluid
 from fsci.case.mesh import Mesh, Shape
 from fsci.case.structure import Structure
 from fsci.estimate import size
+from solvers.mesh import Mesh as BodyMesh
 
 Row = tuple[str, str]
 
 
-def summary(case: Case) -> str:
-    """A few lines: steps, fields and bodies with their size where it is known, probes, checks."""
+def summary(case: Case, meshes: Mapping[str, BodyMesh] = {}) -> str:
+    """A few lines: steps, fields and bodies with their size where it is known, probes, checks.
+
+    `meshes`: of elastic bodies, by name, as far as they were read.
+    """
     time = case.time
     steps = ceil((time.end - time.start) / time.step - 1e-9)
     rows = [
@@ -23,7 +27,7 @@ def summary(case: Case) -> str:
         ("time", f"{time.start:g} to {time.end:g} {case.units.time}, {_count(steps, 'step')} of {time.step:g}"),
     ]
     if case.structure is not None:
-        rows += _structure(case, case.structure)
+        rows += _structure(case, case.structure, meshes)
     if case.fluid is not None:
         rows += _fluid(case.fluid)
     if case.coupling is not None:
@@ -37,7 +41,7 @@ def summary(case: Case) -> str:
     return "\n".join(f"  {word:<{width}}  {text}" for word, text in rows if text)
 
 
-def _structure(case: Case, structure: Structure) -> Iterator[Row]:
+def _structure(case: Case, structure: Structure, meshes: Mapping[str, BodyMesh]) -> Iterator[Row]:
     motion = "static"
     if structure.dynamics is not None:
         rho_inf = structure.dynamics.rho_inf
@@ -50,6 +54,10 @@ def _structure(case: Case, structure: Structure) -> Iterator[Row]:
             cells, nodes = size(body.mesh)
             total += nodes * body.mesh.dimension
             text += f", {_count(cells, 'cell')} (order {body.mesh.order} {body.mesh.cell})"
+        elif name in meshes:
+            mesh = meshes[name]
+            total += mesh.points.size
+            text += f", {_count(len(mesh.cells), 'cell')} ({mesh.cell_type})"
         else:
             known = False
         yield f"body {name}", text

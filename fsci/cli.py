@@ -133,14 +133,19 @@ def _new(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace) -> int:
     from fsci.case import CaseError, load_case
     from fsci.check import summary
+    from fsci.check_meshes import check_meshes
 
     try:
         case = load_case(options.case, options.overrides)
+        found = check_meshes(case)
+        if found.problems:
+            raise CaseError(found.problems)
     except CaseError as error:
         return _fail(str(error))
-    print(f"{case.path}\n{summary(case)}")
-    for warning in case.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
+    print(f"{case.path}\n{summary(case, found.meshes)}")
+    for kind, lines in (("note", found.notes), ("warning", [*case.warnings, *found.warnings])):
+        for line in lines:
+            print(f"{kind}: {line}", file=sys.stderr)
     print("ok")
     return 0
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TextIO
@@ -52,13 +52,23 @@ class Monitor:
         self.close()
 
     def start(
-        self, title: str, dofs: Mapping[str, int], processes: int, *, begin: float, end: float, time: float
+        self,
+        title: str,
+        dofs: Mapping[str, int],
+        processes: int,
+        *,
+        begin: float,
+        end: float,
+        time: float,
+        notes: Sequence[str] = (),
     ) -> None:
         """The banner of a run from `begin` to `end`; `time` is later than `begin` when it is resumed."""
         self.begin, self.end = begin, end
         sizes = ", ".join(f"{name} {count:,} dofs" for name, count in dofs.items())
         self.say(title, style="bold")
         self.say(f"{sizes}; {processes} process{'es' if processes > 1 else ''}; time {time:g} to {end:g}")
+        for note in notes:
+            self.say(note)
         if self.enabled and self.live:
             self.progress = start_progress(self.stream)
             self.task = self.progress.add_task("", total=end - begin, completed=time - begin)

@@ -150,8 +150,9 @@ class Run:
 
     def _watched_loop(self) -> int:
         """The loop with signals caught."""
-        clock, title, dofs = self.clock, self.case.title, self.simulation.dofs
-        self.monitor.start(title, dofs, self.comm.size, begin=clock.start, end=clock.end, time=clock.time)
+        clock, title, dofs, notes = self.clock, self.case.title, self.simulation.dofs, self.simulation.notes
+        begin, end, now = clock.start, clock.end, clock.time
+        self.monitor.start(title, dofs, self.comm.size, begin=begin, end=end, time=now, notes=notes)
         self._keep()
         with self.stop:
             return self._loop()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from fsci.case.case import Case
 from fsci.case.errors import listed
 from fsci.case.fluid import FACES, Fluid, RigidBody
@@ -41,9 +43,27 @@ def _patches(fluid: Fluid) -> Iterator[Mistake]:
     ends = {face[0] for patch in fluid.patches.values() if patch.periodic for face in patch.on}
     if fluid.scheme == "steady" and len(ends) == dimension and not fluid.bodies:
         yield ("fluid", "scheme"), "a steady flow that is periodic in all directions has no velocity of its own"
+    if any(patch.where is not None for patch in fluid.patches.values()) and (open_faces := uncovered(fluid)):
+        yield ("fluid", "patches"), f"no patch is on part of the box's boundary: {', '.join(open_faces)}"
     if bare := [face for face in faces if not any(face in patch.on for patch in fluid.patches.values())]:
         verb = "face" if len(bare) == 1 else "faces"
         yield ("fluid", "patches"), f"no patch is on the {verb} {listed(bare, 'and')} of the box"
+
+
+def uncovered(fluid: Fluid) -> list[str]:
+    """Faces of the box of which a part, the middle of some cell's face, is on no patch though the face is on one."""
+    planes, found = fluid.grid.planes, []
+    for face in FACES[: 2 * fluid.grid.dimension]:
+        patches = [patch for patch in fluid.patches.values() if face in patch.on]
+        if not patches or any(patch.where is None for patch in patches):
+            continue
+        axis, side = "xyz".index(face[0]), -1 if face[1] == "+" else 0
+        middles = [p[[side]] if i == axis else 0.5 * (p[1:] + p[:-1]) for i, p in enumerate(planes)]
+        x = np.stack([part.ravel() for part in np.meshgrid(*middles, indexing="ij")])
+        on = [np.broadcast_to(patch.where(x, 0.0), x.shape[1]) > 0.0 for patch in patches if patch.where is not None]
+        if not np.any(on, axis=0).all():
+            found.append(face)
+    return found
 
 
 def _periods(fluid: Fluid, name: str) -> Iterator[Mistake]:

@@ -38,21 +38,27 @@ def flow_doubts(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
 
 
 def _thin_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
-    """Bodies through which fluid passes, because both of their sides share unknowns."""
-    smallest = min(float(np.diff(edges).min()) for edges in fluid.grid.planes)
+    """Built-in shapes through which fluid passes; of files only the mesh tells."""
     moving = {("fluid", "bodies", name): (body.mesh, body.motion is not None) for name, body in fluid.bodies.items()}
     elastic = {("structure", "bodies", name): (body.mesh, True) for name, body in case.elastic_bodies.items()}
     one_sided = set(case.coupling.dry_side) if case.coupling is not None else set()
     for (section, kind, name), (mesh, moves) in (moving | elastic).items():
-        least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
-        if not isinstance(mesh, Shape) or name in one_sided or (extent := thickness(mesh)) >= least * smallest:
+        if not isinstance(mesh, Shape) or name in one_sided:
             continue
-        how = "that moves " if moves else ""
-        size = f"the body is {extent:g} thick, {extent / smallest:.2g} of the smallest cells"
-        why = (
-            f"where it has fluid on both sides, fluid passes through a body {how}with less than {least:g} cells across"
-        )
-        yield (section, kind, name, "mesh"), f"{size}: {why}; refine the grid"
+        if doubt := thin_body(fluid, thickness(mesh), moves=moves):
+            yield (section, kind, name, "mesh"), doubt
+
+
+def thin_body(fluid: Fluid, extent: float, *, moves: bool) -> str | None:
+    """Whether fluid passes through a body of this thickness [m], because both of its sides share unknowns."""
+    smallest = min(float(np.diff(edges).min()) for edges in fluid.grid.planes)
+    least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
+    if extent >= least * smallest:
+        return None
+    how = "that moves " if moves else ""
+    size = f"the body is {extent:.4g} thick, {extent / smallest:.2g} of the smallest cells"
+    why = f"where it has fluid on both sides, fluid passes through a body {how}with less than {least:g} cells across"
+    return f"{size}: {why}; refine the grid"
 
 
 def _driven(fluid: Fluid) -> bool:

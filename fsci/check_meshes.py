@@ -1,0 +1,186 @@
+"""What `fsci check` finds out by reading the meshes of a case: the mistakes that a run would stop at, and doubts.
+
+Meshes are read only where they can tell something: files always, built-in shapes where points or bodies depend on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsci.case import Case, CaseError
+from fsci.case.errors import Problem
+from fsci.case.mesh import FileMesh
+from fsci.case.plausible_flow import thin_body
+from fsci.case_meshes import read_body, read_obstacle, read_rigid_body, require_inside_period
+from fsci.rigid_motion import rigid_motion
+from fsci.skin import cut_out_skin
+from solvers.fluid.inside import PointInBody, require_outside
+from solvers.fluid.surface import Motion, Surface
+from solvers.locate import locate
+from solvers.mesh import Mesh
+from solvers.mesh_topology import signed_volumes, surface_facets
+from solvers.tessellation import tessellate
+
+Array = NDArray[np.float64]
+Keys = tuple[str | int, ...]
+T = TypeVar("T")
+
+
+@dataclass
+class Findings:
+    """What the meshes of a case tell."""
+
+    problems: list[Problem] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    meshes: dict[str, Mesh] = field(default_factory=dict)  #: of elastic bodies that were read
+
+    def attempt(self, read: Callable[[], T]) -> T | None:
+        """The result, or None after a mistake, which is kept."""
+        try:
+            return read()
+        except CaseError as error:
+            self.problems += error.problems
+            return None
+
+    def mistake(self, case: Case, keys: Keys, message: str) -> None:
+        self.problems += case.error(keys, message).problems
+
+    def note(self, case: Case, keys: Keys, mesh: Mesh) -> None:
+        """Keep what was changed when the mesh of a body was read."""
+        if mesh.note:
+            self.notes.append(f"{case.place(*keys, 'mesh')}: {mesh.note}")
+
+
+def check_meshes(case: Case) -> Findings:
+    """All of it."""
+    found = Findings()
+    _elastic(case, found)
+    if case.contact is not None:
+        for name, obstacle in case.contact.obstacles.items():
+            if isinstance(obstacle.mesh, FileMesh):
+                found.attempt(partial(read_obstacle, case, name))
+    if case.fluid is not None:
+        _rigid(case, found)
+    return found
+
+
+def _elastic(case: Case, found: Findings) -> None:
+    for name, body in case.elastic_bodies.items():
+        wanted = ("structure", name, "at")
+        at_points = [(key, p) for key, p in case.probes.items() if (p.field, p.body, p.place) == wanted]
+        symmetric = [(i, support.on) for i, support in enumerate(body.supports) if support.symmetry]
+        if not (isinstance(body.mesh, FileMesh) or at_points or symmetric or (case.coupling and _has_period(case))):
+            continue
+        mesh = found.attempt(partial(read_body, case, name))
+        if mesh is None:
+            continue
+        found.meshes[name] = mesh
+        keys: Keys = ("structure", "bodies", name)
+        found.note(case, keys, mesh)
+        for key, probe in at_points:
+            assert probe.at is not None
+            if locate(mesh, np.array(probe.at, dtype=float)) is None:
+                found.mistake(case, ("probes", key, "at"), f"the point {tuple(probe.at)} is not in body '{name}'")
+        for i, surfaces in symmetric:
+            if not all(_is_flat(mesh, surface) for surface in surfaces):
+                found.mistake(case, (*keys, "supports", i), "symmetry needs a plane, and this surface is curved")
+        if case.coupling is not None:
+            _wet(case, found, keys, mesh)
+    _one_dimension(case, found)
+
+
+def _is_flat(mesh: Mesh, surface: str) -> bool:
+    x = mesh.points[np.unique(surface_facets(mesh, surface))]
+    x = x - x.mean(axis=0)
+    extents = np.ptp(x @ np.linalg.svd(x, full_matrices=True)[2].T, axis=0)
+    return bool(extents[-1] <= 1e-9 * extents.max())
+
+
+def _wet(case: Case, found: Findings, keys: Keys, mesh: Mesh) -> None:
+    """What an elastic body in a flow needs besides."""
+    name = str(keys[-1])
+    skin = found.attempt(partial(cut_out_skin, case, name, mesh))
+    if skin is not None:
+        found.attempt(partial(require_inside_period, case, keys, skin.points))
+    if isinstance(case.elastic_bodies[name].mesh, FileMesh):
+        _against_grid(case, found, keys, mesh, moves=True)
+
+
+def _one_dimension(case: Case, found: Findings) -> None:
+    """All bodies are in 2D, or all in 3D."""
+    dims = {name: mesh.points.shape[1] for name, mesh in found.meshes.items()}
+    first = next(iter(dims.values()), None)
+    for name, dim in dims.items():
+        if dim != first:
+            error = case.error(
+                ("structure", "bodies", name, "mesh"), f"the mesh is {dim}D, but another body is {first}D"
+            )
+            found.problems += error.problems
+
+
+def _rigid(case: Case, found: Findings) -> None:
+    assert case.fluid is not None
+    points = [(key, k, at) for key, p in case.probes.items() if p.field == "fluid" for k, at in _points(p)]
+    surfaces, motions = [], []
+    for name, body in case.fluid.bodies.items():
+        if not (isinstance(body.mesh, FileMesh) or points or body.on or _has_period(case)):
+            continue
+        read = found.attempt(partial(read_rigid_body, case, name))
+        if read is None:
+            continue
+        mesh, x, facets = read
+        keys: Keys = ("fluid", "bodies", name)
+        found.note(case, keys, mesh)
+        if body.motion is not None:
+            x = rigid_motion(x, body.motion, case.time.start, case.time.step)(case.time.start)[0]
+        found.attempt(partial(require_inside_period, case, keys, x))
+        if isinstance(body.mesh, FileMesh):
+            _against_grid(case, found, keys, mesh, moves=body.motion is not None)
+        surfaces.append(Surface(name, facets, len(x)))
+        motions.append(Motion(x, np.zeros_like(x)))
+    for key, setting, at in points:
+        try:
+            require_outside(np.array(at, dtype=float), surfaces, motions)
+        except PointInBody as error:
+            found.mistake(case, ("probes", key, setting), str(error))
+
+
+def _points(probe: Any) -> Iterator[tuple[str, tuple[float, ...]]]:
+    for key in ("at", "minus"):
+        if getattr(probe, key) is not None:
+            yield key, getattr(probe, key)
+
+
+def _has_period(case: Case) -> bool:
+    return case.fluid is not None and any(patch.periodic for patch in case.fluid.patches.values())
+
+
+def _against_grid(case: Case, found: Findings, keys: Keys, mesh: Mesh, *, moves: bool) -> None:
+    """Doubts about the size and the place of a body in the flow."""
+    assert case.fluid is not None
+    low, high = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
+    if (mesh.points.max(axis=0) <= low).any() or (mesh.points.min(axis=0) >= high).any():
+        found.warnings.append(f"{case.place(*keys)}: the body is outside of the fluid's box")
+    if keys[-1] in (case.coupling.dry_side if case.coupling is not None else ()):
+        return
+    if doubt := thin_body(case.fluid, thickness(mesh), moves=moves):
+        found.warnings.append(f"{case.place(*keys, 'mesh')}: {doubt}")
+
+
+def thickness(mesh: Mesh) -> float:
+    """The least extent of a body [m], of its principal axes or 2 d V / A: right for plates, discs, balls and boxes."""
+    x = mesh.points - mesh.points.mean(axis=0)
+    axes = np.linalg.svd(x, full_matrices=False)[2]
+    facets, nodes = tessellate(mesh)
+    corners = mesh.points[nodes][facets]
+    edges = corners[:, 1:] - corners[:, :1]
+    dim = x.shape[1]
+    area = np.linalg.norm(edges[:, 0] if dim == 2 else 0.5 * np.cross(edges[:, 0], edges[:, 1]), axis=1).sum()
+    return float(min(np.ptp(x @ axes.T, axis=0).min(), 2 * dim * signed_volumes(mesh).sum() / area))
