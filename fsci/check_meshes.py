@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from solvers.fluid.inside import PointInBody, require_outside
 
 from fsci.case import Case, CaseError
 from fsci.case.errors import Problem
@@ -20,7 +21,6 @@ from fsci.case.plausible_flow import thin_body
 from fsci.case_meshes import read_body, read_obstacle, read_rigid_body, require_inside_period
 from fsci.rigid_motion import rigid_motion
 from fsci.skin import cut_out_skin
-from solvers.fluid.inside import PointInBody, require_outside
 from solvers.fluid.surface import Motion, Surface
 from solvers.locate import locate
 from solvers.mesh import Mesh
