@@ -75,8 +75,10 @@ def _elastic(case: Case, found: Findings) -> None:
     for name, body in case.elastic_bodies.items():
         wanted = ("structure", name, "at")
         at_points = [(key, p) for key, p in case.probes.items() if (p.field, p.body, p.place) == wanted]
-        symmetric = [(i, support.on) for i, support in enumerate(body.supports) if support.symmetry]
-        if not (isinstance(body.mesh, FileMesh) or at_points or symmetric or (case.coupling and _has_period(case))):
+        symmetric = [(i, support.on or ()) for i, support in enumerate(body.supports) if support.symmetry]
+        at_nodes = [p for p in (*body.supports, *body.springs, *body.point_forces) if p.at is not None]
+        needed = at_points or symmetric or at_nodes or (case.coupling and _has_period(case))
+        if not (needed or isinstance(body.mesh, FileMesh)):
             continue
         mesh = found.attempt(partial(read_body, case, name))
         if mesh is None:
