@@ -12,7 +12,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from solvers.fluid.inside import PointInBody, require_outside
 
 from fsci.case import Case, CaseError
 from fsci.case.errors import Problem
@@ -21,6 +20,7 @@ from fsci.case.plausible_flow import thin_body
 from fsci.case_meshes import read_body, read_obstacle, read_rigid_body, require_inside_period
 from fsci.rigid_motion import rigid_motion
 from fsci.skin import cut_out_skin
+from solvers.fluid.inside import PointInBody, require_outside
 from solvers.fluid.surface import Motion, Surface
 from solvers.locate import locate
 from solvers.mesh import Mesh
@@ -76,7 +76,9 @@ def _elastic(case: Case, found: Findings) -> None:
         wanted = ("structure", name, "at")
         at_points = [(key, p) for key, p in case.probes.items() if (p.field, p.body, p.place) == wanted]
         symmetric = [(i, support.on or ()) for i, support in enumerate(body.supports) if support.symmetry]
-        at_nodes = [p for p in (*body.supports, *body.springs, *body.point_forces) if p.at is not None]
+        at_nodes = [
+            p for p in (*body.supports, *body.springs, *body.point_forces) if getattr(p, "at", None) is not None
+        ]
         needed = at_points or symmetric or at_nodes or (case.coupling and _has_period(case))
         if not (needed or isinstance(body.mesh, FileMesh)):
             continue
