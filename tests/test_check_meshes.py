@@ -93,7 +93,12 @@ def test_what_check_accepts_runs(case, capsys):
 #: the case, what is replaced, by what, the message with line and column
 MISTAKES = [
     (SOLID, "file: block.inp}", "file: mixed.vtu}", "6:13: mixed.vtu: the cells are quad and triangle; all must be of"),
-    (SOLID, "on: bottom, disp", "on: botom, disp", "8:23: unknown surface 'botom'; did you mean 'bottom'?"),
+    (
+        SOLID,
+        "on: bottom, disp",
+        "on: botom, disp",
+        "8:23: unknown surface, line or points 'botom'; did you mean 'bottom'?",
+    ),
     (SOLID, "lower, on: top", "lower, on: tip", "15:72: unknown surface 'tip'; did you mean 'top'?"),
     (SOLID, "0.5, 1.5]", "0.5, 2.5]", "17:53: the point (0.5, 2.5) is not in body 'upper'"),
     (SOLID, "0.5, 1.5]", "0.5, 1.5, 0]", "17:53: 'at' has 3 entries, but the mesh is of 2 dimensions"),
