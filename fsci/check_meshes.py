@@ -94,7 +94,11 @@ def _elastic(case: Case, found: Findings) -> None:
                 found.mistake(case, ("probes", key, "at"), f"the point {tuple(probe.at)} is not in body '{name}'")
         for i, surfaces in symmetric:
             if not all(_is_flat(mesh, surface) for surface in surfaces):
-                found.mistake(case, (*keys, "supports", i), "symmetry needs a plane, and this surface is curved")
+                found.mistake(
+                    case,
+                    (*keys, "supports", i),
+                    "symmetry needs a plane, and this surface is curved; 'normal: true' holds such ones",
+                )
         if case.coupling is not None:
             _wet(case, found, keys, mesh)
     _one_dimension(case, found)

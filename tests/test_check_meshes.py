@@ -135,7 +135,7 @@ def test_symmetry_on_a_curve():
     case = SOLID[:start] + f"      {disc}\n      supports: [{{on: outer, symmetry: true}}]\n"
     found = check_meshes(load(case))
     assert [str(p).split("\n")[0] for p in found.problems] == [
-        "case.yaml:8:18: symmetry needs a plane, and this surface is curved"
+        "case.yaml:8:18: symmetry needs a plane, and this surface is curved; 'normal: true' holds such ones"
     ]
 
 

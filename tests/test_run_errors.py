@@ -19,11 +19,19 @@ probes:
 """
 
 MISTAKES = {
-    "surface": ("on: clamp", "on: clmp", "case.yaml:9:16: unknown surface 'clmp'; did you mean 'clamp'?"),
+    "surface": (
+        "on: clamp",
+        "on: clmp",
+        "case.yaml:9:16: unknown surface, line or points 'clmp'; did you mean 'clamp'?",
+    ),
     "region": ("region: flag", "region: flog", "case.yaml:6:15: unknown region 'flog'; did you mean 'flag'?"),
     "length": ("body_force: [0, -1]", "body_force: [0, 0, -1]", "case.yaml:10:19: 'body_force' has 3 entries, but the"),
     "point": ("at: [0.6, 0.2]", "at: [0.7, 0.2]", "case.yaml:12:35: the point (0.7, 0.2) is not in body 'flag'"),
-    "symmetry": ("displacement: [0, 0]", "symmetry: true", "case.yaml:9:11: symmetry needs a plane normal to x, y"),
+    "symmetry": (
+        "displacement: [0, 0]",
+        "symmetry: true",
+        "case.yaml:9:11: symmetry needs a plane, and this surface is curved",
+    ),
 }
 
 
