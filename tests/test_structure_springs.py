@@ -7,7 +7,9 @@ from test_structure_supports import MATERIAL, rotation, turned
 
 from solvers.structure import probes
 from solvers.structure.body import Spring, Symmetry, Traction
-from solvers.structure.materials import StVenantKirchhoff
+from solvers.structure.materials import NeoHooke, StVenantKirchhoff
+from solvers.structure.time import Dynamics
+from solvers.time import GeneralisedAlpha
 
 
 @pytest.mark.parametrize("cell_type", ["triangle", "quad9", "tetra10", "hexahedron"])
@@ -63,6 +65,27 @@ def test_springs_at_nodes():
     structure = make_structure(mesh, MATERIAL, springs=springs, gravity=vector(0.3, -10.0))
     load_step(structure)
     assert structure.now.u.reshape(-1, 2).mean(axis=0) == pytest.approx([0.6 / 200.0, -20.0 / 200.0], rel=1e-11)
+
+
+def test_energy_of_a_mass_on_springs():
+    """A stiff square of mass 2 on springs k swings with sqrt(k/2) and keeps its energy."""
+    k, dt, start = 8.0, 0.01, 0.1
+    structure = make_structure(
+        block("quad", 1),
+        NeoHooke(8e5, 12e5, 2.0),
+        springs=[Spring("bottom", constant(k)), Spring("top", constant(k))],
+        initial_displacement=vector(start, 0.0),
+        time=Dynamics(GeneralisedAlpha.from_rho_inf(1.0)),
+    )
+    structure.initialise(0.0, dt)
+    for step in range(20):
+        structure.begin_step(dt * step, dt)
+        structure.solve()
+        structure.end_step()
+    omega = np.sqrt(2.0 * k / 2.0)
+    assert structure.now.u[0::2] == pytest.approx(start * np.cos(omega * 20 * dt), rel=(omega * dt) ** 2)
+    assert structure.energy.initial == pytest.approx(k * start**2, rel=1e-12)
+    assert abs(structure.energy.error) < 1e-9 * structure.energy.initial
 
 
 def test_tangent():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from structure_setup import block, constant, distort, load_step, make_structure, vector
+from structure_setup import TIGHT, block, constant, distort, load_step, make_structure, vector
 
 from fsci import shapes
 from solvers.structure.body import Pressure, Roller, Support, Symmetry, Traction
@@ -31,7 +31,7 @@ def displacement(structure):
     return structure.now.u.reshape(-1, body.dim), body.points[: body.dim, : body.owned].T
 
 
-@pytest.mark.parametrize("cell_type", ["triangle6", "quad", "tetra", "hexahedron27"])
+@pytest.mark.parametrize("cell_type", ["triangle6", "quad", "tetra10", "hexahedron27"])
 @pytest.mark.parametrize("kind", ["symmetry", "normal", "direction"])
 def test_uniaxial_stretch_in_a_turned_frame(cell_type, kind):
     """A block on rollers is pulled: it stretches by t along its axis and by n across it.
@@ -143,6 +143,8 @@ def test_linear_systems_with_held_directions(rows_only):
     projection = np.stack([structure.held.part(e) for e in np.eye(n)])
     missing = structure.missing_displacement()
     assert np.abs(missing).max() > 0.05
+    assert not structure.held.reached(structure.now.u, structure._target, 1.0)
+    assert structure.held.reached(structure.now.u + missing, structure._target, 1.0)
     held = np.linalg.svd(projection)[2][: round(np.trace(projection))]
     size = len(held)
     assert size == 3 + 3  # two of them at the corner
@@ -158,3 +160,41 @@ def test_linear_systems_with_held_directions(rows_only):
         assert K.isSymmetric(1e-12)
     found = np.linalg.solve(K.convert("dense").getDenseArray(), b.array)
     assert found == pytest.approx(expected, abs=1e-11)
+
+
+@pytest.mark.parametrize("linear", ["direct", "iterative", "ilu"])
+def test_linear_solvers(linear):
+    """They agree on a turned block between rollers, with the rigid modes of multigrid."""
+    R = rotation(3)
+    supports = [Symmetry(name) for name in ("left", "front", "bottom")]
+    loads = [Traction("right", vector(*(20.0 * R[:, 0])))]
+    mesh = turned(block("hexahedron", 4), R)
+    settings = replace(TIGHT, linear=linear, linear_tolerance=1e-12)
+    found = []
+    for chosen in (TIGHT, settings):
+        structure = make_structure(mesh, MATERIAL, supports=supports, tractions=loads, settings=chosen)
+        load_step(structure)
+        found.append(structure.now.u.copy())
+    assert np.abs(found[0] - found[1]).max() < 1e-9 * np.abs(found[0]).max()
+
+
+def test_supports_that_move_in_time():
+    """Two directions that span the plane, each with its motion, drive a body as its components do."""
+    a, b = np.array([1.0, 2.0]) / np.sqrt(5.0), np.array([-1.0, 1.0]) / np.sqrt(2.0)
+
+    def along(direction):
+        return lambda x, t: np.full(x.shape[1], direction @ [0.1 * np.sin(9.0 * t), 0.2 * t**2])
+
+    whole = Support("left", (lambda x, t: 0.1 * np.sin(9.0 * t) + 0.0 * x[0], lambda x, t: 0.2 * t**2 + 0.0 * x[0]))
+    found = []
+    for supports in ([whole], [Roller("left", (1.0, 2.0), along(a)), Roller("left", (-2.0, 2.0), along(b))]):
+        structure = make_structure(
+            block("quad", 2), MATERIAL, supports=supports, time=Dynamics(GeneralisedAlpha.from_rho_inf(0.8))
+        )
+        structure.initialise(0.0, 0.05)
+        for step in range(3):
+            structure.begin_step(0.05 * step, 0.05)
+            structure.solve()
+            structure.end_step()
+        found.append(np.array([*structure.now.u, *structure.now.v, *structure.now.a, structure.energy.work]))
+    assert found[1] == pytest.approx(found[0], rel=1e-9, abs=1e-9 * np.abs(found[0]).max())
