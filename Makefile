@@ -1,9 +1,19 @@
 # `make demo` installs what is missing, runs a first case and draws it; `make test` checks everything.
-# Needs Debian 12 with git and make; `setup` fetches the rest. What is up to date is not done again.
+# Needs Debian 12 or 13, or a system with their packages, with git and make; `setup` fetches the rest. What is up to date is
+# not done again. `make setup PIP=1` takes DOLFINx from PyPI instead and needs no root: a compiler and Python 3.12 or later.
 
 SHELL  := /bin/bash
-PYTHON := /usr/bin/python3
 BIN    := .venv/bin
+
+ifdef PIP
+PYTHON       := $(firstword $(foreach v,3.14 3.13 3.12,$(shell command -v python$(v) 2>/dev/null)) python3)
+VENV_OPTIONS :=
+DOLFINX      := dolfinx-solver-real h5py scipy
+else
+PYTHON       := /usr/bin/python3
+VENV_OPTIONS := --system-site-packages
+DOLFINX      :=
+endif
 
 DEBIAN_PACKAGES := \
   build-essential cmake ninja-build python3-venv python3-dev \
@@ -24,6 +34,8 @@ PACKAGES_STAMP := .venv/debian-packages.stamp
 PROJECT_STAMP  := .venv/project.stamp
 DOCS_STAMP     := .venv/docs.stamp
 MODULES        := .venv/modules.txt
+# DOLFINx was compiled against the numpy that came with it, and needs its generation.
+NUMPY_OF_DOLFINX := $(BIN)/python -c 'import numpy; print("numpy<2" if numpy.__version__ < "2" else "numpy")'
 KERNEL_SOURCES := $(wildcard solvers/kernels/CMakeLists.txt solvers/kernels/*.hpp solvers/kernels/*.cpp)
 INSTALL        := $(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation
 
@@ -32,7 +44,7 @@ INSTALL        := $(BIN)/pip install --quiet --disable-pip-version-check --no-bu
 setup: $(PROJECT_STAMP)
 
 $(PACKAGES_STAMP): Makefile .ci/install-packages
-	.ci/install-packages $(DEBIAN_PACKAGES)
+	$(if $(PIP),,.ci/install-packages $(DEBIAN_PACKAGES))
 	@mkdir -p .venv && touch $@
 
 # An installed module is found where it was: one that came, went or moved since needs a new installation.
@@ -42,10 +54,10 @@ $(MODULES): FORCE
 	@cmp -s $@.new $@ && rm $@.new || mv $@.new $@
 
 $(PROJECT_STAMP): pyproject.toml $(KERNEL_SOURCES) $(MODULES) | $(PACKAGES_STAMP)
-	@test -x $(BIN)/pip || $(PYTHON) -m venv --system-site-packages .venv
+	@test -x $(BIN)/pip || $(PYTHON) -m venv $(VENV_OPTIONS) .venv
 	@echo "setup: building and installing fsci into .venv"
-	$(INSTALL) nanobind scikit-build-core
-	$(INSTALL) --editable '.[test]'
+	$(INSTALL) nanobind scikit-build-core cmake ninja $(DOLFINX)
+	$(INSTALL) --editable '.[test]' "$$($(NUMPY_OF_DOLFINX))"
 	@touch $@
 
 $(DOCS_STAMP): pyproject.toml | $(PROJECT_STAMP)

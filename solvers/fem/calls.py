@@ -10,6 +10,10 @@ from importlib.util import find_spec
 if find_spec("basix.ufl") is None:
     from solvers.fem import pybind as calls
 else:
+    from dolfinx import fem
+
+    if not hasattr(fem, "create_form"):
+        raise ImportError("this DOLFINx is none that fsci knows: take 0.5 (Debian 12), or 0.9 (Debian 13) and later")
     from solvers.fem import nanobind as calls  # type: ignore[no-redef]
 
 __all__ = ["calls"]
