@@ -5,6 +5,9 @@
 SHELL  := /bin/bash
 BIN    := .venv/bin
 
+# The MPI of PyPI's DOLFINx comes with it.
+export PATH := $(CURDIR)/$(BIN):$(PATH)
+
 ifdef PIP
 PYTHON       := $(firstword $(foreach v,3.14 3.13 3.12,$(shell command -v python$(v) 2>/dev/null)) python3)
 VENV_OPTIONS :=
