@@ -83,5 +83,6 @@ def _cells_per_step(case: Case, fluid: Fluid, patch: Patch) -> float:
         inside = np.ones(x.shape[1], dtype=bool) if patch.where is None else patch.where(x, 0.0) > 0.0
         for t in times:
             speed = np.abs([component(x, t) for component in patch.velocity])[:, inside]
-            largest = max(largest, float(np.nanmax(speed / h[:, inside], initial=0.0)) * case.time.step)
+            with np.errstate(over="ignore"):
+                largest = max(largest, float(np.nanmax(speed / h[:, inside], initial=0.0)) * case.time.step)
     return largest
