@@ -1,0 +1,228 @@
+"""The functions of `solvers.fem`, each on a small mesh with a known answer: the same on every version of DOLFINx."""
+
+import numpy as np
+import pytest
+import ufl
+from mpi4py import MPI
+
+from fsci import shapes
+from solvers import fem
+from solvers.fem import calls
+
+CELLS = {
+    "triangle": (2, "tri", 1),
+    "triangle6": (2, "tri", 2),
+    "quad": (2, "quad", 1),
+    "quad9": (2, "quad", 2),
+    "tetra": (3, "tet", 1),
+    "tetra10": (3, "tet", 2),
+    "hexahedron": (3, "hex", 1),
+    "hexahedron27": (3, "hex", 2),
+}
+
+
+def make_domain(cell_type):
+    """[0, 2] x [0, 1] (x [0, 1]) with surfaces on its sides."""
+    dim, cell, order = CELLS[cell_type]
+    make = shapes.rectangle if dim == 2 else shapes.box
+    mesh = make(size=(2.0, 1.0, 1.0)[:dim], cells=(2, 1, 1)[:dim], cell=cell, order=order)
+    return fem.distribute(MPI.COMM_SELF, mesh)
+
+
+@pytest.fixture(params=CELLS)
+def domain(request):
+    return make_domain(request.param)
+
+
+@pytest.fixture
+def square():
+    return make_domain("quad")
+
+
+def test_nodes_are_found_again(domain):
+    """Each block is at the point of the mesh that its number names."""
+    space = fem.vector_space(domain)
+    points = fem.block_points(space)[: domain.dim].T
+    assert np.allclose(points, domain.source.points[fem.node_of_block(domain, space)])
+    blocks = fem.cell_blocks(space)
+    assert blocks.shape == domain.source.cells.shape
+    nodes = fem.node_of_block(domain, space)[blocks]
+    there = domain.source.cells[fem.input_cells(domain)]
+    assert np.array_equal(np.sort(nodes, axis=1), np.sort(there, axis=1))
+
+
+def test_surfaces(domain):
+    space = fem.vector_space(domain)
+    x = fem.block_points(space)[0]
+    assert set(fem.surface_blocks(domain, space, "right")) == set(np.flatnonzero(np.isclose(x, 2.0)))
+    middles = fem.facet_midpoints(domain, domain.surfaces["right"])
+    assert np.allclose(middles[:, 0], 2.0)
+    facets, cells = fem.boundary_facets(domain)
+    assert np.array_equal(facets, np.sort(fem.exterior_facets(domain)))
+    assert set(cells) <= set(range(fem.owned_cells(domain)))
+    inside, pairs = fem.interior_facets(domain)
+    assert not set(inside) & set(facets)
+    assert np.all(pairs[:, 0] != pairs[:, 1])
+
+
+def test_quadrature_of_cells_and_facets(domain):
+    """Volume 2, area of the right side 1, its normal along x, and the first moments."""
+    space = fem.vector_space(domain)
+    (cells,) = fem.cell_quadrature(domain, space, 2)
+    assert cells.weights.sum() == pytest.approx(2.0)
+    assert cells.weights.ravel() @ cells.positions[0] == pytest.approx(2.0)
+    facets = fem.facet_quadrature(domain, space, "right", 2)
+    assert sum(part.weights.sum() for part in facets) == pytest.approx(1.0)
+    x = fem.block_points(space)[: domain.dim].T
+    for part in facets:
+        normals = part.area_vectors(x)
+        assert np.all(normals[..., 0] > 0.0)
+        assert np.allclose(normals[..., 1:], 0.0)
+
+
+def test_points(domain):
+    """A linear function of the position, from nodal values, at a point."""
+    space = fem.vector_space(domain)
+    point = np.array([1.3, 0.6, 0.2])[: domain.dim]
+    cell, reference = fem.locate_point(domain, point)
+    x = fem.block_points(space)[: domain.dim].T[fem.cell_blocks(space)[cell]]
+    assert np.allclose(fem.tabulate(domain, reference) @ x, point)
+    assert fem.locate_point(domain, point + 5.0) is None
+    assert len(fem.reference_nodes(domain)) == fem.cell_blocks(space).shape[1]
+    middles = fem.cell_midpoints(domain)[0]
+    assert middles.mean() == pytest.approx(1.0)
+
+
+def test_integrals_over_chosen_entities(square):
+    """A form whose cells and facets are chosen later: areas and lengths are those of the chosen ones."""
+    one = fem.constant(square, 1.0)
+    space = fem.scalar_space(square)
+    v = ufl.TestFunction(space)
+
+    def total(kind, **entities):
+        form = fem.Integral(square, one * (ufl.avg(v) if kind == "dS" else v) * fem.measure(square, kind, 2))
+        out = np.zeros(len(fem.block_points(space).T))
+        fem.assemble_vector(form.on(**entities), out)
+        return out.sum()
+
+    cells = np.arange(2, dtype=np.int32)
+    assert total("dx", cell=cells) == pytest.approx(2.0)
+    assert total("dx", cell=cells[:1]) == pytest.approx(1.0)
+    assert total("dx", cell=cells[:0]) == 0.0
+    right = square.surfaces["right"]
+    assert total("ds", exterior_facet=right) == pytest.approx(1.0)
+    inside, _ = fem.interior_facets(square)
+    assert total("dS", interior_facet=inside) == pytest.approx(1.0)
+
+
+def test_weights_at_quadrature_points(square):
+    """A coefficient at the points of a rule turns an integral into a weighted sum of the points."""
+    weight = fem.function(fem.quadrature_space(square, 4))
+    v = ufl.TestFunction(fem.scalar_space(square))
+    form = fem.Integral(square, weight * v * fem.measure(square, "dx", 4))
+    points, rule = fem.quadrature_points(square, 4)
+    values = np.random.default_rng(1).random((2, len(rule)))
+    weight.x.array[fem.cell_blocks(weight.function_space)] = values
+    out = np.zeros(6)
+    fem.assemble_vector(form.on(cell=np.arange(2, dtype=np.int32)), out)
+    assert out.sum() == pytest.approx((values @ rule).sum())
+    tensor = fem.quadrature_space(square, 4, (2, 2))
+    assert fem.cell_blocks(tensor).shape == (2, len(points))
+
+
+def test_forms_constants_and_scalars(square):
+    number = fem.constant(square, 3.0)
+    form = fem.compile_form(number * fem.volume_measure(square, 1))
+    assert fem.assemble_scalar(form, square.comm) == pytest.approx(6.0)
+    number.value = 5.0
+    assert fem.assemble_scalar(form, square.comm) == pytest.approx(10.0)
+    side = fem.compile_form(number * fem.surface_measure(square, "top", 1))
+    assert fem.assemble_scalar(side, square.comm) == pytest.approx(10.0)
+    assert fem.mean_cell_size(square) == pytest.approx(1.0)
+
+
+def test_matrices(square):
+    """The mass matrix of scalars: the sum of its entries is the area."""
+    space = fem.scalar_space(square)
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    form = fem.compile_form(u * v * fem.volume_measure(square, 2))
+    matrix = fem.create_matrix(form)
+    fem.assemble_matrix(matrix, form)
+    matrix.assemble()
+    ones, sums = matrix.createVecs()
+    ones.set(1.0)
+    matrix.mult(ones, sums)
+    assert sums.sum() == pytest.approx(2.0)
+
+
+def test_expressions(square):
+    """The gradient of x^2 y, averaged at the nodes of a bilinear interpolant, and in cells."""
+    space = fem.scalar_space(square)
+    u = fem.function(space)
+    x, y, _ = fem.block_points(space)
+    u.x.array[:] = x * y
+    expression = fem.compile_expression(ufl.grad(u), fem.reference_nodes(square))
+    values = fem.evaluate_cells(square, expression)
+    assert values.shape == (2, 8)
+    gradient = fem.average_at_nodes(square, expression, components=2)
+    assert np.allclose(gradient, np.stack([y, x], axis=1))
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_flow_spaces(square, degree):
+    """Velocity and pressure dofs are all different, together all there are, and lie at the nodes of the lattice."""
+    space = fem.flow_space(square, degree)
+    velocity, at = fem.component_dofs(square, space, [0, 1], degree)
+    pressure, below = fem.component_dofs(square, space, [2], 1)
+    count = (2 * degree + 1) * (degree + 1)
+    assert velocity.shape == (count, 2)
+    assert len(pressure) == 6
+    everything = np.concatenate([velocity.ravel(), pressure.ravel()])
+    assert np.array_equal(np.sort(everything), np.arange(2 * count + 6))
+    assert np.array_equal(np.unique(at[:, 0].round(9)), np.linspace(0.0, 2.0, 2 * degree + 1))
+    assert np.array_equal(np.unique(below[:, 1].round(9)), [0.0, 1.0])
+    right = fem.facet_dofs(space, 0, square.surfaces["right"])
+    assert np.allclose(at[np.isin(velocity[:, 0], right), 0], 2.0)
+    assert len(right) == degree + 1
+    cells = fem.component_cell_dofs(space, 0)
+    assert cells.shape == (2, (degree + 1) ** 2)
+
+
+def test_blocks_that_are_identified(square):
+    """The right side gets the blocks of the left one."""
+    space = fem.flow_space(square, 1)
+    x, y, _ = fem.block_points(space).round(9)
+    right = np.flatnonzero(x == 2.0).astype(np.int32)
+    left = np.array([np.flatnonzero((x == 0.0) & (y == y[i]))[0] for i in right], dtype=np.int64)
+    same, local = fem.identify_blocks(space, right, left, np.zeros(len(right), dtype=np.int32))
+    assert np.array_equal(local, left)
+    used = np.unique(fem.cell_blocks(same))
+    assert set(used) == set(range(6)) - set(right)
+
+
+def test_spaces_of_one_number_per_cell(square):
+    assert len(fem.function(fem.cellwise_space(square)).x.array) == 2
+    assert len(fem.function(fem.pressure_space(square)).x.array) == 2
+    second = make_domain("quad9")
+    assert len(fem.function(fem.pressure_space(second)).x.array) == 2 * 3
+
+
+def test_sums_on_one_process(square):
+    space = fem.scalar_space(square)
+    values = np.arange(6.0)
+    assert np.array_equal(fem.sum_ghosts(space, values), values)
+    assert np.array_equal(fem.share_owned(space, values), values)
+    fem.add_ghosts(space, values)
+    assert np.array_equal(values, np.arange(6.0))
+
+
+def test_both_generations_have_the_same_functions():
+    from ast import FunctionDef, parse
+    from pathlib import Path
+
+    folder = Path(calls.__file__).parent
+    names = []
+    for module in ("pybind", "nanobind"):
+        body = parse((folder / f"{module}.py").read_text()).body
+        names.append({part.name for part in body if isinstance(part, FunctionDef) and not part.name.startswith("_")})
+    assert names[0] == names[1]
