@@ -4,6 +4,8 @@ A node is a point of the mesh file, numbered as there on every process; a dof bl
 Elements are isoparametric, so that the nodes of the mesh and of the displacement are the same points.
 """
 
+import mpi4py.MPI  # noqa: F401  (DOLFINx from PyPI finds its MPI only after this)
+
 from solvers.fem.compiling import listening
 from solvers.fem.domain import (
     CELLS,

@@ -101,7 +101,8 @@ def replace_dofs(space: Any, cells: Indices, ghosts: NDArray[np.int64], owners: 
     """The space with other dof blocks in its cells: owned blocks keep their numbers, ghosts come with their owners."""
     dofmap, own = space.dofmap, int(space.dofmap.index_map.size_local)
     index_map = cpp.common.IndexMap(space.mesh.comm, own, ghosts, owners, 0)
-    replaced = cpp.fem.DofMap(dofmap.dof_layout, index_map, dofmap.index_map_bs, cells, dofmap.bs)
+    links = cpp.graph.AdjacencyList_int32(np.ascontiguousarray(cells))
+    replaced = cpp.fem.DofMap(dofmap.dof_layout, index_map, dofmap.index_map_bs, links, dofmap.bs)
     whole = space._cpp_object
     found = type(whole)(space.mesh._cpp_object, whole.element, replaced)
     return fem.FunctionSpace(space.mesh, space.ufl_element(), found)
@@ -165,7 +166,7 @@ def create_matrix(form: Any) -> PETSc.Mat:
 
 def assemble_matrix(matrix: PETSc.Mat, form: Any) -> None:
     """Add a bilinear form to a matrix, without finishing it."""
-    constants, coefficients = fem.pack_constants(form), fem.pack_coefficients(form)
+    constants, coefficients = fem.assemble.pack_constants(form), fem.assemble.pack_coefficients(form)
     cpp.fem.petsc.assemble_matrix(matrix, form._cpp_object, constants, coefficients, [])
 
 
