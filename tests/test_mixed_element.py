@@ -9,6 +9,7 @@ from structure_setup import block, distort, held_everywhere, load_step, make_str
 from test_structure_tangent import MATERIALS, tangent_error
 
 from fsci import shapes
+from fsci.case import CaseError, load_case
 from fsci.history import read_history
 from solvers.api import StepFailed
 from solvers.newton import Tolerance
@@ -240,3 +241,35 @@ def test_processes(tmp_path):
     for column in columns:
         for other in found[1:]:
             assert other[column] == pytest.approx(found[0][column], rel=1e-8, abs=1e-9), column
+
+
+REFUSED = """
+time: {step: 1, end: 1}
+structure:
+  PLANE
+  bodies:
+    body:
+      mesh: MESH
+      material: {law: st_venant_kirchhoff, E: 100, nu: 0.3}
+      element: mixed
+"""
+
+
+def test_triangles_of_a_file_are_refused(tmp_path):
+    import meshio
+
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    meshio.write(tmp_path / "one.msh", meshio.Mesh(points, [("triangle", [[0, 1, 2]])]), file_format="gmsh")
+    (tmp_path / "case.yaml").write_text(REFUSED.replace("PLANE", "").replace("MESH", "{file: one.msh}"))
+    done = fsci("run", tmp_path, "-o", tmp_path / "out")
+    assert done.returncode != 0
+    assert "case.yaml:9:16: 'mixed' is for quadrilaterals and hexahedra" in done.stdout + done.stderr
+
+
+def test_plane_stress_is_refused(tmp_path):
+    mesh = "{shape: rectangle, size: [1, 1], cells: [1, 1]}"
+    (tmp_path / "case.yaml").write_text(REFUSED.replace("PLANE", "plane: stress").replace("MESH", mesh))
+    with pytest.raises(CaseError) as error:
+        load_case(tmp_path)
+    message = "case.yaml:9:16: 'mixed' is not for plane stress, which does not lock; take 'displacement'"
+    assert message in str(error.value)
