@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from solvers import fem
 from solvers.api import Array
 from solvers.structure import forms
-from solvers.structure.materials import Material, Tensor, volume_ratio
+from solvers.structure.materials import Material, Tensor
 
 Formulation = Literal["displacement", "mixed"]
 
@@ -84,7 +84,10 @@ class Mixed:
 
     Stationary in u, theta and p is
 
-        int D(F) + U(theta) + p (J - theta) dX,   D(F) = W(F) - U(J),   U(J) = W(J^(1/3) I).
+        int D(F) + U(theta) + p (J - theta) dX,   D(F) = W(F) - U(J).
+
+    U(J) is the energy of a pure change of volume. J is det F, or 1 + the trace of the strain in laws that have it: what
+    the bulk modulus multiplies, so that D is free of it.
 
     theta, p and their test functions q are constant in first-order cells (mean dilatation, B-bar for small strain) and
     linear in second-order ones (Q2/P1). theta and p follow from u,
@@ -115,7 +118,7 @@ class Mixed:
         theta = ufl.variable(self._ratio)
         self._volumetric = material.volumetric(theta, **parameters)
         pressure = ufl.diff(self._volumetric, theta)
-        J = volume_ratio(forms.deformation_gradient(u), material)
+        J = material.volume_ratio(forms.deformation_gradient(u))
         self._ratio_right = fem.compile_form(J * q * dx)
         self._pressure_right = fem.compile_form(pressure * q * dx)
         self._modulus = fem.compile_form(ufl.diff(pressure, theta) * q * r * dx)
@@ -134,11 +137,11 @@ class Mixed:
         return self.material.distortional(F, **self.parameters) + self._volumetric
 
     def potential(self, F: Tensor) -> Tensor:
-        return self.material.distortional(F, **self.parameters) + self._pressure * volume_ratio(F, self.material)
+        return self.material.distortional(F, **self.parameters) + self._pressure * self.material.volume_ratio(F)
 
     def tangent_potential(self, F: Tensor) -> Tensor:
         distortion = self.material.distortional(F, **self.parameters)
-        return distortion + self._tangent_pressure * volume_ratio(F, self.material)
+        return distortion + self._tangent_pressure * self.material.volume_ratio(F)
 
     def begin_step(self) -> None:
         self._last = None

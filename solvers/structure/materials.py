@@ -38,14 +38,18 @@ class Material(Protocol):
         """Stored energy W(F, parameters by name)."""
         ...
 
+    def volume_ratio(self, F: Tensor) -> Tensor:
+        """J = det F, or the law's own measure of it: 1 + tr of its strain."""
+        ...
+
     @property
     def volumetric(self) -> Callable[..., Tensor]:
-        """Its part of a pure change of volume, U(J, parameters by name) = W(J^(1/3) I)."""
+        """Its part of a pure change of volume: U(J, parameters by name) = W(F) where F = s I has this J."""
         ...
 
     @property
     def distortional(self) -> Callable[..., Tensor]:
-        """The rest of it, W(F) - U(det F)."""
+        """The rest of it, W(F) - U(J)."""
         ...
 
 
@@ -61,11 +65,6 @@ def in_space(F: Tensor) -> Tensor:
     return ufl.as_tensor([[F[0, 0], F[0, 1], 0], [F[1, 0], F[1, 1], 0], [0, 0, 1]])
 
 
-def volume_ratio(F: Tensor, material: Material) -> Tensor:
-    """det F, for small displacements 1 + div u."""
-    return 1 + ufl.tr(F) - F.ufl_shape[0] if material.linear else ufl.det(F)
-
-
 def lame(E: float, nu: float) -> tuple[float, float]:
     """Lame parameters (mu, lambda) [Pa] from Young's modulus [Pa] and Poisson's ratio."""
     return E / (2.0 * (1.0 + nu)), E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
@@ -74,6 +73,10 @@ def lame(E: float, nu: float) -> tuple[float, float]:
 def plane_stress_lambda(mu: float, lmbda: float) -> float:
     """The lambda that makes the 2D St. Venant-Kirchhoff law one of plane stress (S_33 = 0)."""
     return 2.0 * lmbda * mu / (lmbda + 2.0 * mu)
+
+
+def _green_lagrange(F: Tensor) -> Tensor:
+    return (F.T * F - ufl.Identity(F.ufl_shape[0])) / 2
 
 
 @dataclass(frozen=True)
@@ -87,14 +90,18 @@ class StVenantKirchhoff:
     linear: ClassVar[bool] = False
 
     def energy(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
-        E = (F.T * F - ufl.Identity(F.ufl_shape[0])) / 2
+        E = _green_lagrange(F)
         return lmbda / 2 * ufl.tr(E) ** 2 + mu * ufl.inner(E, E)
 
+    def volume_ratio(self, F: Tensor) -> Tensor:
+        return 1 + ufl.tr(_green_lagrange(F))
+
     def volumetric(self, J: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
-        return 3 / 8 * (3 * lmbda + 2 * mu) * (_cube_root(J) ** 2 - 1) ** 2
+        return (lmbda / 2 + mu / 3) * (J - 1) ** 2
 
     def distortional(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
-        return self.energy(F, mu, lmbda) - self.volumetric(ufl.det(F), mu, lmbda)
+        E = _green_lagrange(F)
+        return mu * (ufl.inner(E, E) - ufl.tr(E) ** 2 / 3)
 
 
 @dataclass(frozen=True)
@@ -118,8 +125,10 @@ class LinearElastic:
         e = ufl.sym(F) - ufl.Identity(F.ufl_shape[0])
         return lmbda / 2 * ufl.tr(e) ** 2 + mu * ufl.inner(e, e)
 
+    def volume_ratio(self, F: Tensor) -> Tensor:
+        return 1 + ufl.tr(F) - F.ufl_shape[0]
+
     def volumetric(self, J: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
-        """The volume ratio of small displacements is J = 1 + tr e."""
         return (lmbda / 2 + mu / 3) * (J - 1) ** 2
 
     def distortional(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
@@ -171,6 +180,9 @@ class NeoHooke:
         J, I1 = ufl.det(F), ufl.tr(in_space(F).T * in_space(F))
         return mu / 2 * (I1 - 3) - mu * ufl.ln(J) + lmbda / 2 * ufl.ln(J) ** 2
 
+    def volume_ratio(self, F: Tensor) -> Tensor:
+        return ufl.det(F)
+
     def volumetric(self, J: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
         return 3 * mu / 2 * (_cube_root(J) ** 2 - 1) - mu * ufl.ln(J) + lmbda / 2 * ufl.ln(J) ** 2
 
@@ -195,6 +207,9 @@ class CoupNeoHooke:
         J, I1 = ufl.det(F), ufl.tr(in_space(F).T * in_space(F))
         return mu * _inverse_power(J, lmbda / mu) + mu / 2 * (I1 - 3)
 
+    def volume_ratio(self, F: Tensor) -> Tensor:
+        return ufl.det(F)
+
     def volumetric(self, J: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
         return mu * _inverse_power(J, lmbda / mu) + 3 * mu / 2 * (_cube_root(J) ** 2 - 1)
 
@@ -218,6 +233,9 @@ class MooneyRivlin:
 
     def energy(self, F: Tensor, c10: Tensor, c01: Tensor, bulk: Tensor) -> Tensor:
         return self.distortional(F, c10, c01, bulk) + self.volumetric(ufl.det(F), c10, c01, bulk)
+
+    def volume_ratio(self, F: Tensor) -> Tensor:
+        return ufl.det(F)
 
     def volumetric(self, J: Tensor, c10: Tensor, c01: Tensor, bulk: Tensor) -> Tensor:
         return bulk / 2 * (J - 1) ** 2
