@@ -6,6 +6,7 @@ import os
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,15 +27,18 @@ class FieldWriter:
         self.folder = Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         self.series: dict[str, Series] = {}
+        self._lines: dict[str, list[str]] = {}  # of the collections: made once, they are written at every output
 
     @classmethod
     def resume(cls, folder: Path, time: float) -> FieldWriter:
         """Continues the collections in `folder` after a restart at `time`; later outputs are removed."""
         writer = cls(folder)
-        for collection in sorted(writer.folder.glob("*.pvd")):
-            entries = read_collection(collection)
-            writer.series[collection.stem] = [entry for entry in entries if entry[0] <= time]
-            write_collection(collection, writer.series[collection.stem])
+        for listed in sorted(writer.folder.glob("*.pvd")):
+            entries = read_collection(listed)
+            kept = [entry for entry in entries if entry[0] <= time]
+            writer.series[listed.stem] = kept
+            writer._lines[listed.stem] = [data_set(*entry) for entry in kept]
+            write_collection(listed, kept)
             for later, path in entries:
                 if later > time:
                     path.unlink(missing_ok=True)
@@ -45,9 +49,10 @@ class FieldWriter:
         for snapshot in snapshots:
             path = self.folder / f"{snapshot.name}_{step:06d}.vtu"
             write_vtu(path, snapshot)
-            series = self.series.setdefault(snapshot.name, [])
-            series.append((time, path))
-            write_collection(self.folder / f"{snapshot.name}.pvd", series)
+            self.series.setdefault(snapshot.name, []).append((time, path))
+            lines = self._lines.setdefault(snapshot.name, [])
+            lines.append(data_set(time, path))
+            write_text(self.folder / f"{snapshot.name}.pvd", collection(lines))
 
 
 def write_vtu(path: Path, snapshot: Snapshot) -> None:
@@ -70,12 +75,18 @@ def write_vtu(path: Path, snapshot: Snapshot) -> None:
 
 def write_collection(path: Path, series: Series) -> None:
     """Writes a ParaView collection; the files stand in the folder of `path`."""
-    root = ET.Element("VTKFile", type="Collection", version="0.1")
-    collection = ET.SubElement(root, "Collection")
-    for time, file in series:
-        ET.SubElement(collection, "DataSet", timestep=repr(float(time)), part="0", file=file.name)
-    ET.indent(root)
-    write_text(path, '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n")
+    write_text(path, collection([data_set(*entry) for entry in series]))
+
+
+def data_set(time: float, file: Path) -> str:
+    """The line of a ParaView collection for one file."""
+    return f'    <DataSet timestep="{float(time)!r}" part="0" file={quoteattr(file.name)} />\n'
+
+
+def collection(lines: Sequence[str]) -> str:
+    """The text of a ParaView collection."""
+    begin = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+    return begin + "".join(lines) + "  </Collection>\n</VTKFile>\n"
 
 
 def read_collection(path: Path) -> Series:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import basix
 import numpy as np
 from dolfinx import fem
@@ -11,7 +13,7 @@ from solvers.api import Array
 from solvers.fem.calls import calls
 from solvers.fem.domain import CELLS, Domain, input_cells, owned_cells
 from solvers.fem.ghosts import accumulate
-from solvers.fem.spaces import cell_blocks, function, scalar_space
+from solvers.fem.spaces import cell_blocks, function
 from solvers.locate import locate
 
 
@@ -44,9 +46,11 @@ def evaluate_cells(domain: Domain, expression: fem.Expression) -> Array:
     return calls.evaluate(expression, domain.mesh, cells)
 
 
-def average_at_nodes(domain: Domain, expression: fem.Expression, *, components: int) -> Array:
-    """Mean over the adjacent cells of an expression compiled at `reference_nodes`, shape (local nodes, components)."""
-    space = scalar_space(domain)
+def average_at_nodes(domain: Domain, space: Any, expression: fem.Expression, *, components: int) -> Array:
+    """Mean over the adjacent cells of an expression compiled at `reference_nodes`, shape (local nodes, components).
+
+    `space`: a `scalar_space` of the domain.
+    """
     values = evaluate_cells(domain, expression)
     blocks = cell_blocks(space)[: len(values)]
     values = values.reshape(*blocks.shape, components)

@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from solvers import kernels
 from solvers.api import Array
-from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.pieces import FLUSH, Pieces, put_where_fluid_is
 from solvers.fluid.surface import Motion, normals
 
@@ -164,14 +164,9 @@ class Cutter:
     def _covered(self, corners: Array) -> NDArray[np.bool_]:
         """Box cells around facets that lie on the box's boundary: if these leave it, fluid comes between."""
         box = self.grid.grid
-        marked = np.zeros(box.shape, dtype=bool)
-        ends = [
-            np.clip(np.searchsorted(edge, corners[:, :, axis], side="right") - 1, 0, len(edge) - 2)
-            for axis, edge in enumerate(box.edges)
-        ]
-        for cells in np.stack(ends, axis=2):  # of the corners of one facet
-            marked[tuple(slice(i, j + 1) for i, j in zip(cells.min(axis=0), cells.max(axis=0), strict=True))] = True
-        return marked.ravel(order="F")
+        marked = np.zeros(box.size, dtype=bool)
+        marked[_cells_between(box, corners.min(axis=1), corners.max(axis=1))] = True
+        return marked
 
     def _fluid_weights(self, moments, cut: Cells) -> Array:
         """int_fluid L_q dx / (w_q |K|) on local cut cells, shape (cut, points)."""
@@ -181,6 +176,27 @@ class Cutter:
         known = moments.cells[row] == numbers if len(moments.cells) else np.zeros(len(cut), dtype=bool)
         fluid[known] = 1.0 - moments.solid[row[known]] / weights
         return fluid
+
+
+def _cells_between(box: Grid, low: Array, high: Array) -> NDArray[np.int64]:
+    """Numbers of the cells that boxes between two corners [m] overlap, shape (boxes, dim) each; some several times."""
+    first, last = (
+        [
+            np.clip(np.searchsorted(edge, x[:, axis], side="right") - 1, 0, len(edge) - 2)
+            for axis, edge in enumerate(box.edges)
+        ]
+        for x in (low, high)
+    )
+    spans = [b - a + 1 for a, b in zip(first, last, strict=True)]
+    count = np.prod(spans, axis=0, dtype=np.int64)
+    of = np.repeat(np.arange(len(low)), count)
+    offset = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+    number, stride = np.zeros(len(of), dtype=np.int64), 1
+    for start, span, cells in zip(first, spans, box.shape, strict=True):
+        number += stride * (start[of] + offset % span[of])
+        offset //= span[of]
+        stride *= cells
+    return number
 
 
 def _tensor_weights(points: Array, dim: int) -> Array:

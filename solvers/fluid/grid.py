@@ -72,6 +72,7 @@ class DistributedGrid:
         self.numbers: Indices = fem.input_cells(self.domain)
         self.owned = fem.owned_cells(self.domain)
         self.sizes = grid.cell_sizes()[self.numbers]
+        self._seams: dict[tuple[int, ...], tuple[Indices, Indices]] = {}
 
     @property
     def dim(self) -> int:
@@ -94,6 +95,37 @@ class DistributedGrid:
         """(local faces, their cells, midpoints of shape (faces, dim)) on the box's boundary that this process knows."""
         faces, cells = fem.boundary_facets(self.domain)
         return faces, cells, fem.facet_midpoints(self.domain, faces)
+
+    def seams(self, periodic: tuple[int, ...] = ()) -> tuple[Indices, Indices]:
+        """(owned cells, numbers of corners) where these meet cells of others, or cells across a period.
+
+        Corners are numbered as in the lattice of all corners, those of a `periodic` axis's end as those of its start.
+        """
+        if periodic not in self._seams:
+            self._seams[periodic] = self._find_seams(periodic)
+        return self._seams[periodic]
+
+    def _find_seams(self, periodic: tuple[int, ...]) -> tuple[Indices, Indices]:
+        shape = self.grid.shape
+        lattice = [n if axis in periodic else n + 1 for axis, n in enumerate(shape)]
+        index = np.stack(np.unravel_index(self.numbers[: self.owned], shape, order="F"))
+        cells, numbers, across = [], [], []
+        for side in np.ndindex((2,) * self.dim):
+            corner = (index + np.array(side)[:, None]) % np.array(lattice)[:, None]
+            cells.append(np.arange(self.owned, dtype=np.int64))
+            numbers.append(np.ravel_multi_index(tuple(corner), lattice, order="F"))
+            across.append((corner[list(periodic)] == 0).any(axis=0))
+        cell, number, crossing = (np.concatenate(found) for found in (cells, numbers, across))
+        meeting = np.bincount(number, minlength=int(np.prod(lattice)))
+        around = [np.full(n, 2) for n in lattice]
+        for axis, cells_there in enumerate(around):
+            if axis not in periodic:
+                cells_there[[0, -1]] = 1
+        whole = np.ones(lattice, dtype=np.int64)
+        for axis, cells_there in enumerate(around):
+            whole *= cells_there.reshape([-1 if a == axis else 1 for a in range(self.dim)])
+        seam = crossing | (meeting < whole.ravel(order="F"))[number]
+        return cell[seam], number[seam]
 
     def on_face(self, midpoints: Array, name: str) -> NDArray[np.bool_]:
         """Which midpoints lie on a box face such as 'x-'."""

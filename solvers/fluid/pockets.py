@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy import ndimage, sparse
 from scipy.sparse import csgraph
@@ -21,7 +20,7 @@ Mask = NDArray[np.bool_]
 class Pocket:
     """Active cells that are connected with each other and with no part of the boundary that is open."""
 
-    cells: Mask  #: local cells that belong to it
+    cells: Mask  #: which local cells belong to it; cells of other processes are left out
     largest: bool  #: no pocket has more cells
     elastic: bool  #: a surface that another field moves bounds it, by its elasticity its pressure may be known
 
@@ -34,12 +33,8 @@ def find_pockets(
     `is_open`: local cells at an open boundary; `elastic`: vertices that another field moves. Cells that share a vertex
     are connected, because they share unknowns; those at the ends of `periodic` axes share them across the period.
     """
-    box, own = grid.grid, cut.active[cut.active < grid.owned]
-    active = np.zeros(box.size, dtype=bool)
-    active[grid.numbers[own]] = True
-    grid.comm.Allreduce(MPI.IN_PLACE, active, op=MPI.LOR)
-    labels, count = _label(box.as_box(active), periodic)
-    labels = labels.ravel(order="F")[grid.numbers]
+    own = cut.active[cut.active < grid.owned]
+    labels, count = _join(grid, *_label(grid, own), own, periodic)
     at_elastic = elastic[cut.facets[cut.pieces.facet]].any(axis=1)
     marks = np.zeros((3, count + 1), dtype=np.int64)  # open cells, elastic pieces, cells of each part
     np.add.at(marks[0], labels[is_open], 1)
@@ -51,15 +46,51 @@ def find_pockets(
     return [Pocket(labels == part, part == largest, bool(marks[1, part])) for part in closed]
 
 
-def _label(active: Mask, periodic: Sequence[int]) -> tuple[NDArray[np.int64], int]:
-    """(number of the connected part of each cell, from 1 on, 0 where inactive; how many parts there are)."""
-    width = [(1, 1) if axis in periodic else (0, 0) for axis in range(active.ndim)]
-    padded, count = ndimage.label(np.pad(active, width, mode="wrap"), np.ones((3,) * active.ndim))
-    inner = padded[tuple(slice(before, n - after) for (before, after), n in zip(width, padded.shape, strict=True))]
-    if not periodic:
-        return inner, count
-    images = np.stack([padded.ravel(), np.pad(inner, width, mode="wrap").ravel()])
-    images = images[:, (images > 0).all(axis=0)]
-    links = sparse.coo_matrix((np.ones(images.shape[1]), images), shape=(count + 1,) * 2)
-    parts = csgraph.connected_components(links, directed=False)[1]  # that of 0, which has no links, is 0
-    return parts[inner].astype(np.int64), int(parts.max())
+def _label(grid: DistributedGrid, own: NDArray[np.int32]) -> tuple[NDArray[np.int64], int]:
+    """Parts of this process alone: the number of that of each local cell, from 1 on, 0 where none is; how many."""
+    labels = np.zeros(len(grid.numbers), dtype=np.int64)
+    if not len(own):
+        return labels, 0
+    index = np.stack(np.unravel_index(grid.numbers[own], grid.grid.shape, order="F"))
+    low = index.min(axis=1)
+    place = tuple(index - low[:, None])
+    window = np.zeros(index.max(axis=1) - low + 1, dtype=bool)
+    window[place] = True
+    found, count = ndimage.label(window, np.ones((3,) * grid.dim))
+    labels[own] = found[place]
+    return labels, count
+
+
+def _join(
+    grid: DistributedGrid, labels: NDArray[np.int64], count: int, own: NDArray[np.int32], periodic: Sequence[int]
+) -> tuple[NDArray[np.int64], int]:
+    """The same of the parts of all processes together: they meet in corners on the seams between them (collective)."""
+    cells, corners = grid.seams(tuple(periodic))
+    at = labels[cells] > 0
+    links = np.unique(np.stack([labels[cells[at]] - 1, corners[at]]), axis=1)
+    first = _first_cells(grid, labels, count, own)
+    gathered = grid.comm.allgather((first, links))
+    starts = np.concatenate([[0], np.cumsum([len(found) for found, _ in gathered])])
+    firsts = np.concatenate([found for found, _ in gathered])
+    parts = np.concatenate([start + these[0] for start, (_, these) in zip(starts, gathered, strict=False)])
+    meetings = np.concatenate([these[1] for _, these in gathered])
+    _, meetings = np.unique(meetings, return_inverse=True)
+    size = len(firsts) + int(meetings.max(initial=-1)) + 1
+    graph = sparse.coo_matrix((np.ones(len(parts)), (parts, len(firsts) + meetings)), shape=(size, size))
+    whole, joined = csgraph.connected_components(graph, directed=False)
+    order = np.full(whole, np.iinfo(np.int64).max)
+    np.minimum.at(order, joined[: len(firsts)], firsts)
+    number = np.argsort(np.argsort(order)) + 1
+    mine = joined[starts[grid.comm.rank] : starts[grid.comm.rank] + count]
+    return np.concatenate([[0], number[mine]])[labels], whole
+
+
+def _first_cells(
+    grid: DistributedGrid, labels: NDArray[np.int64], count: int, own: NDArray[np.int32]
+) -> NDArray[np.int64]:
+    """Smallest number of a cell in each part of this process, the last axis running fastest."""
+    shape = grid.grid.shape
+    numbers = np.ravel_multi_index(np.unravel_index(grid.numbers[own], shape, order="F"), shape)
+    first = np.full(count, np.iinfo(np.int64).max)
+    np.minimum.at(first, labels[own] - 1, numbers)
+    return first

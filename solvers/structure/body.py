@@ -75,6 +75,11 @@ class Body:
         return fem.compile_expression(forms.cauchy_stress(self.u, self.element), fem.reference_nodes(self.domain))
 
     @cached_property
+    def _scalars(self):
+        """Space of nodal averages. To make one takes longer than a step of a small body."""
+        return fem.scalar_space(self.domain)
+
+    @cached_property
     def cell_size(self) -> float:
         """Typical edge [m] of a cell."""
         return fem.mean_cell_size(self.domain)
@@ -237,7 +242,7 @@ class Body:
 
     def stress(self) -> Array:
         """Nodal averages of the Cauchy stress [Pa] at owned nodes, 3x3 by rows, shape (owned, 9)."""
-        return fem.average_at_nodes(self.domain, self._stress, components=9)[: self.owned]
+        return fem.average_at_nodes(self.domain, self._scalars, self._stress, components=9)[: self.owned]
 
     def internal_energy(self) -> float:
         """int W dX, and the energy of springs [J]."""
