@@ -103,4 +103,4 @@ def test_point_forces():
     force = body.external_force().reshape(-1, 2)[np.argsort(body.nodes[: body.owned])]
     expected = np.zeros_like(force)
     expected[nodes, 0] = 2.0 * (1.0 + 2.0 * mesh.points[nodes, 0] ** 3)
-    assert np.array_equal(force, expected)
+    assert np.allclose(force, expected, rtol=1e-14, atol=0.0)

@@ -100,7 +100,10 @@ def cell_blocks(space: Any) -> Indices:
 def replace_dofs(space: Any, cells: Indices, ghosts: NDArray[np.int64], owners: Indices) -> Any:
     """The space with other dof blocks in its cells: owned blocks keep their numbers, ghosts come with their owners."""
     dofmap, own = space.dofmap, int(space.dofmap.index_map.size_local)
-    index_map = cpp.common.IndexMap(space.mesh.comm, own, ghosts, owners, 0)
+    try:
+        index_map = cpp.common.IndexMap(space.mesh.comm, own, ghosts, owners)
+    except TypeError:  # later with a tag for messages
+        index_map = cpp.common.IndexMap(space.mesh.comm, own, ghosts, owners, 0)
     links = cpp.graph.AdjacencyList_int32(np.ascontiguousarray(cells))
     replaced = cpp.fem.DofMap(dofmap.dof_layout, index_map, dofmap.index_map_bs, links, dofmap.bs)
     whole = space._cpp_object
@@ -166,7 +169,7 @@ def create_matrix(form: Any) -> PETSc.Mat:
 
 def assemble_matrix(matrix: PETSc.Mat, form: Any) -> None:
     """Add a bilinear form to a matrix, without finishing it."""
-    constants, coefficients = fem.assemble.pack_constants(form), fem.assemble.pack_coefficients(form)
+    constants, coefficients = cpp.fem.pack_constants(form._cpp_object), cpp.fem.pack_coefficients(form._cpp_object)
     cpp.fem.petsc.assemble_matrix(matrix, form._cpp_object, constants, coefficients, [])
 
 
