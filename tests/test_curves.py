@@ -62,6 +62,42 @@ def test_files_of_curves_are_kept(case, tmp_path):
     assert load_case(out).curves["inflow"](0.5) == pytest.approx(-1.0)
 
 
+def test_curves_in_flows_motions_and_obstacles(tmp_path):
+    """Wherever t is allowed: patches, rigid bodies, obstacles of contact."""
+    text = """\
+time: {step: 0.5, end: 1}
+curves: {soft: {table: [[0, 0], [1, 2]]}}
+fluid:
+  density: 1
+  viscosity: 1
+  grid: {from: [0, 0], to: [1, 1], cells: [4, 4]}
+  patches:
+    inlet: {on: x-, velocity: ["soft(t)*y", 0]}
+    rest: {on: [x+, y-, y+], outflow: true}
+  bodies:
+    disc:
+      mesh: {shape: disc, radius: 0.2, cells: [8, 1], translate: [0.5, 0.5]}
+      motion: {velocity: ["soft(t)", 0], rotation: {centre: [0.5, 0.5], angle: 10*soft(t)}}
+structure:
+  bodies:
+    block:
+      mesh: {shape: rectangle, size: [1, 1], cells: [1, 1], origin: [0, -1]}
+      material: {law: neo_hooke, E: 1, nu: 0, density: 1}
+  dynamics: {}
+coupling: {}
+contact:
+  obstacles: {wall: {mesh: {shape: rectangle, size: [1, 1], cells: [1, 1]}, on: left, motion: ["-soft(t)", 0]}}
+  pairs: {wall: {slave: {body: block, on: right}, master: {obstacle: wall}}}
+"""
+    (tmp_path / "case.yaml").write_text(text)
+    case = load_case(tmp_path)
+    y = np.array([[0.0], [0.5]])
+    assert case.fluid.patches["inlet"].velocity[0](y, 0.5) == pytest.approx([0.5])
+    assert case.fluid.bodies["disc"].motion.velocity[0].at_times(0.25) == pytest.approx(0.5)
+    assert case.fluid.bodies["disc"].motion.rotation.angle.at_times(0.25) == pytest.approx(5.0)
+    assert case.contact.obstacles["wall"].motion[0](y, 1.0) == pytest.approx([-2.0])
+
+
 MISTAKES = [
     ("pulse:", "sin:", "3:3: 'sin' must be another name: expressions know 'sin' already"),
     ("pulse:", "a-b:", "3:3: 'a-b' must be a name without '-', which means minus in expressions, not 'a-b'"),

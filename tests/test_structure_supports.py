@@ -92,6 +92,17 @@ def test_conditions_at_one_node():
     assert not target[others].any()
 
 
+def test_directions_along_axes_are_components():
+    """They need no projection, and contact can know them."""
+    value = constant(0.25)
+    supports = [Roller("left", None, value), Roller("top", (0.0, -2.0), value), Roller("bottom", None, value)]
+    structure = make_structure(block("quad", 2), MATERIAL, supports=supports)
+    body, target = structure.bodies[0], structure.held.displacement(1.0).reshape(-1, 2)
+    assert not structure.held.oblique
+    x, y = np.round(body.points[:2, : body.owned], 9)
+    assert target == pytest.approx(-0.25 * np.stack([x == 0.0, (y == 1.0) | (y == 0.0)], axis=1))
+
+
 def test_normals_of_a_circle():
     """A ring under inner pressure keeps its radius where rollers hold its outer surface."""
     ring = shapes.ring(1.0, 2.0, [12, 2], order=2, angle=90.0)

@@ -151,7 +151,7 @@ def _in_space(points: Array) -> Array:
 
 def _add(out: Array, blocks: NDArray[np.int32], values: Array, shape: Array) -> None:
     """Add sum_q values_q N_a(x_q) to the node a of each entity, values of shape (entities, points)."""
-    np.add.at(out, blocks, values @ shape)
+    out += np.bincount(blocks.ravel(), (values @ shape).ravel(), minlength=len(out))
 
 
 class FollowerPressure:

@@ -2,7 +2,7 @@
 
 A support holds components along the axes (dofs), or along a direction that is not an axis. At a node with such a
 direction all conditions n_j.u = g_j are made orthonormal from the last support to the first (Gram-Schmidt): they hold
-P u = G g with the projection P on the span of the n_j. Where supports contradict each other, the last one counts.
+P u with the projection P on the span of the n_j. Where supports contradict each other, the last one counts.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from solvers import fem
@@ -62,20 +62,37 @@ class SupportError(ValueError):
 
 
 @dataclass(frozen=True)
+class Share:
+    """What one support adds at oblique nodes: h.u = (g - along.targets) / size for a new direction h of the node."""
+
+    nodes: NDArray[np.int64]  #: numbers among the oblique nodes, shape (m,)
+    slots: NDArray[np.int64]  #: number of the new direction at its node, shape (m,)
+    along: Array  #: components of the support's direction along those that the node has already, shape (m, dim)
+    sizes: Array  #: length of what is left of it, shape (m,)
+    value: Value  #: g [m]
+    points: Array  #: where it is asked for [m], shape (3, m)
+
+
+@dataclass(frozen=True)
 class Oblique:
     """Owned nodes of a body with a condition along a direction that is not an axis."""
 
     blocks: NDArray[np.int32]  #: local, sorted, shape (k,)
-    projections: Array  #: P, on the prescribed directions, shape (k, dim, dim)
-    conditions: tuple[tuple[Value, Array], ...]  #: g, and the points (3, m) where it is asked for
-    combine: sp.csr_matrix  #: G, shape (k * dim, number of conditions)
+    basis: Array  #: prescribed directions, orthonormal or zero, shape (k, dim, dim)
+    shares: tuple[Share, ...]
+
+    @property
+    def projections(self) -> Array:
+        """P, on the prescribed directions, shape (k, dim, dim)."""
+        return np.einsum("kij,kil->kjl", self.basis, self.basis)
 
     def displacement(self, t: float) -> Array:
         """P u [m], shape (k, dim)."""
-        if not len(self.blocks):
-            return np.zeros(self.projections.shape[:2])
-        values = np.concatenate([value(points, t) for value, points in self.conditions])
-        return (self.combine @ values).reshape(len(self.blocks), -1)
+        targets = np.zeros(self.basis.shape[:2])
+        for share in self.shares:
+            known = np.einsum("md,md->m", share.along, targets[share.nodes])
+            targets[share.nodes, share.slots] = (share.value(share.points, t) - known) / share.sizes
+        return np.einsum("kij,ki->kj", self.basis, targets)
 
 
 @dataclass(frozen=True)
@@ -145,7 +162,9 @@ def _conditions(body: Body, support: Support | Symmetry | Roller) -> list[_Condi
     def along(direction: Array, value: Value) -> _Condition:
         axis = next((i for i in range(body.dim) if np.array_equal(np.abs(direction), axes[i])), None)
         if axis is not None and direction[axis] < 0.0:
-            return _Condition(blocks, axis, -direction, lambda x, t: -value(x, t))
+            return _Condition(
+                blocks, axis, np.broadcast_to(-direction, (len(blocks), body.dim)), lambda x, t: -value(x, t)
+            )
         return _Condition(blocks, axis, np.broadcast_to(direction, (len(blocks), body.dim)), value)
 
     if isinstance(support, Support):
@@ -156,38 +175,32 @@ def _conditions(body: Body, support: Support | Symmetry | Roller) -> list[_Condi
         direction = np.array(support.direction)
         return [along(direction / np.linalg.norm(direction), support.displacement)]
     assert isinstance(support.where, str), "nodes have no normal"
-    return [_Condition(blocks, None, _nodal_normals(body, support.where)[blocks], support.displacement)]
+    normals = _nodal_normals(body, support.where)[blocks]
+    mean = body.domain.comm.allreduce(normals.sum(axis=0))
+    nearest = np.sign(mean[np.argmax(np.abs(mean))]) * axes[np.argmax(np.abs(mean))]
+    if body.domain.comm.allreduce(bool(np.all(np.abs(normals - nearest) < 1e-9)), op=MPI.LAND):
+        return [along(nearest, support.displacement)]
+    return [_Condition(blocks, None, normals, support.displacement)]
 
 
 def _orthonormal(body: Body, conditions: list[_Condition], oblique: NDArray[np.int32]) -> Oblique:
     """The conditions at nodes with an oblique one."""
-    dim = body.dim
-    asked, sources, number = [], [], 0
-    for condition in conditions:
+    basis = np.zeros((len(oblique), body.dim, body.dim))
+    found = np.zeros(len(oblique), dtype=np.int64)
+    shares = []
+    for condition in reversed(conditions):
         here = np.flatnonzero(np.isin(condition.blocks, oblique))
-        blocks, directions = condition.blocks[here], np.broadcast_to(condition.directions, (len(condition.blocks), dim))
-        asked.append((condition.value, body.points[:, blocks]))
-        sources.append((np.searchsorted(oblique, blocks), directions[here], number + np.arange(len(here))))
-        number += len(here)
-
-    basis = np.zeros((len(oblique), dim, dim))  # orthonormal directions, one after the other
-    weights = sp.lil_matrix((len(oblique) * dim, number))  # h_i.u = sum_j weights_ij g_j
-    found = np.zeros(len(oblique), dtype=int)
-    for nodes, directions, columns in reversed(sources):
-        for node, direction, column in zip(nodes, directions, columns, strict=True):
-            along = basis[node] @ direction
-            rest = direction - along @ basis[node]
-            size = np.linalg.norm(rest)
-            if size < PARALLEL:
-                continue
-            row = node * dim + found[node]
-            weights[row] = -(sp.csr_matrix(along) @ weights[node * dim : (node + 1) * dim]) / size
-            weights[row, column] = 1.0 / size
-            basis[node, found[node]] = rest / size
-            found[node] += 1
-    spread = sp.block_diag([h.T for h in basis], format="csr") if len(oblique) else sp.csr_matrix((0, 0))
-    projections = np.einsum("kij,kil->kjl", basis, basis)
-    return Oblique(oblique, projections, tuple(asked), sp.csr_matrix(spread @ weights.tocsr()))
+        nodes, directions = np.searchsorted(oblique, condition.blocks[here]), condition.directions[here]
+        along = np.einsum("mij,mj->mi", basis[nodes], directions)
+        rest = directions - np.einsum("mi,mij->mj", along, basis[nodes])
+        sizes = np.linalg.norm(rest, axis=1)
+        new = sizes >= PARALLEL
+        nodes, slots = nodes[new], found[nodes[new]]
+        basis[nodes, slots] = rest[new] / sizes[new, None]
+        found[nodes] += 1
+        points = body.points[:, oblique[nodes]]
+        shares.append(Share(nodes, slots, along[new], sizes[new], condition.value, points))
+    return Oblique(oblique, basis, tuple(shares) if len(oblique) else ())
 
 
 def symmetry_normal(body: Body, support: Symmetry, blocks: NDArray[np.int32]) -> Array:
