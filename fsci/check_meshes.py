@@ -64,8 +64,11 @@ def check_meshes(case: Case) -> Findings:
     _elastic(case, found)
     if case.contact is not None:
         for name, obstacle in case.contact.obstacles.items():
-            if isinstance(obstacle.mesh, FileMesh):
-                found.attempt(partial(read_obstacle, case, name))
+            if not isinstance(obstacle.mesh, FileMesh):
+                continue
+            mesh = found.attempt(partial(read_obstacle, case, name))
+            if mesh is not None:
+                found.note(case, ("contact", "obstacles", name), mesh)
     if case.fluid is not None:
         _rigid(case, found)
     return found

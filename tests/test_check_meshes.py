@@ -128,6 +128,15 @@ def test_check_says_what_a_run_says(case, old, new, message, capsys):
     assert str(caught.value) in said
 
 
+def test_obstacles_are_read():
+    contact = "contact:\n  obstacles:\n    floor: {mesh: {file: serendipity.inp, translate: [0, -1]}, on: top}\n"
+    case = SOLID.replace("contact:\n", contact).replace("{body: lower, on: top}", "{obstacle: floor}")
+    found = check_meshes(load(case))
+    assert (found.problems, len(found.notes)) == ([], 1)
+    said = check_meshes(load(case.replace("-1]}, on: top", "-1]}, on: tip"))).problems
+    assert str(said[0]).startswith("case.yaml:15:68: unknown surface 'tip'; did you mean 'top'?")
+
+
 def test_symmetry_on_a_curve():
     """Of a built-in shape, too."""
     disc = "mesh: {shape: disc, radius: 0.5, cells: [12, 1]}\n      material: {law: neo_hooke, E: 1, nu: 0}"

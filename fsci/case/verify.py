@@ -28,7 +28,8 @@ CONTACT_COLUMNS = ("contact.active", "contact.changes")
 class Check(Section):
     """A result that the run must reach; exactly one of `relative` and `absolute` says how closely.
 
-    With the largest and smallest value M and m in the window, mean is (M + m)/2 and amplitude (M - m)/2.
+    With the largest and smallest value M and m in the window, mean is (M + m)/2 and amplitude (M - m)/2. All values in
+    the window must be finite, for `final` only the last one: the time of the first contact is nan before.
     """
 
     value: Text = setting(
