@@ -7,6 +7,7 @@ The first bytes of the file (the user block, which HDF5 skips) hold a checksum o
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
@@ -37,14 +38,21 @@ def write_checkpoint(folder: Path, state: State, meta: State) -> Path:
     step = int(meta["step"])
     path = folder / f"checkpoint_{step:06d}.h5"
     unfinished = path.with_name(path.name + ".tmp")
-    with h5py.File(unfinished, "w", userblock_size=USER_BLOCK) as file:
+    buffer = io.BytesIO()  # HDF5 may crash when the disk is full
+    with h5py.File(buffer, "w", userblock_size=USER_BLOCK) as file:
         write_tree(file.create_group("state", track_order=True), state)
         write_tree(file.create_group("meta", track_order=True), meta)
-    with unfinished.open("r+b") as raw:
-        seal = checksum(unfinished)
-        raw.write(seal)
-        raw.flush()
-        os.fsync(raw.fileno())
+    with buffer.getbuffer() as content:
+        seal = seal_of(len(content) - USER_BLOCK, zlib.crc32(content[USER_BLOCK:]))
+        content[: len(seal)] = seal
+        try:
+            with unfinished.open("wb") as raw:
+                raw.write(content)
+                raw.flush()
+                os.fsync(raw.fileno())
+        except OSError as error:
+            unfinished.unlink(missing_ok=True)
+            raise OSError(error.errno, f"cannot write a checkpoint: {error.strerror}", str(path)) from error
 
     for later in list_checkpoints(folder):
         if step_of(later) > step:
@@ -93,6 +101,11 @@ def checksum(path: Path) -> bytes:
         raw.seek(USER_BLOCK)
         while block := raw.read(1 << 22):
             size, code = size + len(block), zlib.crc32(block, code)
+    return seal_of(size, code)
+
+
+def seal_of(size: int, code: int) -> bytes:
+    """The user block's content for a size [bytes] and a CRC-32."""
     return f"fsci checkpoint, {size} bytes, crc32 {code:08x}\n".encode()
 
 

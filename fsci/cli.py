@@ -168,6 +168,8 @@ def _run(options: argparse.Namespace) -> int:
             return int(run_case(case, out, force=options.force))
     except CaseError as error:
         return _fail(str(error)) if first else 2
+    except (OSError, MemoryError, KeyboardInterrupt) as error:
+        return _broken("run", error)
 
 
 def _resume(options: argparse.Namespace) -> int:
@@ -186,6 +188,8 @@ def _resume(options: argparse.Namespace) -> int:
         if MPI.COMM_WORLD.rank == 0:
             print(f"fsci resume: {error}", file=sys.stderr)
         return 1
+    except (OSError, MemoryError, KeyboardInterrupt) as error:
+        return _broken("resume", error)
 
 
 def _plot(options: argparse.Namespace) -> int:
@@ -211,3 +215,11 @@ def _schema(options: argparse.Namespace) -> int:
 def _fail(message: str) -> int:
     print(message, file=sys.stderr)
     return 2
+
+
+def _broken(command: str, error: BaseException) -> int:
+    """A run on one process that the machine or the user has ended."""
+    from fsci.processes import describe
+
+    print(f"fsci {command}: {describe(error)}", file=sys.stderr)
+    return 3 if isinstance(error, KeyboardInterrupt) else 1

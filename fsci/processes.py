@@ -34,6 +34,8 @@ def describe(error: BaseException) -> str:
     """What the user has to know: the message of a failing disk or of too little memory, else all of the traceback."""
     if isinstance(error, MemoryError):
         return "there is not enough memory"
+    if isinstance(error, KeyboardInterrupt):
+        return "stopped before the first step"
     if isinstance(error, OSError):
         what = error.strerror or str(error)
         return f"{what}: '{error.filename}'" if error.filename else what

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ from fsci.history import HistoryWriter, read_history
 from fsci.memory import require_memory
 from fsci.monitor import Monitor
 from fsci.output import FieldWriter, write_text
+from fsci.processes import describe
 from fsci.results_folder import keep_case, prepare_folder
 from fsci.stop import StopWatch
 from fsci.summary import RunRecord, memory_mb, summarize, write_summary
@@ -155,7 +157,24 @@ class Run:
         self.monitor.start(title, dofs, self.comm.size, begin=begin, end=end, time=now, notes=notes)
         self._keep()
         with self.stop:
-            return self._loop()
+            try:
+                return self._loop()
+            except OSError as error:
+                raise OSError(error.errno, f"{describe(error)}. {self._rescue()}") from error
+
+    def _rescue(self) -> str:
+        """Write the state of the last accepted step where that is still possible: other files cannot be written."""
+        if not self.root:
+            return "The last good state is on process 0."
+        step, own = self.good_at["step"], self.out / "checkpoint"
+        for folder in (own, Path(tempfile.gettempdir()) / f"fsci_{self.out.resolve().name}_{os.getpid()}"):
+            try:
+                path = write_checkpoint(folder, self.good | {"record": self.record.save()}, self.good_at)
+            except OSError:
+                continue
+            where = "" if folder == own else f"; move it into {own}"
+            return f"The state after step {step} is in {path}{where}; continue with fsci resume."
+        return f"The state after step {step} could not be written either."
 
     def _asked_to_stop(self) -> bool:
         """Any process got a signal, or there is a file STOP in the results folder."""
