@@ -147,13 +147,15 @@ while True:
 def test_kill_in_the_middle_of_a_write_loses_nothing(tmp_path):
     chance = random.Random(1)
     step, interrupted = 0, 0
-    for _ in range(20):
+    for trial in range(20):
         writer = subprocess.Popen(
             [sys.executable, "-c", WRITER, str(tmp_path), str(step)], stdout=subprocess.PIPE, text=True
         )
         assert writer.stdout is not None
         assert writer.stdout.readline() == f"{step + 1}\n"
         time.sleep(chance.uniform(0.0, 0.15))
+        while trial % 3 and not list(tmp_path.glob("*.tmp")):  # at any time, or while a file is being written
+            pass
         writer.send_signal(signal.SIGKILL)
         finished = [step + 1, *map(int, writer.stdout.read().split())][-1]
         writer.wait()
