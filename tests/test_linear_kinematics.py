@@ -157,10 +157,11 @@ def test_case(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["monolithic", "partitioned"])
-@pytest.mark.parametrize("change", ["kinematics=linear", "element=mixed"])
-def test_fluid(change, scheme, tmp_path):
-    """The bar that pushes a column of fluid keeps its exact frequency and amplitude."""
-    changes = (f"coupling.scheme={scheme}", f"structure.bodies.bar.{change}")
+def test_fluid(scheme, tmp_path):
+    """The bar that pushes a column of fluid keeps its exact frequency and amplitude, as `verify` of the case asks."""
+    changes = (f"coupling.scheme={scheme}", "structure.bodies.bar.kinematics=linear")
     sets = (word for entry in changes for word in ("--set", entry))
     done = fsci("run", "cases/elastic_bar_column", "-o", tmp_path / "out", *sets, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
+    assert "verify ok" in done.stdout
+    assert "MISSED" not in done.stdout
