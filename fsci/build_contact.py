@@ -17,7 +17,7 @@ from solvers.contact.surface import Surface
 from solvers.mesh import Mesh
 from solvers.mesh_topology import FACET_TYPE, surface_facets
 from solvers.structure.body import Body
-from solvers.structure.supports import owned_blocks, prescribe, symmetric_dofs
+from solvers.structure.supports import prescribe, symmetric_dofs
 
 
 def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact:
@@ -26,9 +26,8 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
     layout = Layout(comm, [body.size for body in bodies])
     found: dict[tuple[str, ...], Surface] = {}
     pairs = []
-    for name, settings in case.contact.pairs.items():
+    for settings in case.contact.pairs.values():
         sides = []
-        _refuse_oblique(case, comm, bodies, name)
         for side in (settings.slave, settings.master):
             key = (side.body or "", *(side.on or ()), side.obstacle or "")
             if key not in found and side.obstacle is not None:
@@ -40,18 +39,6 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
     assert case.structure is not None
     moves = case.structure.dynamics is not None
     return Contact(comm, pairs, names=tuple(case.contact.pairs), c_n=case.contact.c_n, keep_overlap=moves)
-
-
-def _refuse_oblique(case: Case, comm: MPI.Comm, bodies: Sequence[Body], pair: str) -> None:
-    """The multipliers of slave nodes know supports along axes only."""
-    assert case.contact is not None
-    slave = case.contact.pairs[pair].slave
-    body = next(body for body in bodies if body.name == slave.body)
-    oblique = prescribe(body).oblique.blocks
-    on_slave = [owned_blocks(body, surface) for surface in slave.on or ()]
-    if comm.allreduce(int(np.isin(np.concatenate(on_slave), oblique).any()), op=MPI.MAX):
-        message = f"a support of '{slave.body}' holds nodes of this surface along a direction that is not an axis"
-        raise case.error(("contact", "pairs", pair, "slave"), f"{message}: make the other surface the slave")
 
 
 def surface_of_body(comm: MPI.Comm, layout: Layout, bodies: Sequence[Body], body_name: str, *names: str) -> Surface:

@@ -10,6 +10,7 @@ from fsci.case import CaseError, load_case
 from fsci.history import read_history
 from fsci.mesh import build_mesh, extract_region
 from fsci.run import FINISHED, run_case
+from solvers.structure.materials import lame
 
 ROOT = Path(__file__).parents[1]
 
@@ -123,19 +124,32 @@ def test_processes_agree(case, tmp_path):
         assert histories[0][name] == pytest.approx(histories[1][name], rel=1e-9)
 
 
-def test_a_support_that_is_not_along_an_axis_cannot_be_on_a_slave(case):
-    contact = """\
+def test_contact_between_turned_planes_of_symmetry(tmp_path):
+    """A plate presses a block in a channel, all turned by 30 degrees: the pressure is that of uniaxial strain."""
+    (tmp_path / "case.yaml").write_text("""\
+time: {step: 0.25, end: 1}
+structure:
+  bodies:
+    block:
+      mesh: {shape: rectangle, size: [1, 1], cells: [3, 3], rotate: {angle: 30}}
+      material: {law: neo_hooke, E: 1000, nu: 0.3}
+      supports: [{on: [bottom, left, right], symmetry: true}]
 contact:
-  obstacles: {wall: {mesh: {shape: box, size: [1, 1, 1], cells: [1, 1, 1], origin: [-1, 0, 0]}, on: right}}
-  pairs: {wall: {slave: {body: block, on: left}, master: {obstacle: wall}}}
-"""
-    case.write_text(CASE + contact)
-    with pytest.raises(CaseError) as caught:
-        run_case(load_case(case), case.parent / "out")
-    assert str(caught.value).startswith(
-        f"{case}:28:25: a support of 'block' holds nodes of this surface along a direction that is not an axis: "
-        "make the other surface the slave"
-    )
+  obstacles:
+    plate:
+      mesh: {shape: rectangle, size: [3, 1], cells: [1, 1], origin: [-1, 1.01], rotate: {angle: 30}}
+      on: bottom
+      motion: ["0.2*t*sin(pi/6)", "-0.2*t*cos(pi/6)"]
+  pairs: {press: {slave: {body: block, on: top}, master: {obstacle: plate}}}
+solver: {newton: {residual: 1.0e-12}}
+""")
+    assert run_case(load_case(tmp_path), tmp_path / "out") == FINISHED
+    history = read_history(tmp_path / "out" / "history.csv")
+    mu, lmbda = lame(1000, 0.3)
+    stretch = 1 - 0.19
+    stress = (mu * (stretch**2 - 1) + lmbda * np.log(stretch)) / stretch
+    assert history["contact.press.x"][-1] == pytest.approx(-0.5 * stress, rel=1e-9)
+    assert history["contact.press.y"][-1] == pytest.approx(np.sqrt(0.75) * stress, rel=1e-9)
 
 
 #: what is replaced, by what, the message with line and column
