@@ -38,7 +38,6 @@ class Monolithic:
         structure, fluid = coupled.structure, coupled.fluid
         self.comm, fluid.solved_with_bodies = structure.comm, True
         self._numbering = Numbering(self.comm, structure.layout.size, fluid.unknowns.owned)
-        self._iterative = linear.choose_flow(fluid.solver.linear, fluid.dim, fluid.dofs()) == "iterative"
         # in time the matrix of the first guess is too far from the later ones to serve for all of them
         self._direct = LaggedFactors(self.comm, fresh=math.inf if fluid.settings.steady else 2)
         self._farther: Structure | Fluid = fluid
@@ -67,7 +66,7 @@ class Monolithic:
         numbers = coupled.balance.numbers() | {"coupling.linear": float(self._linear_iterations)}
         if coupled.structure.constraint is not None:
             numbers.update(coupled.structure.constraint.numbers())
-        return StepInfo(info.iterations, info.residuals, numbers)
+        return StepInfo(info.iterations, info.residuals, numbers, tuple(coupled.fluid.notes))
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
@@ -107,13 +106,18 @@ class Monolithic:
         return max(structure.update(x.array[:own], everything), fluid.update(x.array[own:]))
 
     def _solve(self, blocks: Blocks, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        if self._iterative:
-            self._iterate(blocks.nested(), b, x)
-        else:
-            self._direct.solve(blocks.assembled(), b, x)
+        ladder = self.coupled.fluid.ladder
+        while ladder.here != "direct":
+            try:
+                self._iterate(blocks, b, x)
+                return
+            except linear.LinearSolveFailed as failure:
+                ladder.climb(failure)
+        self._direct.solve(blocks.assembled(), b, x)
 
-    def _iterate(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
+    def _iterate(self, blocks: Blocks, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Preconditioned by the first matrix of the step as long as that serves."""
+        fluid, matrix = self.coupled.fluid, blocks.nested()
         if self._krylov is not None:
             try:
                 linear.solve(self._krylov, matrix, b, x, self._preconditioned_by)
@@ -125,14 +129,17 @@ class Monolithic:
                 if iterations > 2 * self._fresh_iterations:
                     self._krylov = None
                 return
-        tolerance = self.coupled.fluid.solver.linear_tolerance
-        self._krylov = linear.coupled_solver(
-            self.comm, self._numbering.first, self._numbering.second, tolerance=tolerance
-        )
-        self._preconditioned_by = matrix
-        linear.solve(self._krylov, matrix, b, x)
-        linear.keep_factors(self._krylov)
-        self._fresh_iterations = self._krylov.getIterationNumber()
+        rung, tolerance = fluid.ladder.here, fluid.solver.linear_tolerance
+        parts = self._numbering.first, self._numbering.second
+        krylov = linear.coupled_solver(self.comm, *parts, tolerance=tolerance, fill=rung == "fill")
+        if rung == "multigrid":
+            krylov.setOperators(matrix)
+            krylov.getPC().setUp()
+            fluid.set_up_multigrid(krylov.getPC().getFieldSplitSubKSP()[1].getPC(), blocks.fluid)
+        linear.solve(krylov, matrix, b, x)
+        linear.keep_factors(krylov)
+        self._krylov, self._preconditioned_by = krylov, matrix
+        self._fresh_iterations = krylov.getIterationNumber()
         self._linear_iterations += self._fresh_iterations
 
     def _blocks(self) -> Blocks:

@@ -67,7 +67,7 @@ class Partitioned:
         constraint = coupled.structure.constraint
         if constraint is not None:
             numbers.update(constraint.numbers())
-        return StepInfo(len(history), tuple(history), numbers)
+        return StepInfo(len(history), tuple(history), numbers, tuple(coupled.fluid.notes))
 
     def _small(self, found: Array) -> float:
         return max(self.tolerance.relative * _mean(found - self.coupled.interface.old), self.tolerance.absolute)

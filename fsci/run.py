@@ -241,6 +241,8 @@ class Run:
             clock = self.clock
             self.history.write(clock.step, clock.time, dt, info.iterations, wall, numbers)
             self.monitor.step(clock.step, clock.time, dt, info, wall)
+            for note in info.notes:
+                self.monitor.say(note)
 
     # ------------------------------------------------------------------------------------------------- files
 

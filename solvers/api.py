@@ -25,6 +25,7 @@ class StepInfo:
     iterations: int  #: Newton steps or coupling iterations
     residuals: tuple[float, ...]  #: residual norm seen by each iteration, first to last
     numbers: Mapping[str, float] = field(default_factory=dict)  #: more columns for history.csv
+    notes: tuple[str, ...] = ()  #: what the user should know
 
 
 @dataclass(frozen=True)

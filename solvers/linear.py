@@ -16,7 +16,11 @@ DIRECT_LIMIT = {2: 400_000, 3: 30_000}
 
 
 class LinearSolveFailed(ArithmeticError):
-    """The linear system has no usable solution (singular matrix, or the Krylov method stalled)."""
+    """The linear system has no usable solution: the matrix is singular, or the Krylov method stalled."""
+
+    def __init__(self, message: str, *, singular: bool = False):
+        super().__init__(message)
+        self.singular = singular
 
 
 def choose(method: Method, dim: int, dofs: int) -> Literal["direct", "iterative", "ilu"]:
@@ -84,20 +88,34 @@ def _multigrid(comm) -> PETSc.PC:
     return preconditioner
 
 
-def choose_flow(method: Method, dim: int, dofs: int) -> Literal["direct", "iterative"]:
-    """The method for a flow of this size; the iterative one has incomplete factors anyway."""
+def choose_flow(method: Method, dim: int, dofs: int) -> Literal["direct", "multigrid", "ilu"]:
+    """The method for a flow of this size."""
     if method == "auto":
-        return "direct" if dofs <= FLOW_DIRECT_LIMIT[dim] else "iterative"
-    return "iterative" if method == "ilu" else method
+        return "direct" if dofs <= FLOW_DIRECT_LIMIT[dim] else "multigrid"
+    return "multigrid" if method == "iterative" else method
 
 
 #: Unknowns of a flow above which the iterative solver is taken. Measured: in 3D it is 4 times faster at 8,000 already.
 FLOW_DIRECT_LIMIT = {2: 400_000, 3: 4_000}
 
 
-def flow_solver(comm, *, tolerance: float) -> PETSc.KSP:
-    """GMRES with overlapping subdomains and incomplete factors, velocity and pressure of a node side by side."""
+def flow_solver(comm, *, tolerance: float, fill: bool = False) -> PETSc.KSP:
+    """GMRES with overlapping subdomains and incomplete factors, velocity and pressure of a node side by side.
+
+    fill: more of both, for systems on which the usual ones stall.
+    """
+    if fill:
+        return _schwarz_solver(comm, "flow_fill_", tolerance, pc_asm_overlap=2, sub_pc_factor_levels=1)
     return _schwarz_solver(comm, "flow_", tolerance)
+
+
+def flexible_solver(comm, *, tolerance: float) -> PETSc.KSP:
+    """FGMRES for a preconditioner that may change from iteration to iteration."""
+    ksp = PETSc.KSP().create(comm)
+    ksp.setType(PETSc.KSP.Type.FGMRES)
+    ksp.setGMRESRestart(100)
+    ksp.setTolerances(rtol=tolerance, max_it=200)
+    return ksp
 
 
 def incomplete_solver(comm, *, tolerance: float) -> PETSc.KSP:
@@ -109,7 +127,7 @@ def incomplete_solver(comm, *, tolerance: float) -> PETSc.KSP:
     return _schwarz_solver(comm, "incomplete_", tolerance, sub_pc_factor_mat_ordering_type="rcm")
 
 
-def _schwarz_solver(comm, prefix: str, tolerance: float, **more: str) -> PETSc.KSP:
+def _schwarz_solver(comm, prefix: str, tolerance: float, **more: str | int) -> PETSc.KSP:
     settings = {"pc_type": "asm", "pc_asm_overlap": 1, "sub_pc_type": "ilu", "sub_pc_factor_levels": 0, **more}
     options = PETSc.Options(prefix)
     for name, value in settings.items():
@@ -124,10 +142,11 @@ def _schwarz_solver(comm, prefix: str, tolerance: float, **more: str) -> PETSc.K
     return ksp
 
 
-def coupled_solver(comm, structure, flow, *, tolerance: float) -> PETSc.KSP:
+def coupled_solver(comm, structure, flow, *, tolerance: float, fill: bool = False) -> PETSc.KSP:
     """FGMRES for structure and flow together; `structure`, `flow`: their rows, as index sets.
 
-    Preconditioner: block Gauss-Seidel, the structure by LU, then the flow by incomplete factors on overlapping parts.
+    Preconditioner: block Gauss-Seidel, the structure by LU, then the flow by incomplete factors on overlapping parts
+    (`fill`: more of both), unless its part, the second one, is set up otherwise.
     Source: Gee, Kuttler, Wall, Int. J. Numer. Meth. Engng 85 (2011) 987-1016.
     """
     options = PETSc.Options("coupled_")
@@ -138,8 +157,9 @@ def coupled_solver(comm, structure, flow, *, tolerance: float) -> PETSc.KSP:
         "fieldsplit_structure_pc_factor_mat_solver_type": "mumps",
         "fieldsplit_flow_ksp_type": "preonly",
         "fieldsplit_flow_pc_type": "asm",
-        "fieldsplit_flow_pc_asm_overlap": 1,
+        "fieldsplit_flow_pc_asm_overlap": 2 if fill else 1,
         "fieldsplit_flow_sub_pc_type": "ilu",
+        "fieldsplit_flow_sub_pc_factor_levels": 1 if fill else 0,
     }.items():
         options[name] = value
     ksp = PETSc.KSP().create(comm)
@@ -175,8 +195,9 @@ def solve(
     unlocked.solve(ksp, b, x)
     reason = ksp.getConvergedReason()
     if reason < 0:
+        failed = PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
+        if ksp.getType() == PETSc.KSP.Type.PREONLY or reason == failed:
+            raise LinearSolveFailed("the linear system is singular: is a body not held?", singular=True)
         raise LinearSolveFailed(
-            "the linear system is singular: is a body not held?"
-            if ksp.getType() == PETSc.KSP.Type.PREONLY or reason == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
-            else f"the linear solver stalled after {ksp.getIterationNumber()} iterations (PETSc reason {reason})"
+            f"the linear solver stalled after {ksp.getIterationNumber()} iterations (PETSc reason {reason})"
         )

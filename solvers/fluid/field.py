@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -18,6 +18,7 @@ from solvers.fluid import time
 from solvers.fluid.cut import NOTHING, Cut, Cutter
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.history import History, Past
+from solvers.fluid.krylov import FlowKrylov, Ladder, rungs
 from solvers.fluid.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.pressure_level import hold_pressure, spread_excess
 from solvers.fluid.space import Nodes, Unknowns
@@ -71,7 +72,7 @@ class Fluid:
         self.dim = grid.dim
         self.unknowns = Unknowns(self.grid, settings.degree, periodic_axes(patches))
         self.boundary = Boundary(self.grid, self.unknowns, patches)
-        self._iterative = linear.choose_flow(solver.linear, self.dim, self.dofs()) == "iterative"
+        method = linear.choose_flow(solver.linear, self.dim, self.dofs())
         self.system = FlowSystem(
             self.grid,
             settings,
@@ -79,7 +80,7 @@ class Fluid:
             self.unknowns,
             with_bodies=bool(self.bodies),
             # incomplete factors of dense blocks are two times as fast
-            blocked=self._iterative and self.unknowns.block_size > 1,
+            blocked=method != "direct" and self.unknowns.block_size > 1,
         )
         self.cutter = Cutter(self.grid, self.system.weights.points)
         self.velocity_mask = np.zeros(self.unknowns.local, dtype=bool)
@@ -90,7 +91,9 @@ class Fluid:
         self.solved_with_bodies = False
         self._motions: list[Motion] = []
         self._wet = wetness([body.surface for body in self.bodies])
-        self._krylov: PETSc.KSP | None = None
+        self.notes: list[str] = []  #: what the user should know of this step
+        self.ladder = Ladder(comm, rungs(method, settings.degree), self.dofs(), self.notes.append)
+        self.krylov = None if method == "direct" else FlowKrylov(self.unknowns, self.ladder, solver.linear_tolerance)
         self.linear_iterations = 0  #: of the last linear system
         self._direct = LaggedFactors(comm, fresh=math.inf if settings.steady else 1)
         self.rounding: Array | None = None  #: rounding error of `residual_rows`, as far as this step knows
@@ -153,6 +156,9 @@ class Fluid:
         self._fresh, self._largest = True, 0.0
         self.rounding = self._tangent = None  # a run that is resumed here knows nothing of the last step's
         self._direct.begin_step()
+        self.notes.clear()
+        if self.krylov is not None:
+            self.krylov.begin_step()
         if not self._coupled:
             self.predict()
             self.move({})
@@ -229,7 +235,7 @@ class Fluid:
     def solve(self) -> StepInfo:
         """Newton to the tolerance. Raises StepFailed."""
         self._largest = 0.0
-        return converge(self, self.solver.newton)
+        return replace(converge(self, self.solver.newton), notes=tuple(self.notes))
 
     def end_step(self) -> None:
         """Accept the step. Fluid that comes between surfaces which touch now will have been at rest."""
@@ -295,13 +301,16 @@ class Fluid:
         return self.settings.steady and self.settings.convection and self._size > NEWTON_FROM * self._largest
 
     def _solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        if not self._iterative:
+        if self.krylov is None:
             self.linear_iterations = self._direct.solve(matrix, b, x)
-            return
-        if self._krylov is None:
-            self._krylov = linear.flow_solver(self.comm, tolerance=self.solver.linear_tolerance)
-        linear.solve(self._krylov, matrix, b, x)
-        self.linear_iterations = self._krylov.getIterationNumber()
+        else:
+            self.linear_iterations = self.krylov.solve(matrix, b, x, self.held)
+
+    def set_up_multigrid(self, preconditioner: PETSc.PC, matrix: PETSc.Mat) -> None:
+        """Make a preconditioner a cycle of multigrid for the tangent (collective)."""
+        assert self.krylov is not None
+        assert self.krylov.multigrid is not None
+        self.krylov.multigrid.set_up(preconditioner, matrix, self.held)
 
     def _add(self, owned: Array) -> None:
         self.flow[: self.unknowns.owned] += owned
@@ -375,6 +384,7 @@ class Fluid:
             "room": Nodal(self.system.room(), self.grid.numbers[: self.grid.owned]),
             "steps": list(self.history.steps),
             "time": self._t,
+            "linear_solver": self.ladder.rung,
             "motion": {body.surface.name: {"x": m.x, "v": m.v} for body, m in self._moved()},
         }
 
@@ -393,6 +403,7 @@ class Fluid:
             for column, values in enumerate((self.velocity(), old_velocity))
         )
         self.history.steps, self._t = tuple(state["steps"]), state["time"]
+        self.ladder.rung = state["linear_solver"]
         self.difference = time.STEADY
         self.system.set_room(state["room"].values)
         self.cutter.begin_step()

@@ -1,0 +1,127 @@
+"""Iterative solution of the flow's linear systems, and what is tried when that stalls."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Literal
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from solvers import linear
+from solvers.fluid.multigrid import Multigrid
+from solvers.fluid.space import Unknowns
+
+Rung = Literal["multigrid", "ilu", "fill", "direct"]
+
+#: What the messages call it.
+WORDS: dict[Rung, str] = {
+    "multigrid": "multigrid",
+    "ilu": "incomplete factors",
+    "fill": "incomplete factors with more fill and overlap",
+    "direct": "the direct solver",
+}
+#: Memory [bytes] of the factors of a 3D flow with n unknowns, divided by n^(4/3): 490 measured for q1q1, 1,040 for q2q1.
+FACTORS = 1_100.0
+
+
+def rungs(method: Literal["direct", "multigrid", "ilu"], degree: int) -> tuple[Rung, ...]:
+    """Solvers from the usual one to the last resort. More fill takes minutes for velocities of second degree."""
+    if method == "direct":
+        return ("direct",)
+    return (method, "direct") if degree > 1 else (method, "fill", "direct")
+
+
+class Ladder:
+    """Which of several solvers is in use, and which comes next where that fails. Its `rung` is part of the state."""
+
+    def __init__(self, comm: MPI.Comm, rungs: Sequence[Rung], dofs: int, say: Callable[[str], None]):
+        self.comm, self.rungs, self._dofs, self._say = comm, rungs, dofs, say
+        self.rung = 0
+
+    @property
+    def here(self) -> Rung:
+        return self.rungs[self.rung]
+
+    def climb(self, failure: linear.LinearSolveFailed) -> None:
+        """Take the next solver from now on. Raises LinearSolveFailed if there is none (collective)."""
+        if failure.singular or self.rung == len(self.rungs) - 1:
+            raise failure
+        need, there = FACTORS * self._dofs ** (4.0 / 3.0), free_memory(self.comm)
+        if self.rungs[self.rung + 1] == "direct" and need > there:
+            raise linear.LinearSolveFailed(
+                f"{failure} with {WORDS[self.here]}, and the direct solver would need about {need / 1e9:.3g} GB of the "
+                f"{there / 1e9:.3g} GB that are free; take cells that grow less from one to the next, "
+                f"'element: q1q1', or a larger 'solver.linear.tolerance'"
+            ) from failure
+        before = WORDS[self.here]
+        self.rung += 1
+        self._say(f"{failure} with {before}: {WORDS[self.here]} from here on ('solver.linear.method' chooses)")
+
+
+def free_memory(comm: MPI.Comm) -> float:
+    """Bytes that are free where there is least (collective)."""
+    return float(comm.allreduce(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"), op=MPI.MIN))
+
+
+class FlowKrylov:
+    """Krylov method preconditioned with an earlier matrix of the step, as long as that serves.
+
+    Nothing but the rung of the ladder is kept from step to step, so that resumed runs are the same.
+    """
+
+    def __init__(self, unknowns: Unknowns, ladder: Ladder, tolerance: float):
+        self.ladder, self._unknowns, self._tolerance = ladder, unknowns, tolerance
+        self.multigrid = Multigrid(ladder.comm, unknowns) if "multigrid" in ladder.rungs else None
+        self._ksp: PETSc.KSP | None = None
+        self._fresh = 0  #: iterations with the matrix that the preconditioner is made of
+
+    def begin_step(self) -> None:
+        """The next matrix is one of another step."""
+        self._ksp = None
+
+    def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, held: NDArray[np.bool_]) -> int:
+        """Solve matrix x = b; how many iterations that took. Raises LinearSolveFailed.
+
+        held: owned unknowns whose rows are those of the identity.
+        """
+        if self._ksp is not None:
+            try:
+                linear.solve(self._ksp, matrix, b, x)
+            except linear.LinearSolveFailed:
+                self._ksp = None
+            else:
+                iterations = int(self._ksp.getIterationNumber())
+                if iterations > 2 * self._fresh:
+                    self._ksp = None
+                return iterations
+        while True:
+            try:
+                return self._solve_anew(matrix, b, x, held)
+            except linear.LinearSolveFailed as failure:
+                self.ladder.climb(failure)
+
+    def _solve_anew(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, held: NDArray[np.bool_]) -> int:
+        x.set(0.0)
+        ksp = self._create(matrix, held)
+        linear.solve(ksp, matrix, b, x)
+        self._fresh = int(ksp.getIterationNumber())
+        if self.ladder.here != "direct":
+            ksp.getPC().setReusePreconditioner(True)
+            self._ksp = ksp
+        return self._fresh
+
+    def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> PETSc.KSP:
+        comm, rung = self.ladder.comm, self.ladder.here
+        if rung == "direct":
+            return linear.direct_solver(comm, dim=3, dofs=self._unknowns.size(), symmetric=False)
+        if rung != "multigrid":
+            return linear.flow_solver(comm, tolerance=self._tolerance, fill=rung == "fill")
+        assert self.multigrid is not None
+        ksp = linear.flexible_solver(comm, tolerance=self._tolerance)
+        ksp.setOperators(matrix)
+        self.multigrid.set_up(ksp.getPC(), matrix, held)
+        return ksp

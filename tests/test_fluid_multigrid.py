@@ -1,0 +1,160 @@
+"""Multigrid for flows: what direct solvers give, in a few iterations whatever the size, the cut and the stretching."""
+
+import itertools
+
+import numpy as np
+import pytest
+from fluid_setup import body, field, make_fluid, sphere, wall
+from mpi4py import MPI
+
+from solvers.fluid import krylov
+from solvers.fluid.field import SolverSettings
+from solvers.fluid.grid import Grid, uniform
+from solvers.fluid.krylov import Ladder, rungs
+from solvers.fluid.multigrid import Lattice, coarsen, finest, interpolation
+from solvers.linear import LinearSolveFailed
+from solvers.newton import Tolerance
+
+
+def test_short_cells_are_joined_first():
+    """Cells of 4 x 1: two across become one, then two more, then both ways; planes of coarse lattices are fine ones."""
+    lattice = Lattice((np.linspace(0, 16, 5), np.linspace(0, 16, 17)), ())
+    shapes = []
+    while not lattice.smallest:
+        coarse = lattice.coarser()
+        assert all(np.isin(some, every).all() for some, every in zip(coarse.planes, lattice.planes, strict=True))
+        shapes.append(tuple(len(some) - 1 for some in coarse.planes))
+        lattice = coarse
+    assert shapes == [(4, 8), (4, 4), (2, 2), (1, 1)]
+
+
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_interpolation_of_linear_fields_is_exact(element):
+    """On a stretched grid, on all levels; components stay apart."""
+    edges = tuple(np.cumsum([0.0, *np.geomspace(1.0, ratio, 16)]) for ratio in (1.0, 8.0))
+    fluid = make_fluid(
+        Grid(edges), [wall(field(1, 0))], solver=SolverSettings(linear="iterative"), scheme="steady",
+        convection=False, element=element,
+    )  # fmt: skip
+    levels = [finest(fluid.unknowns), *fluid.krylov.multigrid._levels[1:]]
+    lattices = [levels[-1].components[-1].lattice.coarser()] * 3
+    levels.append(coarsen(MPI.COMM_SELF, levels[-1], lattices))
+    for fine, coarse in itertools.pairwise(levels):
+        P = interpolation(MPI.COMM_SELF, fine, coarse)
+        x, y = P.createVecs()
+        x.array[:], expected = linear_field(coarse), linear_field(fine)
+        P.mult(x, y)
+        assert np.abs(y.array - expected).max() < 1e-12 * np.abs(expected).max()
+
+
+def linear_field(level):
+    values = np.zeros(level.owned)
+    for number, component in enumerate(level.components):
+        x = [some[i] for some, i in zip(component.lattice.planes, component.nodes.T, strict=True)]
+        values[component.dofs - level.start] = number + 2.0 * x[0] - 0.3 * (1 + number) * x[1]
+    return values
+
+
+def around_a_ball(grid, method, element="q1q1"):
+    """The first linear system of Stokes flow around a ball: (its solution, iterations)."""
+    points, facets = sphere((0.07, 0.03, -0.05), 1.0, 2)
+    solver = SolverSettings(Tolerance(1e-6), linear=method, linear_tolerance=1e-8)
+    fluid = make_fluid(
+        grid, [wall(field(1, 0, 0))], [body("ball", points, facets)], solver=solver, scheme="steady",
+        convection=False, element=element,
+    )  # fmt: skip
+    fluid.begin_step(0.0, 1.0)
+    fluid.residual()
+    fluid.advance()
+    return fluid.flow.copy(), fluid.linear_iterations
+
+
+def stretched(fine, coarse, ratio):
+    """A cube of cells around the ball that grow outwards to `ratio` times their length."""
+    steps = np.geomspace(1.0, ratio, coarse)
+    outer = 1.4 + 10.0 * np.cumsum(steps) / steps.sum()
+    edge = np.concatenate([-outer[::-1], np.linspace(-1.4, 1.4, fine + 1), outer])
+    return Grid((edge,) * 3)
+
+
+def test_stretched_cells_take_few_iterations():
+    """Cells of aspect 20, where incomplete factors need three times as many, and the solution of the direct solver."""
+    grid = stretched(6, 3, 20.0)
+    flow, iterations = around_a_ball(grid, "iterative")
+    exact, _ = around_a_ball(grid, "direct")
+    assert np.abs(flow - exact).max() < 1e-5 * np.abs(exact).max()
+    assert iterations <= 15
+
+
+def test_iterations_do_not_grow():
+    """From 5,000 to 20,000 unknowns."""
+    counts = [around_a_ball(uniform([-2.0] * 3, [2.0] * 3, [n] * 3), "iterative")[1] for n in (10, 16)]
+    assert max(counts) <= 10
+    assert counts[1] <= counts[0] + 2
+
+
+@pytest.mark.slow
+def test_second_degree_on_stretched_cells():
+    """The case on which incomplete factors stalled (76,542 unknowns), here with 29,000."""
+    _, iterations = around_a_ball(stretched(4, 3, 20.0), "iterative", "q2q1")
+    assert iterations <= 30
+
+
+# ------------------------------------------------------------------------------------------------------- the ladder
+
+
+def test_what_stalls_is_followed_by_what_does_not(monkeypatch):
+    said = []
+    ladder = Ladder(MPI.COMM_SELF, rungs("multigrid", 1), 1000, said.append)
+    stalled = LinearSolveFailed("the linear solver stalled after 200 iterations (PETSc reason -3)")
+    ladder.climb(stalled)
+    assert ladder.here == "fill"
+    ladder.climb(stalled)
+    assert ladder.here == "direct"
+    assert said[1] == (
+        "the linear solver stalled after 200 iterations (PETSc reason -3) with incomplete factors with more fill and "
+        "overlap: the direct solver from here on ('solver.linear.method' chooses)"
+    )
+    with pytest.raises(LinearSolveFailed, match="stalled"):
+        ladder.climb(stalled)
+
+
+def test_the_direct_solver_needs_memory(monkeypatch):
+    monkeypatch.setattr(krylov, "free_memory", lambda comm: 1e9)
+    ladder = Ladder(MPI.COMM_SELF, rungs("multigrid", 2), 10**6, print)
+    with pytest.raises(LinearSolveFailed, match=r"would need about 110 GB of the 1 GB .* 'solver.linear.tolerance'"):
+        ladder.climb(LinearSolveFailed("the linear solver stalled"))
+    assert ladder.here == "multigrid"
+
+
+def test_a_singular_system_stays_singular():
+    ladder = Ladder(MPI.COMM_SELF, rungs("multigrid", 1), 1000, print)
+    with pytest.raises(LinearSolveFailed, match="singular"):
+        ladder.climb(LinearSolveFailed("the linear system is singular", singular=True))
+    assert ladder.here == "multigrid"
+
+
+def test_a_stalled_solver_is_replaced_within_the_solve(monkeypatch):
+    """One iteration is not enough for multigrid: the flow is solved all the same, and a note says how."""
+    monkeypatch.setattr(krylov.linear, "flexible_solver", impatient(krylov.linear.flexible_solver))
+    points, facets = sphere((0.07, 0.03, -0.05), 1.0, 2)
+    solver = SolverSettings(Tolerance(1e-6), linear="iterative")
+    fluid = make_fluid(
+        uniform([-2.0] * 3, [2.0] * 3, [10] * 3), [wall(field(1, 0, 0))], [body("ball", points, facets)],
+        solver=solver, scheme="steady", convection=False,
+    )  # fmt: skip
+    fluid.begin_step(0.0, 1.0)
+    info = fluid.solve()
+    assert info.residuals[-1] < 1e-6 * info.residuals[0]
+    assert len(info.notes) == 1
+    assert "stalled after 1 iterations" in info.notes[0]
+    assert fluid.save()["linear_solver"] == 1
+
+
+def impatient(create):
+    def flexible_solver(comm, *, tolerance):
+        ksp = create(comm, tolerance=tolerance)
+        ksp.setTolerances(max_it=1)
+        return ksp
+
+    return flexible_solver
