@@ -88,15 +88,24 @@ def _multigrid(comm) -> PETSc.PC:
     return preconditioner
 
 
-def choose_flow(method: Method, dim: int, dofs: int) -> Literal["direct", "multigrid", "ilu"]:
-    """The method for a flow of this size."""
-    if method == "auto":
-        return "direct" if dofs <= FLOW_DIRECT_LIMIT[dim] else "multigrid"
-    return "multigrid" if method == "iterative" else method
+def choose_flow(
+    method: Method, dim: int, dofs: int, *, degree: int = 1, steady: bool = True
+) -> Literal["direct", "multigrid", "ilu"]:
+    """The method for a flow of this size, by the degree of its velocity."""
+    if method != "auto":
+        return "multigrid" if method == "iterative" else method
+    if dofs <= FLOW_DIRECT_LIMIT[dim]:
+        return "direct"
+    return "multigrid" if steady or dofs > FLOW_INCOMPLETE_LIMIT[degree] else "ilu"
 
 
 #: Unknowns of a flow above which the iterative solver is taken. Measured: in 3D it is 4 times faster at 8,000 already.
 FLOW_DIRECT_LIMIT = {2: 400_000, 3: 4_000}
+
+#: Unknowns of a flow in time above which multigrid takes less time than incomplete factors, by degree. Measured per
+#: step, all included: `channel` takes as long with either at 98,000; q2q1 1.4 s instead of 2.8 s at 15,000, but 9.4 s
+#: instead of 5.6 s at 49,000; `torus_wall` (16,200, coupled) 0.95 s instead of 1.5 s.
+FLOW_INCOMPLETE_LIMIT = {1: 100_000, 2: 25_000}
 
 
 def flow_solver(comm, *, tolerance: float, fill: bool = False) -> PETSc.KSP:

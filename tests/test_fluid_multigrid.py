@@ -1,12 +1,16 @@
 """Multigrid for flows: what direct solvers give, in a few iterations whatever the size, the cut and the stretching."""
 
 import itertools
+import json
 
 import numpy as np
 import pytest
 from fluid_setup import body, field, make_fluid, sphere, wall
 from mpi4py import MPI
 
+from fsci.case import load_case
+from fsci.run import FAILED, run_case
+from solvers import linear
 from solvers.fluid import krylov
 from solvers.fluid.field import SolverSettings
 from solvers.fluid.grid import Grid, uniform
@@ -119,6 +123,15 @@ def test_what_stalls_is_followed_by_what_does_not(monkeypatch):
         ladder.climb(stalled)
 
 
+def test_method_is_chosen_by_size():
+    """Incomplete factors where they are cheaper: in time steps of small flows."""
+    assert linear.choose_flow("auto", 3, 20_000, degree=1, steady=False) == "ilu"
+    assert linear.choose_flow("auto", 3, 200_000, degree=1, steady=False) == "multigrid"
+    assert linear.choose_flow("auto", 3, 20_000, degree=1, steady=True) == "multigrid"
+    assert linear.choose_flow("iterative", 3, 10, degree=1, steady=False) == "multigrid"
+    assert rungs("ilu", 1)[1] == "multigrid"
+
+
 def test_the_direct_solver_needs_memory(monkeypatch):
     monkeypatch.setattr(krylov, "free_memory", lambda comm: 1e9)
     ladder = Ladder(MPI.COMM_SELF, rungs("multigrid", 2), 10**6, print)
@@ -158,3 +171,23 @@ def impatient(create):
         return ksp
 
     return flexible_solver
+
+
+def test_a_steady_flow_is_not_repeated(tmp_path):
+    """Half the step would be the same problem: one failure ends the run."""
+    (tmp_path / "case.yaml").write_text(
+        """
+time: {step: 1, end: 1}
+fluid:
+  density: 1
+  viscosity: 0.1
+  scheme: steady
+  grid: {from: [0, 0], to: [1, 1], cells: [4, 4]}
+  patches:
+    lid: {on: y+, velocity: [1, 0]}
+    walls: {on: [x-, x+, y-], no_slip: true}
+solver: {newton: {max_iterations: 1, residual: 1.0e-12}}
+"""
+    )
+    assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") == FAILED
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["steps"] == {"accepted": 0, "retried": 0}

@@ -23,7 +23,7 @@ class Linear(Section):
 
     method: Literal["auto", "direct", "iterative", "ilu"] = setting(
         "auto",
-        "auto takes direct in 2D and for small systems, else iterative; ilu: incomplete factors, for solids in motion",
+        "direct, iterative (multigrid), ilu (incomplete factors); auto: direct in 2D and for small systems",
     )
     tolerance: Positive = setting(1e-8, "residual of iterative solvers, relative to the first", unit="1")
 

@@ -72,7 +72,8 @@ class Fluid:
         self.dim = grid.dim
         self.unknowns = Unknowns(self.grid, settings.degree, periodic_axes(patches))
         self.boundary = Boundary(self.grid, self.unknowns, patches)
-        method = linear.choose_flow(solver.linear, self.dim, self.dofs())
+        degree, steady = settings.degree, settings.steady
+        method = linear.choose_flow(solver.linear, self.dim, self.dofs(), degree=degree, steady=steady)
         self.system = FlowSystem(
             self.grid,
             settings,
@@ -309,7 +310,6 @@ class Fluid:
     def set_up_multigrid(self, preconditioner: PETSc.PC, matrix: PETSc.Mat) -> None:
         """Make a preconditioner a cycle of multigrid for the tangent (collective)."""
         assert self.krylov is not None
-        assert self.krylov.multigrid is not None
         self.krylov.multigrid.set_up(preconditioner, matrix, self.held)
 
     def _add(self, owned: Array) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -24,15 +25,17 @@ WORDS: dict[Rung, str] = {
     "fill": "incomplete factors with more fill and overlap",
     "direct": "the direct solver",
 }
-#: Memory [bytes] of the factors of a 3D flow with n unknowns, divided by n^(4/3): 490 measured for q1q1, 1,040 for q2q1.
+#: Memory [bytes] of the factors of a 3D flow with n unknowns over n^(4/3): 490 measured for q1q1, 1,040 for q2q1.
 FACTORS = 1_100.0
 
 
 def rungs(method: Literal["direct", "multigrid", "ilu"], degree: int) -> tuple[Rung, ...]:
     """Solvers from the usual one to the last resort. More fill takes minutes for velocities of second degree."""
+    if method == "ilu":
+        return ("ilu", "multigrid", "direct")
     if method == "direct":
         return ("direct",)
-    return (method, "direct") if degree > 1 else (method, "fill", "direct")
+    return ("multigrid", "direct") if degree > 1 else ("multigrid", "fill", "direct")
 
 
 class Ladder:
@@ -75,9 +78,13 @@ class FlowKrylov:
 
     def __init__(self, unknowns: Unknowns, ladder: Ladder, tolerance: float):
         self.ladder, self._unknowns, self._tolerance = ladder, unknowns, tolerance
-        self.multigrid = Multigrid(ladder.comm, unknowns) if "multigrid" in ladder.rungs else None
         self._ksp: PETSc.KSP | None = None
         self._fresh = 0  #: iterations with the matrix that the preconditioner is made of
+
+    @cached_property
+    def multigrid(self) -> Multigrid:
+        """The levels (collective)."""
+        return Multigrid(self.ladder.comm, self._unknowns)
 
     def begin_step(self) -> None:
         """The next matrix is one of another step."""
@@ -120,7 +127,6 @@ class FlowKrylov:
             return linear.direct_solver(comm, dim=3, dofs=self._unknowns.size(), symmetric=False)
         if rung != "multigrid":
             return linear.flow_solver(comm, tolerance=self._tolerance, fill=rung == "fill")
-        assert self.multigrid is not None
         ksp = linear.flexible_solver(comm, tolerance=self._tolerance)
         ksp.setOperators(matrix)
         self.multigrid.set_up(ksp.getPC(), matrix, held)

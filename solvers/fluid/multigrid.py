@@ -215,7 +215,7 @@ class Multigrid:
         preconditioner.setReusePreconditioner(True)
 
     def _smooth(self, smoother: PETSc.KSP, matrix: PETSc.Mat, level: Level) -> None:
-        """Incomplete factors of each process' part, with a layer of its neighbours': without, it takes twice as long."""
+        """Incomplete factors by process, with a layer of its neighbours: without that it takes twice as long."""
         prefix = "flow_second_" if self._second else "flow_first_"
         PETSc.Options(prefix)["sub_pc_type"] = "ilu"
         smoother.setOptionsPrefix(prefix)
