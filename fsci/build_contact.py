@@ -9,9 +9,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fsci.case import Case, CaseError
+from fsci.case.contact import Pair as PairSettings
 from fsci.case_meshes import read_obstacle
 from solvers.blocks import Layout
 from solvers.contact.contact import Contact
+from solvers.contact.law.coulomb import Coulomb
+from solvers.contact.law.frictionless import Frictionless
+from solvers.contact.law.law import Law
+from solvers.contact.law.tresca import Tresca
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
 from solvers.mesh import Mesh
@@ -35,10 +40,18 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
             elif key not in found:
                 found[key] = surface_of_body(comm, layout, bodies, side.body or "", *(side.on or ()))
             sides.append(found[key])
-        pairs.append(Pair(sides[0], sides[1], settings.integration))
+        pairs.append(Pair(sides[0], sides[1], settings.integration, _law(settings)))
     assert case.structure is not None
     moves = case.structure.dynamics is not None
     return Contact(comm, pairs, names=tuple(case.contact.pairs), c_n=case.contact.c_n, keep_overlap=moves)
+
+
+def _law(settings: PairSettings) -> Law:
+    if settings.friction.coefficient is not None:
+        return Coulomb(settings.friction.coefficient)
+    if settings.friction.bound is not None:
+        return Tresca(settings.friction.bound)
+    return Frictionless()
 
 
 def surface_of_body(comm: MPI.Comm, layout: Layout, bodies: Sequence[Body], body_name: str, *names: str) -> Surface:

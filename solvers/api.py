@@ -105,6 +105,15 @@ class Constraint(Stateful, Protocol):
 
     def begin_step(self) -> None: ...
 
+    def end_step(self, weight: float) -> None:
+        """Accept the step; weight: of the new force in the balance."""
+        ...
+
+    @property
+    def friction_work(self) -> float:
+        """What friction has dissipated so far [J]."""
+        ...
+
     def evaluate(self, u: Array, t: float) -> None:
         """Everything at the displacements of the present iterate."""
         ...

@@ -14,6 +14,8 @@ from fsci.build_contact import surface_of_body
 from solvers import fem
 from solvers.blocks import Layout
 from solvers.contact.contact import Contact
+from solvers.contact.law.frictionless import Frictionless
+from solvers.contact.law.law import Law
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
 from solvers.mesh import Mesh
@@ -38,6 +40,7 @@ def make_contact(
     time=None,
     settings: SolverSettings = SETTINGS,
     c_n: float = 1.0,
+    law: Law = Frictionless(),
 ) -> tuple[Structure, Contact]:
     """Each pair is slave and master: (body, surface), or a rigid surface."""
     layout = Layout(MPI.COMM_SELF, [body.size for body in bodies])
@@ -50,7 +53,7 @@ def make_contact(
             found[of] = surface_of_body(MPI.COMM_SELF, layout, bodies, *of)
         return found[of]
 
-    contact = Contact(MPI.COMM_SELF, [Pair(side(slave), side(master)) for slave, master in pairs], c_n=c_n)
+    contact = Contact(MPI.COMM_SELF, [Pair(side(slave), side(master), law=law) for slave, master in pairs], c_n=c_n)
     return Structure(MPI.COMM_SELF, bodies, time or Statics(), settings, constraint=contact), contact
 
 

@@ -26,7 +26,17 @@ def update(active_set, pressure, gap, covered=ALL, c=ONE):
     z, one = np.array(pressure, dtype=float)[:, None] * up, np.ones(size)
     gap = np.array(gap, dtype=float)
     point = Point(
-        z=z, normals=up, D=one, gap=gap, covered=covered, stiffness=one, c=c * active_set.damping, touching=0.0
+        z=z,
+        normals=up,
+        D=one,
+        gap=gap,
+        covered=covered,
+        stiffness=one,
+        c_n=c * active_set.damping,
+        c_t=one,
+        touching=0.0,
+        slip=0.0 * z,
+        slip_known=covered,
     )
     active_set.choose(Frictionless().status(point))
     return active_set.active.tolist()

@@ -8,7 +8,7 @@ from pydantic import model_validator
 
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Name, Positive, Surfaces, Switch, Vector
+from fsci.case.values import Name, NotNegative, Positive, Surfaces, Switch, Vector
 
 
 class Side(Section):
@@ -29,6 +29,19 @@ class Side(Section):
         return self
 
 
+class Friction(Section):
+    """Coulomb's law by a coefficient, or Tresca's by a bound."""
+
+    coefficient: NotNegative | None = setting(None, "largest traction along the surface over the pressure", unit="1")
+    bound: Positive | None = setting(None, "largest traction along the surface, whatever the pressure", unit="Pa")
+
+    @model_validator(mode="after")
+    def _one_law(self) -> Friction:
+        if self.coefficient is not None and self.bound is not None:
+            raise fault("give either 'coefficient' or 'bound'", "bound")
+        return self
+
+
 class Pair(Section):
     """Two surfaces that may touch; the slave should be the finer or softer one."""
 
@@ -37,6 +50,8 @@ class Pair(Section):
     integration: Literal["segments", "elements"] = setting(
         "segments", "segments: exact where facets overlap; elements: faster, fixed points on slave facets"
     )
+
+    friction: Friction = setting(Friction, "resistance against sliding; default: none")
 
     @model_validator(mode="after")
     def _deformable_slave(self) -> Pair:
@@ -54,7 +69,7 @@ class Obstacle(Section):
 
 
 class Contact(Section):
-    """Frictionless contact by dual mortar multipliers."""
+    """Contact by dual mortar multipliers."""
 
     pairs: dict[Name, Pair] = setting(..., "pairs of surfaces by name")
     obstacles: dict[Name, Obstacle] = setting(dict, "rigid surfaces by name")

@@ -11,16 +11,19 @@ from numpy.typing import NDArray
 
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
+from solvers.contact.blocked import find_blocked
 from solvers.contact.blocks import block_diagonal, components, expand
 from solvers.contact.condense import Condensed, Linearised, condense, recover
 from solvers.contact.directions import Directions, find_directions, free_normals
 from solvers.contact.distance import distances
+from solvers.contact.friction_work import FrictionWork
 from solvers.contact.interface import Interface, describe_interface
-from solvers.contact.law.law import OPEN, Law, Point, Slopes, Statuses
+from solvers.contact.law.law import OPEN, STICK, Law, Point, Slopes, Statuses, along
 from solvers.contact.lent import lent_shares
 from solvers.contact.mortar import KEEP_AFTER
 from solvers.contact.pair import Pair
 from solvers.contact.share import Shares
+from solvers.contact.slip import Sliding, Slip
 from solvers.contact.terms import Terms, find_normals, total_terms
 from solvers.rows import RowTransformation
 
@@ -74,6 +77,12 @@ class Contact:
         self._blocked = np.zeros(count, dtype=bool)
         self._lent: sp.csr_matrix | None = None
         self._shares = Shares(comm)
+        sliding = [law_multipliers for law, law_multipliers in self.interface.laws if law.slips]
+        touching = [m for m in self.interface.mortars if any(np.isin(m.patch.multipliers, s).all() for s in sliding)]
+        self._sliding = Sliding(touching, self.multipliers, self._shares, (self.size, self.dim))
+        self._slip: Slip | None = None  # at the latest evaluation
+        self._weight = 1.0  # of the new contact force in the balance
+        self.work = FrictionWork((count, self.dim))
         self.time = np.nan  #: of the latest evaluation [s]
         self.touched_at = np.full(len(self.pairs), np.inf)  #: when each pair first touched [s], as probes have noted it
         self.terms: Terms | None = None
@@ -86,23 +95,8 @@ class Contact:
         self._stiffness = np.divide(at_node, areas, out=np.zeros_like(areas), where=areas > 0.0)
         self.x = self.positions(u, t)
         self._x_old = self.x.copy()
-        self._blocked = self._find_blocked()
+        self._blocked = find_blocked(self.interface, self.x)
         self._lent = lent_shares([p.multipliers[p.facets] for p in self.multipliers.patches], self._blocked)
-
-    def _find_blocked(self) -> NDArray[np.bool_]:
-        """Multipliers that supports (or an earlier one in all directions) leave no direction to act in."""
-        node, held, slaves = self.multipliers.node, self.nodes.held, self.multipliers.areas > 0.0
-        if not held[node[slaves]].any() and self.multipliers.alone.all():
-            return np.zeros(len(node), dtype=bool)
-        normals = find_normals(self.multipliers, self.x).values
-        blocked = slaves & self.nodes.fixed[node]
-        own = np.arange(len(node))  # as if every multiplier had its node for itself
-        feels = np.abs(free_normals(normals, own, held[node])).max(axis=1) > 0.0
-        whole = slaves & (self.interface.spans == "space")
-        first = np.zeros(len(node), dtype=bool)
-        first[np.flatnonzero(whole)[np.unique(node[whole], return_index=True)[1]]] = True
-        blocked |= slaves & ~whole & ~feels
-        return blocked | (slaves & np.isin(node, node[whole]) & ~first)
 
     def positions(self, u: Array, t: float) -> Array:
         """Current positions [m] of all nodes from the displacements of the deformable ones, shape (N, dim)."""
@@ -123,6 +117,26 @@ class Contact:
         self._shares.begin_step()
         for mortar in self.interface.mortars:
             mortar.begin_step()
+        self._sliding.begin_step(self.x, self._with_lent)
+        self._slip = None
+
+    def end_step(self, weight: float) -> None:
+        """Accept the step; weight: of the new contact force in the balance."""
+        self.work.end_step(weight, *self._force_and_slip())
+        self._slip = None
+
+    @property
+    def friction_work(self) -> float:
+        """What friction has dissipated so far [J]."""
+        return self.work.total
+
+    def _force_and_slip(self) -> tuple[Array, Array]:
+        """Along the surface: force [N] of the multipliers in contact, and their slip in this step [m]."""
+        if self.terms is None or self._slip is None:
+            return np.zeros_like(self.z), np.zeros_like(self.z)
+        tangent = along(self.terms.normals) * self.active_set.active[:, None, None]
+        slip = np.einsum("nij,nj->ni", tangent, self._slip.values)
+        return self.terms.D[:, None] * np.einsum("nij,nj->ni", tangent, self.z), slip
 
     def evaluate(self, u: Array, t: float) -> None:
         """Mortar terms and active set at the displacements u, shape (N, dim), of the present iterate."""
@@ -142,7 +156,7 @@ class Contact:
     def _point(self, which: NDArray[np.int64]) -> Point:
         """What a law is told of its multipliers."""
         assert self.terms is not None
-        stiffness = self._stiffness[which]
+        stiffness, slip = self._stiffness[which], self._slip
         return Point(
             z=self.z[which],
             normals=self.terms.normals[which],
@@ -150,7 +164,10 @@ class Contact:
             gap=(self._gap - self._overlap)[which],
             covered=self._covers[which],
             stiffness=stiffness,
-            c=self.c_n * self.active_set.damping * stiffness,
+            slip=np.zeros((len(which), self.dim)) if slip is None else slip.values[which],
+            slip_known=np.zeros(len(which), dtype=bool) if slip is None else slip.known[which],
+            c_n=self.c_n * self.active_set.damping * stiffness,
+            c_t=self.c_n * self.active_set.damping * stiffness,
             touching=self._touching,
         )
 
@@ -188,19 +205,22 @@ class Contact:
         if all(len(facet_pairs) == 0 for facet_pairs, _ in near):
             return None
         normals = find_normals(self.multipliers, self.x)
-        patches = self.multipliers.patches
         pieces, met = [], False
         for index, (mortar, (facet_pairs, motion)) in enumerate(zip(self.interface.mortars, near, strict=True)):
             if len(facet_pairs) == 0:
                 continue
-            at = normals.of_patch[next(k for k, patch in enumerate(patches) if patch is mortar.patch)]
+            at = normals.at(self.multipliers, mortar.patch)
             mine = self._shares.mine(index, facet_pairs, len(mortar.facets))
             found = mortar.evaluate(self.x, *at, mine, motion, self.z[mortar.patch.multipliers])
             mortar.keep(self._shares.together(found.used))
             met |= bool(self._shares.combine(index, found.area).any())
             pieces.append((mortar, found))
-        sizes = len(self.pairs), len(self.z), self.size
-        return total_terms(pieces, normals, self._shares, sizes) if met else None
+        if not met:
+            return None
+        if self._sliding.mortars:
+            used = [(mortar, found.used) for mortar, found in pieces]
+            self._slip = self._sliding.evaluate(self.x, normals, used, self._with_lent)
+        return total_terms(pieces, normals, self._shares, (len(self.pairs), len(self.z), self.size))
 
     # ------------------------------------------------------------------------------------- what the balance needs
 
@@ -219,6 +239,7 @@ class Contact:
 
     def violation(self, weight: float) -> float:
         """Norm [N] of what the multipliers in contact miss of their laws."""
+        self._weight = weight
         if self.terms is None:
             return 0.0
         missed = [
@@ -297,7 +318,9 @@ class Contact:
         dgap = self._with_lent(self.terms.dgap)
         by_z, by_u, residual = [], [sp.csr_matrix((0, n))], [np.zeros(0)]
         for law, which in self._in_contact():
-            slopes = Slopes(gap=dgap[which], normals=self.terms.dnormals[components(which, self.dim)])
+            rows_of = components(which, self.dim)
+            slip = sp.csr_matrix((len(rows_of), n)) if self._slip is None else self._slip.slopes[rows_of]
+            slopes = Slopes(gap=dgap[which], normals=self.terms.dnormals[rows_of], slip=slip)
             rows = law.rows(self._point(which), slopes, self.active_set.status[which], weight)
             by_z.append(block_diagonal(rows.by_z))
             by_u.append(rows.by_u)
@@ -335,6 +358,9 @@ class Contact:
             "contact.active": float(len(np.unique(self.multipliers.node[self.active_set.active]))),
             "contact.changes": float(self.active_set.changes),
         }
+        if self._sliding.mortars:
+            found["contact.sticking"] = float(np.sum(self.active_set.status == STICK))
+            found["contact.friction"] = self.work.total + self.work.of_step(self._weight, *self._force_and_slip())
         for index, name in enumerate(self.names):
             for axis, force in zip("xyz", self.resultant(index), strict=False):
                 found[f"contact.{name}.{axis}"] = float(force)
@@ -364,6 +390,7 @@ class Contact:
             "gap": self._gap.copy(),
             "status": self.active_set.status.copy(),
             "touched_at": self.touched_at.copy(),
+            "work": self.work.save(),
         }
 
     def restore(self, state: State) -> None:
@@ -372,3 +399,4 @@ class Contact:
         self._gap = state["gap"].copy()
         self.active_set.status = state["status"].copy()
         self.touched_at[:] = state["touched_at"]
+        self.work.restore(state["work"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,7 +14,7 @@ from solvers.api import Array
 from solvers.contact.patch import Patch
 from solvers.contact.search import Search
 from solvers.contact.surface import KERNEL_TYPES, Surface
-from solvers.kernels import mortar
+from solvers.kernels import MortarResult, mortar
 
 #: Slave facets take part when a master is nearer than this share of the longest edge (and the motion of the step).
 NEAR = 0.3
@@ -127,29 +127,10 @@ class Mortar:
         """All terms at the positions x [m] of all nodes; normals and multipliers z [Pa] are those of the patch."""
         slave, master = self.patch.nodes, self.masters.nodes
         ns, nm, dim = len(slave), len(master), x.shape[1]
-        result = mortar(
-            np.ascontiguousarray(x[slave]),
-            self.facets,
-            self._types[0],
-            np.ascontiguousarray(x[master]),
-            self.masters.facets,
-            self._types[1],
-            normals,
-            facet_pairs,
-            np.ascontiguousarray(z),
-            method=self.integration,
-            reach=self._edge + motion,
-            near=NEAR * self._edge + motion,
-            kept=np.isin(self._codes(facet_pairs), self._kept).astype(np.uint8),
-        )
+        kept = np.isin(self._codes(facet_pairs), self._kept).astype(np.uint8)
+        result = self._kernel(x, normals, facet_pairs, z=np.ascontiguousarray(z), kept=kept, **self._reach(motion))
         columns = dim * (ns + nm)
-
-        def total(direct, by_normals, rows) -> sp.csr_matrix:
-            derivative = sp.csr_matrix(direct, shape=(rows, columns))
-            through = sp.csr_matrix(by_normals, shape=(rows, dim * ns)) @ dnormals
-            return derivative + _widen(through, columns) if through.nnz else derivative
-
-        dforce = total(result.dforce, result.dforce_dn, columns)
+        dforce = self._total(result.dforce, result.dforce_dn, dnormals, columns, columns)
         if self._types[0] == "tri6":
             back = sp.kron(self.patch.basis()[1].T, sp.identity(dim))
             dforce = (sp.block_diag([back, sp.identity(dim * nm)]) @ dforce).tocsr()
@@ -157,11 +138,48 @@ class Mortar:
             D=result.D,
             M=sp.csr_matrix(result.M, shape=(ns, nm)),
             gap=result.gap,
-            dgap=total(result.dgap, result.dgap_dn, ns),
+            dgap=self._total(result.dgap, result.dgap_dn, dnormals, ns, columns),
             dforce=dforce,
             area=result.area,
             used=facet_pairs[result.used.astype(bool)],
         )
+
+    def _kernel(self, x: Array, normals: Array, facet_pairs: NDArray[np.int32], **settings: Any) -> MortarResult:
+        slave, master = (np.ascontiguousarray(x[nodes]) for nodes in (self.patch.nodes, self.masters.nodes))
+        surfaces = slave, self.facets, self._types[0], master, self.masters.facets, self._types[1]
+        return mortar(*surfaces, normals, facet_pairs, method=self.integration, **settings)
+
+    def _reach(self, motion: float) -> dict[str, float]:
+        return {"reach": self._edge + motion, "near": NEAR * self._edge + motion}
+
+    @staticmethod
+    def _total(direct, by_normals, dnormals: sp.csr_matrix, rows: int, columns: int) -> sp.csr_matrix:
+        """Derivative with respect to positions, directly and through the normals."""
+        derivative = sp.csr_matrix(direct, shape=(rows, columns))
+        through = sp.csr_matrix(by_normals, shape=(rows, dnormals.shape[0])) @ dnormals
+        return derivative + _widen(through, columns) if through.nnz else derivative
+
+    def begin(
+        self, x: Array, normals: Array, facet_pairs: NDArray[np.int32]
+    ) -> tuple[Array, sp.csr_matrix, sp.csr_matrix]:
+        """(D, W, M) at the beginning of a step. Facets count from farther away than for contact: they may come."""
+        slave, master = self.patch.nodes, self.masters.nodes
+        result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(self._edge))
+        W = sp.csr_matrix(result.W, shape=(len(slave), len(slave))) @ self.patch.basis()[1]
+        return result.D, W.tocsr(), sp.csr_matrix(result.M, shape=(len(slave), len(master)))
+
+    def gap_vectors(
+        self, x: Array, normals: Array, dnormals: sp.csr_matrix, used: NDArray[np.int32]
+    ) -> tuple[Array, list[sp.csr_matrix]]:
+        """int Phi (x_m - x_s), shape (ns, dim), over facet pairs that took part, and derivatives of each component."""
+        ns, nm, dim = len(self.patch.nodes), len(self.masters.nodes), x.shape[1]
+        values, slopes = np.zeros((ns, dim)), []
+        for axis in range(dim):
+            kept = np.ones(len(used), dtype=np.uint8)
+            result = self._kernel(x, normals, used, kept=kept, along=np.eye(dim)[axis])
+            values[:, axis] = result.gap
+            slopes.append(self._total(result.dgap, result.dgap_dn, dnormals, ns, dim * (ns + nm)))
+        return values, slopes
 
 
 def _widen(matrix: sp.csr_matrix, columns: int) -> sp.csr_matrix:

@@ -15,8 +15,10 @@ PartFields = dict[str, dict[str, tuple[NDArray[np.int64], Array]]]
 def surface_fields(contact: Contact) -> PartFields:
     """Results on slave surfaces.
 
-    contact_traction [Pa] acts on the slave, contact_pressure is its normal part, contact_gap [m] the mean gap. At a
-    node of several surfaces: the sum of the tractions, the largest pressure, the smallest gap.
+    contact_traction [Pa] acts on the slave, contact_pressure is its normal part, contact_gap [m] the mean gap,
+    contact_status 0 without contact, 1 in contact and free to slide, 2 sticking. With friction also the part of the
+    traction along the surface (contact_friction) and the slip of the latest step [m] (contact_slip). At a node of
+    several surfaces: the sum of the tractions, the largest pressure, the smallest gap.
     """
     z, gap = contact.z, contact.mean_gap()
     normals = np.zeros_like(z) if contact.terms is None else contact.terms.normals
@@ -24,8 +26,12 @@ def surface_fields(contact: Contact) -> PartFields:
         "contact_pressure": (np.einsum("nd,nd->n", z, normals), np.fmax),
         "contact_traction": (-z, np.add),
         "contact_gap": (gap, np.fmin),
-        "contact_active": (contact.active_set.active.astype(float), np.fmax),
+        "contact_status": (contact.active_set.status.astype(float), np.fmax),
     }
+    if any(law.slips for law, _ in contact.interface.laws):
+        pressure = np.einsum("nd,nd->n", z, normals)
+        values["contact_friction"] = (pressure[:, None] * normals - z, np.add)
+        values["contact_slip"] = (contact.work.slip, np.add)
     nodal = {name: _at_nodes(contact, array, join) for name, (array, join) in values.items()}
     found: PartFields = {}
     for surface, nodes in _slaves(contact):

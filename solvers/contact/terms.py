@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.contact.blocks import components
 from solvers.contact.mortar import Mortar, MortarTerms
-from solvers.contact.patch import Multipliers
+from solvers.contact.patch import Multipliers, Patch
 from solvers.contact.share import Shares
 
 
@@ -23,6 +23,10 @@ class Normals:
     values: Array  #: shape (C, dim)
     slopes: sp.csr_matrix  #: derivatives with respect to all nodes, shape (dim * C, dim * N)
     of_patch: tuple[tuple[Array, sp.csr_matrix], ...]  #: the same by patch, in its own numbers
+
+    def at(self, multipliers: Multipliers, patch: Patch) -> tuple[Array, sp.csr_matrix]:
+        """Those of a patch."""
+        return self.of_patch[next(k for k, other in enumerate(multipliers.patches) if other is patch)]
 
 
 @dataclass(frozen=True)

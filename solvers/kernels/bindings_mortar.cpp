@@ -24,6 +24,7 @@ namespace {
 using Reals = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Facets = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Flags = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Direction = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Pairs = nb::ndarray<const std::int32_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 void require(bool condition, const std::string& message) {
@@ -107,11 +108,11 @@ nb::object py_nodal_tangents(const Reals& normals) {
 }
 
 struct MortarResult {
-    nb::object D, gap, area, used, force, M, dD, dD_dn, dgap, dgap_dn, dforce, dforce_dn;
+    nb::object D, gap, area, used, force, M, W, dD, dD_dn, dgap, dgap_dn, dforce, dforce_dn;
 };
 
 template <int dim>
-MortarResult to_result(MortarSums<dim> sums, int n_slave, int n_master, bool derivatives, bool forces) {
+MortarResult to_result(MortarSums<dim> sums, int n_slave, int n_master, bool derivatives, bool forces, bool own) {
     const std::size_t pairs = sums.used.size(), nodes = sums.gap.size(), facets = sums.area.size(), dofs = sums.force.size();
     const int all = n_slave + n_master;
     auto sparse = [](const auto& blocks, int rows, int columns, bool wanted) -> nb::object {
@@ -129,6 +130,7 @@ MortarResult to_result(MortarSums<dim> sums, int n_slave, int n_master, bool der
             .used = to_numpy(std::move(sums.used), {pairs}),
             .force = to_numpy(std::move(sums.force), {dofs}),
             .M = sparse(sums.coupling, n_slave, n_master, true),
+            .W = sparse(sums.own_coupling, n_slave, n_slave, own),
             .dD = sparse(sums.d_diagonal, n_slave, all, derivatives),
             .dD_dn = sparse(sums.d_diagonal_normal, n_slave, n_slave, derivatives),
             .dgap = sparse(sums.d_gap, n_slave, all, derivatives),
@@ -140,11 +142,12 @@ MortarResult to_result(MortarSums<dim> sums, int n_slave, int n_master, bool der
 MortarResult py_mortar(const Reals& xs, const Facets& fs, const std::string& type_s, const Reals& xm, const Facets& fm,
                        const std::string& type_m, const Reals& normals, const Pairs& pairs,
                        const std::optional<Reals>& z, const std::string& method, bool derivatives, double reach, double near, double facing,
-                       const std::optional<Flags>& kept) {
+                       const std::optional<Flags>& kept, const std::optional<Direction>& along, bool own) {
     require(method == "segments" || method == "elements", "method must be 'segments' or 'elements'");
     require(xs.shape(1) == xm.shape(1), "slave and master must have the same dimension");
     require(pairs.shape(1) == 2, "pairs must have shape (p, 2)");
     require(!kept || kept->shape(0) == pairs.shape(0), "kept must have one entry for each pair");
+    require(!along || along->shape(0) == xs.shape(1), "along must have as many entries as there are dimensions");
     check_nodal("normals", normals, xs);
     if (z) check_nodal("z", *z, xs);
     const int dim = static_cast<int>(xs.shape(1));
@@ -158,7 +161,7 @@ MortarResult py_mortar(const Reals& xs, const Facets& fs, const std::string& typ
     }
     const MortarInput input{xs.data(), xm.data(), normals.data(), z ? z->data() : nullptr, fs.data(), fm.data(),
                             n_slave,   n_master,  pairs.data(),   pairs.shape(0),          method == "elements", reach, near, facing,
-                            kept ? kept->data() : nullptr};
+                            kept ? kept->data() : nullptr, along ? along->data() : nullptr};
     MortarResult result;
     dispatch(type_s, dim, [&](auto slave) {
         using Slave = decltype(slave);
@@ -175,7 +178,7 @@ MortarResult py_mortar(const Reals& xs, const Facets& fs, const std::string& typ
                     else
                         sum_facets<Slave, Master, false>(input, sums);
                 }
-                result = to_result(std::move(sums), n_slave, n_master, derivatives, z.has_value());
+                result = to_result(std::move(sums), n_slave, n_master, derivatives, z.has_value(), own);
             }
         });
     });
@@ -227,6 +230,7 @@ void bind_mortar(nb::module_& module) {
         .def_ro("used", &MortarResult::used, "which pairs took part, (p,) of 0 and 1")
         .def_ro("force", &MortarResult::force, "slave -D z, master M^T z, (dim*(ns + nm),); zero without z")
         .def_ro("M", &MortarResult::M, "coupling matrix, (ns, nm)")
+        .def_ro("W", &MortarResult::W, "integrals of multiplier functions times the slave's basis, (ns, ns): D but on slivers")
         .def_ro("dD", &MortarResult::dD, "derivative of D, (ns, dim*(ns + nm))")
         .def_ro("dD_dn", &MortarResult::dD_dn, "the same with respect to the nodal normals; empty in 3D")
         .def_ro("dgap", &MortarResult::dgap, "derivative of gap, (ns, dim*(ns + nm))")
@@ -248,7 +252,7 @@ void bind_mortar(nb::module_& module) {
     module.def("mortar", &py_mortar, "xs"_a, "fs"_a, "facet_type_s"_a, "xm"_a, "fm"_a, "facet_type_m"_a, "normals"_a,
                "pairs"_a, "z"_a = nb::none(), nb::kw_only(), "method"_a = "segments", "derivatives"_a = true,
                "reach"_a = std::numeric_limits<double>::infinity(), "near"_a = std::numeric_limits<double>::infinity(), "facing"_a = -0.2,
-               "kept"_a = nb::none(),
+               "kept"_a = nb::none(), "along"_a = nb::none(), "own"_a = false,
                "Mortar integrals between a slave and a master surface.\n\n"
                "xs (ns, dim), xm (nm, dim): current positions; fs, fm: facets, oriented outward, of types line2, line3 "
                "(2D), tri3, tri6, quad4, quad9 (3D), VTK node order; normals (ns, dim) of the slave; pairs (p, 2): "
@@ -256,5 +260,6 @@ void bind_mortar(nb::module_& module) {
                "z (ns, dim): multipliers for the force; method: 'segments' or 'elements' (fixed points on the slave "
                "facet); reach: facets farther apart than this do not see each other; near: slave facets to which no master is as near as "
                "this are left out; facing: facets see each other if the product of their unit normals is below; kept "
-               "(p,) of 0 and 1: pairs for which none of these three is asked.");
+               "(p,) of 0 and 1: pairs for which none of these three is asked; along (dim,): unit vector along which gaps are measured "
+               "instead of the normals; own: also compute W.");
 }

@@ -32,6 +32,7 @@ struct MortarInput {
     double near;    // slave facets with no master as near as this are left out
     double facing;  // facets see each other if the product of their normals is below
     const std::uint8_t* kept;  // pairs for which none of the three is asked; may be null
+    const double* along;       // fixed unit vector along which gaps are measured instead of the normals; may be null
 
     bool is_kept(std::size_t pair) const { return kept && kept[pair]; }
 };
@@ -44,7 +45,7 @@ template <int dim>
 struct MortarSums {
     std::vector<double> diagonal, gap, area, force;
     std::vector<std::uint8_t> used;  // of the pairs: it took part
-    BlockRows<1, 1> coupling;
+    BlockRows<1, 1> coupling, own_coupling;
     BlockRows<1, dim> d_diagonal, d_diagonal_normal, d_gap, d_gap_normal;
     BlockRows<dim, dim> d_force, d_force_normal;
 
@@ -113,6 +114,7 @@ class FacetAssembly {
         const int facet = in_.pairs[2 * first];
         gather(in_.slave_facets + std::size_t(facet) * n, in_.slave_x, slave_nodes_, slave_.x);
         gather(in_.slave_facets + std::size_t(facet) * n, in_.normals, slave_nodes_, slave_.normal);
+        slave_.along = in_.along;
         integrate(first, last);
         if (pairs_.empty()) return;
 
@@ -127,7 +129,7 @@ class FacetAssembly {
         }
         for (const Pair& pair : pairs_) sums_.used[pair.number] = 1;
         const DualBasis<Slave> basis(mass, cover);
-        sum_values(facet, basis);
+        sum_values(facet, mass, basis);
         if constexpr (derivatives) sum_derivatives(basis);
     }
 
@@ -228,7 +230,7 @@ class FacetAssembly {
         else
             visit_segment(pair.geometry, [&](const auto& point) {
                 const double xi = value_of(point.slave), eta = value_of(point.master);
-                if (wanted(gap_at(xi, eta, slave_, pair.nodes), &xi)) pair.integrals.add(point, pair.geometry);
+                if (wanted(gap_at(xi, eta, slave_, pair.nodes), &xi)) pair.integrals.add(point, pair.geometry, slave_);
             });
     }
 
@@ -331,10 +333,18 @@ class FacetAssembly {
         if constexpr (dim == 3)
             pair.integrals.add(point.slave, point.master, point.weight, slave_, pair.nodes);
         else
-            pair.integrals.add(point, pair.geometry);
+            pair.integrals.add(point, pair.geometry, slave_);
     }
 
-    void sum_values(int facet, const DualBasis<Slave>& basis) {
+    void sum_values(int facet, const double (*mass)[n], const DualBasis<Slave>& basis) {
+        double* own = sums_.own_coupling.add(slave_nodes_, slave_nodes_);
+        for (int j = 0; j < n; ++j)
+            for (int i = 0; i < n; ++i) {
+                *own = 0.0;
+                for (int k = 0; k < n; ++k) *own += scale_ * basis.A[j][k] * mass[k][i];
+                ++own;
+            }
+
         coupling_.assign(n * masters_.size(), 0.0);
         for (const Pair& pair : pairs_)
             for (int k = 0; k < n; ++k)

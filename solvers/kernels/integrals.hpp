@@ -26,10 +26,12 @@ template <typename Slave, typename Master, typename T>
 using PairGeometry =
     std::conditional_t<Slave::dim == 3, PlanePair<Slave, Master, T>, LinePair<Slave, Master, T>>;
 
-// Nodes of one facet: positions, and the nodal normals if it is a slave.
+// Nodes of one facet: positions, and the nodal normals if it is a slave. Its gap may be measured along another, fixed
+// direction.
 template <typename Facet>
 struct FacetNodes {
     double x[Facet::nodes][Facet::dim], normal[Facet::nodes][Facet::dim];
+    const double* along = nullptr;
 };
 
 template <typename Slave, typename Master, typename T>
@@ -58,11 +60,13 @@ struct PairIntegrals {
         const SurfacePoint<Slave> field(on_slave.N, on_slave.dN, slave.normal);
         const SurfacePoint<Master> xm(on_master.N, on_master.dN, master.x);
         const double length = std::sqrt(dot(field.x, field.x));
-        const double normal[3] = {field.x[0] / length, field.x[1] / length, field.x[2] / length};
+        double normal[3] = {field.x[0] / length, field.x[1] / length, field.x[2] / length};
         const double r[3] = {xm.x[0] - xs.x[0], xm.x[1] - xs.x[1], xm.x[2] - xs.x[2]};
+        if (slave.along) std::copy_n(slave.along, 3, normal);
         const double g = dot(normal, r);
-        double turn[3];  // dg/dn_h
-        for (int c = 0; c < 3; ++c) turn[c] = (r[c] - g * normal[c]) / length;
+        double turn[3] = {};  // dg/dn_h
+        if (!slave.along)
+            for (int c = 0; c < 3; ++c) turn[c] = (r[c] - g * normal[c]) / length;
 
         T test[n], N_master[m], gap_point = g;
         for (int k = 0; k < n; ++k)
@@ -97,7 +101,7 @@ struct PairIntegrals {
         }
     }
 
-    void add(const LinePoint<T>& point, const LinePair<Slave, Master, T>& pair) {
+    void add(const LinePoint<T>& point, const LinePair<Slave, Master, T>& pair, const FacetNodes<Slave>& slave) {
         T test[n], N_master[m], slope[1][n], slope_master[1][m];
         Slave::shape(&point.slave, test, slope);
         Master::shape(&point.master, N_master, slope_master);
@@ -105,8 +109,9 @@ struct PairIntegrals {
         const FieldPoint<Master, T> xm(pair.master, point.master);
         T g = 0.0, square = 0.0;
         for (int c = 0; c < 2; ++c) {
-            add_product(g, normal.value[c], xm.value[c] - xs.value[c]);
-            add_product(square, normal.value[c], normal.value[c]);
+            const T along = slave.along ? T(slave.along[c]) : normal.value[c];
+            add_product(g, along, xm.value[c] - xs.value[c]);
+            add_product(square, along, along);
         }
         add(test, N_master, point.weight, g / square_root(square));
         cover += point.cover;

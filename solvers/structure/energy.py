@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 class EnergyBalance:
-    """kinetic + internal - work of loads and supports + damping = initial energy, up to the error in time [J]."""
+    """kinetic + internal + damping + friction = initial energy + work of loads and supports, but for time steps [J]."""
 
     def __init__(self) -> None:
-        self.kinetic = self.internal = self.work = self.damping = self.initial = 0.0
+        self.kinetic = self.internal = self.work = self.damping = self.friction = self.initial = 0.0
 
     def start(self, structure: Structure) -> None:
         """Measure the initial energy."""
@@ -31,12 +31,13 @@ class EnergyBalance:
         external, damping = structure.time.averaged_forces(structure)
         self.work += structure.dot(external, du) + structure.dot(structure.residual_force, structure.held.part(du))
         self.damping += structure.dot(damping, du)
+        self.friction = 0.0 if structure.constraint is None else structure.constraint.friction_work
         self._measure(structure)
 
     @property
     def error(self) -> float:
         """What the balance misses [J]."""
-        return self.kinetic + self.internal + self.damping - self.work - self.initial
+        return self.kinetic + self.internal + self.damping + self.friction - self.work - self.initial
 
     def save(self) -> State:
         return dict(vars(self))

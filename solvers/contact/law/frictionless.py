@@ -18,9 +18,10 @@ from solvers.contact.law.law import OPEN, SLIP, Point, Rows, Slopes, Span, Statu
 
 @dataclass(frozen=True)
 class Frictionless:
-    """In contact where z_n - c g > 0; there the gap closes."""
+    """In contact where z_n - c_n g > 0; there the gap closes."""
 
     span: ClassVar[Span] = "normal"
+    slips: ClassVar[bool] = False
 
     def status(self, at: Point) -> Statuses:
         return np.where(at.covered & (at.trial_pressure > 0.0), SLIP, OPEN).astype(np.int8)

@@ -30,7 +30,10 @@ class Point:
     gap: Array  #: weighted gap [m^dim] that must not be negative, shape (m,)
     covered: NDArray[np.bool_]  #: there is enough of a master for a constraint, shape (m,)
     stiffness: Array  #: of the bodies, per area [Pa/m], shape (m,)
-    c: Array  #: complementarity parameter [Pa/m]: any positive number has the same solution, shape (m,)
+    slip: Array  #: of the step [m], its part along the surface counts, shape (m, dim)
+    slip_known: NDArray[np.bool_]  #: the multiplier saw a master at the beginning of the step, shape (m,)
+    c_n: Array  #: complementarity parameter of the gap [Pa/m]: any positive one has the same solution, shape (m,)
+    c_t: Array  #: the same of the slip
     touching: float  #: gap [m] that is rounding
 
     @property
@@ -40,9 +43,9 @@ class Point:
 
     @property
     def trial_pressure(self) -> Array:
-        """z_n - c g [Pa] with the mean gap g, shape (m,): positive where in contact."""
+        """z_n - c_n g [Pa] with the mean gap g, shape (m,): positive where in contact."""
         mean_gap = np.divide(self.gap, self.D, out=np.ones_like(self.gap), where=self.covered)
-        return self.pressure - self.c * (mean_gap - self.touching)
+        return self.pressure - self.c_n * (mean_gap - self.touching)
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,7 @@ class Slopes:
 
     gap: sp.csr_matrix  #: shape (m, dim * N)
     normals: sp.csr_matrix  #: shape (dim * m, dim * N)
+    slip: sp.csr_matrix  #: shape (dim * m, dim * N)
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,11 @@ class Law(Protocol):
     @property
     def span(self) -> Span:
         """Directions that its multipliers may have."""
+        ...
+
+    @property
+    def slips(self) -> bool:
+        """It asks for the slip."""
         ...
 
     def status(self, at: Point) -> Statuses:

@@ -1,0 +1,27 @@
+"""Multipliers that cannot be: supports, or another multiplier, leave them no direction to act in."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.contact.directions import free_normals
+from solvers.contact.interface import Interface
+from solvers.contact.terms import find_normals
+
+
+def find_blocked(interface: Interface, x: Array) -> NDArray[np.bool_]:
+    """Which they are with all nodes at x [m], shape (C,): judged once, at the start of a run."""
+    multipliers, held = interface.multipliers, interface.nodes.held
+    node, slaves = multipliers.node, multipliers.areas > 0.0
+    if not held[node[slaves]].any() and multipliers.alone.all():
+        return np.zeros(len(node), dtype=bool)
+    normals = find_normals(multipliers, x).values
+    own = np.arange(len(node))  # as if every multiplier had its node for itself
+    feels = np.abs(free_normals(normals, own, held[node])).max(axis=1) > 0.0
+    whole = slaves & (interface.spans == "space")
+    first = np.zeros(len(node), dtype=bool)
+    first[np.flatnonzero(whole)[np.unique(node[whole], return_index=True)[1]]] = True
+    blocked = slaves & (interface.nodes.fixed[node] | (~whole & ~feels))
+    return blocked | (slaves & np.isin(node, node[whole]) & ~first)

@@ -1,0 +1,37 @@
+"""Coulomb's friction: the traction along the surface is at most mu times the pressure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import scipy.sparse as sp
+
+from solvers.api import Array
+from solvers.contact.blocks import block_columns
+from solvers.contact.law.friction import friction_residual, friction_rows, friction_status
+from solvers.contact.law.law import Point, Rows, Slopes, Span, Statuses
+
+
+@dataclass(frozen=True)
+class Coulomb:
+    """|z_t| <= mu p; p = z_n - c_n g is the trial pressure: z_n in the solution, and never negative in contact."""
+
+    mu: float  #: coefficient of friction
+    span: ClassVar[Span] = "surface"
+    slips: ClassVar[bool] = True
+
+    def status(self, at: Point) -> Statuses:
+        return friction_status(at, self._radius(at))
+
+    def residual(self, at: Point, status: Statuses, weight: float) -> Array:
+        return friction_residual(at, status, weight, self._radius(at))
+
+    def rows(self, at: Point, slopes: Slopes, status: Statuses, weight: float) -> Rows:
+        by_gap = np.divide(at.c_n, at.D, out=np.zeros_like(at.D), where=at.D > 0.0)
+        by_u = self.mu * (block_columns(at.z).T @ slopes.normals - sp.diags(by_gap) @ slopes.gap)
+        return friction_rows(at, slopes, status, weight, self._radius(at), self.mu * at.normals, by_u.tocsr())
+
+    def _radius(self, at: Point) -> Array:
+        return self.mu * np.where(at.slip_known, np.maximum(0.0, at.trial_pressure), 0.0)

@@ -1,0 +1,87 @@
+"""Friction: the traction along the surface is the projection of a trial one onto a disc.
+
+Per multiplier, with the slip u_t of the step along the surface, z_t = z - n (n.z), any c_t > 0, and the radius s of the
+disc (the bound of the traction), both stick and slip are the one equation
+
+    z_t = P_s(q),   q = z_t + c_t u_t,   P_s(q) = q min(1, s / |q|).
+
+Inside the disc it says u_t = 0, on and outside z_t = s q / |q|: |z_t| <= s, and slip only at the bound, along the
+traction. It is C = max(s, |q|) z_t - s q = 0 over max(s, |q|). All derivatives are exact (semi-smooth Newton).
+Source: Alart & Curnier, Comput. Methods Appl. Mech. Engng 92 (1991); Gitterle, Popp, Gee & Wall, Int. J. Numer. Meth.
+Engng 84 (2010).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from solvers.api import Array
+from solvers.contact.blocks import block_columns, block_diagonal
+from solvers.contact.law.law import OPEN, SLIP, STICK, Point, Rows, Slopes, Statuses, along
+
+
+def trial_traction(at: Point) -> Array:
+    """q [Pa], shape (m, dim)."""
+    y = at.z + at.c_t[:, None] * at.slip
+    return y - np.einsum("nd,nd->n", y, at.normals)[:, None] * at.normals
+
+
+def friction_status(at: Point, radius: Array) -> Statuses:
+    """In contact where the trial pressure is positive; sticking inside the disc.
+
+    Where the trial traction points against the present one the node sticks first: sliding that turns around in one
+    Newton step can turn back in the next, for ever. In the solution they have the same direction.
+    """
+    q = trial_traction(at)
+    turned = np.einsum("nd,nd->n", q, at.z) < 0.0
+    inside = at.slip_known & (turned | (np.linalg.norm(q, axis=1) < radius)) & (radius > 0.0)
+    return np.where(at.covered & (at.trial_pressure > 0.0), np.where(inside, STICK, SLIP), OPEN).astype(np.int8)
+
+
+def friction_residual(at: Point, status: Statuses, weight: float, radius: Array) -> Array:
+    """The closing gap along the normal and z_t - P_s(q) along the surface [N], shape (m, dim)."""
+    z_t = at.z - at.pressure[:, None] * at.normals
+    missed = z_t - _on_disc(trial_traction(at), status, radius)[0]
+    return (at.stiffness * at.gap)[:, None] * at.normals + (weight * at.D)[:, None] * missed
+
+
+def friction_rows(
+    at: Point, slopes: Slopes, status: Statuses, weight: float, radius: Array, by_z: Array, by_u: sp.csr_matrix
+) -> Rows:
+    """The residual and its derivatives; those of the radius are by_z (m, dim) and by_u (m, dim * N)."""
+    dim = at.z.shape[1]
+    tangent = along(at.normals)
+    factor = weight * at.D
+    q = trial_traction(at)
+    _, by_q, by_radius = _on_disc(q, status, radius, derivatives=True)
+    y_n = np.einsum("nd,nd->n", at.z + at.c_t[:, None] * at.slip, at.normals)
+
+    # dz_t = T dz - z_n dn and dq = T (dz + c_t du) - y_n dn, both along the surface; dP = by_q dq + by_radius ds
+    in_z = tangent - by_q @ tangent - by_radius[:, :, None] * by_z[:, None, :]
+    turning = block_diagonal(
+        factor[:, None, None] * (y_n[:, None, None] * by_q - at.pressure[:, None, None] * np.eye(dim))
+    )
+    sliding = block_diagonal((factor * at.c_t)[:, None, None] * (by_q @ tangent))
+    in_u = (
+        block_columns(at.normals) @ sp.diags(at.stiffness) @ slopes.gap
+        + turning @ slopes.normals
+        - sliding @ slopes.slip
+        - block_columns(factor[:, None] * by_radius) @ by_u
+    )
+    residual = friction_residual(at, status, weight, radius)
+    return Rows(residual, factor[:, None, None] * in_z, in_u.tocsr())
+
+
+def _on_disc(q: Array, status: Statuses, radius: Array, *, derivatives: bool = False):
+    """(P_s(q), dP/dq, dP/ds): q itself inside, on the rim outside. The status says which."""
+    size = np.linalg.norm(q, axis=1)
+    stick = status == STICK
+    unit = q / np.where(size > 0.0, size, 1.0)[:, None]
+    projected = np.where(stick[:, None], q, radius[:, None] * unit)
+    if not derivatives:
+        return projected, None, None
+    ratio = np.divide(radius, size, out=np.zeros_like(size), where=size > 0.0)
+    rim = ratio[:, None, None] * (np.eye(q.shape[1]) - unit[:, :, None] * unit[:, None, :])
+    by_q = np.where(stick[:, None, None], np.eye(q.shape[1]), rim)
+    return projected, by_q, np.where(stick[:, None], 0.0, unit)

@@ -1,0 +1,108 @@
+"""The slip of a step at the multipliers, from the mortar integrals at its two ends.
+
+With the integrals of the beginning (n) and of the iterate, and x the positions of the iterate, multiplier j slips
+
+    D_j^n s_j = W_j^n x_slave - M_j^n x_master + int Phi_j (x_m - x_s) = -[(W - W^n) x_slave - (M - M^n) x_master]_j .
+
+W_jk = int Phi_j N_k is D but on slivers. Points that were together at the beginning are followed: a common rigid motion
+has no slip, for the integrals do not feel it. Only the part along the surface matters.
+Source: Gitterle, Popp, Gee & Wall, Int. J. Numer. Meth. Engng 84 (2010), section 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.contact.blocks import components, expand
+from solvers.contact.mortar import Mortar
+from solvers.contact.patch import Multipliers
+from solvers.contact.share import Shares
+from solvers.contact.terms import Normals, find_normals, renumber
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """The integrals at the beginning of a step."""
+
+    difference: sp.csr_matrix  #: (W^n, -M^n) over all nodes, shape (C, N)
+    D: Array  #: shape (C,)
+
+
+@dataclass(frozen=True)
+class Slip:
+    """The slip of the step up to an iterate."""
+
+    values: Array  #: [m], shape (C, dim), zero where it is not known
+    slopes: sp.csr_matrix  #: derivatives, shape (dim * C, dim * N)
+    known: NDArray[np.bool_]  #: multipliers that saw a master at the beginning, shape (C,)
+
+
+class Sliding:
+    """Slip of the present step for the multipliers of some mortars; collective calls."""
+
+    def __init__(self, mortars: Sequence[Mortar], multipliers: Multipliers, shares: Shares, shape: tuple[int, int]):
+        """shape: (N, dim)."""
+        self.mortars, self._multipliers, self._shares = list(mortars), multipliers, shares
+        self._count, self._shape = len(multipliers.node), shape
+        self._beginning: Beginning | None = None
+
+    def begin_step(self, x: Array, with_lent: Callable[[Any], Any]) -> None:
+        """Integrals at the positions x [m] at the beginning of a step, shape (N, dim)."""
+        (N, _), C = self._shape, self._count
+        D, difference = np.zeros(C), sp.csr_matrix((C, N))
+        normals = find_normals(self._multipliers, x) if self.mortars else None
+        for index, mortar in enumerate(self.mortars):
+            facet_pairs, _ = mortar.near(x, x)
+            facet_pairs = self._shares.mine(index, facet_pairs, len(mortar.facets))
+            if normals is None or len(facet_pairs) == 0:
+                continue
+            found, W, M = mortar.begin(x, normals.at(self._multipliers, mortar.patch)[0], facet_pairs)
+            rows = mortar.patch.multipliers
+            D[rows] += found
+            difference = difference + renumber(W, rows, mortar.patch.nodes, difference.shape)
+            difference = difference - renumber(M, rows, mortar.masters.nodes, difference.shape)
+        D, difference = self._shares.total_of(D, difference)
+        self._beginning = Beginning(with_lent(difference), with_lent(D))
+
+    def evaluate(
+        self,
+        x: Array,
+        normals: Normals,
+        used: Sequence[tuple[Mortar, NDArray[np.int32]]],
+        with_lent: Callable[[Any], Any],
+    ) -> Slip:
+        """Slip at the positions x [m] with the facet pairs that took part in the integrals there."""
+        assert self._beginning is not None
+        (N, dim), C = self._shape, self._count
+        gap, dgap = np.zeros((C, dim)), [sp.csr_matrix((C, dim * N)) for _ in range(dim)]
+        for mortar, facet_pairs in used:
+            if not any(mortar is mine for mine in self.mortars):
+                continue
+            values, slopes = mortar.gap_vectors(x, *normals.at(self._multipliers, mortar.patch), facet_pairs)
+            rows, nodes = mortar.patch.multipliers, np.concatenate([mortar.patch.nodes, mortar.masters.nodes])
+            gap[rows] += values
+            for axis, part in enumerate(slopes):
+                dgap[axis] = dgap[axis] + renumber(part, rows, components(nodes, dim), dgap[axis].shape)
+        gap, *dgap = self._shares.total_of(gap, *dgap)
+        D, known = self._beginning.D, self._beginning.D > 0.0
+        share = np.divide(1.0, D, out=np.zeros_like(D), where=known)
+        values = share[:, None] * (self._beginning.difference @ x + with_lent(gap))
+        slopes = expand(self._beginning.difference, dim) + _interleave([with_lent(part) for part in dgap])
+        return Slip(values, (sp.diags(np.repeat(share, dim)) @ slopes).tocsr(), known)
+
+
+def _interleave(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
+    """Matrices of one component each as one with rows dim * multiplier + component."""
+    dim, (rows, columns) = len(parts), parts[0].shape
+    total = sp.csr_matrix((dim * rows, columns))
+    places = components(np.arange(rows), dim).reshape(rows, dim)
+    for axis, part in enumerate(parts):
+        total = total + renumber(part, places[:, axis], np.arange(columns), total.shape)
+    return total

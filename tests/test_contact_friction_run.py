@@ -1,0 +1,99 @@
+"""Friction through the program: a sliding block in time, processes, resume, and mistakes in the case."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from programs import fsci
+
+from fsci.case import CaseError, load_case
+from fsci.history import read_history
+from fsci.run import FINISHED, run_case
+
+#: Weight 10, mu = 0.1, pulled by 3: a = 2. The base is as stiff as the block.
+SLIDING = """\
+title: a block slides on a base
+time: {step: 0.0625, end: 0.25}
+structure:
+  dynamics: {rho_inf: 0.5}
+  bodies:
+    block:
+      mesh: {shape: rectangle, size: [1, 1], cells: [3, 3]}
+      material: {law: st_venant_kirchhoff, E: 1e5, nu: 0.2, density: 1}
+      body_force: [3, -10]
+    base:
+      mesh: {shape: rectangle, size: [3, 0.5], cells: [5, 2], origin: [-1, -0.5]}
+      material: {law: st_venant_kirchhoff, E: 1e5, nu: 0.2, density: 1}
+      supports: [{on: bottom, displacement: [0, 0]}]
+contact:
+  pairs:
+    floor: {slave: {body: block, on: bottom}, master: {body: base, on: top}, friction: {coefficient: 0.1}}
+probes:
+  centre: {body: block, quantity: centre}
+"""
+
+
+def run(text, folder):
+    folder.mkdir(exist_ok=True)
+    (folder / "case.yaml").write_text(text)
+    assert run_case(load_case(folder / "case.yaml"), folder / "out") == FINISHED
+    return read_history(folder / "out" / "history.csv")
+
+
+@pytest.fixture(scope="module")
+def sliding(tmp_path_factory):
+    return run(SLIDING, tmp_path_factory.mktemp("sliding"))
+
+
+def test_a_sliding_block(sliding):
+    """x = a t^2 / 2 and mu N x dissipated, as for a rigid block."""
+    t = sliding["time"]
+    distance = sliding["centre.x"] - 0.5
+    assert np.abs(distance - t**2).max() < 0.02 * t[-1] ** 2
+    assert sliding["contact.friction"][-1] == pytest.approx(distance[-1], rel=0.05)  # impact noise in N
+    ratio = np.abs(sliding["contact.floor.x"] / sliding["contact.floor.y"])
+    assert ratio == pytest.approx(0.1, rel=1e-3)
+    assert sliding["iterations"].max() <= 8
+
+
+def test_processes_agree(sliding, tmp_path):
+    (tmp_path / "case.yaml").write_text(SLIDING)
+    result = fsci("run", tmp_path / "case.yaml", "-o", tmp_path / "out", processes=2)
+    assert result.returncode == FINISHED, result.stdout + result.stderr
+    together = read_history(tmp_path / "out" / "history.csv")
+    for name in ("centre.x", "contact.friction", "contact.floor.x", "contact.floor.y"):
+        assert np.abs(sliding[name] - together[name]).max() <= 1e-9 * np.abs(sliding[name]).max(), name
+
+
+def test_resume_is_bitwise(sliding, tmp_path):
+    run(SLIDING.replace("end: 0.25", "end: 0.125"), tmp_path)
+    out = tmp_path / "out"
+    (out / "case.yaml").write_text((out / "case.yaml").read_text().replace("end: 0.125", "end: 0.25"))
+    result = fsci("resume", out)
+    assert result.returncode == FINISHED, result.stdout + result.stderr
+    resumed = read_history(out / "history.csv")
+    for name in sliding.keys() - {"wall"}:
+        assert np.array_equal(sliding[name], resumed[name]), name
+
+
+PAIR = "    floor: {slave: {body: block, on: bottom}, master: {body: base, on: top}, friction: {coefficient: 0.1}}\n"
+MISTAKES = {
+    "two laws": (
+        ("{coefficient: 0.1}", "{coefficient: 0.1, bound: 3}"),
+        "16:114: give either 'coefficient' or 'bound'",
+    ),
+    "negative": (("{coefficient: 0.1}", "{coefficient: -0.1}"), "16:102: 'coefficient' must be at least 0, not -0.1"),
+    "the same slave": (
+        (PAIR, PAIR + PAIR.replace("floor", "again").replace("0.1", "0.2")),
+        "pair 'floor' has the same slave: both need the same friction",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_mistakes_are_named(name, tmp_path):
+    (old, new), message = MISTAKES[name]
+    (tmp_path / "case.yaml").write_text(SLIDING.replace(old, new))
+    with pytest.raises(CaseError) as caught:
+        load_case(tmp_path / "case.yaml")
+    assert message in str(caught.value)
