@@ -96,6 +96,14 @@ class DistributedGrid:
         faces, cells = fem.boundary_facets(self.domain)
         return faces, cells, fem.facet_midpoints(self.domain, faces)
 
+    @cached_property
+    def window(self) -> tuple[Indices, tuple[int, ...], Indices]:
+        """Lowest index and shape of the smallest box around the owned cells; their places in it, last axis fastest."""
+        index = np.stack(np.unravel_index(self.numbers[: self.owned], self.grid.shape, order="F"))
+        low = index.min(axis=1, initial=np.iinfo(np.int64).max) if self.owned else np.zeros(self.dim, dtype=np.int64)
+        shape = tuple((index.max(axis=1) - low + 1).tolist()) if self.owned else (0,) * self.dim
+        return low, shape, np.ravel_multi_index(tuple(index - low[:, None]), shape) if self.owned else np.empty(0, int)
+
     def seams(self, periodic: tuple[int, ...] = ()) -> tuple[Indices, Indices]:
         """(owned cells, numbers of corners) where these meet cells of others, or cells across a period.
 

@@ -34,45 +34,47 @@ def find_pockets(
     are connected, because they share unknowns; those at the ends of `periodic` axes share them across the period.
     """
     own = cut.active[cut.active < grid.owned]
-    labels, count = _join(grid, *_label(grid, own), own, periodic)
+    labels, count = _join(grid, *_label(grid, own), periodic)
     at_elastic = elastic[cut.facets[cut.pieces.facet]].any(axis=1)
     marks = np.zeros((3, count + 1), dtype=np.int64)  # open cells, elastic pieces, cells of each part
     np.add.at(marks[0], labels[is_open], 1)
     np.add.at(marks[1], labels[cut.cut[cut.pieces.cell[at_elastic]]], 1)
-    np.add.at(marks[2], labels[own], 1)
+    marks[2] = np.bincount(labels[own], minlength=count + 1)
     marks = grid.comm.allreduce(marks)
     closed = [part for part in range(1, count + 1) if not marks[0, part]]
     largest = max(closed, key=lambda part: marks[2, part], default=0)
     return [Pocket(labels == part, part == largest, bool(marks[1, part])) for part in closed]
 
 
-def _label(grid: DistributedGrid, own: NDArray[np.int32]) -> tuple[NDArray[np.int64], int]:
-    """Parts of this process alone: the number of that of each local cell, from 1 on, 0 where none is; how many."""
+def _label(grid: DistributedGrid, own: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Parts of this process alone: number of that of each local cell, from 1 on, 0 where none is; first cell of each.
+
+    Of the cells of a part, the first is that with the smallest number, the last axis running fastest.
+    """
+    low, shape, places = grid.window
+    window = np.zeros(int(np.prod(shape)), dtype=bool)
+    window[places[own]] = True
+    found, count = ndimage.label(window.reshape(shape), np.ones((3,) * grid.dim)) if len(own) else (window, 0)
+    found = found.ravel()
     labels = np.zeros(len(grid.numbers), dtype=np.int64)
-    if not len(own):
-        return labels, 0
-    index = np.stack(np.unravel_index(grid.numbers[own], grid.grid.shape, order="F"))
-    low = index.min(axis=1)
-    place = tuple(index - low[:, None])
-    window = np.zeros(index.max(axis=1) - low + 1, dtype=bool)
-    window[place] = True
-    found, count = ndimage.label(window, np.ones((3,) * grid.dim))
-    labels[own] = found[place]
-    return labels, count
+    labels[own] = found[places[own]]
+    first = np.zeros(count + 1, dtype=np.int64)
+    first[found[::-1]] = np.arange(len(found))[::-1]  # the last one assigned stays
+    index = np.stack(np.unravel_index(first[1:], shape)) + low[:, None] if count else np.zeros((grid.dim, 0), dtype=int)
+    return labels, np.ravel_multi_index(tuple(index), grid.grid.shape)
 
 
 def _join(
-    grid: DistributedGrid, labels: NDArray[np.int64], count: int, own: NDArray[np.int32], periodic: Sequence[int]
+    grid: DistributedGrid, labels: NDArray[np.int64], first: NDArray[np.int64], periodic: Sequence[int]
 ) -> tuple[NDArray[np.int64], int]:
     """The same of the parts of all processes together: they meet in corners on the seams between them (collective)."""
     cells, corners = grid.seams(tuple(periodic))
-    at = labels[cells] > 0
-    links = np.unique(np.stack([labels[cells[at]] - 1, corners[at]]), axis=1)
-    first = _first_cells(grid, labels, count, own)
+    at, corners_in_all = labels[cells] > 0, int(np.prod([n + 1 for n in grid.grid.shape]))
+    links = np.stack(np.divmod(np.unique(labels[cells[at]] * corners_in_all + corners[at]), corners_in_all))
     gathered = grid.comm.allgather((first, links))
     starts = np.concatenate([[0], np.cumsum([len(found) for found, _ in gathered])])
     firsts = np.concatenate([found for found, _ in gathered])
-    parts = np.concatenate([start + these[0] for start, (_, these) in zip(starts, gathered, strict=False)])
+    parts = np.concatenate([start + these[0] - 1 for start, (_, these) in zip(starts, gathered, strict=False)])
     meetings = np.concatenate([these[1] for _, these in gathered])
     _, meetings = np.unique(meetings, return_inverse=True)
     size = len(firsts) + int(meetings.max(initial=-1)) + 1
@@ -81,16 +83,5 @@ def _join(
     order = np.full(whole, np.iinfo(np.int64).max)
     np.minimum.at(order, joined[: len(firsts)], firsts)
     number = np.argsort(np.argsort(order)) + 1
-    mine = joined[starts[grid.comm.rank] : starts[grid.comm.rank] + count]
+    mine = joined[starts[grid.comm.rank] : starts[grid.comm.rank] + len(first)]
     return np.concatenate([[0], number[mine]])[labels], whole
-
-
-def _first_cells(
-    grid: DistributedGrid, labels: NDArray[np.int64], count: int, own: NDArray[np.int32]
-) -> NDArray[np.int64]:
-    """Smallest number of a cell in each part of this process, the last axis running fastest."""
-    shape = grid.grid.shape
-    numbers = np.ravel_multi_index(np.unravel_index(grid.numbers[own], shape, order="F"), shape)
-    first = np.full(count, np.iinfo(np.int64).max)
-    np.minimum.at(first, labels[own] - 1, numbers)
-    return first
