@@ -284,7 +284,7 @@ class Contact:
     def _linearise(self, weight: float) -> Linearised:
         assert self.terms is not None
         dim, active = self.dim, self._touching_now()
-        to_all = sp.identity(len(self.z), format="csr") if self._lent is None else self._with_own()
+        to_all = sp.identity(len(self.z), format="csr") if self._lent is None else sp.identity(len(self.z)) + self._lent
         directions: Directions = find_directions(
             self.z[active],
             self.terms.normals[active],
@@ -307,9 +307,6 @@ class Contact:
             residual=P.T @ (residual - by_z @ self.z[active].ravel()),
             transformation=None if self.interface.basis is None else expand(self.interface.basis[0], dim),
         )
-
-    def _with_own(self) -> sp.csr_matrix:
-        return (sp.identity(len(self.z)) + self._lent).tocsr()
 
     def _law_rows(self, weight: float) -> tuple[sp.csr_matrix, sp.csr_matrix, Array]:
         """(by z, by u, residual) of all multipliers in contact, law by law."""
