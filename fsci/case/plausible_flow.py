@@ -30,11 +30,35 @@ def flow_doubts(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
     yield from _thin_bodies(case, fluid)
     if fluid.scheme == "steady":
         return
+    yield from _fast_bodies(case, fluid)
     for name, patch in fluid.patches.items():
         crossed = _cells_per_step(case, fluid, patch)
         if crossed > MOST_CELLS_PER_STEP:
             message = f"the flow crosses {crossed:.0f} cells in a time step here; take a smaller 'step'"
             yield ("fluid", "patches", name), message
+
+
+def _fast_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
+    """Bodies whose prescribed displacement crosses more than a cell in a step."""
+    from fsci.rigid_motion import rigid_motion
+
+    smallest = np.array([float(np.diff(edges).min()) for edges in fluid.grid.planes])
+    time = case.time
+    steps = np.linspace(time.start, max(time.end - time.step, time.start), 50)
+    for name, body in fluid.bodies.items():
+        if body.motion is None:
+            continue
+        moved = rigid_motion(np.zeros((1, fluid.grid.dimension)), body.motion, time.start, time.step)
+        if body.motion.rotation is not None:
+            continue  # how fast that is depends on the mesh: the run says it
+        ways = np.array([moved(t + time.step)[0][0] - moved(t)[0][0] for t in steps])
+        cells = float((np.abs(ways) / smallest).max())
+        if cells > 1.0 + 1e-9:
+            yield (
+                ("fluid", "bodies", name, "motion"),
+                f"the body moves {cells:.2g} cells in a time step: forces are off; "
+                f"a 'step' below {time.step / cells:.2g} keeps it below one cell",
+            )
 
 
 def _thin_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:

@@ -16,6 +16,7 @@ from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.distributed import Nodal
 from solvers.fluid import time
 from solvers.fluid.cut import NOTHING, Cut, Cutter
+from solvers.fluid.fast_bodies import FastBodies
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.history import History, Past
 from solvers.fluid.krylov import FlowKrylov, Ladder, rungs
@@ -92,6 +93,7 @@ class Fluid:
         self.solved_with_bodies = False
         self._motions: list[Motion] = []
         self._wet = wetness([body.surface for body in self.bodies])
+        self._fast_bodies = FastBodies(grid)
         self.notes: list[str] = []  #: what the user should know of this step
         self.ladder = Ladder(comm, rungs(method, settings.degree), self.dofs(), self.notes.append)
         self.krylov = None if method == "direct" else FlowKrylov(self.unknowns, self.ladder, solver.linear_tolerance)
@@ -236,10 +238,19 @@ class Fluid:
     def solve(self) -> StepInfo:
         """Newton to the tolerance. Raises StepFailed."""
         self._largest = 0.0
-        return replace(converge(self, self.solver.newton), notes=tuple(self.notes))
+        info = converge(self, self.solver.newton)
+        if not self._coupled:
+            self._note_fast_bodies()
+        return replace(info, notes=tuple(self.notes))
+
+    def _note_fast_bodies(self) -> None:
+        if not self.settings.steady:
+            self.notes += self._fast_bodies.notes({body.surface.name: m for body, m in self._moved()}, self.dt)
 
     def end_step(self) -> None:
         """Accept the step. Fluid that comes between surfaces which touch now will have been at rest."""
+        if self._coupled:
+            self._note_fast_bodies()
         known = self.system.active_dofs | self.system.dofs_of(self.cut.shut)
         self.history.end_step(self.dt, self.velocity(), known)
 

@@ -1,0 +1,45 @@
+"""Bodies that cross more than a cell in a time step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from solvers.fluid.grid import Grid
+from solvers.fluid.surface import Motion
+
+#: Cells per step up to which nothing is said.
+MOST_CELLS = 1.0
+
+
+def cells_per_step(grid: Grid, velocity: np.ndarray, dt: float) -> float:
+    """Largest |v_i| dt / h_i over velocities [m/s] of the shape (n, dim), h_i the smallest cell in each direction."""
+    smallest = np.array([float(np.diff(edge).min()) for edge in grid.edges])
+    return float((np.abs(velocity) / smallest).max(initial=0.0)) * dt
+
+
+def warning(name: str, cells: float, dt: float) -> str:
+    """What to say of a body that crosses so many cells in a step of this size [s]."""
+    return (
+        f"body '{name}' moves {cells:.2g} cells in a time step: the flow that it uncovers is extrapolated, "
+        f"and forces are off; a step below {dt / cells:.2g} keeps it below one cell"
+    )
+
+
+class FastBodies:
+    """Says of each body that it is too fast, again only when it is twice as fast."""
+
+    def __init__(self, grid: Grid):
+        self._grid = grid
+        self._said: dict[str, float] = {}
+
+    def notes(self, motions: Mapping[str, Motion], dt: float) -> list[str]:
+        """What is new at the end of a step."""
+        found = []
+        for name, motion in motions.items():
+            cells = cells_per_step(self._grid, motion.v, dt)
+            if cells > max(MOST_CELLS, 2.0 * self._said.get(name, 0.0)):
+                self._said[name] = cells
+                found.append(warning(name, cells, dt))
+        return found

@@ -1,0 +1,41 @@
+"""Bodies that cross more than a cell in a step are named by `fsci check` and by the run, with a step that is small."""
+
+from fsci.case import load_case
+from fsci.run import FINISHED, run_case
+
+CASE = """
+time: {step: 0.1, end: 0.2}
+fluid:
+  density: 1
+  viscosity: 1
+  scheme: backward_euler
+  grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
+  patches:
+    walls: {on: [x-, x+, y-, y+], no_slip: true}
+  bodies:
+    disc:
+      mesh: {shape: rectangle, size: [0.43, 0.43], cells: [2, 2], origin: [0.31, 0.31]}
+      motion: {displacement: ["SPEED*t", 0]}
+"""
+
+
+def run(folder, speed):
+    (folder / "case.yaml").write_text(CASE.replace("SPEED", speed))
+    case = load_case(folder / "case.yaml")
+    assert run_case(case, folder / "out") == FINISHED
+    return case.warnings, (folder / "out" / "log.txt").read_text()
+
+
+def test_three_cells_in_a_step(tmp_path):
+    """0.3 m per step of 0.1 s in cells of 0.1 m."""
+    warnings, log = run(tmp_path, "3")
+    assert len(warnings) == 1
+    assert "the body moves 3 cells in a time step: forces are off; a 'step' below 0.033 keeps it" in warnings[0]
+    assert log.count("body 'disc' moves 3 cells in a time step") == 1
+    assert "a step below 0.033 keeps it below one cell" in log
+
+
+def test_less_than_a_cell(tmp_path):
+    warnings, log = run(tmp_path, "0.9")
+    assert warnings == ()
+    assert "cells in a time step" not in log
