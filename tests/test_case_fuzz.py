@@ -64,9 +64,9 @@ fluid:
   grid: {from: [0, 0], to: [4, 1], cells: [null, 9], x: [{to: 1, cells: 4}, {to: 4, cells: 6, ratio: 3}]}
   patches:
     inlet: {on: x-, velocity: ["y*(1 - y)", 0]}
-    outlet: {on: x+, where: "y - 0.5", outflow: true}
+    outlet: {on: x+, where: "y - 0.45", outflow: true}
     walls: {on: [y-, y+], no_slip: true}
-    above: {on: x+, where: "0.5 - y", traction: [0, t]}
+    above: {on: x+, where: "0.45 - y", traction: [0, t]}
   bodies:
     disc:
       mesh: {shape: disc, radius: 0.3, cells: [8, 2], translate: [1, 0.5]}
