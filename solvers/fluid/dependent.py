@@ -38,7 +38,7 @@ class Combinations:
             self._lattice(unknowns.velocity, unknowns.degree),
             self._lattice(unknowns.pressure, 1),
         ]
-        self._entries: tuple[Array, ...] = ()
+        self._entries: tuple[Numbers, ...] = ()
         self._nothing()
 
     def _lattice(self, nodes: Nodes, degree: int) -> tuple[Nodes, Extension, Directory]:

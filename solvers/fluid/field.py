@@ -207,7 +207,7 @@ class Fluid:
             return 0.0
         fastest = float(np.linalg.norm(motion.v, axis=1).max(initial=0.0))
         steps = 2.0 if self.settings.scheme == "bdf2" else 1.0
-        return max(1.25 * steps * fastest * self.dt, np.finfo(float).tiny)
+        return max(1.25 * steps * fastest * self.dt, float(np.finfo(float).tiny))
 
     def _check_strip(self, cut: Cut) -> None:
         blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)

@@ -77,6 +77,9 @@ class FlowSystem:
         self._plain: PETSc.Mat | None = None  #: couplings of nodal values in cells with dependent nodes
         self._combined: PETSc.Mat | None = None  #: the same of unknowns
         self._matrix: PETSc.Mat | None = None
+        self._cells: list[NDArray[np.int32]] = []  #: without dependent nodes, and with some, of the present pattern
+        self._fresh_pattern = True
+        self.active_dofs = np.zeros(unknowns.local, dtype=bool)  #: local dofs with a value that means something
         self.cut: Cut | None = None
 
     # ------------------------------------------------------------------------------------------------- the forms
@@ -172,7 +175,7 @@ class FlowSystem:
             self._combined = None
         active = np.zeros(len(grid.numbers), dtype=bool)
         active[cut.active] = True
-        was_active = self.active_dofs if before is not None else None
+        was_active = None if before is None else self.active_dofs
         self.active_dofs = self.dofs_of(cut.active)
         pressure = self.unknowns.pressure.dofs[:, 0]
         self.active_dofs[pressure] = self.dofs_of(np.concatenate([cut.uncut, cut.cut]))[pressure]
@@ -245,7 +248,8 @@ class FlowSystem:
         settings, unknowns, weight = self.settings, self.unknowns, self.combinations.weight
         rho, alpha = settings.density, float(self._alpha.value)
         penalty = np.zeros(unknowns.owned)
-        for nodes, speed in ((unknowns.velocity, self._speeds), (unknowns.pressure, self._speeds[unknowns.at_pressure])):
+        speeds = (self._speeds, self._speeds[unknowns.at_pressure])
+        for nodes, speed in zip((unknowns.velocity, unknowns.pressure), speeds, strict=True):
             dofs = nodes.dofs[: nodes.owned]
             h, volume = nodes.sizes[: nodes.owned].min(axis=1), nodes.sizes[: nodes.owned].prod(axis=1)
             phi = settings.viscosity + rho * speed[: nodes.owned] * h + rho * alpha * h**2
@@ -311,6 +315,7 @@ class FlowSystem:
             self._matrix = create_matrix(self.unknowns, self._cells[0], more, blocked=self._blocked)
             self._fresh_pattern = False
         matrix = self._matrix
+        assert matrix is not None
         matrix.zeroEntries()
         for form in self._tangent_forms:
             fem.assemble_matrix(matrix, form)
