@@ -150,7 +150,8 @@ class Fluid:
     def begin_step(self, t: float, dt: float) -> None:
         """Remember the state at t; boundary, loads and moving bodies at t + dt."""
         self._t, self.dt = t + dt, dt
-        self._forget_roots()
+        self.cutter.begin_step()
+        self.system.combinations.begin_step()
         self.difference = self.history.begin_step(dt)
         self.system.set_time(t + dt, self.difference, self.history.rate(self.difference))
         self.flow[self.boundary.dofs] = self.boundary.velocity(t + dt)
@@ -164,11 +165,6 @@ class Fluid:
         if not self._coupled:
             self.predict()
             self.move({})
-
-    def _forget_roots(self) -> None:
-        """Cells and nodes may be active, or depend on others, anew."""
-        self.cutter.begin_step()
-        self.system.combinations.begin_step()
 
     def predict(self) -> None:
         """Let the velocity go on as in the last step, where it was known before that too."""
@@ -413,7 +409,8 @@ class Fluid:
         self.history.steps, self._t = tuple(state["steps"]), state["time"]
         self.ladder.rung = state["linear_solver"]
         self.difference = time.STEADY
-        self._forget_roots()
+        self.cutter.begin_step()
+        self.system.combinations.begin_step()
         kept = self.flow.copy()
         self.move({name: Motion(m["x"], m["v"]) for name, m in state["motion"].items()})
         self.flow[:] = kept

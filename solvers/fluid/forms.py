@@ -28,7 +28,7 @@ class Penalties:
     nitsche: float = 35.0  #: gamma of the viscous Nitsche penalty, times C_T
     mass: float = 35.0 / 40.0  #: normal Nitsche penalty rho h alpha
     convection: float = 35.0 / 6.0  #: normal Nitsche penalty rho |a|
-    extension: float = 1.0  #: of the distance of dependent nodes to their extension; results do not depend on it
+    extension: float = 0.1  #: of the distance of dependent nodes to their extension; results do not depend on it
 
 
 @dataclass(frozen=True)
