@@ -257,7 +257,8 @@ class Structure:
         """The tangent at the present iterate, supports not yet imposed; the next call overwrites it."""
         with self.timer("assembly"):
             matrix = self.tangent()
-        self.rounding = rounding_error(matrix, self.rounded())
+        # entries are sums over the 2^dim cells at a node, which may cancel
+        self.rounding = 2.0**self.dim * rounding_error(matrix, self.rounded())
         return matrix
 
     def rounded(self) -> Array:
