@@ -163,7 +163,7 @@ class Monolithic:
         T: nodal values of the fluid by its unknowns (solvers.fluid.dependent).
         """
         fluid, structure, surface = self.coupled.fluid, self.coupled.structure, self.coupled.interface
-        alpha, weight = fluid.difference.alpha, structure.time.load_weight
+        alpha, weight = fluid.difference.alpha, structure.time.force_weight
         operator = fluid.system.interface
         by_shape, load_by_shape = shape_derivatives(operator, fluid.flow)
         C = operator.coupling_blocks

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any
 
 from mpi4py import MPI
 
@@ -20,6 +20,7 @@ from solvers.mesh import Mesh
 from solvers.structure import materials, probes
 from solvers.structure.body import Body, BodySettings
 from solvers.structure.field import SolverSettings, Structure
+from solvers.structure.massless import NoMassLeft
 from solvers.structure.materials import Parameter, Value
 from solvers.structure.supports import SupportError
 from solvers.structure.time import Damping, Dynamics, Statics, TimeScheme
@@ -39,12 +40,22 @@ def build_structure(
     linear = case.solver.linear
     settings = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
     try:
-        return Structure(comm, bodies, _time_scheme(case), settings, timer, contact)
+        structure = Structure(comm, bodies, _time_scheme(case), settings, timer, contact)
+        structure.mass  # noqa: B018
+    except NoMassLeft as error:
+        raise case.error(("structure", "bodies", error.body, "mesh"), _NO_MASS_LEFT) from None
     except SupportError as error:
         supports = case.elastic_bodies[error.body].supports
         index = next(i for i, support in enumerate(supports) if error.where in (support.on or ()))
         keys = ("structure", "bodies", error.body, "supports", index)
         raise case.error(keys, error.message) from None
+    return structure
+
+
+_NO_MASS_LEFT = (
+    "all nodes of the body are on slave surfaces, which have no mass in dynamics: "
+    "use two or more cells between them, or make one of them the master"
+)
 
 
 def _time_scheme(case: Case) -> TimeScheme:
@@ -58,10 +69,7 @@ def _time_scheme(case: Case) -> TimeScheme:
         alphas: list[Any] = [dynamics.alpha_m, dynamics.alpha_f, dynamics.beta, dynamics.gamma]
         scheme = GeneralisedAlpha(*alphas)
     damping = Damping(dynamics.damping.mass, dynamics.damping.stiffness)
-    contact = case.contact
-    at: Literal["mid", "end"] = "end" if contact is None else contact.force_at
-    massless = contact is not None and contact.massless
-    return Dynamics(scheme, damping=damping, predictor=dynamics.predictor, constraint_at=at, massless=massless)
+    return Dynamics(scheme, damping=damping, predictor=dynamics.predictor)
 
 
 def _body(case: Case, name: str, comm: MPI.Comm) -> Body:

@@ -226,12 +226,15 @@ def test_several_surfaces_of_an_obstacle(plate, tmp_path):
 
 @pytest.mark.parametrize("text", [PLATE.replace("1.01]", "3]"), COLLISION.replace("[1.2, 0.3]", "[9, 0.3]")])
 def test_bodies_that_never_meet(text, tmp_path):
-    """Bit for bit the result without the section."""
+    """The result without the section: static, bit for bit; free flight, in which mass may be anywhere, to rounding."""
     first, last = text.index("contact:\n"), text.index("probes:\n")
     apart, without = run(text, tmp_path / "with"), run(text[:first] + text[last:], tmp_path / "without")
     assert not apart["contact.active"].any()
-    for name in without.keys() - {"wall"}:
-        assert np.array_equal(apart[name], without[name]), name
+    for name in without.keys() - {"wall", "residual", "structure.energy"}:
+        if "dynamics" in text:
+            assert np.abs(apart[name] - without[name]).max() < 1e-12 * max(1.0, np.abs(without[name]).max()), name
+        else:
+            assert np.array_equal(apart[name], without[name]), name
 
 
 def test_momentum_of_a_collision(collision):
@@ -249,26 +252,64 @@ BEFORE = 0.5 * 1.0 * (3**2 + 0.5**2) + 0.5 * 2.0 * 1.0  #: energy of the two blo
 
 @pytest.mark.parametrize(("step", "end"), [("0.02", "1.0"), ("0.005", "1.0"), ("0.00125", "0.15")])
 def test_contact_gives_no_energy(step, end, tmp_path):
-    """Without damping; impact may take some (25 % with the large step, 7 % with the one below).
+    """Without damping; impact may take some (10 % with the large step, 1.1 % with the others).
 
-    At t = 0.095 the corner of the left block slides onto the right one, into which it is bent by then: pushed out in
-    one small step, it would give 25 %.
+    At t = 0.085 the corner of the left block slides onto the right one, into which it is bent by then: pushed out in
+    one small step, it would give 25 %, pushed out as its area grows, 0.7 %.
     """
     history = run(COLLISION, tmp_path / "run", ("time.step", step), ("time.end", end))
     assert history["energy.total"].max() < (1 + 1e-9) * BEFORE
+    assert history["energy.total"][-1] > (0.9 if step == "0.02" else 0.985) * BEFORE
     assert history["contact.active"].max() == 5
 
 
-def test_massless_surfaces_keep_energy(tmp_path):
-    history = run(COLLISION, tmp_path / "run", ("contact.massless", "true"), ("time.step", "0.0025"))
-    assert history["contact.active"][-1] == 0
-    assert history["energy.total"] == pytest.approx(BEFORE, rel=0.005)
-    assert np.abs(history["momentum.x"] - 1.0).max() < 1e-9
-    assert np.abs(history["momentum.y"] - 0.5).max() < 1e-9
+#: A soft block is pressed onto another one and dragged along, slowly.
+DRAG = """\
+title: press and drag
+time: {step: 0.02, end: 1.6}
+structure:
+  dynamics: {rho_inf: 1}
+  bodies:
+    base:
+      mesh: {shape: rectangle, size: [4, 1], cells: [12, 3], origin: [0, -1]}
+      material: {law: neo_hooke, E: 500, nu: 0.3, density: 0.1}
+      supports: [{on: bottom, displacement: [0, 0]}]
+    block:
+      mesh: {shape: rectangle, size: [1, 1], cells: [4, 4], origin: [0.5, 0.001]}
+      material: {law: neo_hooke, E: 500, nu: 0.3, density: 0.1}
+      supports: [{on: top, displacement: ["0.75*max(t - 1, 0)^2", "-0.3*min(t, 1)^2*(3 - 2*min(t, 1))"]}]
+contact:
+  pairs: {p: {slave: {body: block, on: bottom}, master: {body: base, on: top}}}
+probes: {energy: {quantity: energy}}
+"""
 
 
-def test_momentum_with_the_averaged_force(tmp_path):
-    history = run(COLLISION, tmp_path / "mid", ("contact.force_at", "mid"))
+def test_slow_pressing_and_dragging(tmp_path):
+    """Undamped: no energy from nothing, and a force without zigzag; with the mean of old and new force 5 N."""
+    history = run(DRAG, tmp_path / "run")
+    steps = json.loads((tmp_path / "run" / "out" / "summary.json").read_text())["steps"]
+    stored, force = history["energy.internal"].max(), history["contact.p.y"]
+    assert steps["retried"] == 0
+    assert np.abs(history["structure.energy"]).max() < 0.01 * stored
+    zigzag = np.abs(force[2:] - 2 * force[1:-1] + force[:-2]) / 4
+    assert zigzag[force[1:-1] > 1.0].max() < 0.005 * force.max()
+    assert history["contact.active"][-1] == 5
+    assert force[history["time"] > 1.0] == pytest.approx(122.0, rel=0.015)
+
+
+def test_a_body_without_a_node_off_its_slave_surfaces(tmp_path):
+    text = COLLISION.replace("cells: [3, 4]", "cells: [1, 4]").replace("left, on: right}", "left, on: [left, right]}")
+    (tmp_path / "case.yaml").write_text(text)
+    with pytest.raises(CaseError) as caught:
+        run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out")
+    assert str(caught.value).split("\n")[0] == (
+        f"{tmp_path / 'case.yaml'}:7:13: all nodes of the body are on slave surfaces, which have no mass in dynamics: "
+        "use two or more cells between them, or make one of them the master"
+    )
+
+
+def test_momentum_of_a_damped_collision(tmp_path):
+    history = run(COLLISION, tmp_path / "damped", ("structure.dynamics.rho_inf", "0.5"))
     assert np.abs(history["momentum.x"] - 1.0).max() < 1e-9
     assert np.abs(history["momentum.y"] - 0.5).max() < 1e-9
 
@@ -319,7 +360,6 @@ structure:
       material: {law: neo_hooke, E: 2000, nu: 0.3, density: 1.0}
       initial_velocity: [0, 0, -5]
 contact:
-  force_at: end
   obstacles:
     wall: {mesh: {shape: box, size: [3, 3, 1], cells: [1, 1, 1], translate: [-1, -1, -1.02]}, on: top}
   pairs:
@@ -419,17 +459,10 @@ MISTAKES = [
     ),
     (", \"-0.2*sin(2*pi*t)^2\"]", "]", "14:15: 'motion' must have 3 entries in 3D, not 2", "["),
     ("contact:\n", "contact:\n  c_n: 0\n", "10:8: 'c_n' must be greater than 0, not 0", "0"),
-    ("contact:\n", "contact:\n  force_at: start\n", "10:13: 'force_at' must be 'end' or 'mid', not 'start'", "start"),
-    (
-        "contact:\n",
-        "contact:\n  force_at: end\n  massless: true\n",
-        "10:13: 'massless: true' goes with 'force_at: mid'",
-        "end",
-    ),
     (
         "contact:\n",
         "contact:\n  friction: 1\n",
-        "10:3: unknown setting 'friction' (available: pairs, obstacles, c_n, force_at, massless)",
+        "10:3: unknown setting 'friction' (available: pairs, obstacles, c_n)",
         "friction",
     ),
     (

@@ -123,7 +123,7 @@ class Linearisation:
     """Dense derivatives of balance and law with respect to displacements and what multipliers can change (zeta)."""
 
     def __init__(self, structure, contact):
-        terms = contact._linearise(structure.time.constraint_weight)
+        terms = contact._linearise(structure.time.force_weight)
         dofs = contact.nodes.dofs.ravel()
         place = np.zeros((len(dofs), structure.layout.size))
         place[np.flatnonzero(dofs >= 0), dofs[dofs >= 0]] = 1.0
@@ -154,7 +154,7 @@ def test_condensed_step_is_that_of_the_saddle_point_system(name):
     force = np.zeros(size)
     dofs = contact.nodes.dofs.ravel()
     np.add.at(force, dofs[dofs >= 0], contact.force().ravel()[dofs >= 0])
-    without = structure.residual_force + structure.time.constraint_weight * force
+    without = structure.residual_force + structure.time.force_weight * force
 
     matrix = np.block([[L.balance_u, L.balance_z], [L.law_u, L.law_z]])
     right = np.concatenate([-without, -L.law])
@@ -188,7 +188,7 @@ def test_linearisation_is_the_derivative_of_the_residual(name):
         contact.z[L.active] = (pressure + step * dp)[:, None] * contact.terms.normals[L.active]
         structure.residual()
         assert np.array_equal(contact._touching_now(), L.active)
-        law = L.basis.T @ contact._law_rows(structure.time.constraint_weight)[2]
+        law = L.basis.T @ contact._law_rows(structure.time.force_weight)[2]
         return structure.residual_force.copy(), law
 
     step = 1e-6

@@ -1,14 +1,18 @@
-"""Mass moved from a surface to the nodes behind it, and a bar that hits a wall against the exact solution."""
+"""Contact surfaces without mass, and bars that hit a wall or each other against the exact solution."""
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from contact_setup import make_body, make_contact
+from mpi4py import MPI
 from structure_setup import CELL_TYPES, block, constant
 
 from fsci import shapes
+from solvers.blocks import Layout
 from solvers.contact.surface import Surface
 from solvers.structure.body import Support
-from solvers.structure.massless import move_mass_inwards
+from solvers.structure.massless import NoMassLeft, massless_dofs, move_mass_inwards
 from solvers.structure.materials import StVenantKirchhoff
 from solvers.structure.time import Damping, Dynamics
 from solvers.time import GeneralisedAlpha
@@ -20,33 +24,72 @@ def dense(matrix):
     return matrix.convert("dense").getDenseArray()
 
 
+def at_planes(body, *planes):
+    """The owned dofs at x = ... ."""
+    x = body.points[0, : body.owned]
+    return np.repeat(np.min([np.abs(x - plane) for plane in planes], axis=0) < 1e-9, body.dim)
+
+
+def moved(body, massless):
+    return dense(move_mass_inwards(body.mass(), massless, body.points[: body.dim, : body.owned].T))
+
+
 @pytest.mark.parametrize("cell_type", CELL_TYPES)
-def test_mass_and_momentum_stay(cell_type):
-    body = make_body("block", block(cell_type, 3))
-    before = dense(body.mass())
-    at_left = np.repeat(body.points[0, : body.owned] < 1e-9, body.dim)
-    matrix, massless = move_mass_inwards(body.mass(), np.flatnonzero(at_left))
-    after = dense(matrix)
-    assert np.array_equal(massless, np.flatnonzero(at_left))
+def test_mass_and_its_centre_stay(cell_type):
+    body = make_body("block", block(cell_type, 4))
+    at_left = at_planes(body, 0.0)
+    before, after = dense(body.mass()), moved(body, at_left)
     assert not after[at_left].any()
     assert not after[:, at_left].any()
     assert np.abs(after - after.T).max() < 1e-15
     assert np.linalg.eigvalsh(after[~at_left][:, ~at_left]).min() > 0
+    positions = np.vstack([np.ones(body.owned), body.points[: body.dim, : body.owned]]).repeat(body.dim, axis=1)
     for axis in range(body.dim):
         translation = np.tile(np.eye(body.dim)[axis], body.owned)
-        assert translation @ after @ translation == pytest.approx(translation @ before @ translation, rel=1e-13)
-    # the centre of mass moves inwards by less than the part of a cell that was moved
-    x = body.points[0, : body.owned]
-    first = [(mass[:: body.dim, :: body.dim] @ x).sum() for mass in (before, after)]
-    assert 0 < first[1] - first[0] < 1 / 3 / 3
+        for position in positions:
+            wanted = position @ before @ translation
+            assert position @ after @ translation == pytest.approx(wanted, rel=1e-12)
 
 
-def test_nodes_with_nothing_behind_them_keep_their_mass():
-    body = make_body("cell", block("quad", 1))
-    everything = np.arange(body.size)
-    matrix, massless = move_mass_inwards(body.mass(), everything)
-    assert len(massless) == 0
-    assert np.array_equal(dense(matrix), dense(body.mass()))
+@pytest.mark.parametrize("cell_type", ["quad", "triangle6", "hexahedron", "tetra"])
+def test_few_cells(cell_type):
+    """With two cells across, mass stays; its centre moves inwards, by less than a fourth of a cell."""
+    body = make_body("block", block(cell_type, 2))
+    at_left = at_planes(body, 0.0)
+    before, after = dense(body.mass()), moved(body, at_left)
+    assert np.linalg.eigvalsh(after[~at_left][:, ~at_left]).min() > 0
+    assert after.sum() == pytest.approx(before.sum(), rel=1e-13)
+    x = body.points[0, : body.owned].repeat(body.dim)
+    assert 0 < x @ (after - before).sum(axis=1) / before.sum() < 0.125
+
+
+def test_one_layer_between_two_massless_surfaces():
+    """All mass is then in one plane, where no factor can move its centre."""
+    body = make_body("block", block("quad", 2))
+    after = moved(body, at_planes(body, 0.0, 1.0))
+    assert after.sum() == pytest.approx(dense(body.mass()).sum(), rel=1e-13)
+    assert np.linalg.eigvalsh(after[at_planes(body, 0.5)][:, at_planes(body, 0.5)]).min() > 0
+
+
+def surfaces(body, slave, master):
+    """A structure of one body whose contact has these nodes, as far as `massless_dofs` looks."""
+    of = {
+        "dofs": lambda: np.flatnonzero(slave | master).reshape(-1, body.dim),
+        "multiplier_dofs": lambda: np.flatnonzero(slave),
+    }
+    layout = Layout(MPI.COMM_SELF, [body.size])
+    return SimpleNamespace(
+        comm=MPI.COMM_SELF, bodies=[body], layout=layout, constraint=SimpleNamespace(**of)
+    )
+
+
+def test_masters_are_massless_too_if_that_leaves_a_body():
+    body = make_body("block", block("quad", 2))
+    left, right, middle = (at_planes(body, x) for x in (0.0, 1.0, 0.5))
+    assert np.array_equal(massless_dofs(surfaces(body, left, right))[0], left | right)
+    assert np.array_equal(massless_dofs(surfaces(body, left, right | middle))[0], left)
+    with pytest.raises(NoMassLeft):
+        massless_dofs(surfaces(body, left | middle | right, ~left & False))
 
 
 # ----------------------------------------------------------------------------------------------- a bar and a wall
@@ -54,7 +97,7 @@ def test_nodes_with_nothing_behind_them_keep_their_mass():
 SIZE = 1e-3  #: of the displacement, so small that the problem is linear
 
 
-def bar(cells, dt, *, end=3.0, damping=Damping(), **contact):
+def bar(cells, dt, *, end=3.0, damping=Damping(), scheme=TRAPEZOIDAL):
     """Columns time, displacement of the tip, force on the wall, energy; all over SIZE (energy: over its square).
 
     E = rho = 1, held at x = 1, pressed to u = (1 - x) / 2 and let go; the wall is at x = 0. The tip touches from t = 1
@@ -71,12 +114,12 @@ def bar(cells, dt, *, end=3.0, damping=Damping(), **contact):
         initial_displacement=pressed,
     )
     wall = Surface("wall", np.array([[0.0, -1.0], [0.0, 2.0]]), np.array([[0, 1]]), "line", None)
-    time = Dynamics(TRAPEZOIDAL, damping=damping, **contact)
+    time = Dynamics(scheme, damping=damping)
     structure, touching = make_contact([body], [(("bar", "left"), wall)], time=time)
     tip = 2 * np.flatnonzero(body.points[0, : body.owned] < 1e-9)
     structure.initialise(0.0, dt)
     rows = []
-    weight = time.constraint_weight
+    weight = time.force_weight
     for step in range(round(end / dt)):
         structure.begin_step(step * dt, dt)
         structure.solve()
@@ -92,35 +135,38 @@ def exact_tip(t):
     return np.interp(t, [0, 1, 2, 3], [0.5, 0, 0, 0.5])
 
 
-@pytest.mark.parametrize(("contact", "ringing"), [({"massless": True, "constraint_at": "mid"}, 0.05), ({}, 0.35)])
-def test_bar_impact(contact, ringing):
-    """The pressure is 1/2 throughout; its deviation (standard) is 0.03 without mass, 0.28 with it."""
-    (t, tip, force, energy), structure, _ = bar(40, 0.01, **contact)
+@pytest.mark.parametrize(("steps_per_cell", "until"), [(1.4, 3.0), (2.5, 1.6)])
+def test_bar_impact(steps_per_cell, until):
+    """The pressure is 1/2 throughout: no overshoot, no ringing, nothing gained, hardly anything lost.
+
+    steps_per_cell: in which a wave crosses a cell. With many, waves of a few cells' length run ahead of the one that
+    comes back from the other end; the overshoot is that `until` they arrive.
+    """
+    (t, tip, force, energy), structure, _ = bar(40, 1.0 / 40.0 / steps_per_cell)
     body, touching = structure.bodies[0], (t > 1.1) & (t < 1.9)
     u = structure.now.u.reshape(-1, 2)[:, 0] / SIZE
     assert np.abs(tip - exact_tip(t)).max() < 0.03
     assert np.abs(u - 0.5 * (1 - body.points[0, : body.owned])).max() < 0.03
-    assert force[touching].mean() == pytest.approx(0.5, abs=0.005)
-    assert force[touching].std() < ringing
+    assert force[t < until].max() < 0.5 * 1.05
+    assert force[touching].mean() == pytest.approx(0.5, rel=0.04)
+    assert force[touching].std() < 0.02
     assert not force[(t < 0.9) | (t > 2.1)].any()
     # the stress at the free end is relieved in the first step, and nothing is gained afterwards
     assert energy.max() < 0.125 * (1 + 1e-6)
-    assert energy[-1] > 0.985 * energy[0]
-    if contact:
-        assert energy == pytest.approx(energy[0], rel=2e-3)
+    assert energy == pytest.approx(energy[0], rel=2e-3)
 
 
 def test_bar_impact_converges():
     errors = []
     for cells in (10, 40):
-        (t, tip, _, _), _, _ = bar(cells, 0.4 / cells, massless=True, constraint_at="mid")
+        (t, tip, _, _), _, _ = bar(cells, 0.4 / cells)
         errors.append(np.sqrt(np.mean((tip - exact_tip(t)) ** 2)))
     assert errors[1] < 0.5 * errors[0], errors
 
 
 def test_newton_with_damping_and_no_mass():
     """The tangent knows that a massless node has another velocity: quadratic convergence."""
-    _, structure, _ = bar(10, 0.05, end=1.0, damping=Damping(0.1, 0.02), massless=True, constraint_at="mid")
+    _, structure, _ = bar(10, 0.05, end=1.0, damping=Damping(0.1, 0.02))
     structure.begin_step(1.0, 0.05)
     info = structure.solve()
     assert info.iterations <= 3, info.residuals

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import model_validator
 
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Name, NotNegative, Positive, Surfaces, Switch, Vector
+from fsci.case.values import Name, NotNegative, Positive, Surfaces, Vector
 
 
 class Side(Section):
@@ -74,19 +74,3 @@ class Contact(Section):
     pairs: dict[Name, Pair] = setting(..., "pairs of surfaces by name")
     obstacles: dict[Name, Obstacle] = setting(dict, "rigid surfaces by name")
     c_n: Positive = setting(1.0, "factor of the complementarity parameter; the result does not depend on it", unit="1")
-    force_at: Literal["end", "mid"] = setting(
-        "end", "dynamics: contact force at the end of the step, or averaged over it like all forces (with 'massless')"
-    )
-    massless: Switch = setting(
-        False, "dynamics: the mass of slave nodes is moved to those behind them, so that impacts neither ring nor lose"
-    )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _massless_is_averaged(cls, data: Any) -> Any:
-        """What has no mass is in balance at both ends of a step, and so in the mean."""
-        if not isinstance(data, dict) or data.get("massless") is not True:
-            return data
-        if data.get("force_at") == "end":
-            raise fault("'massless: true' goes with 'force_at: mid'", "force_at")
-        return data | {"force_at": "mid"}

@@ -39,9 +39,9 @@ class Contact:
 
     z are the multipliers [Pa]: the negative traction on the slave, z_n = n.z >= 0 the contact pressure.
 
-    keep_overlap: a node whose gap is negative at the start of a step need not close it in the step, only not deepen it.
-    That happens where a slave slides onto a master: a node bends into it unseen. Closed at once it would be shot away;
-    kept, contact does no work: z_n (g_{n+1} - g_n) <= 0 always. For dynamics; the first step closes all there is.
+    keep_overlap: a node whose mean gap is negative at the start of a step need not close it, only not deepen it. That
+    happens where a slave slides onto a master: a node bends into it unseen. Closed at once, or as its area grows, it
+    would be shot away; kept, contact does no work. For dynamics; the first step closes all there is.
     """
 
     def __init__(
@@ -69,7 +69,8 @@ class Contact:
         self.active_set = ActiveSet(count)
         self._keep_overlap = keep_overlap
         self._gap = np.zeros(count)  # weighted gap at the latest evaluation
-        self._overlap = np.zeros(count)  # how much of it may stay negative, <= 0
+        self._mean_gap = np.zeros(count)  # the same over D [m], zero where no master is seen
+        self._kept = np.zeros(count)  # mean gap that may stay in this step [m], <= 0
         self._seen = np.zeros(count, dtype=bool)  # multipliers that could have a constraint in this step
         self._evaluations = 0
         self._stiffness = np.zeros(count)
@@ -110,7 +111,7 @@ class Contact:
         """Facets may have moved from here on."""
         self._x_old = self.x.copy()
         if self._keep_overlap:
-            self._overlap = np.minimum(0.0, self._gap)
+            self._kept = np.minimum(0.0, self._mean_gap)
         self._seen[:] = False
         self._evaluations = 0
         self.active_set.begin_step()
@@ -145,8 +146,10 @@ class Contact:
         self.terms = self._evaluate_mortars()
         status = np.full(len(self.z), OPEN, dtype=np.int8)
         self._gap = np.zeros(len(self.z)) if self.terms is None else self._with_lent(self.terms.gap)
+        self._mean_gap = np.zeros(len(self.z))
         if self.terms is not None:
             self._covers = self._may_touch(self.terms)
+            np.divide(self._gap, self._D, out=self._mean_gap, where=self._D > 0.0)
             for law, which in self.interface.laws:
                 status[which] = law.status(self._point(which))
             self._drop_dependent(status)
@@ -161,7 +164,7 @@ class Contact:
             z=self.z[which],
             normals=self.terms.normals[which],
             D=self._D[which],
-            gap=(self._gap - self._overlap)[which],
+            gap=(self._gap - self._kept * self._D)[which],
             covered=self._covers[which],
             stiffness=stiffness,
             slip=np.zeros((len(which), self.dim)) if slip is None else slip.values[which],
@@ -384,7 +387,7 @@ class Contact:
         return {
             "z": self.z.copy(),
             "x": self.x.copy(),
-            "gap": self._gap.copy(),
+            "mean_gap": self._mean_gap.copy(),
             "status": self.active_set.status.copy(),
             "touched_at": self.touched_at.copy(),
             "work": self.work.save(),
@@ -393,7 +396,7 @@ class Contact:
     def restore(self, state: State) -> None:
         self.z[:] = state["z"]
         self.x[:] = state["x"]
-        self._gap = state["gap"].copy()
+        self._mean_gap = state["mean_gap"].copy()
         self.active_set.status = state["status"].copy()
         self.touched_at[:] = state["touched_at"]
         self.work.restore(state["work"])

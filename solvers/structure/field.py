@@ -114,7 +114,7 @@ class Structure:
     @cached_property
     def mass(self) -> PETSc.Mat:
         """Mass matrix of all bodies [kg]."""
-        return self.time.mass(self, block_diagonal([body.mass() for body in self.bodies]))
+        return self.time.mass(self)
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -226,7 +226,7 @@ class Structure:
         with self.timer("contact"):
             self._assemble_constraint()
         self.residual_force = self.time.balance(self)
-        missed = 0.0 if self.constraint is None else self.constraint.violation(self.time.constraint_weight)
+        missed = 0.0 if self.constraint is None else self.constraint.violation(self.time.force_weight)
         return float(np.hypot(self.norm(self.held.free_part(self.residual_force)), missed))
 
     def tangent(self) -> PETSc.Mat:
@@ -303,7 +303,7 @@ class Structure:
         `numbering` places the structure's dofs in a system that has more unknowns.
         """
         assert self.constraint is not None
-        weight = self.time.constraint_weight
+        weight = self.time.force_weight
         right.array[: self.layout.size] = -(self.residual_force + weight * self.now.constraint)
         with self.timer("contact"):
             matrix, self._taken = transform_rows(matrix, right, self.constraint.condense(weight), numbering)

@@ -1,43 +1,127 @@
-"""Surfaces without mass: that of their nodes is moved to the nodes behind them.
+"""Contact surfaces without mass: the rest of the body takes it over.
 
 A node with mass that hits an obstacle has to stop at once: it loses its kinetic energy, and the force that stops it
-rings from step to step, the more the smaller the step. Without mass, a surface follows the body behind it: pressures
-are continuous in time, and impacts keep energy.
-Source: Khenous, Laborde & Renard, Eur. J. Mech. A/Solids 27 (2008); Hager, Hueber & Wohlmuth, Int. J. Numer. Meth.
-Engng 73 (2008).
+rings from step to step, the more the smaller the step. A surface without mass is in static balance with the body
+behind it: pressures are continuous in time, and impacts keep energy.
+Source: Khenous, Laborde & Renard, Eur. J. Mech. A/Solids 27 (2008).
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from solvers.api import Array
 
-def move_mass_inwards(mass: PETSc.Mat, surface: NDArray[np.int64]) -> tuple[PETSc.Mat, NDArray[np.int64]]:
-    """(T^T M T, owned dofs without mass): the velocity T v of a surface node is a mean of those behind it.
+if TYPE_CHECKING:
+    from solvers.structure.field import Structure
 
-    mass [kg]; surface: global dofs, the same on every process. The mean is weighted by the entries of M, so that T
-    keeps a rigid translation: total mass and momentum stay, the centre of mass moves inwards by a part of a cell.
-    A node with no node behind it keeps its mass. Collective.
+#: Smallest factor of a density, relative to the mean one. For linear cells (F M + M F) / 2 is positive definite as long
+#: as the factors of neighbours differ by less than 7 + 4 sqrt(3); those of a body differ by about twice the inverse of
+#: this number at most. It matters only where a body has less than four layers of cells.
+LEAST_FACTOR = 0.25
+
+#: Mean square distance from the centre, over the square of the body's size, below which a body is a plane: rounding.
+NO_EXTENT = 1e-12
+
+
+class NoMassLeft(ValueError):
+    """All nodes of a body lie on slave surfaces."""
+
+    def __init__(self, body: str):
+        super().__init__(body)
+        self.body = body
+
+
+def massless_dofs(structure: Structure) -> list[NDArray[np.bool_]]:
+    """Owned dofs of each body that have no mass: those of all contact surfaces, collective.
+
+    If these are all nodes of a body, as those of a sheet of one cell between two others, its slave surfaces alone.
+    Raises NoMassLeft.
     """
-    start, end = mass.getOwnershipRange()
-    on_surface = np.zeros(mass.size[1], dtype=bool)
-    on_surface[surface] = True
-    indptr, columns, entries = mass.getValuesCSR()
-    rows = np.repeat(np.arange(end - start), np.diff(indptr))
-    behind = np.where(on_surface[start + rows] & ~on_surface[columns], np.abs(entries), 0.0)
-    total = np.bincount(rows, behind, minlength=end - start)
-    massless = np.flatnonzero(total > 0.0)
+    constraint = structure.constraint
+    assert constraint is not None
+    candidates = [constraint.dofs(), constraint.multiplier_dofs()]
+    parts = [np.split(_owned(structure, dofs), structure.layout.offsets[1:-1]) for dofs in candidates]
+    found = []
+    for body, *choices in zip(structure.bodies, *parts, strict=True):
+        with_rest = [part for part in choices if structure.comm.allreduce(not part.all(), op=MPI.LOR)]
+        if not with_rest:
+            raise NoMassLeft(body.name)
+        found.append(with_rest[0])
+    return found
 
-    T = PETSc.Mat().createAIJ(mass.sizes, nnz=(np.diff(indptr).max(initial=0) + 1,) * 2, comm=mass.comm)
-    kept = np.setdiff1d(np.arange(end - start), massless)
-    for i in kept.tolist():
-        T.setValue(start + i, start + i, 1.0)
-    for i in massless.tolist():
-        part = slice(indptr[i], indptr[i + 1])
-        found = behind[part] > 0.0
-        T.setValues([start + i], columns[part][found], behind[part][found] / total[i])
-        T.setValue(start + i, start + i, 0.0)  # so that the diagonal has a place in T^T M T
-    T.assemble()
-    return mass.ptap(T), massless
+
+def _owned(structure: Structure, dofs: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which owned dofs of the structure are among these global ones."""
+    local = dofs[dofs >= 0] - structure.layout.start
+    among = np.zeros(structure.layout.size, dtype=bool)
+    among[local[(local >= 0) & (local < structure.layout.size)]] = True
+    return among
+
+
+def move_mass_inwards(mass: PETSc.Mat, massless: NDArray[np.bool_], points: Array) -> PETSc.Mat:
+    """The mass matrix [kg] of a body whose surface has none: (F M' + M' F) / 2, as sparse as M. Collective.
+
+    M' is the consistent matrix M without rows and columns of the massless dofs, F the diagonal matrix of a factor f on
+    the density that is linear in space. It keeps the mass and the centre of mass:
+
+        sum_ij p_i (F M' + M' F)_ij / 2 = sum_ij p_i M_ij    for p = 1, x, y, z.
+
+    Where a body has so few cells that the factor would be too small somewhere, the mean factor counts for more, and the
+    centre of mass moves inwards.
+
+    massless: owned dofs without mass, shape (n * dim,); points: reference positions [m] of the owned nodes, shape
+    (n, dim).
+    """
+    comm = mass.comm.tompi4py()
+    x, y = mass.createVecs("right"), mass.createVecs("left")
+
+    def times(matrix: PETSc.Mat, array: Array) -> Array:
+        x.array[:] = array
+        matrix.mult(x, y)
+        return y.array.copy()
+
+    inside = mass.copy()
+    x.array[:] = ~massless
+    inside.diagonalScale(x, x)
+    everywhere = np.ones(len(massless))
+    rows, rows_before = times(inside, everywhere), times(mass, everywhere)
+    total, total_before = comm.allreduce(np.array([rows.sum(), rows_before.sum()]))
+    position = _positions(comm, points)
+    position -= comm.allreduce(rows @ position) / total
+    image = np.stack([0.5 * (rows * p + times(inside, p)) for p in position.T], axis=1)
+    slopes = _solve(comm.allreduce(position.T @ image) / total, comm.allreduce(rows_before @ position) / total)
+    mean = total_before / total
+    x.array[:] = mean + _bounded(comm, position @ slopes, mean)
+    matrix = inside.copy()
+    matrix.diagonalScale(x, None)
+    inside.diagonalScale(None, x)
+    matrix.axpy(1.0, inside, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+    matrix.scale(0.5)
+    return matrix
+
+
+def _positions(comm: MPI.Comm, points: Array) -> Array:
+    """Positions at the owned dofs over the size of the body, shape (owned dofs, dim)."""
+    low = np.min(comm.allgather(points.min(axis=0, initial=np.inf)), axis=0)
+    high = np.max(comm.allgather(points.max(axis=0, initial=-np.inf)), axis=0)
+    return ((points - low) / (high - low).max()).repeat(points.shape[1], axis=0)
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    """Least solution of a symmetric system; nothing in directions in which no mass is left to be moved."""
+    values, vectors = np.linalg.eigh(matrix)
+    inverse = np.divide(1.0, values, out=np.zeros_like(values), where=values > NO_EXTENT)
+    return vectors @ (inverse * (vectors.T @ right))
+
+
+def _bounded(comm: MPI.Comm, change: Array, mean: float) -> Array:
+    """The change of the factor, all of it reduced if mean + change would be too small anywhere."""
+    lowest = comm.allreduce(change.min(initial=0.0), op=MPI.MIN)
+    most = (1.0 - LEAST_FACTOR) * mean
+    return change if lowest >= -most else change * (most / -lowest)

@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from solvers.api import Array
 from solvers.blocks import block_diagonal
-from solvers.structure.massless import move_mass_inwards
+from solvers.structure.massless import massless_dofs, move_mass_inwards
 from solvers.time import GeneralisedAlpha
 
 if TYPE_CHECKING:
@@ -21,17 +21,12 @@ class TimeScheme(Protocol):
     """What a time scheme adds to f_int - f_ext."""
 
     @property
-    def constraint_weight(self) -> float:
-        """Weight of the new constraint force in the balance; the old one has the rest."""
+    def force_weight(self) -> float:
+        """Weight of the forces at the end of the step in the balance; those at its start have the rest."""
         ...
 
-    @property
-    def load_weight(self) -> float:
-        """Weight of the loads at the end of the step in the balance."""
-        ...
-
-    def mass(self, structure: Structure, consistent: PETSc.Mat) -> PETSc.Mat:
-        """The mass matrix [kg] it works with, from the consistent one."""
+    def mass(self, structure: Structure) -> PETSc.Mat:
+        """The mass matrix [kg] of all bodies. Raises NoMassLeft."""
         ...
 
     def start(self, structure: Structure, t: float, dt: float) -> None:
@@ -66,11 +61,10 @@ class TimeScheme(Protocol):
 class Statics:
     """f_int(u) = f_ext(t): every time step is a load step."""
 
-    constraint_weight = 1.0
-    load_weight = 1.0
+    force_weight = 1.0
 
-    def mass(self, structure: Structure, consistent: PETSc.Mat) -> PETSc.Mat:
-        return consistent
+    def mass(self, structure: Structure) -> PETSc.Mat:
+        return block_diagonal([body.mass() for body in structure.bodies])
 
     def start(self, structure: Structure, t: float, dt: float) -> None: ...
     def predict(self, structure: Structure, dt: float) -> None: ...
@@ -105,10 +99,8 @@ class Dynamics:
 
     The forces f = f_int - f_ext - f_contact are averaged, not evaluated in the middle.
 
-    constraint_at: the contact force is averaged like all others (mid) or that at the end of the step.
-    massless: surfaces with multipliers lose their mass to the nodes behind them. Their rows are static balances at
-    n+1, times 1 - alpha_f (the old forces there are in balance and drop out, or would ring for ever if they were not);
-    their velocity is (u_{n+1} - u_n) / dt.
+    Contact surfaces have no mass. Their rows are static balances at n+1, times 1 - alpha_f: the old forces there are in
+    balance and drop out; if they were not, they would ring for ever. Their velocity is (u_{n+1} - u_n) / dt.
     """
 
     def __init__(
@@ -117,14 +109,10 @@ class Dynamics:
         *,
         damping: Damping = Damping(),
         predictor: Literal["constant_displacement", "constant_velocity"] = "constant_displacement",
-        constraint_at: Literal["mid", "end"] = "end",
-        massless: bool = False,
     ):
         self.scheme, self.damping, self.predictor = scheme, damping, predictor
-        self._wants_massless = massless
+        self.force_weight = 1.0 - scheme.alpha_f
         self._massless = np.empty(0, dtype=np.int64)
-        self.constraint_weight = 1.0 - scheme.alpha_f if constraint_at == "mid" else 1.0
-        self.load_weight = 1.0 - scheme.alpha_f
         self._dt = 0.0
         self._damping_matrix: PETSc.Mat | None = None
         self._effective: PETSc.Mat | None = None
@@ -132,11 +120,15 @@ class Dynamics:
 
     # ------------------------------------------------------------------------------------------------- start
 
-    def mass(self, structure: Structure, consistent: PETSc.Mat) -> PETSc.Mat:
-        if not self._wants_massless or structure.constraint is None:
-            return consistent
-        matrix, self._massless = move_mass_inwards(consistent, structure.constraint.multiplier_dofs())
-        return matrix
+    def mass(self, structure: Structure) -> PETSc.Mat:
+        matrices = [body.mass() for body in structure.bodies]
+        if structure.constraint is None:
+            return block_diagonal(matrices)
+        massless = massless_dofs(structure)
+        self._massless = np.flatnonzero(np.concatenate(massless))
+        for i, body in enumerate(structure.bodies):
+            matrices[i] = move_mass_inwards(matrices[i], massless[i], body.points[: body.dim, : body.owned].T)
+        return block_diagonal(matrices)
 
     def start(self, structure: Structure, t: float, dt: float) -> None:
         """a_0 from M a_0 = -C v_0 - f_0; prescribed dofs follow their functions."""
@@ -193,12 +185,9 @@ class Dynamics:
         now.v = scheme.velocity(du, old.v, old.a, dt)
         now.a[self._massless], now.v[self._massless] = 0.0, du[self._massless] / dt
         inertia = self._times(structure.mass, (1.0 - scheme.alpha_m) * now.a + scheme.alpha_m * old.a)
-        present, before = (at.internal - at.external + self._damping_force(at.v) for at in (now, old))
-        weight = self.constraint_weight
-        present = (1.0 - scheme.alpha_f) * present - weight * now.constraint
-        before = scheme.alpha_f * before - (1.0 - weight) * old.constraint
+        present, before = (at.internal - at.external - at.constraint + self._damping_force(at.v) for at in (now, old))
         before[self._massless] = 0.0
-        return inertia + present + before
+        return inertia + (1.0 - scheme.alpha_f) * present + scheme.alpha_f * before
 
     def averaged_forces(self, structure: Structure) -> tuple[Array, Array]:
         alpha, now, old = self.scheme.alpha_f, structure.now, structure.old
@@ -207,18 +196,15 @@ class Dynamics:
 
     def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
         """(1 - alpha_f) K + mass_factor M + damping_factor C."""
-        same = not len(self._massless)
-        pattern = PETSc.Mat.Structure.SAME_NONZERO_PATTERN if same else PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN
+        same = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
         if self._effective is None or self._effective_dt != self._dt:
             self._effective = structure.mass.copy()
             self._effective.scale(self.scheme.mass_factor(self._dt))
             if self._damping_matrix is not None:
-                self._effective.axpy(1.0, self._damping_tangent(), pattern)
+                self._effective.axpy(1.0, self._damping_tangent(), same)
             self._effective_dt = self._dt
-        if not same:
-            stiffness = stiffness.copy()  # the caller uses it again, and its pattern must stay
         stiffness.scale(1.0 - self.scheme.alpha_f)
-        stiffness.axpy(1.0, self._effective, pattern)
+        stiffness.axpy(1.0, self._effective, same)
         return stiffness
 
     def _damping_tangent(self) -> PETSc.Mat:
