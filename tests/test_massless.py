@@ -1,5 +1,6 @@
 """Contact surfaces without mass, and bars that hit a wall or each other against the exact solution."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -78,9 +79,7 @@ def surfaces(body, slave, master):
         "multiplier_dofs": lambda: np.flatnonzero(slave),
     }
     layout = Layout(MPI.COMM_SELF, [body.size])
-    return SimpleNamespace(
-        comm=MPI.COMM_SELF, bodies=[body], layout=layout, constraint=SimpleNamespace(**of)
-    )
+    return SimpleNamespace(comm=MPI.COMM_SELF, bodies=[body], layout=layout, constraint=SimpleNamespace(**of))
 
 
 def test_masters_are_massless_too_if_that_leaves_a_body():
@@ -135,8 +134,8 @@ def exact_tip(t):
     return np.interp(t, [0, 1, 2, 3], [0.5, 0, 0, 0.5])
 
 
-@pytest.mark.parametrize(("steps_per_cell", "until"), [(1.4, 3.0), (2.5, 1.6)])
-def test_bar_impact(steps_per_cell, until):
+@pytest.mark.parametrize(("steps_per_cell", "until", "ringing"), [(1.4, 3.0, 0.002), (2.5, 1.6, 0.06)])
+def test_bar_impact(steps_per_cell, until, ringing):
     """The pressure is 1/2 throughout: no overshoot, no ringing, nothing gained, hardly anything lost.
 
     steps_per_cell: in which a wave crosses a cell. With many, waves of a few cells' length run ahead of the one that
@@ -149,11 +148,11 @@ def test_bar_impact(steps_per_cell, until):
     assert np.abs(u - 0.5 * (1 - body.points[0, : body.owned])).max() < 0.03
     assert force[t < until].max() < 0.5 * 1.05
     assert force[touching].mean() == pytest.approx(0.5, rel=0.04)
-    assert force[touching].std() < 0.02
+    assert force[touching].std() < ringing
     assert not force[(t < 0.9) | (t > 2.1)].any()
     # the stress at the free end is relieved in the first step, and nothing is gained afterwards
-    assert energy.max() < 0.125 * (1 + 1e-6)
-    assert energy == pytest.approx(energy[0], rel=2e-3)
+    assert energy.max() < energy[0] * (1 + 1e-4) < 0.125
+    assert energy[-1] == pytest.approx(energy[0], rel=2e-3)
 
 
 def test_bar_impact_converges():
@@ -171,3 +170,50 @@ def test_newton_with_damping_and_no_mass():
     info = structure.solve()
     assert info.iterations <= 3, info.residuals
     assert info.residuals[-1] < 1e-9 * info.residuals[0]
+
+
+# ------------------------------------------------------------------------------------------- two bars, non-matching
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slave", [0, 1])
+def test_two_bars_in_3d(slave):
+    """Bars of length 1 that meet with 1/2 each: pressure 1/2 for the time 2, then they fly apart as they came.
+
+    2 by 2 cells against 3 by 3, no lateral contraction; the pressure is the same at all nodes.
+    """
+    cells, side, gap = 40, 0.3, 0.05
+    dt = 1.0 / cells / 1.4
+    bodies = []
+    for name, across, start in (("left", 2, 0.0), ("right", 3, 1.0 + gap * SIZE)):
+        mesh = shapes.box([1, side, side], [cells, across, across])
+        mesh = replace(mesh, points=mesh.points + np.array([start, 0.0, 0.0]))
+        flies = (constant((0.5 if name == "left" else -0.5) * SIZE), constant(0), constant(0))
+        bodies.append(make_body(name, mesh, StVenantKirchhoff(mu=0.5, lmbda=0.0, density=1.0), initial_velocity=flies))
+    faces = [("left", "right"), ("right", "left")]
+    structure, contact = make_contact(bodies, [(faces[slave], faces[1 - slave])], time=Dynamics(TRAPEZOIDAL))
+    structure.initialise(0.0, dt)
+    weight, x = structure.time.force_weight, bodies[0].points[0, : bodies[0].owned]
+    at_end = 3 * np.flatnonzero(x > 1 - 1e-9)
+    rows = []
+    for step in range(round(2.4 / dt)):
+        structure.begin_step(step * dt, dt)
+        structure.solve()
+        structure.end_step()
+        force = -(weight * structure.now.constraint + (1 - weight) * structure.old.constraint)[at_end]
+        energy = (structure.energy.kinetic + structure.energy.internal) / side**2
+        spread = np.ptp(contact.z[contact.active_set.active, 0]) if contact.active_set.active.any() else 0.0
+        rows.append([(step + 1) * dt, force.sum() / side**2 / SIZE, energy / SIZE**2, spread / SIZE])
+    t, pressure, energy, spread = np.array(rows).T
+    touching = (t > gap + 0.1) & (t < gap + 1.9)
+    assert pressure.max() < 0.5 * 1.05
+    assert pressure[touching].mean() == pytest.approx(0.5, rel=0.02)
+    assert pressure[touching].std() < 0.01
+    assert spread.max() < 1e-6
+    assert not pressure[t > gap + 2.1].any()
+    assert energy[0] == pytest.approx(0.25, rel=1e-9)
+    assert energy.max() < 0.25 * 1.002
+    assert energy[-1] == pytest.approx(0.25, rel=0.01)
+    momentum = structure.mass.createVecs("right")
+    momentum.array[:] = structure.now.v
+    assert abs((structure.mass * momentum).array[::3].sum()) < 1e-10 * side**2 * SIZE
