@@ -182,7 +182,7 @@ class Structure:
     def end_step(self) -> None:
         """Accept the step."""
         if self.constraint is not None:
-            self.constraint.end_step(self.time.constraint_weight)
+            self.constraint.end_step(self.time.force_weight)
         self.energy.add_step(self)
 
     def _set_time(self, t: float) -> None:
