@@ -46,7 +46,7 @@ class Coupled:
     def predict(self, t: float) -> None:
         """First guess of the fields at t: places on a parabola, unless the structure has a guess of its own.
 
-        Cut the grid at the old place before that: cells that the surface leaves stay active for the step.
+        Cut the grid at the old place before that: cells that the surface leaves keep their ghost penalty for the step.
         """
         structure = self.structure
         self.fluid.predict()

@@ -158,10 +158,7 @@ class Monolithic:
             return Blocks(K, into_structure, into_fluid, A)
 
     def _coupling_blocks(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
-        """T^T alpha C, -w C^T S T and w alpha M as distributed matrices; rows of held fluid unknowns are empty.
-
-        T: nodal values of the fluid by its unknowns (solvers.fluid.dependent).
-        """
+        """alpha C, -w C^T S and w alpha M as distributed matrices; rows of held fluid dofs are empty."""
         fluid, structure, surface = self.coupled.fluid, self.coupled.structure, self.coupled.interface
         alpha, weight = fluid.difference.alpha, structure.time.force_weight
         operator = fluid.system.interface
@@ -176,17 +173,14 @@ class Monolithic:
         moved[fluid.vertices_of([s.name for s in surface.surfaces])] = surface.dofs
         flow, moved = fluid.unknowns.global_dofs, moved.ravel()
         rows, columns = operator.places
-        elastic = moved[columns] >= 0
+        held, elastic = fluid.held_everywhere()[rows], moved[columns] >= 0
         own, own_flow = structure.layout.size, fluid.unknowns.owned
         of_flow, of_structure = flow[rows], moved[columns]
-        into_fluid = from_entries(self.comm, (own_flow, own), of_flow[elastic], of_structure[elastic], into[elastic])
+        kept = elastic & ~held
+        into_fluid = from_entries(self.comm, (own_flow, own), of_flow[kept], of_structure[kept], into[kept])
         into_structure = from_entries(
             self.comm, (own, own_flow), of_structure[elastic], of_flow[elastic], -weight * back[elastic]
         )
-        T = fluid.system.combinations.matrix
-        if T is not None:
-            into_fluid, into_structure = T.transposeMatMult(into_fluid), into_structure.matMult(T)
-        into_fluid.zeroRows((into_fluid.getOwnershipRange()[0] + np.flatnonzero(fluid.held)).astype(PETSc.IntType), 0.0)
         rows, columns = (moved[places] for places in operator.surface_places)
         elastic = (rows >= 0) & (columns >= 0)
         mass = from_entries(self.comm, (own, own), rows[elastic], columns[elastic], weight * load[elastic])

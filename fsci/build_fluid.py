@@ -18,6 +18,7 @@ from fsci.case_meshes import read_rigid_body, require_inside_period
 from fsci.rigid_motion import rigid_motion
 from solvers.fluid import probes
 from solvers.fluid.field import Body, Fluid, SolverSettings
+from solvers.fluid.forms import ELASTIC, Penalties
 from solvers.fluid.grid import Grid
 from solvers.fluid.inside import PointInBody
 from solvers.fluid.patches import Patch, UncoveredFaces, Value
@@ -38,7 +39,8 @@ def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Body]
     assert case.fluid is not None
     settings, linear = case.fluid, case.solver.linear
     solver = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
-    grid, flow, patches = Grid(settings.grid.planes), _flow(settings), _patches(settings)
+    elastic = any(body.motion is None for body in bodies)
+    grid, flow, patches = Grid(settings.grid.planes), _flow(settings, elastic=elastic), _patches(settings)
     try:
         return Fluid(comm, grid, flow, patches, bodies, solver, timer)
     except UncoveredFaces as error:
@@ -46,7 +48,7 @@ def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Body]
         raise case.error(("fluid", "patches"), f"no patch is on part of the box's boundary: {faces}") from None
 
 
-def _flow(settings: Section) -> FlowSettings:
+def _flow(settings: Section, *, elastic: bool) -> FlowSettings:
     return FlowSettings(
         density=settings.density,
         viscosity=settings.viscosity,
@@ -55,6 +57,7 @@ def _flow(settings: Section) -> FlowSettings:
         scheme=settings.scheme,
         body_force=_body_force(settings),
         initial_velocity=settings.initial_velocity,
+        penalties=ELASTIC if elastic and settings.element == "q2q1" else Penalties(),
     )
 
 

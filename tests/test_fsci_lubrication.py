@@ -25,14 +25,14 @@ def test_cylinder_second_order(gap):
 
 
 def test_cylinder_second_order_below_a_cell():
-    """Within 2 % at 0.4 cells; 10 % are passed before 0.2 cells: the wall is felt less and less."""
-    assert drag_ratio(2, 0.02, H, "q2q1") == pytest.approx(1.0, abs=0.02)
-    assert drag_ratio(2, 0.01, H, "q2q1") == pytest.approx(0.806, abs=0.02)
+    """10 % are passed between 0.4 and 0.2 cells: the wall is felt less and less."""
+    assert drag_ratio(2, 0.02, H, "q2q1") == pytest.approx(0.915, abs=0.02)
+    assert drag_ratio(2, 0.01, H, "q2q1") == pytest.approx(0.644, abs=0.03)
 
 
-@pytest.mark.parametrize(("gap", "ratio"), [(0.5, 1.002), (0.2, 1.021), (0.1, 1.068), (0.05, 1.306), (0.01, 0.683)])
+@pytest.mark.parametrize(("gap", "ratio"), [(0.5, 1.003), (0.2, 1.023), (0.1, 1.078), (0.05, 1.372), (0.01, 0.643)])
 def test_cylinder_first_order(gap, ratio):
-    """Known and documented: 2 % with four cells in the gap, 7 % with two, 10 % are passed at 1.8 cells."""
+    """Known and documented: 2 % with four cells in the gap, 8 % with two, 10 % are passed at 1.8 cells."""
     assert drag_ratio(2, gap, H, "q1q1") == pytest.approx(ratio, abs=0.01)
 
 

@@ -27,7 +27,7 @@ def leak(fluid: Fluid) -> float:
 class Balances:
     """Sums of all momentum equations, tested with a constant velocity and with that of the fluid.
 
-    Stabilisation and extension vanish in the first sum; what they take from the second is lost by the method.
+    Stabilisation and ghost penalty vanish in the first sum; what they take from the second is lost by the method.
     """
 
     def __init__(self, fluid: Fluid):
@@ -41,7 +41,7 @@ class Balances:
     def __call__(self) -> tuple[Array, float]:
         """(force [N] of the fluid on all bodies together, shape (dim,); power [W] that the method takes) (collective).
 
-        Force: that on walls and patches less int rho (u_t + u . grad u) - f. Power, by stabilisation, extension and
+        Force: that on walls and patches less int rho (u_t + u . grad u) - f. Power, by stabilisation, ghost penalty and
         slip at the bodies: that of walls and patches less what bodies get and
         int (rho (u_t + u . grad u) - f) . u + 2 mu eps(u) : eps(u).
         """

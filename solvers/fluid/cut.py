@@ -17,9 +17,6 @@ from solvers.fluid.surface import Motion, normals
 #: Share of a cell (of its face) below which fluid (surface) in it is rounding error of the geometry.
 NOTHING = 1e-10
 
-#: Layers around the cells of a process, besides those of the strip, that it cuts too: roots are found there.
-MARGIN = 4
-
 Cells = NDArray[np.int32]
 
 
@@ -30,11 +27,9 @@ class Cut:
     uncut: Cells  #: cells full of fluid
     cut: Cells  #: cells with a piece of surface, or partly solid
     strip: Cells  #: solid cells that the flow is extended to
+    ghost_faces: NDArray[np.int32]  #: faces between active cells, one of them cut or of the strip
     shut: Cells  #: solid cells where surfaces touch each other or the box's boundary
-    alive: NDArray[np.bool_]  #: active cells of the box, near those that this process holds
-    wet: NDArray[np.bool_]  #: those of them that are not of the strip
-    share: Array  #: share of fluid in these cells of the box, zero elsewhere
-    depth: int  #: cells from the strip's farthest cell to a cut one
+    reach: NDArray[np.bool_]  #: local cells that the surfaces may soon cut or uncover
     fluid: Array  #: int_fluid L_q dx / (w_q |K|) on cut cells, shape (cut, points)
     fraction: Array  #: share of fluid in each local cell
     pieces: Pieces
@@ -50,8 +45,8 @@ class Cut:
 class Cutter:
     """Cuts one grid again and again; `points` (n,) are the 1D points of the rule on cut cells.
 
-    Within a step no cell that was active becomes inactive: iterates that go to and fro across a cell's face would
-    otherwise solve two systems in turn and never settle.
+    Within a step no cell leaves the ghost penalty that once was under it: iterates that go to and fro across a cell's
+    face would otherwise solve two systems in turn and never settle.
     """
 
     def __init__(self, grid: DistributedGrid, points: Array):
@@ -60,25 +55,22 @@ class Cutter:
         own[grid.numbers] = True
         self._own = grid.grid.as_box(own)
         self._special = np.zeros(grid.grid.size, dtype=bool)
-        self._depth = 0
 
     def begin_step(self) -> None:
         """Forget where the surfaces have been."""
         self._special[:] = False
-        self._depth = 0
 
     def __call__(
-        self, facets: NDArray[np.int64], motion: Motion, reach: float, wet: NDArray[np.bool_] | None = None
+        self, facets: NDArray[np.int64], motion: Motion, layers: int, wet: NDArray[np.bool_] | None = None
     ) -> Cut:
-        """Cells and weights for the surfaces; cells behind them that are nearer than `reach` [m] are kept active.
+        """Cells and weights for the surfaces, with this many layers of cells behind them kept active.
 
         Facets that are not `wet`, and those on the boundary of the box, only close the solid.
         """
         grid, box = self.grid, self.grid.grid
         if not len(facets):
             return self._whole(facets, motion)
-        self._depth = max(self._depth, box.layers_within(reach))
-        wanted = _grow(self._own, self._depth + MARGIN)
+        wanted = _grow(self._own, layers + 2)
         moments = kernels.moments(box.edges, self.points, motion.x, facets, wanted.ravel(order="F"))
         normal = -normals(motion.x, facets)
         off = self._off_boundary(motion.x[facets])
@@ -89,13 +81,14 @@ class Cutter:
         touched = counts[moments.piece_facet] & (cells >= 0)
         is_cut, in_use = self._cut_cells(moments, cells, touched)
         solid = (moments.fraction >= 1.0 - NOTHING) & ~is_cut  # surfaces that touch keep their cells: they may part
-        near = box.near(box.as_box(is_cut), reach).ravel(order="F")
+        near = _grow(box.as_box(is_cut), layers).ravel(order="F") if layers else is_cut
         strip = solid & (near | self._special)
         self._special |= is_cut | strip
         shut = solid & (self._facing(moments, counts, normal) | self._covered(motion.x[facets[~off]]))
         local_cut, local_strip = is_cut[grid.numbers], strip[grid.numbers]
-        alive = (~solid | strip) & np.isfinite(moments.fraction)
-        active = alive[grid.numbers]
+        active = ~solid[grid.numbers] | local_strip
+        faces, sides = grid.interior_faces
+        special = self._special[grid.numbers][sides].any(axis=1) & active[sides].all(axis=1)
         cut = np.flatnonzero(local_cut).astype(np.int32)
         fluid = self._fluid_weights(moments, cut)
         row_of = np.full(box.size, -1, dtype=np.int64)
@@ -110,11 +103,9 @@ class Cutter:
             uncut=np.flatnonzero(active & ~local_cut & ~local_strip).astype(np.int32),
             cut=cut,
             strip=np.flatnonzero(local_strip).astype(np.int32),
+            ghost_faces=faces[special],
             shut=np.flatnonzero(shut[grid.numbers]).astype(np.int32),
-            alive=alive,
-            wet=alive & ~strip,
-            share=np.where(alive & ~strip, np.clip(1.0 - moments.fraction, 0.0, 1.0), 0.0),
-            depth=self._depth,
+            reach=self._reach(box.as_box(self._special), layers),
             fluid=fluid,
             fraction=1.0 - moments.fraction[grid.numbers],
             pieces=pieces,
@@ -142,16 +133,18 @@ class Cutter:
             none,
             none,
             none,
-            np.ones(self.grid.grid.size, dtype=bool),
-            np.ones(self.grid.grid.size, dtype=bool),
-            np.ones(self.grid.grid.size),
-            0,
+            none,
+            np.zeros(len(everything), dtype=bool),
             np.empty((0, points)),
             np.ones(len(everything)),
             pieces,
             facets,
             motion,
         )
+
+    def _reach(self, special: NDArray[np.bool_], layers: int) -> NDArray[np.bool_]:
+        """One layer more than the strip has, none around bodies at rest."""
+        return _grow(special, 1 if layers else 0).ravel(order="F")[self.grid.numbers]
 
     def _cut_cells(self, moments, cells, touched) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Box cells that are cut, and those whose pieces of surface are more than slivers."""

@@ -151,9 +151,9 @@ class Fluid:
         """Remember the state at t; boundary, loads and moving bodies at t + dt."""
         self._t, self.dt = t + dt, dt
         self.cutter.begin_step()
-        self.system.combinations.begin_step()
         self.difference = self.history.begin_step(dt)
-        self.system.set_time(t + dt, self.difference, self.history.rate(self.difference))
+        rate, unknown = self.history.rate(self.difference), self.history.unknown(self.difference)
+        self.system.set_time(t + dt, self.difference, rate, unknown)
         self.flow[self.boundary.dofs] = self.boundary.velocity(t + dt)
         self.system.set_scales(self.history.old.velocity)
         self._fresh, self._largest = True, 0.0
@@ -185,7 +185,7 @@ class Fluid:
         self._motions, self._fresh = motions, True
         with self.timer("cut"):
             facets, motion = together([body.surface for body in self.bodies], motions, self.dim)
-            cut = self.cutter(facets, motion, self._reach(motion), self._wet)
+            cut = self.cutter(facets, motion, self._layers(motion), self._wet)
         with self.timer("weights"):
             self.system.set_cut(cut)
             self._check_strip(cut)
@@ -194,16 +194,16 @@ class Fluid:
             self.held = np.zeros(self.unknowns.owned, dtype=bool)
             prescribed = self.boundary.dofs[self.boundary.dofs < self.unknowns.owned]
             self.held[prescribed] = True
-            self.held |= ~self.system.active_dofs[: self.unknowns.owned] | self.system.combinations.eliminated
+            self.held |= ~self.system.active_dofs[: self.unknowns.owned]
             self._hold_pressure()
 
-    def _reach(self, motion: Motion) -> float:
-        """How far behind the surface [m] the next two steps may uncover cells."""
+    def _layers(self, motion: Motion) -> int:
+        """Cells behind the surface that the next two steps may uncover."""
         if self.settings.steady or all(body.rests for body in self.bodies):
-            return 0.0
+            return 0
         fastest = float(np.linalg.norm(motion.v, axis=1).max(initial=0.0))
         steps = 2.0 if self.settings.scheme == "bdf2" else 1.0
-        return max(1.25 * steps * fastest * self.dt, float(np.finfo(float).tiny))
+        return max(1, math.ceil(1.25 * steps * fastest * self.dt / self._smallest))
 
     def _check_strip(self, cut: Cut) -> None:
         blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)
@@ -302,11 +302,11 @@ class Fluid:
         return 2.0**self.dim * rounding_error(matrix, values)
 
     def update(self, increment: Array) -> float:
-        """Add an increment of the owned unknowns; its size relative to the flow."""
-        self._increment = self.system.combinations.values(increment)
+        """Add an increment of the owned dofs; its size relative to the flow."""
+        self._increment = increment.copy()
         self._add(self._increment)
         size = self._norm(self._diagonal * self.flow[: self.unknowns.owned])
-        return self._norm(self._diagonal * increment) / size if size > 0.0 else 0.0
+        return self._norm(self._diagonal * self._increment) / size if size > 0.0 else 0.0
 
     def _far(self) -> bool:
         """The iterate of a steady flow is not yet where Newton's method converges."""
@@ -357,6 +357,12 @@ class Fluid:
         place = tuple(nodes.points[index].tolist()) if rank == self.comm.rank else None
         return self.comm.bcast(place, root=rank)
 
+    def held_everywhere(self) -> NDArray[np.bool_]:
+        """`held` for all local dofs, ghosts too (collective)."""
+        mark = np.zeros(self.unknowns.local)
+        mark[: self.unknowns.owned] = self.held
+        return self._shared(mark) > 0.5
+
     # ---------------------------------------------------------------------------------------------- reactions
 
     def vertices_of(self, names: Sequence[str]) -> NDArray[np.int64]:
@@ -386,6 +392,7 @@ class Fluid:
             "pressure": nodal(self.flow, pressure),
             "old_velocity": nodal(self.history.old.velocity, velocity),
             "known": Nodal(known[: velocity.owned].astype(float), velocity.numbers[: velocity.owned]),
+            "room": Nodal(self.system.room(), self.grid.numbers[: self.grid.owned]),
             "steps": list(self.history.steps),
             "time": self._t,
             "linear_solver": self.ladder.rung,
@@ -409,8 +416,8 @@ class Fluid:
         self.history.steps, self._t = tuple(state["steps"]), state["time"]
         self.ladder.rung = state["linear_solver"]
         self.difference = time.STEADY
+        self.system.set_room(state["room"].values)
         self.cutter.begin_step()
-        self.system.combinations.begin_step()
         kept = self.flow.copy()
         self.move({name: Motion(m["x"], m["v"]) for name, m in state["motion"].items()})
         self.flow[:] = kept

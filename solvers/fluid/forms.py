@@ -1,4 +1,4 @@
-"""The equations of the flow on a cut grid: bulk, stabilisation, interface, outer faces.
+"""The equations of the flow on a cut grid: bulk, stabilisation, interface, ghost penalty, outer faces.
 
 sigma(u, p) = 2 mu eps(u) - p I, n outward normal of the fluid, g velocity of the interface, h edge length of the cell.
 The time derivative is alpha u - history, alpha = 0 if the flow is steady; `a` is the velocity that scales
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import ufl
-from ufl import div, dot, grad, inner, outer, sqrt, sym, tr
+from ufl import avg, div, dot, grad, inner, outer, sqrt, sym, tr
 
 Expr = Any
 
@@ -28,7 +28,17 @@ class Penalties:
     nitsche: float = 35.0  #: gamma of the viscous Nitsche penalty, times C_T
     mass: float = 35.0 / 40.0  #: normal Nitsche penalty rho h alpha
     convection: float = 35.0 / 6.0  #: normal Nitsche penalty rho |a|
-    extension: float = 0.1  #: of the distance of dependent nodes to their extension; results do not depend on it
+    ghost_viscous: float = 0.1
+    ghost_mass: float = 3e-3
+    ghost_convection: float = 0.01
+    ghost_pressure: float = 0.05
+    ghost_second: float = 0.05  #: second derivatives, relative to first ones
+    ghost_mass_second: float = 0.05  #: the same of the mass
+    ghost_memory: float = 0.9  #: share of its past that the mass keeps per step: with 1, kinks stay where nothing flows
+
+
+#: Of q2q1 around elastic bodies: with less, slivers that these uncover keep Newton's method from converging.
+ELASTIC = Penalties(ghost_mass=2e-2, ghost_mass_second=1.0)
 
 
 @dataclass(frozen=True)
@@ -52,6 +62,19 @@ class Flow:
         """Edge lengths [m] of an axis-aligned cell."""
         jacobian = ufl.Jacobian(self.mesh)
         return [jacobian[i, i] for i in range(ufl.Jacobian(self.mesh).ufl_shape[0])]
+
+
+@dataclass(frozen=True)
+class GhostScales:
+    """What the ghost penalty takes from each cell.
+
+    phi_b = (|a| h)^2 / phi is small where viscosity or the time step rule. Were it phi, the term would be an artificial
+    viscosity along bodies that grows as steps get smaller.
+    """
+
+    phi: Expr  #: nu + |a| h + alpha h^2 [m^2/s]
+    carried: Expr  #: phi_b [m^2/s]
+    known: Expr  #: 1 where the history is known, else 0
 
 
 def eps(u: Expr) -> Expr:
@@ -113,6 +136,43 @@ def interface(flow: Flow, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> E
         - q * tr(carried)
         + dot(dot(weights.penalty, u), v)
     )
+
+
+def ghost_penalty(flow: Flow, factors: Penalties, scales: GhostScales, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+    """Integrand over faces of gamma_p h^3 / (rho phi) [d_n p] [d_n q] and
+
+    sum_j h^(2j-1) (c_j (gamma_v mu + gamma_b rho phi_b) [d_n^j u] + m_j gamma_t rho h^2 [d_n^j u_t]) [d_n^j v],
+    c_1 = m_1 = 1, u_t = alpha u - gamma_m history.
+
+    So the share of the mass is one of the acceleration, as in a mass matrix. Were it one of alpha u (gamma_m = 0), as
+    it is where no history is known, it would take a power from the flow that grows as steps get smaller.
+    Source of mass matrices with it: Sticko, Kreiss, J. Sci. Comput. 80 (2019), doi:10.1007/s10915-019-01004-2.
+    """
+    n = ufl.FacetNormal(flow.mesh)
+    h = avg(abs(sum(n[i] ** 2 * size for i, size in enumerate(flow.sizes))))
+    factor, mass = factors.ghost_viscous * flow.mu, 0.0
+    if not flow.steady:
+        mass = factors.ghost_mass * flow.rho * h**2
+    if flow.convection:
+        factor += factors.ghost_convection * flow.rho * avg(scales.carried)
+    remembered = factors.ghost_memory * scales.known("+") * scales.known("-")
+    terms = factors.ghost_pressure * h**3 / (flow.rho * avg(scales.phi)) * _jump(p, n, 1) * _jump(q, n, 1)
+    for order in range(1, flow.degree + 1):
+        c, m = (1.0, 1.0) if order == 1 else (factors.ghost_second, factors.ghost_mass_second)
+        change = flow.alpha * _jump(u, n, order) - remembered * _jump(flow.history, n, order)
+        terms += h ** (2 * order - 1) * dot(c * factor * _jump(u, n, order) + m * mass * change, _jump(v, n, order))
+    return terms
+
+
+def _jump(field: Expr, n: Expr, order: int) -> Expr:
+    """Jump of the order-th normal derivative across a face, counted along the normal of its '+' side."""
+    derivative = field
+    for _ in range(order):
+        derivative = grad(derivative)
+    jumped = derivative("+") - derivative("-")
+    for _ in range(order):
+        jumped = dot(jumped, n("+"))
+    return jumped
 
 
 def traction(t: Expr, v: Expr) -> Expr:

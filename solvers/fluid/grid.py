@@ -61,28 +61,6 @@ class Grid:
         """Values per cell as an array with one axis per direction (a view)."""
         return values.reshape(self.shape, order="F")
 
-    def _windows(self, axis: int, distance: float) -> tuple[Indices, Indices]:
-        """First and last cell of a row that have a gap shorter than a distance to each cell of the row."""
-        edge, cells = self.edges[axis], np.arange(self.shape[axis])
-        if distance <= 0.0:
-            return cells, cells
-        first = np.searchsorted(edge[1:], edge[:-1] - distance, side="right")
-        last = np.searchsorted(edge[:-1], edge[1:] + distance, side="left") - 1
-        return np.maximum(np.minimum(first, cells - 1), 0), np.minimum(np.maximum(last, cells + 1), cells[-1])
-
-    def layers_within(self, distance: float) -> int:
-        """Most cells that a distance [m] reaches into beyond a cell, in any direction."""
-        windows = [self._windows(axis, distance) for axis in range(self.dim)]
-        return max(int(np.maximum(j - np.arange(len(j)), np.arange(len(i)) - i).max()) for i, j in windows)
-
-    def near(self, marked: NDArray[np.bool_], distance: float) -> NDArray[np.bool_]:
-        """Cells with a gap shorter than a distance [m] to a marked one in every direction; arrays as of `as_box`."""
-        for axis in range(self.dim):
-            first, last = self._windows(axis, distance)
-            count = np.insert(np.cumsum(marked, axis=axis), 0, 0, axis=axis)
-            marked = np.take(count, last + 1, axis=axis) > np.take(count, first, axis=axis)
-        return marked
-
 
 class DistributedGrid:
     """The part of the grid that this process holds: its cells, one layer of ghost cells, and their faces."""

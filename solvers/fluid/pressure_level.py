@@ -20,8 +20,8 @@ class Hold:
     """A pocket whose pressure is held."""
 
     dofs: NDArray[np.int64]  #: owned dofs with identity rows, none or one
-    inside: Mask  #: owned free pressure dofs of the pocket
-    shares: Array  #: of its fluid, by unknowns; their sum over free dofs on all processes is one
+    inside: Mask  #: owned pressure dofs of the pocket
+    shares: Array  #: of its fluid, at owned dofs; their sum on all processes is one
     keeps_level: bool  #: the pressure stays what it was when the pocket closed; else zero
     elastic: bool  #: a surface that another field moves bounds the pocket
 
@@ -48,16 +48,15 @@ def _hold(system: FlowSystem, pocket: Pocket, sizes: Array, *, keep_level: bool)
     unknowns, comm = system.unknowns, system.grid.comm
     nodes, last = unknowns.pressure, np.iinfo(np.int64).max
     dofs = nodes.dofs[: nodes.owned, 0]
-    of_pocket = np.zeros(unknowns.owned, dtype=bool)
-    of_pocket[dofs] = system.dofs_of(np.flatnonzero(pocket.cells).astype(np.int32))[dofs]
-    inside = of_pocket & ~system.combinations.dependent[: unknowns.owned]
+    inside = np.zeros(unknowns.owned, dtype=bool)
+    inside[dofs] = system.dofs_of(np.flatnonzero(pocket.cells).astype(np.int32))[dofs]
     numbers = np.where(inside[dofs], nodes.numbers[: nodes.owned], last)
     had_pressure = np.where(system.flow.x.array[dofs] != 0.0, numbers, last)
     choices = [had_pressure, numbers] if keep_level else [numbers]
     smallest = [comm.allreduce(int(choice.min(initial=last)), op=MPI.MIN) for choice in choices]
     best = next((number for number in smallest if number < last), last)
-    shares = np.where(of_pocket, sizes, 0.0)
-    total = comm.allreduce(float(shares[inside].sum()))
+    shares = np.where(inside, sizes, 0.0)
+    total = comm.allreduce(float(shares.sum()))
     at = dofs[nodes.numbers[: nodes.owned] == best].astype(np.int64)
     return Hold(at, inside, shares / total if total > 0.0 else shares, keep_level, pocket.elastic)
 

@@ -16,10 +16,9 @@ from solvers import fem
 from solvers.api import Array
 from solvers.fluid import forms
 from solvers.fluid.cut import Cut
-from solvers.fluid.dependent import Combinations
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.interface import Interface
-from solvers.fluid.matrix import create_matrix
+from solvers.fluid.matrix import Pattern, choose_pattern, create_matrix, fits, pattern_of
 from solvers.fluid.patches import Boundary, Value
 from solvers.fluid.pieces import Pieces
 from solvers.fluid.space import Unknowns
@@ -68,18 +67,16 @@ class FlowSystem:
         self.flow, self._history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
         self._alpha = fem.constant(domain, 0.0)
         self._newton = fem.constant(domain, 1.0)
+        self._phi, self._carried, self._known = (fem.function(fem.cellwise_space(domain)) for _ in range(3))
         self.weights = Weights(grid, settings.degree)
         self._compile()
+        #: the ghost penalty's share of the residual is a matrix times the flow, less what the history has of it
+        self._remembered = np.zeros(unknowns.local)
         self._out = np.zeros(unknowns.local)
-        #: nodal values by unknowns
-        self.combinations = Combinations(unknowns)
-        self._penalty = np.zeros(unknowns.owned)  #: of the unknowns of dependent nodes
-        self._plain: PETSc.Mat | None = None  #: couplings of nodal values in cells with dependent nodes
-        self._combined: PETSc.Mat | None = None  #: the same of unknowns
         self._matrix: PETSc.Mat | None = None
-        self._cells: list[NDArray[np.int32]] = []  #: without dependent nodes, and with some, of the present pattern
-        self._fresh_pattern = True
-        self.active_dofs = np.zeros(unknowns.local, dtype=bool)  #: local dofs with a value that means something
+        self._ghost: PETSc.Mat | None = None
+        self._pattern: Pattern | None = None
+        self._penalised: NDArray[np.int32] | None = None  #: faces that the ghost penalty is assembled for
         self.cut: Cut | None = None
 
     # ------------------------------------------------------------------------------------------------- the forms
@@ -115,6 +112,12 @@ class FlowSystem:
         if self.with_bodies:
             on_interface = forms.interface(flow, self.weights, u, p, v, q)
             cell_forms.append(self.weights.fluid * everywhere * dx_cut + on_interface * dx_cut)
+            dS = fem.measure(domain, "dS", 2 * settings.degree)
+            du, dp = unknowns.parts(trial)
+            scales = forms.GhostScales(self._phi, self._carried, self._known)
+            ghost = forms.ghost_penalty(flow, settings.penalties, scales, du, dp, v, q) * dS
+            self._ghost_penalty, remembered = fem.Integral(domain, ufl.lhs(ghost)), ufl.rhs(ghost)
+            self._ghost_history = None if remembered.empty() else fem.Integral(domain, remembered)
         self._residuals = [fem.Integral(domain, form) for form in cell_forms]
         self._tangents = [fem.Integral(domain, ufl.derivative(form, self.flow, trial)) for form in cell_forms]
         self._compile_outer_faces(v, u, trial)
@@ -123,7 +126,8 @@ class FlowSystem:
     def _integrals(self) -> list[fem.Integral]:
         found = [*self._residuals, *self._tangents, *(form for *_, form in self._tractions)]
         found += [self._outflow_form, self._outflow_tangent] if self._outflow else []
-        return found
+        ghost = [self._ghost_penalty, self._ghost_history] if self.with_bodies else []
+        return found + [form for form in ghost if form is not None]
 
     def _compile_outer_faces(self, v, u, trial) -> None:
         domain, ds = self.grid.domain, fem.measure(self.grid.domain, "ds", 2 * self.settings.degree + 1)
@@ -143,10 +147,11 @@ class FlowSystem:
 
     # ------------------------------------------------------------------------------------------------- a new step
 
-    def set_time(self, t: float, difference: Difference, history: Array) -> None:
-        """Loads at time t; u_t = alpha u - history [m/s^2], local dofs."""
+    def set_time(self, t: float, difference: Difference, history: Array, unknown: NDArray[np.bool_]) -> None:
+        """Loads at time t; u_t = alpha u - history [m/s^2], local dofs, `unknown` where no step has found them."""
         self._alpha.value = difference.alpha
         self._history.x.array[:] = history
+        self._known.x.array[:] = ~unknown[self.unknowns.cell_velocity].any(axis=(1, 2))
         nodes = self.unknowns.velocity
         if self.settings.body_force is not None:
             _set_velocity(self._force, nodes, self.settings.body_force, t)
@@ -158,53 +163,32 @@ class FlowSystem:
     def set_scales(self, velocity: Array) -> None:
         """Take local velocity dofs [m/s] that scale stabilisation and penalties from now on (collective)."""
         settings, unknowns = self.settings, self.unknowns
-        self._scale_velocity.x.array[:] = velocity
+        self._scale_velocity.x.array[:], self._penalised = velocity, None
+        h = self.grid.sizes.min(axis=1)
         speed = np.linalg.norm(velocity[unknowns.velocity.dofs], axis=1)
         by_dof = np.zeros(unknowns.local)
         by_dof[unknowns.velocity.dofs[:, 0]] = speed
-        self._speeds = speed if settings.convection else np.zeros(len(speed))
         dofs = unknowns.cell_blocks if unknowns.block_size == 1 else unknowns.cell_blocks * unknowns.block_size
-        self.speed = by_dof[dofs].max(axis=1) if settings.convection else np.zeros(len(self.grid.numbers))
+        self.speed = by_dof[dofs].max(axis=1) if settings.convection else np.zeros(len(h))
         self.fastest = float(self.grid.comm.allreduce(self.speed.max(initial=0.0), op=MPI.MAX))
+        carried = self.speed * h
+        phi = settings.viscosity / settings.density + carried + float(self._alpha.value) * h**2
+        self._phi.x.array[:], self._carried.x.array[:] = phi, carried**2 / phi
 
     def set_cut(self, cut: Cut) -> None:
-        """Take a cut; cells, faces and the matrix follow (collective)."""
-        before, self.cut, grid = self.cut, cut, self.grid
-        if self._combined is not None:
-            self._combined.destroy()
-            self._combined = None
+        """Take a cut; cells, faces and the matrix follow."""
+        self.cut, grid = cut, self.grid
         active = np.zeros(len(grid.numbers), dtype=bool)
         active[cut.active] = True
-        was_active = None if before is None else self.active_dofs
         self.active_dofs = self.dofs_of(cut.active)
-        pressure = self.unknowns.pressure.dofs[:, 0]
-        self.active_dofs[pressure] = self.dofs_of(np.concatenate([cut.uncut, cut.cut]))[pressure]
-        new_pattern = self.combinations.set(cut, self.boundary.dofs) if self.with_bodies else before is None
-        self.active_dofs &= ~self.combinations.lost
-        self._settle(was_active)
         cells = [some[some < grid.owned] for some in (cut.uncut, cut.cut)]
-        dependent = self._has_dependent_nodes(cells[1])
-        self._residual_forms = [form.on(cell=some) for form, some in zip(self._residuals, cells, strict=False)]
-        free = [cells[0], cells[1][~dependent]]
-        self._tangent_forms = [form.on(cell=some) for form, some in zip(self._tangents, free, strict=False)]
-        self._dependent_forms = [self._tangents[-1].on(cell=cells[1][dependent])] if self.with_bodies else []
-        self._add_outer_faces(active, cells[1][dependent])
-        cells = [np.sort(np.concatenate(free)), cells[1][dependent]]
-        same = self._matrix is not None and not new_pattern and all(map(np.array_equal, cells, self._cells))
-        if not grid.comm.allreduce(same, op=MPI.LAND):
-            self._cells, self._fresh_pattern = cells, True
-
-    def _settle(self, was_active: NDArray[np.bool_] | None) -> None:
-        """Values of eliminated nodes, and first ones of nodes that were not there, are what the extension says."""
-        owned = self.unknowns.owned
-        fresh = np.zeros(owned, dtype=bool) if was_active is None else ~was_active[:owned]
-        self.flow.x.array[:owned] = self.combinations.settle(self.flow.x.array[:owned], fresh)
-        self.flow.x.scatter_forward()
-
-    def _has_dependent_nodes(self, cells: NDArray[np.int32]) -> NDArray[np.bool_]:
-        unknowns, marks = self.unknowns, self.combinations.dependent
-        velocity, pressure = unknowns.cell_velocity[cells], unknowns.cell_pressure[cells]
-        return marks[velocity].any(axis=(1, 2)) | marks[pressure].any(axis=1)
+        self._residual_forms, self._tangent_forms = (
+            [form.on(cell=some) for form, some in zip(integrals, cells, strict=False)]
+            for integrals in (self._residuals, self._tangents)
+        )
+        self._add_outer_faces(active)
+        if not fits(self.unknowns, self._pattern, cut):
+            self._make_room(choose_pattern(self.unknowns, cut))
 
     def dofs_of(self, cells: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Which local dofs belong to some local cells or, on other processes, to theirs (collective)."""
@@ -213,7 +197,38 @@ class FlowSystem:
         blocks = fem.sum_ghosts(self.unknowns.space, blocks.astype(float)) > 0.0
         return self.unknowns.expand(blocks)
 
-    def _add_outer_faces(self, active, dependent: NDArray[np.int32]) -> None:
+    def room(self) -> Array:
+        """What the matrix has room for, per owned cell: couplings within it, and across its faces."""
+        assert self._pattern is not None
+        return np.stack([self._pattern.cells, self._pattern.reach], axis=1)[: self.grid.owned].astype(float)
+
+    def set_room(self, room: Array) -> None:
+        """Make the matrix of a saved state: the rounding of a direct solver depends on its pattern (collective)."""
+        both = np.zeros((2, len(self.grid.numbers)))
+        both[:, : self.grid.owned] = room.T
+        cells, reach = (fem.share_owned(self._phi.function_space, column) > 0.5 for column in both)
+        self._make_room(pattern_of(self.unknowns, cells, reach))
+
+    def _make_room(self, pattern: Pattern) -> None:
+        self._pattern, self._matrix = pattern, self._fill_pattern(pattern)
+        self._ghost, self._penalised = self._matrix.duplicate(copy=False), None
+
+    def _fill_pattern(self, pattern: Pattern) -> PETSc.Mat:
+        """A matrix that has all entries of a pattern, with values that do not matter."""
+        matrix = create_matrix(self.unknowns, pattern, blocked=self._blocked)
+        cells = np.flatnonzero(pattern.cells[: self.grid.owned]).astype(np.int32)
+        fem.assemble_matrix(matrix, self._tangents[0].on(cell=cells))
+        if self.with_bodies:
+            faces = self.grid.interior_faces[0][pattern.faces]
+            fem.assemble_matrix(matrix, self._ghost_penalty.on(interior_facet=faces))
+        diagonal = matrix.createVecLeft()
+        diagonal.set(1.0)
+        matrix.setDiagonal(diagonal, addv=PETSc.InsertMode.ADD_VALUES)
+        matrix.assemble()
+        matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
+        return matrix
+
+    def _add_outer_faces(self, active) -> None:
         boundary = self.boundary
         kept = [np.sort(f[active[c]]) for f, c in zip(boundary.facets, boundary.cells, strict=True)]
         for number, _, form in self._tractions:
@@ -221,44 +236,38 @@ class FlowSystem:
         if self._outflow:
             faces = np.sort(np.concatenate([kept[number] for number in self._outflow]))
             self._residual_forms.append(self._outflow_form.on(exterior_facet=faces))
-            at = [boundary.facets[number][np.isin(boundary.cells[number], dependent)] for number in self._outflow]
-            special = np.intersect1d(faces, np.concatenate(at))
-            self._tangent_forms.append(self._outflow_tangent.on(exterior_facet=np.setdiff1d(faces, special)))
-            if len(special):
-                self._dependent_forms.append(self._outflow_tangent.on(exterior_facet=special))
+            self._tangent_forms.append(self._outflow_tangent.on(exterior_facet=faces))
 
     def set_penalties(self) -> None:
-        """Weights of the interface and the penalty of dependent nodes, after the cut or the scales changed."""
+        """Weights of the interface and the ghost penalty, after the cut or the scales changed."""
         assert self.cut is not None
+        assert self._ghost is not None
+        pieces, cut = self.cut.pieces, self.cut
         if self.with_bodies:
-            penalty = self._interface_penalties(self.cut.pieces, self.cut)
-            self.weights.set(self.cut, penalty)
-            self.interface = Interface(
-                self.grid, self.unknowns, self.weights, self.cut, self.settings.viscosity, penalty
-            )
-            self._penalty = self._extension_penalty()
+            penalty = self._interface_penalties(pieces, cut)
+            self.weights.set(cut, penalty)
+            self.interface = Interface(self.grid, self.unknowns, self.weights, cut, self.settings.viscosity, penalty)
+        if not self._same_faces(cut):
+            self._penalised = cut.ghost_faces
+            self._ghost.zeroEntries()
+            if self.with_bodies:
+                self._assemble_ghost_penalty(cut.ghost_faces)
+            self._ghost.assemble()
+            self._in, self._through = self._ghost.createVecs()
 
-    def _extension_penalty(self) -> Array:
-        """d_i of the unknowns of dependent nodes [kg/s; m^4 s/kg in rows of the pressure], owned dofs.
+    def _assemble_ghost_penalty(self, faces: NDArray[np.int32]) -> None:
+        fem.assemble_matrix(self._ghost, self._ghost_penalty.on(interior_facet=faces))
+        if self._ghost_history is not None:
+            self._remembered[:] = 0.0
+            fem.assemble_vector(self._ghost_history.on(interior_facet=faces), self._remembered)
 
-        phi = mu + rho |a| h + rho alpha h^2 scales as the equations do; with the share k that a node keeps of its own,
-
-            d = phi V / h^2 (1 - k) / k  of the velocity,   d = V / phi (1 - k) / k  of the pressure.
-        """
-        settings, unknowns, weight = self.settings, self.unknowns, self.combinations.weight
-        rho, alpha = settings.density, float(self._alpha.value)
-        penalty = np.zeros(unknowns.owned)
-        speeds = (self._speeds, self._speeds[unknowns.at_pressure])
-        for nodes, speed in zip((unknowns.velocity, unknowns.pressure), speeds, strict=True):
-            dofs = nodes.dofs[: nodes.owned]
-            h, volume = nodes.sizes[: nodes.owned].min(axis=1), nodes.sizes[: nodes.owned].prod(axis=1)
-            phi = settings.viscosity + rho * speed[: nodes.owned] * h + rho * alpha * h**2
-            scale = phi * volume / h**2 if nodes is unknowns.velocity else volume / phi
-            penalty[dofs] = settings.penalties.extension * scale[:, None] * weight[dofs]
-        return penalty
+    def _same_faces(self, cut: Cut) -> bool:
+        """The ghost penalty is assembled for these faces already, on every process (collective)."""
+        same = self._penalised is not None and np.array_equal(self._penalised, cut.ghost_faces)
+        return self.grid.comm.allreduce(same, op=MPI.LAND)
 
     def pressure_sizes(self) -> Array:
-        """int q dx over the fluid of the pressure function of each owned unknown [m^dim] (collective)."""
+        """int q dx over the fluid of each owned dof's pressure function [m^dim] (collective)."""
         assert self.cut is not None
         cut, unknowns, weights = self.cut, self.unknowns, self.weights
         volume, (psi, _) = self.grid.sizes.prod(axis=1), weights.pressure_table
@@ -268,7 +277,7 @@ class FlowSystem:
         parts = volume[cells, None] * ((fluid * weights.rule) @ psi)
         size = np.bincount(unknowns.cell_pressure[cells].ravel(), parts.ravel(), unknowns.local).astype(float)
         fem.add_ghosts(unknowns.space, size)
-        return self.combinations.collect(size[: unknowns.owned])
+        return size[: unknowns.owned]
 
     def _interface_penalties(self, pieces: Pieces, cut: Cut) -> Array:
         """P = s I + s_n n n^T of pieces [Pa s/m], shape (pieces, dim, dim).
@@ -288,64 +297,37 @@ class FlowSystem:
     # --------------------------------------------------------------------------------------- residual and tangent
 
     def residual(self) -> Array:
-        """Equations of the owned unknowns, T^T r + d w: forces [N] of velocity rows, volume rates of pressure rows."""
+        """Left-hand side of the equations at owned dofs: forces [N] of velocity rows, volume rates of pressure rows."""
+        assert self._ghost is not None
         assert self.cut is not None
-        self._out[:] = 0.0
+        np.negative(self._remembered, out=self._out)
         for form in self._residual_forms:
             fem.assemble_vector(form, self._out)
         if self.with_bodies:
             self._out += self.interface.velocity_terms(self.cut.motion.v)
         fem.add_ghosts(self.unknowns.space, self._out)
-        owned, combinations = self.unknowns.owned, self.combinations
-        return combinations.collect(self._out[:owned]) + self._penalty * combinations.distance(
-            self.flow.x.array[:owned]
-        )
+        owned = self.unknowns.owned
+        self._in.array[:] = self.flow.x.array[:owned]
+        self._ghost.mult(self._in, self._through)
+        return self._out[:owned] + self._through.array
 
     def tangent(self, identity: Array, *, picard: bool) -> PETSc.Mat:
-        """d(residual)/d(unknowns), with rows of the identity at the marked owned dofs; the next call overwrites it.
+        """d(residual)/d(flow), with rows of the identity at the marked owned dofs; the next call overwrites it.
 
         Picard: the velocity that carries momentum is taken as known; right if it is that of `set_scales`.
         """
+        assert self._matrix is not None
+        assert self._ghost is not None
         self._newton.value = 0.0 if picard else 1.0
-        combined = self._combine_dependent()
-        if self._fresh_pattern:
-            if self._matrix is not None:
-                self._matrix.destroy()
-            more = None if combined is None else np.diff(combined[0]).astype(np.int64)
-            self._matrix = create_matrix(self.unknowns, self._cells[0], more, blocked=self._blocked)
-            self._fresh_pattern = False
         matrix = self._matrix
-        assert matrix is not None
-        matrix.zeroEntries()
+        self._ghost.copy(matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         for form in self._tangent_forms:
             fem.assemble_matrix(matrix, form)
         self._newton.value = 1.0
-        if combined is not None:
-            matrix.setValuesCSR(*combined, addv=PETSc.InsertMode.ADD_VALUES)
-        diagonal = matrix.createVecLeft()
-        diagonal.array[:] = self._penalty
-        matrix.setDiagonal(diagonal, addv=PETSc.InsertMode.ADD_VALUES)
         matrix.assemble()
         start = matrix.getOwnershipRange()[0]
         matrix.zeroRows((start + np.flatnonzero(identity)).astype(PETSc.IntType), 1.0)
         return matrix
-
-    def _combine_dependent(self):
-        """T^T A T of cells with dependent nodes, owned rows as (starts, columns, values); None without any."""
-        T = self.combinations.matrix
-        if T is None:
-            return None
-        if self._fresh_pattern:
-            if self._plain is not None:
-                self._plain.destroy()
-            self._plain = create_matrix(self.unknowns, self._cells[1], blocked=False)
-        assert self._plain is not None
-        self._plain.zeroEntries()
-        for form in self._dependent_forms:
-            fem.assemble_matrix(self._plain, form)
-        self._plain.assemble()
-        self._combined = self._plain.ptap(T, result=self._combined)
-        return self._combined.getValuesCSR()
 
     # -------------------------------------------------------------------------------------------------- reactions
 
