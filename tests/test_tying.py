@@ -143,7 +143,7 @@ def solve_tied(lower, upper, exact, held):
 def condensation(parts, n):
     """(T: all values from those that are not the slave's, the slave's dofs)."""
     (xs, fs, slave), (xm, fm, master) = (
-        cut_out(piece.mesh, name) for piece, name in zip(parts, ("top", "bottom"), strict=True)
+        cut_out(piece.mesh, [name]) for piece, name in zip(parts, ("top", "bottom"), strict=True)
     )
     types = [KERNEL_TYPES[FACET_TYPE[piece.mesh.cell_type]] for piece in parts]
     P = sp.coo_matrix(tie(xs, fs, types[0], xm, fm, types[1]))
