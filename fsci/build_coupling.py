@@ -11,11 +11,11 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from coupling.accelerate import Accelerator, Aitken, QuasiNewton, Relaxation
+from coupling.contact_surface import global_dofs
 from coupling.coupled import Coupled
 from coupling.interface import DrySide, Interface, Wetted
 from coupling.monolithic import Monolithic
 from coupling.partitioned import Partitioned, Tolerance
-from fsci.build_contact import global_dofs
 from fsci.build_fluid import build_fluid, build_rigid_bodies
 from fsci.build_solver import build_tolerance
 from fsci.case import Case
@@ -43,7 +43,7 @@ def build_coupled(
     skins = [_skin(case, comm, body) for body in bodies]
     layout = Layout(comm, [body.size for body in bodies])
     wetted = [
-        Wetted(skin.name, skin.points, global_dofs(comm, layout, index, bodies[index], skin.nodes))
+        Wetted(skin.name, skin.points, global_dofs(layout, index, bodies[index], skin.nodes))
         for index, skin in enumerate(skins)
     ]
     rigid = build_rigid_bodies(case, comm)

@@ -7,6 +7,7 @@ node to the second, so that the outward normal of an edge (dx, dy) is (dy, -dx).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import factorial
 
 import numpy as np
@@ -166,6 +167,17 @@ def surface_facets(mesh: Mesh, name: str) -> Indices:
         inside = len(corners) - len(facets)
         raise ValueError(f"surface '{name}': {inside} of its facets are not on the boundary of the mesh")
     return facets
+
+
+def cut_out(mesh: Mesh, names: Sequence[str]) -> tuple[NDArray[np.float64], Indices, Indices]:
+    """Named surfaces as one: (points, facets, node numbers in the mesh); a facet that is in several counts once.
+
+    Raises KeyError and ValueError as `surface_facets`.
+    """
+    facets = np.concatenate([surface_facets(mesh, name) for name in names])
+    facets = facets[np.sort(np.unique(facets, axis=0, return_index=True)[1])]
+    nodes, local = np.unique(facets, return_inverse=True)
+    return mesh.points[nodes], local.reshape(facets.shape).astype(np.int64), nodes
 
 
 def _pick(mesh: Mesh, facets: Indices, corners: Indices) -> Indices:

@@ -10,9 +10,8 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from structure_setup import block, corner_count, corner_shape_functions
 
-from fsci.build_contact import surface_of_body
+from coupling.contact_surface import contact_surface
 from solvers import fem
-from solvers.blocks import Layout
 from solvers.contact.contact import Contact
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import Law
@@ -43,14 +42,13 @@ def make_contact(
     law: Law = Frictionless(),
 ) -> tuple[Structure, Contact]:
     """Each pair is slave and master: (body, surface), or a rigid surface."""
-    layout = Layout(MPI.COMM_SELF, [body.size for body in bodies])
     found: dict[tuple[str, str], Surface] = {}
 
     def side(of: tuple[str, str] | Surface) -> Surface:
         if isinstance(of, Surface):
             return of
         if of not in found:
-            found[of] = surface_of_body(MPI.COMM_SELF, layout, bodies, *of)
+            found[of] = contact_surface(bodies, *of)
         return found[of]
 
     contact = Contact(MPI.COMM_SELF, [Pair(side(slave), side(master), law=law) for slave, master in pairs], c_n=c_n)

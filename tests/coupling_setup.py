@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from coupling.contact_surface import global_dofs
 from coupling.coupled import Coupled
 from coupling.interface import Interface, Wetted
 from fsci import shapes
-from fsci.build_contact import global_dofs
 from solvers import fem
 from solvers.blocks import Layout
 from solvers.fluid.field import Body as Bather
@@ -51,7 +51,7 @@ def couple(
     structure = Structure(comm, [solid], time, SolverSettings(TIGHT))
     facets, nodes = tessellate(mesh)
     points = mesh.points[nodes]
-    dofs = global_dofs(comm, Layout(comm, [solid.size]), 0, solid, nodes)
+    dofs = global_dofs(Layout(comm, [solid.size]), 0, solid, nodes)
     surface = Surface(body.name, facets, len(points), ~dry(points[facets].mean(axis=1)))
     fluid = Fluid(comm, grid, flow, patches, [Bather(surface, None)], FlowSolver(TIGHT))
     return Coupled(fluid, structure, Interface(structure, [Wetted(body.name, points, dofs)]))

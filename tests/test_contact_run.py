@@ -7,17 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 from programs import fsci
 from structure_setup import make_structure
 
+from coupling.contact_surface import contact_surface
 from fsci import shapes
-from fsci.build_contact import surface_of_body
 from fsci.case import CaseError, load_case
 from fsci.checkpoint import read_checkpoint
 from fsci.history import read_history
 from fsci.run import FINISHED, resume_run, run_case
-from solvers.blocks import Layout
 from solvers.structure.materials import NeoHooke, lame
 
 #: A rigid plate comes down on a block, slides and leaves it, twice.
@@ -209,8 +207,7 @@ def test_surfaces_together_are_one():
     parts = {"west": top[:3], "east": top[2:]}
     mesh = replace(mesh, surfaces=mesh.surfaces | parts)
     bodies = [make_structure(mesh, NeoHooke(1.0, 1.0)).bodies[0]]
-    layout = Layout(MPI.COMM_SELF, [bodies[0].size])
-    whole, together = (surface_of_body(MPI.COMM_SELF, layout, bodies, "body", *n) for n in (("top",), tuple(parts)))
+    whole, together = (contact_surface(bodies, "body", *n) for n in (("top",), tuple(parts)))
     assert np.array_equal(whole.points, together.points)
     assert np.array_equal(np.sort(whole.facets, axis=0), np.sort(together.facets, axis=0))
     assert together.name == "body.west.east"

@@ -17,11 +17,10 @@ from scipy.sparse.linalg import spsolve
 from structure_setup import distort
 
 from fsci import shapes
-from fsci.build_contact import _cut_out as cut_out
 from solvers import fem
 from solvers.contact.surface import KERNEL_TYPES
 from solvers.kernels import basis_transformation, mortar, nodal_normals
-from solvers.mesh_topology import FACET_TYPE
+from solvers.mesh_topology import FACET_TYPE, cut_out
 
 
 def tie(xs, fs, slave, xm, fm, master):

@@ -14,11 +14,10 @@ import numpy as np
 from mpi4py import MPI
 from scipy.optimize import brentq
 
+from coupling.contact_surface import contact_surface
 from fsci import shapes
 from fsci.bench.table import Row
-from fsci.build_contact import surface_of_body
 from solvers import fem
-from solvers.blocks import Layout
 from solvers.contact.contact import Contact
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
@@ -116,8 +115,7 @@ def build(mesh: Mesh) -> tuple[Structure, Contact]:
     ]
     settings = BodySettings("ball", NeoHooke(*lame(E, NU)), supports=supports)
     body = Body(fem.distribute(MPI.COMM_SELF, mesh), settings)
-    layout = Layout(MPI.COMM_SELF, [body.size])
-    slave = surface_of_body(MPI.COMM_SELF, layout, [body], "ball", "bottom")
+    slave = contact_surface([body], "ball", "bottom")
     corners = BLOCK * np.array([[-0.1, -0.1, 0], [1.1, -0.1, 0], [1.1, 1.1, 0], [-0.1, 1.1, 0]])
     contact = Contact(MPI.COMM_SELF, [Pair(slave, Surface("plane", corners, np.array([[0, 1, 2, 3]]), "quad", None))])
     solver = SolverSettings(Tolerance(residual=1e-10), linear="ilu")

@@ -1,0 +1,63 @@
+"""Surfaces of elastic bodies as contact sees them: facets, dofs, and what supports hold there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from solvers.blocks import Layout
+from solvers.contact.surface import Surface
+from solvers.mesh_topology import FACET_TYPE, cut_out
+from solvers.structure.body import Body
+from solvers.structure.supports import prescribe, symmetric_dofs
+
+
+def contact_surface(bodies: Sequence[Body], body: str, *surfaces: str) -> Surface:
+    """Named surfaces of one of the bodies of a structure as one, whole on every process (collective).
+
+    `bodies`: all bodies of the structure in their order, which numbers the dofs.
+    """
+    index = next(i for i, other in enumerate(bodies) if other.name == body)
+    chosen, comm = bodies[index], bodies[index].domain.comm
+    layout = Layout(comm, [other.size for other in bodies])
+    mesh = chosen.domain.source
+    points, facets, nodes = comm.bcast(None if mesh is None else cut_out(mesh, surfaces), root=0)
+    dofs = global_dofs(layout, index, chosen, nodes)
+    start = layout.start + layout.offsets[index]
+    return Surface(
+        ".".join([body, *surfaces]),
+        points,
+        facets,
+        FACET_TYPE[chosen.domain.cell_type],
+        dofs,
+        held=_held(comm, start, chosen, dofs),
+        symmetric=np.isin(dofs, np.concatenate(comm.allgather(start + symmetric_dofs(chosen)))),
+        body=body,
+        mesh_nodes=nodes,
+    )
+
+
+def _held(comm: MPI.Comm, start: int, body: Body, dofs: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Projections on what supports hold at nodes with these global dofs, shape (n, dim, dim) (collective)."""
+    supports = prescribe(body)
+    along_axes = np.isin(dofs, np.concatenate(comm.allgather(start + supports.dofs)))
+    found = along_axes[:, :, None] * np.eye(body.dim)
+    oblique = supports.oblique
+    for first, projections in comm.allgather((start + body.dim * oblique.blocks, oblique.projections)):
+        for dof, projection in zip(first, projections, strict=True):
+            found[dofs[:, 0] == dof] = projection
+    return found
+
+
+def global_dofs(layout: Layout, index: int, body: Body, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Global dofs of nodes of the mesh of body `index`, shape (n, dim) (collective)."""
+    order = np.argsort(body.nodes[: body.owned])
+    owned = body.nodes[: body.owned][order]
+    at = np.minimum(np.searchsorted(owned, nodes), max(len(owned) - 1, 0))
+    mine = owned[at] == nodes if len(owned) else np.zeros(len(nodes), dtype=bool)
+    first = np.zeros(len(nodes), dtype=np.int64)
+    first[mine] = layout.start + layout.offsets[index] + body.dim * order[at[mine]]
+    return layout.comm.allreduce(first)[:, None] + np.arange(body.dim)
