@@ -1,4 +1,4 @@
-"""Balances of the interface: action against reaction, momentum that crosses it, and power."""
+"""Balances of the interface: what the structure took against what the fluid gave, force by force and as work."""
 
 from __future__ import annotations
 
@@ -25,36 +25,52 @@ COLUMNS = {
 
 
 class Balance:
-    """What the last step left over."""
+    """What the last step left over.
+
+    With the fluid's force f on the vertices at the end of the step and f_n at its start, the structure's balance asks
+    for the mean m = w f + (1 - w) f_n. What the structure took is measured without it: its own balance, b, is inertia,
+    damping, inner forces, own loads and contact.
+
+        force = |b - m| / |m|,  work = sum over steps of b . (d - d_n) - dt f . g
+    """
 
     def __init__(self, fluid: Fluid) -> None:
         self._of_fluid = Balances(fluid)
-        self.force = 0.0  #: |force on the structure - reaction of the fluid| / |reaction|, 1
+        self.force = 0.0  #: |force that the structure took - mean force of the fluid| / |that force|, 1
         self.momentum = 0.0  #: |force on all bodies - what it is by the momentum of the fluid| [N]
         self.power = 0.0  #: of the fluid on the structure [W]
         self.loss = 0.0  #: power that the method takes from the fluid [W]
-        self.work = 0.0  #: work that fluid and structure count differently in all steps [J]
+        self.work = 0.0  #: of the structure's load less that of the fluid's force, all steps [J]
+        self.given: Array  #: force [N] of the fluid on the vertices at the end of the last step
 
-    def add_step(self, coupled: Coupled, carried: Array) -> None:
-        """`carried`: force [N] on the vertices in the structure's balance."""
-        interface, reaction = coupled.interface, coupled.force()
-        size = float(np.abs(reaction).sum())
-        self.force = float(np.abs(carried - reaction).sum()) / size if size > 0.0 else 0.0
-        total = sum(force.sum(axis=0) for force in coupled.fluid.force().values())
+    def start(self, coupled: Coupled) -> None:
+        """The state before the first step; the structure starts without the fluid's force."""
+        self.given = coupled.interface.gather(coupled.structure.carried_at_start())
+
+    def add_step(self, coupled: Coupled) -> None:
+        """After both fields have accepted the step."""
+        interface, structure = coupled.interface, coupled.structure
+        before, self.given = self.given, coupled.force()
+        weight = structure.time.force_weight
+        mean = weight * self.given + (1.0 - weight) * before
+        taken = interface.gather(structure.carried())
+        size = float(np.linalg.norm(mean))
+        self.force = float(np.linalg.norm(taken - mean)) / size if size > 0.0 else 0.0
         of_fluid, self.loss = self._of_fluid()
-        missed = total + (carried - reaction).sum(axis=0) - of_fluid
-        self.momentum = float(np.linalg.norm(missed))
-        structure_moves = interface.displacement() - interface.old
-        self.power = float((reaction * interface.velocity(interface.now)).sum())
-        self.work += float((carried * structure_moves).sum()) - coupled.fluid.dt * self.power
+        total = sum(force.sum(axis=0) for force in coupled.fluid.force().values())
+        self.momentum = float(np.linalg.norm(total - of_fluid))
+        self.power = float((self.given * interface.velocity(interface.now)).sum())
+        moved = interface.gather(structure.now.u - structure.old.u)
+        self.work += float((taken * moved).sum()) - coupled.fluid.dt * self.power
 
     def numbers(self) -> dict[str, float]:
         """Columns of the history."""
         return {column: getattr(self, name) for column, name in COLUMNS.items()}
 
     def save(self) -> State:
-        return {name: getattr(self, name) for name in COLUMNS.values()}
+        return {"given": self.given.copy()} | {name: getattr(self, name) for name in COLUMNS.values()}
 
     def restore(self, state: State) -> None:
+        self.given = state["given"].copy()
         for name in COLUMNS.values():
             setattr(self, name, state[name])

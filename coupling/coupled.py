@@ -35,6 +35,7 @@ class Coupled:
         self.interface.old = self.interface.now.copy()
         self.fluid.initialise(t, dt)
         self.fluid.move(self.interface.move(self.interface.now))
+        self.balance.start(self)
 
     def begin_step(self, t: float, dt: float) -> None:
         """Boundary and loads at t + dt, both fields as they were at t."""
@@ -55,11 +56,11 @@ class Coupled:
         if not structure.comm.allreduce(own_guess, op=MPI.LOR):
             now.u[:] = held.part(now.u) + held.free_part(self.predictor.at(t))
 
-    def end_step(self, force: Array) -> None:
-        """Accept the step; `force` [N] on the vertices is what the structure has carried."""
+    def end_step(self) -> None:
+        """Accept the step."""
         self.structure.end_step()
         self.fluid.end_step()
-        self.balance.add_step(self, force)
+        self.balance.add_step(self)
 
     def force(self) -> Array:
         """Force [N] of the fluid on the vertices, shape (n, dim)."""

@@ -69,7 +69,11 @@ class Interface:
 
     def displacement(self) -> Array:
         """Displacement [m] of the vertices as the structure has it now, shape (n, dim) (collective)."""
-        return gather_at(self.comm, self.structure.now.u, self.structure.layout.start, self.dofs)
+        return self.gather(self.structure.now.u)
+
+    def gather(self, owned: Array) -> Array:
+        """Values at the vertices from those at owned dofs of the structure, shape (n, dim) (collective)."""
+        return gather_at(self.comm, owned, self.structure.layout.start, self.dofs)
 
     def velocity(self, d: Array) -> Array:
         """Velocity [m/s] of the vertices for displacements d at the end of the step."""

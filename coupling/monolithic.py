@@ -62,7 +62,7 @@ class Monolithic:
             coupled.predict(t + dt)
         info = converge(self, self.tolerance, unmoved)
         coupled.structure.check_deformation(info.iterations, info.residuals)
-        coupled.end_step(self._force)
+        coupled.end_step()
         numbers = coupled.balance.numbers() | {"coupling.linear": float(self._linear_iterations)}
         if coupled.structure.constraint is not None:
             numbers.update(coupled.structure.constraint.numbers())
@@ -75,8 +75,7 @@ class Monolithic:
         fluid, structure, interface = self.coupled.fluid, self.coupled.structure, self.coupled.interface
         fluid.move(interface.move(interface.displacement()))
         of_fluid = fluid.residual()
-        self._force = self.coupled.force()
-        structure.load(interface.spread(self._force))
+        structure.load(interface.spread(self.coupled.force()))
         found = np.array([structure.residual(), of_fluid])
         self._largest = np.maximum(self._largest, found)
         self._found = found

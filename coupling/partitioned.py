@@ -46,8 +46,7 @@ class Partitioned:
         while True:
             coupled.fluid.move(interface.move(d))
             newton += coupled.fluid.solve().iterations
-            force = coupled.force()
-            coupled.structure.load(interface.spread(force))
+            coupled.structure.load(interface.spread(coupled.force()))
             newton += coupled.structure.solve().iterations
             found = interface.displacement()
             residual = _mean(found - d)
@@ -62,7 +61,7 @@ class Partitioned:
                 self.accelerator.forget()
             contact = touching
             d = self.accelerator.next(d, found)
-        coupled.end_step(force)
+        coupled.end_step()
         numbers = {"coupling.newton": float(newton), **coupled.balance.numbers()}
         constraint = coupled.structure.constraint
         if constraint is not None:

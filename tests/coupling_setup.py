@@ -91,7 +91,9 @@ def bar_and_column(ratio: float, *, density: float | None = None, amplitude: flo
     )
 
 
-def post_in_flow(*, E: float = 100.0, rho_s: float = 2.0, scheme: str = "bdf2", mu: float = 0.05) -> Coupled:
+def post_in_flow(
+    *, E: float = 100.0, rho_s: float = 2.0, scheme: str = "bdf2", mu: float = 0.05, rho_inf: float = 0.8
+) -> Coupled:
     """A soft square post that stands on the bottom of a channel, in a flow that begins to move."""
     a, b = lame(E, 0.3)
     body = BodySettings("post", StVenantKirchhoff(a, b, rho_s), supports=(Support("bottom", (zero, zero)),))
@@ -101,7 +103,7 @@ def post_in_flow(*, E: float = 100.0, rho_s: float = 2.0, scheme: str = "bdf2", 
     return couple(
         mesh,
         body,
-        Dynamics(GeneralisedAlpha.from_rho_inf(0.8)),
+        Dynamics(GeneralisedAlpha.from_rho_inf(rho_inf)),
         uniform([0.0, 0.0], [2.0, 1.0], [20, 10]),
         FlowSettings(1.0, mu, scheme=scheme),
         [

@@ -54,7 +54,7 @@ def test_it_arrives_and_is_pressed_against_the_wall(history):
 
 def test_nothing_is_lost_on_the_way(history):
     """Action is reaction, the volume of the fluid stays, and nothing goes through the wall."""
-    assert history["interface.force"].max() < 1e-12
+    assert history["interface.force"].max() < 1e-5  # Newton's method stops at 1e-6
     inflow = 10.0 * (4.0 / 3.0) ** 2
     assert np.abs(history["fluid.mass"]).max() < 1e-3 * inflow
     assert history["gap"].min() > -1e-10

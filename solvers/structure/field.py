@@ -46,12 +46,18 @@ class Instant:
     v: Array  #: velocity [m/s]
     a: Array  #: acceleration [m/s^2]
     internal: Array  #: internal force [N]
-    external: Array  #: loads [N]
+    loads: Array  #: loads of its own [N]
+    surface: Array  #: load by another field [N]
     constraint: Array  #: contact force [N]
 
     @classmethod
     def zeros(cls, size: int) -> Instant:
         return cls(*(np.zeros(size) for _ in fields(cls)))
+
+    @property
+    def external(self) -> Array:
+        """All loads [N]."""
+        return self.loads + self.surface
 
     def copy(self) -> Instant:
         return Instant(**{name: array.copy() for name, array in vars(self).items()})
@@ -79,7 +85,6 @@ class Structure:
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
         self.energy = EnergyBalance()
         self.residual_force = np.zeros(self.layout.size)  #: left-hand side of the balance, supports included [N]
-        self._surface_load = np.zeros(self.layout.size)
         self._target = np.zeros(self.layout.size)
         self._increment = np.zeros(self.layout.size)
         self.rounding: Array | None = None  #: rounding error of `residual_force` [N], as far as this step knows
@@ -155,7 +160,21 @@ class Structure:
 
     def load(self, force: Array) -> None:
         """Take forces [N] at owned dofs that another field exerts at the end of the step, besides the loads."""
-        self._surface_load = force
+        self.now.surface[:] = force
+
+    def carried(self) -> Array:
+        """Force [N] of another field that the bodies took in this step, averaged over it, at owned dofs.
+
+        It is what inertia, damping, inner forces, own loads and contact leave open. Supports would fill any gap: where
+        they hold, it is the load that was handed over.
+        """
+        weight = self.time.force_weight
+        handed_over = weight * self.now.surface + (1.0 - weight) * self.old.surface
+        return self.held.free_part(self.time.carried(self)) + self.held.part(handed_over)
+
+    def carried_at_start(self) -> Array:
+        """The same [N] for the state that the first step starts from."""
+        return self.held.free_part(self.time.reaction(self))
 
     def solve(self) -> StepInfo:
         """Newton to the tolerance. Raises StepFailed."""
@@ -197,12 +216,11 @@ class Structure:
 
     def _assemble_bodies(self) -> None:
         now = self.now
-        parts = zip(self.bodies, *(self.split(a) for a in (now.u, now.internal, now.external)), strict=True)
-        for body, u, internal, external in parts:
+        parts = zip(self.bodies, *(self.split(a) for a in (now.u, now.internal, now.loads)), strict=True)
+        for body, u, internal, loads in parts:
             body.set_displacement(u)
             internal[:] = body.internal_force()
-            external[:] = body.external_force()
-        now.external += self._surface_load
+            loads[:] = body.external_force()
 
     def _assemble_constraint(self) -> None:
         if self.constraint is None:

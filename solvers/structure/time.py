@@ -14,7 +14,7 @@ from solvers.structure.massless import massless_dofs, move_mass_inwards
 from solvers.time import GeneralisedAlpha
 
 if TYPE_CHECKING:
-    from solvers.structure.field import Structure
+    from solvers.structure.field import Instant, Structure
 
 
 class TimeScheme(Protocol):
@@ -39,6 +39,10 @@ class TimeScheme(Protocol):
 
     def balance(self, structure: Structure) -> Array:
         """The residual [N] at the present iterate; velocity and acceleration follow the displacement."""
+        ...
+
+    def carried(self, structure: Structure) -> Array:
+        """The balance [N] without loads by another field, all forces averaged over the step."""
         ...
 
     def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
@@ -71,6 +75,9 @@ class Statics:
 
     def balance(self, structure: Structure) -> Array:
         return self.reaction(structure)
+
+    def carried(self, structure: Structure) -> Array:
+        return structure.now.internal - structure.now.loads - structure.now.constraint
 
     def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
         return stiffness
@@ -184,10 +191,20 @@ class Dynamics:
         now.a = scheme.acceleration(du, old.v, old.a, dt)
         now.v = scheme.velocity(du, old.v, old.a, dt)
         now.a[self._massless], now.v[self._massless] = 0.0, du[self._massless] / dt
-        inertia = self._times(structure.mass, (1.0 - scheme.alpha_m) * now.a + scheme.alpha_m * old.a)
-        present, before = (at.internal - at.external - at.constraint + self._damping_force(at.v) for at in (now, old))
+        present, before = (self._own_forces(at) - at.surface for at in (now, old))
         before[self._massless] = 0.0
-        return inertia + (1.0 - scheme.alpha_f) * present + scheme.alpha_f * before
+        return self._inertia(structure) + (1.0 - scheme.alpha_f) * present + scheme.alpha_f * before
+
+    def carried(self, structure: Structure) -> Array:
+        present, before = (self._own_forces(at) for at in (structure.now, structure.old))
+        return self._inertia(structure) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
+
+    def _inertia(self, structure: Structure) -> Array:
+        share = self.scheme.alpha_m
+        return self._times(structure.mass, (1.0 - share) * structure.now.a + share * structure.old.a)
+
+    def _own_forces(self, at: Instant) -> Array:
+        return at.internal - at.loads - at.constraint + self._damping_force(at.v)
 
     def averaged_forces(self, structure: Structure) -> tuple[Array, Array]:
         alpha, now, old = self.scheme.alpha_f, structure.now, structure.old
