@@ -6,22 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coupling.wetted import WettedSurface
 from solvers.api import Array, State
 from solvers.fluid.surface import Motion
 from solvers.fluid.time import Difference
 from solvers.rows import gather_at
 from solvers.structure.field import Structure
-
-
-@dataclass(frozen=True)
-class Wetted:
-    """The surface of one body; the same on every process."""
-
-    name: str  #: of the body in structure and fluid
-    points: Array  #: reference positions [m] of its vertices, shape (n, dim)
-    dofs: NDArray[np.int64]  #: their global dofs in the structure, shape (n, dim)
 
 
 @dataclass(frozen=True)
@@ -51,7 +42,7 @@ class Interface:
     g = alpha d_{n+1} - beta_0 d_n - beta_1 d_{n-1}, so that fluid and surface sweep the same volume.
     """
 
-    def __init__(self, structure: Structure, surfaces: Sequence[Wetted], dry_sides: Sequence[DrySide] = ()):
+    def __init__(self, structure: Structure, surfaces: Sequence[WettedSurface], dry_sides: Sequence[DrySide] = ()):
         self.structure, self.surfaces, self.dry_sides = structure, list(surfaces), list(dry_sides)
         self.dofs = np.concatenate([surface.dofs for surface in surfaces])
         self.points = np.concatenate([surface.points for surface in surfaces])

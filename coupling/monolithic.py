@@ -4,7 +4,7 @@
     [ alpha C                A    ] [dw]  =  - [ r_f ]        C, S, M: see solvers.fluid.interface, g = alpha d - ...
 
 To alpha C and M_G come the derivatives with respect to the shape of the fluid's domain (solvers.fluid.shape): in steady
-flows, where alpha = 0, they are all that the fluid feels of du; in time they halve the number of Newton steps.
+flows, where alpha = 0, they are the whole dependence of the fluid on du; in time they halve the number of Newton steps.
 Source: Schott, Ager, Wall, Int. J. Numer. Meth. Engng 119 (2019) 757-796.
 """
 
@@ -49,6 +49,10 @@ class Monolithic:
         self._prepared: Blocks | None = None  #: the matrix at the present iterate, if it is there already
 
     # ------------------------------------------------------------------------------------------------- steps
+
+    def initialise(self, t: float, dt: float) -> None:
+        """Both fields at the first time."""
+        self.coupled.initialise(t, dt)
 
     def step(self, t: float, dt: float) -> StepInfo:
         coupled = self.coupled
@@ -149,7 +153,7 @@ class Monolithic:
             PETSc.garbage_cleanup(K.comm)  # the K of earlier iterates, on a communicator that no solver has
             K = K.copy()
             K.axpy(1.0, mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-            # what each field hears of the other is rounded too: positions and velocities of the surface, and the force
+            # what the fields exchange is rounded too: positions and velocities of the surface, and the force
             fluid.add_rounding(fluid.rounding_of(into_fluid, structure.rounded()))
             structure.add_rounding(rounding_error(into_structure, fluid.flow[: fluid.unknowns.owned]))
             structure.add_rounding(rounding_error(mass, structure.rounded()))

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coupling.accelerate import Accelerator
+from coupling.accelerate import Accelerator, QuasiNewton
 from coupling.coupled import Coupled
 from solvers.api import Array, State, StepFailed, StepInfo
 
 
 @dataclass(frozen=True)
-class Tolerance:
+class FixedPointTolerance:
     """When the interface is in balance: |D(d) - d| in the root mean square of all vertices."""
 
     relative: float = 1e-6  #: to the displacement of the step
@@ -29,8 +29,17 @@ class Tolerance:
 class Partitioned:
     """A Scheme: each step iterates over the fields until the interface residual is small."""
 
-    def __init__(self, coupled: Coupled, accelerator: Accelerator, tolerance: Tolerance = Tolerance()):
-        self.coupled, self.accelerator, self.tolerance = coupled, accelerator, tolerance
+    def __init__(
+        self,
+        coupled: Coupled,
+        accelerator: Accelerator | None = None,
+        tolerance: FixedPointTolerance = FixedPointTolerance(),
+    ):
+        self.coupled, self.accelerator, self.tolerance = coupled, accelerator or QuasiNewton(0.5), tolerance
+
+    def initialise(self, t: float, dt: float) -> None:
+        """Both fields at the first time."""
+        self.coupled.initialise(t, dt)
 
     def step(self, t: float, dt: float) -> StepInfo:
         coupled, interface = self.coupled, self.coupled.interface

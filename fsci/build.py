@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from mpi4py import MPI
 
 from fsci.case import Case
-from solvers.api import Field, Scheme, Snapshot, State, StepInfo
+from solvers.api import Scheme, Snapshot
 from solvers.timing import Timer
 
 if TYPE_CHECKING:
@@ -22,25 +22,6 @@ if TYPE_CHECKING:
     from solvers.structure.body import Body
 
 Numbers = dict[str, float]
-
-
-@dataclass(frozen=True)
-class Alone:
-    """The scheme of a case with one field."""
-
-    field: Field
-
-    def step(self, t: float, dt: float) -> StepInfo:
-        self.field.begin_step(t, dt)
-        info = self.field.solve()
-        self.field.end_step()
-        return info
-
-    def save(self) -> State:
-        return self.field.save()
-
-    def restore(self, state: State) -> None:
-        self.field.restore(state)
 
 
 @dataclass(frozen=True)
@@ -73,7 +54,7 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     contact = _contact(case, comm, bodies)
     structure = build_structure(case, comm, bodies, contact, timer)
     return Simulation(
-        scheme=Alone(structure),
+        scheme=structure,
         initialise=structure.initialise,
         snapshots=lambda: snapshots(structure, _contact_fields(contact)),
         probes=build_probes(case, structure),
@@ -136,7 +117,7 @@ def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
     fluid = build_fluid(case, comm, timer, build_rigid_bodies(case, comm))
     return Simulation(
-        scheme=Alone(fluid),
+        scheme=fluid,
         initialise=fluid.initialise,
         snapshots=lambda: snapshots(fluid),
         probes=build_probes(case, fluid),

@@ -40,7 +40,8 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
         pairs.append(Pair(sides[0], sides[1], settings.integration, _law(settings)))
     assert case.structure is not None
     moves = case.structure.dynamics is not None
-    return Contact(comm, pairs, names=tuple(case.contact.pairs), c_n=case.contact.c_n, keep_overlap=moves)
+    names = tuple(case.contact.pairs)
+    return Contact(pairs, names=names, c_n=case.contact.c_n, keep_overlap=moves, comm=comm)
 
 
 def _law(settings: PairSettings) -> Law:

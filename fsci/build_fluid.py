@@ -17,24 +17,26 @@ from fsci.case.probes import Reference
 from fsci.case_meshes import read_rigid_body, require_inside_period
 from fsci.rigid_motion import rigid_motion
 from solvers.fluid import probes
-from solvers.fluid.field import Body, Fluid, SolverSettings
+from solvers.fluid.field import Fluid
 from solvers.fluid.forms import ELASTIC, Penalties
 from solvers.fluid.grid import Grid
+from solvers.fluid.immersed import ImmersedBody, rigid_body
 from solvers.fluid.inside import PointInBody
-from solvers.fluid.patches import Patch, UncoveredFaces, Value
-from solvers.fluid.surface import Motion, Surface
+from solvers.fluid.patches import Patch, UncoveredFaces
 from solvers.fluid.system import FlowSettings
+from solvers.solver_settings import SolverSettings
 from solvers.timing import Timer
+from solvers.values import Value
 
 Array = NDArray[np.float64]
 
 
-def build_rigid_bodies(case: Case, comm: MPI.Comm) -> list[Body]:
+def build_rigid_bodies(case: Case, comm: MPI.Comm) -> list[ImmersedBody]:
     """The rigid bodies of a case. Raises CaseError (collective)."""
     return [] if case.fluid is None else [_body(case, name, comm) for name in case.fluid.bodies]
 
 
-def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Body]) -> Fluid:
+def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[ImmersedBody]) -> Fluid:
     """The flow around bodies. Raises CaseError (collective)."""
     assert case.fluid is not None
     settings, linear = case.fluid, case.solver.linear
@@ -42,7 +44,7 @@ def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Body]
     elastic = any(body.motion is None for body in bodies)
     grid, flow, patches = Grid(settings.grid.planes), _flow(settings, elastic=elastic), _patches(settings)
     try:
-        return Fluid(comm, grid, flow, patches, bodies, solver, timer)
+        return Fluid(grid, flow, patches, bodies, solver, timer=timer, comm=comm)
     except UncoveredFaces as error:
         faces = ", ".join(error.faces)
         raise case.error(("fluid", "patches"), f"no patch is on part of the box's boundary: {faces}") from None
@@ -84,27 +86,26 @@ def _patches(settings: Section) -> list[Patch]:
 # ---------------------------------------------------------------------------------------------------------- bodies
 
 
-def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
+def _body(case: Case, name: str, comm: MPI.Comm) -> ImmersedBody:
     """A rigid body, whole on every process."""
     assert case.fluid is not None
     found: Any = None
     if comm.rank == 0:
         try:
             found = read_rigid_body(case, name)[1:]
-        except Exception as raised:  # every process must hear of it
+        except Exception as raised:  # raised on every process below
             found = raised
     found = comm.bcast(found, root=0)
     if isinstance(found, Exception):
         raise found
     points, facets = found
-    surface = Surface(name, facets, len(points))
     movement = case.fluid.bodies[name].motion
     if movement is None:
         require_inside_period(case, ("fluid", "bodies", name), points)
-        return Body(surface, lambda t: Motion(points, np.zeros_like(points)), rests=True)
+        return rigid_body(name, points, facets)
     moved = rigid_motion(points, movement, case.time.start, case.time.step)
     require_inside_period(case, ("fluid", "bodies", name), moved(case.time.start)[0])
-    return Body(surface, lambda t: Motion(*moved(t)))
+    return rigid_body(name, points, facets, moved)
 
 
 # ---------------------------------------------------------------------------------------------------------- probes

@@ -16,7 +16,7 @@ from solvers.structure.supports import Roller
 
 
 def build_loads(body: Section, places: Places) -> dict[str, tuple[Any, ...]]:
-    """Supports, springs and loads as `BodySettings` takes them."""
+    """Supports, springs and loads as `Body` takes them."""
 
     def each(section: str, build: Any) -> tuple[Any, ...]:
         entries = enumerate(getattr(body, section))

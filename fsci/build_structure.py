@@ -14,18 +14,18 @@ from fsci.case import Case
 from fsci.case.probes import Probe
 from fsci.case_meshes import VECTORS, read_body
 from fsci.places import Places, find_places
-from solvers import fem
 from solvers.api import Constraint
 from solvers.mesh import Mesh
+from solvers.solver_settings import SolverSettings
 from solvers.structure import materials, probes
-from solvers.structure.body import Body, BodySettings
-from solvers.structure.field import SolverSettings, Structure
+from solvers.structure.body import Body
+from solvers.structure.field import Structure
 from solvers.structure.massless import NoMassLeft
-from solvers.structure.materials import Parameter, Value
 from solvers.structure.supports import SupportError
 from solvers.structure.time import Damping, Dynamics, Statics, TimeScheme
 from solvers.time import GeneralisedAlpha
 from solvers.timing import Timer
+from solvers.values import Value
 
 
 def build_bodies(case: Case, comm: MPI.Comm) -> list[Body]:
@@ -40,7 +40,7 @@ def build_structure(
     linear = case.solver.linear
     settings = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
     try:
-        structure = Structure(comm, bodies, _time_scheme(case), settings, timer, contact)
+        structure = Structure(bodies, _time_scheme(case), settings, contact=contact, timer=timer)
         structure.mass  # noqa: B018
     except NoMassLeft as error:
         raise case.error(("structure", "bodies", error.body, "mesh"), _NO_MASS_LEFT) from None
@@ -76,18 +76,10 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
     assert case.structure is not None
     settings = case.elastic_bodies[name]
     mesh, places = _mesh(case, name, comm)
-    domain = fem.distribute(comm, mesh)
     vectors = {key: getattr(settings, key) for key in VECTORS}
-    return Body(
-        domain,
-        BodySettings(
-            name=name,
-            material=_material(settings, case.structure.plane if domain.dim == 2 else "strain"),
-            element=settings.element,
-            **build_loads(settings, places),
-            **vectors,
-        ),
-    )
+    material = _material(settings, case.structure.plane)
+    loads = build_loads(settings, places)
+    return Body(name, mesh, material, element=settings.element, **loads, **vectors, comm=comm)
 
 
 def _mesh(case: Case, name: str, comm: MPI.Comm) -> tuple[Mesh | None, Places]:
@@ -97,7 +89,7 @@ def _mesh(case: Case, name: str, comm: MPI.Comm) -> tuple[Mesh | None, Places]:
         try:
             mesh = read_body(case, name)
             places = find_places(case, name, mesh)
-        except Exception as raised:  # every process must hear of it
+        except Exception as raised:  # raised on every process below
             error = raised
     error, places = comm.bcast((error, places), root=0)
     if error is not None:
@@ -128,7 +120,7 @@ def _material(body, plane: str) -> materials.Material:
     return law(mu, lmbda, density)
 
 
-def _lame(settings) -> tuple[Parameter, Parameter]:
+def _lame(settings) -> tuple[Value, Value]:
     """(mu, lambda) at small strain from the constants that the case gives."""
     if settings.law == "mooney_rivlin":
         c10, c01, bulk = (_parameter(p) for p in (settings.c10, settings.c01, settings.bulk))
@@ -144,11 +136,11 @@ def _lame(settings) -> tuple[Parameter, Parameter]:
     return mu, _combine(lambda mu, nu: 2.0 * mu * nu / (1.0 - 2.0 * nu), mu, _parameter(settings.nu))
 
 
-def _parameter(expression) -> Parameter:
+def _parameter(expression) -> Value:
     return expression if expression.constant is None else float(expression.constant)
 
 
-def _combine(function: Callable[..., Any], *parameters: Parameter) -> Parameter:
+def _combine(function: Callable[..., Any], *parameters: Value) -> Value:
     """function(*parameters), where some may be fields."""
     numbers = [p for p in parameters if not callable(p)]
     if len(numbers) == len(parameters):
@@ -157,8 +149,7 @@ def _combine(function: Callable[..., Any], *parameters: Parameter) -> Parameter:
     def combined(x, t):
         return function(*(p(x, t) if callable(p) else p for p in parameters))
 
-    value: Value = combined
-    return value
+    return combined
 
 
 # ---------------------------------------------------------------------------------------------------------- probes

@@ -19,7 +19,7 @@ from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import thin_body
 from fsci.case_meshes import read_body, read_obstacle, read_rigid_body, require_inside_period
 from fsci.rigid_motion import rigid_motion
-from fsci.skin import cut_out_skin
+from fsci.skin import find_skin
 from solvers.fluid.inside import PointInBody, require_outside
 from solvers.fluid.surface import Motion, Surface
 from solvers.locate import locate
@@ -117,9 +117,9 @@ def _is_flat(mesh: Mesh, surface: str) -> bool:
 def _wet(case: Case, found: Findings, keys: Keys, mesh: Mesh) -> None:
     """What an elastic body in a flow needs besides."""
     name = str(keys[-1])
-    skin = found.attempt(partial(cut_out_skin, case, name, mesh))
+    skin = found.attempt(partial(find_skin, case, name, mesh))
     if skin is not None:
-        found.attempt(partial(require_inside_period, case, keys, skin.points))
+        found.attempt(partial(require_inside_period, case, keys, skin[0].points))
     if isinstance(case.elastic_bodies[name].mesh, FileMesh):
         _against_grid(case, found, keys, mesh, moves=True)
 

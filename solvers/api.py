@@ -83,7 +83,7 @@ class Constraint(Stateful, Protocol):
 
     @property
     def near(self) -> bool:
-        """It has something to say at the latest `evaluate`."""
+        """Some constraint may be active at the latest `evaluate`."""
         ...
 
     @property
@@ -144,14 +144,9 @@ class Constraint(Stateful, Protocol):
 
 
 class Scheme(Stateful, Protocol):
-    """Takes one time step from t to t + dt for everything the case contains; raises StepFailed."""
+    """Takes one time step from t to t + dt for everything the case contains; raises StepFailed.
+
+    A field alone is one.
+    """
 
     def step(self, t: float, dt: float) -> StepInfo: ...
-
-
-class Field(Stateful, Protocol):
-    """One physical field, computed alone; `solve` raises StepFailed."""
-
-    def begin_step(self, t: float, dt: float) -> None: ...
-    def solve(self) -> StepInfo: ...
-    def end_step(self) -> None: ...

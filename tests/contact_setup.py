@@ -11,7 +11,6 @@ from scipy.optimize import brentq
 from structure_setup import block, corner_count, corner_shape_functions
 
 from coupling.contact_surface import contact_surface
-from solvers import fem
 from solvers.contact.contact import Contact
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import Law
@@ -19,8 +18,9 @@ from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
 from solvers.mesh import Mesh
 from solvers.newton import Tolerance
-from solvers.structure.body import Body, BodySettings, Support
-from solvers.structure.field import SolverSettings, Structure
+from solvers.solver_settings import SolverSettings
+from solvers.structure.body import Body, Support
+from solvers.structure.field import Structure
 from solvers.structure.materials import NeoHooke
 from solvers.structure.time import Statics
 
@@ -29,7 +29,7 @@ MATERIAL = NeoHooke(mu=400.0, lmbda=600.0, density=1.0)
 
 
 def make_body(name: str, mesh: Mesh, material=MATERIAL, **loads) -> Body:
-    return Body(fem.distribute(MPI.COMM_SELF, mesh), BodySettings(name, material, **loads))
+    return Body(name, mesh, material, **loads, comm=MPI.COMM_SELF)
 
 
 def make_contact(
@@ -51,8 +51,9 @@ def make_contact(
             found[of] = contact_surface(bodies, *of)
         return found[of]
 
-    contact = Contact(MPI.COMM_SELF, [Pair(side(slave), side(master), law=law) for slave, master in pairs], c_n=c_n)
-    return Structure(MPI.COMM_SELF, bodies, time or Statics(), settings, constraint=contact), contact
+    parts = [Pair(side(slave), side(master), law=law) for slave, master in pairs]
+    contact = Contact(parts, c_n=c_n, comm=MPI.COMM_SELF)
+    return Structure(bodies, time or Statics(), settings, contact=contact), contact
 
 
 def solve_step(structure: Structure, t: float = 0.0, dt: float = 1.0, *, first: bool = True):

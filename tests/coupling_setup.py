@@ -5,56 +5,35 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from coupling.contact_surface import global_dofs
+from coupling.couple import couple
 from coupling.coupled import Coupled
-from coupling.interface import Interface, Wetted
 from fsci import shapes
-from solvers import fem
-from solvers.blocks import Layout
-from solvers.fluid.field import Body as Bather
-from solvers.fluid.field import Fluid
-from solvers.fluid.field import SolverSettings as FlowSolver
 from solvers.fluid.grid import Grid, uniform
 from solvers.fluid.patches import Patch
-from solvers.fluid.surface import Surface
 from solvers.fluid.system import FlowSettings
-from solvers.mesh import Mesh
 from solvers.newton import Tolerance
-from solvers.structure.body import Body, BodySettings, Support, Symmetry
-from solvers.structure.field import SolverSettings, Structure
+from solvers.solver_settings import SolverSettings
+from solvers.structure.body import Body, Support, Symmetry
+from solvers.structure.field import Structure
 from solvers.structure.materials import StVenantKirchhoff, lame
 from solvers.structure.time import Dynamics, TimeScheme
-from solvers.tessellation import tessellate
 from solvers.time import GeneralisedAlpha
 
 TIGHT = Tolerance(1e-10)
 
 
-def zero(x, t):
-    return np.zeros(x.shape[1])
-
-
-def couple(
-    mesh: Mesh,
-    body: BodySettings,
+def couple_one(
+    body: Body,
     time: TimeScheme,
     grid: Grid,
     flow: FlowSettings,
     patches: list[Patch],
     *,
-    dry=lambda middles: np.zeros(len(middles), dtype=bool),
-    comm=MPI.COMM_SELF,
+    wetted: tuple[str, ...],
 ) -> Coupled:
-    """One elastic body in a flow; `dry` marks facets by their middles that the fluid does not touch."""
-    domain = fem.distribute(comm, mesh if comm.rank == 0 else None)
-    solid = Body(domain, body)
-    structure = Structure(comm, [solid], time, SolverSettings(TIGHT))
-    facets, nodes = tessellate(mesh)
-    points = mesh.points[nodes]
-    dofs = global_dofs(Layout(comm, [solid.size]), 0, solid, nodes)
-    surface = Surface(body.name, facets, len(points), ~dry(points[facets].mean(axis=1)))
-    fluid = Fluid(comm, grid, flow, patches, [Bather(surface, None)], FlowSolver(TIGHT))
-    return Coupled(fluid, structure, Interface(structure, [Wetted(body.name, points, dofs)]))
+    """One elastic body in a flow that touches some of its surfaces, solved more accurately than by default."""
+    structure = Structure([body], time, SolverSettings(TIGHT))
+    return couple(structure, grid, flow, patches, wetted={body.name: wetted}, solver=SolverSettings(TIGHT))
 
 
 #: rho_s L_s / (rho_f L) -> smallest k with k tan k = r
@@ -68,16 +47,17 @@ def bar_and_column(ratio: float, *, density: float | None = None, amplitude: flo
     """
     k, height, shift = BAR_MODES[ratio], 0.2, 0.0137
     density = 1.0 / ratio if density is None else density
-    first_mode = (lambda x, t: amplitude * np.sin(k * x[0]) / np.sin(k), zero)
+    first_mode = (lambda x, t: amplitude * np.sin(k * x[0]) / np.sin(k), 0.0)
     mu, lmbda = lame(1.0, 0.0)
-    body = BodySettings(
+    body = Body(
         "bar",
-        StVenantKirchhoff(mu, lmbda, 1.0),
-        supports=(Support("left", (zero, zero)), Symmetry("top"), Symmetry("bottom")),
-        initial_displacement=first_mode,
-    )
-    return couple(
         shapes.rectangle([1.0, height], [cells, 2], order=1, cell="quad"),
+        StVenantKirchhoff(mu, lmbda, 1.0),
+        supports=(Support("left"), Symmetry("top"), Symmetry("bottom")),
+        initial_displacement=first_mode,
+        comm=MPI.COMM_SELF,
+    )
+    return couple_one(
         body,
         Dynamics(GeneralisedAlpha.from_rho_inf(1.0)),
         uniform([0.5 + shift, 0.0], [2.0, height], [15, 2]),
@@ -85,9 +65,9 @@ def bar_and_column(ratio: float, *, density: float | None = None, amplitude: flo
         [
             Patch("sides", ("y-", "y+"), "slip"),
             Patch("behind", ("x-",), "slip"),
-            Patch("end", ("x+",), "traction", (zero, zero)),
+            Patch("end", ("x+",), "traction", (0.0, 0.0)),
         ],
-        dry=lambda middles: middles[:, 0] < 1.0 - 1e-9,
+        wetted=("right",),
     )
 
 
@@ -96,13 +76,12 @@ def post_in_flow(
 ) -> Coupled:
     """A soft square post that stands on the bottom of a channel, in a flow that begins to move."""
     a, b = lame(E, 0.3)
-    body = BodySettings("post", StVenantKirchhoff(a, b, rho_s), supports=(Support("bottom", (zero, zero)),))
-    inflow = (lambda x, t: 4.0 * x[1] * (1.0 - x[1]) * np.minimum(t / 0.1, 1.0), zero)
+    inflow = (lambda x, t: 4.0 * x[1] * (1.0 - x[1]) * np.minimum(t / 0.1, 1.0), 0.0)
     mesh = shapes.rectangle([0.23, 0.41], [3, 5], order=1, cell="quad")
     mesh.points[:, 0] += 0.62
-    return couple(
-        mesh,
-        body,
+    material, supports = StVenantKirchhoff(a, b, rho_s), [Support("bottom")]
+    return couple_one(
+        Body("post", mesh, material, supports=supports, comm=MPI.COMM_SELF),
         Dynamics(GeneralisedAlpha.from_rho_inf(rho_inf)),
         uniform([0.0, 0.0], [2.0, 1.0], [20, 10]),
         FlowSettings(1.0, mu, scheme=scheme),
@@ -111,5 +90,5 @@ def post_in_flow(
             Patch("outlet", ("x+",), "outflow"),
             Patch("walls", ("y-", "y+"), "no_slip"),
         ],
-        dry=lambda middles: middles[:, 1] < 1e-9,
+        wetted=("left", "right", "top"),
     )

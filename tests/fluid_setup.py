@@ -10,12 +10,14 @@ from mpi4py import MPI
 
 from solvers import fem
 from solvers.fluid.cut import Cutter
-from solvers.fluid.field import Body, Fluid, SolverSettings
+from solvers.fluid.field import Fluid
 from solvers.fluid.grid import Grid
+from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.patches import Patch
 from solvers.fluid.surface import Motion, Surface
 from solvers.fluid.system import FlowSettings
 from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 
 TIGHT = SolverSettings(Tolerance(residual=1e-12), linear="direct")
 BOX = {2: ("x-", "x+", "y-", "y+"), 3: ("x-", "x+", "y-", "y+", "z-", "z+")}
@@ -39,7 +41,7 @@ def wall(velocity) -> Patch:
 def make_fluid(
     grid: Grid,
     patches: Sequence[Patch],
-    bodies: Sequence[Body] = (),
+    bodies: Sequence[ImmersedBody] = (),
     *,
     solver: SolverSettings = TIGHT,
     comm: MPI.Comm = MPI.COMM_SELF,
@@ -51,7 +53,7 @@ def make_fluid(
     **settings,
 ) -> Fluid:
     """A flow at its start."""
-    fluid = Fluid(comm, grid, FlowSettings(rho, mu, **settings), patches, bodies, solver, timer)
+    fluid = Fluid(grid, FlowSettings(rho, mu, **settings), patches, bodies, solver, timer=timer, comm=comm)
     fluid.initialise(start, dt)
     return fluid
 
@@ -71,7 +73,7 @@ def solve_steady(fluid: Fluid):
 # ---------------------------------------------------------------------------------------------------------- bodies
 
 
-def body(name: str, points, facets, *, motion=None, velocity=0.0, wet=None) -> Body:
+def body(name: str, points, facets, *, motion=None, velocity=0.0, wet=None) -> ImmersedBody:
     """A body whose vertices are at points + (displacement by time) and have velocity(points, t) [m/s].
 
     Without a motion, t -> (positions, velocities), it rests, its surface moving in itself by `velocity`.
@@ -80,8 +82,8 @@ def body(name: str, points, facets, *, motion=None, velocity=0.0, wet=None) -> B
     surface = Surface(name, np.asarray(facets, dtype=np.int64), len(points), wet)
     if motion is None:
         slip = np.zeros_like(points) + velocity
-        return Body(surface, lambda t: Motion(points, slip), rests=True)
-    return Body(surface, lambda t: Motion(*motion(points, t)))
+        return ImmersedBody(surface, lambda t: Motion(points, slip), rests=True)
+    return ImmersedBody(surface, lambda t: Motion(*motion(points, t)))
 
 
 def loop(count: int) -> np.ndarray:

@@ -11,12 +11,11 @@ from mpi4py import MPI
 from structure_setup import TIGHT, block, constant, load_step, vector
 
 from solvers import fem
-from solvers.structure.body import Body, BodySettings, Pressure, Support
+from solvers.structure.body import Body, Pressure, Support
 from solvers.structure.field import Structure
 from solvers.structure.materials import NeoHooke
 from solvers.structure.probes import at_point, of_bodies, on_surface
 from solvers.structure.snapshot import snapshots
-from solvers.structure.time import Statics
 
 
 def middle_apart(comm, parts, dim, cells, ghost_mode):
@@ -31,14 +30,15 @@ def main(out):
     comm, create_mesh = MPI.COMM_WORLD, dolfinx.mesh.create_mesh
     if comm.size > 1:
         dolfinx.mesh.create_mesh = lambda *arguments: create_mesh(*arguments, partitioner=middle_apart)
-    domain = fem.distribute(comm, block("hexahedron", 3) if comm.rank == 0 else None)
+    supports = [Support("bottom", vector(0, 0, 0))]
+    load = [Pressure("top", constant(0.1))]
+    material = NeoHooke(1.0, 1.0, 1.0)
+    body = Body("cube", block("hexahedron", 3), material, supports=supports, pressures=load, comm=comm)
+    domain = body.domain
     if comm.rank == 1:
         assert fem.owned_cells(domain) == 1
         assert not any(len(facets) for facets in domain.surfaces.values())
-    supports = [Support("bottom", vector(0, 0, 0))]
-    load = [Pressure("top", constant(0.1))]
-    body = Body(domain, BodySettings("cube", NeoHooke(1.0, 1.0, 1.0), supports=supports, pressures=load))
-    structure = Structure(comm, [body], Statics(), TIGHT)
+    structure = Structure([body], settings=TIGHT)
     load_step(structure)
     probes = [
         at_point(structure, body, "displacement", (0.5, 0.5, 0.5)),

@@ -11,8 +11,9 @@ from fsci import shapes
 from solvers import fem
 from solvers.mesh import Mesh
 from solvers.newton import Tolerance
-from solvers.structure.body import Body, BodySettings, Support
-from solvers.structure.field import SolverSettings, Structure
+from solvers.solver_settings import SolverSettings
+from solvers.structure.body import Body, Support
+from solvers.structure.field import Structure
 from solvers.structure.time import Statics
 
 CELL_TYPES = ("triangle", "triangle6", "quad", "quad9", "tetra", "tetra10", "hexahedron", "hexahedron27")
@@ -65,8 +66,7 @@ def corner_shape_functions(mesh: Mesh) -> np.ndarray:
 
 def make_structure(mesh: Mesh, material, *, time=None, settings=TIGHT, comm=MPI.COMM_SELF, **loads) -> Structure:
     """A structure of one body."""
-    body = Body(fem.distribute(comm, mesh if comm.rank == 0 else None), BodySettings("body", material, **loads))
-    return Structure(comm, [body], time or Statics(), settings)
+    return Structure([Body("body", mesh, material, **loads, comm=comm)], time or Statics(), settings)
 
 
 def held_everywhere(mesh: Mesh, displacement) -> list[Support]:

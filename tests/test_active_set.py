@@ -11,8 +11,8 @@ from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import Point
 from solvers.contact.surface import Surface
 from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
-from solvers.structure.field import SolverSettings
 
 ONE = np.ones(3)
 ALL = np.ones(3, dtype=bool)

@@ -11,8 +11,8 @@ from fsci import shapes
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.law import STICK
 from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
-from solvers.structure.field import SolverSettings
 from solvers.structure.materials import StVenantKirchhoff, lame
 
 E, NU, RADIUS, MU = 1000.0, 0.3, 200.0, 0.4

@@ -15,8 +15,8 @@ from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import OPEN, SLIP, STICK
 from solvers.contact.law.tresca import Tresca
 from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
-from solvers.structure.field import SolverSettings
 from solvers.structure.materials import StVenantKirchhoff, lame
 
 ZERO = constant(0)

@@ -9,8 +9,8 @@ from structure_setup import constant
 from fsci import shapes
 from fsci.history import read_history
 from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
-from solvers.structure.field import SolverSettings
 from solvers.structure.materials import NeoHooke, lame
 
 ZERO = constant(0.0)

@@ -90,7 +90,7 @@ def sheared(base_cells, split):
         )
         for (name, start, width), n in zip(halves, base_cells, strict=True)
     ]
-    pairs = [(("top", "bottom"), (base.settings.name, "top")) for base in bases]
+    pairs = [(("top", "bottom"), (base.name, "top")) for base in bases]
     return make_contact([top, *bases], pairs)
 
 

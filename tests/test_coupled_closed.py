@@ -44,19 +44,19 @@ def message(text: str, folder) -> str:
 def test_walls_all_round(tmp_path):
     closed = POST.replace("{on: x+, outflow: true}", "{on: x+, no_slip: true}").replace("monolithic", "partitioned")
     said = message(closed, tmp_path)
-    assert "case.yaml:18:20: the boundary closes the fluid in, and iterations by turns cannot find the level" in said
+    assert "case.yaml:18:20: the boundary encloses the fluid, and the partitioned scheme does not determine" in said
     assert "take 'monolithic', or a patch with 'traction', 'pressure' or 'outflow'" in said
 
 
 def test_walls_all_round_a_steady_flow(tmp_path):
     said = message(COLUMN.replace(OPEN, CLOSED), tmp_path)
-    assert "case.yaml:6:11: the boundary closes the fluid in, and a steady flow does not know how much there is" in said
+    assert "case.yaml:6:11: the boundary encloses the fluid, and a steady flow does not determine" in said
     assert "take 'bdf2', or a patch with 'traction', 'pressure' or 'outflow'" in said
 
 
 def test_a_room_in_a_body(tmp_path):
     said = message(RING.replace("monolithic", "partitioned"), tmp_path)
-    assert "case.yaml:17:20: bodies close in a part of the fluid, and iterations by turns cannot find the level" in said
+    assert "case.yaml:17:20: bodies enclose a part of the fluid, and the partitioned scheme does not determine" in said
     run(RING, tmp_path)
 
 

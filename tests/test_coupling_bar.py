@@ -7,7 +7,7 @@ import pytest
 
 from coupling.accelerate import Aitken, QuasiNewton, Relaxation
 from coupling.monolithic import Monolithic
-from coupling.partitioned import Partitioned, Tolerance
+from coupling.partitioned import FixedPointTolerance, Partitioned
 from solvers.api import StepFailed
 from tests.coupling_setup import BAR_MODES, TIGHT, bar_and_column
 
@@ -47,7 +47,7 @@ def test_both_schemes_take_the_same_way(accelerator):
     """50 steps with the heavy fluid, ratio 0.1."""
     dt = 0.1
     one, newton = swing(Monolithic(bar_and_column(0.1), TIGHT), dt, 50)
-    two, _ = swing(Partitioned(bar_and_column(0.1), accelerator, Tolerance(1e-7)), dt, 50)
+    two, _ = swing(Partitioned(bar_and_column(0.1), accelerator, FixedPointTolerance(1e-7)), dt, 50)
     assert np.abs(one - two).max() < 10 * 1e-7 * np.abs(one).max()
     light, _ = swing(Monolithic(bar_and_column(10.0), TIGHT), dt, 5)
     assert np.isfinite(light).all()
@@ -57,7 +57,7 @@ def test_both_schemes_take_the_same_way(accelerator):
 def test_steps_begin_on_the_parabola_through_the_last_places(monkeypatch):
     """After the cut of the old place, which cells that the surface leaves in this step need."""
     dt, steps = 0.1, 6
-    scheme = Partitioned(bar_and_column(1.0), QuasiNewton(0.5), Tolerance(1e-9))
+    scheme = Partitioned(bar_and_column(1.0), QuasiNewton(0.5), FixedPointTolerance(1e-9))
     interface = scheme.coupled.interface
     scheme.coupled.initialise(0.0, dt)
     places, tried, move = [interface.displacement()], [], interface.move
@@ -97,7 +97,7 @@ def test_plain_iterations_on_both_sides_of_their_limit(times_limit: float):
     density = times_limit / unit
     coupled = bar_and_column(1.0, density=density, cells=cells, amplitude=1e-6)
     coupled.initialise(0.0, dt)
-    scheme = Partitioned(coupled, Relaxation(1.0), Tolerance(1e-12, 0.0, max_iterations=14))
+    scheme = Partitioned(coupled, Relaxation(1.0), FixedPointTolerance(1e-12, 0.0, max_iterations=14))
     with pytest.raises(StepFailed) as failure:
         scheme.step(0.0, dt)
     history = failure.value.history

@@ -8,11 +8,11 @@ import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, solve_steady, sphere
 
 from solvers import fem
-from solvers.fluid.field import SolverSettings
 from solvers.fluid.grid import uniform
 from solvers.fluid.patches import Patch
 from solvers.fluid.probes import on_patch
 from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 
 #: F / (mu U) per length of a cylinder, and F / (6 pi mu a U) of a sphere, U the mean velocity of the whole cell
 CYLINDERS = {0.05: 15.56, 0.1: 24.83, 0.2: 51.53, 0.3: 102.90, 0.5: 532.55}

@@ -5,10 +5,10 @@ import pytest
 from fluid_setup import field, make_fluid, solve_steady
 
 from fsci.bench import fluid as bench
-from solvers.fluid.field import SolverSettings
 from solvers.fluid.grid import Grid
 from solvers.fluid.patches import Patch
 from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 
 #: min u on x = 1/2, max v and min v on y = 1/2. Botella, Peyret, Computers & Fluids 27 (1998) 421-433.
 CAVITY = {100: (-0.2140424, 0.1795728, -0.2538030), 1000: (-0.3885698, 0.3769447, -0.5270771)}

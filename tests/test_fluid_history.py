@@ -5,9 +5,9 @@ import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, nodal_errors, step, wall
 
 from solvers.api import StepFailed
-from solvers.fluid.field import Body
 from solvers.fluid.grid import uniform
 from solvers.fluid.history import Past
+from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.surface import Motion, Surface
 
 VELOCITY, DT = field(2.0, 0.0), 0.01
@@ -16,7 +16,7 @@ VELOCITY, DT = field(2.0, 0.0), 0.01
 def carried():
     """A block that another field moves with the flow, in a flow that does not notice it."""
     points, facets = block([0.23, 0.32], [0.57, 0.66])
-    body = Body(Surface("block", facets, len(points)), motion=None)
+    body = ImmersedBody(Surface("block", facets, len(points)), motion=None)
     fluid = make_fluid(
         uniform([0, 0], [1, 1], [20, 20]), [wall(VELOCITY)], [body], dt=DT, initial_velocity=VELOCITY, mu=0.1
     )

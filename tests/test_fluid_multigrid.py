@@ -12,12 +12,12 @@ from fsci.case import load_case
 from fsci.run import FAILED, run_case
 from solvers import linear
 from solvers.fluid import krylov
-from solvers.fluid.field import SolverSettings
 from solvers.fluid.grid import Grid, uniform
 from solvers.fluid.krylov import Ladder, rungs
 from solvers.fluid.multigrid import Lattice, coarsen, finest, interpolation
 from solvers.linear import LinearSolveFailed
 from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 
 
 def test_short_cells_are_joined_first():

@@ -5,9 +5,9 @@ import pytest
 import sympy
 from fluid_setup import body, circle, errors, field, loop, make_fluid, solve_steady, sphere, symbolic, wall
 
-from solvers.fluid.field import SolverSettings
 from solvers.fluid.grid import uniform
 from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 
 X, Y, Z, T = sympy.symbols("x y z t")
 BARS = {"q1q1": (1.9, 0.95, 1.4), "q2q1": (2.9, 1.9, 1.9)}

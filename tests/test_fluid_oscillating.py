@@ -6,10 +6,10 @@ from fluid_setup import body, circle, loop, make_fluid, step
 from scipy.signal import butter, sosfiltfilt
 
 from fsci.bench.fluid import graded
-from solvers.fluid.field import SolverSettings
 from solvers.fluid.grid import Grid
 from solvers.fluid.patches import Patch
 from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 
 FREQUENCY, AMPLITUDE = 0.2, 5.0 / (2.0 * np.pi)
 

@@ -5,17 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from fluid_setup import body, field, loop, make_fluid, step
+from mpi4py import MPI
 
 from coupling.monolithic import Monolithic
 from fsci import shapes
 from solvers.fluid.grid import uniform
 from solvers.fluid.patches import Patch
 from solvers.fluid.system import FlowSettings
-from solvers.structure.body import BodySettings, Symmetry
+from solvers.structure.body import Body, Symmetry
 from solvers.structure.materials import StVenantKirchhoff, lame
 from solvers.structure.time import Dynamics
 from solvers.time import GeneralisedAlpha
-from tests.coupling_setup import TIGHT, couple, zero
+from tests.coupling_setup import TIGHT, couple_one
 
 WEIGHT, DT = 3.0, 0.05
 
@@ -81,20 +82,19 @@ def chamber():
     mesh = shapes.rectangle([0.4, 0.2], [4, 2], order=1, cell="quad")
     mesh.points[:, 0] += 0.513
     mu, lmbda = lame(100.0, 0.0)
-    plug = BodySettings("plug", StVenantKirchhoff(mu, lmbda, 1.0), supports=(Symmetry("top"), Symmetry("bottom")))
-    push = (lambda x, t: 2.0 * np.ones(x.shape[1]), zero)
-    return couple(
-        mesh,
+    supports = (Symmetry("top"), Symmetry("bottom"))
+    plug = Body("plug", mesh, StVenantKirchhoff(mu, lmbda, 1.0), supports=supports, comm=MPI.COMM_SELF)
+    return couple_one(
         plug,
         Dynamics(GeneralisedAlpha.from_rho_inf(0.0)),
         uniform([0.0, 0.0], [1.5, 0.2], [15, 2]),
         FlowSettings(1.0, 0.1, scheme="backward_euler"),
         [
-            Patch("inlet", ("x-",), "traction", push),
+            Patch("inlet", ("x-",), "traction", (2.0, 0.0)),
             Patch("sides", ("y-", "y+"), "slip"),
             Patch("end", ("x+",), "slip"),
         ],
-        dry=lambda middles: (middles[:, 1] < 1e-9) | (middles[:, 1] > 0.2 - 1e-9),
+        wetted=("left", "right"),
     )
 
 

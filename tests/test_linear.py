@@ -11,13 +11,13 @@ from fsci import shapes
 from fsci.case import load_case
 from fsci.history import read_history
 from fsci.run import FINISHED, run_case
-from solvers import fem, linear
+from solvers import linear
 from solvers.newton import Tolerance
-from solvers.structure.body import Body, BodySettings, Pressure, Support, Traction
-from solvers.structure.field import SolverSettings, Structure
+from solvers.solver_settings import SolverSettings
+from solvers.structure.body import Body, Pressure, Support, Traction
+from solvers.structure.field import Structure
 from solvers.structure.materials import NeoHooke
 from solvers.structure.rigid_modes import attach_rigid_modes
-from solvers.structure.time import Statics
 
 LIMIT = 60  #: iterations to a residual of 1e-8
 
@@ -156,17 +156,16 @@ def test_two_bodies():
     def structure(chosen, method):
         bodies = [
             Body(
-                fem.distribute(MPI.COMM_SELF, meshes[i]),
-                BodySettings(
-                    f"body{i}",
-                    NeoHooke(400.0, 600.0),
-                    supports=[held()],
-                    tractions=[Traction("right", vector(0, 0, -4))],
-                ),
+                f"body{i}",
+                meshes[i],
+                NeoHooke(400.0, 600.0),
+                supports=[held()],
+                tractions=[Traction("right", vector(0, 0, -4))],
+                comm=MPI.COMM_SELF,
             )
             for i in chosen
         ]
-        return Structure(MPI.COMM_SELF, bodies, Statics(), SolverSettings(Tolerance(residual=1e-10), linear=method))
+        return Structure(bodies, settings=SolverSettings(Tolerance(residual=1e-10), linear=method))
 
     alone = [solve_once(structure([i], "iterative")) for i in (0, 1)]
     assert solve_once(structure([0, 1], "iterative")) <= max(alone) + 3

@@ -13,8 +13,8 @@ from fsci.case import CaseError, load_case
 from fsci.history import read_history
 from solvers.api import StepFailed
 from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Pressure, Support, Traction
-from solvers.structure.field import SolverSettings
 from solvers.structure.materials import LinearElastic, NeoHooke, lame
 from solvers.structure.time import Dynamics
 from solvers.time import GeneralisedAlpha

@@ -6,9 +6,9 @@ from structure_setup import block, constant, make_structure, vector
 
 from fsci import shapes
 from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 from solvers.structure import probes
 from solvers.structure.body import Support
-from solvers.structure.field import SolverSettings
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
 from solvers.structure.time import Damping, Dynamics
 from solvers.time import GeneralisedAlpha

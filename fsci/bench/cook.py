@@ -10,13 +10,12 @@ from mpi4py import MPI
 
 from fsci import shapes
 from fsci.bench.table import Row
-from solvers import fem
 from solvers.mesh import Mesh
-from solvers.structure.body import Body, BodySettings, Support, Traction
+from solvers.solver_settings import SolverSettings
+from solvers.structure.body import Body, Support, Traction
 from solvers.structure.elements import Formulation
-from solvers.structure.field import SolverSettings, Structure
+from solvers.structure.field import Structure
 from solvers.structure.materials import LinearElastic, lame
-from solvers.structure.time import Statics
 
 #: cell, order, element, cells along an edge
 MESHES: tuple[tuple[str, int, Formulation, tuple[int, ...]], ...] = (
@@ -62,11 +61,10 @@ def membrane(cell: str, order: int, cells: int) -> Mesh:
 
 def solve(mesh: Mesh, element: Formulation) -> tuple[float, float]:
     """(vertical displacement of the upper right corner, processor seconds) for E = 70, nu = 0.4999, a shear of 6.25."""
-    held, sheared = Support("left", (constant(0.0),) * 2), Traction("right", (constant(0.0), constant(6.25)))
+    held, sheared = Support("left"), Traction("right", (0.0, 6.25))
     material = LinearElastic(*lame(70.0, 0.4999))
-    settings = BodySettings("panel", material, element=element, supports=[held], tractions=[sheared])
-    body = Body(fem.distribute(MPI.COMM_SELF, mesh), settings)
-    structure = Structure(MPI.COMM_SELF, [body], Statics(), SolverSettings(linear="direct"))
+    body = Body("panel", mesh, material, element=element, supports=[held], tractions=[sheared], comm=MPI.COMM_SELF)
+    structure = Structure([body], settings=SolverSettings(linear="direct"))
     structure.initialise(0.0, 1.0)
     structure.begin_step(0.0, 1.0)
     begin = process_time()

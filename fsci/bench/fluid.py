@@ -10,13 +10,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fsci.bench.table import Row
-from solvers.fluid.field import Body, Fluid, SolverSettings
+from solvers.fluid.field import Fluid
 from solvers.fluid.grid import Grid, uniform
+from solvers.fluid.immersed import ImmersedBody, rigid_body
 from solvers.fluid.patches import Patch
 from solvers.fluid.probes import at_point, difference
-from solvers.fluid.surface import Motion, Surface
 from solvers.fluid.system import FlowSettings
 from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 from solvers.timing import Timer
 
 Array = NDArray[np.float64]
@@ -54,15 +55,10 @@ def polygon(centre: tuple[float, float], radius: float, count: int) -> Array:
     return np.asarray(centre) + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
-def at_rest(name: str, points: Array, facets: NDArray[np.int64]) -> Body:
-    """A body that does not move."""
-    return Body(Surface(name, facets, len(points)), lambda t: Motion(points, np.zeros_like(points)), rests=True)
-
-
-def disc(name: str, points: Array) -> Body:
+def disc(name: str, points: Array) -> ImmersedBody:
     """The polygon of some corners."""
     count = np.arange(len(points))
-    return at_rest(name, points, np.stack([count, np.roll(count, -1)], axis=1))
+    return rigid_body(name, points, np.stack([count, np.roll(count, -1)], axis=1))
 
 
 def cylinder_grid(cells: int) -> Grid:
@@ -91,7 +87,7 @@ def cylinder(
     ]
     body = disc("cylinder", polygon(CENTRE, DIAMETER / 2, segments))
     flow = FlowSettings(1.0, 1e-3, element=element, scheme=scheme)  # type: ignore[arg-type]
-    return Fluid(MPI.COMM_SELF, grid, flow, patches, [body], SolverSettings(Tolerance(tolerance)), timer)
+    return Fluid(grid, flow, patches, [body], SolverSettings(Tolerance(tolerance)), timer=timer, comm=MPI.COMM_SELF)
 
 
 def run_steady() -> list[Row]:
@@ -142,7 +138,7 @@ def stokes(cells: int) -> Row:
     body = disc("disc", polygon((0.51, 0.48), 0.21, 4 * cells))
     flow = FlowSettings(1.0, 1.0, scheme="steady", convection=False)
     solver = SolverSettings(Tolerance(1e-8), linear="direct")
-    fluid = Fluid(MPI.COMM_SELF, uniform([0, 0], [1, 1], [cells] * 2), flow, patches, [body], solver, timer)
+    fluid = Fluid(uniform([0, 0], [1, 1], [cells] * 2), flow, patches, [body], solver, timer=timer, comm=MPI.COMM_SELF)
     fluid.initialise(0.0, 1.0)
     fluid.begin_step(0.0, 1.0)
     fluid.solve()
@@ -186,10 +182,11 @@ def channel(cells: int, steps: int, dt: float = 0.05) -> Row:
         Patch("out", ("z-",), "outflow"),
         Patch("walls", ("x-", "x+", "y-", "y+"), "no_slip"),
     ]
-    body = Body(Surface("ring", facets, len(points)), lambda t: Motion(points + t * speed, 0.0 * points + speed))
+    body = rigid_body("ring", points, facets, lambda t: (points + t * speed, 0.0 * points + speed))
     flow = FlowSettings(1.0, 0.01, scheme="backward_euler")
     solver, timer = SolverSettings(Tolerance(1e-6), linear_tolerance=1e-5), Timer()
-    fluid = Fluid(MPI.COMM_SELF, uniform([-1.0] * 3, [1.0] * 3, [cells] * 3), flow, patches, [body], solver, timer)
+    grid = uniform([-1.0] * 3, [1.0] * 3, [cells] * 3)
+    fluid = Fluid(grid, flow, patches, [body], solver, timer=timer, comm=MPI.COMM_SELF)
     fluid.initialise(0.0, dt)
     timer.seconds.clear()
     begin, newton = perf_counter(), 0

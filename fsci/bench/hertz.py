@@ -17,17 +17,15 @@ from scipy.optimize import brentq
 from coupling.contact_surface import contact_surface
 from fsci import shapes
 from fsci.bench.table import Row
-from solvers import fem
 from solvers.contact.contact import Contact
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
 from solvers.mesh import Mesh
 from solvers.newton import Tolerance
-from solvers.structure.body import Body, BodySettings, Support
-from solvers.structure.field import SolverSettings, Structure
+from solvers.solver_settings import SolverSettings
+from solvers.structure.body import Body, Support
+from solvers.structure.field import Structure
 from solvers.structure.materials import NeoHooke, lame
-from solvers.structure.time import Statics
-from solvers.timing import Timer
 
 Array = np.ndarray
 
@@ -109,17 +107,17 @@ def solve(per_radius: int, outer: int) -> Found:
 def build(mesh: Mesh) -> tuple[Structure, Contact]:
     """The ball with its planes of symmetry, and the plane, one facet."""
     supports = [
-        Support("left", (_value(0.0), None, None)),
-        Support("front", (None, _value(0.0), None)),
-        Support("top", (None, None, _value(-PRESS))),
+        Support("left", (0.0, None, None)),
+        Support("front", (None, 0.0, None)),
+        Support("top", (None, None, -PRESS)),
     ]
-    settings = BodySettings("ball", NeoHooke(*lame(E, NU)), supports=supports)
-    body = Body(fem.distribute(MPI.COMM_SELF, mesh), settings)
+    body = Body("ball", mesh, NeoHooke(*lame(E, NU)), supports=supports, comm=MPI.COMM_SELF)
     slave = contact_surface([body], "ball", "bottom")
     corners = BLOCK * np.array([[-0.1, -0.1, 0], [1.1, -0.1, 0], [1.1, 1.1, 0], [-0.1, 1.1, 0]])
-    contact = Contact(MPI.COMM_SELF, [Pair(slave, Surface("plane", corners, np.array([[0, 1, 2, 3]]), "quad", None))])
+    plane = Surface("plane", corners, np.array([[0, 1, 2, 3]]), "quad", None)
+    contact = Contact([Pair(slave, plane)], comm=MPI.COMM_SELF)
     solver = SolverSettings(Tolerance(residual=1e-10), linear="ilu")
-    return Structure(MPI.COMM_SELF, [body], Statics(), solver, Timer(), contact), contact
+    return Structure([body], settings=solver, contact=contact), contact
 
 
 def _value(number: float) -> Callable[[Array, float], Array]:

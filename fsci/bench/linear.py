@@ -10,12 +10,11 @@ from mpi4py import MPI
 
 from fsci import shapes
 from fsci.bench.table import Row
-from solvers import fem
 from solvers.mesh import Mesh
-from solvers.structure.body import Body, BodySettings, Support, Traction
-from solvers.structure.field import SolverSettings, Structure
+from solvers.solver_settings import SolverSettings
+from solvers.structure.body import Body, Support, Traction
+from solvers.structure.field import Structure
 from solvers.structure.materials import NeoHooke
-from solvers.structure.time import Statics
 
 #: name -> mesh: compact, slender, thin, with flat cells, of second order
 MESHES: dict[str, Any] = {
@@ -52,11 +51,9 @@ def measure(name: str, mesh: Mesh) -> Row:
 
 def clamped(mesh: Mesh, method: Any) -> Structure:
     """A body held at its left end and pulled aside at its right one."""
-    held = Support("left", (constant(0.0), constant(0.0), constant(0.0)))
-    pulled = Traction("right", (constant(0.0), constant(0.0), constant(-1.0)))
-    settings = BodySettings("body", NeoHooke(400.0, 600.0), supports=[held], tractions=[pulled])
-    domain = fem.distribute(MPI.COMM_SELF, mesh)
-    return Structure(MPI.COMM_SELF, [Body(domain, settings)], Statics(), SolverSettings(linear=method))
+    held, pulled = Support("left"), Traction("right", (0.0, 0.0, -1.0))
+    body = Body("body", mesh, NeoHooke(400.0, 600.0), supports=[held], tractions=[pulled], comm=MPI.COMM_SELF)
+    return Structure([body], settings=SolverSettings(linear=method))
 
 
 def constant(value: float):

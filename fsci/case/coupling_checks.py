@@ -38,15 +38,15 @@ def coupling_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
     kinds = {patch.kind for patch in case.fluid.patches.values()}
     if (steady or coupling.scheme == "partitioned") and not kinds & set(OPEN):
         where, why = closed_in(case)
-        yield where, f"the boundary closes the fluid in, and {why}, or a patch with {listed(OPEN)}"
+        yield where, f"the boundary encloses the fluid, and {why}, or give a patch with {listed(OPEN)}"
 
 
 def closed_in(case: Case) -> Mistake:
-    """Why a steady or partitioned solution has no level of the pressure in fluid that walls and bodies close in."""
+    """Why a steady or partitioned solution does not determine the pressure level of enclosed fluid."""
     assert case.fluid is not None
     if case.fluid.scheme == "steady":
-        return ("fluid", "scheme"), "a steady flow does not know how much there is of it: take 'bdf2'"
-    reason = "iterations by turns cannot find the level of its pressure: take 'monolithic'"
+        return ("fluid", "scheme"), "a steady flow does not determine the pressure of enclosed fluid: take 'bdf2'"
+    reason = "the partitioned scheme does not determine the pressure of enclosed fluid: take 'monolithic'"
     return ("coupling", "scheme"), reason
 
 

@@ -46,12 +46,12 @@ class Contact:
 
     def __init__(
         self,
-        comm: MPI.Comm,
         pairs: Sequence[Pair],
         *,
         names: Sequence[str] = (),
         c_n: float = 1.0,
         keep_overlap: bool = False,
+        comm: MPI.Comm = MPI.COMM_WORLD,
     ):
         self.comm, self.c_n = comm, c_n
         self.names = tuple(names) or tuple(f"pair{i}" for i in range(len(pairs)))

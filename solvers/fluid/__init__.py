@@ -1,1 +1,14 @@
 """Incompressible flow on a fixed grid that moving surfaces cut (CutFEM)."""
+
+from solvers.lazy import lazy_names
+
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "field": ["Fluid"],
+        "grid": ["Grid", "uniform"],
+        "immersed": ["ImmersedBody", "rigid_body"],
+        "patches": ["Patch"],
+        "system": ["FlowSettings"],
+    },
+)

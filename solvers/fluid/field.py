@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
@@ -19,37 +19,22 @@ from solvers.fluid.cut import NOTHING, Cut, Cutter
 from solvers.fluid.fast_bodies import FastBodies
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.history import History, Past
+from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.krylov import FlowKrylov, Ladder, rungs
 from solvers.fluid.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.pressure_level import hold_pressure, spread_excess
 from solvers.fluid.space import Nodes, Unknowns
-from solvers.fluid.surface import Motion, Surface, offsets, together, wetness
+from solvers.fluid.surface import Motion, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
 from solvers.lagged import LaggedFactors
-from solvers.newton import Tolerance, converge
+from solvers.newton import converge
 from solvers.rounding import rounding_error
+from solvers.solver_settings import SolverSettings
 from solvers.timing import Timer
+from solvers.values import evaluate
 
 #: Share of the largest residual of a steady flow below which Newton's method takes over from Picard's.
 NEWTON_FROM = 0.02
-
-
-@dataclass(frozen=True)
-class SolverSettings:
-    """How the nonlinear and the linear systems are solved."""
-
-    newton: Tolerance = Tolerance()
-    linear: linear.Method = "auto"
-    linear_tolerance: float = 1e-8
-
-
-@dataclass(frozen=True)
-class Body:
-    """A surface in the flow; `motion` gives its vertices at a time, None if another field moves it."""
-
-    surface: Surface
-    motion: Callable[[float], Motion] | None
-    rests: bool = False  #: it never moves
 
 
 class Fluid:
@@ -59,13 +44,14 @@ class Fluid:
 
     def __init__(
         self,
-        comm: MPI.Comm,
         grid: Grid,
         settings: FlowSettings,
         patches: Sequence[Patch],
-        bodies: Sequence[Body] = (),
+        bodies: Sequence[ImmersedBody] = (),
         solver: SolverSettings = SolverSettings(),
+        *,
         timer: Timer | None = None,
+        comm: MPI.Comm = MPI.COMM_WORLD,
     ):
         self.comm, self.settings, self.solver, self.timer = comm, settings, solver, timer or Timer()
         self.bodies = list(bodies)
@@ -133,7 +119,7 @@ class Fluid:
             points = np.zeros((3, len(self.unknowns.velocity.points)))
             points[: self.dim] = self.unknowns.velocity.points.T
             for axis, component in enumerate(self.settings.initial_velocity):
-                self.flow[self.unknowns.velocity.dofs[:, axis]] = component(points, t)
+                self.flow[self.unknowns.velocity.dofs[:, axis]] = evaluate(component, points, t)
         self.history.now.velocity = self.velocity()
         self._t, self.dt = t, dt
         self.difference = time.STEADY if self.settings.steady else time.backward_euler(dt)
@@ -146,6 +132,13 @@ class Fluid:
         return any(body.motion is None for body in self.bodies)
 
     # ------------------------------------------------------------------------------------------------- steps
+
+    def step(self, t: float, dt: float) -> StepInfo:
+        """One step from t to t + dt. Raises StepFailed."""
+        self.begin_step(t, dt)
+        info = self.solve()
+        self.end_step()
+        return info
 
     def begin_step(self, t: float, dt: float) -> None:
         """Remember the state at t; boundary, loads and moving bodies at t + dt."""

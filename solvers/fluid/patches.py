@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,13 +13,11 @@ from solvers import fem
 from solvers.api import Array
 from solvers.fluid.grid import FACES, DistributedGrid
 from solvers.fluid.space import Unknowns
-
-#: A component as function of positions (dim, n) [m] and time [s].
-Value = Callable[[Array, float], Array]
+from solvers.values import Value, evaluate
 
 Kind = Literal["velocity", "no_slip", "slip", "traction", "pressure", "outflow", "periodic"]
 
-#: Kinds of patches that let the fluid through as it likes, so that they say how high the pressure is.
+#: Kinds of patches with free normal flow: they determine the level of the pressure.
 OPEN = ("traction", "pressure", "outflow")
 
 
@@ -35,7 +33,7 @@ class Patch:
     name: str
     faces: tuple[str, ...]
     kind: Kind
-    value: tuple[Value, ...] | None = None  #: velocity, traction or pressure
+    value: Sequence[Value] | None = None  #: velocity, traction or pressure
     where: Value | None = None  #: positive on the part of the faces that belongs to it; default: all
 
     def __post_init__(self) -> None:
@@ -70,7 +68,7 @@ class Boundary:
             for face in patch.faces:
                 on |= grid.on_face(midpoints, face)
             if patch.where is not None:
-                on &= np.broadcast_to(patch.where(midpoints.T, 0.0), len(facets)) > 0.0
+                on &= evaluate(patch.where, midpoints.T, 0.0) > 0.0
             patch_of[on] = number
         self._check(grid, midpoints[patch_of < 0])
         #: local faces and their cells, by patch
@@ -130,5 +128,5 @@ class Boundary:
             assert patch.value is not None
             for component, value in enumerate(patch.value):
                 on = (owner == number) & (axis == component)
-                values[on] = value(self._unknowns.velocity.points[node[on]].T, t)
+                values[on] = evaluate(value, self._unknowns.velocity.points[node[on]].T, t)
         return values

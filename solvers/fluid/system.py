@@ -19,11 +19,12 @@ from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.interface import Interface
 from solvers.fluid.matrix import Pattern, choose_pattern, create_matrix, fits, pattern_of
-from solvers.fluid.patches import Boundary, Value
+from solvers.fluid.patches import Boundary
 from solvers.fluid.pieces import Pieces
 from solvers.fluid.space import Unknowns
 from solvers.fluid.time import Difference
 from solvers.fluid.weights import Weights
+from solvers.values import Value, evaluate
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,8 @@ class FlowSettings:
     element: Literal["q1q1", "q2q1"] = "q1q1"
     convection: bool = True  #: False: Stokes
     scheme: Literal["steady", "backward_euler", "bdf2"] = "bdf2"
-    body_force: tuple[Value, ...] | None = None  #: [N/m^3]
-    initial_velocity: tuple[Value, ...] | None = None  #: [m/s]
+    body_force: Sequence[Value] | None = None  #: [N/m^3]
+    initial_velocity: Sequence[Value] | None = None  #: [m/s]
     penalties: forms.Penalties = forms.Penalties()
 
     @property
@@ -348,4 +349,4 @@ def _set_velocity(function, nodes, value: Sequence[Value], t: float) -> None:
     points = np.zeros((3, len(nodes.points)))
     points[: nodes.points.shape[1]] = nodes.points.T
     for axis, component in enumerate(value):
-        function.x.array[nodes.dofs[:, axis]] = component(points, t)
+        function.x.array[nodes.dofs[:, axis]] = evaluate(component, points, t)

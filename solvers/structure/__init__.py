@@ -1,1 +1,16 @@
 """Finite-deformation solids: bodies of hyperelastic material, static or in motion."""
+
+from solvers.lazy import lazy_names
+
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "body": ["Body"],
+        "field": ["Structure"],
+        "loads": ["LineForce", "PointForce", "Pressure", "Traction"],
+        "materials": ["CoupNeoHooke", "LinearElastic", "MooneyRivlin", "NeoHooke", "StVenantKirchhoff", "lame"],
+        "springs": ["Spring"],
+        "supports": ["Roller", "Support", "Symmetry"],
+        "time": ["Damping", "Dynamics", "Statics"],
+    },
+)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,12 +12,14 @@ from petsc4py import PETSc
 
 from solvers import fem
 from solvers.api import Array
+from solvers.mesh import Mesh
 from solvers.structure import forms
 from solvers.structure.elements import Displacement, Element, Formulation, Mixed
 from solvers.structure.loads import DeadLoads, FollowerPressure, LineForce, PointForce, Pressure, Traction
-from solvers.structure.materials import Material, Parameter, Value, parameters
+from solvers.structure.materials import Material, parameters
 from solvers.structure.springs import Spring, Springs
 from solvers.structure.supports import Roller, Support, Symmetry
+from solvers.values import Value, evaluate_components
 
 #: Cell type -> quadrature degree of (internal forces, mass): full integration of the affine cell.
 QUADRATURE = {
@@ -33,41 +34,59 @@ QUADRATURE = {
 }
 
 
-@dataclass(frozen=True)
-class BodySettings:
-    """What the user says of a body, besides its mesh. Vectors have one entry per dimension."""
-
-    name: str
-    material: Material
-    element: Formulation = "displacement"
-    supports: Sequence[Support | Symmetry | Roller] = ()
-    springs: Sequence[Spring] = ()
-    gravity: tuple[Value, ...] | None = None  #: [m/s^2]
-    body_force: tuple[Value, ...] | None = None  #: [N/m^3]
-    tractions: Sequence[Traction] = ()
-    pressures: Sequence[Pressure] = ()
-    point_forces: Sequence[PointForce] = ()
-    line_forces: Sequence[LineForce] = ()
-    initial_displacement: tuple[Value, ...] | None = None  #: [m]
-    initial_velocity: tuple[Value, ...] | None = None  #: [m/s]
-
-
 class Body:
-    """Assembles mass, internal forces, loads and tangent of one body at the displacement `u`."""
+    """Mass, internal forces, loads and tangent of one body at the displacement `u`.
 
-    def __init__(self, domain: fem.Domain, settings: BodySettings):
-        self.name, self.domain, self.settings = settings.name, domain, settings
+    `mesh` is that of the whole body; only process 0 needs it, others may pass None. Vectors have one entry per
+    dimension, each a number or a function of place and time.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        mesh: Mesh | None,
+        material: Material,
+        *,
+        element: Formulation = "displacement",
+        supports: Sequence[Support | Symmetry | Roller] = (),
+        springs: Sequence[Spring] = (),
+        gravity: Sequence[Value] | None = None,  # [m/s^2]
+        body_force: Sequence[Value] | None = None,  # [N/m^3]
+        tractions: Sequence[Traction] = (),
+        pressures: Sequence[Pressure] = (),
+        point_forces: Sequence[PointForce] = (),
+        line_forces: Sequence[LineForce] = (),
+        initial_displacement: Sequence[Value] | None = None,  # [m]
+        initial_velocity: Sequence[Value] | None = None,  # [m/s]
+        comm: MPI.Comm = MPI.COMM_WORLD,
+    ):
+        self.name, self.material, self.formulation = name, material, element
+        self.supports, self.springs = tuple(supports), tuple(springs)
+        self.initial_displacement, self.initial_velocity = initial_displacement, initial_velocity
+        self.domain = domain = fem.distribute(comm, mesh if comm.rank == 0 else None)
         self.space = fem.vector_space(domain)
         self.u = fem.function(self.space)
         self.nodes = fem.node_of_block(domain, self.space)
         self.points = fem.block_points(self.space)
         self.owned = self.space.dofmap.index_map.size_local
         self.stiffness_degree, self.mass_degree = QUADRATURE[domain.cell_type]
-        self.density = self._parameter(settings.material.density)
-        self.parameters = {k: self._parameter(p) for k, p in parameters(settings.material).items()}
+        self.density = self._parameter(material.density)
+        self.parameters = {k: self._parameter(p) for k, p in parameters(material).items()}
         self._compile()
-        self._build_loads()
-        self._springs = Springs(self) if settings.springs else None
+        self._dead = DeadLoads(domain, self.space, self.nodes[: self.owned])
+        if body_force:
+            self._dead.add_volume(body_force)
+        if gravity:
+            self._dead.add_volume(gravity, material.density)
+        for traction in tractions:
+            self._dead.add_surface(traction)
+        for line in line_forces:
+            self._dead.add_lines(line)
+        for point in point_forces:
+            self._dead.add_points(point)
+        self._dead_load: Array | None = None
+        self.pressures = [FollowerPressure(domain, self.space, pressure) for pressure in pressures]
+        self._spring_matrix = Springs(self) if springs else None
 
     @cached_property
     def _stress(self):
@@ -87,7 +106,7 @@ class Body:
     @property
     def linear(self) -> bool:
         """Small displacements: strain and loads belong to the reference configuration."""
-        return self.settings.material.linear
+        return self.material.linear
 
     @property
     def dim(self) -> int:
@@ -98,7 +117,7 @@ class Body:
         """Owned dofs."""
         return self.owned * self.dim
 
-    def _parameter(self, value: Parameter):
+    def _parameter(self, value: Value):
         """A UFL coefficient: one number, or one number per cell taken at its midpoint."""
         if not callable(value):
             return fem.constant(self.domain, float(value))
@@ -107,10 +126,9 @@ class Body:
         return cellwise
 
     def _element(self, dx: ufl.Measure) -> Element:
-        material = self.settings.material
-        if self.settings.element == "mixed":
-            return Mixed(self.domain, self.u, material, self.parameters, dx)
-        return Displacement(material, self.parameters)
+        if self.formulation == "mixed":
+            return Mixed(self.domain, self.u, self.material, self.parameters, dx)
+        return Displacement(self.material, self.parameters)
 
     def _compile(self) -> None:
         v, du = ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
@@ -129,27 +147,11 @@ class Body:
         nodes = fem.reference_nodes(self.domain)
         self._jacobian = fem.compile_expression(ufl.det(forms.deformation_gradient(self.u)), nodes)
 
-    def _build_loads(self) -> None:
-        settings = self.settings
-        self._dead = DeadLoads(self.domain, self.space, self.nodes[: self.owned])
-        if settings.body_force:
-            self._dead.add_volume(settings.body_force)
-        if settings.gravity:
-            self._dead.add_volume(settings.gravity, settings.material.density)
-        for traction in settings.tractions:
-            self._dead.add_surface(traction)
-        for line in settings.line_forces:
-            self._dead.add_lines(line)
-        for point in settings.point_forces:
-            self._dead.add_points(point)
-        self._dead_load: Array | None = None
-        self._pressures = [FollowerPressure(self.domain, self.space, pressure) for pressure in settings.pressures]
-
     # ------------------------------------------------------------------------------------------------- state
 
     def nodal(self, value: Sequence[Value], t: float) -> Array:
         """A vector field given by its components at all local nodes, shape (blocks, dim)."""
-        return np.stack([component(self.points, t) for component in value], axis=1)
+        return evaluate_components(value, self.points, t).T
 
     def set_displacement(self, owned: Array) -> None:
         """Set the displacement from owned dofs [m], shape (size,)."""
@@ -162,7 +164,7 @@ class Body:
         if self.domain.comm.allreduce(self._dead.update(t)):
             self._force.x.array[:] = self._dead.force
             self._dead_load = self._summed()
-        for pressure in self._pressures:
+        for pressure in self.pressures:
             pressure.set_time(t)
 
     # ---------------------------------------------------------------------------------------------- assembly
@@ -184,15 +186,15 @@ class Body:
 
     def spring_force(self) -> Array | float:
         """What the body exerts on its springs [N], shape (size,); 0 without any (collective)."""
-        return 0.0 if self._springs is None else self._springs.force(self.u.x.array[: self.size])
+        return 0.0 if self._spring_matrix is None else self._spring_matrix.force(self.u.x.array[: self.size])
 
     def external_force(self) -> Array:
         """Loads at the time of `set_time` and the present displacement [N], shape (size,)."""
         assert self._dead_load is not None, "set_time comes first"
-        if not self._pressures:
+        if not self.pressures:
             return self._dead_load.copy()
         self._force.x.array[:] = 0.0
-        for pressure in self._pressures:
+        for pressure in self.pressures:
             pressure.add_force(self._shape, self._force.x.array)
         return self._dead_load + self._summed()
 
@@ -217,11 +219,11 @@ class Body:
         self.element.linearise()
         matrix.zeroEntries()
         fem.assemble_matrix(matrix, self._tangent)
-        for pressure in () if self.linear else self._pressures:
+        for pressure in () if self.linear else self.pressures:
             pressure.add_tangent(self._shape, matrix)
         matrix.assemble()
-        if self._springs is not None:
-            matrix.axpy(1.0, self._springs.matrix, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        if self._spring_matrix is not None:
+            matrix.axpy(1.0, self._spring_matrix.matrix, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         self.element.complete_tangent(matrix)
 
     def smallest_jacobian(self) -> tuple[float, str, tuple[float, ...]]:
@@ -247,6 +249,6 @@ class Body:
     def internal_energy(self) -> float:
         """int W dX, and the energy of springs [J]."""
         energy = fem.assemble_scalar(self._energy, self.domain.comm)
-        if self._springs is not None:
-            energy += self._springs.energy(self.u.x.array[: self.size], self.domain.comm)
+        if self._spring_matrix is not None:
+            energy += self._spring_matrix.energy(self.u.x.array[: self.size], self.domain.comm)
         return energy

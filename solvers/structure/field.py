@@ -14,28 +14,20 @@ from solvers import linear
 from solvers.api import Array, Constraint, State, StepFailed, StepInfo
 from solvers.blocks import Layout, block_diagonal
 from solvers.distributed import Nodal
-from solvers.newton import Tolerance, converge
+from solvers.newton import converge
 from solvers.rounding import rounding_error
 from solvers.rows import Numbering, TakenRows, gather, gather_at, transform_rows
+from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body
 from solvers.structure.energy import EnergyBalance
 from solvers.structure.held import Held
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.supports import prescribe
-from solvers.structure.time import TimeScheme
+from solvers.structure.time import Statics, TimeScheme
 from solvers.timing import Timer
 
 #: Displacement, in sizes of the largest body, that only a singular system gives.
 FLOWN_OFF = 1e6
-
-
-@dataclass(frozen=True)
-class SolverSettings:
-    """How the nonlinear and the linear systems are solved."""
-
-    newton: Tolerance = Tolerance()
-    linear: linear.Method = "auto"
-    linear_tolerance: float = 1e-8
 
 
 @dataclass
@@ -70,15 +62,16 @@ class Structure:
 
     def __init__(
         self,
-        comm: MPI.Comm,
         bodies: Sequence[Body],
-        time: TimeScheme,
+        time: TimeScheme = Statics(),
         settings: SolverSettings = SolverSettings(),
+        *,
+        contact: Constraint | None = None,
         timer: Timer | None = None,
-        constraint: Constraint | None = None,
     ):
-        self.comm, self.bodies, self.time, self.settings = comm, list(bodies), time, settings
-        self.timer, self.constraint = timer or Timer(), constraint
+        self.comm = comm = bodies[0].domain.comm
+        self.bodies, self.time, self.settings = list(bodies), time, settings
+        self.timer, self.constraint = timer or Timer(), contact
         self.dim = bodies[0].dim
         self.layout = Layout(comm, [body.size for body in bodies])
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
@@ -95,8 +88,8 @@ class Structure:
         self._b, self._x = self.layout.vector(), self.layout.vector()
         self._method = linear.choose(settings.linear, self.dim, self.dofs())
         # the tangent of a follower pressure has an unsymmetric boundary term
-        self._ksp = self._linear_solver(symmetric=not any(body.settings.pressures for body in self.bodies))
-        self._constrained_ksp = None if constraint is None else self._linear_solver(symmetric=False)
+        self._ksp = self._linear_solver(symmetric=not any(body.pressures for body in self.bodies))
+        self._constrained_ksp = None if contact is None else self._linear_solver(symmetric=False)
 
     def _linear_solver(self, *, symmetric: bool) -> PETSc.KSP:
         tolerance = self.settings.linear_tolerance
@@ -127,8 +120,8 @@ class Structure:
         """Initial displacement and velocity, and the acceleration that is in balance with the loads at t."""
         for body, u, v in zip(self.bodies, self.split(self.now.u), self.split(self.now.v), strict=True):
             for target, value in (
-                (u, body.settings.initial_displacement),
-                (v, body.settings.initial_velocity),
+                (u, body.initial_displacement),
+                (v, body.initial_velocity),
             ):
                 if value is not None:
                     target[:] = body.nodal(value, t)[: body.owned].ravel()
@@ -144,6 +137,13 @@ class Structure:
         for body, matrix in zip(self.bodies, self._tangents, strict=True):
             body.assemble_tangent(matrix)
         return np.concatenate([matrix.getDiagonal().array for matrix in self._tangents])
+
+    def step(self, t: float, dt: float) -> StepInfo:
+        """One step from t to t + dt. Raises StepFailed."""
+        self.begin_step(t, dt)
+        info = self.solve()
+        self.end_step()
+        return info
 
     def begin_step(self, t: float, dt: float) -> None:
         """Remember the state at t and predict the one at t + dt."""
@@ -288,7 +288,7 @@ class Structure:
 
     @property
     def constrained(self) -> bool:
-        """The constraint has something to say at the present iterate."""
+        """Some constraint of contact may be active at the present iterate."""
         return self.constraint is not None and self.constraint.near
 
     def missing_displacement(self) -> Array:

@@ -9,6 +9,7 @@ J F^-T N dA. Source: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Elem
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +19,7 @@ from petsc4py import PETSc
 
 from solvers import fem
 from solvers.api import Array
-from solvers.structure.materials import Parameter, Value
+from solvers.values import Value, evaluate, evaluate_components
 
 #: Loads of the third degree in x are integrated exactly over affine cells and facets, times the shape functions.
 LOAD_DEGREE = 3
@@ -29,7 +30,7 @@ class Traction:
     """Dead load [N/m^2 of reference surface]."""
 
     surface: str
-    value: tuple[Value, ...]
+    value: Sequence[Value]
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class PointForce:
     """Dead load [N] at each of some nodes, by their numbers in the mesh."""
 
     nodes: NDArray[np.int64]
-    value: tuple[Value, ...]
+    value: Sequence[Value]
 
 
 @dataclass(frozen=True)
@@ -54,14 +55,14 @@ class LineForce:
 
     lines: NDArray[np.int64]  #: nodes of each line in the mesh: both ends, then the middle if there is one
     points: Array  #: their reference positions [m], shape (lines, nodes, dim)
-    value: tuple[Value, ...]
+    value: Sequence[Value]
 
 
 @dataclass(frozen=True)
 class _Part:
     """Values of a load at points, and how they become forces at nodes."""
 
-    value: tuple[Value, ...]
+    value: Sequence[Value]
     blocks: NDArray[
         np.int32
     ]  #: dof blocks, shape (entities, nodes); nodes of other processes have the one after the last
@@ -82,7 +83,7 @@ class DeadLoads:
         self._values: list[Array] | None = None
         self.force = np.zeros(self._blocks * domain.dim)  #: at the time of `update` [N]
 
-    def add_volume(self, value: tuple[Value, ...], density: Parameter = 1.0) -> None:
+    def add_volume(self, value: Sequence[Value], density: Value = 1.0) -> None:
         """A force per mass, or per volume without the density [kg/m^3], which is that of the cell's midpoint."""
         for cells in fem.cell_quadrature(self._domain, self._space, self._degree):
             rho: Any = density
@@ -124,7 +125,7 @@ class DeadLoads:
 
         `force` [N] is at local dofs: those of other processes wait for `accumulate`.
         """
-        values = [np.stack([component(part.positions, t) for component in part.value]) for part in self._parts]
+        values = [evaluate_components(part.value, part.positions, t) for part in self._parts]
         if self._values is not None and all(map(np.array_equal, values, self._values)):
             return False
         self._values = values
@@ -165,7 +166,7 @@ class FollowerPressure:
 
     def set_time(self, t: float) -> None:
         """Evaluate the pressure at time t."""
-        self._values = [self._load.value(f.positions, t).reshape(f.weights.shape) for f in self._facets]
+        self._values = [evaluate(self._load.value, f.positions, t).reshape(f.weights.shape) for f in self._facets]
 
     def add_force(self, u: Array, out: Array) -> None:
         """Add -int p n.v da [N] at the displacement u to local dofs; both of the shape (local dofs,)."""

@@ -1,6 +1,6 @@
 """Hyperelastic materials: stored energies per reference volume [J/m^3] as functions of the deformation gradient F.
 
-Parameters are numbers or functions of the reference position; `energy` receives them as UFL coefficients by name.
+Values are numbers or functions of the reference position; `energy` receives them as UFL coefficients by name.
 In 2D, F is 2x2: plane strain completes it with F_33 = 1.
 """
 
@@ -12,11 +12,8 @@ from typing import Any, ClassVar, Protocol, TypeAlias
 
 import ufl
 
-from solvers.api import Array
+from solvers.values import Value
 
-#: A field given by the user: value(x, t) with x of shape (3, n) [m] and t [s] -> shape (n,)
-Value = Callable[[Array, float], Array]
-Parameter = float | Value
 Tensor: TypeAlias = Any  #: a UFL expression
 
 
@@ -29,7 +26,7 @@ class Material(Protocol):
     linear: ClassVar[bool]
 
     @property
-    def density(self) -> Parameter:
+    def density(self) -> Value:
         """Reference density [kg/m^3]."""
         ...
 
@@ -53,7 +50,7 @@ class Material(Protocol):
         ...
 
 
-def parameters(material: Material) -> dict[str, Parameter]:
+def parameters(material: Material) -> dict[str, Value]:
     """The parameters of the energy by name."""
     return {f.name: getattr(material, f.name) for f in fields(material) if f.name != "density"}  # type: ignore[arg-type]
 
@@ -83,9 +80,9 @@ def _green_lagrange(F: Tensor) -> Tensor:
 class StVenantKirchhoff:
     """W = lambda/2 (tr E)^2 + mu E:E with E = (F^T F - I)/2."""
 
-    mu: Parameter
-    lmbda: Parameter
-    density: Parameter = 0.0
+    mu: Value
+    lmbda: Value
+    density: Value = 0.0
     plane_stress: ClassVar[bool] = False
     linear: ClassVar[bool] = False
 
@@ -115,9 +112,9 @@ class PlaneStressStVenantKirchhoff(StVenantKirchhoff):
 class LinearElastic:
     """W = lambda/2 (tr e)^2 + mu e:e with the strain e = sym(grad u) of small displacements (Hooke's law)."""
 
-    mu: Parameter
-    lmbda: Parameter
-    density: Parameter = 0.0
+    mu: Value
+    lmbda: Value
+    density: Value = 0.0
     plane_stress: ClassVar[bool] = False
     linear: ClassVar[bool] = True
 
@@ -170,9 +167,9 @@ class NeoHooke:
     Source: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (2008), eq. 6.27.
     """
 
-    mu: Parameter
-    lmbda: Parameter
-    density: Parameter = 0.0
+    mu: Value
+    lmbda: Value
+    density: Value = 0.0
     plane_stress: ClassVar[bool] = False
     linear: ClassVar[bool] = False
 
@@ -197,9 +194,9 @@ class CoupNeoHooke:
     The compressible neo-Hooke law of the code 4C and its predecessors. For nu = 0 the first term is its limit -mu ln J.
     """
 
-    mu: Parameter
-    lmbda: Parameter
-    density: Parameter = 0.0
+    mu: Value
+    lmbda: Value
+    density: Value = 0.0
     plane_stress: ClassVar[bool] = False
     linear: ClassVar[bool] = False
 
@@ -224,10 +221,10 @@ class MooneyRivlin:
     Source: Bonet & Wood (2008), section 6.5; shear modulus 2 (c10 + c01).
     """
 
-    c10: Parameter
-    c01: Parameter
-    bulk: Parameter
-    density: Parameter = 0.0
+    c10: Value
+    c01: Value
+    bulk: Value
+    density: Value = 0.0
     plane_stress: ClassVar[bool] = False
     linear: ClassVar[bool] = False
 

@@ -6,6 +6,7 @@ configuration. Without a direction d a spring holds all components alike.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,8 +15,8 @@ from petsc4py import PETSc
 
 from solvers import fem
 from solvers.api import Array
-from solvers.structure.materials import Value
 from solvers.structure.supports import Where, owned_blocks
+from solvers.values import Value, evaluate
 
 if TYPE_CHECKING:
     from solvers.structure.body import Body
@@ -27,7 +28,7 @@ class Spring:
 
     where: Where
     stiffness: Value
-    direction: tuple[float, ...] | None = None  #: the only one in which it acts
+    direction: Sequence[float] | None = None  #: the only one in which it acts
     normal: bool = False  #: that direction is the normal of the surface
 
 
@@ -36,7 +37,7 @@ class Springs:
 
     def __init__(self, body: Body):
         self.matrix = body.create_tangent()
-        for spring in body.settings.springs:
+        for spring in body.springs:
             if isinstance(spring.where, str):
                 self._add_surface(body, spring, spring.where)
             else:
@@ -61,13 +62,13 @@ class Springs:
             normals = facets.area_vectors(x)
             normals /= np.linalg.norm(normals, axis=2, keepdims=True)
             tensor = _tensor(spring, normals)
-            weights = facets.weights * spring.stiffness(facets.positions, 0.0).reshape(facets.weights.shape)
+            weights = facets.weights * evaluate(spring.stiffness, facets.positions, 0.0).reshape(facets.weights.shape)
             block = np.einsum("ep,pa,pb,epij->eaibj", weights, facets.shape, facets.shape, tensor, optimize=True)
             self._add(body, facets.blocks, block)
 
     def _add_nodes(self, body: Body, spring: Spring) -> None:
         blocks = owned_blocks(body, spring.where)
-        stiffness = spring.stiffness(body.points[:, blocks], 0.0)
+        stiffness = evaluate(spring.stiffness, body.points[:, blocks], 0.0)
         tensor = _tensor(spring, np.zeros((len(blocks), body.dim)))
         self._add(body, blocks[:, None], (stiffness[:, None, None] * tensor)[:, None, :, None, :])
 

@@ -7,6 +7,7 @@ P u with the projection P on the span of the n_j. Where supports contradict each
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from solvers import fem
 from solvers.api import Array
-from solvers.structure.materials import Value
+from solvers.values import Value, evaluate
 
 if TYPE_CHECKING:
     from solvers.structure.body import Body
@@ -30,10 +31,13 @@ PARALLEL = 1e-6
 
 @dataclass(frozen=True)
 class Support:
-    """Prescribed displacement components [m]; None leaves a component free."""
+    """Prescribed displacement components [m]; None leaves a component free. One number: all components."""
 
     where: Where
-    displacement: tuple[Value | None, ...]
+    displacement: float | Sequence[Value | None] = 0.0
+
+    def components(self, dim: int) -> Sequence[Value | None]:
+        return (self.displacement,) * dim if isinstance(self.displacement, (int, float)) else self.displacement
 
 
 @dataclass(frozen=True)
@@ -48,8 +52,8 @@ class Roller:
     """Prescribed displacement [m] along one direction, in the reference configuration; free across it."""
 
     where: Where
-    direction: tuple[float, ...] | None  #: None: the outward normal of the surface, node by node
-    displacement: Value
+    direction: Sequence[float] | None = None  #: None: the outward normal of the surface, node by node
+    displacement: Value = 0.0
 
 
 class SupportError(ValueError):
@@ -91,7 +95,7 @@ class Oblique:
         targets = np.zeros(self.basis.shape[:2])
         for share in self.shares:
             known = np.einsum("md,md->m", share.along, targets[share.nodes])
-            targets[share.nodes, share.slots] = (share.value(share.points, t) - known) / share.sizes
+            targets[share.nodes, share.slots] = (evaluate(share.value, share.points, t) - known) / share.sizes
         return np.einsum("kij,ki->kj", self.basis, targets)
 
 
@@ -107,7 +111,7 @@ class Prescribed:
         """Values [m] at the dofs, shape (n,). Where supports overlap, the last one counts."""
         values = np.zeros(len(self.dofs))
         for dofs, value, points in self.entries:
-            values[np.searchsorted(self.dofs, dofs)] = value(points, t)
+            values[np.searchsorted(self.dofs, dofs)] = evaluate(value, points, t)
         return values
 
 
@@ -123,7 +127,7 @@ class _Condition:
 
 def prescribe(body: Body) -> Prescribed:
     """Collect the supports of a body (collective). Raises SupportError."""
-    conditions = [condition for support in body.settings.supports for condition in _conditions(body, support)]
+    conditions = [condition for support in body.supports for condition in _conditions(body, support)]
     turned = [c.blocks for c in conditions if c.axis is None]
     oblique = np.unique(np.concatenate([np.empty(0, dtype=np.int32), *turned])).astype(np.int32)
     entries = []
@@ -138,7 +142,7 @@ def prescribe(body: Body) -> Prescribed:
 def symmetric_dofs(body: Body) -> NDArray[np.int32]:
     """Owned dofs that planes of symmetry normal to an axis hold, local (collective). Raises SupportError."""
     found = [np.empty(0, dtype=np.int32)]
-    for support in body.settings.supports:
+    for support in body.supports:
         if isinstance(support, Symmetry):
             blocks = owned_blocks(body, support.where)
             normal = np.abs(symmetry_normal(body, support, blocks))
@@ -163,14 +167,14 @@ def _conditions(body: Body, support: Support | Symmetry | Roller) -> list[_Condi
         axis = next((i for i in range(body.dim) if np.array_equal(np.abs(direction), axes[i])), None)
         if axis is not None and direction[axis] < 0.0:
             return _Condition(
-                blocks, axis, np.broadcast_to(-direction, (len(blocks), body.dim)), lambda x, t: -value(x, t)
+                blocks, axis, np.broadcast_to(-direction, (len(blocks), body.dim)), lambda x, t: -evaluate(value, x, t)
             )
         return _Condition(blocks, axis, np.broadcast_to(direction, (len(blocks), body.dim)), value)
 
     if isinstance(support, Support):
-        return [along(axes[i], value) for i, value in enumerate(support.displacement) if value is not None]
+        return [along(axes[i], value) for i, value in enumerate(support.components(body.dim)) if value is not None]
     if isinstance(support, Symmetry):
-        return [along(symmetry_normal(body, support, blocks), _zero)]
+        return [along(symmetry_normal(body, support, blocks), 0.0)]
     if support.direction is not None:
         direction = np.array(support.direction)
         return [along(direction / np.linalg.norm(direction), support.displacement)]
@@ -247,7 +251,3 @@ def _nodal_normals(body: Body, surface: str) -> Array:
     owned = normals[: body.owned]
     size = np.linalg.norm(owned, axis=1, keepdims=True)
     return np.divide(owned, size, out=np.zeros_like(owned), where=size > 0.0)
-
-
-def _zero(x: Array, t: float) -> Array:
-    return np.zeros(x.shape[1])

@@ -1,0 +1,49 @@
+"""A coupled system from its parts, for use as a library."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from coupling.coupled import Coupled
+from coupling.interface import Interface
+from coupling.wetted import immerse, wetted_surface
+from solvers.fluid.field import Fluid
+from solvers.fluid.grid import Grid
+from solvers.fluid.immersed import ImmersedBody
+from solvers.fluid.patches import Patch
+from solvers.fluid.system import FlowSettings
+from solvers.skin import cut_out_skin
+from solvers.solver_settings import SolverSettings
+from solvers.structure.field import Structure
+from solvers.timing import Timer
+
+
+def couple(
+    structure: Structure,
+    grid: Grid,
+    flow: FlowSettings,
+    patches: Sequence[Patch],
+    *,
+    rigid_bodies: Sequence[ImmersedBody] = (),
+    wetted: Mapping[str, Sequence[str]] = {},
+    solver: SolverSettings = SolverSettings(),
+    timer: Timer | None = None,
+) -> Coupled:
+    """Elastic bodies in a flow, for `Monolithic` or `Partitioned` (collective).
+
+    grid: the box of cells around the bodies. patches: conditions on the faces of the box. rigid_bodies: others that the
+    flow does not move. wetted: body -> names of the surfaces that the fluid touches; by default it touches all that is
+    neither in another body nor on the boundary of the box.
+    """
+    comm, bodies = structure.comm, structure.bodies
+    surfaces = []
+    for index, body in enumerate(bodies):
+        mesh = body.domain.source
+        skin = comm.bcast(None if mesh is None else cut_out_skin(mesh, wetted.get(body.name)), root=0)
+        surfaces.append(wetted_surface(bodies, index, skin))
+    box = np.array([edge[0] for edge in grid.edges]), np.array([edge[-1] for edge in grid.edges])
+    immersed = immerse(surfaces, rigid_bodies, box)
+    fluid = Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=comm)
+    return Coupled(fluid, structure, Interface(structure, surfaces))

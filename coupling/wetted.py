@@ -1,0 +1,78 @@
+"""Surfaces of elastic bodies as the fluid sees them: closed, of segments or triangles, and where they are wet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coupling.contact_surface import global_dofs
+from solvers.api import Array
+from solvers.blocks import Layout
+from solvers.fluid.immersed import ImmersedBody
+from solvers.fluid.inside import winding
+from solvers.fluid.surface import Motion, Surface
+from solvers.skin import Skin
+from solvers.structure.body import Body
+
+#: Distance to the face of the box, in sizes of the box, below which a facet is on it.
+ON_BOX = 1e-9
+
+#: Winding number above which the middle of a facet is in another body; on its surface it is one half.
+INSIDE = 0.75
+
+
+@dataclass(frozen=True)
+class WettedSurface:
+    """The surface of one body; the same on every process."""
+
+    name: str  #: of the body in structure and fluid
+    points: Array  #: reference positions [m] of its vertices, shape (n, dim)
+    dofs: NDArray[np.int64]  #: their global dofs in the structure, shape (n, dim)
+    facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
+    wet: NDArray[np.bool_] | None = None  #: facets that the fluid touches; None: found by `find_wet`
+
+
+def wetted_surface(bodies: Sequence[Body], index: int, skin: Skin) -> WettedSurface:
+    """A skin with the dofs of its body, the one of that index among all of the structure (collective)."""
+    body = bodies[index]
+    layout = Layout(body.domain.comm, [other.size for other in bodies])
+    return WettedSurface(body.name, skin.points, global_dofs(layout, index, body, skin.nodes), skin.facets, skin.wet)
+
+
+def immerse(
+    surfaces: Sequence[WettedSurface], rigid: Sequence[ImmersedBody], box: tuple[Array, Array], t: float = 0.0
+) -> list[ImmersedBody]:
+    """All bodies for the fluid, the rigid ones first. `box`: lowest and highest corner [m]; t: the first time [s]."""
+    at_start = [(body.surface, body.motion(t).x) for body in rigid if body.motion is not None]
+    at_start += [(Surface(s.name, s.facets, len(s.points), s.wet), s.points) for s in surfaces]
+    wet = find_wet(at_start, box)
+    found = [replace(body, surface=surface) for body, surface in zip(rigid, wet, strict=False)]
+    return found + [ImmersedBody(surface, None) for surface in wet[len(rigid) :]]
+
+
+def find_wet(surfaces: Sequence[tuple[Surface, Array]], box: tuple[Array, Array]) -> list[Surface]:
+    """Surfaces, given with the positions of their vertices [m], with the facets marked that the fluid touches.
+
+    It does not touch facets in other bodies, where bodies are one piece, nor those on the box's boundary. What a
+    surface says itself of its facets stays.
+    """
+    low, high = box
+    found = []
+    for index, (surface, x) in enumerate(surfaces):
+        if surface.wet is None:
+            middles = x[surface.facets].mean(axis=1)
+            distance = np.abs(np.concatenate([middles - low, middles - high], axis=1)).min(axis=1)
+            wet = distance > ON_BOX * (high - low).max()
+            for other, (body, at) in enumerate(surfaces):
+                if other == index:
+                    continue
+                near = np.all((middles > at.min(axis=0)) & (middles < at.max(axis=0)), axis=1)
+                motion = Motion(at, np.zeros_like(at))
+                for facet in np.flatnonzero(near & wet):
+                    wet[facet] = winding(middles[facet], motion, body.facets) < INSIDE
+            surface = replace(surface, wet=wet)
+        found.append(surface)
+    return found

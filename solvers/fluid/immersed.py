@@ -1,0 +1,41 @@
+"""Bodies in the flow: closed surfaces that rest, follow a given motion, or are moved by another field."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.fluid.surface import Motion, Surface
+
+
+@dataclass(frozen=True)
+class ImmersedBody:
+    """A surface in the flow; `motion` gives its vertices at a time, None if another field moves it."""
+
+    surface: Surface
+    motion: Callable[[float], Motion] | None
+    rests: bool = False  #: it never moves
+
+
+def rigid_body(
+    name: str,
+    points: Array,
+    facets: NDArray[np.int64],
+    motion: Callable[[float], tuple[Array, Array]] | None = None,
+) -> ImmersedBody:
+    """A body that the flow does not move.
+
+    points: vertices [m], shape (n, dim). facets: segments (2D) or triangles (3D) as vertex numbers, shape (m, dim);
+    their right-hand normals point out of the body: in 2D they run with the body on their left.
+    motion: t [s] -> (positions [m], velocities [m/s]) of the vertices, each of shape (n, dim); None: it rests.
+    """
+    points = np.ascontiguousarray(points, dtype=float)
+    surface = Surface(name, np.asarray(facets, dtype=np.int64), len(points))
+    if motion is None:
+        return ImmersedBody(surface, lambda t: Motion(points, np.zeros_like(points)), rests=True)
+    given = motion
+    return ImmersedBody(surface, lambda t: Motion(*given(t)))

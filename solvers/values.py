@@ -1,0 +1,25 @@
+"""Values that a user gives: numbers, or functions of place and time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from solvers.api import Array
+
+#: A number, or f(x, t) with positions x [m] of shape (3, n) or (dim, n) and the time t [s] -> values of shape (n,).
+Value: TypeAlias = float | Callable[[Array, float], Array]
+
+
+def evaluate(value: Value, x: Array, t: float) -> Array:
+    """A value at points of shape (3, n) or (dim, n), shape (n,)."""
+    if callable(value):
+        return value(x, t)
+    return np.full(x.shape[1], float(value))
+
+
+def evaluate_components(values: Sequence[Value], x: Array, t: float) -> Array:
+    """A vector at points, shape (components, n)."""
+    return np.stack([evaluate(value, x, t) for value in values])

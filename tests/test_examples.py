@@ -1,0 +1,77 @@
+"""The examples of the library page run as they stand and print what they should."""
+
+import re
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
+
+
+def numbers(name: str) -> list[list[float]]:
+    """The numbers of each line that an example prints."""
+    done = subprocess.run([sys.executable, EXAMPLES / f"{name}.py"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return [[float(text) for text in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", line)] for line in done.stdout.splitlines()]
+
+
+def test_all_are_tested_and_shown():
+    names = {path.stem for path in EXAMPLES.glob("*.py")}
+    assert names == {"cylinder", "flap", "own_material", "parameter_study", "torus_and_wall", "two_blocks"}
+    page = (EXAMPLES.parent / "library.md").read_text()
+    assert all(f"examples/{name}.py" in page for name in names)
+
+
+def test_two_blocks():
+    """In every step all nodes touch, and the force grows a little faster than the displacement."""
+    lines = numbers("two_blocks")
+    times, steps, active, force = zip(*lines, strict=True)
+    assert times == (0.25, 0.5, 0.75, 1.0)
+    assert set(active) == {8.0}
+    assert max(steps) <= 4
+    stiffness = [f / t for f, t in zip(force, times, strict=True)]
+    assert all(1.0 < after / before < 1.05 for before, after in pairwise(stiffness))
+
+
+def test_flap():
+    """The flap bends with the flow and sinks as it does."""
+    lines = numbers("flap")
+    assert len(lines) == 20
+    assert max(line[1] for line in lines) <= 6
+    assert max(line[2] for line in lines) > 0.05
+    assert all(line[3] <= 1e-12 for line in lines[3:])
+
+
+def test_own_material():
+    """Nearly incompressible: the stress of the incompressible bar within its compressibility."""
+    for _, stress, exact in numbers("own_material"):
+        assert stress == pytest.approx(exact, rel=5e-4)
+
+
+def test_parameter_study():
+    """Small deflections are those of Euler and Bernoulli plus shear, w = q L^4 / (8 E' I) + ..., within 1 %."""
+    lines = numbers("parameter_study")
+    assert len(lines) == 8
+    E, tip = lines[-1]
+    assert tip == pytest.approx(-(1.0 - 0.3**2) * 1e4 / 8.0 * 12.0 / E, rel=0.02)
+
+
+@pytest.mark.slow
+def test_torus_and_wall():
+    """The flow brings the torus down; no node goes deeper than the weighted gap lets it."""
+    lines = numbers("torus_and_wall")
+    gaps = [line[2] for line in lines]
+    assert gaps[0] > 0.03
+    assert min(gaps) > -0.005
+    assert min(gaps) < 0.01
+
+
+@pytest.mark.slow
+def test_cylinder():
+    """Schafer & Turek's 2D-1."""
+    _, _, drag, lift = numbers("cylinder")[0]
+    assert drag == pytest.approx(5.579535, rel=2e-3)
+    assert lift == pytest.approx(0.010619, rel=3e-2)
