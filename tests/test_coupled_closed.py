@@ -45,13 +45,13 @@ def test_walls_all_round(tmp_path):
     closed = POST.replace("{on: x+, outflow: true}", "{on: x+, no_slip: true}").replace("monolithic", "partitioned")
     said = message(closed, tmp_path)
     assert "case.yaml:18:20: the boundary encloses the fluid, and the partitioned scheme does not determine" in said
-    assert "take 'monolithic', or a patch with 'traction', 'pressure' or 'outflow'" in said
+    assert "take 'monolithic', or give a patch with 'traction', 'pressure' or 'outflow'" in said
 
 
 def test_walls_all_round_a_steady_flow(tmp_path):
     said = message(COLUMN.replace(OPEN, CLOSED), tmp_path)
     assert "case.yaml:6:11: the boundary encloses the fluid, and a steady flow does not determine" in said
-    assert "take 'bdf2', or a patch with 'traction', 'pressure' or 'outflow'" in said
+    assert "take 'bdf2', or give a patch with 'traction', 'pressure' or 'outflow'" in said
 
 
 def test_a_room_in_a_body(tmp_path):

@@ -7,15 +7,14 @@ import pytest
 
 from coupling import accelerate
 from coupling.monolithic import Monolithic
-from coupling.partitioned import Partitioned
-from coupling.partitioned import Tolerance as Agreement
+from coupling.partitioned import FixedPointTolerance, Partitioned
 from solvers.fluid.interface import Interface
 from solvers.structure.field import Structure
 from tests.coupling_setup import TIGHT, post_in_flow
 
 SCHEMES = {
     "monolithic": lambda coupled: Monolithic(coupled, TIGHT),
-    "partitioned": lambda coupled: Partitioned(coupled, accelerate.QuasiNewton(reuse=2), Agreement(1e-10)),
+    "partitioned": lambda coupled: Partitioned(coupled, accelerate.QuasiNewton(reuse=2), FixedPointTolerance(1e-10)),
 }
 
 
