@@ -20,7 +20,6 @@ from solvers.solver_settings import SolverSettings
 from solvers.structure import materials, probes
 from solvers.structure.body import Body
 from solvers.structure.field import Structure
-from solvers.structure.massless import NoMassLeft
 from solvers.structure.supports import SupportError
 from solvers.structure.time import Damping, Dynamics, Statics, TimeScheme
 from solvers.time import GeneralisedAlpha
@@ -40,22 +39,12 @@ def build_structure(
     linear = case.solver.linear
     settings = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
     try:
-        structure = Structure(bodies, _time_scheme(case), settings, contact=contact, timer=timer)
-        structure.mass  # noqa: B018
-    except NoMassLeft as error:
-        raise case.error(("structure", "bodies", error.body, "mesh"), _NO_MASS_LEFT) from None
+        return Structure(bodies, _time_scheme(case), settings, contact=contact, timer=timer)
     except SupportError as error:
         supports = case.elastic_bodies[error.body].supports
         index = next(i for i, support in enumerate(supports) if error.where in (support.on or ()))
         keys = ("structure", "bodies", error.body, "supports", index)
         raise case.error(keys, error.message) from None
-    return structure
-
-
-_NO_MASS_LEFT = (
-    "all nodes of the body are on slave surfaces, which have no mass in dynamics: "
-    "use two or more cells between them, or make one of them the master"
-)
 
 
 def _time_scheme(case: Case) -> TimeScheme:

@@ -46,6 +46,7 @@ def read_body(case: Case, name: str) -> Mesh:
     except (MeshError, ValueError) as error:
         raise case.error(keys, str(error)) from None
     _check_lengths(case, name, mesh.points.shape[1])
+    _require_mass(case, name, mesh)
     find_places(case, name, mesh)
     return mesh
 
@@ -55,6 +56,29 @@ def _require_dimension(case: Case, name: str, mesh: Mesh) -> None:
     if case.dimension not in (None, dim):
         other = "the grid" if case.fluid is not None else "another body"
         raise case.error(("structure", "bodies", name, "mesh"), f"the mesh is {dim}D, but {other} is {case.dimension}D")
+
+
+def slave_surfaces(case: Case, name: str) -> list[str]:
+    """Those of a body."""
+    pairs = () if case.contact is None else case.contact.pairs.values()
+    return [surface for pair in pairs if pair.slave.body == name for surface in pair.slave.on or ()]
+
+
+def _require_mass(case: Case, name: str, mesh: Mesh) -> None:
+    """In dynamics slave surfaces have no mass: the body needs other nodes too."""
+    assert case.structure is not None
+    surfaces = slave_surfaces(case, name)
+    if not surfaces or case.structure.dynamics is None:
+        return
+    slaves = np.unique(np.concatenate([surface_facets(mesh, surface).ravel() for surface in surfaces]))
+    if len(slaves) == len(mesh.points):
+        raise case.error(("structure", "bodies", name, "mesh"), _NO_MASS_LEFT)
+
+
+_NO_MASS_LEFT = (
+    "all nodes of the body are on slave surfaces, which have no mass in dynamics: "
+    "use two or more cells between them, or make one of them the master"
+)
 
 
 def _named_surfaces(case: Case, name: str) -> Iterator[tuple[Keys, str]]:

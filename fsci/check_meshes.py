@@ -17,7 +17,7 @@ from fsci.case import Case, CaseError
 from fsci.case.errors import Problem
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import thin_body
-from fsci.case_meshes import read_body, read_obstacle, read_rigid_body, require_inside_period
+from fsci.case_meshes import read_body, read_obstacle, read_rigid_body, require_inside_period, slave_surfaces
 from fsci.rigid_motion import rigid_motion
 from fsci.skin import find_skin
 from solvers.fluid.inside import PointInBody, require_outside
@@ -82,7 +82,8 @@ def _elastic(case: Case, found: Findings) -> None:
         at_nodes = [
             p for p in (*body.supports, *body.springs, *body.point_forces) if getattr(p, "at", None) is not None
         ]
-        needed = at_points or symmetric or at_nodes or (case.coupling and _has_period(case))
+        massless = case.structure is not None and case.structure.dynamics is not None and slave_surfaces(case, name)
+        needed = at_points or symmetric or at_nodes or massless or (case.coupling and _has_period(case))
         if not (needed or isinstance(body.mesh, FileMesh)):
             continue
         mesh = found.attempt(partial(read_body, case, name))

@@ -97,9 +97,8 @@ class Run:
     def __post_init__(self) -> None:
         time = self.case.time
         self.root = self.comm.rank == 0
-        flow = self.case.fluid
-        # a steady flow does not know the size of the step: half of it is the same problem again
-        steady = flow is not None and flow.scheme == "steady" and self.case.structure is None
+        # a steady flow does not know the size of the step: half of it is the same problem again, with bodies or without
+        steady = self.case.fluid is not None and self.case.fluid.scheme == "steady"
         halvings = 0 if steady else time.retry.halvings
         self.clock = Clock(time.start, time.end, time.step, halvings, time.retry.recover_after)
         self.record.residual_steps = self.case.output.residuals

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from coupled_case import POST
 from test_coupled_dry_side import COLUMN
 from test_coupled_run import run
 
+from coupling.coupled import Coupled
 from fsci.case import CaseError, load_case
-from fsci.run import run_case
+from fsci.run import FAILED, run_case
+from solvers.api import StepFailed
 
 #: fluid inside of a ring, and outside of it in an open channel
 RING = """\
@@ -52,6 +56,19 @@ def test_walls_all_round_a_steady_flow(tmp_path):
     said = message(COLUMN.replace(OPEN, CLOSED), tmp_path)
     assert "case.yaml:6:11: the boundary encloses the fluid, and a steady flow does not determine" in said
     assert "take 'bdf2', or give a patch with 'traction', 'pressure' or 'outflow'" in said
+
+
+@pytest.mark.parametrize("scheme", ["monolithic", "partitioned"])
+def test_a_steady_flow_is_not_repeated_with_half_its_step(scheme, tmp_path, monkeypatch):
+    """The size of the step means nothing to it, nor to a body at rest in it."""
+
+    def fail(self, t, dt):
+        raise StepFailed("test", "on purpose")
+
+    monkeypatch.setattr(Coupled, "begin_step", fail)
+    (tmp_path / "case.yaml").write_text(COLUMN.replace("coupling:", f"coupling:\n  scheme: {scheme}"))
+    assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") == FAILED
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["steps"]["retried"] == 0
 
 
 def test_a_room_in_a_body(tmp_path):

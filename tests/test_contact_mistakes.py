@@ -1,0 +1,146 @@
+"""Mistakes in the contact section of a case: each has its message and its place."""
+
+from __future__ import annotations
+
+import pytest
+from contact_cases import COLLISION, PLATE
+
+from fsci.case import CaseError, load_case
+from fsci.check_meshes import check_meshes
+from fsci.run import run_case
+
+PRESS = "    press: {slave: {body: block, on: top}, master: {obstacle: plate}}"
+
+
+BOX_SURFACES = "(available: left, right, front, back, bottom, top)"
+
+
+#: what is replaced, by what, the message with line and column, the text that stands there
+MISTAKES = [
+    ("body: block, on: top", "body: blok, on: top", "16:27: unknown body 'blok'; did you mean 'block'?", "blok"),
+    (
+        "body: block, on: top",
+        "body: block, on: tpo",
+        f"16:38: 'box' has no surface 'tpo'; did you mean 'top'? {BOX_SURFACES}",
+        "tpo",
+    ),
+    ("obstacle: plate", "obstacle: plat", "16:63: unknown obstacle 'plat'; did you mean 'plate'?", "plat"),
+    ("on: bottom\n", "on: botom\n", f"13:11: 'box' has no surface 'botom'; did you mean 'bottom'? {BOX_SURFACES}", "b"),
+    (
+        "{body: block, on: top}",
+        "{obstacle: plate}",
+        "16:20: the slave must be a surface of a body: make the obstacle the master",
+        "{obstacle",
+    ),
+    (
+        "body: block, on: top",
+        "body: block",
+        "16:27: a side of a body needs the setting 'on', the name of its surface",
+        "block",
+    ),
+    (
+        "{obstacle: plate}",
+        "{obstacle: plate, body: block, on: top}",
+        "16:52: give either 'body' and 'on', or 'obstacle'",
+        "{obstacle",
+    ),
+    ("{obstacle: plate}", "{on: top}", "16:52: give either 'body' and 'on', or 'obstacle'", "{on"),
+    (
+        "{obstacle: plate}",
+        "{obstacle: plate, on: top}",
+        "16:74: the surface of an obstacle is named where the obstacle is",
+        "top",
+    ),
+    ("  pairs:\n" + PRESS, "  pairs: {}", "15:10: 'pairs' needs at least one pair", "{}"),
+    ("  pairs:\n" + PRESS + "\n", "", "9:1: missing setting 'pairs' in 'contact'", "contact"),
+    (
+        "body: block, on: top",
+        "body: block, on: [left, tpo]",
+        f"16:45: 'box' has no surface 'tpo'; did you mean 'top'? {BOX_SURFACES}",
+        "tpo",
+    ),
+    (
+        "master: {obstacle: plate}",
+        "master: {body: block, on: [left, top]}",
+        "16:52: a surface cannot touch itself: name another master",
+        "{body",
+    ),
+    (
+        "master: {obstacle: plate}",
+        "master: {body: block, on: top}",
+        "16:52: a surface cannot touch itself: name another master",
+        "{body",
+    ),
+    (", \"-0.2*sin(2*pi*t)^2\"]", "]", "14:15: 'motion' must have 3 entries in 3D, not 2", "["),
+    ("contact:\n", "contact:\n  c_n: 0\n", "10:8: 'c_n' must be greater than 0, not 0", "0"),
+    (
+        "contact:\n",
+        "contact:\n  friction: 1\n",
+        "10:3: unknown setting 'friction' (available: pairs, obstacles, c_n)",
+        "friction",
+    ),
+    (
+        "quantity: displacement, at: [0.4, 0.5, 1]",
+        "quantity: gap, pair: press, at: [0.4, 0.5, 1], extreme: least",
+        "19:65: give either 'at' or 'extreme', not both",
+        "least",
+    ),
+    (
+        "quantity: displacement, at: [0.4, 0.5, 1]",
+        "quantity: first_contact, pair: press, extreme: least",
+        "19:56: 'first_contact' is that of the whole pair: no 'extreme'",
+        "least",
+    ),
+    (
+        "quantity: displacement, at: [0.4, 0.5, 1]",
+        "quantity: pressure, pair: pres",
+        "19:35: unknown pair 'pres'; did you mean 'press'?",
+        "pres",
+    ),
+    (
+        "quantity: displacement, at: [0.4, 0.5, 1]",
+        "quantity: first_contact",
+        "19:19: quantity 'first_contact' needs 'pair: PAIR'",
+        "first",
+    ),
+    (
+        "quantity: displacement, at: [0.4, 0.5, 1]",
+        "quantity: gap, pair: press, on: top",
+        "19:41: give either 'pair' or 'on', not both",
+        "top",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "message", "at"), MISTAKES, ids=[m[2] for m in MISTAKES])
+def test_message(old, new, message, at, tmp_path):
+    path = tmp_path / "case.yaml"
+    assert PLATE.count(old) >= 1
+    text = PLATE.replace(old, new, 1)
+    path.write_text(text)
+    with pytest.raises(CaseError) as caught:
+        load_case(path)
+    lines = [str(problem).split("\n")[0] for problem in caught.value.problems]
+    found = [i for i, line in enumerate(lines) if line == f"{path}:{message}"]
+    assert found, lines
+    assert len(lines) == 1, lines
+    place = caught.value.problems[found[0]].place
+    assert text.split("\n")[place.line - 1][place.column - 1 :].startswith(at)
+
+
+def test_the_case_without_mistakes_loads(tmp_path):
+    (tmp_path / "case.yaml").write_text(PLATE)
+    assert load_case(tmp_path / "case.yaml").warnings == ()
+
+
+def test_a_body_without_a_node_off_its_slave_surfaces(tmp_path):
+    text = COLLISION.replace("cells: [3, 4]", "cells: [1, 4]").replace("left, on: right}", "left, on: [left, right]}")
+    (tmp_path / "case.yaml").write_text(text)
+    with pytest.raises(CaseError) as caught:
+        run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out")
+    said = str(caught.value)
+    assert check_meshes(load_case(tmp_path / "case.yaml")).problems == list(caught.value.problems)
+    assert said.split("\n")[0] == (
+        f"{tmp_path / 'case.yaml'}:7:13: all nodes of the body are on slave surfaces, which have no mass in dynamics: "
+        "use two or more cells between them, or make one of them the master"
+    )
