@@ -4,18 +4,10 @@ import os
 import threading
 
 import pytest
+from small_cases import BLOCK
 
 from fsci.case import CaseError, load_case
 from fsci.memory import require_memory
-
-CASE = """\
-time: {step: 1, end: 1}
-structure:
-  bodies:
-    block:
-      mesh: {shape: rectangle, size: [1, 1], cells: [1, 1]}
-      material: {law: neo_hooke, E: 1, nu: 0}
-"""
 
 
 def message(tmp_path, text):
@@ -53,11 +45,11 @@ def test_a_pipe_is_not_waited_for(tmp_path):
 
 @pytest.mark.parametrize("time", ["step: 1, end: 1e300", "step: 1e-300, end: 1", "start: -1e20, step: 1, end: 0"])
 def test_a_step_that_time_does_not_feel(tmp_path, time):
-    assert "is lost in rounding" in message(tmp_path, CASE.replace("step: 1, end: 1", time))
+    assert "is lost in rounding" in message(tmp_path, BLOCK.replace("step: 1, end: 1", time))
 
 
 def test_a_long_line_is_cut_around_the_mistake(tmp_path):
-    text = message(tmp_path, CASE.replace("E: 1,", f"{'rho: 1, ' * 1} E: '{' ' * 1000}1 + x + w',"))
+    text = message(tmp_path, BLOCK.replace("E: 1,", f"{'rho: 1, ' * 1} E: '{' ' * 1000}1 + x + w',"))
     shown = max(text.split("\n"), key=len)
     assert "unknown" in text
     assert len(shown) < 400
@@ -72,7 +64,7 @@ class TwoMachines:
     ("cells", "words"), [(30_000, "GB, and there are"), (100_000, "more than the 2,147,483,647 that can be numbered")]
 )
 def test_more_than_the_machine_holds(tmp_path, cells, words):
-    (tmp_path / "case.yaml").write_text(CASE.replace("cells: [1, 1]", f"cells: [{cells}, {cells}]"))
+    (tmp_path / "case.yaml").write_text(BLOCK.replace("cells: [1, 1]", f"cells: [{cells}, {cells}]"))
     with pytest.raises(CaseError, match=words) as error:
         require_memory(load_case(tmp_path), TwoMachines())
     assert "case.yaml:5:13: the case has" in str(error.value)

@@ -5,22 +5,13 @@ import tempfile
 
 import numpy as np
 import pytest
+from small_cases import PLATE
 
 from fsci.checkpoint import list_checkpoints, write_checkpoint
 from fsci.cli import execute
 from fsci.history import HistoryWriter, read_history
 
-CASE = """\
-time: {step: 0.2, end: 1}
-structure:
-  bodies:
-    plate:
-      mesh: {shape: rectangle, size: [1, 1], cells: [2, 2]}
-      material: {law: neo_hooke, E: 1, nu: 0.3}
-      supports: [{on: left, displacement: [0, 0]}]
-      body_force: [0, "1e-6*t"]
-output: {fields_every: 0}
-"""
+CASE = PLATE + "output: {fields_every: 0}\n"
 FULL = (28, "No space left on device", "history.csv")
 
 

@@ -13,6 +13,7 @@ import pytest
 import scipy.sparse as sp
 from petsc4py import PETSc
 from programs import ENVIRONMENT, PARALLEL, fsci
+from small_cases import PLATE
 
 from fsci.history import read_history
 from solvers import unlocked
@@ -20,17 +21,10 @@ from solvers import unlocked
 PROGRAM = Path(__file__).parent / "disturbed_run.py"
 
 #: one linear solve a step
-CASE = """\
-time: {step: 0.25, end: 1}
-structure:
-  bodies:
-    plate:
-      mesh: {shape: rectangle, size: [1, 1], cells: [2, 2]}
-      material: {law: neo_hooke, E: 1, nu: 0.3}
-      supports: [{on: left, displacement: [0, 0]}]
-      body_force: [0, "1e-6*t"]
-probes: {corner: {quantity: displacement, at: [1, 1]}}
-solver: {newton: {residual: 1e-3}}
+CASE = f"""\
+{PLATE.replace("0.2", "0.25")}\
+probes: {{corner: {{quantity: displacement, at: [1, 1]}}}}
+solver: {{newton: {{residual: 1e-3}}}}
 """
 
 

@@ -2,19 +2,11 @@
 
 import pytest
 from programs import fsci
+from small_cases import BLOCK
 
 from fsci.case import CaseError, load_case
 from fsci.results_folder import list_pictures, prepare_folder
 
-CASE = """\
-time: {step: 1, end: 1}
-structure:
-  bodies:
-    block:
-      mesh: {shape: rectangle, size: [1, 1], cells: [1, 1]}
-      material: {law: neo_hooke, E: 1, nu: 0}
-      supports: [{on: left, displacement: [0, 0]}]
-"""
 FOREIGN = [
     "case.yaml",
     "history.csv",
@@ -31,7 +23,7 @@ FOREIGN = [
 @pytest.fixture
 def case(tmp_path):
     (tmp_path / "case").mkdir()
-    (tmp_path / "case" / "case.yaml").write_text(CASE)
+    (tmp_path / "case" / "case.yaml").write_text(BLOCK)
     return load_case(tmp_path / "case")
 
 
@@ -56,13 +48,13 @@ def test_a_folder_with_other_files_is_refused(case, tmp_path, name):
 def test_the_folder_of_the_case_is_refused(case, tmp_path):
     with pytest.raises(CaseError, match="this folder is the folder of the case itself"):
         prepare_folder(load_case(tmp_path / "case", [("time.end", "2")]), tmp_path / "case")
-    assert (tmp_path / "case" / "case.yaml").read_text() == CASE
+    assert (tmp_path / "case" / "case.yaml").read_text() == BLOCK
 
 
 def test_force_keeps_what_was_there(case, tmp_path):
     put(tmp_path / "out", FOREIGN)
     prepare_folder(case, tmp_path / "out", force=True)
-    assert (tmp_path / "out" / "case.yaml").read_text() == CASE
+    assert (tmp_path / "out" / "case.yaml").read_text() == BLOCK
     assert set(texts(tmp_path / "out")) >= {f"my {name}" for name in FOREIGN}
     assert (tmp_path / "out" / "fields.old" / "photo.vtu").is_file()
 
@@ -70,7 +62,7 @@ def test_force_keeps_what_was_there(case, tmp_path):
 def test_force_in_the_folder_of_the_case_keeps_the_case(case, tmp_path):
     folder = tmp_path / "case"
     prepare_folder(load_case(folder, [("time.end", "2")]), folder, force=True)
-    assert (folder / "case.yaml.old").read_text() == CASE
+    assert (folder / "case.yaml.old").read_text() == BLOCK
     assert load_case(folder).time.end == 2
 
 
@@ -102,7 +94,7 @@ def test_links_are_replaced_not_followed(case, tmp_path):
     (out / "case.yaml").symlink_to(elsewhere)
     prepare_folder(case, out)
     assert elsewhere.read_text() == "mine"
-    assert (out / "case.yaml").read_text() == CASE
+    assert (out / "case.yaml").read_text() == BLOCK
 
 
 def test_a_file_instead_of_a_folder(case, tmp_path):

@@ -72,10 +72,6 @@ def plane_stress_lambda(mu: float, lmbda: float) -> float:
     return 2.0 * lmbda * mu / (lmbda + 2.0 * mu)
 
 
-def _green_lagrange(F: Tensor) -> Tensor:
-    return (F.T * F - ufl.Identity(F.ufl_shape[0])) / 2
-
-
 @dataclass(frozen=True)
 class StVenantKirchhoff:
     """W = lambda/2 (tr E)^2 + mu E:E with E = (F^T F - I)/2."""
@@ -86,18 +82,21 @@ class StVenantKirchhoff:
     plane_stress: ClassVar[bool] = False
     linear: ClassVar[bool] = False
 
+    def strain(self, F: Tensor) -> Tensor:
+        return (F.T * F - ufl.Identity(F.ufl_shape[0])) / 2
+
     def energy(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
-        E = _green_lagrange(F)
+        E = self.strain(F)
         return lmbda / 2 * ufl.tr(E) ** 2 + mu * ufl.inner(E, E)
 
     def volume_ratio(self, F: Tensor) -> Tensor:
-        return 1 + ufl.tr(_green_lagrange(F))
+        return 1 + ufl.tr(self.strain(F))
 
     def volumetric(self, J: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
         return (lmbda / 2 + mu / 3) * (J - 1) ** 2
 
     def distortional(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
-        E = _green_lagrange(F)
+        E = self.strain(F)
         return mu * (ufl.inner(E, E) - ufl.tr(E) ** 2 / 3)
 
 
@@ -109,28 +108,13 @@ class PlaneStressStVenantKirchhoff(StVenantKirchhoff):
 
 
 @dataclass(frozen=True)
-class LinearElastic:
-    """W = lambda/2 (tr e)^2 + mu e:e with the strain e = sym(grad u) of small displacements (Hooke's law)."""
+class LinearElastic(StVenantKirchhoff):
+    """The same energy of the strain e = sym(grad u) of small displacements (Hooke's law)."""
 
-    mu: Value
-    lmbda: Value
-    density: Value = 0.0
-    plane_stress: ClassVar[bool] = False
     linear: ClassVar[bool] = True
 
-    def energy(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
-        e = ufl.sym(F) - ufl.Identity(F.ufl_shape[0])
-        return lmbda / 2 * ufl.tr(e) ** 2 + mu * ufl.inner(e, e)
-
-    def volume_ratio(self, F: Tensor) -> Tensor:
-        return 1 + ufl.tr(F) - F.ufl_shape[0]
-
-    def volumetric(self, J: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
-        return (lmbda / 2 + mu / 3) * (J - 1) ** 2
-
-    def distortional(self, F: Tensor, mu: Tensor, lmbda: Tensor) -> Tensor:
-        e = ufl.sym(F) - ufl.Identity(F.ufl_shape[0])
-        return mu * (ufl.inner(e, e) - ufl.tr(e) ** 2 / 3)
+    def strain(self, F: Tensor) -> Tensor:
+        return ufl.sym(F) - ufl.Identity(F.ufl_shape[0])
 
 
 @dataclass(frozen=True)
