@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from mpi4py import MPI
 
 from fsci.case import Case
+from fsci.columns import Numbers
 from solvers.api import Scheme, Snapshot
 from solvers.timing import Timer
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from solvers.contact.contact import Contact
     from solvers.contact.results import PartFields
     from solvers.structure.body import Body
-
-Numbers = dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -129,10 +128,3 @@ def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 def _notes(bodies: list[Body]) -> list[str]:
     meshes = [(body.name, body.domain.source) for body in bodies]
     return [f"mesh of body '{name}': {mesh.note}" for name, mesh in meshes if mesh is not None and mesh.note]
-
-
-def columns(probes: dict[str, Callable[[], Numbers]]) -> Callable[[], Numbers]:
-    """All probes as one function: NAME, or NAME.x for each component of a vector."""
-    return lambda: {
-        f"{name}.{part}" if part else name: value for name, probe in probes.items() for part, value in probe().items()
-    }

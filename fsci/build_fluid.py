@@ -9,12 +9,12 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fsci.build import Numbers, columns
 from fsci.build_solver import build_tolerance
 from fsci.case import Case
 from fsci.case.fluid import Fluid as Section
 from fsci.case.probes import Reference
 from fsci.case_meshes import read_rigid_body, require_inside_period
+from fsci.columns import Numbers, columns
 from fsci.rigid_motion import rigid_motion
 from solvers.fluid import probes
 from solvers.fluid.field import Fluid

@@ -7,14 +7,14 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fsci.build import Numbers, columns
 from fsci.build_loads import build_loads
 from fsci.build_solver import build_tolerance
 from fsci.case import Case
 from fsci.case.probes import Probe
 from fsci.case_meshes import VECTORS, read_body
+from fsci.columns import Numbers, columns
 from fsci.places import Places, find_places
-from solvers.api import Constraint
+from solvers.constraint import Constraint
 from solvers.mesh import Mesh
 from solvers.solver_settings import SolverSettings
 from solvers.structure import materials, probes

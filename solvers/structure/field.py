@@ -11,8 +11,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from solvers import linear
-from solvers.api import Array, Constraint, State, StepFailed, StepInfo
+from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.blocks import Layout, block_diagonal
+from solvers.constraint import Constraint
 from solvers.distributed import Nodal
 from solvers.newton import converge
 from solvers.rounding import rounding_error
