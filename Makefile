@@ -20,7 +20,7 @@ endif
 
 DEBIAN_PACKAGES := \
   build-essential cmake ninja-build python3-venv python3-dev \
-  python3-dolfinx python3-petsc4py python3-mpi4py python3-h5py-mpi python3-scipy libopenblas0-pthread \
+  python3-dolfinx python3-petsc4py python3-mpi4py python3-h5py python3-h5py-mpi python3-scipy libopenblas0-pthread \
   libosmesa6 libegl1 libgl1 libglu1-mesa libxrender1 libxft2 libxcursor1 libxinerama1 libxfixes3
 
 # One thread per process. Open MPI: as root, on few or shared cores (processes that do not move made two parallel tests at

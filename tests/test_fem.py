@@ -115,6 +115,25 @@ def test_integrals_over_chosen_entities(square):
     assert total("dS", interior_facet=inside) == pytest.approx(1.0)
 
 
+def test_coefficients_that_derivatives_do_not_have(square):
+    """At u = 3 the derivative of c + a u + b u^2 is a + 2 b u: it has no c, and u is not its first coefficient."""
+    space = fem.scalar_space(square)
+    c, a, b, u = (fem.function(space) for _ in range(4))
+    for function, value in ((c, 11.0), (a, 5.0), (b, 7.0), (u, 3.0)):
+        function.x.array[:] = value
+    dx = fem.measure(square, "dx", 4)
+    v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
+    tangent = ufl.derivative((c + a * u + b * u**2) * v * dx, u, du)
+    form = fem.Integral(square, tangent).on(cell=np.arange(2, dtype=np.int32))
+    matrix = fem.create_matrix(form)
+    fem.assemble_matrix(matrix, form)
+    matrix.assemble()
+    ones, sums = matrix.createVecs()
+    ones.set(1.0)
+    matrix.mult(ones, sums)
+    assert sums.sum() == pytest.approx(2.0 * (5.0 + 2.0 * 7.0 * 3.0))
+
+
 def test_weights_at_quadrature_points(square):
     """A coefficient at the points of a rule turns an integral into a weighted sum of the points."""
     weight = fem.function(fem.quadrature_space(square, 4))

@@ -107,7 +107,8 @@ def replace_dofs(space: Any, cells: Indices, ghosts: NDArray[np.int64], owners: 
     links = cpp.graph.AdjacencyList_int32(np.ascontiguousarray(cells))
     replaced = cpp.fem.DofMap(dofmap.dof_layout, index_map, dofmap.index_map_bs, links, dofmap.bs)
     whole = space._cpp_object
-    found = type(whole)(space.mesh._cpp_object, whole.element, replaced)
+    shape = [whole.value_shape] if hasattr(whole, "value_shape") else []  # later the element has it
+    found = type(whole)(space.mesh._cpp_object, whole.element, replaced, *shape)
     return fem.FunctionSpace(space.mesh, space.ufl_element(), found)
 
 
@@ -130,7 +131,7 @@ class Compiled:
     def __init__(self, mesh: dolfinx_mesh.Mesh, form: ufl.Form, options: dict[str, Any]):
         self._mesh = mesh
         self._compiled = fem.compile_form(mesh.comm, form, jit_options=options)
-        self._coefficients = {c: c for c in form.coefficients()}
+        self._coefficients = _coefficients(self._compiled)
         self._constants = {c: c for c in form.constants()}
         self._spaces = [argument.ufl_function_space() for argument in form.arguments()]
         topology = mesh.topology
@@ -144,6 +145,19 @@ class Compiled:
             kind = getattr(fem.IntegralType, name)
             domains[kind] = [(1, _integration_entities(self._mesh, kind, np.asarray(local, dtype=np.int32)))]
         return fem.create_form(self._compiled, self._spaces, self._mesh, domains, self._coefficients, self._constants)
+
+
+def _coefficients(compiled: Any) -> dict[Any, Any]:
+    """The argument of `create_form` that gives a compiled form its coefficients.
+
+    `create_form` calls a coefficient `w` and its number among all of the form. The compiled form has names of its own:
+    in DOLFINx 0.9 the number among those that are left after derivatives are taken. A coefficient therefore stands
+    under the one that has its name.
+    """
+    every, kept, ffi = compiled.ufl_form.coefficients(), compiled.ufcx_form, compiled.module.ffi
+    names = [ffi.string(kept.coefficient_name_map[i]).decode() for i in range(kept.num_coefficients)]
+    positions = [kept.original_coefficient_positions[i] for i in range(kept.num_coefficients)]
+    return {every[int(name[1:])]: every[position] for name, position in zip(names, positions, strict=True)}
 
 
 def _integration_entities(mesh: dolfinx_mesh.Mesh, kind: Any, local: Indices) -> Indices:

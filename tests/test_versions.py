@@ -1,0 +1,207 @@
+"""The same numbers on every version of DOLFINx, PETSc, MPI and numpy, on one process and two.
+
+NUMBERS were computed with DOLFINx 0.5.2, PETSc 3.18 and Open MPI 4.1. Newton's method goes on to rounding.
+"""
+
+import pytest
+from programs import fsci
+
+from fsci.history import read_history
+
+TWISTED = """\
+title: a block of second order is twisted and moves
+time: {step: 0.02, end: 0.06}
+structure:
+  dynamics: {rho_inf: 0.8}
+  bodies:
+    block:
+      mesh: {shape: box, size: [2, 1, 1], cells: [2, 1, 1], order: 2}
+      material: {law: neo_hooke, E: 1000, nu: 0.3, density: 1}
+      supports:
+        - {on: left, displacement: [0, 0, 0]}
+        - {on: right, displacement: ["t", "-3*t*z", "3*t*y"]}
+probes:
+  middle: {quantity: displacement, at: [1, 1, 1]}
+  wall: {quantity: reaction, on: left}
+  energy: {quantity: energy}
+solver: {newton: {residual: 1.0e-12}}
+"""
+
+PRESSED = """\
+title: a rigid plate presses and slides on a block, with friction
+time: {step: 0.125, end: 0.375}
+structure:
+  bodies:
+    block:
+      mesh: {shape: box, size: [1, 1, 1], cells: [3, 3, 3]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3, density: 1}
+      supports: [{on: bottom, displacement: [0, 0, 0]}]
+contact:
+  obstacles:
+    plate:
+      mesh: {shape: box, size: [3, 3, 1], cells: [1, 1, 1], translate: [-1, -1, 1.01]}
+      on: bottom
+      motion: ["0.05*t", "0.1*t", "-0.2*sin(2*pi*t)^2"]
+  pairs:
+    press: {slave: {body: block, on: top}, master: {obstacle: plate}, friction: {coefficient: 0.2}}
+probes:
+  foot: {quantity: reaction, on: bottom}
+  top: {quantity: displacement, at: [0.4, 0.5, 1]}
+solver: {newton: {residual: 1.0e-12}}
+"""
+
+FLOW = """\
+title: a disc moves through a channel
+time: {step: 0.02, end: 0.06}
+fluid:
+  density: 1.2
+  viscosity: 0.02
+  element: ELEMENT
+  grid: {from: [0, 0], to: [2, 1], cells: [16, 8]}
+  patches:
+    inlet: {on: x-, velocity: ["4*y*(1 - y)*min(t/0.1, 1)", 0]}
+    outlet: {on: x+, outflow: true}
+    walls: {on: [y-, y+], no_slip: true}
+  bodies:
+    disc:
+      mesh: {shape: disc, radius: 0.2, cells: [40, 1], translate: [0.7, 0.52]}
+      motion: {displacement: ["t", "0.1*sin(20*t)"]}
+probes:
+  force: {quantity: force}
+  wake: {quantity: velocity, at: [1.3, 0.45]}
+  drop: {quantity: pressure, at: [0, 0.5], minus: [2, 0.5]}
+  outflow: {quantity: flow_rate, through: outlet}
+solver: {newton: {residual: 1.0e-12}}
+"""
+
+POST = """\
+title: a post in a channel
+time: {step: 0.02, end: 0.06}
+fluid:
+  density: 1
+  viscosity: 0.05
+  grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
+  patches:
+    inlet: {on: x-, velocity: ["4*y*(1 - y)*min(t/0.1, 1)", 0]}
+    outlet: {on: x+, outflow: true}
+    walls: {on: [y-, y+], no_slip: true}
+structure:
+  dynamics: {rho_inf: 0.8}
+  bodies:
+    post:
+      mesh: {shape: rectangle, size: [0.23, 0.41], origin: [0.62, 0], cells: [3, 5]}
+      material: {law: st_venant_kirchhoff, E: 1000, nu: 0.3, density: 10}
+      supports: [{on: bottom, displacement: [0, 0]}]
+COUPLING
+probes:
+  tip: {quantity: displacement, at: [0.735, 0.41]}
+  force: {quantity: force}
+  outflow: {quantity: flow_rate, through: outlet}
+solver: {newton: {residual: 1.0e-11}}
+"""
+
+WALL = """\
+coupling: {scheme: monolithic}
+contact:
+  obstacles:
+    wall: {mesh: {shape: rectangle, size: [1, 1], cells: [1, 1], translate: [0.8501, 0]}, on: left}
+  pairs: {stop: {slave: {body: post, on: right}, master: {obstacle: wall}}}
+"""
+
+CASES = {
+    "twisted": TWISTED,
+    "pressed": PRESSED,
+    "flow q1q1": FLOW.replace("ELEMENT", "q1q1"),
+    "flow q2q1": FLOW.replace("ELEMENT", "q2q1"),
+    "post monolithic": POST.replace("COUPLING", "coupling: {scheme: monolithic}"),
+    "post partitioned": POST.replace("COUPLING", "coupling: {scheme: partitioned, tolerance: 1.0e-10}"),
+    "stopped post": POST.replace("COUPLING", WALL),
+}
+
+#: case -> column of history.csv -> value at the end
+NUMBERS: dict[str, dict[str, float]] = {
+    "twisted": {
+        "middle.x": 0.029153835817825678,
+        "middle.y": -0.023755439118404,
+        "middle.z": 0.010735762248726603,
+        "wall.x": -18.028944848308406,
+        "wall.y": -2.6175551448515115,
+        "wall.z": 2.539960745929804,
+        "energy.kinetic": 4.270569932156023,
+        "energy.internal": 3.549125561926344,
+        "energy.work": 7.538190255488949,
+    },
+    "pressed": {
+        "foot.x": -4.821923084665291,
+        "foot.y": -9.605929346575866,
+        "foot.z": 102.0905064102312,
+        "top.x": 0.016818672490092074,
+        "top.y": 0.0351076138911848,
+        "top.z": -0.09,
+        "contact.active": 16.0,
+        "contact.sticking": 10.0,
+        "contact.friction": 0.38489193582787984,
+    },
+    "flow q1q1": {
+        "force.x": 1.054550256198303,
+        "force.y": 7.361251105434504,
+        "wake.x": 0.34891535855268996,
+        "wake.y": -0.3233352524382477,
+        "drop": 19.044799748770288,
+        "outflow": 0.39375,
+        "fluid.leak": 0.05686135202592469,
+    },
+    "flow q2q1": {
+        "force.x": 1.7945822632852881,
+        "force.y": 8.62580986946842,
+        "wake.x": 0.35011856595248775,
+        "wake.y": -0.2926110645320732,
+        "drop": 20.268958720912387,
+        "outflow": 0.4,
+        "fluid.leak": 0.017090327045757896,
+    },
+    "post monolithic": {
+        "tip.x": 0.005079890609455511,
+        "tip.y": -0.0026739954349175137,
+        "force.x": 3.7861364596283975,
+        "force.y": -3.0619885305909422,
+        "outflow": 0.3993718036950677,
+        "fluid.leak": 0.019133155876924143,
+    },
+    "post partitioned": {
+        "tip.x": 0.005079890609460055,
+        "tip.y": -0.0026739954349289164,
+        "force.x": 3.7861364596612423,
+        "force.y": -3.0619885306550043,
+        "outflow": 0.39937180369626857,
+        "fluid.leak": 0.0191331558769258953,
+    },
+    "stopped post": {
+        "tip.x": 0.0026704328724297516,
+        "tip.y": -0.002072977959679321,
+        "force.x": 5.6134007802635,
+        "force.y": -2.8104423507185947,
+        "outflow": 0.37019984675879825,
+        "contact.active": 5.0,
+        "contact.stop.x": -7.50995669465082,
+        "contact.stop.y": 0.0003666562027768858,
+        "fluid.leak": 0.03231111280382939,
+    },
+}
+
+#: share of a probe's largest component (small components are sums that cancel)
+TOLERANCE = 1e-9
+
+
+@pytest.mark.parametrize("processes", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", CASES)
+def test_numbers_do_not_depend_on_the_version(name, processes, tmp_path):
+    (tmp_path / "case.yaml").write_text(CASES[name])
+    run = fsci("run", tmp_path / "case.yaml", "-o", tmp_path / "out", processes=processes, timeout=600)
+    assert run.returncode == 0, run.stdout + run.stderr
+    history = read_history(tmp_path / "out" / "history.csv")
+    expected = NUMBERS[name]
+    for column, value in expected.items():
+        probe = column.rpartition(".")[0] or column
+        size = max(abs(other) for key, other in expected.items() if key.startswith(probe))
+        assert abs(history[column][-1] - value) <= TOLERANCE * size, column
