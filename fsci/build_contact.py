@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from mpi4py import MPI
@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from coupling.contact_surface import contact_surface
 from fsci.case import Case, CaseError
 from fsci.case.contact import Pair as PairSettings
-from fsci.case_meshes import read_obstacle
+from fsci.case_meshes import read_obstacle, read_rigid_body
+from fsci.rigid_motion import rigid_motion
+from solvers.api import Array
 from solvers.contact.contact import Contact
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless
@@ -53,25 +55,45 @@ def _law(settings: PairSettings) -> Law:
 
 
 def _obstacle(case: Case, comm: MPI.Comm, name: str) -> Surface:
-    """A rigid surface, whole on every process."""
+    """The rigid surface of an obstacle or of a rigid body in the flow, whole on every process."""
     assert case.contact is not None
-    settings = case.contact.obstacles[name]
     found, error = None, None
     if comm.rank == 0:
         try:
-            mesh = read_obstacle(case, name)
-            found = (*cut_out(mesh, settings.on)[:2], FACET_TYPE[mesh.cell_type])
+            found = _rigid_mesh(case, name)
         except CaseError as problem:
             error = problem
     error = comm.bcast(error, root=0)
     if error is not None:
         raise error
     points, facets, facet_type = comm.bcast(found, root=0)
-    motion = None
-    if settings.motion is not None:
-        displacement = settings.motion
+    return Surface(name, points, facets, facet_type, None, motion=_motion(case, name, points))
 
-        def motion(t: float) -> NDArray[np.float64]:
-            return points + np.stack([component(points.T, t) for component in displacement], axis=1)
 
-    return Surface(name, points, facets, facet_type, None, motion=motion)
+def _rigid_mesh(case: Case, name: str) -> tuple[Array, NDArray[np.int64], str]:
+    """(points [m], facets, facet type) of a rigid surface."""
+    assert case.contact is not None
+    if name in case.contact.obstacles:
+        mesh = read_obstacle(case, name)
+        points, facets, _ = cut_out(mesh, case.contact.obstacles[name].on)
+    else:
+        assert case.fluid is not None
+        mesh = read_rigid_body(case, name)[0]
+        points, facets, _ = cut_out(mesh, case.fluid.bodies[name].on)
+    return points, facets, FACET_TYPE[mesh.cell_type]
+
+
+def _motion(case: Case, name: str, points: Array) -> Callable[[float], Array] | None:
+    """Positions [m] of the points at a time; None if they stay where they are."""
+    assert case.contact is not None
+    if name in case.contact.obstacles:
+        displacement = case.contact.obstacles[name].motion
+        if displacement is None:
+            return None
+        return lambda t: points + np.stack([component(points.T, t) for component in displacement], axis=1)
+    assert case.fluid is not None
+    movement = case.fluid.bodies[name].motion
+    if movement is None:
+        return None
+    moved = rigid_motion(points, movement, case.time.start, case.time.step)
+    return lambda t: moved(t)[0]

@@ -169,12 +169,13 @@ def surface_facets(mesh: Mesh, name: str) -> Indices:
     return facets
 
 
-def cut_out(mesh: Mesh, names: Sequence[str]) -> tuple[NDArray[np.float64], Indices, Indices]:
+def cut_out(mesh: Mesh, names: Sequence[str] | None) -> tuple[NDArray[np.float64], Indices, Indices]:
     """Named surfaces as one: (points, facets, node numbers in the mesh); a facet that is in several counts once.
 
-    Raises KeyError and ValueError as `surface_facets`.
+    None: the whole boundary. Raises KeyError and ValueError as `surface_facets`.
     """
-    facets = np.concatenate([surface_facets(mesh, name) for name in names])
+    parts = [boundary_facets(mesh)] if names is None else [surface_facets(mesh, name) for name in names]
+    facets = np.concatenate(parts)
     facets = facets[np.sort(np.unique(facets, axis=0, return_index=True)[1])]
     nodes, local = np.unique(facets, return_inverse=True)
     return mesh.points[nodes], local.reshape(facets.shape).astype(np.int64), nodes

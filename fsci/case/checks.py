@@ -125,6 +125,11 @@ def _contact(case: Case, contact: Contact) -> Iterator[Mistake]:
         keys: Keys = ("contact", "obstacles", name)
         yield from length_mistakes(obstacle.motion, case.dimension, (*keys, "motion"))
         yield from surfaces_mistakes(obstacle.mesh, obstacle.on, (*keys, "on"))
+        if case.fluid is not None and name in case.fluid.bodies:
+            message = (
+                f"a rigid body of the flow is called '{name}', too: remove the obstacle, the body can be the master"
+            )
+            yield keys, message
     for name, pair in contact.pairs.items():
         for side in ("slave", "master"):
             yield from _side(case, contact, getattr(pair, side), ("contact", "pairs", name, side))
@@ -139,8 +144,9 @@ def _contact(case: Case, contact: Contact) -> Iterator[Mistake]:
 def _side(case: Case, contact: Contact, side: Side, keys: Keys) -> Iterator[Mistake]:
     bodies = case.elastic_bodies
     if side.body is None:
-        if side.obstacle not in contact.obstacles:
-            hint = did_you_mean(side.obstacle or "", contact.obstacles)
+        rigid = [*contact.obstacles, *([] if case.fluid is None else case.fluid.bodies)]
+        if side.obstacle not in rigid:
+            hint = did_you_mean(side.obstacle or "", rigid)
             yield (*keys, "obstacle"), f"unknown obstacle '{side.obstacle}'{hint}"
     elif side.body not in bodies:
         yield (*keys, "body"), f"unknown body '{side.body}'{did_you_mean(side.body, bodies)}"

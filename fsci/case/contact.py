@@ -12,11 +12,11 @@ from fsci.case.values import Name, NotNegative, Positive, Surfaces, Vector
 
 
 class Side(Section):
-    """A surface of a body, or an obstacle."""
+    """A surface of a body, or an obstacle, which may be a rigid body in the flow."""
 
     body: Name | None = setting(None, "name of the body")
     on: Surfaces | None = setting(None, "name of its surface, or list of names that are one surface together")
-    obstacle: Name | None = setting(None, "name of the obstacle")
+    obstacle: Name | None = setting(None, "name of the obstacle, or of a rigid body of the flow")
 
     @model_validator(mode="after")
     def _one_kind(self) -> Side:

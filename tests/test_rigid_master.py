@@ -1,0 +1,90 @@
+"""A rigid body in the flow is a master of contact, too: one mesh, one motion."""
+
+import numpy as np
+import pytest
+
+from fsci.case import CaseError, load_case
+from fsci.history import read_history
+from fsci.run import FINISHED, run_case
+
+#: A ram comes down in a channel and presses an elastic block against the floor; it turns a little.
+RAM = """\
+title: a ram in a channel
+time: {step: 0.02, end: 0.2}
+fluid:
+  density: 1
+  viscosity: 0.05
+  grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
+  patches:
+    open: {on: [x-, x+], outflow: true}
+    walls: {on: [y-, y+], no_slip: true}
+  bodies:
+    ram:
+      mesh: {shape: rectangle, size: [0.6, 0.3], origin: [0.7, 0.46], cells: [2, 1]}
+      motion: {displacement: [0, "-0.09*(t/0.2)^2*(3 - 2*t/0.2)"], rotation: {centre: [1, 0.5], angle: "20*t"}}
+structure:
+  dynamics: {rho_inf: 0.5}
+  bodies:
+    block:
+      mesh: {shape: rectangle, size: [0.4, 0.4], origin: [0.8, 0], cells: [4, 4]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3, density: 2}
+      supports: [{on: bottom, displacement: [0, 0]}]
+contact:
+  pairs:
+    press: {slave: {body: block, on: top}, master: {obstacle: ram}}
+coupling: {scheme: monolithic}
+probes:
+  force: {field: structure, body: block, quantity: reaction, on: bottom}
+solver: {newton: {residual: 1.0e-9}}
+"""
+
+#: The same ram again, as a surface of contact alone (without the rotation, which obstacles do not have).
+TWICE = RAM.replace(', rotation: {centre: [1, 0.5], angle: "20*t"}', "").replace(
+    "contact:\n",
+    """contact:
+  obstacles:
+    plate:
+      mesh: {shape: rectangle, size: [0.6, 0.3], origin: [0.7, 0.46], cells: [2, 1]}
+      on: bottom
+      motion: [0, "-0.09*(t/0.2)^2*(3 - 2*t/0.2)"]
+""",
+)
+
+
+def run(text, folder):
+    folder.mkdir()
+    (folder / "case.yaml").write_text(text)
+    assert run_case(load_case(folder / "case.yaml"), folder / "out") == FINISHED
+    return read_history(folder / "out" / "history.csv")
+
+
+def test_one_body_for_flow_and_contact(tmp_path):
+    """The same as the body and an obstacle that moves with it."""
+    one = run(TWICE, tmp_path / "one")
+    two = run(TWICE.replace("obstacle: ram", "obstacle: plate"), tmp_path / "two")
+    assert one["force.y"].max() > 10.0
+    for column in ("force.x", "force.y", "contact.press.y"):
+        np.testing.assert_allclose(one[column], two[column], rtol=1e-7, atol=1e-7)
+
+
+def test_it_turns(tmp_path):
+    """The right end of the ram lies higher than the left one: the left corner of the block is pressed first."""
+    history = run(RAM, tmp_path / "case")
+    assert history["contact.press.y"].min() < -1.0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("obstacle: ram", "obstacle: rum"), "unknown obstacle 'rum'; did you mean 'ram'?"),
+        (
+            ("plate:", "ram:"),
+            "a rigid body of the flow is called 'ram', too: remove the obstacle, the body can be the master",
+        ),
+    ],
+)
+def test_mistakes(change, message, tmp_path):
+    (tmp_path / "case.yaml").write_text(TWICE.replace(*change))
+    with pytest.raises(CaseError) as caught:
+        load_case(tmp_path / "case.yaml")
+    assert message in str(caught.value)
