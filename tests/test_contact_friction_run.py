@@ -13,7 +13,7 @@ from fsci.run import FINISHED, run_case
 #: Weight 10, mu = 0.1, pulled by 3: a = 2. The base is as stiff as the block.
 SLIDING = """\
 title: a block slides on a base
-time: {step: 0.03125, end: 0.25}
+time: {step: 0.0625, end: 0.25}
 structure:
   dynamics: {rho_inf: 0.5}
   bodies:

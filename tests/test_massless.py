@@ -54,14 +54,14 @@ def test_mass_and_its_centre_stay(cell_type):
 
 @pytest.mark.parametrize("cell_type", ["quad", "triangle6", "hexahedron", "tetra"])
 def test_few_cells(cell_type):
-    """With two cells across, mass stays; its centre moves inwards, by less than a fourth of a cell."""
+    """With two cells across, mass stays; its centre stays or moves inwards, by less than a fourth of a cell."""
     body = make_body("block", block(cell_type, 2))
     at_left = at_planes(body, 0.0)
     before, after = dense(body.mass()), moved(body, at_left)
     assert np.linalg.eigvalsh(after[~at_left][:, ~at_left]).min() > 0
     assert after.sum() == pytest.approx(before.sum(), rel=1e-13)
     x = body.points[0, : body.owned].repeat(body.dim)
-    assert 0 < x @ (after - before).sum(axis=1) / before.sum() < 0.125
+    assert -1e-14 < x @ (after - before).sum(axis=1) / before.sum() < 0.125
 
 
 def test_one_layer_between_two_massless_surfaces():

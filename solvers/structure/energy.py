@@ -19,7 +19,8 @@ class EnergyBalance:
     def start(self, structure: Structure) -> None:
         """Measure the initial energy."""
         self._measure(structure)
-        self.initial = self.kinetic + self.internal
+        self.friction = 0.0 if structure.constraint is None else structure.constraint.friction_work
+        self.initial = self.kinetic + self.internal + self.friction
 
     def _measure(self, structure: Structure) -> None:
         self.kinetic = structure.time.kinetic_energy(structure)

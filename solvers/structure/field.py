@@ -133,6 +133,21 @@ class Structure:
         self.time.start(self, t, dt)
         self.energy.start(self)
 
+    def settle(self, time: TimeScheme, held: Held, t: float, dt: float) -> None:
+        """A step to the same t by another scheme and with other supports, to find the state that a run starts from.
+
+        Raises StepFailed.
+        """
+        own = self.time, self.held
+        self.time, self.held = time, held
+        try:
+            self.begin_step(t - dt, dt)
+            self.solve()
+        finally:
+            self.time, self.held = own
+        if self.constraint is not None:
+            self.constraint.end_step(time.force_weight)
+
     def _stiffness(self) -> Array:
         """Diagonal of the static tangent [N/m]."""
         for body, matrix in zip(self.bodies, self._tangents, strict=True):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -31,6 +32,14 @@ class Held:
         self._nodes = np.concatenate(nodes).astype(np.int64)[:, None] + np.arange(dim)  #: owned dofs, (k, dim)
         self._projections = np.concatenate([s.oblique.projections for s in supports])
         self.oblique = layout.comm.allreduce(len(self._nodes)) > 0  #: on any process
+        self._stopped_at: Array | None = None
+
+    def stopped(self, dofs: NDArray[np.int64], u: Array) -> Held:
+        """These owned dofs are held too, and all that is held stays at the displacement u [m]."""
+        held = copy(self)
+        held.dofs = np.union1d(self.dofs, dofs)
+        held._stopped_at = held.part(u)
+        return held
 
     def part(self, array: Array) -> Array:
         """P a, of owned dofs."""
@@ -46,6 +55,8 @@ class Held:
 
     def displacement(self, t: float) -> Array:
         """u_p [m] of owned dofs, zero where nothing is held."""
+        if self._stopped_at is not None:
+            return self._stopped_at
         whole = np.zeros(self._layout.size)
         whole[self.dofs] = np.concatenate([support.displacement(t) for support in self._supports])
         if self.oblique:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array
@@ -15,6 +16,10 @@ from solvers.time import GeneralisedAlpha
 
 if TYPE_CHECKING:
     from solvers.structure.field import Instant, Structure
+
+
+#: Time, in first steps, in which velocities and accelerations at the start are measured.
+SHORT = 1e-3
 
 
 class TimeScheme(Protocol):
@@ -93,6 +98,33 @@ class Statics:
         return 0.0
 
 
+class Settling(Statics):
+    """f_int(u) + C v = f_ext(t): the first state of nodes without mass, which move from u_0 in a short time dt.
+
+    Without damping they are at once where the forces on them are in balance. With damping they are still where they
+    were, and v = (u - u_0) / dt is the velocity with which they start. v of the others is given.
+    """
+
+    def __init__(self, moving: NDArray[np.int64], damping: PETSc.Mat | None, dt: float):
+        """moving: owned dofs without mass."""
+        self._moving, self._damping, self._dt = moving, damping, dt
+
+    def balance(self, structure: Structure) -> Array:
+        force = self.reaction(structure)
+        if self._damping is None:
+            return force
+        now, (v, damping) = structure.now, self._damping.createVecs()
+        now.v[self._moving] = (now.u - structure.old.u)[self._moving] / self._dt
+        v.array[:] = now.v
+        self._damping.mult(v, damping)
+        return force + damping.array
+
+    def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
+        if self._damping is not None:
+            stiffness.axpy(1.0 / self._dt, self._damping, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        return stiffness
+
+
 @dataclass(frozen=True)
 class Damping:
     """Rayleigh damping C = mass * M + stiffness * K(u = 0)."""
@@ -138,11 +170,19 @@ class Dynamics:
         return block_diagonal(matrices)
 
     def start(self, structure: Structure, t: float, dt: float) -> None:
-        """a_0 from M a_0 = -C v_0 - f_0; prescribed dofs follow their functions."""
+        """Where nodes without mass are at t, then a_0 from M a_0 = -C v_0 - f_0; prescribed dofs follow their functions.
+
+        A load on a node without mass acts on those with mass by internal forces alone. If these were not in balance
+        with it at t, the part of its impulse that belongs to the start of the first step would be lost.
+        """
         self._work = structure.mass.createVecs("right"), structure.mass.createVecs("left")
         self._damping_matrix = self._assemble_damping(structure)
         self._effective = None
-        self._start_supports(structure, t, 1e-3 * dt)
+        self._start_supports(structure, t, SHORT * dt)
+        if structure.comm.allreduce(len(self._massless)):
+            settling = Settling(self._massless, self._damping_matrix, SHORT * dt)
+            others = np.setdiff1d(np.arange(structure.layout.size), self._massless)
+            structure.settle(settling, structure.held.stopped(others, structure.now.u), t, SHORT * dt)
         self._solve_acceleration(structure)
 
     def _assemble_damping(self, structure: Structure) -> PETSc.Mat | None:
@@ -163,7 +203,7 @@ class Dynamics:
 
     def _solve_acceleration(self, structure: Structure) -> None:
         now, (x, b) = structure.now, self._work
-        b.array[:] = now.external - now.internal - self._damping_force(now.v)
+        b.array[:] = now.external + now.constraint - now.internal - self._damping_force(now.v)
         x.array[:] = now.a
         x.array[self._massless] = 0.0
         matrix = structure.held.impose(structure.mass.copy(), x, b)

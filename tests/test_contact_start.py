@@ -1,0 +1,95 @@
+"""The first state of bodies whose contact surfaces have no mass: loads on these surfaces count from the first step on."""
+
+import numpy as np
+import pytest
+from contact_setup import make_body, make_contact
+from structure_setup import block, constant
+
+from fsci import shapes
+from solvers.contact.law.coulomb import Coulomb
+from solvers.contact.law.frictionless import Frictionless
+from solvers.contact.surface import Surface
+from solvers.newton import Tolerance
+from solvers.structure.body import Support
+from solvers.structure.field import SolverSettings
+from solvers.structure.loads import Pressure, Traction
+from solvers.structure.materials import NeoHooke, StVenantKirchhoff
+from solvers.structure.time import Damping, Dynamics
+from solvers.time import GeneralisedAlpha
+
+TIGHT = SolverSettings(Tolerance(residual=1e-12, residual_absolute=1e-13), linear="direct")
+FAR = Surface("wall", np.array([[9.0, 9.0], [9.0, -9.0]]), np.array([[0, 1]]), "line", None)
+
+
+def momentum(structure):
+    x, y = structure.mass.createVecs()
+    x.array[:] = structure.now.v
+    structure.mass.mult(x, y)
+    return y.array.reshape(-1, structure.dim).sum(axis=0)
+
+
+def advance(structure, dt, steps):
+    """The times after the start and each of the steps."""
+    structure.initialise(0.0, dt)
+    yield 0.0
+    for n in range(steps):
+        structure.begin_step(n * dt, dt)
+        structure.solve()
+        structure.end_step()
+        yield (n + 1) * dt
+
+
+@pytest.mark.parametrize("rho_inf", [1.0, 0.5, 0.0])
+@pytest.mark.parametrize("damping", [Damping(), Damping(0.0, 0.01)], ids=["undamped", "damped"])
+def test_impulse_of_a_sudden_load(rho_inf, damping):
+    """A load on a surface without mass, there from t = 0 on: momentum F t at the end of every step."""
+    force = np.array([-3.0, 1.0])
+    load = Traction("right", tuple(constant(f) for f in force))
+    body = make_body("block", block("quad", 4), NeoHooke(400.0, 600.0, 2.0), tractions=[load])
+    scheme = GeneralisedAlpha.from_rho_inf(rho_inf)
+    time = Dynamics(scheme, damping=damping)
+    structure, _ = make_contact([body], [(("block", "right"), FAR)], time=time, settings=TIGHT)
+    for t in advance(structure, 0.01, 5):
+        assert momentum(structure) == pytest.approx(force * t, rel=1e-9, abs=1e-15), t
+
+
+def end_of_a_pushed_bar(rho_inf, dt):
+    """Displacements of a bar that is held at its left end and pressed at the right one from t = 0 on."""
+    held = [Support("left", (constant(0), constant(0)))]
+    body = make_body(
+        "bar",
+        shapes.rectangle([1, 0.25], [8, 2]),
+        NeoHooke(40.0, 60.0, 1.0),
+        supports=held,
+        pressures=[Pressure("right", lambda x, t: np.full(x.shape[1], 10.0))],
+    )
+    time = Dynamics(GeneralisedAlpha.from_rho_inf(rho_inf))
+    structure, _ = make_contact([body], [(("bar", "right"), FAR)], time=time, settings=TIGHT)
+    *_, _ = advance(structure, dt, round(0.08 / dt))
+    return structure.now.u.copy()
+
+
+@pytest.mark.parametrize("rho_inf", [1.0, 0.5])
+def test_second_order_with_a_sudden_load(rho_inf):
+    dt = 0.00125
+    coarse, middle, fine = (end_of_a_pushed_bar(rho_inf, dt / 2**k) for k in range(3))
+    ratio = np.linalg.norm(coarse - middle) / np.linalg.norm(middle - fine)
+    assert np.abs(coarse).max() > 0.01
+    assert np.log2(ratio) == pytest.approx(2.0, abs=0.15)
+
+
+@pytest.mark.parametrize("law", [Frictionless(), Coulomb(0.4)], ids=["frictionless", "coulomb"])
+@pytest.mark.parametrize("rho_inf", [1.0, 0.5])
+def test_a_load_on_a_surface_that_touches(law, rho_inf):
+    """The wall carries all of it from the first step on, with friction along the wall too: nothing moves."""
+    along = 0.3 if law.slips else 0.0
+    load = Traction("right", (constant(2.0), constant(2.0 * along)))
+    body = make_body("block", block("quad", 3), StVenantKirchhoff(400.0, 600.0, 1.0), tractions=[load])
+    wall = Surface("wall", np.array([[1.0, 9.0], [1.0, -9.0]]), np.array([[0, 1]]), "line", None)
+    time = Dynamics(GeneralisedAlpha.from_rho_inf(rho_inf))
+    structure, contact = make_contact([body], [(("block", "right"), wall)], time=time, settings=TIGHT, law=law)
+    for _ in advance(structure, 0.02, 4):
+        assert contact.resultant(0) == pytest.approx([-2.0, -2.0 * along], abs=1e-9)
+        assert np.abs(structure.now.u).max() < 1e-12
+        assert np.abs(structure.now.a).max() < 1e-9
+    assert structure.energy.error == pytest.approx(0.0, abs=1e-12)
