@@ -4,19 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact_setup import MATERIAL, brick, make_body, make_contact, solve_step
+from contact_setup import MATERIAL, brick, displacement_error, make_body, make_contact, solve_step
 from structure_setup import constant
 from test_contact_several import wall
 from test_contact_system import Linearisation, compare
 
 from fsci import shapes
 from solvers.contact.law.coulomb import Coulomb
+from solvers.contact.law.friction import trial_traction
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import OPEN, SLIP, STICK
 from solvers.contact.law.tresca import Tresca
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
+from solvers.structure.loads import Traction
 from solvers.structure.materials import StVenantKirchhoff, lame
 
 ZERO = constant(0)
@@ -41,10 +43,23 @@ def two_blocks(cell_type, law):
     return make_contact(bodies, [(("upper", "bottom"), ("lower", "top"))], law=law)
 
 
+def put_at_the_edge(contact, law, distance):
+    """Tangential multipliers with |q| = s (1 + distance) or s (1 - distance), in turns."""
+    every = np.arange(len(contact.z))
+    point = contact._point(every)
+    normal = np.einsum("nd,nd->n", contact.z, point.normals)[:, None] * point.normals
+    q = trial_traction(point)
+    side = 1.0 + distance * np.where(every % 2, 1.0, -1.0)
+    wanted = (side * law._radius(point) / np.linalg.norm(q, axis=1))[:, None] * q
+    contact.z[:] += np.where(point.covered[:, None], wanted - q, 0.0)
+    assert np.abs(np.einsum("nd,nd->n", contact.z - normal, point.normals)).max() < 1e-9
+
+
 @pytest.mark.parametrize("cell_type", [*PLANE, *SPACE])
 @pytest.mark.parametrize("law", [Coulomb(0.3), Tresca(8.0)], ids=["coulomb", "tresca"])
-def test_linearisation_is_the_derivative_of_the_residual(cell_type, law):
-    """At a random state with nodes that stick and nodes that slip; some of them lie at the rim of the disc."""
+@pytest.mark.parametrize("edge", [None, 1e-4], ids=["anywhere", "near the edge"])
+def test_linearisation_is_the_derivative_of_the_residual(cell_type, law, edge):
+    """At a random state with nodes that stick and nodes that slip; or with all of them close to the cone's edge."""
     structure, contact = two_blocks(cell_type, law)
     rng = np.random.default_rng(3)
     structure.initialise(0.0, 0.1)
@@ -52,6 +67,8 @@ def test_linearisation_is_the_derivative_of_the_residual(cell_type, law):
     structure.now.u[:] = rng.uniform(-0.001, 0.001, structure.layout.size)
     structure.residual()
     contact.z[:] = 30.0 * contact.terms.normals + rng.uniform(-12.0, 12.0, contact.z.shape)
+    if edge is not None:
+        put_at_the_edge(contact, law, edge)
     for _ in range(2):
         structure.residual()
     status = contact.active_set.status[contact._touching_now()]
@@ -78,7 +95,7 @@ def test_linearisation_is_the_derivative_of_the_residual(cell_type, law):
         across = np.einsum("nij,nj->ni", tangents, missed) * frozen.D[:, None]
         return structure.residual_force.copy(), gap[:, None] * normals + across
 
-    step = 1e-7
+    step = 1e-7 if edge is None else 1e-8
     ahead, behind = residual(step), residual(-step)
     balance, rows = [(a - b) / (2 * step) for a, b in zip(ahead, behind, strict=True)]
     compare(L.balance_u @ du + L.balance_z @ dz.ravel(), balance, 1e-6)
@@ -182,6 +199,41 @@ def test_a_block_that_sticks_is_sheared(cell_type):
     assert (contact.active_set.status[contact.active_set.active] == STICK).all()
     assert np.abs(u[bottom, 0] - u[bottom, 0][0]).max() < 1e-10
     assert structure.energy.friction == pytest.approx(0.0, abs=1e-12)
+
+
+STRAIN = {2: [[0.005, 0.02], [0.01, -0.03]], 3: [[0.005, 0.002, 0.02], [-0.003, 0.004, 0.01], [0.01, 0.005, -0.03]]}
+
+
+@pytest.mark.parametrize("slave", ["lower", "upper"])
+@pytest.mark.parametrize(
+    ("lower", "upper"),
+    [("quad", "quad"), ("quad", "triangle6"), ("hexahedron", "tetra"), ("hexahedron27", "hexahedron")],
+)
+def test_patch_that_sticks(lower, upper, slave):
+    """Two blocks that do not match, with shear across the contact: the homogeneous state of one block, to 1e-8."""
+    dim = dimension(lower)
+    F = np.eye(dim) + np.array(STRAIN[dim])
+    material = StVenantKirchhoff(*lame(1000.0, 0.3), 1.0)
+    E = 0.5 * (F.T @ F - np.eye(dim))
+    P = F @ (material.lmbda * np.trace(E) * np.eye(dim) + 2.0 * material.mu * E)
+    exact = [lambda x, t, row=row: np.einsum("d,dn->n", row, x[:dim]) for row in F - np.eye(dim)]
+    sides = [("left", 0, -1), ("right", 0, 1), ("front", 1, -1), ("back", 1, 1)][: 2 * (dim - 1)]
+    tractions = [Traction(name, tuple(constant(sign * c) for c in P[:, axis])) for name, axis, sign in sides]
+    bodies = []
+    for name, cell_type, cells, far, start in (("lower", lower, 3, "bottom", 0.0), ("upper", upper, 2, "top", 0.5)):
+        irregular = 0.0 if upper == "tetra" else 0.15  # integrals over irregular quads are not exact in 3D
+        mesh = brick(cell_type, cells, [*[1.0] * (dim - 1), 0.5], [0.0] * (dim - 1) + [start], irregular)
+        bodies.append(make_body(name, mesh, material, supports=[Support(far, tuple(exact))], tractions=tractions))
+    near = [("upper", "bottom"), ("lower", "top")]
+    pair = tuple(near if slave == "upper" else near[::-1])
+    structure, contact = make_contact(bodies, [pair], law=Coulomb(2.0), settings=LOOSER)
+    solve_step(structure)
+    on_slave = contact.multipliers.areas > 0.0
+    assert (contact.active_set.status[on_slave] == STICK).all()
+    assert displacement_error(structure, exact) < 1e-8
+    normal = np.linalg.inv(F).T[:, -1] * (1.0 if slave == "lower" else -1.0)
+    traction = P @ np.eye(dim)[-1] * np.sign(normal[-1]) / np.linalg.norm(np.linalg.det(F) * normal)
+    assert np.abs(contact.z[on_slave] + traction).max() < 1e-8 * np.abs(traction).max()
 
 
 @pytest.mark.parametrize("cell_type", ["quad", "hexahedron"])

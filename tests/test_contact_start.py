@@ -1,4 +1,4 @@
-"""The first state of bodies whose contact surfaces have no mass: loads on these surfaces count from the first step on."""
+"""The first state of bodies whose contact surfaces have no mass: loads there count from the first step on."""
 
 import numpy as np
 import pytest
@@ -11,13 +11,14 @@ from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.surface import Surface
 from solvers.newton import Tolerance
 from solvers.structure.body import Support
-from solvers.structure.field import SolverSettings
+from solvers.solver_settings import SolverSettings
 from solvers.structure.loads import Pressure, Traction
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
 from solvers.structure.time import Damping, Dynamics
 from solvers.time import GeneralisedAlpha
 
 TIGHT = SolverSettings(Tolerance(residual=1e-12, residual_absolute=1e-13), linear="direct")
+TRAPEZOIDAL = GeneralisedAlpha.from_rho_inf(1.0)
 FAR = Surface("wall", np.array([[9.0, 9.0], [9.0, -9.0]]), np.array([[0, 1]]), "line", None)
 
 
@@ -76,6 +77,18 @@ def test_second_order_with_a_sudden_load(rho_inf):
     ratio = np.linalg.norm(coarse - middle) / np.linalg.norm(middle - fine)
     assert np.abs(coarse).max() > 0.01
     assert np.log2(ratio) == pytest.approx(2.0, abs=0.15)
+
+
+@pytest.mark.parametrize("cell_type", ["quad", "triangle6"])
+def test_free_fall(cell_type):
+    """Gravity acts on mass where it is: a body that falls is not strained, although its surface has no mass."""
+    gravity = (constant(1.0), constant(-9.0))
+    body = make_body("block", block(cell_type, 3), StVenantKirchhoff(400.0, 600.0, 2.0), gravity=gravity)
+    structure, _ = make_contact([body], [(("block", "bottom"), FAR)], time=Dynamics(TRAPEZOIDAL), settings=TIGHT)
+    for t in advance(structure, 0.02, 4):
+        fallen = 0.5 * np.array([1.0, -9.0]) * t**2
+        assert np.abs(structure.now.u.reshape(-1, 2) - fallen).max() < 1e-11
+        assert structure.energy.internal == pytest.approx(0.0, abs=1e-14)
 
 
 @pytest.mark.parametrize("law", [Frictionless(), Coulomb(0.4)], ids=["frictionless", "coulomb"])

@@ -85,6 +85,8 @@ class Body:
         for point in point_forces:
             self._dead.add_points(point)
         self._dead_load: Array | None = None
+        self._gravity = gravity
+        self._moved: PETSc.Mat | None = None  # mass that is elsewhere than the density says [kg]
         self.pressures = [FollowerPressure(domain, self.space, pressure) for pressure in pressures]
         self._spring_matrix = Springs(self) if springs else None
 
@@ -163,7 +165,7 @@ class Body:
         """Evaluate the loads at time t."""
         if self.domain.comm.allreduce(self._dead.update(t)):
             self._force.x.array[:] = self._dead.force
-            self._dead_load = self._summed()
+            self._dead_load = self._summed() + self._moved_weight(t)
         for pressure in self.pressures:
             pressure.set_time(t)
 
@@ -209,6 +211,18 @@ class Body:
         fem.assemble_matrix(matrix, self._mass)
         matrix.assemble()
         return matrix
+
+    def move_mass(self, change: PETSc.Mat) -> None:
+        """Gravity acts on mass where the time scheme has it: `change` [kg] is its mass matrix minus `mass()`."""
+        self._moved = change
+
+    def _moved_weight(self, t: float) -> Array | float:
+        if self._moved is None or not self._gravity:
+            return 0.0
+        g, force = self._moved.createVecs()
+        g.array[:] = self.nodal(self._gravity, t)[: self.owned].ravel()
+        self._moved.mult(g, force)
+        return force.array.copy()
 
     def create_tangent(self) -> PETSc.Mat:
         """An empty matrix for `assemble_tangent`."""

@@ -126,6 +126,7 @@ class Structure:
             ):
                 if value is not None:
                     target[:] = body.nodal(value, t)[: body.owned].ravel()
+        self.mass  # noqa: B018  gravity must know it
         self._set_time(t)
         self._assemble_bodies()
         if self.constraint is not None:

@@ -166,7 +166,10 @@ class Dynamics:
         massless = massless_dofs(structure)
         self._massless = np.flatnonzero(np.concatenate(massless))
         for i, body in enumerate(structure.bodies):
-            matrices[i] = move_mass_inwards(matrices[i], massless[i], body.points[: body.dim, : body.owned].T)
+            change, points = matrices[i], body.points[: body.dim, : body.owned].T
+            matrices[i] = move_mass_inwards(change, massless[i], points)
+            change.aypx(-1.0, matrices[i], PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            body.move_mass(change)
         return block_diagonal(matrices)
 
     def start(self, structure: Structure, t: float, dt: float) -> None:
