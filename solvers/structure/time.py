@@ -173,7 +173,7 @@ class Dynamics:
         return block_diagonal(matrices)
 
     def start(self, structure: Structure, t: float, dt: float) -> None:
-        """Where nodes without mass are at t, then a_0 from M a_0 = -C v_0 - f_0; prescribed dofs follow their functions.
+        """Places of nodes without mass, then M a_0 = -C v_0 - f_0; prescribed dofs follow their functions.
 
         A load on a node without mass acts on those with mass by internal forces alone. If these were not in balance
         with it at t, the part of its impulse that belongs to the start of the first step would be lost.
