@@ -10,8 +10,8 @@ from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.surface import Surface
 from solvers.newton import Tolerance
-from solvers.structure.body import Support
 from solvers.solver_settings import SolverSettings
+from solvers.structure.body import Support
 from solvers.structure.loads import Pressure, Traction
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
 from solvers.structure.time import Damping, Dynamics
