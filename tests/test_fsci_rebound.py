@@ -90,8 +90,9 @@ def test_both_schemes_agree(accelerator):
             assert contacts[1].resultant(0) == pytest.approx(contacts[0].resultant(0), rel=1e-7, abs=1e-7)
             assert np.abs(moved[0] - moved[1]).max() < 1e-8
         else:
-            # a dry patch that may open can also stay closed: here the schemes open it one step apart
-            assert np.abs(moved[0] - moved[1]).max() < 2e-3
+            # a dry patch that may open can also stay closed: here the schemes open it one step apart; what they differ
+            # by is less than a quarter of the ball's way in a step
+            assert np.abs(moved[0] - moved[1]).max() < 0.25 * 0.8 * DT
     assert len(set(sets[:8])) > 1
 
 
