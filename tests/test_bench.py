@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 
-from fsci.bench import linear
+from fsci.bench import linear, small
 from fsci.bench.table import show, text
 from fsci.shapes import box
 
@@ -45,7 +45,13 @@ def test_command_line(tmp_path):
 def test_unknown_name():
     done = subprocess.run([sys.executable, "-m", "fsci.bench", "sercah"], capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
-    assert "unknown benchmark 'sercah' (available: static, linear," in done.stderr
+    assert "unknown benchmark 'sercah' (available: small, static, linear," in done.stderr
+
+
+def test_small_row():
+    row = small.measure("beam", *small.CASES["beam"], steps=2)
+    assert row["unknowns"] == 138
+    assert row["newton per step"] >= 1
 
 
 def test_linear_row():

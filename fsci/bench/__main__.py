@@ -9,12 +9,13 @@ import platform
 from collections.abc import Callable
 from pathlib import Path
 
-from fsci.bench import contact, cook, flag, fluid, hertz, linear, moments, static
+from fsci.bench import contact, cook, flag, fluid, hertz, linear, moments, small, static
 from fsci.bench.table import Row, show
 from fsci.summary import plain, versions
 
 #: Name -> (what it measures, how). One column of a row is one number or word.
 BENCHMARKS: dict[str, tuple[str, Callable[[], list[Row]]]] = {
+    "small": ("one time step of small problems: milliseconds of the processor", small.run),
     "static": ("one load step of a neo-Hookean cube, 25 x 25 x 25 hex8, as `fsci run` computes it", static.run),
     "linear": ("one linear system of a body under load: direct against iterative, by size", linear.run),
     "cook": ("Cook's membrane, nearly incompressible: error against time, by element and mesh", cook.run),

@@ -2,16 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
 
+#: A sparse matrix and the numbers of its rows and columns in a larger one.
+Part = tuple[sp.csr_matrix, NDArray[np.int64], NDArray[np.int64]]
+
 
 def expand(matrix: sp.csr_matrix, dim: int) -> sp.csr_matrix:
     """matrix (x) I: the same for every component of a vector."""
-    return sp.kron(matrix, sp.identity(dim), format="csr")
+    matrix, axes = matrix.tocsr(), np.arange(dim)
+    rows, columns = (dim * at[:, None] + axes for at in (row_numbers(matrix), matrix.indices))
+    shape = dim * matrix.shape[0], dim * matrix.shape[1]
+    return sp.csr_matrix((matrix.data.repeat(dim), (rows.ravel(), columns.ravel())), shape=shape)
+
+
+def row_numbers(matrix: sp.csr_matrix) -> NDArray[np.int64]:
+    """The row of each entry."""
+    return np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
+
+
+def add_up(parts: Sequence[Part], shape: tuple[int, int]) -> sp.csr_matrix:
+    """The sum of matrices whose rows and columns have other numbers in it: (matrix, rows, columns) each.
+
+    All entries become one matrix at once: that of a small problem costs as much as all its numbers.
+    """
+    if not parts:
+        return sp.csr_matrix(shape)
+    data = np.concatenate([matrix.data for matrix, _, _ in parts])
+    rows = np.concatenate([rows[row_numbers(matrix)] for matrix, rows, _ in parts])
+    columns = np.concatenate([columns[matrix.indices] for matrix, _, columns in parts])
+    return sp.csr_matrix((data, (rows, columns)), shape=shape)
+
+
+def vstack(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
+    """Matrices one below the other."""
+    return parts[0] if len(parts) == 1 else sp.vstack(parts, format="csr")
 
 
 def components(items: NDArray[np.int64], dim: int) -> NDArray[np.int64]:
@@ -23,6 +54,12 @@ def block_diagonal(blocks: Array) -> sp.csr_matrix:
     """Blocks of shape (m, rows, columns) along the diagonal."""
     m, rows, columns = blocks.shape
     return sp.bsr_matrix((blocks, np.arange(m), np.arange(m + 1)), shape=(m * rows, m * columns)).tocsr()
+
+
+def scale_rows(matrix: sp.csr_matrix, factors: Array) -> sp.csr_matrix:
+    """The rows times factors, shape (rows,)."""
+    data = matrix.data * factors.repeat(np.diff(matrix.indptr))
+    return sp.csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def block_columns(vectors: Array) -> sp.csr_matrix:

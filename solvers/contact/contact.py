@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.blocked import find_blocked
-from solvers.contact.blocks import block_diagonal, components, expand
+from solvers.contact.blocks import block_diagonal, components, expand, vstack
 from solvers.contact.condense import Condensed, Linearised, condense, recover
 from solvers.contact.directions import Directions, find_directions, free_normals
 from solvers.contact.distance import distances
@@ -238,7 +238,13 @@ class Contact:
 
     def force(self) -> Array:
         """Contact force [N] on all nodes for the present multipliers, shape (N, dim)."""
-        return np.zeros((self.size, self.dim)) if self.terms is None else self._force_matrix() @ self.z
+        on_slave = np.zeros((self.size, self.dim))
+        if self.terms is None:
+            return on_slave
+        np.add.at(on_slave, self.multipliers.node, -self.terms.D[:, None] * self.z)
+        if self.interface.basis is not None:
+            on_slave = self.interface.basis[1].T @ on_slave
+        return on_slave + self.terms.M.T @ self.z
 
     def violation(self, weight: float) -> float:
         """Norm [N] of what the multipliers in contact miss of their laws."""
@@ -287,7 +293,9 @@ class Contact:
     def _linearise(self, weight: float) -> Linearised:
         assert self.terms is not None
         dim, active = self.dim, self._touching_now()
-        to_all = sp.identity(len(self.z), format="csr") if self._lent is None else sp.identity(len(self.z)) + self._lent
+        force = self._force_matrix()
+        if self._lent is not None:
+            force = force + force @ self._lent
         directions: Directions = find_directions(
             self.z[active],
             self.terms.normals[active],
@@ -300,7 +308,7 @@ class Contact:
         P = directions.basis
         return Linearised(
             weight=weight,
-            force=expand((self._force_matrix() @ to_all)[:, active], dim),
+            force=expand(force[:, active], dim),
             dforce=self.terms.dforce,
             basis=P,
             turning=turning,
@@ -316,17 +324,18 @@ class Contact:
         assert self.terms is not None
         n = self.dim * self.size
         dgap = self._with_lent(self.terms.dgap)
-        by_z, by_u, residual = [], [sp.csr_matrix((0, n))], [np.zeros(0)]
+        by_z, by_u, residual = [], [], []
         for law, which in self._in_contact():
             rows_of = components(which, self.dim)
             slip = sp.csr_matrix((len(rows_of), n)) if self._slip is None else self._slip.slopes[rows_of]
             slopes = Slopes(gap=dgap[which], normals=self.terms.dnormals[rows_of], slip=slip)
             rows = law.rows(self._point(which), slopes, self.active_set.status[which], weight)
-            by_z.append(block_diagonal(rows.by_z))
+            by_z.append(rows.by_z)
             by_u.append(rows.by_u)
             residual.append(rows.residual.ravel())
-        blocks = sp.block_diag(by_z, format="csr") if by_z else sp.csr_matrix((0, 0))
-        return blocks, sp.vstack(by_u, format="csr"), np.concatenate(residual)
+        if not by_z:
+            return sp.csr_matrix((0, 0)), sp.csr_matrix((0, n)), np.zeros(0)
+        return block_diagonal(np.concatenate(by_z)), vstack(by_u), np.concatenate(residual)
 
     def dofs(self) -> NDArray[np.int64]:
         """Global dofs of all nodes, -1 where rigid, shape (N, dim)."""

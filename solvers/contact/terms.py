@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.contact.blocks import components
+from solvers.contact.blocks import add_up, components
 from solvers.contact.mortar import Mortar, MortarTerms
 from solvers.contact.patch import Multipliers, Patch
 from solvers.contact.share import Shares
@@ -46,15 +46,13 @@ class Terms:
 def find_normals(multipliers: Multipliers, x: Array) -> Normals:
     """Normals of all patches at positions x [m] of all nodes, shape (N, dim)."""
     (N, dim), C = x.shape, len(multipliers.node)
-    values, slopes = np.zeros((C, dim)), sp.csr_matrix((dim * C, dim * N))
-    of_patch = []
+    values, slopes, of_patch = np.zeros((C, dim)), [], []
     for patch in multipliers.patches:
         normals, derivative = patch.normals(x[patch.nodes])
         values[patch.multipliers] = normals
-        rows, columns = components(patch.multipliers, dim), components(patch.nodes, dim)
-        slopes = slopes + renumber(derivative, rows, columns, slopes.shape)
+        slopes.append((derivative, components(patch.multipliers, dim), components(patch.nodes, dim)))
         of_patch.append((normals, derivative))
-    return Normals(values, slopes, tuple(of_patch))
+    return Normals(values, add_up(slopes, (dim * C, dim * N)), tuple(of_patch))
 
 
 def total_terms(
@@ -67,8 +65,7 @@ def total_terms(
     pairs, C, N = sizes
     dim = normals.values.shape[1]
     D, gap, D_of_pair = np.zeros(C), np.zeros(C), np.zeros((pairs, C))
-    M, dgap = sp.csr_matrix((C, N)), sp.csr_matrix((C, dim * N))
-    dforce = sp.csr_matrix((dim * N, dim * N))
+    all_M, all_dgap, all_dforce = [], [], []
     for mortar, found in pieces:
         slave, multiplier, master = mortar.patch.nodes, mortar.patch.multipliers, mortar.masters.nodes
         columns = components(np.concatenate([slave, master]), dim)
@@ -76,14 +73,15 @@ def total_terms(
         gap[multiplier] += found.gap
         for pair in np.unique(mortar.masters.pair):
             D_of_pair[pair, multiplier] += found.M @ (mortar.masters.pair == pair).astype(float)
-        M = M + renumber(found.M, multiplier, master, M.shape)
-        dgap = dgap + renumber(found.dgap, multiplier, columns, dgap.shape)
-        dforce = dforce + renumber(found.dforce, columns, columns, dforce.shape)
+        all_M.append((found.M, multiplier, master))
+        all_dgap.append((found.dgap, multiplier, columns))
+        all_dforce.append((found.dforce, columns, columns))
+    M, dgap = add_up(all_M, (C, N)), add_up(all_dgap, (C, dim * N))
+    dforce = add_up(all_dforce, (dim * N, dim * N))
     D, gap, D_of_pair, M, dgap, dforce = shares.total_of(D, gap, D_of_pair, M, dgap, dforce)
     return Terms(D, D_of_pair, M, gap, normals.values, dgap, dforce, normals.slopes)
 
 
 def renumber(matrix: sp.csr_matrix, rows: NDArray, columns: NDArray, shape: tuple[int, int]) -> sp.csr_matrix:
     """The entries of a matrix at other rows and columns."""
-    entries = matrix.tocoo()
-    return sp.csr_matrix((entries.data, (rows[entries.row], columns[entries.col])), shape=shape)
+    return add_up([(matrix, rows, columns)], shape)

@@ -19,8 +19,8 @@ def leak(fluid: Fluid) -> float:
     """
     at, cut = fluid.system.interface, fluid.cut
     u, g = fluid.flow[at.u], cut.motion.v[at.corners]
-    through = np.einsum("pav,pai,pi->p", at.phi, u, at.n, optimize=True)
-    through -= np.einsum("pvw,pwi,pi->p", at.mass_of_pieces, g, at.n, optimize=True)
+    through = np.einsum("pav,pa->p", at.phi, np.einsum("pai,pi->pa", u, at.n))
+    through -= np.einsum("pvw,pw->p", at.mass_of_pieces, np.einsum("pwi,pi->pw", g, at.n))
     return fluid.comm.allreduce(float(np.abs(through).sum()))
 
 

@@ -13,6 +13,7 @@ from solvers.api import Array
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.pieces import FLUSH, Pieces, put_where_fluid_is
 from solvers.fluid.surface import Motion, normals
+from solvers.gauss import gauss
 
 #: Share of a cell (of its face) below which fluid (surface) in it is rounding error of the geometry.
 NOTHING = 1e-10
@@ -201,7 +202,7 @@ def _cells_between(box: Grid, low: Array, high: Array) -> NDArray[np.int64]:
 
 def _tensor_weights(points: Array, dim: int) -> Array:
     """Weights of the tensor Gauss rule on [0, 1]^dim with these 1D points."""
-    weights = np.polynomial.legendre.leggauss(len(points))[1] / 2.0
+    weights = gauss(len(points))[1]
     product = weights
     for _ in range(dim - 1):
         product = np.multiply.outer(weights, product)

@@ -44,21 +44,21 @@ class Interface:
         phi, gradient = rule.velocity_table
         psi, psi_gradient = rule.pressure_table
         #: int phi_a N_b, int grad phi_a N_b, int psi_a N_b, int d_n phi_a N_b and int grad psi_a over each piece
-        self.phi = np.einsum("pqv,qa->pav", moments, phi, optimize=True)
-        slope = np.einsum("pqv,qaj->pavj", moments, gradient, optimize=True)
+        self.phi = np.tensordot(moments, phi, (1, 0)).transpose(0, 2, 1)
+        slope = np.tensordot(moments, gradient, (1, 0)).transpose(0, 2, 1, 3)
         self.grad = slope / self.sizes[:, None, None, :]
-        self.psi = np.einsum("pqv,qa->pav", moments, psi, optimize=True)
+        self.psi = np.tensordot(moments, psi, (1, 0)).transpose(0, 2, 1)
         self.normal_slope = np.einsum("pavj,pj->pav", self.grad, self.n)
-        slope = np.einsum("pq,qaj->paj", moments.sum(axis=2), psi_gradient, optimize=True)
+        slope = np.tensordot(moments.sum(axis=2), psi_gradient, (1, 0))
         self.pressure_slope = slope / self.sizes[:, None, :]
 
     def velocity_terms(self, g: Array) -> Array:
         """C g at local dofs, the ghosts' share still there; g [m/s] of shape (vertices, dim)."""
         g, n, mu = g[self.corners], self.n, self.mu
         against = np.einsum("pav,pvi->pai", mu * self.normal_slope, g)
-        against += mu * np.einsum("pavj,pvj,pi->pai", self.grad, g, n, optimize=True)
-        against -= np.einsum("pij,pav,pvj->pai", self.penalty, self.phi, g, optimize=True)
-        leak = np.einsum("pav,pvi,pi->pa", self.psi, g, n, optimize=True)
+        against += mu * np.einsum("pavj,pvj->pa", self.grad, g)[:, :, None] * n[:, None, :]
+        against -= np.einsum("pij,paj->pai", self.penalty, self.phi @ g)
+        leak = np.einsum("pav,pv->pa", self.psi, np.einsum("pvi,pi->pv", g, n))
         size = self._unknowns.local
         total: Array = np.bincount(self.u.ravel(), against.ravel(), size).astype(float)
         return total + np.bincount(self.p.ravel(), leak.ravel(), size)
@@ -67,8 +67,8 @@ class Interface:
         """This process' share of the force [N] on the vertices, shape (vertices, dim); `flow` at local dofs."""
         u, p, n, mu = flow[self.u], flow[self.p], self.n, self.mu
         force = -mu * np.einsum("pav,pai->pvi", self.normal_slope, u)
-        force -= mu * np.einsum("pavi,paj,pj->pvi", self.grad, u, n, optimize=True)
-        force += np.einsum("pav,pa,pi->pvi", self.psi, p, n, optimize=True)
+        force -= mu * np.einsum("pavi,pa->pvi", self.grad, np.einsum("paj,pj->pa", u, n))
+        force += np.einsum("pav,pa->pv", self.psi, p)[:, :, None] * n[:, None, :]
         slip = np.einsum("pav,pai->pvi", self.phi, u) - np.einsum("pvw,pwi->pvi", self.mass_of_pieces, g[self.corners])
         force += np.einsum("pij,pvj->pvi", self.penalty, slip)
         total = np.zeros((self._vertices, n.shape[1]))

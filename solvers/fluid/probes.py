@@ -21,6 +21,7 @@ from solvers.fluid.grid import FACES
 from solvers.fluid.inside import INSIDE, require_outside, winding
 from solvers.fluid.space import Nodes
 from solvers.fluid.wet_faces import wet_face
+from solvers.gauss import gauss
 
 Probe = Callable[[], dict[str, float]]
 
@@ -165,7 +166,7 @@ def _facets(fluid: Fluid, patches: Sequence[str]) -> tuple[np.ndarray, list[Cove
 def _covered(fluid: Fluid, face: str, cells: np.ndarray) -> tuple[CoveredFaces, np.ndarray]:
     """(the covered ones of the faces of local cells, which of the cells they belong to)."""
     grid, axis, side = fluid.grid, "xyz".index(face[0]), int(face[1] == "+")
-    points = np.polynomial.legendre.leggauss(fluid.unknowns.degree + 1)[0] / 2.0 + 0.5
+    points = gauss(fluid.unknowns.degree + 1)[0]
     found = wet_face(grid.grid, face, points, fluid.cut.facets, fluid.cut.motion)
     places = np.unravel_index(grid.numbers[cells], grid.grid.shape, order="F")
     others = [i for i in range(grid.dim) if i != axis]

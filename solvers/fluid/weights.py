@@ -19,6 +19,7 @@ from solvers.api import Array
 from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.pieces import Pieces
+from solvers.gauss import gauss
 
 
 class Weights:
@@ -30,7 +31,7 @@ class Weights:
         self.degree = 2 * points_per_direction - 1
         domain = grid.domain
         self.reference, rule = fem.quadrature_points(domain, self.degree)
-        self.points = np.polynomial.legendre.leggauss(points_per_direction)[0] / 2.0 + 0.5
+        self.points = gauss(points_per_direction)[0]
         assert len(rule) == points_per_direction**dim
         self.rule = rule
         #: kernel's number (x fastest) of each point of the rule

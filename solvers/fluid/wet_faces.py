@@ -16,6 +16,7 @@ from solvers.api import Array
 from solvers.fluid.grid import Grid
 from solvers.fluid.pieces import FLUSH
 from solvers.fluid.surface import Motion
+from solvers.gauss import gauss
 
 Facets = NDArray[np.int64]
 
@@ -39,7 +40,7 @@ def wet_face(box: Grid, face: str, points: Array, facets: Facets, motion: Motion
     flush = bool((np.abs(motion.x[facets][:, :, axis] - plane) <= inset).all(axis=1).any())
     place = float(plane + 2.0 * inwards * inset * flush)
     edges = [e for other, e in enumerate(box.edges) if other != axis]
-    n, rule = len(points), np.polynomial.legendre.leggauss(len(points))[1] / 2.0
+    n, rule = len(points), gauss(len(points))[1]
     corners, above = motion.x[facets], motion.x[facets][:, :, axis] > place
     crossing = above.any(axis=1) & ~above.all(axis=1)
     if box.dim == 2:
@@ -68,8 +69,8 @@ def _crossings(corners: Array, axis: int, place: float) -> tuple[Array, Array]:
 def _line(edge: Array, points: Array, at: Array, begins: Array) -> tuple[Array, Array]:
     """(int_solid L_q / h of each cell of a line, the solid's share of it) from what begins where."""
     start = np.clip((at[:, None] - edge[:-1]) / np.diff(edge), 0.0, 1.0)  # of the solid in each cell, if it begins
-    nodes, weights = (part / 2.0 for part in np.polynomial.legendre.leggauss(len(points)))
-    t = start[:, :, None] + (1.0 - start[:, :, None]) * (nodes + 0.5)
+    nodes, weights = gauss(len(points))
+    t = start[:, :, None] + (1.0 - start[:, :, None]) * nodes
     basis = [np.prod([(t - p) / (q - p) for p in points if p != q], axis=0) @ weights for q in points]
     solid = np.einsum("c,cjq->jq", begins, np.stack(basis, axis=2) * (1.0 - start[:, :, None]))
     fraction = begins @ (1.0 - start)
@@ -101,7 +102,7 @@ def _plane(edges: list[Array], points: Array, x: Array, segments: Facets) -> tup
     if not len(segments):
         return np.zeros((count, len(points) ** 2)), np.zeros(count)
     moments = kernels.moments(edges, points, np.ascontiguousarray(x), segments)
-    rule = np.polynomial.legendre.leggauss(len(points))[1] / 2.0
+    rule = gauss(len(points))[1]
     solid = moments.fraction[:, None] * np.multiply.outer(rule, rule).ravel()
     solid[moments.cells] = moments.solid
     return solid, moments.fraction

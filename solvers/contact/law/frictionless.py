@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import scipy.sparse as sp
 
 from solvers.api import Array
-from solvers.contact.blocks import block_columns
+from solvers.contact.blocks import block_columns, scale_rows
 from solvers.contact.law.law import OPEN, SLIP, Point, Rows, Slopes, Span, Statuses, along
 
 
@@ -32,7 +31,7 @@ class Frictionless:
 
     def rows(self, at: Point, slopes: Slopes, status: Statuses, weight: float) -> Rows:
         dim = at.z.shape[1]
-        closing = block_columns(at.normals) @ sp.diags(at.stiffness) @ slopes.gap
-        turning = sp.diags(np.repeat(weight * at.D * at.pressure, dim)) @ slopes.normals
+        closing = block_columns(at.stiffness[:, None] * at.normals) @ slopes.gap
+        turning = scale_rows(slopes.normals, np.repeat(weight * at.D * at.pressure, dim))
         by_z = (weight * at.D)[:, None, None] * along(at.normals)
         return Rows(self.residual(at, status, weight), by_z, (closing - turning).tocsr())
