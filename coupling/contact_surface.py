@@ -24,7 +24,8 @@ def contact_surface(bodies: Sequence[Body], body: str, *surfaces: str) -> Surfac
     chosen, comm = bodies[index], bodies[index].domain.comm
     layout = Layout(comm, [other.size for other in bodies])
     mesh = chosen.domain.source
-    points, facets, nodes = comm.bcast(None if mesh is None else cut_out(mesh, surfaces), root=0)
+    found = None if mesh is None else (*cut_out(mesh, surfaces), mesh.unmoved)
+    points, facets, nodes, unmoved = comm.bcast(found, root=0)
     dofs = global_dofs(layout, index, chosen, nodes)
     start = layout.start + layout.offsets[index]
     return Surface(
@@ -37,6 +38,7 @@ def contact_surface(bodies: Sequence[Body], body: str, *surfaces: str) -> Surfac
         symmetric=np.isin(dofs, np.concatenate(comm.allgather(start + symmetric_dofs(chosen)))),
         body=body,
         mesh_nodes=nodes,
+        unmoved=None if unmoved is None else unmoved[nodes],
     )
 
 

@@ -5,10 +5,10 @@ Every folder gives what is in it. The pictures of this documentation come from
     fsci run cases/two_tori -o results/two_tori
     fsci run cases/two_tori -o results/tori_close --set output.fields_every=1 --set time.end=5.6 --set 'verify=[]'
     fsci run cases/sphere_tube -o results/sphere_tube
-    fsci run cases/double_arch -o results/double_arch
-    python docs/make_contact_pictures.py results/two_tori results/tori_close results/sphere_tube results/double_arch
+    python docs/make_contact_pictures.py results/two_tori results/tori_close results/sphere_tube
 
-The second run is for two times 0.05 apart, at which the first one keeps no fields.
+The second run is for two times 0.05 apart, at which the first one keeps no fields. Runs of the cases in PANELS, each in
+a folder of the name of the case, give one picture each.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from fsci.render import ROUND, SUPERSAMPLING, View, face_edges, frame, import_py
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "verification_contact.md"
-LIGHT = {
-    "lower": "#f2c9a0",
-    "upper": "#a9c9e8",
-    "sphere": "#f2c9a0",
-    "tube": "#a9c9e8",
-    "ring": "#a9c9e8",
-    "base": "#f2c9a0",
-}
+LIGHT = ("#a9c9e8", "#f2c9a0", "#b9dfb5", "#d9c3e8")
+#: colours of bodies, where they are not given in the order of their names
+COLOUR = {"lower": LIGHT[1], "middle": LIGHT[2], "upper": LIGHT[0], "sphere": LIGHT[1], "tube": LIGHT[0]}
 PAPER_TIMES = (3, 5, 7, 7.5, 8, 10)
 CLOSE_TIMES = (5.5, 5.55)
+#: name of a run -> (times, panels in a row, camera)
+PANELS: dict[str, tuple[tuple[float, ...], int, tuple[float, float, float]]] = {
+    "double_arch": ((0, 15, 35, 50, 60, 70), 3, (0.0, 0.0, 1.0)),
+    "tied_cube": ((0, 1), 2, (0.5, -1.0, 0.4)),
+}
 PIXELS = 1200  #: width of a picture
 
 #: residuals per Newton step, and how many of the first steps changed the active set; Popp & Wall, tables 1 and 2
@@ -60,14 +60,16 @@ def main(folders: list[Path]) -> None:
     """Draw and tabulate what the folders hold."""
     for folder in folders:
         states = {path.stem: dict(read_collection(path)) for path in sorted((folder / "fields").glob("*.pvd"))}
-        if "lower" in states:
+        if "lower" in states and folder.name not in PANELS:
             draw_tori(folder, states)
         elif "tube" in states:
             draw_tube(states)
             write_table(folder, "sphere_tube")
-        elif "ring" in states:
-            axes = axes_towards(0.0, 0.0, 1.0, up=(0.0, 1.0, 0.0))
-            panel("double_arch", states, (0, 15, 35, 50, 60, 70), columns=3, axes=axes)
+        elif folder.name in PANELS:
+            times, columns, camera = PANELS[folder.name]
+            flat = camera[:2] == (0.0, 0.0)
+            axes = axes_towards(*camera, up=(0.0, 1.0, 0.0) if flat else (0.0, 0.0, 1.0))
+            panel(folder.name, states, times, columns=columns, axes=axes)
 
 
 def draw_tori(folder: Path, states: dict[str, dict[float, Path]]) -> None:
@@ -160,9 +162,9 @@ def render(grid: dict[str, Any], view: View, size: tuple[int, int], arrows: str 
     )
     plotter.set_background("white")
     away = np.cross(view.right, view.up)
-    for body, mesh in grid.items():
+    for index, (body, mesh) in enumerate(sorted(grid.items())):
         surface = mesh.extract_surface(algorithm="dataset_surface")
-        plotter.add_mesh(surface, color=LIGHT[body], **ROUND)
+        plotter.add_mesh(surface, color=COLOUR.get(body, LIGHT[index % len(LIGHT)]), **ROUND)
         edges, _ = face_edges(surface.cast_to_unstructured_grid())
         lines = polylines(edges + 0.004 * view.half_height * away)
         plotter.add_mesh(lines, color="black", line_width=1, opacity=0.45, lighting=False)

@@ -18,6 +18,7 @@ from solvers.contact.contact import Contact
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import Law
+from solvers.contact.law.tied import Tied
 from solvers.contact.law.tresca import Tresca
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
@@ -47,6 +48,8 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
 
 
 def _law(settings: PairSettings) -> Law:
+    if settings.tied:
+        return Tied()
     if settings.friction.coefficient is not None:
         return Coulomb(settings.friction.coefficient)
     if settings.friction.bound is not None:

@@ -29,7 +29,8 @@ from solvers.values import Value
 
 def build_bodies(case: Case, comm: MPI.Comm) -> list[Body]:
     """The elastic bodies of a case. Raises CaseError (collective)."""
-    return [_body(case, name, comm) for name in case.elastic_bodies]
+    meshes, places = _meshes(case, comm)
+    return [_body(case, name, comm, meshes.get(name), places[name]) for name in case.elastic_bodies]
 
 
 def build_structure(
@@ -61,29 +62,32 @@ def _time_scheme(case: Case) -> TimeScheme:
     return Dynamics(scheme, damping=damping, predictor=dynamics.predictor)
 
 
-def _body(case: Case, name: str, comm: MPI.Comm) -> Body:
+def _body(case: Case, name: str, comm: MPI.Comm, mesh: Mesh | None, places: Places) -> Body:
     assert case.structure is not None
     settings = case.elastic_bodies[name]
-    mesh, places = _mesh(case, name, comm)
     vectors = {key: getattr(settings, key) for key in VECTORS}
     material = _material(settings, case.structure.plane)
     loads = build_loads(settings, places)
     return Body(name, mesh, material, element=settings.element, **loads, **vectors, comm=comm)
 
 
-def _mesh(case: Case, name: str, comm: MPI.Comm) -> tuple[Mesh | None, Places]:
-    """The body's mesh on rank 0, with all surfaces that the case names, and where loads act on every process."""
-    error, mesh, places = None, None, {}
+def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Places]]:
+    """The meshes of the bodies on rank 0, with all surfaces that the case names; on all processes where loads act."""
+    error, meshes, places = None, {}, {}
     if comm.rank == 0:
         try:
-            mesh = read_body(case, name)
-            places = find_places(case, name, mesh)
+            meshes = {name: read_body(case, name) for name in case.elastic_bodies}
+            places = {name: find_places(case, name, mesh) for name, mesh in meshes.items()}
+            if case.contact is not None:
+                from fsci.build_tied import join_tied
+
+                meshes = join_tied(case, meshes)
         except Exception as raised:  # raised on every process below
             error = raised
     error, places = comm.bcast((error, places), root=0)
     if error is not None:
         raise error
-    return mesh, places
+    return meshes, places
 
 
 def _material(body, plane: str) -> materials.Material:

@@ -83,7 +83,10 @@ def _elastic(case: Case, found: Findings) -> None:
             p for p in (*body.supports, *body.springs, *body.point_forces) if getattr(p, "at", None) is not None
         ]
         massless = case.structure is not None and case.structure.dynamics is not None and slave_surfaces(case, name)
-        needed = at_points or symmetric or at_nodes or massless or (case.coupling and _has_period(case))
+        pairs = [] if case.contact is None else case.contact.pairs.values()
+        tied = [pair for pair in pairs if pair.tied and name in (pair.slave.body, pair.master.body)]
+        special = at_points or symmetric or at_nodes or massless or tied
+        needed = special or (case.coupling and _has_period(case))
         if not (needed or isinstance(body.mesh, FileMesh)):
             continue
         mesh = found.attempt(partial(read_body, case, name))
@@ -106,6 +109,15 @@ def _elastic(case: Case, found: Findings) -> None:
         if case.coupling is not None:
             _wet(case, found, keys, mesh)
     _one_dimension(case, found)
+    if not found.problems:
+        found.attempt(partial(_tied, case, found.meshes))
+
+
+def _tied(case: Case, meshes: dict[str, Mesh]) -> None:
+    if case.contact is not None and any(pair.tied for pair in case.contact.pairs.values()):
+        from fsci.build_tied import join_tied
+
+        join_tied(case, meshes)
 
 
 def _is_flat(mesh: Mesh, surface: str) -> bool:

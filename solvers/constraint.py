@@ -31,8 +31,12 @@ class Constraint(Stateful, Protocol):
         """Global dofs of its nodes, -1 where there are none, shape (N, dim)."""
         ...
 
+    def touching_dofs(self) -> NDArray[np.int64]:
+        """Global dofs of the nodes of surfaces that come and go, each once."""
+        ...
+
     def multiplier_dofs(self) -> NDArray[np.int64]:
-        """Global dofs of the nodes that carry multipliers, each once."""
+        """Those of them that carry multipliers."""
         ...
 
     def start(self, u: Array, stiffness: Array, t: float) -> None:

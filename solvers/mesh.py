@@ -26,4 +26,5 @@ class Mesh:
         default_factory=dict
     )  #: in space: name -> nodes of lines, shape (lines, 2 or 3): both ends, then the middle
     nodes: dict[str, NDArray[np.int64]] = field(default_factory=dict)  #: name of points -> their nodes
+    unmoved: NDArray[np.float64] | None = None  #: positions [m] before nodes of tied surfaces moved, (n, dim)
     note: str = ""  #: what was changed when the mesh was read, for the user

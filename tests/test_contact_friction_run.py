@@ -85,7 +85,7 @@ MISTAKES = {
     "negative": (("{coefficient: 0.1}", "{coefficient: -0.1}"), "16:102: 'coefficient' must be at least 0, not -0.1"),
     "the same slave": (
         (PAIR, PAIR + PAIR.replace("floor", "again").replace("0.1", "0.2")),
-        "pair 'floor' has the same slave: both need the same friction",
+        "pair 'floor' has the same slave: both need the same 'friction'",
     ),
 }
 

@@ -134,9 +134,10 @@ def _contact(case: Case, contact: Contact) -> Iterator[Mistake]:
         for side in ("slave", "master"):
             yield from _side(case, contact, getattr(pair, side), ("contact", "pairs", name, side))
         first = next(other for other in contact.pairs if contact.pairs[other].slave == pair.slave)
-        if contact.pairs[first].friction != pair.friction:
-            message = f"pair '{first}' has the same slave: both need the same friction"
-            yield ("contact", "pairs", name, *(["friction"] if "friction" in pair.model_fields_set else [])), message
+        for setting in ("friction", "tied"):
+            if getattr(contact.pairs[first], setting) != getattr(pair, setting):
+                message = f"pair '{first}' has the same slave: both need the same '{setting}'"
+                yield ("contact", "pairs", name, *([setting] if setting in pair.model_fields_set else [])), message
         if pair.slave.body == pair.master.body and set(pair.slave.on or ()) & set(pair.master.on or ()):
             yield ("contact", "pairs", name, "master"), "a surface cannot touch itself: name another master"
 

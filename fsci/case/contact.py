@@ -52,11 +52,14 @@ class Pair(Section):
     )
 
     friction: Friction = setting(Friction, "resistance against sliding; default: none")
+    tied: bool = setting(False, "true: one body where they lie on each other at the start")
 
     @model_validator(mode="after")
     def _deformable_slave(self) -> Pair:
         if self.slave.obstacle is not None:
             raise fault("the slave must be a surface of a body: make the obstacle the master", "slave")
+        if self.tied and self.friction != Friction():
+            raise fault("tied surfaces do not slide: remove 'friction' or 'tied'", "friction")
         return self
 
 

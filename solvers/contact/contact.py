@@ -12,23 +12,22 @@ from numpy.typing import NDArray
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.blocked import find_blocked
-from solvers.contact.blocks import block_diagonal, components, expand, vstack
-from solvers.contact.condense import Condensed, Linearised, condense, recover
-from solvers.contact.directions import Directions, find_directions, free_normals
+from solvers.contact.condense import Condensed, condense, recover
+from solvers.contact.coverage import Coverage
+from solvers.contact.directions import free_normals
 from solvers.contact.distance import distances
 from solvers.contact.friction_work import FrictionWork
 from solvers.contact.interface import Interface, describe_interface
-from solvers.contact.law.law import OPEN, STICK, Law, Point, Slopes, Statuses, along
+from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
+from solvers.contact.law.tied import Tied
 from solvers.contact.lent import lent_shares
-from solvers.contact.mortar import KEEP_AFTER
+from solvers.contact.linearise import Part, linearise
 from solvers.contact.pair import Pair
 from solvers.contact.share import Shares
 from solvers.contact.slip import Sliding, Slip
 from solvers.contact.terms import Terms, find_normals, total_terms
+from solvers.contact.ties import Ties
 from solvers.rows import RowTransformation
-
-#: Share of a slave node's area that must see a master, and the share with which a node that did in this step still may.
-LEAST_COVERED, LEAST_KEPT = 0.02, 0.01
 
 #: Gap, as a share of the extent of all surfaces, up to which nodes without pressure touch: rounding of positions.
 TOUCHING = 1e-12
@@ -71,16 +70,19 @@ class Contact:
         self._gap = np.zeros(count)  # weighted gap at the latest evaluation
         self._mean_gap = np.zeros(count)  # the same over D [m], zero where no master is seen
         self._kept = np.zeros(count)  # mean gap that may stay in this step [m], <= 0
-        self._seen = np.zeros(count, dtype=bool)  # multipliers that could have a constraint in this step
-        self._evaluations = 0
+        self._coverage = Coverage(self.multipliers.areas)
         self._stiffness = np.zeros(count)
         self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
         self._blocked = np.zeros(count, dtype=bool)
         self._lent: sp.csr_matrix | None = None
         self._shares = Shares(comm)
-        sliding = [law_multipliers for law, law_multipliers in self.interface.laws if law.slips]
-        touching = [m for m in self.interface.mortars if any(np.isin(m.patch.multipliers, s).all() for s in sliding)]
-        self._sliding = Sliding(touching, self.multipliers, self._shares, (self.size, self.dim))
+        laws = [(mortar, self.interface.law_of(mortar.patch)) for mortar in self.interface.mortars]
+        self._mortars = [mortar for mortar, law in laws if not isinstance(law, Tied)]
+        self._tied = np.isin(np.arange(count), [m for law, own in self.interface.laws if law == Tied() for m in own])
+        tied = [mortar for mortar, law in laws if isinstance(law, Tied)]
+        self._ties = Ties(tied, self.multipliers, self.nodes.points, self.interface.unmoved())
+        sliding = [mortar for mortar, law in laws if law.slips]
+        self._sliding = Sliding(sliding, self.multipliers, self._shares, (self.size, self.dim))
         self._slip: Slip | None = None  # at the latest evaluation
         self._weight = 1.0  # of the new contact force in the balance
         self.work = FrictionWork((count, self.dim))
@@ -98,6 +100,7 @@ class Contact:
         self._x_old = self.x.copy()
         self._blocked = find_blocked(self.interface, self.x)
         self._lent = lent_shares([p.multipliers[p.facets] for p in self.multipliers.patches], self._blocked)
+        self._ties.start(self._with_lent)
 
     def positions(self, u: Array, t: float) -> Array:
         """Current positions [m] of all nodes from the displacements of the deformable ones, shape (N, dim)."""
@@ -112,11 +115,10 @@ class Contact:
         self._x_old = self.x.copy()
         if self._keep_overlap:
             self._kept = np.minimum(0.0, self._mean_gap)
-        self._seen[:] = False
-        self._evaluations = 0
+        self._coverage.begin_step()
         self.active_set.begin_step()
         self._shares.begin_step()
-        for mortar in self.interface.mortars:
+        for mortar in self._mortars:
             mortar.begin_step()
         self._sliding.begin_step(self.x, self._with_lent)
         self._slip = None
@@ -148,7 +150,8 @@ class Contact:
         self._gap = np.zeros(len(self.z)) if self.terms is None else self._with_lent(self.terms.gap)
         self._mean_gap = np.zeros(len(self.z))
         if self.terms is not None:
-            self._covers = self._may_touch(self.terms)
+            self._D = self._with_lent(self.terms.D)
+            self._covers = self._coverage.judge(self.terms.D) & ~self._blocked
             np.divide(self._gap, self._D, out=self._mean_gap, where=self._D > 0.0)
             for law, which in self.interface.laws:
                 status[which] = law.status(self._point(which))
@@ -188,28 +191,14 @@ class Contact:
         """Rows (of gap, D, ...) of multipliers plus those of the functions that are lent to them."""
         return rows if self._lent is None else rows + self._lent.T @ rows
 
-    def _may_touch(self, terms: Terms) -> NDArray[np.bool_]:
-        """Multipliers that can have a constraint. As for facet pairs: from some evaluation on none of them goes."""
-        self._D = self._with_lent(terms.D)
-        found = self._covered(terms)
-        found |= self._seen & self._covered(terms, LEAST_KEPT)
-        self._evaluations += 1
-        if self._evaluations >= KEEP_AFTER:
-            self._seen |= found
-        return found & ~self._blocked
-
-    def _covered(self, terms: Terms, least: float = LEAST_COVERED) -> NDArray[np.bool_]:
-        """Multipliers that see enough of a master for a constraint: less is a sliver that comes and goes."""
-        return terms.D > least * np.maximum(self.multipliers.areas, np.finfo(float).tiny)
-
     def _evaluate_mortars(self) -> Terms | None:
         """Terms of all pairs, each process doing its share of the slave facets; None if no facets are near."""
-        near = [mortar.near(self.x, self._x_old) for mortar in self.interface.mortars]
-        if all(len(facet_pairs) == 0 for facet_pairs, _ in near):
+        near = [mortar.near(self.x, self._x_old) for mortar in self._mortars]
+        if not self._ties.pieces and all(len(facet_pairs) == 0 for facet_pairs, _ in near):
             return None
         normals = find_normals(self.multipliers, self.x)
-        pieces, met = [], False
-        for index, (mortar, (facet_pairs, motion)) in enumerate(zip(self.interface.mortars, near, strict=True)):
+        pieces, met = [], bool(self._ties.pieces)
+        for index, (mortar, (facet_pairs, motion)) in enumerate(zip(self._mortars, near, strict=True)):
             if len(facet_pairs) == 0:
                 continue
             at = normals.at(self.multipliers, mortar.patch)
@@ -223,6 +212,10 @@ class Contact:
         if self._sliding.mortars:
             used = [(mortar, found.used) for mortar, found in pieces]
             self._slip = self._sliding.evaluate(self.x, normals, used, self._with_lent)
+        if self._ties.pieces:
+            tied = self._ties.slip(self.x)
+            self._slip = tied if self._slip is None or not self._sliding.mortars else self._slip.plus(tied)
+            pieces += self._ties.pieces if self.comm.rank == 0 else []
         return total_terms(pieces, normals, self._shares, (len(self.pairs), len(self.z), self.size))
 
     # ------------------------------------------------------------------------------------- what the balance needs
@@ -251,21 +244,26 @@ class Contact:
         self._weight = weight
         if self.terms is None:
             return 0.0
-        missed = [
-            law.residual(self._point(which), self.active_set.status[which], weight) for law, which in self._in_contact()
-        ]
+        missed = [part.law.residual(part.point, part.status, weight) for part in self._in_contact()]
         return float(np.sqrt(sum(np.sum(part**2) for part in missed)))
 
-    def _in_contact(self) -> list[tuple[Law, NDArray[np.int64]]]:
+    def _in_contact(self) -> list[Part]:
         parts = [(law, which[self.active_set.active[which]]) for law, which in self.interface.laws]
-        return [(law, which) for law, which in parts if len(which)]
+        status = self.active_set.status
+        return [Part(law, which, self._point(which), status[which]) for law, which in parts if len(which)]
 
     def condense(self, weight: float) -> RowTransformation:
         """What makes rows without multipliers of the linearised balance without the new contact force.
 
         weight: of that force in the balance.
         """
-        self._linearised = self._linearise(weight)
+        assert self.terms is not None
+        count, n, dgap = len(self.z), self.dim * self.size, self._with_lent(self.terms.dgap)
+        slip = sp.csr_matrix((self.dim * count, n)) if self._slip is None else self._slip.slopes
+        slopes = Slopes(gap=dgap, normals=self.terms.dnormals, slip=slip)
+        force = self._force_matrix() if self._lent is None else self._force_matrix() @ (sp.identity(count) + self._lent)
+        self._parts = self._in_contact()
+        self._linearised = linearise(self.interface, self._parts, slopes, force, self.terms.dforce, weight)
         self._condensed: Condensed = condense(self._linearised)
         changed = np.zeros(self.size, dtype=bool)
         changed[self.multipliers.node[self.active_set.active]] = True
@@ -284,66 +282,25 @@ class Contact:
         """Multipliers in contact from J du + R, the linearised balance, and du [m] at the nodes, shapes (N * dim,)."""
         own = np.zeros_like(self.z)
         found = recover(self._linearised, self._condensed, balance, du)
-        own[self._touching_now()] = found.reshape(-1, self.dim)
+        if self._parts:
+            own[np.concatenate([part.which for part in self._parts])] = found.reshape(-1, self.dim)
         self._set_multipliers(own)
-
-    def _touching_now(self) -> NDArray[np.int64]:
-        return np.concatenate([which for _, which in self._in_contact()] or [np.empty(0, dtype=np.int64)])
-
-    def _linearise(self, weight: float) -> Linearised:
-        assert self.terms is not None
-        dim, active = self.dim, self._touching_now()
-        force = self._force_matrix()
-        if self._lent is not None:
-            force = force + force @ self._lent
-        directions: Directions = find_directions(
-            self.z[active],
-            self.terms.normals[active],
-            self.multipliers.node[active],
-            self.nodes.held,
-            self.interface.spans[active],
-        )
-        turning = directions.turning @ self.terms.dnormals[components(active, dim)]
-        by_z, by_u, residual = self._law_rows(weight)
-        P = directions.basis
-        return Linearised(
-            weight=weight,
-            force=expand(force[:, active], dim),
-            dforce=self.terms.dforce,
-            basis=P,
-            turning=turning,
-            felt=directions.felt,
-            by_multiplier=(P.T @ by_z @ P).tocsr(),
-            by_displacement=(P.T @ (by_u + by_z @ turning)).tocsr(),
-            residual=P.T @ (residual - by_z @ self.z[active].ravel()),
-            transformation=None if self.interface.basis is None else expand(self.interface.basis[0], dim),
-        )
-
-    def _law_rows(self, weight: float) -> tuple[sp.csr_matrix, sp.csr_matrix, Array]:
-        """(by z, by u, residual) of all multipliers in contact, law by law."""
-        assert self.terms is not None
-        n = self.dim * self.size
-        dgap = self._with_lent(self.terms.dgap)
-        by_z, by_u, residual = [], [], []
-        for law, which in self._in_contact():
-            rows_of = components(which, self.dim)
-            slip = sp.csr_matrix((len(rows_of), n)) if self._slip is None else self._slip.slopes[rows_of]
-            slopes = Slopes(gap=dgap[which], normals=self.terms.dnormals[rows_of], slip=slip)
-            rows = law.rows(self._point(which), slopes, self.active_set.status[which], weight)
-            by_z.append(rows.by_z)
-            by_u.append(rows.by_u)
-            residual.append(rows.residual.ravel())
-        if not by_z:
-            return sp.csr_matrix((0, 0)), sp.csr_matrix((0, n)), np.zeros(0)
-        return block_diagonal(np.concatenate(by_z)), vstack(by_u), np.concatenate(residual)
 
     def dofs(self) -> NDArray[np.int64]:
         """Global dofs of all nodes, -1 where rigid, shape (N, dim)."""
         return self.nodes.dofs
 
+    def touching_dofs(self) -> NDArray[np.int64]:
+        """Global dofs of the nodes of all surfaces that are not tied, each once."""
+        pairs = [pair for pair in self.pairs if pair.law != Tied()]
+        numbers = [self.interface.nodes_of(side) for pair in pairs for side in (pair.slave, pair.master)]
+        dofs = self.nodes.dofs[np.unique(np.concatenate(numbers))] if numbers else np.empty(0, dtype=np.int64)
+        return dofs[dofs >= 0]
+
     def multiplier_dofs(self) -> NDArray[np.int64]:
-        """Global dofs of the slave nodes, each once."""
-        return self.nodes.dofs[np.unique(self.multipliers.node[self.multipliers.areas > 0.0])].ravel()
+        """Those of slave nodes."""
+        slaves = (self.multipliers.areas > 0.0) & ~self._tied
+        return self.nodes.dofs[np.unique(self.multipliers.node[slaves])].ravel()
 
     @property
     def near(self) -> bool:
@@ -364,11 +321,11 @@ class Contact:
     def numbers(self) -> dict[str, float]:
         """Columns for the history."""
         found = {
-            "contact.active": float(len(np.unique(self.multipliers.node[self.active_set.active]))),
+            "contact.active": float(len(np.unique(self.multipliers.node[self.active_set.active & ~self._tied]))),
             "contact.changes": float(self.active_set.changes),
         }
         if self._sliding.mortars:
-            found["contact.sticking"] = float(np.sum(self.active_set.status == STICK))
+            found["contact.sticking"] = float(np.sum((self.active_set.status == STICK) & ~self._tied))
             found["contact.friction"] = self.work.total + self.work.of_step(self._weight, *self._force_and_slip())
         for index, name in enumerate(self.names):
             for axis, force in zip("xyz", self.resultant(index), strict=False):
@@ -389,7 +346,7 @@ class Contact:
         """Mean gap [m] at each multiplier, NaN where no master is near, shape (C,)."""
         if self.terms is None:
             return np.full(len(self.z), np.nan)
-        covered = self._covered(self.terms)
+        covered = self._coverage.enough(self.terms.D)
         return np.divide(self.terms.gap, self.terms.D, out=np.full(len(self.z), np.nan), where=covered)
 
     def save(self) -> State:

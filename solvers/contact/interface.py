@@ -9,10 +9,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from solvers.api import Array
 from solvers.contact.law.law import Law
 from solvers.contact.mortar import Mortar, join_masters
 from solvers.contact.pair import Pair
-from solvers.contact.patch import Multipliers, number_multipliers
+from solvers.contact.patch import Multipliers, Patch, number_multipliers
 from solvers.contact.surface import Nodes, Surface, longest_edge, number_nodes
 
 #: T with N~ = N T over all nodes, and its inverse
@@ -36,6 +37,18 @@ class Interface:
     def nodes_of(self, surface: Surface) -> NDArray[np.int64]:
         """Among all nodes."""
         return self.nodes.of_surface[_index(self.surfaces, surface)]
+
+    def unmoved(self) -> Array:
+        """Positions [m] of all nodes before those of tied surfaces were moved, shape (N, dim)."""
+        x = self.nodes.points.copy()
+        for surface, numbers in zip(self.surfaces, self.nodes.of_surface, strict=True):
+            if surface.unmoved is not None:
+                x[numbers] = surface.unmoved
+        return x
+
+    def law_of(self, patch: Patch) -> Law:
+        """Of a patch: all its multipliers have the same."""
+        return next(law for law, which in self.laws if np.isin(patch.multipliers, which).all())
 
     def multipliers_of(self, slave: Surface) -> NDArray[np.int64]:
         """Multipliers at the nodes of a slave surface."""

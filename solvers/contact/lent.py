@@ -22,12 +22,16 @@ def lent_shares(facets: Sequence[NDArray[np.int64]], blocked: NDArray[np.bool_])
     C, rows, columns = len(blocked), [], []
     for of_patch in facets:
         n = of_patch.shape[1]
-        row, column = np.repeat(of_patch, n, axis=1).ravel(), np.tile(of_patch, (1, n)).ravel()
-        lends = blocked[row] & ~blocked[column]
-        rows.append(row[lends])
-        columns.append(column[lends])
+        rows.append(np.repeat(of_patch, n, axis=1).ravel())
+        columns.append(np.tile(of_patch, (1, n)).ravel())
     row, column = np.concatenate(rows), np.concatenate(columns)
     beside = sp.csr_matrix((np.ones(len(row)), (row, column)), shape=(C, C))
     beside.data[:] = 1.0
-    count = np.asarray(beside.sum(axis=1)).ravel()
-    return (sp.diags(1.0 / np.maximum(count, 1.0)) @ beside).tocsr()
+    served, shares = ~blocked, sp.diags((~blocked).astype(float)).tocsr()
+    while True:  # a corner has blocked neighbours only: it comes after them
+        count = np.where(served, 0.0, beside @ served.astype(float))
+        if not count.any():
+            return (shares - sp.diags((~blocked).astype(float))).tocsr()
+        mean = sp.diags(np.divide(1.0, count, out=np.zeros(C), where=count > 0.0)) @ beside
+        shares = (shares + mean @ sp.diags(served.astype(float)) @ shares).tocsr()
+        served = served | (count > 0.0)

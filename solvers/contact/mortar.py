@@ -149,6 +149,19 @@ class Mortar:
         surfaces = slave, self.facets, self._types[0], master, self.masters.facets, self._types[1]
         return mortar(*surfaces, normals, facet_pairs, method=self.integration, **settings)
 
+    def tie(
+        self, x: Array, normals: Array, facet_pairs: NDArray[np.int32]
+    ) -> tuple[MortarTerms, sp.csr_matrix, sp.csr_matrix]:
+        """(terms, W, M) at the positions x [m]; forces follow from D and M, and have no derivatives."""
+        slave, master = self.patch.nodes, self.masters.nodes
+        ns, nm, columns = len(slave), len(master), x.shape[1] * (len(slave) + len(master))
+        result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(0.0))
+        W = sp.csr_matrix(result.W, shape=(ns, ns)) @ self.patch.basis()[1]
+        M = sp.csr_matrix(result.M, shape=(ns, nm))
+        nothing = sp.csr_matrix((ns, columns)), sp.csr_matrix((columns, columns))
+        used = facet_pairs[result.used.astype(bool)]
+        return MortarTerms(result.D, M, np.zeros(ns), *nothing, result.area, used), W.tocsr(), M
+
     def _reach(self, motion: float) -> dict[str, float]:
         return {"reach": self._edge + motion, "near": NEAR * self._edge + motion}
 

@@ -43,6 +43,10 @@ class Slip:
     slopes: sp.csr_matrix  #: derivatives, shape (dim * C, dim * N)
     known: NDArray[np.bool_]  #: multipliers that saw a master at the beginning, shape (C,)
 
+    def plus(self, other: Slip) -> Slip:
+        """With that of other multipliers."""
+        return Slip(self.values + other.values, self.slopes + other.slopes, self.known | other.known)
+
 
 class Sliding:
     """Slip of the present step for the multipliers of some mortars; collective calls."""

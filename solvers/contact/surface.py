@@ -38,6 +38,7 @@ class Surface:
     body: str = ""  #: whose surface it is
     symmetric: NDArray[np.bool_] | None = None  #: held by planes of symmetry: normals have no such component, (n, dim)
     mesh_nodes: NDArray[np.int64] | None = None  #: number of each node in the mesh of the body
+    unmoved: Array | None = None  #: positions [m] before nodes of tied surfaces were moved, shape (n, dim)
     motion: Callable[[float], Array] | None = None  #: rigid: positions [m] at a time, shape (n, dim)
 
     @property

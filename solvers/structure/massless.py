@@ -45,7 +45,7 @@ def massless_dofs(structure: Structure) -> list[NDArray[np.bool_]]:
     """
     constraint = structure.constraint
     assert constraint is not None
-    candidates = [constraint.dofs(), constraint.multiplier_dofs()]
+    candidates = [constraint.touching_dofs(), constraint.multiplier_dofs()]
     parts = [np.split(_owned(structure, dofs), structure.layout.offsets[1:-1]) for dofs in candidates]
     found = []
     for body, *choices in zip(structure.bodies, *parts, strict=True):

@@ -1,0 +1,49 @@
+"""Tied surfaces before the run: where they are bent, nodes of the slave move onto the surface of the master."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from fsci.case import Case
+from fsci.case_meshes import read_obstacle
+from solvers.contact.law.tied import Tied
+from solvers.contact.pair import Pair
+from solvers.contact.surface import Surface
+from solvers.contact.ties import relocated
+from solvers.mesh import Mesh
+from solvers.mesh_topology import FACET_TYPE, cut_out
+
+#: Motion of nodes, relative to the surface, that is none.
+ROUNDING = 1e-13
+
+
+def join_tied(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
+    """Meshes of elastic bodies, with the slaves of tied pairs where the constraint has them. Raises CaseError.
+
+    A tie between bent surfaces would otherwise resist a common rotation: its offset would keep its direction in space.
+    """
+    found, contact = dict(meshes), case.contact
+    for name, settings in {} if contact is None else contact.pairs.items():
+        if not settings.tied:
+            continue
+        assert contact is not None
+        sides, nodes = [], []
+        for side in (settings.slave, settings.master):
+            mesh = meshes[side.body] if side.body is not None else read_obstacle(case, side.obstacle or "")
+            names = side.on or contact.obstacles[side.obstacle or ""].on
+            points, facets, at = cut_out(mesh, names)
+            sides.append(Surface(name, points, facets, FACET_TYPE[mesh.cell_type], None))
+            nodes.append(at)
+        moved = relocated(Pair(sides[0], sides[1], settings.integration, Tied()))
+        if moved is None:
+            raise case.error(("contact", "pairs", name), "the surfaces do not lie on each other: nothing to tie")
+        body = settings.slave.body or ""
+        if np.abs(moved - sides[0].points).max() < ROUNDING * np.ptp(moved, axis=0).max():
+            continue
+        points = found[body].points.copy()
+        points[nodes[0]] = moved
+        found[body] = replace(found[body], points=points, unmoved=meshes[body].points)
+    return found

@@ -1,0 +1,36 @@
+"""Which multipliers see enough of a master to have a constraint."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.contact.mortar import KEEP_AFTER
+
+#: Share of a slave node's area that must see a master, and the share with which a node that did in this step still may.
+LEAST_COVERED, LEAST_KEPT = 0.02, 0.01
+
+
+class Coverage:
+    """As for facet pairs: from some evaluation of a step on none of the multipliers goes."""
+
+    def __init__(self, areas: Array):
+        self._areas = np.maximum(areas, np.finfo(float).tiny)
+        self.begin_step()
+
+    def begin_step(self) -> None:
+        self._seen = np.zeros(len(self._areas), dtype=bool)
+        self._evaluations = 0
+
+    def enough(self, D: Array, least: float = LEAST_COVERED) -> NDArray[np.bool_]:
+        """The covered areas D [m^(dim-1)] are more than a sliver, which comes and goes, shape (C,)."""
+        return D > least * self._areas
+
+    def judge(self, D: Array) -> NDArray[np.bool_]:
+        """Those of an iterate that can have a constraint, shape (C,)."""
+        found = self.enough(D) | (self._seen & self.enough(D, LEAST_KEPT))
+        self._evaluations += 1
+        if self._evaluations >= KEEP_AFTER:
+            self._seen |= found
+        return found

@@ -1,0 +1,78 @@
+"""Mortar integrals of tied surfaces: computed once, where the bodies have no displacement.
+
+With W_jk = int Phi_j N_k over the slave and M_jl = int Phi_j N_l, both for the meshes as they were read, multiplier j
+asks for
+
+    sum_k W_jk u_k - sum_l M_jl u_l = 0 .
+
+It is linear, and a common translation fulfils it. So does a common rotation if sum W X = sum M X, which holds where the
+surfaces are flat; where they are bent the nodes of the slave are moved there before the run (`relocated`), by a length
+that falls with the square of the facets. The integrals stay those of the meshes as they were.
+Source: Puso & Laursen, Comput. Methods Appl. Mech. Engng 193 (2004); Puso, Int. J. Numer. Meth. Engng 59 (2004), for
+the initial positions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from solvers.api import Array
+from solvers.contact.blocks import expand
+from solvers.contact.coverage import Coverage
+from solvers.contact.interface import describe_interface
+from solvers.contact.mortar import Mortar, MortarTerms
+from solvers.contact.pair import Pair
+from solvers.contact.patch import Multipliers
+from solvers.contact.slip import Slip
+from solvers.contact.terms import find_normals, renumber
+
+
+class Ties:
+    """Of some mortars; reference: positions [m] of all nodes, x: where they were before any were moved, (N, dim)."""
+
+    def __init__(self, mortars: Sequence[Mortar], multipliers: Multipliers, reference: Array, x: Array):
+        self.pieces: list[tuple[Mortar, MortarTerms]] = []
+        N, C = len(x), len(multipliers.node)
+        self._reference = reference
+        self.D = np.zeros(C)  #: covered area [m^(dim-1)]
+        self.difference = sp.csr_matrix((C, N))  #: (W, -M) over all nodes
+        normals = find_normals(multipliers, x) if mortars else None
+        for mortar in mortars:
+            assert normals is not None
+            facet_pairs, _ = mortar.near(x, x)
+            found, W, M = mortar.tie(x, normals.at(multipliers, mortar.patch)[0], facet_pairs)
+            rows, slave, master = mortar.patch.multipliers, mortar.patch.nodes, mortar.masters.nodes
+            self.pieces.append((mortar, found))
+            self.D[rows] += found.D
+            self.difference = self.difference + renumber(W, rows, slave, (C, N)) - renumber(M, rows, master, (C, N))
+
+    def start(self, with_lent: Callable[[Any], Any]) -> None:
+        """Once it is known which multipliers lend their functions."""
+        if not self.pieces:
+            return
+        D, dim = with_lent(self.D), self._reference.shape[1]
+        share = np.divide(1.0, D, out=np.zeros_like(D), where=D > 0.0)
+        self._slopes = (sp.diags(share) @ with_lent(self.difference)).tocsr()
+        self._all_slopes, self._known = expand(self._slopes, dim), D > 0.0
+
+    def slip(self, x: Array) -> Slip:
+        """Since the reference configuration, at the positions x [m] of all nodes."""
+        return Slip(self._slopes @ (x - self._reference), self._all_slopes, self._known)
+
+
+def relocated(pair: Pair) -> Array | None:
+    """Positions [m] of the slave's nodes with sum W X = sum M X, shape (n, dim); None if the surfaces do not meet."""
+    interface = describe_interface([pair])
+    patch, x = interface.multipliers.patches[0], interface.nodes.points.copy()
+    ties = Ties(interface.mortars, interface.multipliers, x, x)
+    tied = Coverage(interface.multipliers.areas).enough(ties.D)
+    if not tied.any():
+        return None
+    away = np.zeros_like(x)
+    away[tied] = (ties.difference @ x)[tied] / ties.D[tied, None]
+    x[patch.nodes] -= patch.basis()[0] @ away[patch.multipliers]
+    return x[interface.nodes_of(pair.slave)]
