@@ -38,6 +38,10 @@ class Simulation:
 
 def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     """All objects of a case. Raises CaseError for what only the meshes can tell (collective)."""
+    if case.contact is not None:
+        from fsci.automatic_pairs import with_pairs
+
+        case = with_pairs(case, comm)
     if case.coupling is not None:
         return _coupled(case, comm, timer)
     if case.fluid is not None:

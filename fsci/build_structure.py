@@ -174,7 +174,10 @@ def _of_pair(case: Case, structure: Structure, settings: Probe) -> probes.Probe:
 
     contact, pairs = structure.constraint, [] if case.contact is None else list(case.contact.pairs)
     assert isinstance(contact, Contact)
-    index = pairs.index(settings.pair or "")
+    if settings.pair not in pairs:
+        name = next(key for key, probe in case.probes.items() if probe is settings)
+        raise case.error(("probes", name, "pair"), f"unknown pair '{settings.pair}' (available: {', '.join(pairs)})")
+    index = pairs.index(settings.pair)
     if settings.quantity == "first_contact":
         return first_contact(contact, index)
     extreme = settings.extreme or ("least" if settings.quantity == "gap" else "largest")

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from math import ceil
 
 from fsci.case import Case
+from fsci.case.contact import Pair
 from fsci.case.fluid import Fluid
 from fsci.case.mesh import Mesh, Shape
 from fsci.case.structure import Structure
@@ -15,10 +16,10 @@ from solvers.mesh import Mesh as BodyMesh
 Row = tuple[str, str]
 
 
-def summary(case: Case, meshes: Mapping[str, BodyMesh] = {}) -> str:
-    """A few lines: steps, fields and bodies with their size where it is known, probes, checks.
+def summary(case: Case, meshes: Mapping[str, BodyMesh] = {}, pairs: Mapping[str, Pair] = {}) -> str:
+    """A few lines: steps, fields and bodies with their size where it is known, pairs of contact, probes, checks.
 
-    `meshes`: of elastic bodies, by name, as far as they were read.
+    `meshes`: of elastic bodies, by name, as far as they were read; `pairs`: also those that the case does not name.
     """
     time = case.time
     steps = ceil((time.end - time.start) / time.step - 1e-9)
@@ -33,6 +34,7 @@ def summary(case: Case, meshes: Mapping[str, BodyMesh] = {}) -> str:
     if case.coupling is not None:
         scheme, by = case.coupling.scheme, case.coupling.accelerator
         rows.append(("coupling", scheme if scheme == "monolithic" else f"{scheme}, {by}"))
+    rows += [(f"pair {name}", _sides(pair)) for name, pair in pairs.items()]
     if case.probes:
         rows.append(("probes", ", ".join(case.probes)))
     if case.verify:
@@ -76,6 +78,15 @@ def _fluid(fluid: Fluid) -> Iterator[Row]:
     for name, body in fluid.bodies.items():
         yield f"body {name}", f"{_name(body.mesh)}, rigid, {'at rest' if body.motion is None else 'moved'}"
     yield "dofs", f"{fluid.dofs:,} with those inside of bodies"
+
+
+def _sides(pair: Pair) -> str:
+    sides = [side.obstacle or f"{side.body}.{' + '.join(side.on or ())}" for side in (pair.slave, pair.master)]
+    friction = pair.friction
+    law = ", tied" if pair.tied else ""
+    law += f", friction {friction.coefficient:g}" if friction.coefficient else ""
+    law += f", friction up to {friction.bound:g}" if friction.bound is not None else ""
+    return f"{sides[0]} (slave) on {sides[1]}{law}"
 
 
 def _name(mesh: Mesh) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.case import Case, CaseError
+from fsci.case.contact import Pair
 from fsci.case.errors import Problem
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import thin_body
@@ -40,6 +41,7 @@ class Findings:
     warnings: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     meshes: dict[str, Mesh] = field(default_factory=dict)  #: of elastic bodies that were read
+    pairs: dict[str, Pair] = field(default_factory=dict)  #: of contact, also those that the case does not name
 
     def attempt(self, read: Callable[[], T]) -> T | None:
         """The result, or None after a mistake, which is kept."""
@@ -61,6 +63,11 @@ class Findings:
 def check_meshes(case: Case) -> Findings:
     """All of it."""
     found = Findings()
+    if case.contact is not None:
+        from fsci.automatic_pairs import with_pairs
+
+        case = found.attempt(partial(with_pairs, case)) or case
+    found.pairs = {} if case.contact is None else case.contact.pairs
     _elastic(case, found)
     if case.contact is not None:
         for name, obstacle in case.contact.obstacles.items():

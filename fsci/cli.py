@@ -142,7 +142,7 @@ def _check(options: argparse.Namespace) -> int:
             raise CaseError(found.problems)
     except CaseError as error:
         return _fail(str(error))
-    print(f"{case.path}\n{summary(case, found.meshes)}")
+    print(f"{case.path}\n{summary(case, found.meshes, found.pairs)}")
     for kind, lines in (("note", found.notes), ("warning", [*case.warnings, *found.warnings])):
         for line in lines:
             print(f"{kind}: {line}", file=sys.stderr)

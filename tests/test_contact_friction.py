@@ -71,7 +71,7 @@ def test_linearisation_is_the_derivative_of_the_residual(cell_type, law, edge):
         put_at_the_edge(contact, law, edge)
     for _ in range(2):
         structure.residual()
-    status = contact.active_set.status[contact._touching_now()]
+    status = contact.active_set.status[contact.active_set.active]
     assert {SLIP, STICK} <= set(status.tolist())
     L = Linearisation(structure, contact)
     u, z = structure.now.u.copy(), contact.z.copy()

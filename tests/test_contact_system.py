@@ -123,13 +123,14 @@ class Linearisation:
     """Dense derivatives of balance and law with respect to displacements and what multipliers can change (zeta)."""
 
     def __init__(self, structure, contact):
-        terms = contact._linearise(structure.time.force_weight)
+        parts = contact.in_contact()
+        terms = contact.linearised(parts, structure.time.force_weight)
         dofs = contact.nodes.dofs.ravel()
         place = np.zeros((len(dofs), structure.layout.size))
         place[np.flatnonzero(dofs >= 0), dofs[dofs >= 0]] = 1.0
         on_balance = -terms.weight * place.T
         force = on_balance @ terms.force.toarray()
-        self.active = contact._touching_now()
+        self.active = np.concatenate([part.which for part in parts])
         self.basis = terms.basis.toarray()
         self.balance_u = dense(structure.tangent()) + on_balance @ terms.dforce.toarray() @ place
         self.balance_u += force @ terms.turning.toarray() @ place
@@ -187,8 +188,9 @@ def test_linearisation_is_the_derivative_of_the_residual(name):
         structure.residual()
         contact.z[L.active] = (pressure + step * dp)[:, None] * contact.terms.normals[L.active]
         structure.residual()
-        assert np.array_equal(contact._touching_now(), L.active)
-        law = L.basis.T @ contact._law_rows(structure.time.force_weight)[2]
+        (part,) = contact.in_contact()
+        assert np.array_equal(part.which, L.active)
+        law = L.basis.T @ part.law.residual(part.point, part.status, structure.time.force_weight).ravel()
         return structure.residual_force.copy(), law
 
     step = 1e-6

@@ -119,8 +119,14 @@ def _needs(structure: Structure, body: Body, keys: Keys) -> Iterator[Mistake]:
 
 
 def _contact(case: Case, contact: Contact) -> Iterator[Mistake]:
-    if not contact.pairs:
-        yield ("contact", "pairs"), "'pairs' needs at least one pair"
+    if not contact.pairs and contact.bodies is None:
+        yield ("contact",), "'contact' needs 'pairs', or 'bodies: all' to have them found"
+    for setting in ("friction", "reach"):
+        if setting in contact.model_fields_set and contact.bodies is None:
+            yield ("contact", setting), f"'{setting}' is for the pairs that 'bodies' asks for"
+    for i, name in enumerate(() if contact.bodies in (None, "all") else contact.bodies or ()):
+        if name not in case.elastic_bodies:
+            yield ("contact", "bodies", i), f"unknown body '{name}'{did_you_mean(name, case.elastic_bodies)}"
     for name, obstacle in contact.obstacles.items():
         keys: Keys = ("contact", "obstacles", name)
         yield from length_mistakes(obstacle.motion, case.dimension, (*keys, "motion"))

@@ -74,6 +74,13 @@ class Obstacle(Section):
 class Contact(Section):
     """Contact by dual mortar multipliers."""
 
-    pairs: dict[Name, Pair] = setting(..., "pairs of surfaces by name")
+    pairs: dict[Name, Pair] = setting(dict, "pairs of surfaces by name")
+    bodies: Literal["all"] | tuple[Name, ...] | None = setting(
+        None, "all, or names of bodies: the program finds the pairs among their surfaces, and with all obstacles"
+    )
+    friction: Friction = setting(Friction, "resistance against sliding in the pairs that the program finds")
+    reach: Positive | None = setting(
+        None, "distance up to which surfaces are a pair at the start; default: the extent of the smaller body", unit="m"
+    )
     obstacles: dict[Name, Obstacle] = setting(dict, "rigid surfaces by name")
     c_n: Positive = setting(1.0, "factor of the complementarity parameter; the result does not depend on it", unit="1")

@@ -36,7 +36,8 @@ def probe_mistakes(case: Case) -> Iterator[Mistake]:
             yield keys, f"a probe cannot be called '{name}': history.csv has a column of this name"
         yield from length_mistakes(probe.at, case.dimension, (*keys, "at"))
         pairs = {} if case.contact is None else case.contact.pairs
-        if probe.pair is not None and probe.pair not in pairs:
+        found_later = case.contact is not None and case.contact.bodies is not None
+        if probe.pair is not None and probe.pair not in pairs and not found_later:
             yield (*keys, "pair"), f"unknown pair '{probe.pair}'{did_you_mean(probe.pair, pairs)}"
         match field_of(case, probe):
             case "structure" if case.structure is not None:
@@ -138,7 +139,8 @@ def verify_mistakes(case: Case) -> Iterator[Mistake]:
         columns += CONTACT_COLUMNS
     for i, check in enumerate(case.verify):
         keys: Keys = ("verify", i)
-        if check.value not in columns:
+        found_later = case.contact is not None and case.contact.bodies is not None and check.value[:8] == "contact."
+        if check.value not in columns and not found_later:
             hint = did_you_mean(check.value, columns)
             yield (*keys, "value"), f"there is no value '{check.value}'{hint}"
         if check.start is not None and not case.time.start <= check.start < case.time.end:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.blocked import find_blocked
-from solvers.contact.condense import Condensed, condense, recover
+from solvers.contact.condense import Condensed, Linearised, condense, recover
 from solvers.contact.coverage import Coverage
 from solvers.contact.directions import free_normals
 from solvers.contact.distance import distances
@@ -244,26 +244,31 @@ class Contact:
         self._weight = weight
         if self.terms is None:
             return 0.0
-        missed = [part.law.residual(part.point, part.status, weight) for part in self._in_contact()]
+        missed = [part.law.residual(part.point, part.status, weight) for part in self.in_contact()]
         return float(np.sqrt(sum(np.sum(part**2) for part in missed)))
 
-    def _in_contact(self) -> list[Part]:
+    def in_contact(self) -> list[Part]:
+        """Multipliers in contact, law by law."""
         parts = [(law, which[self.active_set.active[which]]) for law, which in self.interface.laws]
         status = self.active_set.status
         return [Part(law, which, self._point(which), status[which]) for law, which in parts if len(which)]
+
+    def linearised(self, parts: Sequence[Part], weight: float) -> Linearised:
+        """What multipliers in contact add to a Newton step."""
+        assert self.terms is not None
+        count, n, dgap = len(self.z), self.dim * self.size, self._with_lent(self.terms.dgap)
+        slip = sp.csr_matrix((self.dim * count, n)) if self._slip is None else self._slip.slopes
+        slopes = Slopes(gap=dgap, normals=self.terms.dnormals, slip=slip)
+        force = self._force_matrix() if self._lent is None else self._force_matrix() @ (sp.identity(count) + self._lent)
+        return linearise(self.interface, parts, slopes, force, self.terms.dforce, weight)
 
     def condense(self, weight: float) -> RowTransformation:
         """What makes rows without multipliers of the linearised balance without the new contact force.
 
         weight: of that force in the balance.
         """
-        assert self.terms is not None
-        count, n, dgap = len(self.z), self.dim * self.size, self._with_lent(self.terms.dgap)
-        slip = sp.csr_matrix((self.dim * count, n)) if self._slip is None else self._slip.slopes
-        slopes = Slopes(gap=dgap, normals=self.terms.dnormals, slip=slip)
-        force = self._force_matrix() if self._lent is None else self._force_matrix() @ (sp.identity(count) + self._lent)
-        self._parts = self._in_contact()
-        self._linearised = linearise(self.interface, self._parts, slopes, force, self.terms.dforce, weight)
+        self._parts = self.in_contact()
+        self._linearised = self.linearised(self._parts, weight)
         self._condensed: Condensed = condense(self._linearised)
         changed = np.zeros(self.size, dtype=bool)
         changed[self.multipliers.node[self.active_set.active]] = True

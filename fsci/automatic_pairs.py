@@ -1,0 +1,161 @@
+"""Pairs of contact that the case leaves to the program: `contact: {bodies: all}`.
+
+Candidates are the named surfaces of the bodies that no support holds across. Two of them are a pair if they can meet
+(see `facing`). The softer body is the slave; of two that are equally stiff the one with the smaller facets; then the
+first one in the case. Obstacles are masters. Bodies that a pair of the case names are left to such pairs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fsci.case import Case, CaseError
+from fsci.case.contact import Pair, Side
+from fsci.case.material import Material
+from fsci.case.supports import Support
+from fsci.case_meshes import read_body, read_obstacle
+from fsci.expression import Expression
+from fsci.facing import Face, face, faces, meeting
+from solvers.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+#: Difference of two stiffnesses or sizes that is none.
+EQUAL = 1e-6
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A body or an obstacle with its surfaces."""
+
+    side: dict[str, str]  #: body or obstacle -> name
+    faces: list[Face]
+    stiffness: float  #: mean of Young's modulus [Pa], infinite if rigid
+    extent: float  #: of the body [m]
+
+    @property
+    def rigid(self) -> bool:
+        return "obstacle" in self.side
+
+
+def with_pairs(case: Case, comm: MPI.Comm = MPI.COMM_SELF) -> Case:
+    """The case with all its pairs named. Raises CaseError (collective)."""
+    assert case.contact is not None
+    if case.contact.bodies is None:
+        return case
+    chosen = list(case.elastic_bodies) if case.contact.bodies == "all" else list(case.contact.bodies)
+    pairs, error = {}, None
+    if comm.rank == 0:
+        try:
+            pairs = find_pairs(case, {name: read_body(case, name) for name in chosen})
+        except CaseError as problem:
+            error = problem
+    error, pairs = comm.bcast((error, pairs), root=0)
+    if error is not None:
+        raise error
+    if not pairs:
+        raise case.error(("contact", "bodies"), "no named surfaces of these bodies can meet: name the pairs")
+    return case.model_copy(update={"contact": case.contact.model_copy(update={"pairs": pairs, "bodies": None})})
+
+
+def find_pairs(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Pair]:
+    """Pairs by name: those that the case names, then those between the bodies with these meshes and obstacles."""
+    assert case.contact is not None
+    found = dict(case.contact.pairs)
+    named = [{_owner(pair.slave), _owner(pair.master)} for pair in found.values()]
+    candidates = [_body(case, name, mesh) for name, mesh in meshes.items()]
+    candidates += [_obstacle(case, name) for name in case.contact.obstacles]
+    for i, first in enumerate(candidates):
+        for second in candidates[i + 1 :]:
+            names = {*first.side.values(), *second.side.values()}
+            if first.rigid or not first.faces or not second.faces or names in named:
+                continue
+            reach = case.contact.reach
+            near = min(first.extent, second.extent) if reach is None else reach
+            for pair in meeting(first.faces, second.faces, near):
+                name, settings = _pair(case, (first, second), pair)
+                found[name] = settings
+    return found
+
+
+def _pair(case: Case, bodies: tuple[Candidate, Candidate], pair: tuple[Face, Face]) -> tuple[str, Pair]:
+    assert case.contact is not None
+    sides = list(zip(bodies, pair, strict=True))
+    if not _is_slave(sides[0], sides[1]):
+        sides.reverse()
+    words = []
+    found = []
+    for body, surface in sides:
+        words += [*body.side.values(), *([] if body.rigid else [surface.name])]
+        found.append(Side(**body.side, on=None if body.rigid else (surface.name,)))
+    name = "_".join("".join(c if c.isalnum() or c in "_-" else "_" for c in word) for word in words)
+    return name, Pair(slave=found[0], master=found[1], friction=case.contact.friction)
+
+
+def _is_slave(first: tuple[Candidate, Face], second: tuple[Candidate, Face]) -> bool:
+    """The first one against the second: softer, then finer."""
+    stiffness = first[0].stiffness, second[0].stiffness
+    if second[0].rigid or not np.isclose(*stiffness, rtol=EQUAL, atol=0.0):
+        return stiffness[0] < stiffness[1]
+    return first[1].size <= second[1].size * (1.0 + EQUAL)
+
+
+def _owner(side: Side) -> str:
+    return side.body or side.obstacle or ""
+
+
+def _body(case: Case, name: str, mesh: Mesh) -> Candidate:
+    settings = case.elastic_bodies[name]
+    held = [support for support in settings.supports if support.on is not None]
+    free = [face for face in faces(mesh) if not any(_holds(support, face) for support in held)]
+    middles = mesh.points[mesh.cells].mean(axis=1).T
+    return Candidate({"body": name}, free, _youngs_modulus(settings.material, middles), _extent(mesh))
+
+
+def _obstacle(case: Case, name: str) -> Candidate:
+    assert case.contact is not None
+    mesh = read_obstacle(case, name)
+    found = [face(mesh, surface) for surface in case.contact.obstacles[name].on]
+    return Candidate({"obstacle": name}, found, np.inf, np.inf)
+
+
+def _extent(mesh: Mesh) -> float:
+    return float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+
+
+def _holds(support: Support, face: Face) -> bool:
+    """It prescribes the displacement across this surface."""
+    if face.name not in (support.on or ()):
+        return False
+    if support.symmetry or support.normal:
+        return True
+    if support.direction is not None:
+        direction = np.array(support.direction, dtype=float)
+        share = (face.normals @ direction) ** 2 / (direction @ direction)
+    else:
+        components = support.displacement if isinstance(support.displacement, tuple) else ()
+        prescribed = [component is not None for component in components]
+        share = face.normals**2 @ np.array(prescribed, dtype=float)
+    return bool(share.min() > 0.5)
+
+
+def _youngs_modulus(material: Material, points: Array) -> float:
+    """The mean of Young's modulus [Pa] at these points, shape (dim, n), for small strains."""
+
+    def at(formula: Expression | None) -> Array:
+        return np.zeros(points.shape[1]) if formula is None else formula(points, 0.0)
+
+    if material.law == "mooney_rivlin":
+        shear, bulk = 2.0 * (at(material.c10) + at(material.c01)), at(material.bulk)
+        return float(np.mean(9.0 * bulk * shear / (3.0 * bulk + shear)))
+    if material.E is not None:
+        return float(np.mean(at(material.E)))
+    mu, lmbda = at(material.mu), at(material.lmbda)
+    if material.lmbda is None:
+        return float(np.mean(2.0 * mu * (1.0 + at(material.nu))))
+    return float(np.mean(mu * (3.0 * lmbda + 2.0 * mu) / (lmbda + mu)))

@@ -1,0 +1,105 @@
+"""Which named surfaces of bodies can meet: those that see each other and are near enough."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.mesh import Mesh
+from solvers.mesh_topology import surface_facets
+from solvers.tessellation import is_closed, tessellate
+
+Array = NDArray[np.float64]
+
+#: How far facets may lie behind each other and still see each other, as a share of their size: surfaces that touch, of
+#: meshes that do not match, cross a little.
+CROSSING = 0.05
+
+#: Product of the normals of facets that face each other: less than this.
+OPPOSED = -0.2
+
+#: Facets of one surface that are looked at together.
+CHUNK = 256
+
+
+@dataclass(frozen=True)
+class Face:
+    """A named surface by its flat pieces, as the mesh has it."""
+
+    name: str
+    middles: Array  #: of its simplices [m], shape (m, dim)
+    normals: Array  #: outward, of unit length, shape (m, dim)
+    size: float  #: mean extent of a simplex [m]
+    cavity: bool  #: it encloses a hole in the body
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        return self.middles.min(axis=0), self.middles.max(axis=0)
+
+
+def face(mesh: Mesh, name: str) -> Face:
+    """A named surface of a mesh."""
+    simplices, nodes = tessellate(mesh, [name])
+    x = mesh.points[nodes][simplices]
+    edges = x[:, 1:] - x[:, :1]
+    if x.shape[2] == 2:
+        along = np.stack([edges[:, 0, 1], -edges[:, 0, 0]], axis=1)
+    else:
+        along = 0.5 * np.cross(edges[:, 0], edges[:, 1])
+    measure = np.linalg.norm(along, axis=1)
+    middles = x.mean(axis=1)
+    volume = np.einsum("md,md->", middles - middles.mean(axis=0), along)
+    size = float(measure.mean() ** (1.0 / (x.shape[2] - 1)))
+    return Face(name, middles, along / measure[:, None], size, is_closed(simplices) and volume < 0.0)
+
+
+def faces(mesh: Mesh) -> list[Face]:
+    """Named surfaces that overlap no smaller one."""
+    found: list[Face] = []
+    known: set[tuple[int, ...]] = set()
+    for name in sorted(mesh.surfaces, key=lambda name: (len(mesh.surfaces[name]), name)):
+        try:
+            facets = {tuple(facet) for facet in np.sort(surface_facets(mesh, name), axis=1).tolist()}
+        except ValueError:  # it lies inside of the body
+            continue
+        if facets and not facets & known:
+            found.append(face(mesh, name))
+            known |= facets
+    return found
+
+
+def meeting(first: Sequence[Face], second: Sequence[Face], reach: float) -> list[tuple[Face, Face]]:
+    """Surfaces of two bodies that can meet. Inside of a cavity nothing but the cavity can be met."""
+    hulls = [_hull(first), _hull(second)]
+    sides = []
+    for own, other in ((first, hulls[1]), (second, hulls[0])):
+        around = [face for face in own if face.cavity and _contains(face.box, other)]
+        sides.append(around or [face for face in own if not face.cavity])
+    return [(a, b) for a in sides[0] for b in sides[1] if see_each_other(a, b, reach)]
+
+
+def see_each_other(a: Face, b: Face, reach: float) -> bool:
+    """Some of their facets face each other, at most so far [m] apart, each in front of the other."""
+    behind = CROSSING * min(a.size, b.size)
+    for start in range(0, len(a.middles), CHUNK):
+        part = slice(start, start + CHUNK)
+        away = b.middles[None] - a.middles[part, None]
+        found = np.linalg.norm(away, axis=2) <= reach
+        found &= a.normals[part] @ b.normals.T < OPPOSED
+        found &= np.einsum("ijd,id->ij", away, a.normals[part]) > -behind
+        found &= np.einsum("ijd,jd->ij", away, b.normals) < behind
+        if found.any():
+            return True
+    return False
+
+
+def _hull(faces: Sequence[Face]) -> tuple[Array, Array]:
+    low, high = zip(*(face.box for face in faces), strict=True)
+    return np.min(low, axis=0), np.max(high, axis=0)
+
+
+def _contains(outer: tuple[Array, Array], inner: tuple[Array, Array]) -> bool:
+    return bool((outer[0] <= inner[0]).all() and (inner[1] <= outer[1]).all())

@@ -1,0 +1,135 @@
+"""Pairs of contact that the program finds: the rule, `fsci check`, and results equal to those of named pairs."""
+
+import pytest
+from programs import fsci
+
+from fsci.automatic_pairs import with_pairs
+from fsci.case import CaseError, load_case
+from fsci.history import read_history
+from fsci.run import FINISHED, run_case
+
+#: A soft block between two stiff ones, and a rigid floor below.
+STACK = """\
+title: a stack
+time: {step: 0.5, end: 1}
+structure:
+  bodies:
+    low:
+      mesh: {shape: rectangle, size: [3, 1], cells: [6, 2]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3}
+      supports: [{on: left, displacement: [0, null]}]
+    soft:
+      mesh: {shape: rectangle, size: [2, 1], cells: [5, 3], origin: [0, 1]}
+      material: {law: neo_hooke, mu: 40, nu: 0.25}
+      supports: [{on: left, displacement: [0, null]}]
+    high:
+      mesh: {shape: rectangle, size: [3, 1], cells: [9, 3], origin: [0, 2]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3}
+      supports: [{on: [left], displacement: [0, null]}, {on: top, displacement: [null, -0.1 * t]}]
+contact:
+  CONTACT
+  obstacles:
+    floor: {mesh: {shape: rectangle, size: [5, 1], cells: [3, 1], origin: [-1, -1]}, on: top}
+probes:
+  soft: {body: soft, quantity: displacement, at: [2, 2]}
+"""
+NAMED = """pairs:
+    low_floor: {slave: {body: low, on: bottom}, master: {obstacle: floor}}
+    soft_bottom: {slave: {body: soft, on: bottom}, master: {body: low, on: top}}
+    soft_top: {slave: {body: soft, on: top}, master: {body: high, on: bottom}}"""
+
+
+def write(folder, contact):
+    folder.mkdir(exist_ok=True)
+    path = folder / "case.yaml"
+    path.write_text(STACK.replace("CONTACT", contact))
+    return path
+
+
+def run(folder, contact):
+    assert run_case(load_case(write(folder, contact)), folder / "out") == FINISHED
+    return read_history(folder / "out" / "history.csv")
+
+
+def test_three_bodies_and_a_floor(tmp_path):
+    """The same as with named pairs; what is behind another body is a pair, too (it may come out), and not touched."""
+    found = {name: run(tmp_path / name, text) for name, text in (("all", "bodies: all"), ("named", NAMED))}
+    found["near"] = run(tmp_path / "near", "bodies: all\n  reach: 0.5")
+    touched = {
+        "soft_bottom_low_top": "soft_bottom",
+        "low_bottom_floor": "low_floor",
+        "soft_top_high_bottom": "soft_top",
+    }
+    for which in ("all", "near"):
+        forces = {name[8:-2]: f for name, f in found[which].items() if name[:8] == "contact." and name[-2:] == ".y"}
+        assert {name for name, force in forces.items() if force.any()} == touched.keys()
+        assert len(forces) == (3 if which == "near" else 6)
+        for name, other in touched.items():
+            assert forces[name] == pytest.approx(found["named"][f"contact.{other}.y"], rel=1e-10)
+        assert found[which]["soft.x"] == pytest.approx(found["named"]["soft.x"], rel=1e-12)
+    assert found["named"]["contact.soft_top.y"][-1] < -1.0
+
+
+def pairs_of(path, *changes):
+    case = with_pairs(load_case(path, changes))
+    sides = [(pair.slave, pair.master) for pair in case.contact.pairs.values()]
+    return {tuple(side.obstacle or f"{side.body}.{side.on[0]}" for side in pair) for pair in sides}
+
+
+def test_two_tori():
+    """Hollow bodies: outer surfaces only; of two that are alike the first one is the slave."""
+    both = [("contact", "{bodies: all}")]
+    assert pairs_of("cases/two_tori/case.yaml", *both) == {("lower.outer", "upper.outer")}
+    stiff = [*both, ("structure.bodies.lower.material.E", "1e4")]
+    assert pairs_of("cases/two_tori/case.yaml", *stiff) == {("upper.outer", "lower.outer")}
+    fine = [*both, ("structure.bodies.upper.mesh.cells", "[60, 30, 1]")]
+    assert pairs_of("cases/two_tori/case.yaml", *fine) == {("upper.outer", "lower.outer")}
+
+
+def test_a_body_in_a_cavity(tmp_path):
+    """A sphere in a hollow one meets its inside; one in a tube does, too, and not the ends and the outside."""
+    case = load_case("cases/sphere_tube/case.yaml", [("contact", "{bodies: all}")])
+    named = load_case("cases/sphere_tube/case.yaml").contact.pairs
+    (found,) = with_pairs(case).contact.pairs.values()
+    (wanted,) = named.values()
+    assert (found.slave, found.master) == (wanted.slave, wanted.master)
+
+
+def test_reach(tmp_path):
+    """Surfaces farther apart than that are no pair; pairs that the case names stay."""
+    path = write(tmp_path, "bodies: all")
+    lifted = [("structure.bodies.high.mesh.origin", "[0, 2.5]")]
+    assert ("soft.top", "high.bottom") in pairs_of(path, *lifted)
+    assert ("soft.top", "high.bottom") not in pairs_of(path, *lifted, ("contact.reach", "0.4"))
+    own = "{slave: {body: high, on: bottom}, master: {body: soft, on: top}}"
+    found = pairs_of(path, ("contact.pairs", f"{{mine: {own}}}"))
+    assert ("high.bottom", "soft.top") in found
+    assert ("soft.top", "high.bottom") not in found
+
+
+def test_check_lists_the_pairs(tmp_path):
+    done = fsci("check", write(tmp_path, "bodies: all\n  reach: 0.5\n  friction: {coefficient: 0.3}"))
+    assert done.returncode == 0, done.stderr
+    lines = [line.split(maxsplit=2)[1:] for line in done.stdout.splitlines() if line.strip().startswith("pair ")]
+    assert ["soft_top_high_bottom", "soft.top (slave) on high.bottom, friction 0.3"] in lines
+    assert len(lines) == 3
+
+
+MISTAKES = {
+    "nothing": ("c_n: 1", "'contact' needs 'pairs', or 'bodies: all' to have them found"),
+    "unknown": ("bodies: [low, sotf]", "unknown body 'sotf'; did you mean 'soft'?"),
+    "far": ("bodies: all\n  reach: 1e-9", "no named surfaces of these bodies can meet: name the pairs"),
+    "reach": (f"{NAMED}\n  reach: 1", "'reach' is for the pairs that 'bodies' asks for"),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_mistakes_are_named(name, tmp_path):
+    contact, message = MISTAKES[name]
+    path = write(tmp_path, contact)
+    if name == "far":
+        path.write_text(path.read_text().replace("origin: [0, 1]", "origin: [0, 1.2]").replace("[0, 2]}", "[0, 3]}"))
+        path.write_text(path.read_text().replace("origin: [-1, -1]", "origin: [-1, -3]"))
+    with pytest.raises(CaseError) as caught:
+        with_pairs(load_case(path))
+    assert message in str(caught.value)
