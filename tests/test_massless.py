@@ -75,7 +75,7 @@ def test_one_layer_between_two_massless_surfaces():
 def surfaces(body, slave, master):
     """A structure of one body whose contact has these nodes, as far as `massless_dofs` looks."""
     of = {
-        "dofs": lambda: np.flatnonzero(slave | master).reshape(-1, body.dim),
+        "touching_dofs": lambda: np.flatnonzero(slave | master),
         "multiplier_dofs": lambda: np.flatnonzero(slave),
     }
     layout = Layout(MPI.COMM_SELF, [body.size])

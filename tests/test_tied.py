@@ -81,7 +81,7 @@ structure:
       material: {law: neo_hooke, E: 1000, nu: 0.3}
       supports:
         - on: inner
-            displacement: [x * (cos(0.5 * t) - 1) - y * sin(0.5 * t), x * sin(0.5 * t) + y * (cos(0.5 * t) - 1)]
+          displacement: [x * (cos(0.5 * t) - 1) - y * sin(0.5 * t), x * sin(0.5 * t) + y * (cos(0.5 * t) - 1)]
     outer:
       mesh: {shape: ring, inner_radius: 1.5, outer_radius: 2.0, angle: 90, cells: [8, 2], order: ORDER}
       material: {law: neo_hooke, E: 500, nu: 0.3}
