@@ -67,7 +67,7 @@ def find_pairs(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Pair]:
     """Pairs by name: those that the case names, then those between the bodies with these meshes and obstacles."""
     assert case.contact is not None
     found = dict(case.contact.pairs)
-    named = [{_owner(pair.slave), _owner(pair.master)} for pair in found.values()]
+    named = [{_owner(side) for _, side in pair.sides} for pair in found.values()]
     candidates = [_body(case, name, mesh) for name, mesh in meshes.items()]
     candidates += [_obstacle(case, name) for name in case.contact.obstacles]
     for i, first in enumerate(candidates):

@@ -33,7 +33,7 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
     pairs = []
     for settings in case.contact.pairs.values():
         sides = []
-        for side in (settings.slave, settings.master):
+        for _, side in settings.sides:
             key = (side.body or "", *(side.on or ()), side.obstacle or "")
             if key not in found and side.obstacle is not None:
                 found[key] = _obstacle(case, comm, side.obstacle)

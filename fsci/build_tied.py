@@ -31,7 +31,7 @@ def join_tied(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
             continue
         assert contact is not None
         sides, nodes = [], []
-        for side in (settings.slave, settings.master):
+        for _, side in settings.sides:
             mesh = meshes[side.body] if side.body is not None else read_obstacle(case, side.obstacle or "")
             names = side.on or contact.obstacles[side.obstacle or ""].on
             points, facets, at = cut_out(mesh, names)
@@ -40,7 +40,7 @@ def join_tied(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
         moved = relocated(Pair(sides[0], sides[1], settings.integration, Tied()))
         if moved is None:
             raise case.error(("contact", "pairs", name), "the surfaces do not lie on each other: nothing to tie")
-        body = settings.slave.body or ""
+        body = settings.sides[0][1].body or ""
         if np.abs(moved - sides[0].points).max() < ROUNDING * np.ptp(moved, axis=0).max():
             continue
         points = found[body].points.copy()

@@ -59,9 +59,10 @@ def _require_dimension(case: Case, name: str, mesh: Mesh) -> None:
 
 
 def slave_surfaces(case: Case, name: str) -> list[str]:
-    """Those of a body."""
+    """Those of a body that are not tied."""
     pairs = () if case.contact is None else case.contact.pairs.values()
-    return [surface for pair in pairs if pair.slave.body == name for surface in pair.slave.on or ()]
+    slaves = [pair.sides[0][1] for pair in pairs if not pair.tied]
+    return [surface for side in slaves if side.body == name for surface in side.on or ()]
 
 
 def _require_mass(case: Case, name: str, mesh: Mesh) -> None:
@@ -84,7 +85,7 @@ _NO_MASS_LEFT = (
 def _named_surfaces(case: Case, name: str) -> Iterator[tuple[Keys, str]]:
     """(where, surface name) of every surface that contact and probes of a body name."""
     for pair_name, pair in ({} if case.contact is None else case.contact.pairs).items():
-        for role, side in (("slave", pair.slave), ("master", pair.master)):
+        for role, side in dict(pair.sides).items():
             for surface in side.on or () if side.body == name else ():
                 yield ("contact", "pairs", pair_name, role, "on"), surface
     for probe_name, probe in case.probes.items():

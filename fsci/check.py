@@ -81,12 +81,12 @@ def _fluid(fluid: Fluid) -> Iterator[Row]:
 
 
 def _sides(pair: Pair) -> str:
-    sides = [side.obstacle or f"{side.body}.{' + '.join(side.on or ())}" for side in (pair.slave, pair.master)]
+    sides = [side.obstacle or f"{side.body}.{' + '.join(side.on or ())}" for _, side in pair.sides]
     friction = pair.friction
     law = ", tied" if pair.tied else ""
     law += f", friction {friction.coefficient:g}" if friction.coefficient else ""
     law += f", friction up to {friction.bound:g}" if friction.bound is not None else ""
-    return f"{sides[0]} (slave) on {sides[1]}{law}"
+    return f"{sides[0]} on itself{law}" if pair.itself is not None else f"{sides[0]} (slave) on {sides[1]}{law}"
 
 
 def _name(mesh: Mesh) -> str:

@@ -91,7 +91,7 @@ def _elastic(case: Case, found: Findings) -> None:
         ]
         massless = case.structure is not None and case.structure.dynamics is not None and slave_surfaces(case, name)
         pairs = [] if case.contact is None else case.contact.pairs.values()
-        tied = [pair for pair in pairs if pair.tied and name in (pair.slave.body, pair.master.body)]
+        tied = [pair for pair in pairs if pair.tied and name in {side.body for _, side in pair.sides}]
         special = at_points or symmetric or at_nodes or massless or tied
         needed = special or (case.coupling and _has_period(case))
         if not (needed or isinstance(body.mesh, FileMesh)):

@@ -51,8 +51,8 @@ MISTAKES = [
         "16:74: the surface of an obstacle is named where the obstacle is",
         "top",
     ),
-    ("  pairs:\n" + PRESS, "  pairs: {}", "15:10: 'pairs' needs at least one pair", "{}"),
-    ("  pairs:\n" + PRESS + "\n", "", "9:1: missing setting 'pairs' in 'contact'", "contact"),
+    ("  pairs:\n" + PRESS, "  pairs: {}", "15:10: 'contact' needs 'pairs', or 'bodies: all' to have them found", "{}"),
+    ("  pairs:\n" + PRESS + "\n", "", "9:1: 'contact' needs 'pairs', or 'bodies: all' to have them found", "contact"),
     (
         "body: block, on: top",
         "body: block, on: [left, tpo]",
@@ -62,22 +62,22 @@ MISTAKES = [
     (
         "master: {obstacle: plate}",
         "master: {body: block, on: [left, top]}",
-        "16:52: a surface cannot touch itself: name another master",
+        "16:52: a surface that may touch itself is not a slave and a master: write 'self: {body, on}'",
         "{body",
     ),
     (
         "master: {obstacle: plate}",
         "master: {body: block, on: top}",
-        "16:52: a surface cannot touch itself: name another master",
+        "16:52: a surface that may touch itself is not a slave and a master: write 'self: {body, on}'",
         "{body",
     ),
     (", \"-0.2*sin(2*pi*t)^2\"]", "]", "14:15: 'motion' must have 3 entries in 3D, not 2", "["),
     ("contact:\n", "contact:\n  c_n: 0\n", "10:8: 'c_n' must be greater than 0, not 0", "0"),
     (
         "contact:\n",
-        "contact:\n  friction: 1\n",
-        "10:3: unknown setting 'friction' (available: pairs, obstacles, c_n)",
-        "friction",
+        "contact:\n  gap: 1\n",
+        "10:3: unknown setting 'gap' (available: pairs, bodies, friction, reach, obstacles, c_n)",
+        "gap",
     ),
     (
         "quantity: displacement, at: [0.4, 0.5, 1]",

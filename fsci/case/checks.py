@@ -120,7 +120,8 @@ def _needs(structure: Structure, body: Body, keys: Keys) -> Iterator[Mistake]:
 
 def _contact(case: Case, contact: Contact) -> Iterator[Mistake]:
     if not contact.pairs and contact.bodies is None:
-        yield ("contact",), "'contact' needs 'pairs', or 'bodies: all' to have them found"
+        where = ("contact", "pairs") if "pairs" in contact.model_fields_set else ("contact",)
+        yield where, "'contact' needs 'pairs', or 'bodies: all' to have them found"
     for setting in ("friction", "reach"):
         if setting in contact.model_fields_set and contact.bodies is None:
             yield ("contact", setting), f"'{setting}' is for the pairs that 'bodies' asks for"
@@ -137,15 +138,17 @@ def _contact(case: Case, contact: Contact) -> Iterator[Mistake]:
             )
             yield keys, message
     for name, pair in contact.pairs.items():
-        for side in ("slave", "master"):
-            yield from _side(case, contact, getattr(pair, side), ("contact", "pairs", name, side))
-        first = next(other for other in contact.pairs if contact.pairs[other].slave == pair.slave)
+        (_, slave), (_, master) = pair.sides
+        for where, side in dict(pair.sides).items():
+            yield from _side(case, contact, side, ("contact", "pairs", name, where))
+        first = next(other for other in contact.pairs if contact.pairs[other].sides[0][1] == slave)
         for setting in ("friction", "tied"):
             if getattr(contact.pairs[first], setting) != getattr(pair, setting):
                 message = f"pair '{first}' has the same slave: both need the same '{setting}'"
                 yield ("contact", "pairs", name, *([setting] if setting in pair.model_fields_set else [])), message
-        if pair.slave.body == pair.master.body and set(pair.slave.on or ()) & set(pair.master.on or ()):
-            yield ("contact", "pairs", name, "master"), "a surface cannot touch itself: name another master"
+        if pair.itself is None and slave.body == master.body and set(slave.on or ()) & set(master.on or ()):
+            message = "a surface that may touch itself is not a slave and a master: write 'self: {body, on}'"
+            yield ("contact", "pairs", name, "master"), message
 
 
 def _side(case: Case, contact: Contact, side: Side, keys: Keys) -> Iterator[Mistake]:

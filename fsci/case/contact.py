@@ -43,10 +43,11 @@ class Friction(Section):
 
 
 class Pair(Section):
-    """Two surfaces that may touch; the slave should be the finer or softer one."""
+    """Two surfaces that may touch, or one that may touch itself; the slave should be the finer or softer one."""
 
-    slave: Side = setting(..., "surface that carries the contact pressure; of a body")
-    master: Side = setting(..., "surface it may touch")
+    slave: Side | None = setting(None, "surface that carries the contact pressure; of a body")
+    master: Side | None = setting(None, "surface it may touch")
+    itself: Side | None = setting(None, "instead of both: a surface that may touch itself", name="self")
     integration: Literal["segments", "elements"] = setting(
         "segments", "segments: exact where facets overlap; elements: faster, fixed points on slave facets"
     )
@@ -54,10 +55,26 @@ class Pair(Section):
     friction: Friction = setting(Friction, "resistance against sliding; default: none")
     tied: bool = setting(False, "true: one body where they lie on each other at the start")
 
+    @property
+    def sides(self) -> tuple[tuple[str, Side], tuple[str, Side]]:
+        """(setting, surface) of the slave and of the master."""
+        if self.itself is not None:
+            return ("self", self.itself), ("self", self.itself)
+        assert self.slave is not None
+        assert self.master is not None
+        return ("slave", self.slave), ("master", self.master)
+
     @model_validator(mode="after")
-    def _deformable_slave(self) -> Pair:
-        if self.slave.obstacle is not None:
-            raise fault("the slave must be a surface of a body: make the obstacle the master", "slave")
+    def _both_sides(self) -> Pair:
+        if self.itself is not None and (self.slave or self.master) is not None:
+            raise fault("give either 'slave' and 'master', or 'self'", "self")
+        if self.itself is None and (self.slave is None or self.master is None):
+            raise fault("a pair needs 'slave' and 'master', or 'self' for a surface that may touch itself")
+        if self.itself is not None and self.tied:
+            raise fault("a surface cannot be tied to itself", "tied")
+        where, slave = self.sides[0]
+        if slave.obstacle is not None:
+            raise fault("the slave must be a surface of a body: make the obstacle the master", where)
         if self.tied and self.friction != Friction():
             raise fault("tied surfaces do not slide: remove 'friction' or 'tied'", "friction")
         return self

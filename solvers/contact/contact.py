@@ -119,7 +119,7 @@ class Contact:
         self.active_set.begin_step()
         self._shares.begin_step()
         for mortar in self._mortars:
-            mortar.begin_step()
+            mortar.begin_step(self.active_set.active)
         self._sliding.begin_step(self.x, self._with_lent)
         self._slip = None
 
@@ -342,8 +342,13 @@ class Contact:
         return np.zeros(self.dim) if self.terms is None else -self.terms.D_of_pair[index] @ self.z
 
     def distances(self, index: int) -> Array:
-        """Distances [m] of the slave nodes of a pair to its master, as of the latest `evaluate`."""
+        """Distances [m] of the slave nodes of a pair to its master, as of the latest `evaluate`.
+
+        Of a surface to itself: the mean gaps, nan where nothing is near.
+        """
         pair = self.pairs[index]
+        if pair.master is pair.slave:
+            return self.mean_gap()[self.interface.multipliers_of(pair.slave)]
         slave, master = (self.interface.nodes_of(surface) for surface in (pair.slave, pair.master))
         return distances(self.x[slave], self.x[master], pair.master.facets, pair.master.facet_type)
 

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.contact.law.law import Law
-from solvers.contact.mortar import Mortar, join_masters
+from solvers.contact.mortar import FacetSearch, Mortar, join_masters
 from solvers.contact.pair import Pair
 from solvers.contact.patch import Multipliers, Patch, number_multipliers
+from solvers.contact.search import Search
+from solvers.contact.self_search import SelfSearch
 from solvers.contact.surface import Nodes, Surface, longest_edge, number_nodes
 
 #: T with N~ = N T over all nodes, and its inverse
@@ -65,9 +67,9 @@ def describe_interface(pairs: Sequence[Pair]) -> Interface:
     law_of_slave = [next(pair.law for pair in pairs if pair.slave is slave) for slave in slaves]
     multipliers = number_multipliers(slaves, [numbers[id(slave)] for slave in slaves], nodes, law_of_slave)
     laws = _multipliers_by_law(multipliers, law_of_slave)
-    mortars = [
-        mortar for k, slave in enumerate(slaves) for mortar in _mortars_of(slave, k, pairs, numbers, multipliers)
-    ]
+    mortars: list[Mortar] = []
+    for k, slave in enumerate(slaves):
+        mortars += _mortars_of(slave, k, pairs, numbers, multipliers, nodes.points)
     return Interface(
         pairs=tuple(pairs),
         surfaces=tuple(surfaces),
@@ -107,6 +109,7 @@ def _mortars_of(
     pairs: Sequence[Pair],
     numbers: dict[int, NDArray[np.int64]],
     multipliers: Multipliers,
+    points: Array,
 ) -> list[Mortar]:
     patch = multipliers.patches[multipliers.patch_of_surface[index]]
     facets = np.searchsorted(patch.nodes, numbers[id(slave)])[slave.facets]
@@ -114,9 +117,15 @@ def _mortars_of(
     found = []
     for integration in ("segments", "elements"):
         mine = [i for i, pair in enumerate(pairs) if pair.slave is slave and pair.integration == integration]
+        mine.sort(key=lambda i: pairs[i].master is not slave)  # its own facets come first
         masters = [pairs[i].master for i in mine]
         for joined in join_masters(masters, [numbers[id(master)] for master in masters], mine):
-            found.append(Mortar(patch, facets, edge, joined, integration))
+            search: FacetSearch
+            if masters[0] is slave and mine[0] in joined.pair:
+                search = SelfSearch(facets, slave.facet_type, points[patch.nodes], joined.facets[len(facets) :])
+            else:
+                search = Search(facets, joined.facets)
+            found.append(Mortar(patch, facets, edge, joined, integration, search))
     return found
 
 

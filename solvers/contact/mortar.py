@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.contact.patch import Patch
-from solvers.contact.search import Search
 from solvers.contact.surface import KERNEL_TYPES, Surface
 from solvers.kernels import MortarResult, mortar
 
@@ -71,23 +70,43 @@ def join_masters(
     return found
 
 
+class FacetSearch(Protocol):
+    """Finds facet pairs (slave, master) that may meet."""
+
+    def begin_step(self, pressed: NDArray[np.int64]) -> None:
+        """pressed: how many multipliers of each slave facet are in contact."""
+        ...
+
+    def pairs(
+        self, xs: Array, xm: Array, inflation: float, xs_previous: Array, xm_previous: Array
+    ) -> NDArray[np.int32]: ...
+
+
 class Mortar:
-    """A slave surface, given by facets of a patch, and its masters."""
+    """A slave surface, given by facets of a patch, and its masters: other surfaces, or itself."""
 
     def __init__(
-        self, patch: Patch, facets: NDArray[np.int64], edge: float, masters: Masters, integration: Integration
+        self,
+        patch: Patch,
+        facets: NDArray[np.int64],
+        edge: float,
+        masters: Masters,
+        integration: Integration,
+        search: FacetSearch,
     ):
         self.patch, self.masters, self.integration = patch, masters, integration
-        self._search = Search(facets, masters.facets)
+        self._search = search
         self._types = KERNEL_TYPES[patch.facet_type], KERNEL_TYPES[masters.facet_type]
         self.facets = np.ascontiguousarray(facets, dtype=np.int64)
         self._edge = edge
-        self.begin_step()
-
-    def begin_step(self) -> None:
-        """Facet pairs are chosen anew."""
         self._evaluations = 0
         self._kept = np.empty(0, dtype=np.int64)
+
+    def begin_step(self, active: NDArray[np.bool_]) -> None:
+        """Facet pairs are chosen anew; active: multipliers in contact, shape (C,)."""
+        self._evaluations = 0
+        self._kept = np.empty(0, dtype=np.int64)
+        self._search.begin_step(active[self.patch.multipliers][self.facets].sum(axis=1))
 
     def _codes(self, facet_pairs: NDArray[np.int32]) -> NDArray[np.int64]:
         """One number for each facet pair, in the same order."""

@@ -1,4 +1,4 @@
-"""Two surfaces that may touch."""
+"""Two surfaces that may touch, or one that may touch itself."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from solvers.contact.surface import Surface
 
 @dataclass(frozen=True)
 class Pair:
-    """The slave carries the multipliers; pairs with the same slave have the same law."""
+    """The slave carries the multipliers; pairs with the same slave have the same law.
+
+    Self contact: the master is the same object as the slave.
+    """
 
     slave: Surface
     master: Surface

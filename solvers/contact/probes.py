@@ -22,13 +22,13 @@ def at_slave(contact: Contact, pair: int, quantity: str, where: Sequence[float] 
     """pressure [Pa] or gap [m] of a pair at the slave node nearest to a point (reference coordinates), or an extreme.
 
     The pressure is the normal part of the traction between the surfaces, zero where they are apart. The gap is the
-    distance of a slave node from the master surface.
+    distance of a slave node from the master surface; of a surface to itself the mean gap, nan while nothing is near.
     """
     values = {"pressure": lambda: pressures(contact, pair), "gap": lambda: contact.distances(pair)}[quantity]
     if where == "largest":
-        return lambda: {"": float(values().max())}
+        return lambda: {"": float(np.fmax.reduce(values()))}
     if where == "least":
-        return lambda: {"": float(values().min())}
+        return lambda: {"": float(np.fmin.reduce(values()))}
     away = np.linalg.norm(contact.pairs[pair].slave.points - np.asarray(where, dtype=float), axis=1)
     node = int(np.argmin(away))
     return lambda: {"": float(values()[node])}

@@ -31,6 +31,9 @@ class Search:
         self._master_facets = np.ascontiguousarray(master_facets, dtype=np.int64)
         self._trees: tuple[Tree, Tree] | None = None
 
+    def begin_step(self, pressed: NDArray[np.int64]) -> None:
+        """Nothing to choose: one side is the slave, the other one the master."""
+
     def pairs(
         self,
         xs: Array,

@@ -1,0 +1,93 @@
+"""Search of a surface that may touch itself: facet pairs, and which facet of a pair is the slave."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array, StepFailed
+from solvers.contact.dual_tree import OPPOSED, DualTree
+from solvers.contact.roles import MASTER, SLAVE, choose_roles
+from solvers.contact.search import Search
+
+Indices = NDArray[np.int64]
+
+#: Facets whose distances from all others are found together.
+CHUNK = 256
+
+
+class SelfSearch:
+    """Pairs (slave facet, master facet) of one surface; roles are chosen anew in each step and stay within it.
+
+    A facet sees the other side of its own wall behind itself, like a master into which it has sunk by the thickness of
+    the wall. A pair that overlaps by more than half of that thickness is the wall.
+    """
+
+    def __init__(self, facets: Indices, facet_type: str, points: Array, others: Indices | None = None):
+        """points: reference positions [m] of the nodes, shape (n, dim); others: masters of other bodies, numbered after
+        its own facets."""
+        self.tree = DualTree(facets, facet_type, points)
+        self._others = None if others is None or len(others) == 0 else Search(facets, others)
+        self._count = len(facets)
+        self._thickness = wall_thickness(points[facets].mean(axis=1), self._normals(points))
+        self.begin_step(np.zeros(self._count, dtype=np.int64))
+
+    def begin_step(self, pressed: NDArray[np.int64]) -> None:
+        """pressed: how many multipliers of each facet are in contact; such facets are slaves again, shape (k,)."""
+        self._pressed = pressed
+        self._roles = np.zeros(self._count, dtype=np.int8)
+        self._directed = np.empty(0, dtype=np.int64)  # codes of directed pairs, sorted
+
+    def pairs(
+        self, xs: Array, xm: Array, inflation: float, xs_previous: Array | None = None, xm_previous: Array | None = None
+    ) -> NDArray[np.int32]:
+        """As those of `Search`; the own facets among the masters have the nodes of the slaves."""
+        own = self._own_pairs(xs, inflation, xs_previous)
+        if self._others is None:
+            return own
+        beside = self._others.pairs(xs, xm, inflation, xs_previous, xm_previous)
+        found = np.concatenate([own, beside + np.array([0, self._count], dtype=np.int32)])
+        return np.ascontiguousarray(found[np.lexsort(found.T[::-1])])
+
+    def _own_pairs(self, xs: Array, inflation: float, xs_previous: Array | None) -> NDArray[np.int32]:
+        if not np.isfinite(xs).all():
+            raise StepFailed("contact", "surface positions are not finite")
+        found = self.tree.pairs(xs, inflation, xs_previous)
+        found = found[~self._through_the_wall(found, xs)]
+        k = self._count
+        known = np.isin(found @ [k, 1], self._directed) | np.isin(found @ [1, k], self._directed)
+        new = found[~known]
+        if len(new):
+            self._roles = choose_roles(self._roles, self._pressed, found)
+            turned = (self._roles[new[:, 0]] == MASTER) & (self._roles[new[:, 1]] == SLAVE)
+            new[turned] = new[turned][:, ::-1]
+            self._directed = np.union1d(self._directed, new @ [k, 1])
+        forward, backward = found @ [k, 1], found @ [1, k]
+        codes = np.sort(np.where(np.isin(forward, self._directed), forward, backward))
+        return np.stack([codes // k, codes % k], axis=1).astype(np.int32)
+
+    def _normals(self, x: Array) -> Array:
+        mean = self.tree.normals(x).mean(axis=1)
+        return mean / np.linalg.norm(mean, axis=1, keepdims=True)
+
+    def _through_the_wall(self, pairs: Indices, x: Array) -> NDArray[np.bool_]:
+        normals, middles = self._normals(x), x[self.tree.facets].mean(axis=1)
+        i, j = pairs.T
+        overlap = -0.5 * np.einsum("pd,pd->p", middles[j] - middles[i], normals[i] - normals[j])
+        return overlap > 0.5 * np.minimum(self._thickness[i], self._thickness[j])
+
+
+def wall_thickness(middles: Array, normals: Array) -> Array:
+    """Distance [m] of facets from what is behind them, infinite if there is nothing, shape (k,)."""
+    found = np.full(len(middles), np.inf)
+    for start in range(0, len(middles), CHUNK):
+        part = slice(start, start + CHUNK)
+        away = middles[None] - middles[part, None]
+        depth = -np.einsum("ijd,id->ij", away, normals[part])
+        behind = (depth > 0.0) & (np.einsum("ijd,jd->ij", away, normals) > 0.0)
+        behind &= normals[part] @ normals.T < OPPOSED
+        distance = np.where(behind, np.linalg.norm(away, axis=2), np.inf)
+        nearest = distance.argmin(axis=1)
+        rows = np.arange(len(nearest))
+        found[part] = np.where(np.isfinite(distance[rows, nearest]), depth[rows, nearest], np.inf)
+    return found
