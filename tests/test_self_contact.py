@@ -212,8 +212,8 @@ def test_with_contact_between_bodies(tmp_path):
         [
             ("time", "{step: 0.05, end: 0.8}"),
             ("verify", "[]"),
-            ("contact.obstacles.sheet.mesh", "{shape: rectangle, size: [0.9, 0.01], cells: [1, 1], origin: [-0.05, 0.07]}"),
-            ("contact.obstacles.sheet.on", "top"),
+            ("contact.obstacles.sheet", "{mesh: {shape: rectangle, size: [0.9, 0.01], cells: [1, 1]}, on: top}"),
+            ("contact.obstacles.sheet.mesh.origin", "[-0.05, 0.07]"),
             ("contact.pairs.sheet", "{slave: {body: strip, on: inside}, master: {obstacle: sheet}}"),
             ("probes.bottom", "{body: strip, quantity: reaction, on: bottom}"),
             ("probes.least", "{pair: sheet, quantity: gap}"),

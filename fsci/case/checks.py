@@ -120,8 +120,8 @@ def _needs(structure: Structure, body: Body, keys: Keys) -> Iterator[Mistake]:
 
 def _contact(case: Case, contact: Contact) -> Iterator[Mistake]:
     if not contact.pairs and contact.bodies is None:
-        where = ("contact", "pairs") if "pairs" in contact.model_fields_set else ("contact",)
-        yield where, "'contact' needs 'pairs', or 'bodies: all' to have them found"
+        missing: Keys = ("contact", "pairs") if "pairs" in contact.model_fields_set else ("contact",)
+        yield missing, "'contact' needs 'pairs', or 'bodies: all' to have them found"
     for setting in ("friction", "reach"):
         if setting in contact.model_fields_set and contact.bodies is None:
             yield ("contact", setting), f"'{setting}' is for the pairs that 'bodies' asks for"
