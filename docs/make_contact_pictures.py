@@ -37,6 +37,7 @@ CLOSE_TIMES = (5.5, 5.55)
 #: name of a run -> (times, panels in a row, camera)
 PANELS: dict[str, tuple[tuple[float, ...], int, tuple[float, float, float]]] = {
     "double_arch": ((0, 15, 35, 50, 60, 70), 3, (0.0, 0.0, 1.0)),
+    "ironing": ((0, 1, 3, 5), 2, (0.0, 0.0, 1.0)),
     "tied_cube": ((0, 1), 2, (0.5, -1.0, 0.4)),
     "self_contact_fold": ((0, 0.6, 0.8, 1), 2, (0.0, 0.0, 1.0)),
 }

@@ -34,6 +34,7 @@ class Simulation:
     balances: Callable[[], Numbers]  #: column -> value
     dofs: dict[str, int]
     notes: list[str] = field(default_factory=list)  #: on rank 0: what was changed when meshes were read
+    imbalance: Callable[[], Numbers] = dict  #: of contact work, with facets dealt out evenly and as it was
 
 
 def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
@@ -64,6 +65,7 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         balances=lambda: {"structure.energy": structure.energy.error},
         dofs={"structure": structure.dofs()},
         notes=_notes(bodies),
+        imbalance=lambda: {} if contact is None else contact.imbalance,
     )
 
 
@@ -110,6 +112,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         balances=lambda: {"structure.energy": structure.energy.error, **mass(), **coupled.balance.numbers()},
         dofs={"fluid": fluid.dofs(), "structure": structure.dofs()},
         notes=_notes(bodies),
+        imbalance=lambda: {} if contact is None else contact.imbalance,
     )
 
 

@@ -334,6 +334,7 @@ class Run:
             verify=results,
             units=self.case.units.model_dump(),
             message=message,
+            imbalance=self.simulation.imbalance(),
         )
         write_summary(self.out / "summary.json", data)
         return self._report(status, message, results)

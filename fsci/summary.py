@@ -74,11 +74,13 @@ def summarize(
     verify: Sequence[Mapping[str, Any]] = (),
     units: Mapping[str, str] | None = None,
     message: str = "",
+    imbalance: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
     """The content of summary.json.
 
     `status` is finished, stopped or failed and `message` says why; `memory` is the peak of the largest
-    process [MB]; `probes` and `balances` are history columns; `units` are those of length, mass and time.
+    process [MB]; `probes` and `balances` are history columns; `units` are those of length, mass and time; `imbalance`:
+    work of contact on the busiest process over the mean.
     """
     iterations = [int(count) for count in history.get("iterations", ())]
     columns = {name: history[name] for name in (*probes, *balances) if len(history.get(name, ()))}
@@ -110,6 +112,7 @@ def summarize(
         },
         "verify": [dict(result) for result in verify],
         "units": dict(units or {}),
+        **({"contact": {"imbalance": dict(imbalance)}} if imbalance else {}),
     }
 
 

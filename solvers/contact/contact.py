@@ -197,16 +197,19 @@ class Contact:
         if not self._ties.pieces and all(len(facet_pairs) == 0 for facet_pairs, _ in near):
             return None
         normals = find_normals(self.multipliers, self.x)
-        pieces, met = [], bool(self._ties.pieces)
+        pieces, met, work = [], bool(self._ties.pieces), np.zeros((2, self.comm.size))
         for index, (mortar, (facet_pairs, motion)) in enumerate(zip(self._mortars, near, strict=True)):
             if len(facet_pairs) == 0:
                 continue
             at = normals.at(self.multipliers, mortar.patch)
             mine = self._shares.mine(index, facet_pairs, len(mortar.facets))
             found = mortar.evaluate(self.x, *at, mine, motion, self.z[mortar.patch.multipliers])
-            mortar.keep(self._shares.together(found.used))
+            all_used = self._shares.together(found.used)
+            mortar.keep(all_used)
+            work += self._shares.measure(index, facet_pairs, all_used, len(mortar.facets))
             met |= bool(self._shares.combine(index, found.area).any())
             pieces.append((mortar, found))
+        self._shares.note(work)
         if not met:
             return None
         if self._sliding.mortars:
@@ -351,6 +354,11 @@ class Contact:
             return self.mean_gap()[self.interface.multipliers_of(pair.slave)]
         slave, master = (self.interface.nodes_of(surface) for surface in (pair.slave, pair.master))
         return distances(self.x[slave], self.x[master], pair.master.facets, pair.master.facet_type)
+
+    @property
+    def imbalance(self) -> dict[str, float]:
+        """Of the contact work of processes; see `Shares`."""
+        return self._shares.imbalance
 
     def mean_gap(self) -> Array:
         """Mean gap [m] at each multiplier, NaN where no master is near, shape (C,)."""

@@ -20,6 +20,8 @@ class Shares:
     def __init__(self, comm: MPI.Comm):
         self.comm = comm
         self._met: dict[int, NDArray[np.bool_]] = {}
+        self._most = np.zeros(2)  # sums over evaluations of the work of the busiest process ...
+        self._mean = 0.0  # ... and of the mean
 
     def begin_step(self) -> None:
         """A step begins like that of a resumed run, which does not know what facets met."""
@@ -29,11 +31,40 @@ class Shares:
         """The facet pairs that this process integrates; all pairs of a slave facet stay together."""
         if self.comm.size == 1 or len(facet_pairs) == 0:
             return facet_pairs
+        return np.ascontiguousarray(facet_pairs[self._owners(pair, facet_pairs, facets) == self.comm.rank])
+
+    def _owners(self, pair: int, facet_pairs: NDArray[np.int32], facets: int) -> NDArray[np.int64]:
         met = self._met.get(pair, np.ones(facets, dtype=bool))
         cost = np.cumsum(np.where(met[facet_pairs[:, 0]], OVERLAP_COST, 1.0))
         owner = np.minimum((cost / cost[-1] * self.comm.size).astype(int), self.comm.size - 1)
-        first = np.searchsorted(facet_pairs[:, 0], facet_pairs[:, 0])  # the first pair of a facet decides
-        return np.ascontiguousarray(facet_pairs[owner[first] == self.comm.rank])
+        return owner[np.searchsorted(facet_pairs[:, 0], facet_pairs[:, 0])]  # the first pair of a facet decides
+
+    def measure(
+        self, pair: int, facet_pairs: NDArray[np.int32], used: NDArray[np.int32], facets: int
+    ) -> NDArray[np.float64]:
+        """Work of each process for these pairs, of which some overlap: with facets dealt out evenly, and as it is.
+
+        Shape (2, processes). To be asked before `combine`.
+        """
+        size = self.comm.size
+        if size == 1:
+            return np.zeros((2, 1))
+        overlaps = np.isin(_codes(facet_pairs), _codes(used))
+        cost = np.where(overlaps, OVERLAP_COST, 1.0)
+        owners = facet_pairs[:, 0].astype(np.int64) * size // facets, self._owners(pair, facet_pairs, facets)
+        return np.stack([np.bincount(owner, cost, size) for owner in owners])
+
+    def note(self, work: NDArray[np.float64]) -> None:
+        """Keep the work of one evaluation, shape (2, processes)."""
+        self._most += work.max(axis=1)
+        self._mean += float(work[0].mean())
+
+    @property
+    def imbalance(self) -> dict[str, float]:
+        """Work of the busiest process over the mean, of all evaluations: `before` with facets dealt out evenly."""
+        if self._mean == 0.0:
+            return {}
+        return {"before": float(self._most[0] / self._mean), "after": float(self._most[1] / self._mean)}
 
     def combine(self, pair: int, area: Array) -> Array:
         """Covered area of all slave facets; remembered as what the next division goes by."""
@@ -58,3 +89,7 @@ class Shares:
             return parts
         gathered = self.comm.allgather(parts)
         return tuple(sum(found[1:], found[0]) for found in zip(*gathered, strict=True))
+
+
+def _codes(facet_pairs: NDArray[np.int32]) -> NDArray[np.int64]:
+    return facet_pairs[:, 0].astype(np.int64) << 32 | facet_pairs[:, 1]
