@@ -262,7 +262,9 @@ class Contact:
         count, n, dgap = len(self.z), self.dim * self.size, self._with_lent(self.terms.dgap)
         slip = sp.csr_matrix((self.dim * count, n)) if self._slip is None else self._slip.slopes
         slopes = Slopes(gap=dgap, normals=self.terms.dnormals, slip=slip)
-        force = self._force_matrix() if self._lent is None else self._force_matrix() @ (sp.identity(count) + self._lent)
+        force = self._force_matrix()
+        if self._lent is not None:
+            force = force + force @ self._lent
         return linearise(self.interface, parts, slopes, force, self.terms.dforce, weight)
 
     def condense(self, weight: float) -> RowTransformation:
