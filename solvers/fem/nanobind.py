@@ -131,7 +131,11 @@ class Compiled:
     def __init__(self, mesh: dolfinx_mesh.Mesh, form: ufl.Form, options: dict[str, Any]):
         self._mesh = mesh
         self._compiled = fem.compile_form(mesh.comm, form, jit_options=options)
-        self._coefficients = _coefficients(self._compiled)
+        compiled = self._compiled.ufcx_form
+        self._every = form.coefficients()
+        #: those that are left after derivatives are taken
+        self._left = [self._every[compiled.original_coefficient_positions[i]] for i in range(compiled.num_coefficients)]
+        self._coefficients = {c: c for c in self._left}
         self._constants = {c: c for c in form.constants()}
         self._spaces = [argument.ufl_function_space() for argument in form.arguments()]
         topology = mesh.topology
@@ -144,20 +148,14 @@ class Compiled:
         for name, local in entities.items():
             kind = getattr(fem.IntegralType, name)
             domains[kind] = [(1, _integration_entities(self._mesh, kind, np.asarray(local, dtype=np.int32)))]
-        return fem.create_form(self._compiled, self._spaces, self._mesh, domains, self._coefficients, self._constants)
-
-
-def _coefficients(compiled: Any) -> dict[Any, Any]:
-    """The argument of `create_form` that gives a compiled form its coefficients.
-
-    `create_form` calls a coefficient `w` and its number among all of the form. The compiled form has names of its own:
-    in DOLFINx 0.9 the number among those that are left after derivatives are taken. A coefficient therefore stands
-    under the one that has its name.
-    """
-    every, kept, ffi = compiled.ufl_form.coefficients(), compiled.ufcx_form, compiled.module.ffi
-    names = [ffi.string(kept.coefficient_name_map[i]).decode() for i in range(kept.num_coefficients)]
-    positions = [kept.original_coefficient_positions[i] for i in range(kept.num_coefficients)]
-    return {every[int(name[1:])]: every[position] for name, position in zip(names, positions, strict=True)}
+        arguments = self._compiled, self._spaces, self._mesh, domains
+        try:
+            return fem.create_form(*arguments, self._coefficients, self._constants)
+        except RuntimeError:
+            # DOLFINx 0.9 looks for coefficient i of those left under the name of coefficient i of all; unless all are
+            # left, one is missing. There it gets what it looks for under that name.
+            self._coefficients = dict(zip(self._every, self._left, strict=False))
+            return fem.create_form(*arguments, self._coefficients, self._constants)
 
 
 def _integration_entities(mesh: dolfinx_mesh.Mesh, kind: Any, local: Indices) -> Indices:
