@@ -64,6 +64,8 @@ def main(folders: list[Path]) -> None:
         states = {path.stem: dict(read_collection(path)) for path in sorted((folder / "fields").glob("*.pvd"))}
         if "lower" in states and folder.name not in PANELS:
             draw_tori(folder, states)
+        elif folder.name == "cattaneo_mindlin":
+            draw_shear(folder, states["cylinder"])
         elif "tube" in states:
             draw_tube(states)
             write_table(folder, "sphere_tube")
@@ -213,6 +215,45 @@ def draw_balances(folder: Path) -> None:
         right.set(title="change of momentum", xlabel="t [s]")
         right.legend()
         save(figure, "two_tori_energy")
+
+
+def draw_shear(folder: Path, cylinder: dict[float, Path]) -> None:
+    """Pressure and shear under the cylinder beside the exact ones of the same forces."""
+    import meshio
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    E, nu, radius, mu = 1000.0, 0.3, 200.0, 0.4  # of the case
+    mesh = meshio.read(cylinder[max(cylinder)])
+    history = read_history(folder / "history.csv")
+    along, across = abs(history["contact.touch.x"][-1]), abs(history["contact.touch.y"][-1])
+    a = np.sqrt(8.0 * across * radius * (1.0 - nu**2) / (np.pi * E))
+    c = a * np.sqrt(1.0 - along / (mu * across))
+    pressed = mesh.point_data["contact_pressure"] > 0
+    x = mesh.points[pressed, 0]
+    order = np.argsort(x)
+    x, pressure = x[order], mesh.point_data["contact_pressure"][pressed][order]
+    shear = np.linalg.norm(mesh.point_data["contact_friction"][pressed][order], axis=1)
+    status = mesh.point_data["contact_status"][pressed][order]
+    s = np.linspace(-a, a, 801)
+    peak = 2.0 * across / (np.pi * a)
+    exact = peak / a * np.sqrt(a**2 - s**2)
+    inner = mu * peak / a * np.sqrt(np.maximum(c**2 - s**2, 0.0))
+    with rc_context(STYLE):
+        figure = Figure((8, 4.5), dpi=150, layout="constrained")
+        axes = figure.subplots()
+        middle = x.mean()
+        axes.plot(s, exact, color=COLOURS[0], label="pressure, exact")
+        axes.plot(s, mu * exact - inner, color=COLOURS[1], label="shear, exact")
+        axes.plot(x - middle, pressure, "o", color=COLOURS[0], markersize=3, label="pressure")
+        axes.plot(x - middle, shear, "o", color=COLOURS[1], markersize=3, label="shear")
+        axes.set(xlabel="x [m]", ylabel="[Pa]")
+        axes.legend()
+        save(figure, "cattaneo_mindlin")
+    width = 0.5 * (np.ptp(x[status == 2]) + np.diff(x).min())
+    largest = mu * peak * np.sqrt(1.0 - (c / a) ** 2)
+    print(f"a {a:.4f}, stick {width:.4f} of {c:.4f}, shear {shear.max():.4f} of {largest:.4f}, ", end="")
+    print(f"pressure {pressure.max():.4f} of {peak:.4f}")
 
 
 def save(figure: Any, name: str) -> None:
