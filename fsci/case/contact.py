@@ -35,6 +35,11 @@ class Friction(Section):
     coefficient: NotNegative | None = setting(None, "largest traction along the surface over the pressure", unit="1")
     bound: Positive | None = setting(None, "largest traction along the surface, whatever the pressure", unit="Pa")
 
+    @property
+    def some(self) -> bool:
+        """There is friction, if only with a coefficient of zero."""
+        return self.coefficient is not None or self.bound is not None
+
     @model_validator(mode="after")
     def _one_law(self) -> Friction:
         if self.coefficient is not None and self.bound is not None:
@@ -75,7 +80,7 @@ class Pair(Section):
         where, slave = self.sides[0]
         if slave.obstacle is not None:
             raise fault("the slave must be a surface of a body: make the obstacle the master", where)
-        if self.tied and self.friction != Friction():
+        if self.tied and self.friction.some:
             raise fault("tied surfaces do not slide: remove 'friction' or 'tied'", "friction")
         return self
 

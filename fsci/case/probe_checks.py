@@ -11,7 +11,14 @@ from fsci.case.material import has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, surface_mistakes
 from fsci.case.probes import COEFFICIENTS, RESERVED, Probe, Reference
 from fsci.case.structure import Structure
-from fsci.case.verify import BODY_COLUMN, CONTACT_COLUMNS, COUPLING_COLUMNS, FIELD_COLUMNS, RUN_COLUMNS
+from fsci.case.verify import (
+    BODY_COLUMN,
+    CONTACT_COLUMNS,
+    COUPLING_COLUMNS,
+    FIELD_COLUMNS,
+    FRICTION_COLUMNS,
+    RUN_COLUMNS,
+)
 from fsci.case.yaml_text import Keys
 
 OF_BODIES = ("force", "moment", *COEFFICIENTS)
@@ -137,6 +144,8 @@ def verify_mistakes(case: Case) -> Iterator[Mistake]:
     if case.contact is not None:
         columns += [f"contact.{name}.{axis}" for name in case.contact.pairs for axis in "xyz"[: case.dimension or 3]]
         columns += CONTACT_COLUMNS
+        if any(pair.friction.some for pair in case.contact.pairs.values()):
+            columns += FRICTION_COLUMNS
     for i, check in enumerate(case.verify):
         keys: Keys = ("verify", i)
         found_later = case.contact is not None and case.contact.bodies is not None and check.value[:8] == "contact."

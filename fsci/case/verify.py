@@ -23,6 +23,7 @@ COUPLING_COLUMNS = ("interface.force", "interface.momentum", "interface.power", 
 
 #: and those of a run with contact, besides the resultants contact.PAIR.x, .y, .z on the slave
 CONTACT_COLUMNS = ("contact.active", "contact.changes")
+FRICTION_COLUMNS = ("contact.sticking", "contact.friction")
 
 
 class Check(Section):
