@@ -1,5 +1,5 @@
 # `make demo` installs what is missing, runs a first case and draws it; `make test` checks everything.
-# Needs Debian 12 or 13, or a system with their packages, with git and make; `setup` fetches the rest. What is up to date is
+# Needs Debian 12 or 13, or Ubuntu 26.04 or later, with git and make; `setup` fetches the rest. What is up to date is
 # not done again. `make setup PIP=1` takes DOLFINx from PyPI instead and needs no root: a compiler and Python 3.12 or later.
 
 SHELL  := /bin/bash
@@ -40,9 +40,11 @@ MODULES        := .venv/modules.txt
 # DOLFINx was compiled against the numpy that came with it, and needs its generation.
 NUMPY_OF_DOLFINX := $(BIN)/python -c 'import numpy; print("numpy<2" if numpy.__version__ < "2" else "numpy")'
 KERNEL_SOURCES := $(wildcard solvers/kernels/CMakeLists.txt solvers/kernels/*.hpp solvers/kernels/*.cpp)
+VERSION_TESTS  := fem versions lagged linear moments_kernel mortar_kernel mortar_derivatives structure_patch fluid_patch \
+  contact_patch contact_system contact_run contact_friction coupling_bar coupling_blocks coupled_run
 INSTALL        := $(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation
 
-.PHONY: setup demo test test-slow lint bench docs clean FORCE
+.PHONY: setup demo test test-slow test-versions test-debian13 lint bench docs clean FORCE
 
 setup: $(PROJECT_STAMP)
 
@@ -61,6 +63,7 @@ $(PROJECT_STAMP): pyproject.toml $(KERNEL_SOURCES) $(MODULES) | $(PACKAGES_STAMP
 	@echo "setup: building and installing fsci into .venv"
 	$(INSTALL) nanobind scikit-build-core cmake ninja $(DOLFINX)
 	$(INSTALL) --editable '.[test]' "$$($(NUMPY_OF_DOLFINX))"
+	@$(BIN)/python -c 'from solvers.fem import calls'
 	@touch $@
 
 $(DOCS_STAMP): pyproject.toml | $(PROJECT_STAMP)
@@ -77,6 +80,15 @@ test: setup lint
 
 test-slow: setup
 	$(BIN)/python -m pytest -n 2 -m slow --durations=10
+
+# What versions of DOLFINx, PETSc, MPI and numpy may break.
+test-versions: setup
+	$(BIN)/python -m pytest -n 2 -m "not slow" $(VERSION_TESTS:%=tests/test_%.py)
+	$(BIN)/python -m pytest -m slow tests/test_versions.py
+
+# The same in a Debian 13 that is made for it, as root.
+test-debian13:
+	.ci/test-debian13
 
 lint: setup
 	$(BIN)/ruff check
