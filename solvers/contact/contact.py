@@ -188,8 +188,11 @@ class Contact:
         self.z[:] = own if self._lent is None else own + self._lent @ own
 
     def _with_lent(self, rows):
-        """Rows (of gap, D, ...) of multipliers plus those of the functions that are lent to them."""
-        return rows if self._lent is None else rows + self._lent.T @ rows
+        """Rows of multipliers, one each or one for each component, plus those of functions that are lent to them."""
+        if self._lent is None:
+            return rows
+        lent = self._lent if rows.shape[0] == len(self.z) else expand(self._lent, self.dim)
+        return rows + lent.T @ rows
 
     def _evaluate_mortars(self) -> Terms | None:
         """Terms of all pairs, each process doing its share of the slave facets; None if no facets are near."""

@@ -20,11 +20,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.contact.blocks import components, expand
+from solvers.contact.blocks import add_up, components, expand
 from solvers.contact.mortar import Mortar
 from solvers.contact.patch import Multipliers
 from solvers.contact.share import Shares
-from solvers.contact.terms import Normals, find_normals, renumber
+from solvers.contact.terms import Normals, find_normals
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,7 @@ class Beginning:
     """The integrals at the beginning of a step."""
 
     difference: sp.csr_matrix  #: (W^n, -M^n) over all nodes, shape (C, N)
+    slopes: sp.csr_matrix  #: the same for all components, shape (dim * C, dim * N)
     D: Array  #: shape (C,)
 
 
@@ -59,8 +60,8 @@ class Sliding:
 
     def begin_step(self, x: Array, with_lent: Callable[[Any], Any]) -> None:
         """Integrals at the positions x [m] at the beginning of a step, shape (N, dim)."""
-        (N, _), C = self._shape, self._count
-        D, difference = np.zeros(C), sp.csr_matrix((C, N))
+        (N, dim), C = self._shape, self._count
+        D, parts = np.zeros(C), []
         normals = find_normals(self._multipliers, x) if self.mortars else None
         for index, mortar in enumerate(self.mortars):
             facet_pairs, _ = mortar.near(x, x)
@@ -70,10 +71,10 @@ class Sliding:
             found, W, M = mortar.begin(x, normals.at(self._multipliers, mortar.patch)[0], facet_pairs)
             rows = mortar.patch.multipliers
             D[rows] += found
-            difference = difference + renumber(W, rows, mortar.patch.nodes, difference.shape)
-            difference = difference - renumber(M, rows, mortar.masters.nodes, difference.shape)
-        D, difference = self._shares.total_of(D, difference)
-        self._beginning = Beginning(with_lent(difference), with_lent(D))
+            parts += [(W, rows, mortar.patch.nodes), (-M, rows, mortar.masters.nodes)]
+        D, difference = self._shares.total_of(D, add_up(parts, (C, N)))
+        difference = with_lent(difference)
+        self._beginning = Beginning(difference, expand(difference, dim), with_lent(D))
 
     def evaluate(
         self,
@@ -85,28 +86,19 @@ class Sliding:
         """Slip at the positions x [m] with the facet pairs that took part in the integrals there."""
         assert self._beginning is not None
         (N, dim), C = self._shape, self._count
-        gap, dgap = np.zeros((C, dim)), [sp.csr_matrix((C, dim * N)) for _ in range(dim)]
+        gap, parts = np.zeros((C, dim)), []
         for mortar, facet_pairs in used:
             if not any(mortar is mine for mine in self.mortars):
                 continue
             values, slopes = mortar.gap_vectors(x, *normals.at(self._multipliers, mortar.patch), facet_pairs)
             rows, nodes = mortar.patch.multipliers, np.concatenate([mortar.patch.nodes, mortar.masters.nodes])
             gap[rows] += values
-            for axis, part in enumerate(slopes):
-                dgap[axis] = dgap[axis] + renumber(part, rows, components(nodes, dim), dgap[axis].shape)
-        gap, *dgap = self._shares.total_of(gap, *dgap)
+            columns = components(nodes, dim)
+            parts += [(part, dim * rows + axis, columns) for axis, part in enumerate(slopes)]
+        gap, dgap = self._shares.total_of(gap, add_up(parts, (dim * C, dim * N)))
         D, known = self._beginning.D, self._beginning.D > 0.0
         share = np.divide(1.0, D, out=np.zeros_like(D), where=known)
         values = share[:, None] * (self._beginning.difference @ x + with_lent(gap))
-        slopes = expand(self._beginning.difference, dim) + _interleave([with_lent(part) for part in dgap])
-        return Slip(values, (sp.diags(np.repeat(share, dim)) @ slopes).tocsr(), known)
-
-
-def _interleave(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
-    """Matrices of one component each as one with rows dim * multiplier + component."""
-    dim, (rows, columns) = len(parts), parts[0].shape
-    total = sp.csr_matrix((dim * rows, columns))
-    places = components(np.arange(rows), dim).reshape(rows, dim)
-    for axis, part in enumerate(parts):
-        total = total + renumber(part, places[:, axis], np.arange(columns), total.shape)
-    return total
+        slopes = self._beginning.slopes + with_lent(dgap)
+        slopes.data *= np.repeat(share.repeat(dim), np.diff(slopes.indptr))
+        return Slip(values, slopes, known)

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import scipy.sparse as sp
 
 from solvers.api import Array
-from solvers.contact.blocks import block_columns
 from solvers.contact.law.friction import friction_residual, friction_rows, friction_status
 from solvers.contact.law.law import Point, Rows, Slopes, Span, Statuses
 
@@ -29,9 +27,11 @@ class Coulomb:
         return friction_residual(at, status, weight, self._radius(at))
 
     def rows(self, at: Point, slopes: Slopes, status: Statuses, weight: float) -> Rows:
-        by_gap = np.divide(at.c_n, at.D, out=np.zeros_like(at.D), where=at.D > 0.0)
-        by_u = self.mu * (block_columns(at.z).T @ slopes.normals - sp.diags(by_gap) @ slopes.gap)
-        return friction_rows(at, slopes, status, weight, self._radius(at), self.mu * at.normals, by_u.tocsr())
+        by_gap = -self.mu * np.divide(at.c_n, at.D, out=np.zeros_like(at.D), where=at.D > 0.0)
+        by_z, by_normal = self.mu * at.normals, self.mu * at.z
+        return friction_rows(
+            at, slopes, status, weight, self._radius(at), by_z=by_z, by_normal=by_normal, by_gap=by_gap
+        )
 
     def _radius(self, at: Point) -> Array:
         return self.mu * np.where(at.slip_known, np.maximum(0.0, at.trial_pressure), 0.0)

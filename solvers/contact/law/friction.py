@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from solvers.api import Array
-from solvers.contact.blocks import block_columns, block_diagonal
+from solvers.contact.blocks import components
 from solvers.contact.law.law import OPEN, SLIP, STICK, Point, Rows, Slopes, Statuses, along
 
 
@@ -47,30 +47,42 @@ def friction_residual(at: Point, status: Statuses, weight: float, radius: Array)
 
 
 def friction_rows(
-    at: Point, slopes: Slopes, status: Statuses, weight: float, radius: Array, by_z: Array, by_u: sp.csr_matrix
+    at: Point,
+    slopes: Slopes,
+    status: Statuses,
+    weight: float,
+    radius: Array,
+    *,
+    by_z: Array,
+    by_normal: Array,
+    by_gap: Array,
 ) -> Rows:
-    """The residual and its derivatives; those of the radius are by_z (m, dim) and by_u (m, dim * N)."""
+    """The residual and its derivatives; those of the radius by z and n have the shape (m, dim), by the gap (m,)."""
     dim = at.z.shape[1]
     tangent = along(at.normals)
-    factor = weight * at.D
+    factor = (weight * at.D)[:, None, None]
     q = trial_traction(at)
     _, by_q, by_radius = _on_disc(q, status, radius, derivatives=True)
-    y_n = np.einsum("nd,nd->n", at.z + at.c_t[:, None] * at.slip, at.normals)
+    y_n = np.einsum("nd,nd->n", at.z + at.c_t[:, None] * at.slip, at.normals)[:, None, None]
 
     # dz_t = T dz - z_n dn and dq = T (dz + c_t du) - y_n dn, both along the surface; dP = by_q dq + by_radius ds
     in_z = tangent - by_q @ tangent - by_radius[:, :, None] * by_z[:, None, :]
-    turning = block_diagonal(
-        factor[:, None, None] * (y_n[:, None, None] * by_q - at.pressure[:, None, None] * np.eye(dim))
-    )
-    sliding = block_diagonal((factor * at.c_t)[:, None, None] * (by_q @ tangent))
-    in_u = (
-        block_columns(at.normals) @ sp.diags(at.stiffness) @ slopes.gap
-        + turning @ slopes.normals
-        - sliding @ slopes.slip
-        - block_columns(factor[:, None] * by_radius) @ by_u
-    )
-    residual = friction_residual(at, status, weight, radius)
-    return Rows(residual, factor[:, None, None] * in_z, in_u.tocsr())
+    turning = y_n * by_q - at.pressure[:, None, None] * np.eye(dim) - by_radius[:, :, None] * by_normal[:, None, :]
+    closing = at.stiffness[:, None] * at.normals - factor[:, 0] * by_gap[:, None] * by_radius
+    sliding = -at.c_t[:, None, None] * (by_q @ tangent)
+    in_u = _in_displacements(closing, factor * turning, factor * sliding, slopes)
+    return Rows(friction_residual(at, status, weight, radius), factor * in_z, in_u)
+
+
+def _in_displacements(by_gap: Array, by_normal: Array, by_slip: Array, slopes: Slopes) -> sp.csr_matrix:
+    """by_gap dg + by_normal dn + by_slip du_t; shapes (m, dim), (m, dim, dim), (m, dim, dim): one sparse product."""
+    m, dim = by_gap.shape
+    entries = np.concatenate([by_gap[:, :, None], by_normal, by_slip], axis=2)
+    vectors = m + components(np.arange(m), dim).reshape(m, dim)
+    columns = np.concatenate([np.arange(m)[:, None], vectors, dim * m + vectors], axis=1)
+    indices, indptr = columns.repeat(dim, axis=0).ravel(), (1 + 2 * dim) * np.arange(dim * m + 1)
+    combination = sp.csr_matrix((entries.ravel(), indices, indptr), shape=(dim * m, (1 + 2 * dim) * m))
+    return combination @ sp.vstack([slopes.gap, slopes.normals, slopes.slip], format="csr")
 
 
 def _on_disc(q: Array, status: Statuses, radius: Array, *, derivatives: bool = False):

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import scipy.sparse as sp
 
 from solvers.api import Array
 from solvers.contact.law.friction import friction_residual, friction_rows, friction_status
@@ -28,8 +27,10 @@ class Tresca:
         return friction_residual(at, status, weight, self._radius(at))
 
     def rows(self, at: Point, slopes: Slopes, status: Statuses, weight: float) -> Rows:
-        constant = np.zeros_like(at.z), sp.csr_matrix(slopes.gap.shape)
-        return friction_rows(at, slopes, status, weight, self._radius(at), *constant)
+        zero = np.zeros_like(at.z)
+        return friction_rows(
+            at, slopes, status, weight, self._radius(at), by_z=zero, by_normal=zero, by_gap=np.zeros_like(at.D)
+        )
 
     def _radius(self, at: Point) -> Array:
         return np.where(at.slip_known, self.bound, 0.0)
