@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.blocked import find_blocked
+from solvers.contact.blocks import expand
 from solvers.contact.condense import Condensed, Linearised, condense, recover
 from solvers.contact.coverage import Coverage
 from solvers.contact.directions import free_normals

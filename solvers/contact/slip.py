@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.contact.blocks import add_up, components, expand
+from solvers.contact.blocks import add_up, components, expand, scale_rows
 from solvers.contact.mortar import Mortar
 from solvers.contact.patch import Multipliers
 from solvers.contact.share import Shares
@@ -99,6 +99,5 @@ class Sliding:
         D, known = self._beginning.D, self._beginning.D > 0.0
         share = np.divide(1.0, D, out=np.zeros_like(D), where=known)
         values = share[:, None] * (self._beginning.difference @ x + with_lent(gap))
-        slopes = self._beginning.slopes + with_lent(dgap)
-        slopes.data *= np.repeat(share.repeat(dim), np.diff(slopes.indptr))
+        slopes = scale_rows(self._beginning.slopes + with_lent(dgap), share.repeat(dim))
         return Slip(values, slopes, known)

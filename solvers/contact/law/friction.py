@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from solvers.api import Array
-from solvers.contact.blocks import components
+from solvers.contact.blocks import components, vstack
 from solvers.contact.law.law import OPEN, SLIP, STICK, Point, Rows, Slopes, Statuses, along
 
 
@@ -82,7 +82,7 @@ def _in_displacements(by_gap: Array, by_normal: Array, by_slip: Array, slopes: S
     columns = np.concatenate([np.arange(m)[:, None], vectors, dim * m + vectors], axis=1)
     indices, indptr = columns.repeat(dim, axis=0).ravel(), (1 + 2 * dim) * np.arange(dim * m + 1)
     combination = sp.csr_matrix((entries.ravel(), indices, indptr), shape=(dim * m, (1 + 2 * dim) * m))
-    return combination @ sp.vstack([slopes.gap, slopes.normals, slopes.slip], format="csr")
+    return combination @ vstack([slopes.gap, slopes.normals, slopes.slip])
 
 
 def _on_disc(q: Array, status: Statuses, radius: Array, *, derivatives: bool = False):
