@@ -38,6 +38,7 @@ CLOSE_TIMES = (5.5, 5.55)
 PANELS: dict[str, tuple[tuple[float, ...], int, tuple[float, float, float]]] = {
     "double_arch": ((0, 15, 35, 50, 60, 70), 3, (0.0, 0.0, 1.0)),
     "ironing": ((0, 1, 3, 5), 2, (0.0, 0.0, 1.0)),
+    "two_tori_friction": (PAPER_TIMES, 3, (0.1, -1.0, 0.35)),
     "tied_cube": ((0, 1), 2, (0.5, -1.0, 0.4)),
     "self_contact_fold": ((0, 0.6, 0.8, 1), 2, (0.0, 0.0, 1.0)),
 }
