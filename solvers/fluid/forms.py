@@ -101,25 +101,29 @@ def bulk(flow: Flow, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
 
 
 def residual_based(flow: Flow, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
-    """Integrand of the SUPG, PSPG and grad-div terms, (tau_M (rho a . grad v + grad q), R) + (tau_C div u, div v).
+    """Integrand of the SUPG, PSPG and grad-div terms, (rho a . grad v + grad q, T R) + (tau_C div u, div v).
 
     tau_M = (4 rho^2 alpha^2 + rho^2 a . G a + 36 mu^2 G : G)^(-1/2), 144 for second degree, tau_C = 1 / (tau_M tr G),
-    G = diag(4 / h_i^2). The viscous part of R is that of a field without divergence, mu lap u, zero for first degree.
+    G = diag(4 / h_i^2), T = tau_M I. For first degree T = diag(tau_i) with dim G_ii^2 in the place of G : G: with
+    the shortest edge for all directions the pressure would hardly be stabilised along the longer ones, and the error
+    would grow with their ratio. For second degree the viscous part of R, that of a field without divergence, mu lap u,
+    bounds tau by the shortest edge; for first degree it is zero.
+    Source of tau by direction: Blasco, Comput. Methods Appl. Mech. Engrg. 197 (2008) 3712-3723.
     """
     metric = [4.0 / h**2 for h in flow.sizes]
-    trace = sum(metric)
-    square = (36.0 if flow.degree == 1 else 144.0) * flow.mu**2 * sum(g**2 for g in metric)
-    if not flow.steady:
-        square += 4.0 * flow.rho**2 * flow.alpha**2
+    trace, square = sum(metric), sum(g**2 for g in metric)
+    directions = [len(metric) * g**2 for g in metric] if flow.degree == 1 else [square] * len(metric)
+    viscous = (36.0 if flow.degree == 1 else 144.0) * flow.mu**2
+    common = 0.0 if flow.steady else 4.0 * flow.rho**2 * flow.alpha**2
     test = grad(q)
     if flow.convection:
-        square += flow.rho**2 * sum(g * flow.a[i] ** 2 for i, g in enumerate(metric))
+        common += flow.rho**2 * sum(g * flow.a[i] ** 2 for i, g in enumerate(metric))
         test += flow.rho * dot(grad(v), flow.a)
-    tau = 1.0 / sqrt(square)
     strong = inertia(flow, u) + grad(p)
     if flow.degree > 1:
         strong -= flow.mu * div(grad(u))
-    return tau * dot(test, strong) + div(u) * div(v) / (tau * trace)
+    by_direction = sum(test[i] * strong[i] / sqrt(common + viscous * g) for i, g in enumerate(directions))
+    return by_direction + sqrt(common + viscous * square) / trace * div(u) * div(v)
 
 
 def interface(flow: Flow, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:

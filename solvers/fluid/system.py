@@ -283,11 +283,12 @@ class FlowSystem:
     def _interface_penalties(self, pieces: Pieces, cut: Cut) -> Array:
         """P = s I + s_n n n^T of pieces [Pa s/m], shape (pieces, dim, dim).
 
-        s = gamma mu C_T / h + rho max(0, -g . n), s_n = rho (gamma_b |a| + gamma_t h alpha).
+        s = gamma mu C_T / h + rho max(0, -g . n), s_n = rho (gamma_b |a| + gamma_t h alpha) with
+        h = (sum n_i^2 / h_i^2)^(-1/2), the length of a cell along the normal.
         """
         settings, factors, n = self.settings, self.settings.penalties, pieces.normal
         cells = cut.cut[pieces.cell]
-        h, rho = self.grid.sizes[cells].min(axis=1), settings.density
+        h, rho = 1.0 / np.linalg.norm(n / self.grid.sizes[cells], axis=1), settings.density
         s = factors.nitsche * settings.viscosity * forms.TRACE[self.grid.dim, settings.degree] / h
         if settings.convection:
             g = cut.motion.v[cut.facets[pieces.facet]].mean(axis=1)
