@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from coupling.interface import Interface
 from solvers.api import Array, State
 from solvers.fluid.balances import Balances
 from solvers.fluid.field import Fluid
-
-if TYPE_CHECKING:
-    from coupling.coupled import Coupled
-
+from solvers.structure.field import Structure
 
 #: columns of the history -> attributes
 COLUMNS = {
@@ -34,7 +30,8 @@ class Balance:
         force = |b - m| / |m|,  work = sum over steps of b . (d - d_n) - dt f . g
     """
 
-    def __init__(self, fluid: Fluid) -> None:
+    def __init__(self, fluid: Fluid, structure: Structure, interface: Interface) -> None:
+        self._fluid, self._structure, self._interface = fluid, structure, interface
         self._of_fluid = Balances(fluid)
         self.force = 0.0  #: |force that the structure took - mean force of the fluid| / |that force|, 1
         self.momentum = 0.0  #: |force on all bodies - what it is by the momentum of the fluid| [N]
@@ -43,25 +40,26 @@ class Balance:
         self.work = 0.0  #: of the structure's load less that of the fluid's force, all steps [J]
         self.given: Array  #: force [N] of the fluid on the vertices at the end of the last step
 
-    def start(self, coupled: Coupled) -> None:
+    def start(self) -> None:
         """The state before the first step; the structure starts without the fluid's force."""
-        self.given = coupled.interface.gather(coupled.structure.carried_at_start())
+        self.given = self._interface.gather(self._structure.carried_at_start())
 
-    def add_step(self, coupled: Coupled) -> None:
+    def add_step(self) -> None:
         """After both fields have accepted the step."""
-        interface, structure = coupled.interface, coupled.structure
-        before, self.given = self.given, coupled.force()
+        fluid, interface, structure = self._fluid, self._interface, self._structure
+        by_surface = fluid.force()
+        before, self.given = self.given, interface.join(by_surface)
         weight = structure.time.force_weight
         mean = weight * self.given + (1.0 - weight) * before
         taken = interface.gather(structure.carried())
         size = float(np.linalg.norm(mean))
         self.force = float(np.linalg.norm(taken - mean)) / size if size > 0.0 else 0.0
         of_fluid, self.loss = self._of_fluid()
-        total = sum(force.sum(axis=0) for force in coupled.fluid.force().values())
+        total = sum(force.sum(axis=0) for force in by_surface.values())
         self.momentum = float(np.linalg.norm(total - of_fluid))
         self.power = float((self.given * interface.velocity(interface.now)).sum())
         moved = interface.gather(structure.now.u - structure.old.u)
-        self.work += float((taken * moved).sum()) - coupled.fluid.dt * self.power
+        self.work += float((taken * moved).sum()) - fluid.dt * self.power
 
     def numbers(self) -> dict[str, float]:
         """Columns of the history."""

@@ -26,7 +26,7 @@ class Coupled:
     predictor: Predictor = field(init=False)
 
     def __post_init__(self) -> None:
-        self.balance, self.predictor = Balance(self.fluid), Predictor()
+        self.balance, self.predictor = Balance(self.fluid, self.structure, self.interface), Predictor()
 
     def initialise(self, t: float, dt: float) -> None:
         """Both fields at the first time, the fluid around the structure as it starts."""
@@ -35,7 +35,7 @@ class Coupled:
         self.interface.old = self.interface.now.copy()
         self.fluid.initialise(t, dt)
         self.fluid.move(self.interface.move(self.interface.now))
-        self.balance.start(self)
+        self.balance.start()
 
     def begin_step(self, t: float, dt: float) -> None:
         """Boundary and loads at t + dt, both fields as they were at t."""
@@ -60,7 +60,7 @@ class Coupled:
         """Accept the step."""
         self.structure.end_step()
         self.fluid.end_step()
-        self.balance.add_step(self)
+        self.balance.add_step()
 
     def force(self) -> Array:
         """Force [N] of the fluid on the vertices, shape (n, dim)."""

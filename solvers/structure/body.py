@@ -14,7 +14,8 @@ from solvers import fem
 from solvers.api import Array
 from solvers.mesh import Mesh
 from solvers.structure import forms
-from solvers.structure.elements import Displacement, Element, Formulation, Mixed
+from solvers.structure.element import Element
+from solvers.structure.elements import Displacement, Formulation, Mixed
 from solvers.structure.loads import DeadLoads, FollowerPressure, LineForce, PointForce, Pressure, Traction
 from solvers.structure.materials import Material, parameters
 from solvers.structure.springs import Spring, Springs

@@ -11,14 +11,10 @@ Source: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import ufl
 
+from solvers.structure.element import Element
 from solvers.structure.materials import Tensor, in_space
-
-if TYPE_CHECKING:
-    from solvers.structure.elements import Element
 
 
 def deformation_gradient(u: Tensor) -> Tensor:
