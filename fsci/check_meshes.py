@@ -17,7 +17,7 @@ from fsci.case import Case, CaseError
 from fsci.case.contact import Pair
 from fsci.case.errors import Problem
 from fsci.case.mesh import FileMesh
-from fsci.case.plausible_flow import thin_body
+from fsci.case.plausible_flow import fast_body, thin_body
 from fsci.case_meshes import read_body, read_obstacle, read_rigid_body, require_inside_period, slave_surfaces
 from fsci.rigid_motion import rigid_motion
 from fsci.skin import find_skin
@@ -161,7 +161,8 @@ def _rigid(case: Case, found: Findings) -> None:
     points = [(key, k, at) for key, p in case.probes.items() if p.field == "fluid" for k, at in _points(p)]
     surfaces, motions = [], []
     for name, body in case.fluid.bodies.items():
-        if not (isinstance(body.mesh, FileMesh) or points or body.on or _has_period(case)):
+        turns = body.motion is not None and body.motion.rotation is not None
+        if not (isinstance(body.mesh, FileMesh) or points or body.on or turns or _has_period(case)):
             continue
         read = found.attempt(partial(read_rigid_body, case, name))
         if read is None:
@@ -170,6 +171,8 @@ def _rigid(case: Case, found: Findings) -> None:
         keys: Keys = ("fluid", "bodies", name)
         found.note(case, keys, mesh)
         if body.motion is not None:
+            if turns and case.fluid.scheme != "steady" and (doubt := fast_body(case, case.fluid, body.motion, x)):
+                found.warnings.append(f"{case.place(*keys, 'motion')}: {doubt}")
             x = rigid_motion(x, body.motion, case.time.start, case.time.step)(case.time.start)[0]
         found.attempt(partial(require_inside_period, case, keys, x))
         if isinstance(body.mesh, FileMesh):

@@ -1,6 +1,7 @@
 """Bodies that cross more than a cell in a step are named by `fsci check` and by the run, with a step that is small."""
 
 from fsci.case import load_case
+from fsci.check_meshes import check_meshes
 from fsci.run import FINISHED, run_case
 
 CASE = """
@@ -33,6 +34,18 @@ def test_three_cells_in_a_step(tmp_path):
     assert "the body moves 3 cells in a time step: forces are off; a 'step' below 0.033 keeps it" in warnings[0]
     assert log.count("body 'disc' moves 3 cells in a time step") == 1
     assert "a step below 0.033 keeps it below one cell" in log
+
+
+def test_a_rotation(tmp_path):
+    """The corners, 0.304 m from the centre, go round with 57 degrees in a step of 0.1 s: 3 cells, less on a slant."""
+    turning = "motion: {rotation: {centre: [0.525, 0.525], angular_velocity: 573}}"
+    (tmp_path / "case.yaml").write_text(CASE.replace('motion: {displacement: ["SPEED*t", 0]}', turning))
+    case = load_case(tmp_path / "case.yaml")
+    assert case.warnings == ()  # the mesh is not read yet
+    (warning,) = check_meshes(case).warnings
+    assert "case.yaml:13:15: the body moves 3 cells in a time step: forces are off; a 'step' below 0.034" in warning
+    slow = load_case(tmp_path / "case.yaml", [("time.step", "0.03")])
+    assert check_meshes(slow).warnings == []
 
 
 def test_less_than_a_cell(tmp_path):
