@@ -2,11 +2,14 @@
 
 import os
 import threading
+from pathlib import Path
 
 import pytest
+from ruamel.yaml import YAML
 from small_cases import BLOCK
 
 from fsci.case import CaseError, load_case
+from fsci.case.yaml_text import MOST_VALUES
 from fsci.memory import require_memory
 
 
@@ -21,6 +24,19 @@ def test_aliases_that_multiply(tmp_path):
     """Six lines stand for 10^6 values."""
     lines = [f"a{i}: &a{i} [" + ",".join(["1" if i == 0 else f"*a{i - 1}"] * 10) + "]" for i in range(6)]
     assert "the case has more than 20000 values up to here" in message(tmp_path, "\n".join(lines))
+
+
+def test_the_bound_is_far_from_cases_that_are_meant():
+    counts = {}
+    for path in Path("cases").glob("*/case.yaml"):
+        counts[path.parent.name] = count(YAML(typ="safe", pure=True).load(path))
+    assert max(counts.values()) < MOST_VALUES / 50, counts
+
+
+def count(data) -> int:
+    """Settings and entries of lists."""
+    parts = data.values() if isinstance(data, dict) else data if isinstance(data, list) else ()
+    return 1 + sum((1 if isinstance(data, dict) else 0) + count(part) for part in parts)
 
 
 def test_a_long_file(tmp_path):

@@ -14,6 +14,8 @@ from fsci.case.errors import CaseError, Place, Problem
 Keys = tuple[str | int, ...]  #: path of a setting, such as ("structure", "bodies", "flag", "supports", 0, "on")
 
 #: Settings and list entries of a case, counted again wherever an alias repeats them. Long tables belong into files.
+#: Each takes about 0.1 ms and 1 kB. The largest of `cases/` has 250, and 200,000 would take 20 s: from 1,000 to 200,000
+#: any limit does the same, refuse what is not meant to be a case.
 MOST_VALUES = 20_000
 
 #: what the YAML reader says -> what the author of a case file can use; the first that fits counts
