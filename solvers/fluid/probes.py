@@ -7,7 +7,6 @@ is per unit of depth.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import ufl
@@ -16,12 +15,10 @@ from solvers import fem
 from solvers.api import Array
 from solvers.fluid import forms
 from solvers.fluid.balances import leak
+from solvers.fluid.covered_faces import CoveredFaces, covered_faces
 from solvers.fluid.field import Fluid
-from solvers.fluid.grid import FACES
 from solvers.fluid.inside import INSIDE, require_outside, winding
 from solvers.fluid.space import Nodes
-from solvers.fluid.wet_faces import wet_face
-from solvers.gauss import gauss
 
 Probe = Callable[[], dict[str, float]]
 
@@ -95,11 +92,14 @@ def on_patch(fluid: Fluid, quantity: str, patch: str) -> Probe:
     ds = fem.measure(domain, "ds", 1)
     force, area = (fem.Integral(domain, f * ds) for f in (p, fem.constant(domain, 1.0)))
 
+    def pressure(part: CoveredFaces) -> Array:
+        return part.pressure(fluid.grid, fluid.unknowns, fluid.flow)
+
     def probe() -> dict[str, float]:
         facets, covered = _facets(fluid, [patch])
         total, size = (fem.assemble_scalar(f.on(exterior_facet=facets), fluid.comm) for f in (force, area))
-        total += fluid.comm.allreduce(sum(float((part.weights * part.pressure(fluid)).sum()) for part in covered))
-        size += fluid.comm.allreduce(sum(float(part.weights.sum()) for part in covered))
+        total += fluid.comm.allreduce(sum(float((p.weights * pressure(p)).sum()) for p in covered))
+        size += fluid.comm.allreduce(sum(float(p.weights.sum()) for p in covered))
         return {"": total / size if size else float("nan")}
 
     return probe
@@ -112,34 +112,15 @@ def flow_rate(fluid: Fluid) -> Callable[[Sequence[str]], float]:
         domain, ufl.dot(u, ufl.FacetNormal(domain.mesh)) * fem.measure(domain, "ds", fluid.unknowns.degree)
     )
 
+    def outflow(part: CoveredFaces) -> Array:
+        return part.outward(part.velocity(fluid.grid, fluid.unknowns, fluid.flow))
+
     def rate(patches: Sequence[str]) -> float:
         facets, covered = _facets(fluid, patches)
         whole = fem.assemble_scalar(form.on(exterior_facet=facets), fluid.comm)
-        return whole + fluid.comm.allreduce(sum(float((p.weights * p.outflow(fluid)).sum()) for p in covered))
+        return whole + fluid.comm.allreduce(sum(float((p.weights * outflow(p)).sum()) for p in covered))
 
     return rate
-
-
-@dataclass(frozen=True)
-class CoveredFaces:
-    """Faces of cells on one face of the box that bodies cover in part."""
-
-    cells: np.ndarray  #: local cells
-    axis: int
-    side: int  #: 0 or 1
-    reference: Array  #: points in the reference cell, shape (points, dim)
-    weights: Array  #: wet weights times areas [m^(dim-1)], shape (cells, points)
-
-    def outflow(self, fluid: Fluid) -> Array:
-        """Velocity [m/s] out of the box at the points, shape (cells, points)."""
-        shapes, _ = fem.tabulate_lagrange(fluid.grid.domain, fluid.unknowns.degree, self.reference)
-        values = fluid.flow[fluid.unknowns.cell_velocity[self.cells][:, :, self.axis]] @ shapes.T
-        return values if self.side else -values
-
-    def pressure(self, fluid: Fluid) -> Array:
-        """Pressure [Pa] at the points, shape (cells, points)."""
-        shapes, _ = fem.tabulate_lagrange(fluid.grid.domain, 1, self.reference)
-        return fluid.flow[fluid.unknowns.cell_pressure[self.cells]] @ shapes.T
 
 
 def _facets(fluid: Fluid, patches: Sequence[str]) -> tuple[np.ndarray, list[CoveredFaces]]:
@@ -152,35 +133,8 @@ def _facets(fluid: Fluid, patches: Sequence[str]) -> tuple[np.ndarray, list[Cove
     facets, cells = facets[order], cells[order]
     wet = np.zeros(len(grid.numbers), dtype=bool)
     wet[np.concatenate([cut.uncut, cut.cut])] = True
-    counted, covered = wet[cells], []
-    if len(cut.facets):
-        middles = fem.facet_midpoints(grid.domain, facets)
-        for face in FACES[: 2 * grid.dim]:
-            on = grid.on_face(middles, face)
-            part, touched = _covered(fluid, face, cells[on])
-            counted[np.flatnonzero(on)[touched]] = False
-            covered += [part] if len(part.cells) else []
-    return facets[counted], covered
-
-
-def _covered(fluid: Fluid, face: str, cells: np.ndarray) -> tuple[CoveredFaces, np.ndarray]:
-    """(the covered ones of the faces of local cells, which of the cells they belong to)."""
-    grid, axis, side = fluid.grid, "xyz".index(face[0]), int(face[1] == "+")
-    points = gauss(fluid.unknowns.degree + 1)[0]
-    found = wet_face(grid.grid, face, points, fluid.cut.facets, fluid.cut.motion)
-    places = np.unravel_index(grid.numbers[cells], grid.grid.shape, order="F")
-    others = [i for i in range(grid.dim) if i != axis]
-    shape = [grid.grid.shape[i] for i in others]
-    number = np.ravel_multi_index([places[i] for i in others], shape, order="F")
-    row = np.full(int(np.prod(shape)), -1)
-    row[found.cells] = np.arange(len(found.cells))
-    touched = np.flatnonzero(row[number] >= 0)
-    reference = np.full((len(points) ** len(others), grid.dim), float(side))
-    for k, i in enumerate(others):
-        reference[:, i] = np.tile(np.repeat(points, len(points) ** k), len(points) ** (len(others) - 1 - k))
-    areas = grid.sizes[cells[touched]][:, others].prod(axis=1)
-    weights = found.weights[row[number[touched]]] * areas[:, None]
-    return CoveredFaces(cells[touched], axis, side, reference, weights), touched
+    free, covered = covered_faces(grid, cut, fluid.unknowns.degree + 1, facets, cells)
+    return facets[wet[cells] & free], covered
 
 
 def mass_balance(fluid: Fluid) -> Callable[[], dict[str, float]]:

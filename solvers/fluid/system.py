@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,6 +15,7 @@ from petsc4py import PETSc
 from solvers import fem
 from solvers.api import Array
 from solvers.fluid import forms
+from solvers.fluid.covered_faces import CoveredFaces, covered_faces
 from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.interface import Interface
@@ -140,6 +141,9 @@ class FlowSystem:
                 given = self.unknowns.parts(t)[0]
                 term = forms.traction(given, v) if patch.kind == "traction" else forms.pressure(self.terms, given[0], v)
                 self._tractions.append((number, t, fem.Integral(domain, term * ds)))
+        #: (which traction, faces that bodies cover in part)
+        self._covered: list[tuple[int, CoveredFaces]] = []
+        self._covered_outflow: list[CoveredFaces] = []
         self._outflow = [number for number, patch in enumerate(patches) if patch.kind == "outflow"]
         if self._outflow:
             form = forms.outflow(self.terms, u, v) * ds
@@ -231,13 +235,47 @@ class FlowSystem:
 
     def _add_outer_faces(self, active) -> None:
         boundary = self.boundary
-        kept = [np.sort(f[active[c]]) for f, c in zip(boundary.facets, boundary.cells, strict=True)]
-        for number, _, form in self._tractions:
-            self._residual_forms.append(form.on(exterior_facet=kept[number]))
+        self._covered = []
+        for index, (number, _, form) in enumerate(self._tractions):
+            cells = boundary.cells[number]
+            free, covered = self._covered_faces(boundary.facets[number], cells, active)
+            self._covered += [(index, part) for part in covered]
+            self._residual_forms.append(form.on(exterior_facet=np.sort(boundary.facets[number][active[cells] & free])))
         if self._outflow:
-            faces = np.sort(np.concatenate([kept[number] for number in self._outflow]))
+            facets, cells = (
+                np.concatenate([parts[n] for n in self._outflow]) for parts in (boundary.facets, boundary.cells)
+            )
+            free, self._covered_outflow = self._covered_faces(facets, cells, active)
+            faces = np.sort(facets[active[cells] & free])
             self._residual_forms.append(self._outflow_form.on(exterior_facet=faces))
             self._tangent_forms.append(self._outflow_tangent.on(exterior_facet=faces))
+
+    def _covered_faces(self, facets, cells, active) -> tuple[NDArray[np.bool_], list[CoveredFaces]]:
+        assert self.cut is not None
+        free, covered = covered_faces(self.grid, self.cut, 2 * self.unknowns.degree + 1, facets, cells)
+        return free, [part.only(active) for part in covered]
+
+    def _add_covered(self, out: Array) -> None:
+        """-<t, v>, <p, n . v> and the terms of outflow over the wet part of faces that bodies cover."""
+        for index, part in self._covered:
+            number, given, _ = self._tractions[index]
+            traction = part.velocity(self.grid, self.unknowns, given.x.array)
+            if self.boundary.patches[number].kind == "pressure":
+                pressure = traction[:, :, 0].copy()
+                traction[:] = 0.0
+                traction[:, :, part.axis] = -pressure if part.side else pressure
+            dofs, load = part.load(self.grid, self.unknowns, traction)
+            np.subtract.at(out, dofs, load)
+        for dofs, block in self._outflow_blocks():
+            np.add.at(out, dofs, np.einsum("caibk,cbk->cai", block, self.flow.x.array[dofs]))
+
+    def _outflow_blocks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
+        """(local dofs, derivatives) of the terms of outflow on faces that bodies cover in part."""
+        settings, unknowns = self.settings, self.unknowns
+        for part in self._covered_outflow:
+            density = settings.density if settings.convection else 0.0
+            carried = density * part.velocity(self.grid, unknowns, self._scale_velocity.x.array)
+            yield unknowns.cell_velocity[part.cells], part.outflow(self.grid, unknowns, settings.viscosity, carried)
 
     def set_penalties(self) -> None:
         """Weights of the interface and the ghost penalty, after the cut or the scales changed."""
@@ -307,6 +345,7 @@ class FlowSystem:
             fem.assemble_vector(form, self._out)
         if self.with_bodies:
             self._out += self.interface.velocity_terms(self.cut.motion.v)
+        self._add_covered(self._out)
         fem.add_ghosts(self.unknowns.space, self._out)
         owned = self.unknowns.owned
         self._in.array[:] = self.flow.x.array[:owned]
@@ -325,6 +364,9 @@ class FlowSystem:
         self._ghost.copy(matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         for form in self._tangent_forms:
             fem.assemble_matrix(matrix, form)
+        for dofs, blocks in self._outflow_blocks():
+            for at, block in zip(dofs.reshape(len(dofs), -1).astype(PETSc.IntType), blocks, strict=True):
+                matrix.setValuesLocal(at, at, block.reshape(len(at), -1), PETSc.InsertMode.ADD_VALUES)
         self._newton.value = 1.0
         matrix.assemble()
         start = matrix.getOwnershipRange()[0]
@@ -343,6 +385,7 @@ class FlowSystem:
         out = np.zeros(self.unknowns.local)
         for form in self._residual_forms[len(self._residuals) :]:
             fem.assemble_vector(form, out)
+        self._add_covered(out)
         return out
 
 

@@ -43,6 +43,8 @@ def wet_face(box: Grid, face: str, points: Array, facets: Facets, motion: Motion
     n, rule = len(points), gauss(len(points))[1]
     corners, above = motion.x[facets], motion.x[facets][:, :, axis] > place
     crossing = above.any(axis=1) & ~above.all(axis=1)
+    if not crossing.any():
+        return WetFace(np.empty(0, dtype=np.int64), np.empty((0, n ** (box.dim - 1))))
     if box.dim == 2:
         solid, fraction = _line(edges[0], points, *_crossings(corners[crossing], axis, place))
         full = rule

@@ -1,0 +1,111 @@
+"""Faces of cells at the boundary of the box that bodies cover in part or whole, and what acts on the rest of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers import fem
+from solvers.api import Array
+from solvers.fluid.cut import Cut
+from solvers.fluid.grid import FACES, DistributedGrid
+from solvers.fluid.space import Unknowns
+from solvers.fluid.wet_faces import wet_face
+from solvers.gauss import gauss
+
+
+@dataclass(frozen=True)
+class CoveredFaces:
+    """Those on one face of the box, with Gauss points and weights of their wet part."""
+
+    cells: NDArray[np.int32]  #: local cells
+    axis: int
+    side: int  #: 0 or 1
+    reference: Array  #: points in the reference cell, shape (points, dim)
+    weights: Array  #: wet weights times areas [m^(dim-1)], shape (cells, points)
+
+    def only(self, marked: NDArray[np.bool_]) -> CoveredFaces:
+        """Those of marked local cells."""
+        keep = marked[self.cells]
+        return replace(self, cells=self.cells[keep], weights=self.weights[keep])
+
+    def velocity(self, grid: DistributedGrid, unknowns: Unknowns, values: Array) -> Array:
+        """Of values at local dofs, at the points, shape (cells, points, dim)."""
+        shapes, _ = fem.tabulate_lagrange(grid.domain, unknowns.degree, self.reference)
+        return np.einsum("qa,cai->cqi", shapes, values[unknowns.cell_velocity[self.cells]])
+
+    def pressure(self, grid: DistributedGrid, unknowns: Unknowns, values: Array) -> Array:
+        """The same of the pressure, shape (cells, points)."""
+        shapes, _ = fem.tabulate_lagrange(grid.domain, 1, self.reference)
+        return values[unknowns.cell_pressure[self.cells]] @ shapes.T
+
+    def outward(self, vectors: Array) -> Array:
+        """Components of vectors along the normal that points out of the box."""
+        normal: Array = vectors[..., self.axis]
+        return normal if self.side else -normal
+
+    def load(self, grid: DistributedGrid, unknowns: Unknowns, traction: Array) -> tuple[NDArray[np.int32], Array]:
+        """(local dofs, int t . v over the wet part) with tractions t [Pa] at the points, shape (cells, points, dim)."""
+        shapes, _ = fem.tabulate_lagrange(grid.domain, unknowns.degree, self.reference)
+        weighted = self.weights[:, :, None] * traction
+        return unknowns.cell_velocity[self.cells], np.einsum("qa,cqi->cai", shapes, weighted)
+
+    def outflow(self, grid: DistributedGrid, unknowns: Unknowns, mu: float, carried: Array) -> Array:
+        """d/du of `forms.outflow` over the wet part [Pa s m^(dim-2)], shape (cells, functions, dim, functions, dim).
+
+        -<mu (grad u)^T n, v> - <min(0, rho a . n) u, v> / 2; carried: rho a at the points, shape (cells, points, dim).
+        """
+        shapes, slopes = fem.tabulate_lagrange(grid.domain, unknowns.degree, self.reference)
+        slopes = slopes / grid.sizes[self.cells][:, None, None, :]
+        (cells, _, functions, dim), w = slopes.shape, self.weights
+        block = np.zeros((cells, functions, dim, functions, dim))
+        normal = 1.0 if self.side else -1.0
+        block[..., self.axis] = -mu * normal * np.einsum("cq,qa,cqbi->caib", w, shapes, slopes)
+        back = 0.5 * np.minimum(0.0, self.outward(carried))
+        mass = np.einsum("cq,qa,qb->cab", w * back, shapes, shapes)
+        for i in range(dim):
+            block[:, :, i, :, i] -= mass
+        return block
+
+
+def covered_faces(
+    grid: DistributedGrid, cut: Cut, points: int, facets: NDArray[np.int32], cells: NDArray[np.int32]
+) -> tuple[NDArray[np.bool_], list[CoveredFaces]]:
+    """(which of some outer facets no body covers, the others), with Gauss points in each direction of a face.
+
+    facets: local; cells: the local cells that they belong to. Polynomials of the degree points - 1 are integrated
+    exactly.
+    """
+    free, covered = np.ones(len(facets), dtype=bool), []
+    if len(cut.facets):
+        middles = fem.facet_midpoints(grid.domain, facets)
+        for face in FACES[: 2 * grid.dim]:
+            on = grid.on_face(middles, face)
+            part, touched = _covered(grid, cut, face, points, cells[on])
+            free[np.flatnonzero(on)[touched]] = False
+            covered += [part] if len(part.cells) else []
+    return free, covered
+
+
+def _covered(
+    grid: DistributedGrid, cut: Cut, face: str, points_per_direction: int, cells: NDArray[np.int32]
+) -> tuple[CoveredFaces, NDArray[np.int64]]:
+    """(the covered ones of the faces of local cells, which of the cells they belong to)."""
+    axis, side = "xyz".index(face[0]), int(face[1] == "+")
+    points = gauss(points_per_direction)[0]
+    found = wet_face(grid.grid, face, points, cut.facets, cut.motion)
+    places = np.unravel_index(grid.numbers[cells], grid.grid.shape, order="F")
+    others = [i for i in range(grid.dim) if i != axis]
+    shape = [grid.grid.shape[i] for i in others]
+    number = np.ravel_multi_index([places[i] for i in others], shape, order="F")
+    row = np.full(int(np.prod(shape)), -1)
+    row[found.cells] = np.arange(len(found.cells))
+    touched = np.flatnonzero(row[number] >= 0)
+    reference = np.full((len(points) ** len(others), grid.dim), float(side))
+    for k, i in enumerate(others):
+        reference[:, i] = np.tile(np.repeat(points, len(points) ** k), len(points) ** (len(others) - 1 - k))
+    areas = grid.sizes[cells[touched]][:, others].prod(axis=1)
+    weights = found.weights[row[number[touched]]] * areas[:, None]
+    return CoveredFaces(cells[touched], axis, side, reference, weights), touched
