@@ -1,8 +1,10 @@
 """Bodies that cross more than a cell in a step are named by `fsci check` and by the run, with a step that is small."""
 
+import pytest
+
 from fsci.case import load_case
 from fsci.check_meshes import check_meshes
-from fsci.run import FINISHED, run_case
+from fsci.run import FAILED, FINISHED, run_case
 
 CASE = """
 time: {step: 0.1, end: 0.2}
@@ -46,6 +48,14 @@ def test_a_rotation(tmp_path):
     assert "case.yaml:13:15: the body moves 3 cells in a time step: forces are off; a 'step' below 0.034" in warning
     slow = load_case(tmp_path / "case.yaml", [("time.step", "0.03")])
     assert check_meshes(slow).warnings == []
+
+
+@pytest.mark.filterwarnings("ignore:overflow")
+@pytest.mark.parametrize("speed", ["1e12", "1e200"])
+def test_a_body_that_is_gone(speed, tmp_path):
+    """As an iterate that diverges: no more layers of cells than there are, and a run that ends."""
+    (tmp_path / "case.yaml").write_text(CASE.replace("SPEED", speed))
+    assert run_case(load_case(tmp_path / "case.yaml", [("time.retry.halvings", "0")]), tmp_path / "out") in (0, FAILED)
 
 
 def test_less_than_a_cell(tmp_path):

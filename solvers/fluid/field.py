@@ -196,7 +196,8 @@ class Fluid:
             return 0
         fastest = float(np.linalg.norm(motion.v, axis=1).max(initial=0.0))
         steps = 2.0 if self.settings.scheme == "bdf2" else 1.0
-        return max(1, math.ceil(1.25 * steps * fastest * self.dt / self._smallest))
+        layers = 1.25 * steps * fastest * self.dt / self._smallest
+        return math.ceil(min(max(1.0, layers), max(self.grid.grid.shape)))  # no more than there are
 
     def _check_strip(self, cut: Cut) -> None:
         blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)

@@ -253,7 +253,8 @@ class FlowSystem:
     def _covered_faces(self, facets, cells, active) -> tuple[NDArray[np.bool_], list[CoveredFaces]]:
         assert self.cut is not None
         free, covered = covered_faces(self.grid, self.cut, 2 * self.unknowns.degree + 1, facets, cells)
-        return free, [part.only(active) for part in covered]
+        with_fluid = [part.only(active) for part in covered]
+        return free, [part for part in with_fluid if len(part.cells)]
 
     def _add_covered(self, out: Array) -> None:
         """-<t, v>, <p, n . v> and the terms of outflow over the wet part of faces that bodies cover."""
