@@ -205,6 +205,65 @@ def test_a_closing_c(tmp_path):
     assert found["iterations"].max() <= 8
 
 
+#: A free ring with a slit claps together.
+CLAPPING = """\
+title: a C claps
+time: {step: 0.02, end: 0.3}
+structure:
+  dynamics: {rho_inf: 1}
+  bodies:
+    c:
+      mesh: {shape: ring, inner_radius: 0.8, outer_radius: 1.0, angle: 350, start: 5, cells: [40, 3]}
+      material: {law: neo_hooke, E: 100, nu: 0.3, density: 1}
+      initial_velocity: [0.1, "-1.5 * y * max(x, 0)"]
+contact:
+  pairs:
+    tips: {self: {body: c, on: [inner, outer, start, end]}}
+probes:
+  energy: {quantity: energy}
+  momentum: {quantity: momentum}
+"""
+
+
+@pytest.fixture(scope="module")
+def clapping(tmp_path_factory):
+    return run(CLAPPING, tmp_path_factory.mktemp("clapping"))
+
+
+def test_a_ring_claps(clapping):
+    """Momentum stays, and no energy comes from nothing; the tips touch and part again."""
+    touching = clapping["contact.active"] > 0
+    assert 2 <= touching.sum() < len(touching)
+    assert not touching[-1]
+    for axis in "xy":
+        change = clapping[f"momentum.{axis}"] - clapping[f"momentum.{axis}"][0]
+        assert np.abs(change).max() < 1e-8 * np.abs(clapping["momentum.x"][0])
+    assert np.abs(clapping["structure.energy"]).max() < 0.01 * clapping["energy.total"][0]
+    assert clapping["iterations"].max() <= 8
+
+
+def test_a_resumed_ring_claps_alike(clapping, tmp_path):
+    """Stopped with its tips in contact: equal bits."""
+    middle = clapping["time"][np.flatnonzero(clapping["contact.active"])[0]]
+    run(CLAPPING.replace("end: 0.3", f"end: {middle:g}"), tmp_path)
+    out = tmp_path / "out"
+    (out / "case.yaml").write_text((out / "case.yaml").read_text().replace(f"end: {middle:g}", "end: 0.3"))
+    done = fsci("resume", out)
+    assert done.returncode == FINISHED, done.stdout + done.stderr
+    resumed = read_history(out / "history.csv")
+    for name in clapping.keys() - {"wall"}:
+        assert np.array_equal(clapping[name], resumed[name]), name
+
+
+def test_processes_clap_alike(clapping, tmp_path):
+    (tmp_path / "case.yaml").write_text(CLAPPING)
+    done = fsci("run", tmp_path / "case.yaml", "-o", tmp_path / "out", processes=2)
+    assert done.returncode == FINISHED, done.stdout + done.stderr
+    together = read_history(tmp_path / "out" / "history.csv")
+    for name in ("energy.total", "contact.active", "momentum.x"):
+        assert np.abs(clapping[name] - together[name]).max() <= 1e-9 * np.abs(clapping[name]).max(), name
+
+
 def test_with_contact_between_bodies(tmp_path):
     """A fold with a sheet in it: the surface meets itself and an obstacle, and all forces are in balance."""
     case = load_case(
