@@ -51,7 +51,7 @@ def put_at_the_edge(contact, law, distance):
     normal = np.einsum("nd,nd->n", contact.z, point.normals)[:, None] * point.normals
     q = trial_traction(point)
     side = 1.0 + distance * np.where(every % 2, 1.0, -1.0)
-    wanted = (side * law._radius(point) / np.linalg.norm(q, axis=1))[:, None] * q
+    wanted = (side * law.radius(point) / np.linalg.norm(q, axis=1))[:, None] * q
     contact.z[:] += np.where(point.covered[:, None], wanted - q, 0.0)
     assert np.abs(np.einsum("nd,nd->n", contact.z - normal, point.normals)).max() < 1e-9
 

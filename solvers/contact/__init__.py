@@ -8,6 +8,7 @@ __getattr__, __all__ = lazy_names(
         "contact": ["Contact"],
         "law.coulomb": ["Coulomb"],
         "law.frictionless": ["Frictionless"],
+        "law.tied": ["Tied"],
         "law.tresca": ["Tresca"],
         "pair": ["Pair"],
         "surface": ["Surface"],

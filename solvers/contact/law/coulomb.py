@@ -9,7 +9,7 @@ import numpy as np
 
 from solvers.api import Array
 from solvers.contact.law.friction import friction_residual, friction_rows, friction_status
-from solvers.contact.law.law import Point, Rows, Slopes, Span, Statuses
+from solvers.contact.law.law import Point, Span
 
 
 @dataclass(frozen=True)
@@ -20,18 +20,13 @@ class Coulomb:
     span: ClassVar[Span] = "surface"
     slips: ClassVar[bool] = True
 
-    def status(self, at: Point) -> Statuses:
-        return friction_status(at, self._radius(at))
+    status = friction_status
+    residual = friction_residual
+    rows = friction_rows
 
-    def residual(self, at: Point, status: Statuses, weight: float) -> Array:
-        return friction_residual(at, status, weight, self._radius(at))
-
-    def rows(self, at: Point, slopes: Slopes, status: Statuses, weight: float) -> Rows:
-        by_gap = -self.mu * np.divide(at.c_n, at.D, out=np.zeros_like(at.D), where=at.D > 0.0)
-        by_z, by_normal = self.mu * at.normals, self.mu * at.z
-        return friction_rows(
-            at, slopes, status, weight, self._radius(at), by_z=by_z, by_normal=by_normal, by_gap=by_gap
-        )
-
-    def _radius(self, at: Point) -> Array:
+    def radius(self, at: Point) -> Array:
         return self.mu * np.where(at.slip_known, np.maximum(0.0, at.trial_pressure), 0.0)
+
+    def radius_slopes(self, at: Point) -> tuple[Array, Array, Array]:
+        by_gap = -self.mu * np.divide(at.c_n, at.D, out=np.zeros_like(at.D), where=at.D > 0.0)
+        return self.mu * at.normals, self.mu * at.z, by_gap

@@ -13,6 +13,8 @@ Engng 84 (2010).
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -21,48 +23,51 @@ from solvers.contact.blocks import components, vstack
 from solvers.contact.law.law import OPEN, SLIP, STICK, Point, Rows, Slopes, Statuses, along
 
 
+class Bound(Protocol):
+    """What tells one law of friction from another; the functions below are methods of such a law."""
+
+    def radius(self, at: Point) -> Array:
+        """s, the largest traction along the surface [Pa], shape (m,)."""
+        ...
+
+    def radius_slopes(self, at: Point) -> tuple[Array, Array, Array]:
+        """Its derivatives by z and by n, shapes (m, dim), and by the weighted gap, shape (m,)."""
+        ...
+
+
 def trial_traction(at: Point) -> Array:
     """q [Pa], shape (m, dim)."""
     y = at.z + at.c_t[:, None] * at.slip
     return y - np.einsum("nd,nd->n", y, at.normals)[:, None] * at.normals
 
 
-def friction_status(at: Point, radius: Array) -> Statuses:
+def friction_status(law: Bound, at: Point) -> Statuses:
     """In contact where the trial pressure is positive; sticking inside the disc.
 
     Where the trial traction points against the present one the node sticks first: sliding that turns around in one
     Newton step can turn back in the next, for ever. In the solution they have the same direction.
     """
-    q = trial_traction(at)
+    q, radius = trial_traction(at), law.radius(at)
     turned = np.einsum("nd,nd->n", q, at.z) < 0.0
     inside = at.slip_known & (turned | (np.linalg.norm(q, axis=1) < radius)) & (radius > 0.0)
     return np.where(at.covered & (at.trial_pressure > 0.0), np.where(inside, STICK, SLIP), OPEN).astype(np.int8)
 
 
-def friction_residual(at: Point, status: Statuses, weight: float, radius: Array) -> Array:
+def friction_residual(law: Bound, at: Point, status: Statuses, weight: float) -> Array:
     """The closing gap along the normal and z_t - P_s(q) along the surface [N], shape (m, dim)."""
     z_t = at.z - at.pressure[:, None] * at.normals
-    missed = z_t - _on_disc(trial_traction(at), status, radius)[0]
+    missed = z_t - _on_disc(trial_traction(at), status, law.radius(at))[0]
     return (at.stiffness * at.gap)[:, None] * at.normals + (weight * at.D)[:, None] * missed
 
 
-def friction_rows(
-    at: Point,
-    slopes: Slopes,
-    status: Statuses,
-    weight: float,
-    radius: Array,
-    *,
-    by_z: Array,
-    by_normal: Array,
-    by_gap: Array,
-) -> Rows:
-    """The residual and its derivatives; those of the radius by z and n have the shape (m, dim), by the gap (m,)."""
+def friction_rows(law: Bound, at: Point, slopes: Slopes, status: Statuses, weight: float) -> Rows:
+    """The residual and its derivatives."""
+    by_z, by_normal, by_gap = law.radius_slopes(at)
     dim = at.z.shape[1]
     tangent = along(at.normals)
     factor = (weight * at.D)[:, None, None]
     q = trial_traction(at)
-    _, by_q, by_radius = _on_disc(q, status, radius, derivatives=True)
+    _, by_q, by_radius = _on_disc(q, status, law.radius(at), derivatives=True)
     y_n = np.einsum("nd,nd->n", at.z + at.c_t[:, None] * at.slip, at.normals)[:, None, None]
 
     # dz_t = T dz - z_n dn and dq = T (dz + c_t du) - y_n dn, both along the surface; dP = by_q dq + by_radius ds
@@ -71,7 +76,7 @@ def friction_rows(
     closing = at.stiffness[:, None] * at.normals - factor[:, 0] * by_gap[:, None] * by_radius
     sliding = -at.c_t[:, None, None] * (by_q @ tangent)
     in_u = _in_displacements(closing, factor * turning, factor * sliding, slopes)
-    return Rows(friction_residual(at, status, weight, radius), factor * in_z, in_u)
+    return Rows(friction_residual(law, at, status, weight), factor * in_z, in_u)
 
 
 def _in_displacements(by_gap: Array, by_normal: Array, by_slip: Array, slopes: Slopes) -> sp.csr_matrix:

@@ -9,7 +9,7 @@ import numpy as np
 
 from solvers.api import Array
 from solvers.contact.law.friction import friction_residual, friction_rows, friction_status
-from solvers.contact.law.law import Point, Rows, Slopes, Span, Statuses
+from solvers.contact.law.law import Point, Span
 
 
 @dataclass(frozen=True)
@@ -20,17 +20,12 @@ class Tresca:
     span: ClassVar[Span] = "surface"
     slips: ClassVar[bool] = True
 
-    def status(self, at: Point) -> Statuses:
-        return friction_status(at, self._radius(at))
+    status = friction_status
+    residual = friction_residual
+    rows = friction_rows
 
-    def residual(self, at: Point, status: Statuses, weight: float) -> Array:
-        return friction_residual(at, status, weight, self._radius(at))
-
-    def rows(self, at: Point, slopes: Slopes, status: Statuses, weight: float) -> Rows:
-        zero = np.zeros_like(at.z)
-        return friction_rows(
-            at, slopes, status, weight, self._radius(at), by_z=zero, by_normal=zero, by_gap=np.zeros_like(at.D)
-        )
-
-    def _radius(self, at: Point) -> Array:
+    def radius(self, at: Point) -> Array:
         return np.where(at.slip_known, self.bound, 0.0)
+
+    def radius_slopes(self, at: Point) -> tuple[Array, Array, Array]:
+        return np.zeros_like(at.z), np.zeros_like(at.z), np.zeros_like(at.D)
