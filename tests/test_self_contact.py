@@ -340,6 +340,15 @@ def test_mistakes_are_named(name, tmp_path):
     assert message in str(caught.value)
 
 
+def test_check_warns_of_sharp_edges(tmp_path):
+    (tmp_path / "case.yaml").write_text(CLOSING)
+    done = fsci("check", tmp_path / "case.yaml")
+    assert done.returncode == 0, done.stderr
+    assert "case.yaml:14:18: the surface has edges of 94 degrees; contact at their nodes takes a mean" in done.stderr
+    (tmp_path / "case.yaml").write_text(CLOSING.replace("[inner, outer, start, end]", "[start, end]"))
+    assert "degrees" not in fsci("check", tmp_path / "case.yaml").stderr
+
+
 def test_check_lists_it():
     done = fsci("check", "cases/self_contact_fold")
     assert done.returncode == 0, done.stderr

@@ -50,7 +50,7 @@ class DualTree:
         dim = points.shape[1]
         self._samples, self._directions = _sample_vectors(dim), _directions(dim)
         corners = facets[:, : CORNERS[facet_type]]
-        self.levels = _join(len(facets), _neighbours(corners, dim), points[corners].mean(axis=1))
+        self.levels = _join(len(facets), neighbours(corners, dim), points[corners].mean(axis=1))
         self.tests = 0  #: comparisons of two nodes, or of a node with itself, in the latest search
 
     def normals(self, x: Array) -> Array:
@@ -140,7 +140,7 @@ def _directions(dim: int) -> Array:
     return np.array(found)
 
 
-def _neighbours(corners: Indices, dim: int) -> Indices:
+def neighbours(corners: Indices, dim: int) -> Indices:
     """Facets with a common edge (2D: node), the dual graph, shape (e, 2)."""
     k, n = corners.shape
     if dim == 2:

@@ -1,0 +1,31 @@
+"""Sharp edges within a surface of contact: the normals of their nodes are means of two that have little in common."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from solvers.contact.dual_tree import neighbours
+from solvers.mesh import Mesh
+from solvers.mesh_topology import CORNERS, FACET_TYPE, cut_out
+
+#: Angle between neighbouring facets from which on an edge is sharp [degrees]; a ring of five facets has 72.
+SHARP = 75.0
+
+
+def sharpest_edge(mesh: Mesh, names: Sequence[str]) -> float:
+    """Largest angle [degrees] by which the normal turns from a facet to its neighbour; 0 for one facet."""
+    points, facets, _ = cut_out(mesh, names)
+    dim = points.shape[1]
+    corners = facets[:, : CORNERS[FACET_TYPE[mesh.cell_type]]]
+    x = points[corners]
+    if dim == 2:
+        along = x[:, 1] - x[:, 0]
+        normals = np.stack([along[:, 1], -along[:, 0]], axis=1)
+    else:
+        normals = np.cross(x[:, 1] - x[:, 0], x[:, -1] - x[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    i, j = neighbours(corners, dim).T
+    least = np.einsum("ed,ed->e", normals[i], normals[j]).min(initial=1.0)
+    return float(np.degrees(np.arccos(np.clip(least, -1.0, 1.0))))
