@@ -33,6 +33,12 @@ if TYPE_CHECKING:
 FINISHED, FAILED, BAD_CASE, STOPPED = 0, 1, 2, 3  #: exit codes
 
 
+_NO_START = (
+    "surfaces of contact have no mass in dynamics, and find no balance with the loads and the overlap that they have "
+    "at the start; let these grow from zero"
+)
+
+
 def run_case(case: Case, out: Path, *, force: bool = False) -> int:
     """Compute a case from its start into the folder `out`; returns the exit code. Raises CaseError.
 
@@ -110,13 +116,20 @@ class Run:
         """Compute from the initial state."""
         with self._shown():
             simulation = self._build()
-            with self.record.timer("start"):
-                simulation.initialise(self.clock.time, self.clock.dt)
+            self._initialise(simulation)
             if self.root:
                 self.history = HistoryWriter(self.out / "history.csv")
                 self.fields = FieldWriter(self.out / "fields")
             self._write_fields()
             return self._watched_loop()
+
+    def _initialise(self, simulation: Simulation) -> None:
+        """The state at the first time. Raises CaseError if contact surfaces find no balance with the loads on them."""
+        try:
+            with self.record.timer("start"):
+                simulation.initialise(self.case.time.start, self.case.time.step)
+        except StepFailed as failure:
+            raise self.case.error(("contact",), f"{_NO_START}: {failure}") from None
 
     def from_checkpoint(self, state: State) -> int:
         """Compute from a checkpoint."""
@@ -124,10 +137,10 @@ class Run:
 
         with self._shown():
             simulation = self._build()
-            self.clock.restore(state["clock"])
             self.record.restore(state["record"])
+            self._initialise(simulation)
+            self.clock.restore(state["clock"])
             with self.record.timer("start"):
-                simulation.initialise(self.case.time.start, self.case.time.step)
                 simulation.scheme.restore(scatter(self.comm, state["scheme"], simulation.scheme.save()))
             if self.root:
                 (self.out / "STOP").unlink(missing_ok=True)

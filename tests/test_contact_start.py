@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from contact_setup import make_body, make_contact
 from structure_setup import block, constant
+from test_contact_friction_run import SLIDING
 
 from fsci import shapes
+from fsci.case import CaseError, load_case
+from fsci.run import run_case
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.surface import Surface
@@ -106,3 +109,14 @@ def test_a_load_on_a_surface_that_touches(law, rho_inf):
         assert np.abs(structure.now.u).max() < 1e-12
         assert np.abs(structure.now.a).max() < 1e-9
     assert structure.energy.error == pytest.approx(0.0, abs=1e-12)
+
+
+def test_no_balance_at_the_start(tmp_path):
+    (tmp_path / "case.yaml").write_text(SLIDING + "solver: {newton: {max_iterations: 1}}\n")
+    with pytest.raises(CaseError) as caught:
+        run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out")
+    message = str(caught.value).split("\n")[0]
+    assert message.startswith(
+        f"{tmp_path / 'case.yaml'}:14:1: surfaces of contact have no mass in dynamics, and find no balance with the "
+        "loads and the overlap that they have at the start; let these grow from zero: structure: Newton did not"
+    )
