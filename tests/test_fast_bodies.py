@@ -33,9 +33,9 @@ def test_three_cells_in_a_step(tmp_path):
     """0.3 m per step of 0.1 s in cells of 0.1 m."""
     warnings, log = run(tmp_path, "3")
     assert len(warnings) == 1
-    assert "the body moves 3 cells in a time step: forces are off; a 'step' below 0.033 keeps it" in warnings[0]
+    assert "the body moves 3 cells in a time step: forces are off; a 'step' below 0.067 keeps it" in warnings[0]
     assert log.count("body 'disc' moves 3 cells in a time step") == 1
-    assert "a step below 0.033 keeps it below one cell" in log
+    assert "a step below 0.067 keeps it below 2 cells" in log
 
 
 def test_a_rotation(tmp_path):
@@ -45,8 +45,8 @@ def test_a_rotation(tmp_path):
     case = load_case(tmp_path / "case.yaml")
     assert case.warnings == ()  # the mesh is not read yet
     (warning,) = check_meshes(case).warnings
-    assert "case.yaml:13:15: the body moves 3 cells in a time step: forces are off; a 'step' below 0.034" in warning
-    slow = load_case(tmp_path / "case.yaml", [("time.step", "0.03")])
+    assert "case.yaml:13:15: the body moves 3 cells in a time step: forces are off; a 'step' below 0.067" in warning
+    slow = load_case(tmp_path / "case.yaml", [("time.step", "0.06")])
     assert check_meshes(slow).warnings == []
 
 
@@ -58,7 +58,7 @@ def test_a_body_that_is_gone(speed, tmp_path):
     assert run_case(load_case(tmp_path / "case.yaml", [("time.retry.halvings", "0")]), tmp_path / "out") in (0, FAILED)
 
 
-def test_less_than_a_cell(tmp_path):
-    warnings, log = run(tmp_path, "0.9")
+def test_less_than_two_cells(tmp_path):
+    warnings, log = run(tmp_path, "1.9")
     assert warnings == ()
     assert "cells in a time step" not in log

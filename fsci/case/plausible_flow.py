@@ -12,6 +12,7 @@ from fsci.case.fluid import Fluid, Movement, Patch
 from fsci.case.mesh import Shape
 from fsci.case.yaml_text import Keys
 from fsci.estimate import thickness
+from solvers.fluid.fast_bodies import MOST_CELLS
 
 MOST_CELLS_PER_STEP = 10.0  #: that a flow or a body may cross in a time step without being asked about it
 #: Cells across a body that both of its sides need to share no unknowns: with fewer, fluid passes through the body.
@@ -40,7 +41,7 @@ def flow_doubts(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
 
 
 def _fast_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
-    """Bodies that cross more than a cell in a step; how fast those are that turn only the mesh tells."""
+    """Bodies that cross too many cells in a step; how fast those are that turn only the mesh tells."""
     for name, body in fluid.bodies.items():
         if body.motion is not None and body.motion.rotation is None:
             if doubt := fast_body(case, fluid, body.motion, np.zeros((1, fluid.grid.dimension))):
@@ -48,7 +49,7 @@ def _fast_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
 
 
 def fast_body(case: Case, fluid: Fluid, motion: Movement, points: NDArray[np.float64]) -> str | None:
-    """Whether any of some points [m] of a body, shape (n, dim), crosses more than a cell in a step."""
+    """Whether any of some points [m] of a body, shape (n, dim), crosses too many cells in a step."""
     from fsci.rigid_motion import rigid_motion
 
     smallest = np.array([float(np.diff(edges).min()) for edges in fluid.grid.planes])
@@ -58,11 +59,11 @@ def fast_body(case: Case, fluid: Fluid, motion: Movement, points: NDArray[np.flo
         (before, _), (after, velocity) = moved(t), moved(t + time.step)
         ways = np.maximum(np.abs(after - before), np.abs(velocity) * time.step)
         cells = max(cells, float((ways / smallest).max()))
-    if cells <= 1.0 + 1e-9:
+    if cells <= MOST_CELLS * (1.0 + 1e-9):
         return None
     return (
         f"the body moves {cells:.2g} cells in a time step: forces are off; "
-        f"a 'step' below {time.step / cells:.2g} keeps it below one cell"
+        f"a 'step' below {MOST_CELLS * time.step / cells:.2g} keeps it below {MOST_CELLS:g} cells"
     )
 
 
