@@ -6,6 +6,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
+from run_fuzz import places
 
 from fsci.case import CaseError, load_case
 from fsci.check import summary
@@ -104,16 +105,6 @@ EDITS = st.lists(
     max_size=3,
 )
 LIMITS = settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-
-
-def places(data, found=None):
-    """Every (container, key) in the data."""
-    found = [] if found is None else found
-    for key, value in data.items() if isinstance(data, dict) else enumerate(data):
-        found.append((data, key))
-        if isinstance(value, dict | list):
-            places(value, found)
-    return found
 
 
 def mutate(data, kind, where, value):
