@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.curves import COLOURS, STYLE
-from fsci.history import read_history
-from fsci.output import read_collection
-from fsci.render import ROUND, SUPERSAMPLING, View, face_edges, frame, import_pyvista, photograph, polylines
+from fsci.plot.curves import COLOURS, STYLE
+from fsci.plot.render import ROUND, SUPERSAMPLING, View, face_edges, frame, import_pyvista, photograph, polylines
+from fsci.run.history import read_history
+from fsci.run.output import read_collection
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "verification_contact.md"

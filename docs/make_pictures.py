@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.bench.program import run_case
-from fsci.curves import COLOURS, STYLE
-from fsci.history import read_history
-from fsci.output import read_collection
-from fsci.verify import amplitude, frequency, mean, window
+from fsci.plot.curves import COLOURS, STYLE
+from fsci.run.history import read_history
+from fsci.run.output import read_collection
+from fsci.run.verify import amplitude, frequency, mean, window
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "verification_structure.md"

@@ -132,8 +132,8 @@ def _new(options: argparse.Namespace) -> int:
 
 def _check(options: argparse.Namespace) -> int:
     from fsci.case import CaseError, load_case
-    from fsci.check import summary
-    from fsci.check_meshes import check_meshes
+    from fsci.check.check import summary
+    from fsci.check.meshes import check_meshes
 
     try:
         case = load_case(options.case, options.overrides)
@@ -160,8 +160,8 @@ def _run(options: argparse.Namespace) -> int:
         case = load_case(options.case, options.overrides)
         for warning in case.warnings if first else ():
             print(f"warning: {warning}", file=sys.stderr)
-        from fsci.processes import ending_together
-        from fsci.run import run_case
+        from fsci.run.processes import ending_together
+        from fsci.run.run import run_case
 
         out = options.out or Path("results") / case.folder.absolute().name
         with ending_together(MPI.COMM_WORLD, CaseError):
@@ -176,8 +176,8 @@ def _resume(options: argparse.Namespace) -> int:
     from mpi4py import MPI
 
     from fsci.case import CaseError
-    from fsci.processes import ending_together
-    from fsci.run import resume_run
+    from fsci.run.processes import ending_together
+    from fsci.run.run import resume_run
 
     try:
         with ending_together(MPI.COMM_WORLD, CaseError, FileNotFoundError):
@@ -193,7 +193,7 @@ def _resume(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from fsci.picture import plot_run
+    from fsci.plot.picture import plot_run
 
     if not options.out.is_dir():
         return _fail(f"fsci plot: there is no folder '{options.out}'")
@@ -219,7 +219,7 @@ def _fail(message: str) -> int:
 
 def _broken(command: str, error: BaseException) -> int:
     """A run on one process that the machine or the user has ended."""
-    from fsci.processes import describe
+    from fsci.run.processes import describe
 
     print(f"fsci {command}: {describe(error)}", file=sys.stderr)
     return 3 if isinstance(error, KeyboardInterrupt) else 1

@@ -3,10 +3,10 @@
 import pytest
 from programs import fsci
 
-from fsci.automatic_pairs import with_pairs
+from fsci.builder.automatic_pairs import with_pairs
 from fsci.case import CaseError, load_case
-from fsci.history import read_history
-from fsci.run import FINISHED, run_case
+from fsci.run.history import read_history
+from fsci.run.run import FINISHED, run_case
 
 #: A soft block between two stiff ones, and a rigid floor below.
 STACK = """\

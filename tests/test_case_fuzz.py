@@ -9,7 +9,7 @@ from ruamel.yaml import YAML
 from run_fuzz import places
 
 from fsci.case import CaseError, load_case
-from fsci.check import summary
+from fsci.check.check import summary
 
 CASES = [
     """\

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fsci.case import load_case
-from fsci.check import summary
+from fsci.check.check import summary
 
 ROOT = Path(__file__).parent.parent
 

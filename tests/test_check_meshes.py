@@ -6,10 +6,10 @@ import pytest
 
 from fsci import shapes
 from fsci.case import CaseError, load_case
-from fsci.check import summary
-from fsci.check_meshes import check_meshes, thickness
+from fsci.check.check import summary
+from fsci.check.meshes import check_meshes, thickness
 from fsci.cli import execute
-from fsci.run import FINISHED, run_case
+from fsci.run.run import FINISHED, run_case
 from solvers.mesh import Mesh
 
 SOLID = """\

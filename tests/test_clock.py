@@ -4,7 +4,7 @@ from fractions import Fraction
 
 import pytest
 
-from fsci.clock import Clock
+from fsci.run.clock import Clock
 
 
 def clock(end, step, *, start=0.0, halvings=4, recover_after=5):

@@ -7,7 +7,7 @@ from programs import fsci
 from structure_setup import constant
 
 from fsci import shapes
-from fsci.history import read_history
+from fsci.run.history import read_history
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support

@@ -6,8 +6,8 @@ import pytest
 from contact_cases import COLLISION, PLATE
 
 from fsci.case import CaseError, load_case
-from fsci.check_meshes import check_meshes
-from fsci.run import run_case
+from fsci.check.meshes import check_meshes
+from fsci.run.run import run_case
 
 PRESS = "    press: {slave: {body: block, on: top}, master: {obstacle: plate}}"
 

@@ -14,9 +14,9 @@ from structure_setup import make_structure
 from coupling.contact_surface import contact_surface
 from fsci import shapes
 from fsci.case import load_case
-from fsci.checkpoint import read_checkpoint
-from fsci.history import read_history
-from fsci.run import FINISHED, resume_run, run_case
+from fsci.run.checkpoint import read_checkpoint
+from fsci.run.history import read_history
+from fsci.run.run import FINISHED, resume_run, run_case
 from solvers.structure.materials import NeoHooke, lame
 
 

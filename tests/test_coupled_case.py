@@ -4,7 +4,7 @@ import pytest
 from coupled_case import POST
 
 from fsci.case import CaseError, load_case
-from fsci.check import summary
+from fsci.check.check import summary
 
 COUPLING = "coupling: {scheme: monolithic}"
 STRUCTURE = POST[POST.index("structure:") : POST.index("coupling:")]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from programs import fsci
 
-from fsci.history import read_history
+from fsci.run.history import read_history
 
 OBLIQUE = {
     "fluid.grid.cells": "[8, 8, 13]",

@@ -7,10 +7,10 @@ from programs import ENVIRONMENT, fsci
 
 from coupling.coupled import Coupled
 from fsci.case import load_case
-from fsci.history import read_history
-from fsci.output import read_collection
-from fsci.picture import plot_run
-from fsci.run import FINISHED, run_case
+from fsci.plot.picture import plot_run
+from fsci.run.history import read_history
+from fsci.run.output import read_collection
+from fsci.run.run import FINISHED, run_case
 from solvers.api import StepFailed
 
 SCHEMES = {

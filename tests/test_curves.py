@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fsci.case import CaseError, load_case
-from fsci.results_folder import prepare_folder
+from fsci.run.results_folder import prepare_folder
 
 CASE = """\
 time: {step: 0.5, end: 1}

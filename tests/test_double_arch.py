@@ -10,7 +10,7 @@ from programs import fsci
 from structure_setup import constant
 
 from fsci import shapes
-from fsci.history import read_history
+from fsci.run.history import read_history
 from solvers.contact.surface import Surface
 from solvers.structure.body import Support
 from solvers.structure.materials import NeoHooke, lame

@@ -7,8 +7,8 @@ import pytest
 from pydantic import TypeAdapter
 
 from fsci.case.mesh import Shape
-from fsci.estimate import aspect, size
-from fsci.mesh import build_mesh
+from fsci.check.estimate import aspect, size
+from fsci.meshes.mesh import build_mesh
 
 SHAPES: list[dict[str, Any]] = [
     {"shape": "rectangle", "size": [2, 1], "cells": [4, 3]},

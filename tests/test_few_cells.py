@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from programs import PARALLEL, fsci
 
-from fsci.history import read_history
+from fsci.run.history import read_history
 
 ONE_CELL_ON_A_BLOCK = """\
 time: {step: 1, end: 1}

@@ -8,7 +8,7 @@ import pytest
 
 from fsci.case import CaseError, load_case
 from fsci.case.grid import Grid
-from fsci.check import summary
+from fsci.check.check import summary
 
 CASE = """\
 title: channel

@@ -5,7 +5,7 @@ import pytest
 from fluid_setup import block, body, field, make_fluid, nodal_errors, solve_steady, turned
 from programs import fsci
 
-from fsci.history import read_history
+from fsci.run.history import read_history
 from solvers.fluid.balances import Balances
 from solvers.fluid.covered_faces import CoveredFaces
 from solvers.fluid.grid import uniform

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fsci.case import load_case
-from fsci.history import read_history
-from fsci.run import run_case
+from fsci.run.history import read_history
+from fsci.run.run import run_case
 
 #: cells of 0.1, and a plate that seals the channel, pressure 1 on its left side
 CASE = """\

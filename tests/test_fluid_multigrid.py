@@ -9,7 +9,7 @@ from fluid_setup import body, field, make_fluid, sphere, wall
 from mpi4py import MPI
 
 from fsci.case import load_case
-from fsci.run import FAILED, run_case
+from fsci.run.run import FAILED, run_case
 from solvers import linear
 from solvers.fluid import krylov
 from solvers.fluid.grid import Grid, uniform

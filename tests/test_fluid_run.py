@@ -9,15 +9,15 @@ import pytest
 from programs import fsci
 
 from fsci import shapes
+from fsci.builder.rigid_motion import rigid_motion
 from fsci.case import CaseError, load_case
 from fsci.case.fluid import Movement
-from fsci.history import read_history
-from fsci.mesh import place
-from fsci.output import read_collection
-from fsci.picture import plot_run
-from fsci.rigid_motion import rigid_motion
-from fsci.run import FINISHED, run_case
-from fsci.scene import UPRIGHT
+from fsci.meshes.mesh import place
+from fsci.plot.picture import plot_run
+from fsci.plot.scene import UPRIGHT
+from fsci.run.history import read_history
+from fsci.run.output import read_collection
+from fsci.run.run import FINISHED, run_case
 from solvers.fluid.inside import winding
 from solvers.fluid.snapshot import vertex_areas
 from solvers.fluid.surface import Motion, normals

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from programs import fsci
 
-from fsci.history import read_history
+from fsci.run.history import read_history
 
 #: changes of the case for the second fluid
 REYNOLDS_12 = (

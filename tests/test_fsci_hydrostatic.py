@@ -7,7 +7,7 @@ import pytest
 from fluid_setup import block, body, field, make_fluid, solve_steady
 from programs import fsci
 
-from fsci.history import read_history
+from fsci.run.history import read_history
 from solvers.fluid.grid import uniform
 from solvers.fluid.patches import Patch
 

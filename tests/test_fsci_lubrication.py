@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from programs import fsci
 
-from fsci.history import read_history
+from fsci.run.history import read_history
 from tests.lubrication import cylinder_drag, drag_ratio, settling_ratio, sphere_drag
 
 H = 0.05

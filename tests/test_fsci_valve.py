@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from programs import fsci
 
-from fsci.history import read_history
+from fsci.run.history import read_history
 
 
 @pytest.mark.slow

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from small_cases import PLATE
 
-from fsci.checkpoint import list_checkpoints, write_checkpoint
 from fsci.cli import execute
-from fsci.history import HistoryWriter, read_history
+from fsci.run.checkpoint import list_checkpoints, write_checkpoint
+from fsci.run.history import HistoryWriter, read_history
 
 CASE = PLATE + "output: {fields_every: 0}\n"
 FULL = (28, "No space left on device", "history.csv")
@@ -55,7 +55,7 @@ def test_full_disk_without_room_for_a_checkpoint(tmp_path, full_disk, monkeypatc
             raise OSError(*FULL)
         return original(folder, *what)
 
-    monkeypatch.setattr("fsci.run.write_checkpoint", fails)
+    monkeypatch.setattr("fsci.run.run.write_checkpoint", fails)
     assert run(tmp_path) == 1
     errors = capfd.readouterr().err
     (folder,) = (tmp_path / "elsewhere").iterdir()
@@ -82,7 +82,7 @@ def test_not_enough_memory(tmp_path, monkeypatch, capfd):
     def fails(*arguments):
         raise MemoryError
 
-    monkeypatch.setattr("fsci.build.build", fails)
+    monkeypatch.setattr("fsci.builder.build.build", fails)
     assert run(tmp_path) == 1
     assert capfd.readouterr().err == "fsci run: there is not enough memory\n"
 
@@ -91,6 +91,6 @@ def test_interrupted_before_the_first_step(tmp_path, monkeypatch, capfd):
     def interrupted(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("fsci.build.build", interrupted)
+    monkeypatch.setattr("fsci.builder.build.build", interrupted)
     assert run(tmp_path) == 3
     assert capfd.readouterr().err == "fsci run: stopped before the first step\n"

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fsci.history import HistoryWriter, read_history
+from fsci.run.history import HistoryWriter, read_history
 
 
 def test_numbers_come_back_bit_for_bit(tmp_path):

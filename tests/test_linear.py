@@ -9,8 +9,8 @@ from structure_setup import constant, load_step, make_structure, vector
 
 from fsci import shapes
 from fsci.case import load_case
-from fsci.history import read_history
-from fsci.run import FINISHED, run_case
+from fsci.run.history import read_history
+from fsci.run.run import FINISHED, run_case
 from solvers import linear
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings

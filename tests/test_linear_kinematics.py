@@ -8,7 +8,7 @@ from structure_setup import CELL_TYPES, block, constant, distort, held_everywher
 from test_structure_tangent import tangent_error
 
 from fsci import shapes
-from fsci.history import read_history
+from fsci.run.history import read_history
 from solvers.structure.body import Pressure, Support, Symmetry, Traction
 from solvers.structure.materials import LinearElastic, PlaneStressLinearElastic, lame, plane_stress_lambda
 from solvers.structure.time import Dynamics

@@ -11,7 +11,7 @@ import pytest
 from cell_geometry import smallest_determinant, volume
 
 from fsci import shapes
-from fsci.mesh import MeshError, build_mesh, extract_region, place, require_region, require_surface
+from fsci.meshes.mesh import MeshError, build_mesh, extract_region, place, require_region, require_surface
 from solvers.mesh import Mesh
 from solvers.mesh_topology import boundary_facets, surface_facets
 

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from fsci.mesh import MeshError, build_mesh
-from fsci.mesh_scripts import RefusedScript, require_harmless
+from fsci.meshes.mesh import MeshError, build_mesh
+from fsci.meshes.scripts import RefusedScript, require_harmless
 
 TRIANGLE = """\
 Point(1) = {0, 0, 0, 1}; Point(2) = {1, 0, 0, 1}; Point(3) = {0, 1, 0, 1};

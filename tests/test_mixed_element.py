@@ -10,7 +10,7 @@ from test_structure_tangent import MATERIALS, tangent_error
 
 from fsci import shapes
 from fsci.case import CaseError, load_case
-from fsci.history import read_history
+from fsci.run.history import read_history
 from solvers.api import StepFailed
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings

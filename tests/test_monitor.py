@@ -6,7 +6,7 @@ import io
 
 import pytest
 
-from fsci.monitor import Monitor, duration
+from fsci.run.monitor import Monitor, duration
 from solvers.api import StepFailed, StepInfo
 
 

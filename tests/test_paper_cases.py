@@ -7,9 +7,9 @@ import pytest
 from mpi4py import MPI
 from programs import fsci
 
-from fsci.build import build
+from fsci.builder.build import build
 from fsci.case import load_case
-from fsci.history import read_history
+from fsci.run.history import read_history
 from solvers.time import GeneralisedAlpha
 from solvers.timing import Timer
 

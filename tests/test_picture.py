@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from fsci.curves import contact_panels, label, plot_history
-from fsci.history import HistoryWriter
-from fsci.output import FieldWriter, write_text, write_vtu
-from fsci.picture import plot_run
-from fsci.render import axes_of_view, frame, load_body, render
-from fsci.scene import compose
-from fsci.summary import write_summary
+from fsci.plot.curves import contact_panels, label, plot_history
+from fsci.plot.picture import plot_run
+from fsci.plot.render import axes_of_view, frame, load_body, render
+from fsci.plot.scene import compose
+from fsci.run.history import HistoryWriter
+from fsci.run.output import FieldWriter, write_text, write_vtu
+from fsci.run.summary import write_summary
 from solvers.api import Snapshot
 
 SI = {"length": "m", "mass": "kg", "time": "s"}

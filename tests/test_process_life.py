@@ -15,7 +15,7 @@ from petsc4py import PETSc
 from programs import ENVIRONMENT, PARALLEL, fsci
 from small_cases import PLATE
 
-from fsci.history import read_history
+from fsci.run.history import read_history
 from solvers import unlocked
 
 PROGRAM = Path(__file__).parent / "disturbed_run.py"

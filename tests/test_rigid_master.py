@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fsci.case import CaseError, load_case
-from fsci.history import read_history
-from fsci.run import FINISHED, run_case
+from fsci.run.history import read_history
+from fsci.run.run import FINISHED, run_case
 
 #: A ram comes down in a channel and presses an elastic block against the floor; it turns a little.
 RAM = """\

@@ -15,8 +15,8 @@ import pytest
 from programs import fsci, start_fsci
 
 from fsci.case import CaseError, load_case
-from fsci.history import read_history
-from fsci.run import FAILED, FINISHED, STOPPED, resume_run, run_case
+from fsci.run.history import read_history
+from fsci.run.run import FAILED, FINISHED, STOPPED, resume_run, run_case
 from solvers.api import StepFailed
 
 CASE = """\
@@ -48,7 +48,7 @@ def case(tmp_path):
 
 
 def final_state(out):
-    from fsci.checkpoint import read_checkpoint
+    from fsci.run.checkpoint import read_checkpoint
 
     state, _ = read_checkpoint(out / "checkpoint")
     return {name: state["scheme"][name]["beam"] for name in ("u", "v", "a")}
@@ -113,15 +113,15 @@ class FailsAt:
 
 
 def inject(monkeypatch, calls):
-    import fsci.build
+    import fsci.builder.build
 
-    original = fsci.build.build
+    original = fsci.builder.build.build
 
     def build(*arguments):
         simulation = original(*arguments)
         return replace(simulation, scheme=FailsAt(simulation.scheme, calls))
 
-    monkeypatch.setattr(fsci.build, "build", build)
+    monkeypatch.setattr(fsci.builder.build, "build", build)
 
 
 def test_retry(case, tmp_path, monkeypatch):

@@ -51,7 +51,7 @@ def test_located(mistake, processes, tmp_path):
 
 def test_several_bodies_of_different_cells(tmp_path):
     """Two bodies in one case, quads and triangles, give what each gives alone; on two processes, too."""
-    from fsci.history import read_history
+    from fsci.run.history import read_history
 
     body = "{{mesh: {{shape: rectangle, size: [2, 1], cells: [4, 2], cell: {cell}, order: {order}}}, \
 material: {{law: neo_hooke, E: {E}, nu: 0.3}}, supports: [{{on: left, displacement: [0, 0]}}], \

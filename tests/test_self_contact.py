@@ -10,8 +10,8 @@ from structure_setup import constant
 
 from fsci import shapes
 from fsci.case import CaseError, load_case
-from fsci.history import read_history
-from fsci.run import FINISHED, run_case
+from fsci.run.history import read_history
+from fsci.run.run import FINISHED, run_case
 from solvers.contact.dual_tree import DualTree
 from solvers.contact.roles import MASTER, SLAVE, choose_roles
 from solvers.contact.self_search import SelfSearch, wall_thickness

@@ -5,7 +5,7 @@ import time
 import ffcx.codegeneration.jit
 import pytest
 
-import fsci.run
+import fsci.run.run
 from fsci.case import load_case
 
 CASE = """\
@@ -31,7 +31,7 @@ def steps(tmp_path, monkeypatch):
     for name in ("compile_forms", "compile_elements", "compile_expressions"):
         original = getattr(ffcx.codegeneration.jit, name)
         monkeypatch.setattr(ffcx.codegeneration.jit, name, lambda *a, f=original, **k: (asked.append(a), f(*a, **k))[1])
-    one_step = fsci.run.Run._step
+    one_step = fsci.run.run.Run._step
 
     def timed(run):
         begin = time.process_time()
@@ -40,11 +40,11 @@ def steps(tmp_path, monkeypatch):
         if run.clock.step == 1:
             asked.clear()
 
-    monkeypatch.setattr(fsci.run.Run, "_step", timed)
+    monkeypatch.setattr(fsci.run.run.Run, "_step", timed)
 
     def run(end):
         (tmp_path / "case.yaml").write_text(CASE)
-        assert fsci.run.run_case(load_case(tmp_path / "case.yaml", [("time.end", str(end))]), tmp_path / "out") == 0
+        assert fsci.run.run.run_case(load_case(tmp_path / "case.yaml", [("time.end", str(end))]), tmp_path / "out") == 0
         return cpu, asked
 
     return run

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fsci.output import FieldWriter
-from fsci.picture import look_at, plot_run
-from fsci.render_flow import load_meshes, load_state
-from fsci.storyboard import arrange, choose, plane_state
+from fsci.plot.picture import look_at, plot_run
+from fsci.plot.render_flow import load_meshes, load_state
+from fsci.plot.storyboard import arrange, choose, plane_state
+from fsci.run.output import FieldWriter
 from solvers.api import Snapshot
 
 HEXAHEDRON = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])

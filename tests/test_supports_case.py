@@ -7,9 +7,9 @@ import pytest
 from programs import fsci
 
 from fsci.case import CaseError, load_case
-from fsci.history import read_history
-from fsci.mesh import build_mesh, extract_region
-from fsci.run import FINISHED, run_case
+from fsci.meshes.mesh import build_mesh, extract_region
+from fsci.run.history import read_history
+from fsci.run.run import FINISHED, run_case
 from solvers.structure.materials import lame
 
 ROOT = Path(__file__).parents[1]
@@ -66,7 +66,7 @@ def case(tmp_path, monkeypatch):
 def build(case):
     from mpi4py import MPI
 
-    from fsci.build_structure import build_bodies, build_structure
+    from fsci.builder.structure import build_bodies, build_structure
     from solvers.timing import Timer
 
     bodies = build_bodies(case, MPI.COMM_SELF)

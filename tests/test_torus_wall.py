@@ -9,11 +9,11 @@ import pytest
 from mpi4py import MPI
 from programs import fsci
 
-from fsci.build import build
+from fsci.builder.build import build
 from fsci.case import load_case
-from fsci.checkpoint import read_checkpoint
-from fsci.history import read_history
-from fsci.output import read_collection
+from fsci.run.checkpoint import read_checkpoint
+from fsci.run.history import read_history
+from fsci.run.output import read_collection
 from solvers.distributed import scatter
 from solvers.structure.probes import of_bodies
 from solvers.timing import Timer

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from fsci.verify import evaluate
+from fsci.run.verify import evaluate
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ NUMBERS were computed with DOLFINx 0.5.2, PETSc 3.18 and Open MPI 4.1. Newton's 
 import pytest
 from programs import fsci
 
-from fsci.history import read_history
+from fsci.run.history import read_history
 
 TWISTED = """\
 title: a block of second order is twisted and moves

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fsci.bench import contact, cook, flag, fluid, hertz, linear, moments, small, static
 from fsci.bench.table import Row, show
-from fsci.summary import plain, versions
+from fsci.run.summary import plain, versions
 
 #: Name -> (what it measures, how). One column of a row is one number or word.
 BENCHMARKS: dict[str, tuple[str, Callable[[], list[Row]]]] = {

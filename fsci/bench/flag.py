@@ -10,8 +10,8 @@ import numpy as np
 
 from fsci.bench.program import run_case
 from fsci.bench.table import Row
-from fsci.history import read_history
-from fsci.verify import amplitude, frequency
+from fsci.run.history import read_history
+from fsci.run.verify import amplitude, frequency
 
 CASE = Path(__file__).parents[2] / "cases" / "csm3"
 REFINE = "structure.bodies.flag.mesh.parameters.refine"

@@ -10,7 +10,7 @@ from fsci.case.mesh import FileMesh, Shape
 from fsci.case.plausible_flow import flow_doubts
 from fsci.case.structure import Body
 from fsci.case.yaml_text import Keys
-from fsci.estimate import aspect
+from fsci.check.estimate import aspect
 
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from aerogel to osmium, with a margin
 STIFFNESSES = (1.0, 2e12)  #: [Pa] Young's modulus from the softest gel to diamond, with a margin

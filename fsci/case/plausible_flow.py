@@ -11,7 +11,7 @@ from fsci.case.case import Case
 from fsci.case.fluid import Fluid, Movement, Patch
 from fsci.case.mesh import Shape
 from fsci.case.yaml_text import Keys
-from fsci.estimate import thickness
+from fsci.check.estimate import thickness
 from solvers.fluid.fast_bodies import MOST_CELLS
 
 MOST_CELLS_PER_STEP = 10.0  #: that a flow or a body may cross in a time step without being asked about it
@@ -50,7 +50,7 @@ def _fast_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
 
 def fast_body(case: Case, fluid: Fluid, motion: Movement, points: NDArray[np.float64]) -> str | None:
     """Whether any of some points [m] of a body, shape (n, dim), crosses too many cells in a step."""
-    from fsci.rigid_motion import rigid_motion
+    from fsci.builder.rigid_motion import rigid_motion
 
     smallest = np.array([float(np.diff(edges).min()) for edges in fluid.grid.planes])
     time = case.time

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fsci.case import Case
-from fsci.case_meshes import read_obstacle
+from fsci.meshes.of_case import read_obstacle
 from solvers.contact.law.tied import Tied
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fsci.history import COLUMNS, History
+from fsci.run.history import COLUMNS, History
 
 SIZE = (8.0, 5.0)  #: of a picture in inches; 1600 x 1000 pixels
 PANEL = 2.2  #: inches of height of each panel where there are several

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci import shapes
-from fsci.mesh_files import MeshError, read_mesh, unknown
+from fsci.meshes.files import MeshError, read_mesh, unknown
 from solvers.mesh import Mesh
 from solvers.mesh_topology import CORNERS, FACET_TYPE, find_facets
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.render import ISOMETRIC, Array, Body, field_values, import_pyvista, load_body
+from fsci.plot.render import ISOMETRIC, Array, Body, field_values, import_pyvista, load_body
 
 STREAMLINES = "velocity"  #: the field that is drawn with streamlines, besides its components
 SPACING = 0.035  #: distance of streamlines in the plane, as part of the edge of a square as large as the box

@@ -14,21 +14,21 @@ from typing import TYPE_CHECKING, Any
 
 from fsci.case import Case, CaseError
 from fsci.case.resume import end_error, resumed_case
-from fsci.checkpoint import read_checkpoint, write_checkpoint
-from fsci.clock import Clock
-from fsci.history import HistoryWriter, read_history
-from fsci.memory import require_memory
-from fsci.monitor import Monitor
-from fsci.output import FieldWriter, write_text
-from fsci.processes import describe
-from fsci.results_folder import keep_case, prepare_folder
-from fsci.stop import StopWatch
-from fsci.summary import RunRecord, memory_mb, summarize, write_summary
-from fsci.verify import evaluate
+from fsci.run.checkpoint import read_checkpoint, write_checkpoint
+from fsci.run.clock import Clock
+from fsci.run.history import HistoryWriter, read_history
+from fsci.run.memory import require_memory
+from fsci.run.monitor import Monitor
+from fsci.run.output import FieldWriter, write_text
+from fsci.run.processes import describe
+from fsci.run.results_folder import keep_case, prepare_folder
+from fsci.run.stop import StopWatch
+from fsci.run.summary import RunRecord, memory_mb, summarize, write_summary
+from fsci.run.verify import evaluate
 from solvers.api import State, StepFailed, StepInfo
 
 if TYPE_CHECKING:
-    from fsci.build import Simulation
+    from fsci.builder.build import Simulation
 
 FINISHED, FAILED, BAD_CASE, STOPPED = 0, 1, 2, 3  #: exit codes
 
@@ -158,7 +158,7 @@ class Run:
             yield
 
     def _build(self) -> Simulation:
-        from fsci.build import build
+        from fsci.builder.build import build
 
         with self.record.timer("start"):
             self.simulation = build(self.case, self.comm, self.record.timer)

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from fsci.curves import DOTS, plot_convergence, plot_history
-from fsci.history import read_history
-from fsci.movie import plot_movie
-from fsci.output import Series, read_collection
-from fsci.render import ISOMETRIC, Array, import_pyvista, load_body
-from fsci.render_flow import is_flow, load_meshes, load_state
-from fsci.results_folder import list_pictures
-from fsci.scene import compose, draw
-from fsci.storyboard import choose, plot_story
+from fsci.plot.curves import DOTS, plot_convergence, plot_history
+from fsci.plot.movie import plot_movie
+from fsci.plot.render import ISOMETRIC, Array, import_pyvista, load_body
+from fsci.plot.render_flow import is_flow, load_meshes, load_state
+from fsci.plot.scene import compose, draw
+from fsci.plot.storyboard import choose, plot_story
+from fsci.run.history import read_history
+from fsci.run.output import Series, read_collection
+from fsci.run.results_folder import list_pictures
 
 STRUCTURE_FIELDS = ("displacement",)  #: what is drawn if nothing is asked for
 FLUID_FIELDS = ("velocity", "pressure")

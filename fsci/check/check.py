@@ -10,7 +10,7 @@ from fsci.case.contact import Pair
 from fsci.case.fluid import Fluid
 from fsci.case.mesh import Mesh, Shape
 from fsci.case.structure import Structure
-from fsci.estimate import size
+from fsci.check.estimate import size
 from solvers.mesh import Mesh as BodyMesh
 
 Row = tuple[str, str]

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fsci.curves import SIZE, STYLE, label
-from fsci.render import ISOMETRIC, Array, Body, Pixels, View, axes_of_view, frame, render
+from fsci.plot.curves import SIZE, STYLE, label
+from fsci.plot.render import ISOMETRIC, Array, Body, Pixels, View, axes_of_view, frame, render
 
 Rectangle = tuple[float, float, float, float]  #: left, bottom, width, height in parts of the figure
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from fsci.case import Case, CaseError
 from fsci.case.errors import Place, Problem
-from fsci.output import write_text
+from fsci.run.output import write_text
 
 #: A folder with this file was made by a run; a later run may replace what runs write there.
 MARKER = ".fsci-run"

@@ -8,7 +8,7 @@ from typing import Any
 from fsci.case import Case
 from fsci.case.mesh import Shape
 from fsci.case.yaml_text import Keys
-from fsci.estimate import size
+from fsci.check.estimate import size
 
 #: Memory [bytes] that an unknown takes at least: its row of a matrix in 2D with its nine neighbours, twice. In 3D with
 #: factors or a preconditioner it is up to twenty times as much.

@@ -13,14 +13,14 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.builder.rigid_motion import rigid_motion
+from fsci.builder.skin import find_skin
 from fsci.case import Case, CaseError
 from fsci.case.contact import Pair
 from fsci.case.errors import Problem
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import fast_body, thin_body
-from fsci.case_meshes import read_body, read_obstacle, read_rigid_body, require_inside_period, slave_surfaces
-from fsci.rigid_motion import rigid_motion
-from fsci.skin import find_skin
+from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body, require_inside_period, slave_surfaces
 from solvers.fluid.inside import PointInBody, require_outside
 from solvers.fluid.surface import Motion, Surface
 from solvers.locate import locate
@@ -64,7 +64,7 @@ def check_meshes(case: Case) -> Findings:
     """All of it."""
     found = Findings()
     if case.contact is not None:
-        from fsci.automatic_pairs import with_pairs
+        from fsci.builder.automatic_pairs import with_pairs
 
         case = found.attempt(partial(with_pairs, case)) or case
     found.pairs = {} if case.contact is None else case.contact.pairs
@@ -128,7 +128,7 @@ def _sharp_edges(case: Case, found: Findings) -> None:
         where, side = pair.sides[0]
         if pair.tied or side.body not in found.meshes:
             continue
-        from fsci.edges import SHARP, sharpest_edge
+        from fsci.check.edges import SHARP, sharpest_edge
 
         angle = sharpest_edge(found.meshes[side.body], side.on or ())
         if angle > SHARP:
@@ -140,7 +140,7 @@ def _sharp_edges(case: Case, found: Findings) -> None:
 
 def _tied(case: Case, meshes: dict[str, Mesh]) -> None:
     if case.contact is not None and any(pair.tied for pair in case.contact.pairs.values()):
-        from fsci.build_tied import join_tied
+        from fsci.builder.tied import join_tied
 
         join_tied(case, meshes)
 

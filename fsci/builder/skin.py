@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.builder.dry_side import DrySideError, close
 from fsci.case import Case
-from fsci.dry_side import DrySideError, close
-from fsci.mesh import MeshError, require_surface
+from fsci.meshes.mesh import MeshError, require_surface
 from solvers.mesh import Mesh
 from solvers.skin import Skin, cut_out_skin
 from solvers.tessellation import tessellate

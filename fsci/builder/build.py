@@ -1,4 +1,4 @@
-"""From a case to the objects that compute it: this module and its `build_*` parts are all that knows every class.
+"""From a case to the objects that compute it: the modules of this folder are all that knows every class.
 
 A part that the case does not mention is not imported.
 """
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
+from fsci.builder.columns import Numbers
 from fsci.case import Case
-from fsci.columns import Numbers
 from solvers.api import Scheme, Snapshot
 from solvers.timing import Timer
 
@@ -40,7 +40,7 @@ class Simulation:
 def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     """All objects of a case. Raises CaseError for what only the meshes can tell (collective)."""
     if case.contact is not None:
-        from fsci.automatic_pairs import with_pairs
+        from fsci.builder.automatic_pairs import with_pairs
 
         case = with_pairs(case, comm)
     if case.coupling is not None:
@@ -51,7 +51,7 @@ def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
 
 def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
-    from fsci.build_structure import build_bodies, build_probes, build_structure
+    from fsci.builder.structure import build_bodies, build_probes, build_structure
     from solvers.structure.snapshot import snapshots
 
     bodies = build_bodies(case, comm)
@@ -72,7 +72,7 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 def _contact(case: Case, comm: MPI.Comm, bodies: list[Body]) -> Contact | None:
     if case.contact is None:
         return None
-    from fsci.build_contact import build_contact
+    from fsci.builder.contact import build_contact
 
     return build_contact(case, comm, bodies)
 
@@ -86,9 +86,10 @@ def _contact_fields(contact: Contact | None) -> PartFields | None:
 
 
 def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
-    from fsci import build_fluid, build_structure
-    from fsci.build_coupling import build_coupled, start
-    from fsci.dry_side import outlines
+    from fsci.builder import fluid as build_fluid
+    from fsci.builder import structure as build_structure
+    from fsci.builder.coupling import build_coupled, start
+    from fsci.builder.dry_side import outlines
     from solvers.fluid.probes import mass_balance
     from solvers.fluid.snapshot import snapshots as of_fluid
     from solvers.structure.snapshot import snapshots as of_structure
@@ -117,7 +118,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
 
 def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
-    from fsci.build_fluid import build_fluid, build_probes, build_rigid_bodies
+    from fsci.builder.fluid import build_fluid, build_probes, build_rigid_bodies
     from solvers.fluid.probes import mass_balance
     from solvers.fluid.snapshot import snapshots
 

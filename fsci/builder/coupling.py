@@ -15,13 +15,13 @@ from coupling.interface import DrySide, Interface
 from coupling.monolithic import Monolithic
 from coupling.partitioned import FixedPointTolerance, Partitioned
 from coupling.wetted import WettedSurface, immerse, wetted_surface
-from fsci.build_fluid import build_fluid, build_rigid_bodies
-from fsci.build_solver import build_tolerance
+from fsci.builder.dry_side import find_ends
+from fsci.builder.fluid import build_fluid, build_rigid_bodies
+from fsci.builder.skin import find_skin
+from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.coupling_checks import closed_in
-from fsci.case_meshes import require_inside_period
-from fsci.dry_side import find_ends
-from fsci.skin import find_skin
+from fsci.meshes.of_case import require_inside_period
 from solvers.api import Scheme
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.surface import Surface

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from fsci.curves import DOTS, STYLE, label
-from fsci.render import Array, Body, Pixels, View, import_pyvista, render
-from fsci.render_flow import NO_LINES, fill_lines, is_flat, lengthwise, load_state, plane_flow, segments
-from fsci.scene import draw_colour_bar, field_label
+from fsci.plot.curves import DOTS, STYLE, label
+from fsci.plot.render import Array, Body, Pixels, View, import_pyvista, render
+from fsci.plot.render_flow import NO_LINES, fill_lines, is_flat, lengthwise, load_state, plane_flow, segments
+from fsci.plot.scene import draw_colour_bar, field_label
 
 PANELS = 6  #: at most
 WIDTH = 9.0  #: of the picture, inches

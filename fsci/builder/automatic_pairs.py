@@ -14,13 +14,13 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fsci.builder.facing import Face, face, faces, meeting
 from fsci.case import Case, CaseError
 from fsci.case.contact import Pair, Side
 from fsci.case.material import Material
 from fsci.case.supports import Support
-from fsci.case_meshes import read_body, read_obstacle
 from fsci.expression import Expression
-from fsci.facing import Face, face, faces, meeting
+from fsci.meshes.of_case import read_body, read_obstacle
 from solvers.mesh import Mesh
 
 Array = NDArray[np.float64]

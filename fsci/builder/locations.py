@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.case import Case
-from fsci.mesh import MeshError, require_surface
-from fsci.mesh_files import unknown
+from fsci.meshes.files import unknown
+from fsci.meshes.mesh import MeshError, require_surface
 from solvers.mesh import Mesh
 
 #: A named surface, or nodes by their numbers.

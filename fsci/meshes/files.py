@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.mesh_scripts import RefusedScript, require_harmless
-from fsci.serendipity import FULL, complete
+from fsci.meshes.scripts import RefusedScript, require_harmless
+from fsci.meshes.serendipity import FULL, complete
 from solvers.mesh import Mesh
 from solvers.mesh_topology import (
     CORNERS,

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fsci.render import Body, Pixels
-from fsci.render_flow import load_state
-from fsci.scene import animate, compose
+from fsci.plot.render import Body, Pixels
+from fsci.plot.render_flow import load_state
+from fsci.plot.scene import animate, compose
 
 FRAMES = 200  #: at most; of a longer series every second, third, ... time is shown
 DOTS = 120  #: pixels per inch: 960 x 600

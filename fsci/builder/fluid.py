@@ -9,13 +9,13 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fsci.build_solver import build_tolerance
+from fsci.builder.columns import Numbers, columns
+from fsci.builder.rigid_motion import rigid_motion
+from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.fluid import Fluid as Section
 from fsci.case.probes import Reference
-from fsci.case_meshes import read_rigid_body, require_inside_period
-from fsci.columns import Numbers, columns
-from fsci.rigid_motion import rigid_motion
+from fsci.meshes.of_case import read_rigid_body, require_inside_period
 from solvers.fluid import probes
 from solvers.fluid.field import Fluid
 from solvers.fluid.forms import ELASTIC, Penalties

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.output import write_text
+from fsci.run.output import write_text
 
 COLUMNS = ("step", "time", "dt", "iterations", "wall")
 

@@ -7,13 +7,13 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fsci.build_loads import build_loads
-from fsci.build_solver import build_tolerance
+from fsci.builder.columns import Numbers, columns
+from fsci.builder.loads import build_loads
+from fsci.builder.locations import Places, find_places
+from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.probes import Probe
-from fsci.case_meshes import VECTORS, read_body
-from fsci.columns import Numbers, columns
-from fsci.places import Places, find_places
+from fsci.meshes.of_case import VECTORS, read_body
 from solvers.constraint import Constraint
 from solvers.mesh import Mesh
 from solvers.solver_settings import SolverSettings
@@ -79,7 +79,7 @@ def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Plac
             meshes = {name: read_body(case, name) for name in case.elastic_bodies}
             places = {name: find_places(case, name, mesh) for name, mesh in meshes.items()}
             if case.contact is not None:
-                from fsci.build_tied import join_tied
+                from fsci.builder.tied import join_tied
 
                 meshes = join_tied(case, meshes)
         except Exception as raised:  # raised on every process below

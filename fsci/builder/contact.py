@@ -9,10 +9,10 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from coupling.contact_surface import contact_surface
+from fsci.builder.rigid_motion import rigid_motion
 from fsci.case import Case, CaseError
 from fsci.case.contact import Pair as PairSettings
-from fsci.case_meshes import read_obstacle, read_rigid_body
-from fsci.rigid_motion import rigid_motion
+from fsci.meshes.of_case import read_obstacle, read_rigid_body
 from solvers.api import Array
 from solvers.contact.contact import Contact
 from solvers.contact.law.coulomb import Coulomb

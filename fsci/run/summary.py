@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from fsci.history import History
-from fsci.output import write_text
+from fsci.run.history import History
+from fsci.run.output import write_text
 from solvers.api import State, StepInfo
 from solvers.timing import Timer
 

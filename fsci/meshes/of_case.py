@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.builder.locations import find_places
 from fsci.case import Case
 from fsci.case.checks import load_vectors
 from fsci.case.structure import NO_MIXED_SIMPLICES
-from fsci.mesh import MeshError, build_mesh, extract_region, require_surface
-from fsci.places import find_places
+from fsci.meshes.mesh import MeshError, build_mesh, extract_region, require_surface
 from solvers.mesh import Mesh
 from solvers.mesh_topology import surface_facets
 from solvers.tessellation import is_closed, tessellate

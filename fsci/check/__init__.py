@@ -1,0 +1,1 @@
+"""What `fsci check` says of a case."""

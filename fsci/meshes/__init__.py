@@ -1,0 +1,1 @@
+"""Meshes of a case: from files and scripts, placed, their parts found by name."""

@@ -1,0 +1,1 @@
+"""Pictures, curves and movies of a results folder."""

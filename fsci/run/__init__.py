@@ -1,0 +1,1 @@
+"""A run: steps through time, results, checkpoints, stop and resume."""
