@@ -42,7 +42,7 @@ class Balance:
 
     def start(self) -> None:
         """The state before the first step; the structure starts without the fluid's force."""
-        self.given = self._interface.gather(self._structure.carried_at_start())
+        self.given = self._interface.gather(self._structure.load_at_start())
 
     def add_step(self) -> None:
         """After both fields have accepted the step."""
@@ -51,7 +51,7 @@ class Balance:
         before, self.given = self.given, interface.join(by_surface)
         weight = structure.time.force_weight
         mean = weight * self.given + (1.0 - weight) * before
-        taken = interface.gather(structure.carried())
+        taken = interface.gather(structure.averaged_load())
         size = float(np.linalg.norm(mean))
         self.force = float(np.linalg.norm(taken - mean)) / size if size > 0.0 else 0.0
         of_fluid, self.loss = self._of_fluid()

@@ -45,15 +45,15 @@ class Coupled:
         self.predictor.add(t, self.structure.old.u)
 
     def predict(self, t: float) -> None:
-        """First guess of the fields at t: places on a parabola, unless the structure has a guess of its own.
+        """Predict the fields at t: displacements on a parabola, unless the structure has a predictor of its own.
 
-        Cut the grid at the old place before that: cells that the surface leaves keep their ghost penalty for the step.
+        Cut the grid at the old positions before that: cells that the surface leaves keep their ghost penalty.
         """
         structure = self.structure
         self.fluid.predict()
         held, now = structure.held, structure.now
-        own_guess = not np.array_equal(held.free_part(now.u), held.free_part(structure.old.u))
-        if not structure.comm.allreduce(own_guess, op=MPI.LOR):
+        own_predictor = not np.array_equal(held.free_part(now.u), held.free_part(structure.old.u))
+        if not structure.comm.allreduce(own_predictor, op=MPI.LOR):
             now.u[:] = held.part(now.u) + held.free_part(self.predictor.at(t))
 
     def end_step(self) -> None:
@@ -72,13 +72,13 @@ class Coupled:
             "structure": self.structure.save(),
             "interface": self.interface.save(),
             "balance": self.balance.save(),
-            "places": self._save_places(),
+            "predictor": self._save_predictor(),
         }
 
-    def _save_places(self) -> State:
-        """Three of them at all times, so that all states have the same parts."""
-        places = [*self.predictor.places, *[self.structure.now.u] * 3][:3]
-        by_name: State = {str(i): self.structure.per_body(place) for i, place in enumerate(places)}
+    def _save_predictor(self) -> State:
+        """Three displacements at all times, so that all states have the same parts."""
+        displacements = [*self.predictor.displacements, *[self.structure.now.u] * 3][:3]
+        by_name: State = {str(i): self.structure.per_body(u) for i, u in enumerate(displacements)}
         return by_name | {"times": list(self.predictor.times)}
 
     def restore(self, state: State) -> None:
@@ -86,6 +86,7 @@ class Coupled:
         self.fluid.restore(state["fluid"])
         self.interface.restore(state["interface"])
         self.balance.restore(state["balance"])
-        times = list(state["places"]["times"])
-        self.predictor.times = times
-        self.predictor.places = [self.structure.from_bodies(state["places"][str(i)]) for i in range(len(times))]
+        predictor, self.predictor.times = state["predictor"], list(state["predictor"]["times"])
+        self.predictor.displacements = [
+            self.structure.from_bodies(predictor[str(i)]) for i in range(len(self.predictor.times))
+        ]

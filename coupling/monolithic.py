@@ -175,7 +175,7 @@ class Monolithic:
         moved = np.full((len(fluid.cut.motion.x), fluid.dim), -1)
         moved[fluid.vertices_of([s.name for s in surface.surfaces])] = surface.dofs
         flow, moved = fluid.unknowns.global_dofs, moved.ravel()
-        rows, columns = operator.places
+        rows, columns = operator.pattern
         held, elastic = fluid.held_everywhere()[rows], moved[columns] >= 0
         own, own_flow = structure.layout.size, fluid.unknowns.owned
         of_flow, of_structure = flow[rows], moved[columns]
@@ -184,7 +184,7 @@ class Monolithic:
         into_structure = from_entries(
             self.comm, (own, own_flow), of_structure[elastic], of_flow[elastic], -weight * back[elastic]
         )
-        rows, columns = (moved[places] for places in operator.surface_places)
+        rows, columns = (moved[dofs] for dofs in operator.surface_pattern)
         elastic = (rows >= 0) & (columns >= 0)
         mass = from_entries(self.comm, (own, own), rows[elastic], columns[elastic], weight * load[elastic])
         return into_fluid, into_structure, mass

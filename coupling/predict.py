@@ -1,4 +1,4 @@
-"""Where a body will be: the parabola through its last three places, or as much of it as is known.
+"""Extrapolation of displacements: the parabola through the last three, or the line or constant through fewer.
 
 d(t) = sum_i L_i(t) d_i, L_i the Lagrange polynomials on the times t_i, whatever the lengths of the steps were.
 """
@@ -11,20 +11,20 @@ from solvers.api import Array
 
 
 class Predictor:
-    """The last places, newest first, three at most."""
+    """The last displacements, newest first, three at most."""
 
     def __init__(self) -> None:
         self.times: list[float] = []
-        self.places: list[Array] = []
+        self.displacements: list[Array] = []
 
     def add(self, t: float, d: Array) -> None:
         """Displacements [m] at time t [s], later than all before."""
-        self.times, self.places = [t, *self.times][:3], [d.copy(), *self.places][:3]
+        self.times, self.displacements = [t, *self.times][:3], [d.copy(), *self.displacements][:3]
 
     def at(self, t: float) -> Array:
         """Displacements [m] expected at time t [s]."""
-        predicted = np.zeros_like(self.places[0])
-        for i, (time, place) in enumerate(zip(self.times, self.places, strict=True)):
+        predicted = np.zeros_like(self.displacements[0])
+        for i, (time, displacement) in enumerate(zip(self.times, self.displacements, strict=True)):
             others = [other for j, other in enumerate(self.times) if j != i]
-            predicted += float(np.prod([(t - other) / (time - other) for other in others])) * place
+            predicted += float(np.prod([(t - other) / (time - other) for other in others])) * displacement
         return predicted

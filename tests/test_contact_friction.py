@@ -127,7 +127,7 @@ def test_a_common_rigid_motion_is_no_slip(cell_type):
         contact.begin_step()
         contact.evaluate(moved - contact.nodes.points, 1.0)
         contact._x_old = contact.x.copy()
-        seen = contact._slip.known & (contact.terms.D > 0)
+        seen = contact._slip.defined & (contact.terms.D > 0)
         slips.append(contact._slip.values[seen])
         contact.x = contact.nodes.points.copy()
     assert np.abs(slips[0]).max() > 1e-3

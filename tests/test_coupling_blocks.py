@@ -109,7 +109,7 @@ def test_the_force_on_the_structure_is_the_reaction_of_the_fluid():
         ones[fluid.unknowns.velocity.dofs[:, axis]] = 1.0
         # terms of the interface in the momentum rows, tested with a unit velocity: a force of -f on the fluid
         on_fluid = np.zeros(fluid.cut.motion.x.size)
-        rows, columns = interface.places
+        rows, columns = interface.pattern
         values = np.concatenate([part.ravel() for part in interface.coupling_blocks])
         np.add.at(on_fluid, columns, values * ones[rows])
         against = interface.force(fluid.flow, fluid.cut.motion.v)[:, axis].sum()

@@ -15,7 +15,9 @@ def numbers(name: str) -> list[list[float]]:
     """The numbers of each line that an example prints."""
     done = subprocess.run([sys.executable, EXAMPLES / f"{name}.py"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    return [[float(text) for text in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", line)] for line in done.stdout.splitlines()]
+    return [
+        [float(text) for text in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", line)] for line in done.stdout.splitlines()
+    ]
 
 
 def test_all_are_tested_and_shown():

@@ -10,10 +10,10 @@ def parabola(t: float) -> np.ndarray:
     return np.array([[1.0 + 2.0 * t - 3.0 * t**2, 0.5 * t**2]])
 
 
-@pytest.mark.parametrize(("places", "order"), [(1, 0), (2, 1), (3, 2)])
-def test_follows_polynomials_of_the_order_it_knows(places: int, order: int) -> None:
+@pytest.mark.parametrize(("displacements", "order"), [(1, 0), (2, 1), (3, 2)])
+def test_follows_polynomials_of_the_order_it_knows(displacements: int, order: int) -> None:
     predictor = Predictor()
-    times = [0.0, 0.1, 0.25][:places]
+    times = [0.0, 0.1, 0.25][:displacements]
     for t in times:
         predictor.add(t, np.array([[t**order, 2.0 * t**order]]))
     assert predictor.at(0.4) == pytest.approx(np.array([[0.4**order, 2.0 * 0.4**order]]), rel=1e-13)

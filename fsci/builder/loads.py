@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fsci.builder.locations import Places
+from fsci.builder.locations import Locations
 from fsci.case.structure import Body as Section
 from fsci.case.supports import Spring as SpringSection
 from fsci.case.supports import Support as SupportSection
@@ -15,12 +15,12 @@ from solvers.structure.loads import LineForce, PointForce, Pressure, Traction
 from solvers.structure.supports import Roller
 
 
-def build_loads(body: Section, places: Places) -> dict[str, tuple[Any, ...]]:
+def build_loads(body: Section, locations: Locations) -> dict[str, tuple[Any, ...]]:
     """Supports, springs and loads as `Body` takes them."""
 
     def each(section: str, build: Any) -> tuple[Any, ...]:
         entries = enumerate(getattr(body, section))
-        return tuple(build(entry, where) for index, entry in entries for where in places[section, index])
+        return tuple(build(entry, where) for index, entry in entries for where in locations[section, index])
 
     return {
         "supports": each("supports", _support),

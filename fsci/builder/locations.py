@@ -21,14 +21,14 @@ TOLERANCE = 1e-6
 
 
 #: (setting of the body, number of the entry) -> where it acts: a surface, nodes, or (nodes, positions) of lines
-Places = dict[tuple[str, int], list[Any]]
+Locations = dict[tuple[str, int], list[Any]]
 
 KINDS = {"supports": ("surface", "line", "points"), "springs": ("surface", "points"), "point_forces": ("points",)}
 
 
-def find_places(case: Case, name: str, mesh: Mesh) -> Places:
+def find_locations(case: Case, name: str, mesh: Mesh) -> Locations:
     """Where supports, springs and loads of a body act. Raises CaseError."""
-    body, places = case.elastic_bodies[name], {}
+    body, locations = case.elastic_bodies[name], {}
     for section in (*KINDS, "tractions", "pressures", "line_forces"):
         for index, entry in enumerate(getattr(body, section)):
             at = getattr(entry, "at", None)
@@ -39,8 +39,8 @@ def find_places(case: Case, name: str, mesh: Mesh) -> Places:
                 )
             except MeshError as error:
                 raise case.error(("structure", "bodies", name, section, index, key), str(error)) from None
-            places[section, index] = found
-    return places
+            locations[section, index] = found
+    return locations
 
 
 def _find(mesh: Mesh, section: str, entry: Any, name: str) -> Any:

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from fsci.builder.columns import Numbers, columns
 from fsci.builder.loads import build_loads
-from fsci.builder.locations import Places, find_places
+from fsci.builder.locations import Locations, find_locations
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.probes import Probe
@@ -29,8 +29,8 @@ from solvers.values import Value
 
 def build_bodies(case: Case, comm: MPI.Comm) -> list[Body]:
     """The elastic bodies of a case. Raises CaseError (collective)."""
-    meshes, places = _meshes(case, comm)
-    return [_body(case, name, comm, meshes.get(name), places[name]) for name in case.elastic_bodies]
+    meshes, locations = _meshes(case, comm)
+    return [_body(case, name, comm, meshes.get(name), locations[name]) for name in case.elastic_bodies]
 
 
 def build_structure(
@@ -62,32 +62,32 @@ def _time_scheme(case: Case) -> TimeScheme:
     return Dynamics(scheme, damping=damping, predictor=dynamics.predictor)
 
 
-def _body(case: Case, name: str, comm: MPI.Comm, mesh: Mesh | None, places: Places) -> Body:
+def _body(case: Case, name: str, comm: MPI.Comm, mesh: Mesh | None, locations: Locations) -> Body:
     assert case.structure is not None
     settings = case.elastic_bodies[name]
     vectors = {key: getattr(settings, key) for key in VECTORS}
     material = _material(settings, case.structure.plane)
-    loads = build_loads(settings, places)
+    loads = build_loads(settings, locations)
     return Body(name, mesh, material, element=settings.element, **loads, **vectors, comm=comm)
 
 
-def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Places]]:
+def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Locations]]:
     """The meshes of the bodies on rank 0, with all surfaces that the case names; on all processes where loads act."""
-    error, meshes, places = None, {}, {}
+    error, meshes, locations = None, {}, {}
     if comm.rank == 0:
         try:
             meshes = {name: read_body(case, name) for name in case.elastic_bodies}
-            places = {name: find_places(case, name, mesh) for name, mesh in meshes.items()}
+            locations = {name: find_locations(case, name, mesh) for name, mesh in meshes.items()}
             if case.contact is not None:
                 from fsci.builder.tied import join_tied
 
                 meshes = join_tied(case, meshes)
         except Exception as raised:  # raised on every process below
             error = raised
-    error, places = comm.bcast((error, places), root=0)
+    error, locations = comm.bcast((error, locations), root=0)
     if error is not None:
         raise error
-    return meshes, places
+    return meshes, locations
 
 
 def _material(body, plane: str) -> materials.Material:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.builder.locations import find_places
+from fsci.builder.locations import find_locations
 from fsci.case import Case
 from fsci.case.checks import load_vectors
 from fsci.case.structure import NO_MIXED_SIMPLICES
@@ -47,7 +47,7 @@ def read_body(case: Case, name: str) -> Mesh:
         raise case.error(keys, str(error)) from None
     _check_lengths(case, name, mesh.points.shape[1])
     _require_mass(case, name, mesh)
-    find_places(case, name, mesh)
+    find_locations(case, name, mesh)
     return mesh
 
 

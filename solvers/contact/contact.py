@@ -21,9 +21,9 @@ from solvers.contact.friction_work import FrictionWork
 from solvers.contact.interface import Interface, describe_interface
 from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
 from solvers.contact.law.tied import Tied
-from solvers.contact.lent import lent_shares
 from solvers.contact.linearise import Part, linearise
 from solvers.contact.pair import Pair
+from solvers.contact.redistribute import redistributed_shares
 from solvers.contact.share import Shares
 from solvers.contact.slip import Sliding, Slip
 from solvers.contact.terms import Terms, find_normals, total_terms
@@ -75,7 +75,7 @@ class Contact:
         self._stiffness = np.zeros(count)
         self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
         self._blocked = np.zeros(count, dtype=bool)
-        self._lent: sp.csr_matrix | None = None
+        self._redistribution: sp.csr_matrix | None = None
         self._shares = Shares(comm)
         laws = [(mortar, self.interface.law_of(mortar.patch)) for mortar in self.interface.mortars]
         self._mortars = [mortar for mortar, law in laws if not isinstance(law, Tied)]
@@ -100,8 +100,9 @@ class Contact:
         self.x = self.positions(u, t)
         self._x_old = self.x.copy()
         self._blocked = find_blocked(self.interface, self.x)
-        self._lent = lent_shares([p.multipliers[p.facets] for p in self.multipliers.patches], self._blocked)
-        self._ties.start(self._with_lent)
+        facets = [patch.multipliers[patch.facets] for patch in self.multipliers.patches]
+        self._redistribution = redistributed_shares(facets, self._blocked)
+        self._ties.start(self._redistributed)
 
     def positions(self, u: Array, t: float) -> Array:
         """Current positions [m] of all nodes from the displacements of the deformable ones, shape (N, dim)."""
@@ -121,7 +122,7 @@ class Contact:
         self._shares.begin_step()
         for mortar in self._mortars:
             mortar.begin_step(self.active_set.active)
-        self._sliding.begin_step(self.x, self._with_lent)
+        self._sliding.begin_step(self.x, self._redistributed)
         self._slip = None
 
     def end_step(self, weight: float) -> None:
@@ -148,10 +149,10 @@ class Contact:
         self.time = t
         self.terms = self._evaluate_mortars()
         status = np.full(len(self.z), OPEN, dtype=np.int8)
-        self._gap = np.zeros(len(self.z)) if self.terms is None else self._with_lent(self.terms.gap)
+        self._gap = np.zeros(len(self.z)) if self.terms is None else self._redistributed(self.terms.gap)
         self._mean_gap = np.zeros(len(self.z))
         if self.terms is not None:
-            self._D = self._with_lent(self.terms.D)
+            self._D = self._redistributed(self.terms.D)
             self._covers = self._coverage.judge(self.terms.D) & ~self._blocked
             np.divide(self._gap, self._D, out=self._mean_gap, where=self._D > 0.0)
             for law, which in self.interface.laws:
@@ -172,7 +173,7 @@ class Contact:
             covered=self._covers[which],
             stiffness=stiffness,
             slip=np.zeros((len(which), self.dim)) if slip is None else slip.values[which],
-            slip_known=np.zeros(len(which), dtype=bool) if slip is None else slip.known[which],
+            slip_defined=np.zeros(len(which), dtype=bool) if slip is None else slip.defined[which],
             c_n=self.c_n * self.active_set.damping * stiffness,
             c_t=self.c_n * self.active_set.damping * stiffness,
             touching=self._touching,
@@ -186,14 +187,14 @@ class Contact:
         status[several[~left.any(axis=1)]] = OPEN
 
     def _set_multipliers(self, own: Array) -> None:
-        self.z[:] = own if self._lent is None else own + self._lent @ own
+        self.z[:] = own if self._redistribution is None else own + self._redistribution @ own
 
-    def _with_lent(self, rows):
-        """Rows of multipliers, one each or one for each component, plus those of functions that are lent to them."""
-        if self._lent is None:
+    def _redistributed(self, rows):
+        """Rows of multipliers, one each or one for each component, plus those that are redistributed to them."""
+        if self._redistribution is None:
             return rows
-        lent = self._lent if rows.shape[0] == len(self.z) else expand(self._lent, self.dim)
-        return rows + lent.T @ rows
+        moved = self._redistribution if rows.shape[0] == len(self.z) else expand(self._redistribution, self.dim)
+        return rows + moved.T @ rows
 
     def _evaluate_mortars(self) -> Terms | None:
         """Terms of all pairs, each process doing its share of the slave facets; None if no facets are near."""
@@ -218,7 +219,7 @@ class Contact:
             return None
         if self._sliding.mortars:
             used = [(mortar, found.used) for mortar, found in pieces]
-            self._slip = self._sliding.evaluate(self.x, normals, used, self._with_lent)
+            self._slip = self._sliding.evaluate(self.x, normals, used, self._redistributed)
         if self._ties.pieces:
             tied = self._ties.slip(self.x)
             self._slip = tied if self._slip is None or not self._sliding.mortars else self._slip.plus(tied)
@@ -263,12 +264,12 @@ class Contact:
     def linearised(self, parts: Sequence[Part], weight: float) -> Linearised:
         """What multipliers in contact add to a Newton step."""
         assert self.terms is not None
-        count, n, dgap = len(self.z), self.dim * self.size, self._with_lent(self.terms.dgap)
+        count, n, dgap = len(self.z), self.dim * self.size, self._redistributed(self.terms.dgap)
         slip = sp.csr_matrix((self.dim * count, n)) if self._slip is None else self._slip.slopes
         slopes = Slopes(gap=dgap, normals=self.terms.dnormals, slip=slip)
         force = self._force_matrix()
-        if self._lent is not None:
-            force = force + force @ self._lent
+        if self._redistribution is not None:
+            force = force + force @ self._redistribution
         return linearise(self.interface, parts, slopes, force, self.terms.dforce, weight)
 
     def condense(self, weight: float) -> RowTransformation:

@@ -42,11 +42,11 @@ class Slip:
 
     values: Array  #: [m], shape (C, dim), zero where it is not known
     slopes: sp.csr_matrix  #: derivatives, shape (dim * C, dim * N)
-    known: NDArray[np.bool_]  #: multipliers that saw a master at the beginning, shape (C,)
+    defined: NDArray[np.bool_]  #: multipliers that saw a master at the beginning, shape (C,)
 
     def plus(self, other: Slip) -> Slip:
         """With that of other multipliers."""
-        return Slip(self.values + other.values, self.slopes + other.slopes, self.known | other.known)
+        return Slip(self.values + other.values, self.slopes + other.slopes, self.defined | other.defined)
 
 
 class Sliding:

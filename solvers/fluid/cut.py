@@ -29,7 +29,7 @@ class Cut:
     cut: Cells  #: cells with a piece of surface, or partly solid
     strip: Cells  #: solid cells that the flow is extended to
     ghost_faces: NDArray[np.int32]  #: faces between active cells, one of them cut or of the strip
-    shut: Cells  #: solid cells where surfaces touch each other or the box's boundary
+    contact_cells: Cells  #: solid cells where surfaces touch each other or the box's boundary
     reach: NDArray[np.bool_]  #: local cells that the surfaces may soon cut or uncover
     fluid: Array  #: int_fluid L_q dx / (w_q |K|) on cut cells, shape (cut, points)
     fraction: Array  #: share of fluid in each local cell
@@ -85,7 +85,7 @@ class Cutter:
         near = _grow(box.as_box(is_cut), layers).ravel(order="F") if layers else is_cut
         strip = solid & (near | self._special)
         self._special |= is_cut | strip
-        shut = solid & (self._facing(moments, counts, normal) | self._covered(motion.x[facets[~off]]))
+        touching = solid & (self._facing(moments, counts, normal) | self._covered(motion.x[facets[~off]]))
         local_cut, local_strip = is_cut[grid.numbers], strip[grid.numbers]
         active = ~solid[grid.numbers] | local_strip
         faces, sides = grid.interior_faces
@@ -105,7 +105,7 @@ class Cutter:
             cut=cut,
             strip=np.flatnonzero(local_strip).astype(np.int32),
             ghost_faces=faces[special],
-            shut=np.flatnonzero(shut[grid.numbers]).astype(np.int32),
+            contact_cells=np.flatnonzero(touching[grid.numbers]).astype(np.int32),
             reach=self._reach(box.as_box(self._special), layers),
             fluid=fluid,
             fraction=1.0 - moments.fraction[grid.numbers],

@@ -164,10 +164,10 @@ class Fluid:
         old, older = self.history.old, self.history.older
         if self.difference.beta_1 == 0.0:
             return
-        going_on = old.known & older.known
-        going_on[self.boundary.dofs] = False
+        continued = old.valid & older.valid
+        continued[self.boundary.dofs] = False
         growth = self.dt / self.history.steps[-1]
-        self.flow[going_on] += growth * (old.velocity - older.velocity)[going_on]
+        self.flow[continued] += growth * (old.velocity - older.velocity)[continued]
 
     def move(self, coupled: Mapping[str, Motion]) -> None:
         """Cut the grid by the surfaces where they are now: `coupled` bodies by name, all others as prescribed.
@@ -245,7 +245,7 @@ class Fluid:
         """Accept the step. Fluid that comes between surfaces which touch now will have been at rest."""
         if self._coupled:
             self._note_fast_bodies()
-        known = self.system.active_dofs | self.system.dofs_of(self.cut.shut)
+        known = self.system.active_dofs | self.system.dofs_of(self.cut.contact_cells)
         self.history.end_step(self.dt, self.velocity(), known)
 
     # ---------------------------------------------------------------------------- the system that Newton solves
@@ -380,13 +380,13 @@ class Fluid:
         def nodal(values: Array, nodes) -> Nodal:
             return Nodal(values[nodes.dofs[: nodes.owned]].astype(float), nodes.numbers[: nodes.owned])
 
-        known = np.stack([self.history.now.known, self.history.old.known], axis=1)[velocity.dofs[:, 0]]
+        known = np.stack([self.history.now.valid, self.history.old.valid], axis=1)[velocity.dofs[:, 0]]
         return {
             "velocity": nodal(self.history.now.velocity, velocity),
             "pressure": nodal(self.flow, pressure),
             "old_velocity": nodal(self.history.old.velocity, velocity),
-            "known": Nodal(known[: velocity.owned].astype(float), velocity.numbers[: velocity.owned]),
-            "room": Nodal(self.system.room(), self.grid.numbers[: self.grid.owned]),
+            "valid": Nodal(known[: velocity.owned].astype(float), velocity.numbers[: velocity.owned]),
+            "pattern": Nodal(self.system.pattern_state(), self.grid.numbers[: self.grid.owned]),
             "steps": list(self.history.steps),
             "time": self._t,
             "linear_solver": self.ladder.rung,
@@ -399,7 +399,7 @@ class Fluid:
     def restore(self, state: State) -> None:
         """Back to a saved state."""
         velocity, pressure = self.unknowns.velocity, self.unknowns.pressure
-        known = state["known"].values
+        known = state["valid"].values
         self.flow[:] = self._at_nodes(velocity, state["velocity"].values)
         self.flow[:] += self._at_nodes(pressure, state["pressure"].values)
         old_velocity = self._at_nodes(velocity, state["old_velocity"].values)
@@ -410,7 +410,7 @@ class Fluid:
         self.history.steps, self._t = tuple(state["steps"]), state["time"]
         self.ladder.rung = state["linear_solver"]
         self.difference = time.STEADY
-        self.system.set_room(state["room"].values)
+        self.system.restore_pattern(state["pattern"].values)
         self.cutter.begin_step()
         kept = self.flow.copy()
         self.move({name: Motion(m["x"], m["v"]) for name, m in state["motion"].items()})

@@ -18,7 +18,7 @@ class Past:
     """Velocities [m/s] of a time behind, at local dofs, and where they are known."""
 
     velocity: Array
-    known: Mask
+    valid: Mask
 
 
 class History:
@@ -54,8 +54,8 @@ class History:
 
     def unknown(self, difference: time.Difference) -> Mask:
         """Where that asks for a velocity that no step has found."""
-        unknown = np.zeros(len(self.old.known), dtype=bool)
+        unknown = np.zeros(len(self.old.valid), dtype=bool)
         for weight, past in ((difference.beta_0, self.old), (difference.beta_1, self.older)):
             if weight:
-                unknown |= ~past.known
+                unknown |= ~past.valid
         return unknown

@@ -91,7 +91,7 @@ class Interface:
         return np.einsum("pij,pvw->pviwj", self.penalty, self.mass_of_pieces)
 
     @cached_property
-    def places(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def pattern(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(local dofs, dofs of the vertices) of the entries of `CouplingBlocks`, those of the velocity first."""
         columns, (on_velocity, on_pressure) = self._columns(), (block.shape for block in self.coupling_blocks)
         rows = [
@@ -105,7 +105,7 @@ class Interface:
         return np.concatenate([part.ravel() for part in rows]), np.concatenate([part.ravel() for part in vertices])
 
     @cached_property
-    def surface_places(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def surface_pattern(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(rows, columns) of the entries of `mass_blocks` among the dofs of the vertices."""
         columns, shape = self._columns(), self.mass_blocks.shape
         return (

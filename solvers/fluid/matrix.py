@@ -17,7 +17,7 @@ from solvers.fluid.space import Unknowns
 
 @dataclass(frozen=True)
 class Pattern:
-    """What a matrix has room for: couplings within cells and across faces of this process."""
+    """Allocated couplings of a matrix: within cells and across faces of this process."""
 
     cells: NDArray[np.bool_]  #: per local cell
     faces: NDArray[np.bool_]  #: per local face with two cells, in the order of `interior_faces`
@@ -42,13 +42,13 @@ def pattern_of(unknowns: Unknowns, cells: NDArray[np.bool_], reach: NDArray[np.b
 
 
 def fits(unknowns: Unknowns, pattern: Pattern | None, cut: Cut) -> bool:
-    """The pattern has room for a cut on every process (collective)."""
+    """The pattern contains the couplings of a cut on every process (collective)."""
     faces, _ = unknowns.grid.interior_faces
     return unknowns.grid.comm.allreduce(pattern is not None and pattern.covers(cut, faces), op=MPI.LAND)
 
 
 def create_matrix(unknowns: Unknowns, pattern: Pattern, *, blocked: bool) -> PETSc.Mat:
-    """An empty matrix with room for a pattern; blocked: by dense blocks of the unknowns of a node (collective)."""
+    """An empty matrix with the entries of a pattern; blocked: in dense blocks of each node (collective)."""
     size = unknowns.block_size
     index_map = unknowns.index_map
     owned, local = int(index_map.size_local), int(index_map.size_local + index_map.num_ghosts)
@@ -68,7 +68,7 @@ def create_matrix(unknowns: Unknowns, pattern: Pattern, *, blocked: bool) -> PET
     inside = np.minimum(total[:owned], owned).astype(PETSc.IntType)
     outside = np.minimum(total[:owned], int(index_map.size_global) - owned).astype(PETSc.IntType)
     if not blocked:
-        inside, outside = (np.repeat(room * size, size) for room in (inside, outside))
+        inside, outside = (np.repeat(count * size, size) for count in (inside, outside))
     matrix.setPreallocationNNZ((inside, outside) if comm.size > 1 else inside)
     matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)
     matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)

@@ -193,7 +193,7 @@ class FlowSystem:
         )
         self._add_outer_faces(active)
         if not fits(self.unknowns, self._pattern, cut):
-            self._make_room(choose_pattern(self.unknowns, cut))
+            self._allocate(choose_pattern(self.unknowns, cut))
 
     def dofs_of(self, cells: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Which local dofs belong to some local cells or, on other processes, to theirs (collective)."""
@@ -202,19 +202,19 @@ class FlowSystem:
         blocks = fem.sum_ghosts(self.unknowns.space, blocks.astype(float)) > 0.0
         return self.unknowns.expand(blocks)
 
-    def room(self) -> Array:
-        """What the matrix has room for, per owned cell: couplings within it, and across its faces."""
+    def pattern_state(self) -> Array:
+        """Allocated couplings of the matrix per owned cell: couplings within it, and across its faces."""
         assert self._pattern is not None
         return np.stack([self._pattern.cells, self._pattern.reach], axis=1)[: self.grid.owned].astype(float)
 
-    def set_room(self, room: Array) -> None:
+    def restore_pattern(self, state: Array) -> None:
         """Make the matrix of a saved state: the rounding of a direct solver depends on its pattern (collective)."""
         both = np.zeros((2, len(self.grid.numbers)))
-        both[:, : self.grid.owned] = room.T
+        both[:, : self.grid.owned] = state.T
         cells, reach = (fem.share_owned(self._phi.function_space, column) > 0.5 for column in both)
-        self._make_room(pattern_of(self.unknowns, cells, reach))
+        self._allocate(pattern_of(self.unknowns, cells, reach))
 
-    def _make_room(self, pattern: Pattern) -> None:
+    def _allocate(self, pattern: Pattern) -> None:
         self._pattern, self._matrix = pattern, self._fill_pattern(pattern)
         self._ghost, self._penalised = self._matrix.duplicate(copy=False), None
 

@@ -46,7 +46,7 @@ class TimeScheme(Protocol):
         """The residual [N] at the present iterate; velocity and acceleration follow the displacement."""
         ...
 
-    def carried(self, structure: Structure) -> Array:
+    def averaged_load(self, structure: Structure) -> Array:
         """The balance [N] without loads by another field, all forces averaged over the step."""
         ...
 
@@ -81,7 +81,7 @@ class Statics:
     def balance(self, structure: Structure) -> Array:
         return self.reaction(structure)
 
-    def carried(self, structure: Structure) -> Array:
+    def averaged_load(self, structure: Structure) -> Array:
         return structure.now.internal - structure.now.loads - structure.now.constraint
 
     def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
@@ -238,7 +238,7 @@ class Dynamics:
         before[self._massless] = 0.0
         return self._inertia(structure) + (1.0 - scheme.alpha_f) * present + scheme.alpha_f * before
 
-    def carried(self, structure: Structure) -> Array:
+    def averaged_load(self, structure: Structure) -> Array:
         present, before = (self._own_forces(at) for at in (structure.now, structure.old))
         return self._inertia(structure) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
 

@@ -25,7 +25,7 @@ class Coulomb:
     rows = friction_rows
 
     def radius(self, at: Point) -> Array:
-        return self.mu * np.where(at.slip_known, np.maximum(0.0, at.trial_pressure), 0.0)
+        return self.mu * np.where(at.slip_defined, np.maximum(0.0, at.trial_pressure), 0.0)
 
     def radius_slopes(self, at: Point) -> tuple[Array, Array, Array]:
         by_gap = -self.mu * np.divide(at.c_n, at.D, out=np.zeros_like(at.D), where=at.D > 0.0)

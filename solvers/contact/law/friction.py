@@ -49,7 +49,7 @@ def friction_status(law: Bound, at: Point) -> Statuses:
     """
     q, radius = trial_traction(at), law.radius(at)
     turned = np.einsum("nd,nd->n", q, at.z) < 0.0
-    inside = at.slip_known & (turned | (np.linalg.norm(q, axis=1) < radius)) & (radius > 0.0)
+    inside = at.slip_defined & (turned | (np.linalg.norm(q, axis=1) < radius)) & (radius > 0.0)
     return np.where(at.covered & (at.trial_pressure > 0.0), np.where(inside, STICK, SLIP), OPEN).astype(np.int8)
 
 

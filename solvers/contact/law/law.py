@@ -31,7 +31,7 @@ class Point:
     covered: NDArray[np.bool_]  #: there is enough of a master for a constraint, shape (m,)
     stiffness: Array  #: of the bodies, per area [Pa/m], shape (m,)
     slip: Array  #: [m], shape (m, dim); with friction that of the step, of which the part along the surface counts
-    slip_known: NDArray[np.bool_]  #: the multiplier saw a master at the beginning of the step, shape (m,)
+    slip_defined: NDArray[np.bool_]  #: the multiplier saw a master at the beginning of the step, shape (m,)
     c_n: Array  #: complementarity parameter of the gap [Pa/m]: any positive one has the same solution, shape (m,)
     c_t: Array  #: the same of the slip
     touching: float  #: gap [m] that is rounding

@@ -25,7 +25,7 @@ class Tresca:
     rows = friction_rows
 
     def radius(self, at: Point) -> Array:
-        return np.where(at.slip_known, self.bound, 0.0)
+        return np.where(at.slip_defined, self.bound, 0.0)
 
     def radius_slopes(self, at: Point) -> tuple[Array, Array, Array]:
         return np.zeros_like(at.z), np.zeros_like(at.z), np.zeros_like(at.D)

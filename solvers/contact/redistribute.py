@@ -9,12 +9,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 
-def lent_shares(facets: Sequence[NDArray[np.int64]], blocked: NDArray[np.bool_]) -> sp.csr_matrix | None:
+def redistributed_shares(facets: Sequence[NDArray[np.int64]], blocked: NDArray[np.bool_]) -> sp.csr_matrix | None:
     """What blocked multipliers get of those of their neighbours, shape (C, C); None if no one is blocked.
 
     facets: multipliers of the facets of each patch. A blocked one would contradict a support or another multiplier.
     With the mean of its neighbours' the multipliers still contain all constants, so that a patch test is passed; the
-    constraint of the neighbours is then that of their own and the lent functions together.
+    constraint of the neighbours is then that of their own and the redistributed functions together.
     Source: Popp, Seitz, Gee & Wall, Comput. Methods Appl. Mech. Engng 264 (2013), section 3.
     """
     if not blocked.any():
