@@ -29,6 +29,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 export OMPI_ALLOW_RUN_AS_ROOT ?= 1
 export OMPI_ALLOW_RUN_AS_ROOT_CONFIRM ?= 1
 export OMPI_MCA_rmaps_base_oversubscribe ?= 1
+export PRTE_MCA_rmaps_default_mapping_policy ?= :oversubscribe
 export OMPI_MCA_hwloc_base_binding_policy ?= none
 export OMPI_MCA_btl_vader_single_copy_mechanism ?= none
 export PYVISTA_OFF_SCREEN ?= true
