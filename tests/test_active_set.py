@@ -36,7 +36,7 @@ def update(active_set, pressure, gap, covered=ALL, c=ONE):
         c_t=one,
         touching=0.0,
         slip=0.0 * z,
-        slip_known=covered,
+        slip_defined=covered,
     )
     active_set.choose(Frictionless().status(point))
     return active_set.active.tolist()
