@@ -4,6 +4,7 @@
 get_filename_component(root ${CMAKE_SOURCE_DIR}/../.. ABSOLUTE)
 file(GLOB_RECURSE modules RELATIVE ${root} ${root}/fsci/*.py ${root}/solvers/*.py ${root}/coupling/*.py)
 list(FILTER modules EXCLUDE REGEX "^fsci/bench/")
+file(REMOVE_RECURSE ${CMAKE_BINARY_DIR}/wheel) # modules that are no more
 foreach(module ${modules})
   file(READ ${root}/${module} text)
   string(REGEX REPLACE "((^|\n) *from )(solvers|coupling)([. ])" "\\1fsci.\\3\\4" text "${text}")
