@@ -35,6 +35,13 @@ structure:
 """
 
 
+#: The repository is installed in place by a finder of its own, which comes before all paths.
+WITHOUT_REPOSITORY = """\
+import sys
+sys.meta_path = [finder for finder in sys.meta_path if not type(finder).__module__.startswith("_editable")]
+"""
+
+
 def modules_of_the_repository() -> set[str]:
     """As they are called in the wheel."""
     found = set()
@@ -71,7 +78,8 @@ def test_wheel(tmp_path):
     assert len(kernels) == 1
     assert names - kernels == modules_of_the_repository()
 
-    environment = {**os.environ, "PYTHONPATH": str(site)}
+    (tmp_path / "sitecustomize.py").write_text(WITHOUT_REPOSITORY)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(site), str(tmp_path)])}
     done = subprocess.run(
         [sys.executable, "-c", IMPORT_ALL], cwd=tmp_path, env=environment, capture_output=True, text=True
     )
