@@ -23,7 +23,7 @@ from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
 from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import Part, linearise
 from solvers.contact.pair import Pair
-from solvers.contact.redistribute import redistributed_shares
+from solvers.contact.redistribute import Redistribution
 from solvers.contact.share import Shares
 from solvers.contact.slip import Sliding, Slip
 from solvers.contact.terms import Terms, find_normals, total_terms
@@ -75,7 +75,9 @@ class Contact:
         self._stiffness = np.zeros(count)
         self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
         self._blocked = np.zeros(count, dtype=bool)
-        self._redistribution: sp.csr_matrix | None = None
+        facets = [patch.multipliers[patch.facets] for patch in self.multipliers.patches]
+        self._redistribution = Redistribution(facets, count)
+        self._shared: sp.csr_matrix | None = None  # redistribution at the latest evaluation
         self._shares = Shares(comm)
         laws = [(mortar, self.interface.law_of(mortar.patch)) for mortar in self.interface.mortars]
         self._mortars = [mortar for mortar, law in laws if not isinstance(law, Tied)]
@@ -100,9 +102,6 @@ class Contact:
         self.x = self.positions(u, t)
         self._x_old = self.x.copy()
         self._blocked = find_blocked(self.interface, self.x)
-        facets = [patch.multipliers[patch.facets] for patch in self.multipliers.patches]
-        self._redistribution = redistributed_shares(facets, self._blocked)
-        self._ties.start(self._redistributed)
 
     def positions(self, u: Array, t: float) -> Array:
         """Current positions [m] of all nodes from the displacements of the deformable ones, shape (N, dim)."""
@@ -122,7 +121,7 @@ class Contact:
         self._shares.begin_step()
         for mortar in self._mortars:
             mortar.begin_step(self.active_set.active)
-        self._sliding.begin_step(self.x, self._redistributed)
+        self._sliding.begin_step(self.x)
         self._slip = None
 
     def end_step(self, weight: float) -> None:
@@ -153,7 +152,6 @@ class Contact:
         self._mean_gap = np.zeros(len(self.z))
         if self.terms is not None:
             self._D = self._redistributed(self.terms.D)
-            self._covers = self._coverage.judge(self.terms.D) & ~self._blocked
             np.divide(self._gap, self._D, out=self._mean_gap, where=self._D > 0.0)
             for law, which in self.interface.laws:
                 status[which] = law.status(self._point(which))
@@ -187,13 +185,13 @@ class Contact:
         status[several[~left.any(axis=1)]] = OPEN
 
     def _set_multipliers(self, own: Array) -> None:
-        self.z[:] = own if self._redistribution is None else own + self._redistribution @ own
+        self.z[:] = own if self._shared is None else own + self._shared @ own
 
     def _redistributed(self, rows):
         """Rows of multipliers, one each or one for each component, plus those that are redistributed to them."""
-        if self._redistribution is None:
+        if self._shared is None:
             return rows
-        moved = self._redistribution if rows.shape[0] == len(self.z) else expand(self._redistribution, self.dim)
+        moved = self._shared if rows.shape[0] == len(self.z) else expand(self._shared, self.dim)
         return rows + moved.T @ rows
 
     def _evaluate_mortars(self) -> Terms | None:
@@ -217,14 +215,17 @@ class Contact:
         self._shares.note(work)
         if not met:
             return None
+        pieces += self._ties.pieces if self.comm.rank == 0 else []
+        terms = total_terms(pieces, normals, self._shares, (len(self.pairs), len(self.z), self.size))
+        self._covers = self._coverage.judge(terms.D) & ~self._blocked
+        self._shared = self._redistribution.shares((terms.D != 0.0) & ~self._covers, self._covers)
         if self._sliding.mortars:
             used = [(mortar, found.used) for mortar, found in pieces]
             self._slip = self._sliding.evaluate(self.x, normals, used, self._redistributed)
         if self._ties.pieces:
-            tied = self._ties.slip(self.x)
+            tied = self._ties.slip(self.x, self._redistributed)
             self._slip = tied if self._slip is None or not self._sliding.mortars else self._slip.plus(tied)
-            pieces += self._ties.pieces if self.comm.rank == 0 else []
-        return total_terms(pieces, normals, self._shares, (len(self.pairs), len(self.z), self.size))
+        return terms
 
     # ------------------------------------------------------------------------------------- what the balance needs
 
@@ -268,8 +269,8 @@ class Contact:
         slip = sp.csr_matrix((self.dim * count, n)) if self._slip is None else self._slip.slopes
         slopes = Slopes(gap=dgap, normals=self.terms.dnormals, slip=slip)
         force = self._force_matrix()
-        if self._redistribution is not None:
-            force = force + force @ self._redistribution
+        if self._shared is not None:
+            force = force + force @ self._shared
         return linearise(self.interface, parts, slopes, force, self.terms.dforce, weight)
 
     def condense(self, weight: float) -> RowTransformation:

@@ -1,4 +1,4 @@
-"""Slave nodes that cannot have a multiplier of their own: their share of those of their neighbours."""
+"""Slave nodes without a constraint of their own: their share of the multipliers of their neighbours."""
 
 from __future__ import annotations
 
@@ -9,29 +9,41 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 
-def redistributed_shares(facets: Sequence[NDArray[np.int64]], blocked: NDArray[np.bool_]) -> sp.csr_matrix | None:
-    """What blocked multipliers get of those of their neighbours, shape (C, C); None if no one is blocked.
+class Redistribution:
+    """What multipliers without a constraint get of those of their neighbours.
 
-    facets: multipliers of the facets of each patch. A blocked one would contradict a support or another multiplier.
-    With the mean of its neighbours' the multipliers still contain all constants, so that a patch test is passed; the
-    constraint of the neighbours is then that of their own and the redistributed functions together.
+    They are those that would contradict a support or another multiplier, and those of which a master covers a sliver,
+    too little for a constraint. With the mean of their neighbours' the multipliers still contain all constants, so that
+    a patch test is passed; the constraint of the neighbours is then that of their own and the redistributed functions
+    together.
     Source: Popp, Seitz, Gee & Wall, Comput. Methods Appl. Mech. Engng 264 (2013), section 3.
     """
-    if not blocked.any():
-        return None
-    C, rows, columns = len(blocked), [], []
-    for of_patch in facets:
-        n = of_patch.shape[1]
-        rows.append(np.repeat(of_patch, n, axis=1).ravel())
-        columns.append(np.tile(of_patch, (1, n)).ravel())
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    beside = sp.csr_matrix((np.ones(len(row)), (row, column)), shape=(C, C))
-    beside.data[:] = 1.0
-    served, shares = ~blocked, sp.diags((~blocked).astype(float)).tocsr()
-    while True:  # a corner has blocked neighbours only: it comes after them
-        count = np.where(served, 0.0, beside @ served.astype(float))
-        if not count.any():
-            return (shares - sp.diags((~blocked).astype(float))).tocsr()
-        mean = sp.diags(np.divide(1.0, count, out=np.zeros(C), where=count > 0.0)) @ beside
-        shares = (shares + mean @ sp.diags(served.astype(float)) @ shares).tocsr()
-        served = served | (count > 0.0)
+
+    def __init__(self, facets: Sequence[NDArray[np.int64]], count: int):
+        """facets: multipliers of the facets of each patch; count: of all multipliers, C."""
+        rows = [np.repeat(of_patch, of_patch.shape[1], axis=1).ravel() for of_patch in facets]
+        columns = [np.tile(of_patch, (1, of_patch.shape[1])).ravel() for of_patch in facets]
+        row, column = np.concatenate(rows), np.concatenate(columns)
+        self._beside = sp.csr_matrix((np.ones(len(row)), (row, column)), shape=(count, count))
+        self._beside.data[:] = 1.0
+        self._latest: tuple[bytes, sp.csr_matrix | None] = (b"", None)
+
+    def shares(self, receive: NDArray[np.bool_], give: NDArray[np.bool_]) -> sp.csr_matrix | None:
+        """Shares, rows of those that receive and columns of those that give, shape (C, C); None if there are none."""
+        if not receive.any():
+            return None
+        key = np.packbits([receive, give]).tobytes()
+        if self._latest[0] != key:
+            self._latest = key, self._spread(receive, give)
+        return self._latest[1]
+
+    def _spread(self, receive: NDArray[np.bool_], give: NDArray[np.bool_]) -> sp.csr_matrix | None:
+        own = sp.diags(give.astype(float)).tocsr()
+        served, shares = give, own
+        while True:  # a corner may have only neighbours that receive: it comes after them
+            count = np.where(receive & ~served, self._beside @ served.astype(float), 0.0)
+            if not count.any():
+                return (shares - own).tocsr() if (served & receive).any() else None
+            mean = sp.diags(np.divide(1.0, count, out=np.zeros_like(count), where=count > 0.0)) @ self._beside
+            shares = (shares + mean @ sp.diags(served.astype(float)) @ shares).tocsr()
+            served = served | (count > 0.0)

@@ -58,7 +58,7 @@ class Sliding:
         self._count, self._shape = len(multipliers.node), shape
         self._beginning: Beginning | None = None
 
-    def begin_step(self, x: Array, with_lent: Callable[[Any], Any]) -> None:
+    def begin_step(self, x: Array) -> None:
         """Integrals at the positions x [m] at the beginning of a step, shape (N, dim)."""
         (N, dim), C = self._shape, self._count
         D, parts = np.zeros(C), []
@@ -73,15 +73,14 @@ class Sliding:
             D[rows] += found
             parts += [(W, rows, mortar.patch.nodes), (-M, rows, mortar.masters.nodes)]
         D, difference = self._shares.total_of(D, add_up(parts, (C, N)))
-        difference = with_lent(difference)
-        self._beginning = Beginning(difference, expand(difference, dim), with_lent(D))
+        self._beginning = Beginning(difference, expand(difference, dim), D)
 
     def evaluate(
         self,
         x: Array,
         normals: Normals,
         used: Sequence[tuple[Mortar, NDArray[np.int32]]],
-        with_lent: Callable[[Any], Any],
+        redistributed: Callable[[Any], Any],
     ) -> Slip:
         """Slip at the positions x [m] with the facet pairs that took part in the integrals there."""
         assert self._beginning is not None
@@ -96,8 +95,9 @@ class Sliding:
             columns = components(nodes, dim)
             parts += [(part, dim * rows + axis, columns) for axis, part in enumerate(slopes)]
         gap, dgap = self._shares.total_of(gap, add_up(parts, (dim * C, dim * N)))
-        D, known = self._beginning.D, self._beginning.D > 0.0
+        D = redistributed(self._beginning.D)
+        known = D > 0.0
         share = np.divide(1.0, D, out=np.zeros_like(D), where=known)
-        values = share[:, None] * (self._beginning.difference @ x + with_lent(gap))
-        slopes = scale_rows(self._beginning.slopes + with_lent(dgap), share.repeat(dim))
+        values = share[:, None] * redistributed(self._beginning.difference @ x + gap)
+        slopes = scale_rows(redistributed(self._beginning.slopes + dgap), share.repeat(dim))
         return Slip(values, slopes, known)

@@ -21,7 +21,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from solvers.api import Array
-from solvers.contact.blocks import expand
+from solvers.contact.blocks import expand, scale_rows
 from solvers.contact.coverage import Coverage
 from solvers.contact.interface import describe_interface
 from solvers.contact.mortar import Mortar, MortarTerms
@@ -50,18 +50,12 @@ class Ties:
             self.D[rows] += found.D
             self.difference = self.difference + renumber(W, rows, slave, (C, N)) - renumber(M, rows, master, (C, N))
 
-    def start(self, with_lent: Callable[[Any], Any]) -> None:
-        """Once it is known which multipliers lend their functions."""
-        if not self.pieces:
-            return
-        D, dim = with_lent(self.D), self._reference.shape[1]
-        share = np.divide(1.0, D, out=np.zeros_like(D), where=D > 0.0)
-        self._slopes = (sp.diags(share) @ with_lent(self.difference)).tocsr()
-        self._all_slopes, self._known = expand(self._slopes, dim), D > 0.0
-
-    def slip(self, x: Array) -> Slip:
+    def slip(self, x: Array, redistributed: Callable[[Any], Any]) -> Slip:
         """Since the reference configuration, at the positions x [m] of all nodes."""
-        return Slip(self._slopes @ (x - self._reference), self._all_slopes, self._known)
+        D = redistributed(self.D)
+        share = np.divide(1.0, D, out=np.zeros_like(D), where=D > 0.0)
+        slopes = scale_rows(redistributed(self.difference), share)
+        return Slip(slopes @ (x - self._reference), expand(slopes, x.shape[1]), D > 0.0)
 
 
 def relocated(pair: Pair) -> Array | None:
