@@ -152,7 +152,7 @@ def test_along(ironing):
 
 def test_newton(ironing):
     """Every step moves the indenter by nearly a facet."""
-    assert ironing[:, 4].max() <= 7
+    assert ironing[:, 4].max() <= 8
     assert ironing[:, 4].mean() <= 5.5
 
 
