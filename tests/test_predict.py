@@ -19,7 +19,7 @@ def test_follows_polynomials_of_the_order_it_knows(displacements: int, order: in
     assert predictor.at(0.4) == pytest.approx(np.array([[0.4**order, 2.0 * 0.4**order]]), rel=1e-13)
 
 
-def test_forgets_what_is_older_than_three_places() -> None:
+def test_forgets_what_is_older_than_three_displacements() -> None:
     predictor = Predictor()
     predictor.add(-5.0, np.array([[1e6, -1e6]]))
     for t in (0.0, 0.1, 0.15):

@@ -13,7 +13,11 @@ LEAST_COVERED, LEAST_KEPT = 0.02, 0.01
 
 
 class Coverage:
-    """As for facet pairs: from some evaluation of a step on none of the multipliers goes."""
+    """Judges coverage in every evaluation of a step.
+
+    After KEEP_AFTER evaluations a multiplier that had a constraint keeps it as long as the lower limit is met, so that
+    the set of constraints cannot alternate. Facet pairs are kept in the same way.
+    """
 
     def __init__(self, areas: Array):
         self._areas = np.maximum(areas, np.finfo(float).tiny)

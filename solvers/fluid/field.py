@@ -150,7 +150,7 @@ class Fluid:
         self.flow[self.boundary.dofs] = self.boundary.velocity(t + dt)
         self.system.set_scales(self.history.old.velocity)
         self._fresh, self._largest = True, 0.0
-        self.rounding = self._tangent = None  # a run that is resumed here knows nothing of the last step's
+        self.rounding = self._tangent = None  # not part of the saved state: a resumed run must start alike
         self._direct.begin_step()
         self.notes.clear()
         if self.krylov is not None:

@@ -6,7 +6,7 @@ of the derivative of the discrete equations with respect to the shape of the flu
     dr(v, q) = -<(grad u) dd, 2 mu eps(v) n + q n> + <P (grad u) dd, v>           the surface sees another velocity
     df_b i   =  <n_i grad p . dd + (P (grad u) dd)_i, N_b> + <(p I - 2 mu eps(u)) d(n ds), N_b e_i>
 
-Fields are those of the present iterate, averaged over each piece of the surface. The residual knows nothing of this:
+Fields are those of the present iterate, averaged over each piece of the surface. The residual does not depend on this:
 it costs no accuracy, and halves the Newton steps.
 """
 

@@ -168,7 +168,7 @@ class Structure:
         for body in self.bodies:
             body.element.begin_step()
         self._time = t + dt
-        self.rounding = self._tangent = None  # a run that is resumed here knows nothing of the last step's
+        self.rounding = self._tangent = None  # not part of the saved state: a resumed run must start alike
         if self.constraint is not None:
             self.constraint.begin_step()
         self._set_time(t + dt)
