@@ -34,9 +34,7 @@ class Penalties:
     ghost_pressure: float = 0.05
     ghost_second: float = 0.05  #: second derivatives, relative to first ones
     ghost_mass_second: float = 0.05  #: the same of the mass
-    ghost_memory: float = (
-        0.9  #: share of the history in the mass term per step; with 1, kinks in fluid at rest would never decay
-    )
+    ghost_memory: float = 0.9  #: share of the history per step; with 1, kinks in fluid at rest would not decay
 
 
 #: Of q2q1 around elastic bodies: with less, slivers that these uncover keep Newton's method from converging.
