@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from contact_setup import MATERIAL, brick, displacement_error, make_body, make_contact, solve_step
+from contact_setup import MATERIAL, brick, make_body, make_contact, solve_step
 from structure_setup import constant
 from test_contact_several import wall
 from test_contact_system import Linearisation, compare
 
 from fsci import shapes
+from solvers.contact.law import friction
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.friction import trial_traction
 from solvers.contact.law.frictionless import Frictionless
@@ -18,7 +19,6 @@ from solvers.contact.law.tresca import Tresca
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
-from solvers.structure.loads import Traction
 from solvers.structure.materials import StVenantKirchhoff, lame
 
 ZERO = constant(0)
@@ -189,6 +189,21 @@ def test_a_dragged_block_slides_at_the_bound(cell_type, law, bound):
     assert work == pytest.approx(friction, rel=1e-8)
 
 
+@pytest.mark.parametrize("edge", [1e-10, 1e-8, 1e-6, 1e-4])
+def test_what_slides_goes_on_sliding(edge, monkeypatch):
+    """The traction at the beginning of a step is on the rim: all nodes slip from the first iterate on.
+
+    Steady sliding takes one Newton step. If all nodes stuck first, and were sheared by the whole step, it would take
+    five. The width of the rim does not matter.
+    """
+    monkeypatch.setattr(friction, "EDGE", edge)
+    structure, contact = sheared("quad", Coulomb(0.25), 0.02, dim=2)
+    structure.initialise(0.0, 1.0)
+    newton = [solve_step(structure, float(k), first=False).iterations for k in range(5)]
+    assert (contact.active_set.status[contact.active_set.active] == SLIP).all()
+    assert newton[2:] == [1, 1, 1], newton
+
+
 @pytest.mark.parametrize("cell_type", ["quad", "hexahedron"])
 def test_a_block_that_sticks_is_sheared(cell_type):
     """Below the bound nothing moves at the plane."""
@@ -202,41 +217,6 @@ def test_a_block_that_sticks_is_sheared(cell_type):
     assert (contact.active_set.status[contact.active_set.active] == STICK).all()
     assert np.abs(u[bottom, 0] - u[bottom, 0][0]).max() < 1e-10
     assert structure.energy.friction == pytest.approx(0.0, abs=1e-12)
-
-
-STRAIN = {2: [[0.005, 0.02], [0.01, -0.03]], 3: [[0.005, 0.002, 0.02], [-0.003, 0.004, 0.01], [0.01, 0.005, -0.03]]}
-
-
-@pytest.mark.parametrize("slave", ["lower", "upper"])
-@pytest.mark.parametrize(
-    ("lower", "upper"),
-    [("quad", "quad"), ("quad", "triangle6"), ("hexahedron", "tetra"), ("hexahedron27", "hexahedron")],
-)
-def test_patch_that_sticks(lower, upper, slave):
-    """Two blocks that do not match, with shear across the contact: the homogeneous state of one block, to 1e-8."""
-    dim = dimension(lower)
-    F = np.eye(dim) + np.array(STRAIN[dim])
-    material = StVenantKirchhoff(*lame(1000.0, 0.3), 1.0)
-    E = 0.5 * (F.T @ F - np.eye(dim))
-    P = F @ (material.lmbda * np.trace(E) * np.eye(dim) + 2.0 * material.mu * E)
-    exact = [lambda x, t, row=row: np.einsum("d,dn->n", row, x[:dim]) for row in F - np.eye(dim)]
-    sides = [("left", 0, -1), ("right", 0, 1), ("front", 1, -1), ("back", 1, 1)][: 2 * (dim - 1)]
-    tractions = [Traction(name, tuple(constant(sign * c) for c in P[:, axis])) for name, axis, sign in sides]
-    bodies = []
-    for name, cell_type, cells, far, start in (("lower", lower, 3, "bottom", 0.0), ("upper", upper, 2, "top", 0.5)):
-        irregular = 0.0 if upper == "tetra" else 0.15  # integrals over irregular quads are not exact in 3D
-        mesh = brick(cell_type, cells, [*[1.0] * (dim - 1), 0.5], [0.0] * (dim - 1) + [start], irregular)
-        bodies.append(make_body(name, mesh, material, supports=[Support(far, tuple(exact))], tractions=tractions))
-    near = [("upper", "bottom"), ("lower", "top")]
-    pair = tuple(near if slave == "upper" else near[::-1])
-    structure, contact = make_contact(bodies, [pair], law=Coulomb(2.0), settings=LOOSER)
-    solve_step(structure)
-    on_slave = contact.multipliers.areas > 0.0
-    assert (contact.active_set.status[on_slave] == STICK).all()
-    assert displacement_error(structure, exact) < 1e-8
-    normal = np.linalg.inv(F).T[:, -1] * (1.0 if slave == "lower" else -1.0)
-    traction = P @ np.eye(dim)[-1] * np.sign(normal[-1]) / np.linalg.norm(np.linalg.det(F) * normal)
-    assert np.abs(contact.z[on_slave] + traction).max() < 1e-8 * np.abs(traction).max()
 
 
 @pytest.mark.parametrize("cell_type", ["quad", "hexahedron"])

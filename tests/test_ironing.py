@@ -13,9 +13,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from contact_setup import make_body, make_contact, solve_step
+from programs import fsci
 from structure_setup import constant
 
 from fsci import shapes
+from fsci.run.history import read_history
 from solvers.mesh import Mesh
 from solvers.structure.body import Support
 from solvers.structure.materials import NeoHooke, lame
@@ -34,6 +36,16 @@ PUBLISHED = {
     "solids4foam": (31.6, 39.5),
     "Hartmann et al. 2009": (32.0, 40.8),
     "Code_Aster": (33.2, 42.1),
+}
+
+#: Horizontal forces from the same curves, for the same friction.
+PUBLISHED_ALONG = {
+    "Poulios & Renard 2015": (5.5, 10.2),
+    "Yastrebov 2011": (5.9, 17.1),
+    "Fischer & Wriggers 2006": (6.2, 18.9),
+    "solids4foam": (5.5, 12.3),
+    "Hartmann et al. 2009": (6.7, 16.0),
+    "Code_Aster": (7.1, 14.3),
 }
 
 
@@ -154,6 +166,21 @@ def test_newton(ironing):
     """Every step moves the indenter by nearly a facet."""
     assert ironing[:, 4].max() <= 8
     assert ironing[:, 4].mean() <= 5.5
+
+
+@pytest.mark.slow
+def test_with_friction(tmp_path):
+    """The case: both components are among the published ones, at full depth and on the way, and smooth there."""
+    run = fsci("run", "cases/ironing", "-o", tmp_path, "--set", "output.fields_every=0", timeout=600)
+    assert run.returncode == 0, run.stdout + run.stderr
+    history = read_history(tmp_path / "history.csv")
+    down, way = np.argmin(np.abs(history["time"] - 1.0)), history["time"] > 3.0
+    for name, sign, published in (("force.y", -1.0, PUBLISHED), ("force.x", 1.0, PUBLISHED_ALONG)):
+        force = sign * history[name]
+        for ours, others in zip((force[down], force[way].mean()), zip(*published.values(), strict=True), strict=True):
+            assert min(others) < ours < max(others), name
+        assert np.abs(np.diff(force[way], 2)).max() < 0.02 * force[way].mean()
+    assert history["iterations"].max() <= 8
 
 
 @pytest.mark.slow

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from programs import fsci
 
+from fsci.builder.automatic_pairs import with_pairs
 from fsci.case import CaseError, load_case
 from fsci.run.history import read_history
 from fsci.run.run import FINISHED, run_case
@@ -71,6 +73,21 @@ def test_it_turns(tmp_path):
     """The right end of the ram lies higher than the left one: the left corner of the block is pressed first."""
     history = run(RAM, tmp_path / "case")
     assert history["contact.press.y"].min() < -1.0
+
+
+def test_the_program_finds_it(tmp_path):
+    """`bodies: all` asks for pairs with rigid bodies of the flow, too, and `check` lists them."""
+    path = tmp_path / "case.yaml"
+    path.write_text(RAM.replace(RAM[RAM.index("contact:") : RAM.index("coupling:")], "contact: {bodies: all}\n"))
+    (found,) = with_pairs(load_case(path)).contact.pairs.values()
+    path.write_text(RAM)
+    (named,) = load_case(path).contact.pairs.values()
+    assert (found.slave, found.master) == (named.slave, named.master)
+    path.write_text(
+        RAM.replace("pairs:\n    press: {slave: {body: block, on: top}, master: {obstacle: ram}}", "bodies: all")
+    )
+    done = fsci("check", path)
+    assert "block.top (slave) on ram" in done.stdout, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(

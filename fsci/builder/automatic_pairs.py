@@ -2,7 +2,8 @@
 
 Candidates are the named surfaces of the bodies that no support holds across. Two of them are a pair if they can meet
 (see `facing`). The softer body is the slave; of two that are equally stiff the one with the smaller facets; then the
-first one in the case. Obstacles are masters. Bodies that a pair of the case names are left to such pairs.
+first one in the case. Obstacles and rigid bodies of the flow are masters. Bodies that a pair of the case names are left
+to such pairs.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from fsci.case.contact import Pair, Side
 from fsci.case.material import Material
 from fsci.case.supports import Support
 from fsci.expression import Expression
-from fsci.meshes.of_case import read_body, read_obstacle
+from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body
 from solvers.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -31,7 +32,7 @@ EQUAL = 1e-6
 
 @dataclass(frozen=True)
 class Candidate:
-    """A body or an obstacle with its surfaces."""
+    """A body, an obstacle or a rigid body of the flow with its surfaces."""
 
     side: dict[str, str]  #: body or obstacle -> name
     faces: list[Face]
@@ -64,12 +65,13 @@ def with_pairs(case: Case, comm: MPI.Comm = MPI.COMM_SELF) -> Case:
 
 
 def find_pairs(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Pair]:
-    """Pairs by name: those that the case names, then those between the bodies with these meshes and obstacles."""
+    """Pairs by name: those that the case names, then those of the bodies with these meshes, and of rigid ones."""
     assert case.contact is not None
     found = dict(case.contact.pairs)
     named = [{_owner(side) for _, side in pair.sides} for pair in found.values()]
     candidates = [_body(case, name, mesh) for name, mesh in meshes.items()]
     candidates += [_obstacle(case, name) for name in case.contact.obstacles]
+    candidates += [_rigid_body(case, name) for name in ({} if case.fluid is None else case.fluid.bodies)]
     for i, first in enumerate(candidates):
         for second in candidates[i + 1 :]:
             names = {*first.side.values(), *second.side.values()}
@@ -120,8 +122,15 @@ def _body(case: Case, name: str, mesh: Mesh) -> Candidate:
 def _obstacle(case: Case, name: str) -> Candidate:
     assert case.contact is not None
     mesh = read_obstacle(case, name)
-    found = [face(mesh, surface) for surface in case.contact.obstacles[name].on]
+    found = [face(mesh, [surface]) for surface in case.contact.obstacles[name].on]
     return Candidate({"obstacle": name}, found, np.inf, np.inf)
+
+
+def _rigid_body(case: Case, name: str) -> Candidate:
+    assert case.fluid is not None
+    return Candidate(
+        {"obstacle": name}, [face(read_rigid_body(case, name)[0], case.fluid.bodies[name].on)], np.inf, np.inf
+    )
 
 
 def _extent(mesh: Mesh) -> float:

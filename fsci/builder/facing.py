@@ -40,9 +40,9 @@ class Face:
         return self.middles.min(axis=0), self.middles.max(axis=0)
 
 
-def face(mesh: Mesh, name: str) -> Face:
-    """A named surface of a mesh."""
-    simplices, nodes = tessellate(mesh, [name])
+def face(mesh: Mesh, names: Sequence[str] | None) -> Face:
+    """Named surfaces of a mesh as one, or all of its boundary."""
+    simplices, nodes = tessellate(mesh, names)
     x = mesh.points[nodes][simplices]
     edges = x[:, 1:] - x[:, :1]
     if x.shape[2] == 2:
@@ -53,7 +53,7 @@ def face(mesh: Mesh, name: str) -> Face:
     middles = x.mean(axis=1)
     volume = np.einsum("md,md->", middles - middles.mean(axis=0), along)
     size = float(measure.mean() ** (1.0 / (x.shape[2] - 1)))
-    return Face(name, middles, along / measure[:, None], size, is_closed(simplices) and volume < 0.0)
+    return Face(" + ".join(names or ()), middles, along / measure[:, None], size, is_closed(simplices) and volume < 0.0)
 
 
 def faces(mesh: Mesh) -> list[Face]:
@@ -66,7 +66,7 @@ def faces(mesh: Mesh) -> list[Face]:
         except ValueError:  # it lies inside of the body
             continue
         if facets and not facets & known:
-            found.append(face(mesh, name))
+            found.append(face(mesh, [name]))
             known |= facets
     return found
 

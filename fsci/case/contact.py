@@ -98,7 +98,7 @@ class Contact(Section):
 
     pairs: dict[Name, Pair] = setting(dict, "pairs of surfaces by name")
     bodies: Literal["all"] | tuple[Name, ...] | None = setting(
-        None, "all, or names of bodies: the program finds the pairs among their surfaces, and with all obstacles"
+        None, "all, or names of bodies: the program finds the pairs among their surfaces, and with all that is rigid"
     )
     friction: Friction = setting(Friction, "resistance against sliding in the pairs that the program finds")
     reach: Positive | None = setting(

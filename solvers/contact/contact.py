@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.blocked import find_blocked
-from solvers.contact.blocks import expand
 from solvers.contact.condense import Condensed, Linearised, condense, recover
 from solvers.contact.coverage import Coverage
-from solvers.contact.directions import free_normals
+from solvers.contact.directions import answered, free_normals
 from solvers.contact.distance import distances
 from solvers.contact.friction_work import FrictionWork
 from solvers.contact.interface import Interface, describe_interface
@@ -23,7 +22,7 @@ from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
 from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import Part, linearise
 from solvers.contact.pair import Pair
-from solvers.contact.redistribute import Redistribution
+from solvers.contact.redistribute import Redistribution, redistributed
 from solvers.contact.share import Shares
 from solvers.contact.slip import Sliding, Slip
 from solvers.contact.terms import Terms, find_normals, total_terms
@@ -87,6 +86,10 @@ class Contact:
         sliding = [mortar for mortar, law in laws if law.slips]
         self._sliding = Sliding(sliding, self.multipliers, self._shares, (self.size, self.dim))
         self._slip: Slip | None = None  # at the latest evaluation
+        held = self.nodes.held[self.multipliers.node].any(axis=(1, 2))
+        self._narrow = np.zeros(count, dtype=bool)  # multipliers without all directions of their law
+        for law, which in self.interface.laws:
+            self._narrow[which] = (law.span != "normal") & (held | (self.interface.spans == "normal"))[which]
         self._weight = 1.0  # of the new contact force in the balance
         self.work = FrictionWork((count, self.dim))
         self.time = np.nan  #: of the latest evaluation [s]
@@ -140,7 +143,7 @@ class Contact:
             return np.zeros_like(self.z), np.zeros_like(self.z)
         tangent = along(self.terms.normals) * self.active_set.active[:, None, None]
         slip = np.einsum("nij,nj->ni", tangent, self._slip.values)
-        return self.terms.D[:, None] * np.einsum("nij,nj->ni", tangent, self.z), slip
+        return self._D[:, None] * np.einsum("nij,nj->ni", tangent, self.z), slip
 
     def evaluate(self, u: Array, t: float) -> None:
         """Mortar terms and active set at the displacements u, shape (N, dim), of the present iterate."""
@@ -188,11 +191,7 @@ class Contact:
         self.z[:] = own if self._shared is None else own + self._shared @ own
 
     def _redistributed(self, rows):
-        """Rows of multipliers, one each or one for each component, plus those that are redistributed to them."""
-        if self._shared is None:
-            return rows
-        moved = self._shared if rows.shape[0] == len(self.z) else expand(self._shared, self.dim)
-        return rows + moved.T @ rows
+        return redistributed(rows, self._shared)
 
     def _evaluate_mortars(self) -> Terms | None:
         """Terms of all pairs, each process doing its share of the slave facets; None if no facets are near."""
@@ -223,7 +222,7 @@ class Contact:
             used = [(mortar, found.used) for mortar, found in pieces]
             self._slip = self._sliding.evaluate(self.x, normals, used, self._redistributed)
         if self._ties.pieces:
-            tied = self._ties.slip(self.x, self._redistributed)
+            tied = self._ties.slip(self.x, self._shared)
             self._slip = tied if self._slip is None or not self._sliding.mortars else self._slip.plus(tied)
         return terms
 
@@ -253,8 +252,15 @@ class Contact:
         self._weight = weight
         if self.terms is None:
             return 0.0
-        missed = [part.law.residual(part.point, part.status, weight) for part in self.in_contact()]
-        return float(np.sqrt(sum(np.sum(part**2) for part in missed)))
+        total = 0.0
+        for part in self.in_contact():
+            missed = part.law.residual(part.point, part.status, weight)
+            if (less := self._narrow[part.which]).any():
+                which = part.which[less]
+                held, spans = self.nodes.held[self.multipliers.node[which]], self.interface.spans[which]
+                missed[less] = answered(missed[less], part.point.normals[less], held, spans)
+            total += float(np.sum(missed**2))
+        return float(np.sqrt(total))
 
     def in_contact(self) -> list[Part]:
         """Multipliers in contact, law by law."""

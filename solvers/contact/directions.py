@@ -71,8 +71,7 @@ def find_directions(
     """
     m, dim = normals.shape
     holds = np.rint(np.einsum("nii->n", held[node])).astype(int)
-    whole = (spans == "space") | ((spans == "surface") & (holds == 0))
-    partly = (spans == "surface") & (holds == 1) & (dim == 3)
+    whole, partly = _wide(spans, holds, dim)
     alone = ~(whole | partly)
     wide = whole | partly
 
@@ -87,7 +86,7 @@ def find_directions(
     Q[alone, :, 0] = free_normals(normals[alone], node[alone], held)
     used[alone, 0] = True
     if partly.any():
-        _span_partly(np.flatnonzero(partly), z, normals, held[node], P, turn)
+        _span_partly(np.flatnonzero(partly), z, normals, held[node], P, Q, turn)
 
     def columns(blocks: Array, rows: NDArray[np.int64], count: int) -> sp.csr_matrix:
         at = np.cumsum(used.ravel()).reshape(used.shape) - 1
@@ -105,6 +104,37 @@ def find_directions(
     )
 
 
+def answered(missed: Array, normals: Array, held: Array, spans: NDArray[np.str_]) -> Array:
+    """What multipliers miss of their laws, in the directions that they have, shape (m, dim).
+
+    In others nothing is asked for: there a support carries what comes, or the node has multipliers of other surfaces.
+    held: of the node of each multiplier, shape (m, dim, dim); spans: as below.
+    """
+    found = missed - np.einsum("nij,nj->ni", held, missed)
+    holds = np.rint(np.einsum("nii->n", held)).astype(int)
+    whole, partly = _wide(spans, holds, normals.shape[1])
+    across = ~whole
+    found[across] = np.einsum("nd,nd->n", missed[across], normals[across])[:, None] * normals[across]
+    if partly.any():
+        t = _along_surface(normals[partly], held[partly])[1]
+        found[partly] += np.einsum("nd,nd->n", missed[partly], t)[:, None] * t
+    return found
+
+
+def _wide(spans: NDArray[np.str_], holds: NDArray[np.int64], dim: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Multipliers with all directions that are free; those with two of three; shapes (m,). All others have one."""
+    whole = (spans == "space") | ((spans == "surface") & (holds == 0))
+    return whole, (spans == "surface") & (holds == 1) & (dim == 3)
+
+
+def _along_surface(n: Array, held: Array) -> tuple[Array, Array, Array]:
+    """(e, t, |e x n|) with the one direction e that is held and t = e x n, made unit."""
+    e = np.linalg.eigh(held)[1][:, :, -1]
+    t = np.cross(e, n)
+    size = np.linalg.norm(t, axis=1)
+    return e, t / size[:, None], size
+
+
 def _free_directions(held: Array) -> Array:
     """Orthonormal columns, those that are free first, shape (m, dim, dim); the axes where nothing is held."""
     found = np.broadcast_to(np.eye(held.shape[1]), held.shape).copy()
@@ -113,14 +143,17 @@ def _free_directions(held: Array) -> Array:
     return found
 
 
-def _span_partly(which: NDArray[np.int64], z: Array, normals: Array, held: Array, P: Array, turn: Array) -> None:
-    """n and t = e x n, made unit, span what a multiplier has where the direction e is held; both turn with n."""
+def _span_partly(
+    which: NDArray[np.int64], z: Array, normals: Array, held: Array, P: Array, Q: Array, turn: Array
+) -> None:
+    """n and t = e x n, made unit, span what a multiplier has where the direction e is held; both turn with n.
+
+    The node feels n along t x e and t along itself: each law's row stands where its diagonal is.
+    """
     n = normals[which]
-    e = np.linalg.eigh(held[which])[1][:, :, -1]
-    t = np.cross(e, n)
-    size = np.linalg.norm(t, axis=1)
-    t /= size[:, None]
+    e, t, size = _along_surface(n, held[which])
     P[which, :, 0], P[which, :, 1] = n, t
+    Q[which, :, 0], Q[which, :, 1] = np.cross(t, e), t
     spin = np.cross(e[:, None, :], np.eye(3)).transpose(0, 2, 1) / size[:, None, None]  # e x, as a matrix
     along = np.einsum("nd,nd->n", z[which], t)[:, None, None]
     turn[which] += along * (np.eye(3) - t[:, :, None] * t[:, None, :]) @ spin

@@ -8,6 +8,16 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from solvers.contact.blocks import expand
+
+
+def redistributed(rows, shares: sp.csr_matrix | None):
+    """Rows of multipliers, one each or one for each component, plus those that are redistributed to them."""
+    if shares is None:
+        return rows
+    components = rows.shape[0] // shares.shape[0]
+    return rows + (shares if components == 1 else expand(shares, components)).T @ rows
+
 
 class Redistribution:
     """What multipliers without a constraint get of those of their neighbours.

@@ -22,6 +22,10 @@ from solvers.api import Array
 from solvers.contact.blocks import components, vstack
 from solvers.contact.law.law import OPEN, SLIP, STICK, Point, Rows, Slopes, Statuses, along
 
+#: A trial traction on the rim of the disc, to this share of its radius, means slip. That of a node that slides is there
+#: at the beginning of the next step, but for the tolerance of Newton's method: it goes on sliding.
+EDGE = 1e-6
+
 
 class Bound(Protocol):
     """What tells one law of friction from another; the functions below are methods of such a law."""
@@ -49,7 +53,7 @@ def friction_status(law: Bound, at: Point) -> Statuses:
     """
     q, radius = trial_traction(at), law.radius(at)
     turned = np.einsum("nd,nd->n", q, at.z) < 0.0
-    inside = at.slip_defined & (turned | (np.linalg.norm(q, axis=1) < radius)) & (radius > 0.0)
+    inside = at.slip_defined & (turned | (np.linalg.norm(q, axis=1) < (1.0 - EDGE) * radius)) & (radius > 0.0)
     return np.where(at.covered & (at.trial_pressure > 0.0), np.where(inside, STICK, SLIP), OPEN).astype(np.int8)
 
 
