@@ -1,14 +1,12 @@
-"""Balances of the interface: what the structure took against what the fluid gave, force by force and as work."""
+"""Balances of the interface: what the solid took against what the fluid gave, force by force and as work."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from coupling.interface import Interface
+from coupling.ports import Flow, Solid
 from solvers.api import Array, State
-from solvers.fluid.balances import Balances
-from solvers.fluid.field import Fluid
-from solvers.structure.field import Structure
 
 #: columns of the history -> attributes
 COLUMNS = {
@@ -23,43 +21,42 @@ COLUMNS = {
 class Balance:
     """What the last step left over.
 
-    With the fluid's force f on the vertices at the end of the step and f_n at its start, the structure's balance asks
-    for the mean m = w f + (1 - w) f_n. What the structure took is measured without it: its own balance, b, is inertia,
-    damping, inner forces, own loads and contact.
+    With the load f that the fluid's force is at the end of the step and f_n at its start, the solid's balance asks for
+    the mean m = w f + (1 - w) f_n. What the solid took is measured without it: its own balance, b, is inertia, damping,
+    inner forces, own loads and contact.
 
         force = |b - m| / |m|,  work = sum over steps of b . (d - d_n) - dt f . g
     """
 
-    def __init__(self, fluid: Fluid, structure: Structure, interface: Interface) -> None:
-        self._fluid, self._structure, self._interface = fluid, structure, interface
-        self._of_fluid = Balances(fluid)
-        self.force = 0.0  #: |force that the structure took - mean force of the fluid| / |that force|, 1
+    def __init__(self, flow: Flow, solid: Solid, interface: Interface) -> None:
+        self._flow, self._solid, self._interface = flow, solid, interface
+        self.force = 0.0  #: |load that the solid took - mean load by the fluid| / |that load|, 1
         self.momentum = 0.0  #: |force on all bodies - what it is by the momentum of the fluid| [N]
-        self.power = 0.0  #: of the fluid on the structure [W]
+        self.power = 0.0  #: of the fluid on the solid [W]
         self.loss = 0.0  #: power that the method takes from the fluid [W]
-        self.work = 0.0  #: of the structure's load less that of the fluid's force, all steps [J]
-        self.given: Array  #: force [N] of the fluid on the vertices at the end of the last step
+        self.work = 0.0  #: of the solid's load less that of the fluid's force, all steps [J]
+        self.given: Array  #: load [N] by the fluid at the end of the last step, as `Solid.reduced` has it
 
     def start(self) -> None:
-        """The state before the first step; the structure starts without the fluid's force."""
-        self.given = self._interface.gather(self._structure.load_at_start())
+        """The state before the first step; the solid starts without the fluid's force."""
+        self.given = self._solid.taken_at_start()
 
-    def add_step(self) -> None:
-        """After both fields have accepted the step."""
-        fluid, interface, structure = self._fluid, self._interface, self._structure
-        by_surface = fluid.force()
-        before, self.given = self.given, interface.join(by_surface)
-        weight = structure.time.force_weight
+    def add_step(self, dt: float) -> None:
+        """After both have accepted a step of length dt [s]."""
+        flow, interface, solid = self._flow, self._interface, self._solid
+        by_surface = flow.force()
+        at_vertices = interface.join(by_surface)
+        before, self.given = self.given, solid.reduced(at_vertices)
+        weight = solid.force_weight
         mean = weight * self.given + (1.0 - weight) * before
-        taken = interface.gather(structure.averaged_load())
+        taken = solid.taken()
         size = float(np.linalg.norm(mean))
         self.force = float(np.linalg.norm(taken - mean)) / size if size > 0.0 else 0.0
-        of_fluid, self.loss = self._of_fluid()
+        of_fluid, self.loss = flow.balances()
         total = sum(force.sum(axis=0) for force in by_surface.values())
         self.momentum = float(np.linalg.norm(total - of_fluid))
-        self.power = float((self.given * interface.velocity(interface.now)).sum())
-        moved = interface.gather(structure.now.u - structure.old.u)
-        self.work += float((taken * moved).sum()) - fluid.dt * self.power
+        self.power = float((at_vertices * interface.velocity(interface.now)).sum())
+        self.work += float((taken * solid.moved()).sum()) - dt * self.power
 
     def numbers(self) -> dict[str, float]:
         """Columns of the history."""

@@ -6,43 +6,44 @@ from dataclasses import dataclass
 
 from petsc4py import PETSc
 
-from solvers.rows import Numbering
-from solvers.structure.field import Structure
+from coupling.ports import Solid
+from solvers.rows import Numbering, RowTransformation, TakenRows, transform_rows
 
 
 @dataclass
 class Blocks:
-    """[[structure, into_structure], [into_fluid, fluid]]."""
+    """[[solid, into_solid], [into_flow, flow]]."""
 
-    structure: PETSc.Mat
-    into_structure: PETSc.Mat
-    into_fluid: PETSc.Mat
-    fluid: PETSc.Mat
+    solid: PETSc.Mat
+    into_solid: PETSc.Mat
+    into_flow: PETSc.Mat
+    flow: PETSc.Mat
 
     def create_vectors(self) -> tuple[PETSc.Vec, PETSc.Vec]:
-        """Two vectors with, on each process, the structure's rows and then the fluid's."""
-        own = self.structure.getLocalSize()[0] + self.fluid.getLocalSize()[0]
-        vector = PETSc.Vec().create(comm=self.fluid.comm)
+        """Two vectors with, on each process, the solid's rows and then the flow's."""
+        own = self.solid.getLocalSize()[0] + self.flow.getLocalSize()[0]
+        vector = PETSc.Vec().create(comm=self.flow.comm)
         vector.setSizes((own, None))
         vector.setType(PETSc.Vec.Type.STANDARD)
         return vector, vector.duplicate()
 
-    def condense(self, field: Structure, b: PETSc.Vec, numbering: Numbering) -> None:
-        """Eliminate the multipliers of the structure's constraint; its rows and those of b change (collective)."""
-        rows = PETSc.Mat().createNest([[self.structure, self.into_structure]], comm=self.fluid.comm)
-        rows = field.condense(rows.convert(PETSc.Mat.Type.AIJ, PETSc.Mat()), b, numbering)
-        self.structure, self.into_structure = numbering.split(rows)
+    def transform(self, change: RowTransformation, b: PETSc.Vec, numbering: Numbering) -> TakenRows:
+        """Eliminate the multipliers of contact; the solid's rows and those of b change (collective)."""
+        rows = PETSc.Mat().createNest([[self.solid, self.into_solid]], comm=self.flow.comm)
+        rows, taken = transform_rows(rows.convert(PETSc.Mat.Type.AIJ, PETSc.Mat()), b, change, numbering)
+        self.solid, self.into_solid = numbering.split(rows)
+        return taken
 
-    def hold(self, field: Structure, b: PETSc.Vec, x: PETSc.Vec) -> None:
+    def hold(self, part: Solid, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Rows of prescribed displacements ask for what x has there (collective)."""
-        own = self.structure.getLocalSize()[0]
-        beside = [self.structure, self.into_structure]
-        self.structure, self.into_structure = field.held.impose_rows(beside, x.array[:own], b.array[:own])
+        own = self.solid.getLocalSize()[0]
+        beside = [self.solid, self.into_solid]
+        self.solid, self.into_solid = part.impose_rows(beside, x.array[:own], b.array[:own])
 
     def nested(self) -> PETSc.Mat:
         """The matrix that still consists of the blocks."""
-        blocks = [[self.structure, self.into_structure], [self.into_fluid, self.fluid]]
-        return PETSc.Mat().createNest(blocks, comm=self.fluid.comm)
+        blocks = [[self.solid, self.into_solid], [self.into_flow, self.flow]]
+        return PETSc.Mat().createNest(blocks, comm=self.flow.comm)
 
     def assembled(self) -> PETSc.Mat:
         """The same as one sparse matrix."""

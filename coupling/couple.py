@@ -7,13 +7,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from coupling.coupled import Coupled
-from coupling.interface import Interface
+from coupling.elastic import Elastic
 from coupling.wetted import immerse, wetted_surface
+from solvers.api import Array
 from solvers.fluid.field import Fluid
 from solvers.fluid.grid import Grid
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.patches import Patch
+from solvers.fluid.surface import Surface
 from solvers.fluid.system import FlowSettings
+from solvers.rigid.field import RigidBodies
 from solvers.skin import cut_out_skin
 from solvers.solver_settings import SolverSettings
 from solvers.structure.field import Structure
@@ -43,7 +46,27 @@ def couple(
         mesh = body.domain.source
         skin = comm.bcast(None if mesh is None else cut_out_skin(mesh, wetted.get(body.name)), root=0)
         surfaces.append(wetted_surface(bodies, index, skin))
-    box = np.array([edge[0] for edge in grid.edges]), np.array([edge[-1] for edge in grid.edges])
-    immersed = immerse(surfaces, rigid_bodies, box)
+    immersed = immerse([surface.at_start for surface in surfaces], rigid_bodies, _box(grid))
     fluid = Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=comm)
-    return Coupled(fluid, structure, Interface(structure, surfaces))
+    return Coupled(fluid, Elastic(structure, surfaces))
+
+
+def couple_rigid(
+    bodies: RigidBodies,
+    grid: Grid,
+    flow: FlowSettings,
+    patches: Sequence[Patch],
+    *,
+    rigid_bodies: Sequence[ImmersedBody] = (),
+    solver: SolverSettings = SolverSettings(),
+    timer: Timer | None = None,
+) -> Coupled:
+    """Rigid bodies that the flow moves, for `Monolithic` or `Partitioned`; all else as in `couple` (collective)."""
+    moved = [(Surface(body.name, body.facets, len(body.points)), body.points) for body in bodies.bodies]
+    immersed = immerse(moved, rigid_bodies, _box(grid), deform=False)
+    return Coupled(Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=bodies.comm), bodies)
+
+
+def _box(grid: Grid) -> tuple[Array, Array]:
+    """Lowest and highest corner [m]."""
+    return np.array([edge[0] for edge in grid.edges]), np.array([edge[-1] for edge in grid.edges])

@@ -1,92 +1,67 @@
-"""Fluid and structure with their interface: what both coupling schemes share."""
+"""A solid and a flow with their interface: what both coupling schemes share."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
-import numpy as np
-from mpi4py import MPI
+from collections.abc import Sequence
 
 from coupling.balance import Balance
-from coupling.interface import Interface
-from coupling.predict import Predictor
+from coupling.interface import DrySide, Interface
+from coupling.ports import Flow, Solid
 from solvers.api import Array, State
-from solvers.fluid.field import Fluid
-from solvers.structure.field import Structure
 
 
-@dataclass
 class Coupled:
-    """The two fields at one time; collective calls."""
+    """The two parts at one time; collective calls."""
 
-    fluid: Fluid
-    structure: Structure
-    interface: Interface
-    balance: Balance = field(init=False)
-    predictor: Predictor = field(init=False)
+    def __init__(self, flow: Flow, solid: Solid, dry_sides: Sequence[DrySide] = ()):
+        self.flow, self.solid = flow, solid
+        self.interface = Interface(solid, dry_sides)
+        self.balance = Balance(flow, solid, self.interface)
+        self._dt = 0.0
 
-    def __post_init__(self) -> None:
-        self.balance, self.predictor = Balance(self.fluid, self.structure, self.interface), Predictor()
-
-    def initialise(self, t: float, dt: float) -> None:
-        """Both fields at the first time, the fluid around the structure as it starts."""
-        self.structure.initialise(t, dt)
-        self.interface.now = self.interface.displacement()
-        self.interface.old = self.interface.now.copy()
-        self.fluid.initialise(t, dt)
-        self.fluid.move(self.interface.move(self.interface.now))
+    def initialise(self, t: float, dt: float, *, with_solid: bool = False) -> None:
+        """Both at the first time, the flow around the solid as it starts; with_solid: solved as one."""
+        self.solid.initialise(t, dt)
+        self.interface.initialise()
+        self.flow.initialise(t, dt)
+        self.flow.move(self.interface.move(self.interface.now), with_solid=with_solid)
         self.balance.start()
 
     def begin_step(self, t: float, dt: float) -> None:
-        """Boundary and loads at t + dt, both fields as they were at t."""
-        self.fluid.begin_step(t, dt)
-        self.interface.begin_step(self.fluid.difference)
-        self.structure.begin_step(t, dt)
-        self.predictor.add(t, self.structure.old.u)
+        """Boundary and loads at t + dt, both as they were at t."""
+        self._dt = dt
+        self.flow.begin_step(t, dt)
+        self.interface.begin_step(self.flow.difference)
+        self.solid.begin_step(t, dt)
 
     def predict(self, t: float) -> None:
-        """Predict the fields at t: displacements on a parabola, unless the structure has a predictor of its own.
+        """Predict both at t.
 
         Cut the grid at the old positions before that: cells that the surface leaves keep their ghost penalty.
         """
-        structure = self.structure
-        self.fluid.predict()
-        held, now = structure.held, structure.now
-        own_predictor = not np.array_equal(held.free_part(now.u), held.free_part(structure.old.u))
-        if not structure.comm.allreduce(own_predictor, op=MPI.LOR):
-            now.u[:] = held.part(now.u) + held.free_part(self.predictor.at(t))
+        self.flow.predict()
+        self.solid.predict(t)
 
     def end_step(self) -> None:
         """Accept the step."""
-        self.structure.end_step()
-        self.fluid.end_step()
-        self.balance.add_step()
+        self.solid.end_step()
+        self.flow.end_step()
+        self.balance.add_step(self._dt)
 
     def force(self) -> Array:
         """Force [N] of the fluid on the vertices, shape (n, dim)."""
-        return self.interface.join(self.fluid.force())
+        return self.interface.join(self.flow.force())
 
     def save(self) -> State:
         return {
-            "fluid": self.fluid.save(),
-            "structure": self.structure.save(),
+            "fluid": self.flow.save(),
+            "structure": self.solid.save(),
             "interface": self.interface.save(),
             "balance": self.balance.save(),
-            "predictor": self._save_predictor(),
         }
 
-    def _save_predictor(self) -> State:
-        """Three displacements at all times, so that all states have the same parts."""
-        displacements = [*self.predictor.displacements, *[self.structure.now.u] * 3][:3]
-        by_name: State = {str(i): self.structure.per_body(u) for i, u in enumerate(displacements)}
-        return by_name | {"times": list(self.predictor.times)}
-
     def restore(self, state: State) -> None:
-        self.structure.restore(state["structure"])
-        self.fluid.restore(state["fluid"])
+        self.solid.restore(state["structure"])
+        self.flow.restore(state["fluid"])
         self.interface.restore(state["interface"])
         self.balance.restore(state["balance"])
-        predictor, self.predictor.times = state["predictor"], list(state["predictor"]["times"])
-        self.predictor.displacements = [
-            self.structure.from_bodies(predictor[str(i)]) for i in range(len(self.predictor.times))
-        ]

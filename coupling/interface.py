@@ -1,4 +1,4 @@
-"""The wetted surfaces: nodes that structure and fluid share, their motion and their load."""
+"""The wetted surfaces: vertices that solid and fluid share, and their motion."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coupling.wetted import WettedSurface
+from coupling.ports import Solid
 from solvers.api import Array, State
 from solvers.fluid.surface import Motion
 from solvers.fluid.time import Difference
-from solvers.rows import gather_at
-from solvers.structure.field import Structure
 
 
 @dataclass(frozen=True)
@@ -42,16 +40,17 @@ class Interface:
     g = alpha d_{n+1} - beta_0 d_n - beta_1 d_{n-1}, so that fluid and surface sweep the same volume.
     """
 
-    def __init__(self, structure: Structure, surfaces: Sequence[WettedSurface], dry_sides: Sequence[DrySide] = ()):
-        self.structure, self.surfaces, self.dry_sides = structure, list(surfaces), list(dry_sides)
-        self.dofs = np.concatenate([surface.dofs for surface in surfaces])
-        self.points = np.concatenate([surface.points for surface in surfaces])
+    def __init__(self, solid: Solid, dry_sides: Sequence[DrySide] = ()):
+        self.solid, self.surfaces, self.dry_sides = solid, list(solid.surfaces), list(dry_sides)
+        self.points = np.concatenate(list(solid.surfaces.values()))
+        self._ends = np.cumsum([len(points) for points in solid.surfaces.values()])[:-1]
         self.now, self.old, self.older = (np.zeros_like(self.points) for _ in range(3))
         self._difference = Difference(0.0, 0.0, 0.0)
 
-    @property
-    def comm(self):
-        return self.structure.comm
+    def initialise(self) -> None:
+        """The solid is where it starts."""
+        self.now = self.displacement()
+        self.old = self.now.copy()
 
     def begin_step(self, difference: Difference) -> None:
         """Remember the displacements of the last two times."""
@@ -59,12 +58,8 @@ class Interface:
         self._difference = difference
 
     def displacement(self) -> Array:
-        """Displacement [m] of the vertices as the structure has it now, shape (n, dim) (collective)."""
-        return self.gather(self.structure.now.u)
-
-    def gather(self, owned: Array) -> Array:
-        """Values at the vertices from those at owned dofs of the structure, shape (n, dim) (collective)."""
-        return gather_at(self.comm, owned, self.structure.layout.start, self.dofs)
+        """Displacement [m] of the vertices as the solid has it now, shape (n, dim) (collective)."""
+        return self.solid.displacement()
 
     def velocity(self, d: Array) -> Array:
         """Velocity [m/s] of the vertices for displacements d at the end of the step."""
@@ -78,22 +73,12 @@ class Interface:
         return motions | {side.name: side.motion(motions[side.behind]) for side in self.dry_sides}
 
     def _by_surface(self, x: Array, v: Array) -> dict[str, Motion]:
-        ends = np.cumsum([len(surface.points) for surface in self.surfaces])[:-1]
-        parts = zip(self.surfaces, np.split(x, ends), np.split(v, ends), strict=True)
-        return {surface.name: Motion(x, v) for surface, x, v in parts}
+        parts = zip(self.surfaces, np.split(x, self._ends), np.split(v, self._ends), strict=True)
+        return {name: Motion(x, v) for name, x, v in parts}
 
     def join(self, by_surface: dict[str, Array]) -> Array:
         """Values at all vertices from those of each surface."""
-        return np.concatenate([by_surface[surface.name] for surface in self.surfaces])
-
-    def spread(self, force: Array) -> Array:
-        """Forces [N] on vertices as owned dofs of the structure."""
-        structure = self.structure
-        local = self.dofs - structure.layout.start
-        mine = (local >= 0) & (local < structure.layout.size)
-        total = np.zeros(structure.layout.size)
-        np.add.at(total, local[mine], force[mine])
-        return total
+        return np.concatenate([by_surface[name] for name in self.surfaces])
 
     def save(self) -> State:
         return {"now": self.now.copy(), "old": self.old.copy()}

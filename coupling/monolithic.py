@@ -1,10 +1,11 @@
-"""Monolithic coupling: one Newton iteration for structure and fluid, contact condensed, the cut following each iterate.
+"""Monolithic coupling: one Newton iteration for solid and flow, contact condensed, the cut following each iterate.
 
-    [ K + w alpha M_G    -w C^T S ] [du]       [ r_s ]        w: weight of the load in the structure's balance
-    [ alpha C                A    ] [dw]  =  - [ r_f ]        C, S, M: see solvers.fluid.interface, g = alpha d - ...
+    [ K + w alpha B^T M B    -w B^T C^T S ] [du]       [ r_s ]      w: weight of the load in the solid's balance
+    [ alpha C B                    A      ] [dw]  =  - [ r_f ]      B: vertices by unknowns of the solid
 
-To alpha C and M_G come the derivatives with respect to the shape of the fluid's domain (solvers.fluid.shape): in steady
-flows, where alpha = 0, they are the whole dependence of the fluid on du; in time they halve the number of Newton steps.
+C, S, M: see solvers.fluid.interface, g = alpha d - ...
+To alpha C and M come the derivatives with respect to the shape of the fluid's domain (solvers.fluid.shape): in steady
+flows, where alpha = 0, they are the whole dependence of the flow on du; in time they halve the number of Newton steps.
 Source: Schott, Ager, Wall, Int. J. Numer. Meth. Engng 119 (2019) 757-796.
 """
 
@@ -17,15 +18,14 @@ from petsc4py import PETSc
 
 from coupling.blocks import Blocks
 from coupling.coupled import Coupled
+from coupling.ports import Part
 from solvers import linear
 from solvers.api import Array, State, StepFailed, StepInfo
-from solvers.fluid.field import Fluid
-from solvers.fluid.shape import shape_derivatives
 from solvers.lagged import LaggedFactors
 from solvers.newton import Tolerance, converge
 from solvers.rounding import rounding_error
 from solvers.rows import Numbering, from_entries
-from solvers.structure.field import Structure
+from solvers.vertices import Entries
 
 
 class Monolithic:
@@ -35,24 +35,24 @@ class Monolithic:
 
     def __init__(self, coupled: Coupled, tolerance: Tolerance = Tolerance()):
         self.coupled, self.tolerance = coupled, tolerance
-        structure, fluid = coupled.structure, coupled.fluid
-        self.comm, fluid.solved_with_bodies = structure.comm, True
-        self._numbering = Numbering(self.comm, structure.layout.size, fluid.unknowns.owned)
+        solid, flow = coupled.solid, coupled.flow
+        self.comm = solid.comm
+        self._numbering = Numbering(self.comm, solid.size, flow.size)
         # in time the matrix of the first guess is too far from the later ones to serve for all of them
-        self._direct = LaggedFactors(self.comm, fresh=math.inf if fluid.settings.steady else 2)
-        self._farther: Structure | Fluid = fluid
+        self._direct = LaggedFactors(self.comm, fresh=math.inf if flow.steady else 2)
+        self._farther: Part = flow
         self._krylov: PETSc.KSP | None = None
         self._preconditioned_by: PETSc.Mat | None = None
         self._fresh_iterations = self._linear_iterations = 0
-        #: rounding errors of the residuals of structure and fluid [N], as far as this step knows
+        #: rounding errors of the residuals of solid and flow [N], as far as this step knows
         self._noise: Array | None = None
         self._prepared: Blocks | None = None  #: the matrix at the present iterate, if it is there already
 
     # ------------------------------------------------------------------------------------------------- steps
 
     def initialise(self, t: float, dt: float) -> None:
-        """Both fields at the first time."""
-        self.coupled.initialise(t, dt)
+        """Both parts at the first time."""
+        self.coupled.initialise(t, dt, with_solid=True)
 
     def step(self, t: float, dt: float) -> StepInfo:
         coupled = self.coupled
@@ -61,55 +61,54 @@ class Monolithic:
         self._noise = self._prepared = None
         self._direct.begin_step()
         unmoved = 0.0
-        if not coupled.fluid.settings.steady:
+        if not coupled.flow.steady:
             unmoved = self.residual()
             coupled.predict(t + dt)
         info = converge(self, self.tolerance, unmoved)
-        coupled.structure.check_deformation(info.iterations, info.residuals)
+        coupled.solid.check(info)
         coupled.end_step()
         numbers = coupled.balance.numbers() | {"coupling.linear": float(self._linear_iterations)}
-        if coupled.structure.constraint is not None:
-            numbers.update(coupled.structure.constraint.numbers())
-        return StepInfo(info.iterations, info.residuals, numbers, tuple(coupled.fluid.notes))
+        numbers.update(coupled.solid.numbers())
+        return StepInfo(info.iterations, info.residuals, numbers, tuple(coupled.flow.notes))
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
     def residual(self) -> float:
-        """The larger of both fields' residuals, relative to its largest of the step, times the sum of those [N]."""
-        fluid, structure, interface = self.coupled.fluid, self.coupled.structure, self.coupled.interface
-        fluid.move(interface.move(interface.displacement()))
-        of_fluid = fluid.residual()
-        structure.load(interface.spread(self.coupled.force()))
-        found = np.array([structure.residual(), of_fluid])
+        """The larger of both parts' residuals, relative to its largest of the step, times the sum of those [N]."""
+        flow, solid, interface = self.coupled.flow, self.coupled.solid, self.coupled.interface
+        flow.move(interface.move(interface.displacement()), with_solid=True)
+        of_flow = flow.residual()
+        solid.load(self.coupled.force())
+        found = np.array([solid.residual(), of_flow])
         self._largest = np.maximum(self._largest, found)
         self._found = found
         above = found > (np.zeros(2) if self._noise is None else self._noise)
         relative = np.divide(found, self._largest, out=np.zeros(2), where=above)
-        self._farther = structure if relative[0] > relative[1] else fluid
+        self._farther = solid if relative[0] > relative[1] else flow
         return float(relative.max() * self._largest.sum())
 
     def advance(self) -> float:
-        """One Newton step; the larger of both fields' relative increments."""
-        structure, fluid = self.coupled.structure, self.coupled.fluid
+        """One Newton step; the larger of both parts' relative increments."""
+        solid, flow = self.coupled.solid, self.coupled.flow
         blocks, self._prepared = self._prepared or self._blocks(), None
         b, x = blocks.create_vectors()
-        own = structure.layout.size
-        b.array[:own] = -structure.residual_force
-        b.array[own:] = -fluid.residual_rows
-        if structure.constrained:
-            blocks.condense(structure, b, self._numbering)
-        x.array[:own] = structure.missing_displacement()
-        blocks.hold(structure, b, x)
+        own = solid.size
+        b.array[:own], b.array[own:] = solid.right_side(), flow.right_side()
+        change = solid.row_transformation()
+        taken = None if change is None else blocks.transform(change, b, self._numbering)
+        x.array[:own] = solid.missing()
+        blocks.hold(solid, b, x)
         try:
-            with fluid.timer("solve"):
+            with flow.timer("solve"):
                 self._solve(blocks, b, x)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
-        everything = self._numbering.gather(self.comm, x.array) if structure.constrained else None
-        return max(structure.update(x.array[:own], everything), fluid.update(x.array[own:]))
+        if taken is not None:
+            solid.recover(taken, self._numbering.gather(self.comm, x.array))
+        return max(solid.update(x.array[:own]), flow.update(x.array[own:]))
 
     def _solve(self, blocks: Blocks, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        ladder = self.coupled.fluid.ladder
+        ladder = self.coupled.flow.ladder
         while ladder.here != "direct":
             try:
                 self._iterate(blocks, b, x)
@@ -120,7 +119,7 @@ class Monolithic:
 
     def _iterate(self, blocks: Blocks, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Preconditioned by the first matrix of the step as long as that serves."""
-        fluid, matrix = self.coupled.fluid, blocks.nested()
+        flow, matrix = self.coupled.flow, blocks.nested()
         if self._krylov is not None:
             try:
                 linear.solve(self._krylov, matrix, b, x, self._preconditioned_by)
@@ -132,13 +131,13 @@ class Monolithic:
                 if iterations > 2 * self._fresh_iterations:
                     self._krylov = None
                 return
-        rung, tolerance = fluid.ladder.here, fluid.solver.linear_tolerance
+        rung, tolerance = flow.ladder.here, flow.linear_tolerance
         parts = self._numbering.first, self._numbering.second
         krylov = linear.coupled_solver(self.comm, *parts, tolerance=tolerance, fill=rung == "fill")
         if rung == "multigrid":
             krylov.setOperators(matrix)
             krylov.getPC().setUp()
-            fluid.set_up_multigrid(krylov.getPC().getFieldSplitSubKSP()[1].getPC(), blocks.fluid)
+            flow.set_up_multigrid(krylov.getPC().getFieldSplitSubKSP()[1].getPC(), blocks.flow)
         linear.solve(krylov, matrix, b, x)
         linear.keep_factors(krylov)
         self._krylov, self._preconditioned_by = krylov, matrix
@@ -146,67 +145,51 @@ class Monolithic:
         self._linear_iterations += self._fresh_iterations
 
     def _blocks(self) -> Blocks:
-        structure, fluid = self.coupled.structure, self.coupled.fluid
-        K, A = structure.linearise(), fluid.linearise()
-        with fluid.timer("coupling"):
-            into_fluid, into_structure, mass = self._coupling_blocks()
+        solid, flow = self.coupled.solid, self.coupled.flow
+        K, A = solid.linearise(), flow.linearise()
+        with flow.timer("coupling"):
+            into_flow, into_solid, mass = self._coupling_blocks()
             PETSc.garbage_cleanup(K.comm)  # the K of earlier iterates, on a communicator that no solver has
             K = K.copy()
             K.axpy(1.0, mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-            # what the fields exchange is rounded too: positions and velocities of the surface, and the force
-            fluid.add_rounding(fluid.rounding_of(into_fluid, structure.rounded()))
-            structure.add_rounding(rounding_error(into_structure, fluid.flow[: fluid.unknowns.owned]))
-            structure.add_rounding(rounding_error(mass, structure.rounded()))
-            self._noise = np.array([structure.round_off(), fluid.round_off()])
-            return Blocks(K, into_structure, into_fluid, A)
+            # what the parts exchange is rounded too: positions and velocities of the surface, and the force
+            flow.add_rounding(2.0**flow.dim * rounding_error(into_flow, solid.rounded()))
+            solid.add_rounding(rounding_error(into_solid, flow.rounded()))
+            solid.add_rounding(rounding_error(mass, solid.rounded()))
+            self._noise = np.array([solid.round_off(), flow.round_off()])
+            return Blocks(K, into_solid, into_flow, A)
 
     def _coupling_blocks(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
-        """alpha C, -w C^T S and w alpha M as distributed matrices; rows of held fluid dofs are empty."""
-        fluid, structure, surface = self.coupled.fluid, self.coupled.structure, self.coupled.interface
-        alpha, weight = fluid.difference.alpha, structure.time.force_weight
-        operator = fluid.system.interface
-        by_shape, load_by_shape = shape_derivatives(operator, fluid.flow)
-        C = operator.coupling_blocks
-        back = np.concatenate([-C[0].ravel(), C[1].ravel()])
-        into = np.concatenate([(alpha * c + s).ravel() for c, s in zip(C, by_shape, strict=True)])
-        load = (alpha * operator.mass_blocks - load_by_shape).ravel()
+        """alpha C B, -w B^T C^T S and w alpha B^T M B ; rows of held dofs of the flow are empty."""
+        flow, solid = self.coupled.flow, self.coupled.solid
+        entries, B, w = flow.interface_entries(self.coupled.interface.surfaces), solid.jacobian(), solid.force_weight
+        into_flow = self._matrix((flow.size, solid.size), B.times(entries.into_flow))
+        force_by_flow = B.transposed_times(entries.force_by_flow.scaled(-w))
+        force_by_motion = B.times(B.transposed_times(entries.force_by_motion.scaled(-w)))
+        into_solid = self._matrix((solid.size, flow.size), force_by_flow)
+        return into_flow, into_solid, self._matrix((solid.size, solid.size), force_by_motion)
 
-        #: the structure's dof of each dof of the vertices, -1 for those of rigid bodies
-        moved = np.full((len(fluid.cut.motion.x), fluid.dim), -1)
-        moved[fluid.vertices_of([s.name for s in surface.surfaces])] = surface.dofs
-        flow, moved = fluid.unknowns.global_dofs, moved.ravel()
-        rows, columns = operator.pattern
-        held, elastic = fluid.held_everywhere()[rows], moved[columns] >= 0
-        own, own_flow = structure.layout.size, fluid.unknowns.owned
-        of_flow, of_structure = flow[rows], moved[columns]
-        kept = elastic & ~held
-        into_fluid = from_entries(self.comm, (own_flow, own), of_flow[kept], of_structure[kept], into[kept])
-        into_structure = from_entries(
-            self.comm, (own, own_flow), of_structure[elastic], of_flow[elastic], -weight * back[elastic]
-        )
-        rows, columns = (moved[dofs] for dofs in operator.surface_pattern)
-        elastic = (rows >= 0) & (columns >= 0)
-        mass = from_entries(self.comm, (own, own), rows[elastic], columns[elastic], weight * load[elastic])
-        return into_fluid, into_structure, mass
+    def _matrix(self, owned: tuple[int, int], entries: Entries) -> PETSc.Mat:
+        return from_entries(self.comm, owned, entries.rows, entries.columns, entries.values)
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""
-        self.coupled.structure.retreat(fraction)
-        self.coupled.fluid.retreat(fraction)
+        self.coupled.solid.retreat(fraction)
+        self.coupled.flow.retreat(fraction)
 
     def settled(self) -> bool:
         """Supports and active sets are fulfilled."""
-        return self.coupled.structure.settled()
+        return self.coupled.solid.settled()
 
     def round_off(self) -> float:
-        """No residual is too large if those of both fields are rounding errors; other ones are left out already."""
+        """No residual is too large if those of both parts are rounding errors; other ones are left out already."""
         if self._noise is None:
             self._prepared = self._blocks()
         assert self._noise is not None
         return math.inf if (self._found <= self._noise).all() else 0.0
 
     def worst(self) -> tuple[float, ...] | None:
-        """Where the field that is farther off has its largest residual [m] (collective)."""
+        """Where the part that is farther off has its largest residual [m] (collective)."""
         return self._farther.worst()
 
     # ---------------------------------------------------------------------------------------- save and restore

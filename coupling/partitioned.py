@@ -1,6 +1,6 @@
-"""Partitioned Dirichlet-Neumann coupling: the fluid takes the surface's motion, the structure the fluid's force.
+"""Partitioned Dirichlet-Neumann coupling: the flow takes the surface's motion, the solid the fluid's force.
 
-d_k -> fluid on the surface at d_k -> force f_k -> structure under f_k -> displacement D(d_k), until D(d) = d.
+d_k -> flow around the surface at d_k -> force f_k -> solid under f_k -> displacement D(d_k), until D(d) = d.
 Source: Kuttler, Wall, Comput. Mech. 43 (2008) 61-72.
 """
 
@@ -45,18 +45,18 @@ class Partitioned:
         coupled, interface = self.coupled, self.coupled.interface
         coupled.begin_step(t, dt)
         self.accelerator.begin_step()
-        if not coupled.fluid.settings.steady:
-            coupled.fluid.move(interface.move(interface.old))
+        if not coupled.flow.steady:
+            coupled.flow.move(interface.move(interface.old))
             coupled.predict(t + dt)
         d = interface.displacement()
         history: list[float] = []
         newton = 0
         contact: NDArray[np.bool_] | None = None
         while True:
-            coupled.fluid.move(interface.move(d))
-            newton += coupled.fluid.solve().iterations
-            coupled.structure.load(interface.spread(coupled.force()))
-            newton += coupled.structure.solve().iterations
+            coupled.flow.move(interface.move(d))
+            newton += coupled.flow.solve().iterations
+            coupled.solid.load(coupled.force())
+            newton += coupled.solid.solve().iterations
             found = interface.displacement()
             residual = _mean(found - d)
             history.append(residual)
@@ -65,24 +65,17 @@ class Partitioned:
             if not math.isfinite(residual) or len(history) == self.tolerance.max_iterations:
                 reason = f"fluid and structure did not agree in {len(history)} iterations (residual {residual:.3g} m)"
                 raise StepFailed("coupling", reason, iteration=len(history), history=tuple(history))
-            touching = self._touching()
+            touching = coupled.solid.touching()
             if contact is not None and touching is not None and not np.array_equal(contact, touching):
                 self.accelerator.forget()
             contact = touching
             d = self.accelerator.next(d, found)
         coupled.end_step()
-        numbers = {"coupling.newton": float(newton), **coupled.balance.numbers()}
-        constraint = coupled.structure.constraint
-        if constraint is not None:
-            numbers.update(constraint.numbers())
-        return StepInfo(len(history), tuple(history), numbers, tuple(coupled.fluid.notes))
+        numbers = {"coupling.newton": float(newton), **coupled.balance.numbers(), **coupled.solid.numbers()}
+        return StepInfo(len(history), tuple(history), numbers, tuple(coupled.flow.notes))
 
     def _small(self, found: Array) -> float:
         return max(self.tolerance.relative * _mean(found - self.coupled.interface.old), self.tolerance.absolute)
-
-    def _touching(self) -> NDArray[np.bool_] | None:
-        constraint = self.coupled.structure.constraint
-        return None if constraint is None else constraint.active()
 
     def save(self) -> State:
         return {**self.coupled.save(), "accelerator": self.accelerator.save()}

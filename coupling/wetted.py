@@ -34,6 +34,11 @@ class WettedSurface:
     facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
     wet: NDArray[np.bool_] | None = None  #: facets that the fluid touches; None: found by `find_wet`
 
+    @property
+    def at_start(self) -> tuple[Surface, Array]:
+        """The surface in the flow, and positions of its vertices [m]."""
+        return Surface(self.name, self.facets, len(self.points), self.wet), self.points
+
 
 def wetted_surface(bodies: Sequence[Body], index: int, skin: Skin) -> WettedSurface:
     """A skin with the dofs of its body, the one of that index among all of the structure (collective)."""
@@ -43,14 +48,22 @@ def wetted_surface(bodies: Sequence[Body], index: int, skin: Skin) -> WettedSurf
 
 
 def immerse(
-    surfaces: Sequence[WettedSurface], rigid: Sequence[ImmersedBody], box: tuple[Array, Array], t: float = 0.0
+    moved: Sequence[tuple[Surface, Array]],
+    given: Sequence[ImmersedBody],
+    box: tuple[Array, Array],
+    t: float = 0.0,
+    *,
+    deform: bool = True,
 ) -> list[ImmersedBody]:
-    """All bodies for the fluid, the rigid ones first. `box`: lowest and highest corner [m]; t: the first time [s]."""
-    at_start = [(body.surface, body.motion(t).x) for body in rigid if body.motion is not None]
-    at_start += [(Surface(s.name, s.facets, len(s.points), s.wet), s.points) for s in surfaces]
-    wet = find_wet(at_start, box)
-    found = [replace(body, surface=surface) for body, surface in zip(rigid, wet, strict=False)]
-    return found + [ImmersedBody(surface, None) for surface in wet[len(rigid) :]]
+    """All bodies for the fluid, first the given ones, whose motion is known, then those that a solid moves.
+
+    moved: surfaces with the positions of their vertices [m] at the start; box: lowest and highest corner [m]; t: the
+    first time [s]; deform: the volume of those that are moved may change.
+    """
+    at_start = [(body.surface, body.motion(t).x) for body in given if body.motion is not None]
+    wet = find_wet([*at_start, *moved], box)
+    found = [replace(body, surface=surface) for body, surface in zip(given, wet, strict=False)]
+    return found + [ImmersedBody(surface, None, deforms=deform) for surface in wet[len(given) :]]
 
 
 def find_wet(surfaces: Sequence[tuple[Surface, Array]], box: tuple[Array, Array]) -> list[Surface]:

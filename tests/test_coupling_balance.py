@@ -53,10 +53,10 @@ def test_a_load_of_the_step_before_shows(scheme, monkeypatch):
     """The structure that gets f_n for f_{n+1} misses w (f_n - f_{n+1}) + (1 - w) (f_{n-1} - f_n)."""
     coupled = post_in_flow(E=1e5)
     load = Structure.load
-    late = lambda self, force: load(self, coupled.interface.spread(coupled.balance.given))  # noqa: E731
+    late = lambda self, force: load(self, coupled.solid.spread(coupled.balance.given.reshape(-1, 2)))  # noqa: E731
     monkeypatch.setattr(Structure, "load", late)
     force, _, _, _, given, _ = advance(scheme, coupled, 4)
-    w, zero = coupled.structure.time.force_weight, np.zeros_like(given[0])
+    w, zero = coupled.solid.structure.time.force_weight, np.zeros_like(given[0])
     levels = [zero, zero, *given]
     for n, found in enumerate(force):
         older, old, new = levels[n : n + 3]

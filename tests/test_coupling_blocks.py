@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coupling import monolithic
 from coupling.monolithic import Monolithic
+from solvers.fluid import coupling_entries
 from solvers.newton import Tolerance
 from tests.coupling_setup import post_in_flow
 
@@ -21,7 +21,7 @@ def disturbed():
     coupled.begin_step(0.02, 0.02)
     scheme._largest = np.zeros(2)
     rng = np.random.default_rng(0)
-    structure, fluid = coupled.structure, coupled.fluid
+    structure, fluid = coupled.solid.structure, coupled.flow
     structure.now.u += structure.held.free_part(1e-3 * rng.standard_normal(structure.layout.size))
     fluid.move(coupled.interface.move(coupled.interface.displacement()))
     free = np.flatnonzero(~fluid.held)
@@ -33,10 +33,10 @@ def disturbed():
 def rows(scheme) -> np.ndarray:
     """Both residuals with the cut held: velocity and force of the surface follow the unknowns, its place does not."""
     coupled = scheme.coupled
-    fluid, structure, interface = coupled.fluid, coupled.structure, coupled.interface
+    fluid, structure, interface = coupled.flow, coupled.solid.structure, coupled.interface
     fluid.cut.motion.v[:] = interface.velocity(interface.displacement())
     fluid.residual()
-    structure.load(interface.spread(coupled.force()))
+    coupled.solid.load(coupled.force())
     structure.residual()
     return np.concatenate([structure.held.free_part(structure.residual_force), fluid.residual_rows])
 
@@ -44,15 +44,15 @@ def rows(scheme) -> np.ndarray:
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_blocks_against_finite_differences(disturbed, monkeypatch, seed: int):
     scheme = disturbed
-    fluid, structure = scheme.coupled.fluid, scheme.coupled.structure
+    fluid, structure = scheme.coupled.flow, scheme.coupled.solid.structure
     rows(scheme)
-    with_shape = monolithic.shape_derivatives
+    with_shape = coupling_entries.shape_derivatives
 
     def without(*a):
         (velocity, pressure), load = with_shape(*a)
         return (0.0 * velocity, 0.0 * pressure), 0.0 * load
 
-    monkeypatch.setattr(monolithic, "shape_derivatives", without)
+    monkeypatch.setattr(coupling_entries, "shape_derivatives", without)
     matrix = scheme._blocks().assembled()
     rng = np.random.default_rng(seed)
     du = structure.held.free_part(rng.standard_normal(structure.layout.size))
@@ -99,7 +99,7 @@ def test_the_force_on_the_structure_is_the_reaction_of_the_fluid():
     coupled = post_in_flow()
     coupled.initialise(0.0, 0.02)
     Monolithic(coupled).step(0.0, 0.02)
-    fluid, system = coupled.fluid, coupled.fluid.system
+    fluid, system = coupled.flow, coupled.flow.system
     with_interface = system.residual()
     owned = fluid.unknowns.owned
     interface = system.interface

@@ -105,7 +105,7 @@ def test_pocket_behind_an_elastic_body():
     coupled.initialise(0.0, 1.0)
     for number in range(25):
         scheme.step(float(number), 1.0)
-    nodes, fluid = coupled.fluid.unknowns.pressure, coupled.fluid
+    nodes, fluid = coupled.flow.unknowns.pressure, coupled.flow
     behind = nodes.points[:, 0] > 1.05
     assert fluid.flow[nodes.dofs[behind, 0]] == pytest.approx(2.0, rel=1e-8)
     right = coupled.interface.points[:, 0] > 0.9

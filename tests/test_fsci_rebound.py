@@ -43,7 +43,7 @@ def test_forces_balance_and_nothing_penetrates():
     """m a = F_fluid + F_gravity + F_contact in every step, by the weights of the time scheme; gaps closed or open."""
     simulation = start()
     coupled = simulation.scheme.coupled
-    structure, contact = coupled.structure, coupled.structure.constraint
+    structure, contact = coupled.solid.structure, coupled.solid.structure.constraint
     scheme, touched = structure.time.scheme, 0
     mass = structure.mass.createVecLeft()
     ones = structure.mass.createVecRight()
@@ -82,7 +82,7 @@ def test_both_schemes_agree(accelerator):
     for step in range(12):
         for simulation in (one, two):
             simulation.scheme.step(step * DT, DT)
-        contacts = [simulation.scheme.coupled.structure.constraint for simulation in (one, two)]
+        contacts = [simulation.scheme.coupled.solid.structure.constraint for simulation in (one, two)]
         sets.append(contacts[0].active().sum())
         moved = [simulation.scheme.coupled.interface.now for simulation in (one, two)]
         if step < 8:

@@ -70,7 +70,7 @@ def test_volume_is_what_the_material_allows(run):
     simulation.initialise(0.0, 0.01)
     state = read_checkpoint(run / "checkpoint")[0]["scheme"]
     simulation.scheme.restore(scatter(MPI.COMM_SELF, state, simulation.scheme.save()))
-    structure, fluid = simulation.scheme.coupled.structure, simulation.scheme.coupled.fluid
+    structure, fluid = simulation.scheme.coupled.solid.structure, simulation.scheme.coupled.flow
     (body,), now = structure.bodies, structure.now
     x = body.points[:, : body.owned].T.ravel() + now.u
     inertia, a = structure.mass.createVecs()

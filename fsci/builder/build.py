@@ -97,17 +97,18 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     bodies = build_structure.build_bodies(case, comm)
     contact = _contact(case, comm, bodies)
     structure = build_structure.build_structure(case, comm, bodies, contact, timer)
-    scheme, coupled = build_coupled(case, comm, bodies, structure, timer)
-    fluid = coupled.fluid
+    scheme, fluid = build_coupled(case, comm, bodies, structure, timer)
+    coupled = scheme.coupled
     mass = mass_balance(fluid)
     probes = [build_structure.build_probes(case, structure), build_fluid.build_probes(case, fluid)]
 
     def snapshots() -> list[Snapshot]:
-        return of_structure(structure, _contact_fields(contact)) + of_fluid(fluid) + outlines(coupled)
+        dry = outlines(fluid, coupled.interface.dry_sides)
+        return of_structure(structure, _contact_fields(contact)) + of_fluid(fluid) + dry
 
     return Simulation(
         scheme=scheme,
-        initialise=partial(start, case, coupled),
+        initialise=partial(start, case, scheme, fluid),
         snapshots=snapshots,
         probes=lambda: {column: value for measure in probes for column, value in measure().items()},
         balances=lambda: {"structure.energy": structure.energy.error, **mass(), **coupled.balance.numbers()},

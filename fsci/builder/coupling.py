@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from coupling.accelerate import Accelerator, Aitken, QuasiNewton, Relaxation
 from coupling.coupled import Coupled
-from coupling.interface import DrySide, Interface
+from coupling.elastic import Elastic
+from coupling.interface import DrySide
 from coupling.monolithic import Monolithic
 from coupling.partitioned import FixedPointTolerance, Partitioned
 from coupling.wetted import WettedSurface, immerse, wetted_surface
@@ -22,7 +23,7 @@ from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.coupling_checks import closed_in
 from fsci.meshes.of_case import require_inside_period
-from solvers.api import Scheme
+from solvers.fluid.field import Fluid
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.surface import Surface
 from solvers.skin import Skin
@@ -35,29 +36,29 @@ Array = NDArray[np.float64]
 
 def build_coupled(
     case: Case, comm: MPI.Comm, bodies: Sequence[Body], structure: Structure, timer: Timer
-) -> tuple[Scheme, Coupled]:
-    """The scheme and what it couples. Raises CaseError (collective)."""
+) -> tuple[Monolithic | Partitioned, Fluid]:
+    """The scheme and the flow in it. Raises CaseError (collective)."""
     assert case.coupling is not None
     assert case.fluid is not None
     skins = [_skin(case, comm, body) for body in bodies]
     surfaces = [wetted_surface(bodies, index, skin) for index, (skin, _) in enumerate(skins)]
     box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
-    immersed = immerse(surfaces, build_rigid_bodies(case, comm), box, case.time.start)
+    immersed = immerse([surface.at_start for surface in surfaces], build_rigid_bodies(case, comm), box, case.time.start)
     dry_sides = [_dry_side(s, c) for s, (_, c) in zip(surfaces, skins, strict=True) if c is not None]
-    immersed += [ImmersedBody(_dry_line(side), None) for side in dry_sides]
+    immersed += [ImmersedBody(_dry_line(side), None, deforms=True) for side in dry_sides]
     fluid = build_fluid(case, comm, timer, immersed)
-    coupled = Coupled(fluid, structure, Interface(structure, surfaces, dry_sides))
+    coupled = Coupled(fluid, Elastic(structure, surfaces), dry_sides)
     if case.coupling.scheme == "monolithic":
-        return Monolithic(coupled, build_tolerance(case)), coupled
+        return Monolithic(coupled, build_tolerance(case)), fluid
     settings = case.coupling
     tolerance = FixedPointTolerance(settings.tolerance, settings.tolerance_absolute, settings.max_iterations)
-    return Partitioned(coupled, _accelerator(case), tolerance), coupled
+    return Partitioned(coupled, _accelerator(case), tolerance), fluid
 
 
-def start(case: Case, coupled: Coupled, t: float, dt: float) -> None:
+def start(case: Case, scheme: Monolithic | Partitioned, fluid: Fluid, t: float, dt: float) -> None:
     """Both fields at the first time. Raises CaseError (collective)."""
-    coupled.initialise(t, dt)
-    if coupled.fluid.level_unknown:
+    scheme.initialise(t, dt)
+    if fluid.level_unknown:
         where, why = closed_in(case)
         raise case.error(where, f"bodies enclose a part of the fluid, and {why}")
 

@@ -14,7 +14,8 @@ from solvers.fluid.inside import winding
 from solvers.fluid.surface import Motion
 
 if TYPE_CHECKING:
-    from coupling.coupled import Coupled
+    from coupling.interface import DrySide
+    from solvers.fluid.field import Fluid
 
 Array = NDArray[np.float64]
 Facets = NDArray[np.int64]
@@ -57,16 +58,15 @@ def close(points: Array, facets: Facets, inside: Array, corners: Array, box: tup
     return way
 
 
-def outlines(coupled: Coupled) -> list[Snapshot]:
+def outlines(fluid: Fluid, dry_sides: Sequence[DrySide]) -> list[Snapshot]:
     """What lies behind surfaces with one wet side, as closed lines that do not leave the box, on rank 0."""
-    fluid = coupled.fluid
     if fluid.comm.rank != 0:
         return []
     surfaces = {body.surface.name: body.surface for body in fluid.bodies}
     edges = fluid.grid.grid.edges
     low, high = (np.array([edge[at] for edge in edges]) for at in (0, -1))
     found = []
-    for side in coupled.interface.dry_sides:
+    for side in dry_sides:
         wet = fluid.cut.motion.x[fluid.vertices_of([side.behind])]
         end, start = side.ends
         way = np.concatenate([[end], len(wet) + np.arange(len(side.corners)), [start]])

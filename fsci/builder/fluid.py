@@ -41,7 +41,7 @@ def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Immer
     assert case.fluid is not None
     settings, linear = case.fluid, case.solver.linear
     solver = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
-    elastic = any(body.motion is None for body in bodies)
+    elastic = any(body.deforms for body in bodies)
     grid, flow, patches = Grid(settings.grid.planes), _flow(settings, elastic=elastic), _patches(settings)
     try:
         return Fluid(grid, flow, patches, bodies, solver, timer=timer, comm=comm)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
@@ -15,6 +16,8 @@ from solvers import fem, linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.distributed import Nodal
 from solvers.fluid import time
+from solvers.fluid.balances import Balances
+from solvers.fluid.coupling_entries import InterfaceEntries, interface_entries
 from solvers.fluid.cut import NOTHING, Cut, Cutter
 from solvers.fluid.fast_bodies import FastBodies
 from solvers.fluid.grid import DistributedGrid, Grid
@@ -75,8 +78,6 @@ class Fluid:
         self.velocity_mask[self.unknowns.velocity.dofs] = True
         self.history = History(settings.scheme, self.unknowns.local)
         self._smallest = min(float(np.diff(edge).min()) for edge in grid.edges)
-        #: the equations of elastic bodies are solved together with these, and bound the pressure in closed pockets
-        self.solved_with_bodies = False
         self._motions: list[Motion] = []
         self._wet = wetness([body.surface for body in self.bodies])
         self._fast_bodies = FastBodies(grid)
@@ -93,6 +94,20 @@ class Fluid:
     def dofs(self) -> int:
         """Unknowns on all processes, inactive ones included."""
         return self.unknowns.size()
+
+    @property
+    def size(self) -> int:
+        """Unknowns that this process owns."""
+        return self.unknowns.owned
+
+    @property
+    def steady(self) -> bool:
+        """Each step is a flow at rest of its own."""
+        return self.settings.steady
+
+    @property
+    def linear_tolerance(self) -> float:
+        return self.solver.linear_tolerance
 
     @property
     def started(self) -> bool:
@@ -169,10 +184,11 @@ class Fluid:
         growth = self.dt / self.history.steps[-1]
         self.flow[continued] += growth * (old.velocity - older.velocity)[continued]
 
-    def move(self, coupled: Mapping[str, Motion]) -> None:
+    def move(self, coupled: Mapping[str, Motion], *, with_solid: bool = False) -> None:
         """Cut the grid by the surfaces where they are now: `coupled` bodies by name, all others as prescribed.
 
-        Raises StepFailed if they ran out of the strip.
+        with_solid: their equations are solved with these, and bound the pressure in closed pockets. Raises StepFailed
+        if surfaces ran out of the strip.
         """
         motions = [coupled[b.surface.name] if b.motion is None else b.motion(self._t) for b in self.bodies]
         self._motions, self._fresh = motions, True
@@ -188,7 +204,7 @@ class Fluid:
             prescribed = self.boundary.dofs[self.boundary.dofs < self.unknowns.owned]
             self.held[prescribed] = True
             self.held |= ~self.system.active_dofs[: self.unknowns.owned]
-            self._hold_pressure()
+            self._hold_pressure(known_by_bodies=with_solid and not self.settings.steady)
 
     def _layers(self, motion: Motion) -> int:
         """Cells behind the surface that the next two steps may uncover."""
@@ -218,10 +234,9 @@ class Fluid:
             if self.comm.allreduce(bool(at_end), op=MPI.LOR):
                 raise StepFailed(self.name, f"a body reaches the periodic faces {'xyz'[axis]}- and {'xyz'[axis]}+")
 
-    def _hold_pressure(self) -> None:
-        elastic = np.concatenate([np.full(b.surface.vertices, b.motion is None) for b in self.bodies] + [[]]) > 0.0
-        known = self.solved_with_bodies and not self.settings.steady
-        self._holds = hold_pressure(self.system, elastic, known_by_bodies=known)
+    def _hold_pressure(self, *, known_by_bodies: bool) -> None:
+        elastic = np.concatenate([np.full(b.surface.vertices, b.deforms) for b in self.bodies] + [[]]) > 0.0
+        self._holds = hold_pressure(self.system, elastic, known_by_bodies=known_by_bodies)
         #: a body that another field moves could know the pressure that is held here
         self.level_unknown = any(hold.elastic for hold in self._holds)
         for hold in self._holds:
@@ -275,7 +290,7 @@ class Fluid:
         """One Newton step; the increment relative to the solution."""
         matrix, self._tangent = self._tangent or self.linearise(), None
         b, x = matrix.createVecs()
-        b.array[:] = -self.residual_rows
+        b.array[:] = self.right_side()
         try:
             with self.timer("solve"):
                 self._solve(matrix, b, x)
@@ -288,12 +303,17 @@ class Fluid:
         with self.timer("assembly"):
             matrix = self.system.tangent(self.held, picard=self._far())
         self._diagonal = np.abs(matrix.getDiagonal().array)
-        self.rounding = self.rounding_of(matrix, self.flow[: self.unknowns.owned])
+        # entries are sums over the 2^dim cells at a node, which may cancel
+        self.rounding = 2.0**self.dim * rounding_error(matrix, self.rounded())
         return matrix
 
-    def rounding_of(self, matrix: PETSc.Mat, values: Array) -> Array:
-        """Rounding error of the rows A x; entries are sums over the 2^dim cells at a node, which may cancel."""
-        return 2.0**self.dim * rounding_error(matrix, values)
+    def right_side(self) -> Array:
+        """What an increment of the owned dofs has to make up for."""
+        return -self.residual_rows
+
+    def rounded(self) -> Array:
+        """What is rounded: velocity [m/s] and pressure [Pa] at owned dofs."""
+        return self.flow[: self.unknowns.owned]
 
     def update(self, increment: Array) -> float:
         """Add an increment of the owned dofs; its size relative to the flow."""
@@ -370,6 +390,19 @@ class Fluid:
         total = self.system.surface_force()
         starts = offsets([body.surface for body in self.bodies])
         return {body.surface.name: total[a:b] for body, a, b in zip(self.bodies, starts, starts[1:], strict=False)}
+
+    def interface_entries(self, surfaces: Sequence[str]) -> InterfaceEntries:
+        """Derivatives of rows and force by the motion of some bodies (collective)."""
+        operator, held, vertices = self.system.interface, self.held_everywhere(), self.vertices_of(surfaces)
+        return interface_entries(operator, self.unknowns, self.flow, self.difference.alpha, held, vertices)
+
+    def balances(self) -> tuple[Array, float]:
+        """(force [N] on all bodies by momentum, shape (dim,); power [W] that the method takes) (collective)."""
+        return self._balances(self.held)
+
+    @cached_property
+    def _balances(self) -> Balances:
+        return Balances(self.system)
 
     # ---------------------------------------------------------------------------------------- save and restore
 

@@ -19,6 +19,7 @@ class ImmersedBody:
     surface: Surface
     motion: Callable[[float], Motion] | None
     rests: bool = False  #: it never moves
+    deforms: bool = False  #: its volume may change
 
 
 def rigid_body(

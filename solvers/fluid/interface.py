@@ -34,7 +34,7 @@ class Interface:
         pieces = cut.pieces
         mine = cut.cut[pieces.cell] < grid.owned
         cells = cut.cut[pieces.cell[mine]]
-        self.mu, self.dim, self._unknowns, self._vertices = mu, grid.dim, unknowns, len(cut.motion.x)
+        self.mu, self.dim, self._unknowns, self.vertices = mu, grid.dim, unknowns, len(cut.motion.x)
         moments = pieces.moments[mine][:, rule.order]
         self.n, self.penalty, self.mass_of_pieces = pieces.normal[mine], penalty[mine], pieces.mass[mine]
         self.corners = cut.facets[pieces.facet[mine]]
@@ -71,7 +71,7 @@ class Interface:
         force += np.einsum("pav,pa->pv", self.psi, p)[:, :, None] * n[:, None, :]
         slip = np.einsum("pav,pai->pvi", self.phi, u) - np.einsum("pvw,pwi->pvi", self.mass_of_pieces, g[self.corners])
         force += np.einsum("pij,pvj->pvi", self.penalty, slip)
-        total = np.zeros((self._vertices, n.shape[1]))
+        total = np.zeros((self.vertices, n.shape[1]))
         np.add.at(total, self.corners, force)
         return total
 

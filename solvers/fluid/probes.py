@@ -152,7 +152,7 @@ def mass_balance(fluid: Fluid) -> Callable[[], dict[str, float]]:
         swept = cut.pieces.moments[mine].sum(axis=1)
         g, n = cut.motion.v[cut.facets[cut.pieces.facet[mine]]], cut.pieces.normal[mine]
         into_bodies = fluid.comm.allreduce(float(np.einsum("pv,pvi,pi->", swept, g, n)))
-        passing = {"fluid.leak": leak(fluid)} if fluid.bodies else {}
+        passing = {"fluid.leak": leak(fluid.system)} if fluid.bodies else {}
         return {"fluid.mass": rate(everywhere) + into_bodies, **passing}
 
     return balance

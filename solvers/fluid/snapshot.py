@@ -54,7 +54,7 @@ def _corners(fluid: Fluid, degree: int) -> np.ndarray:
 def _bodies(fluid: Fluid) -> list[Snapshot]:
     """Rigid surfaces with their velocity and the fluid's force per area on them (zero before the first step).
 
-    A body that another field moves is that field's to show.
+    An elastic body is the structure's to show.
     """
     found, start = [], 0
     forces = fluid.force() if fluid.bodies and fluid.started else {}
@@ -62,7 +62,7 @@ def _bodies(fluid: Fluid) -> list[Snapshot]:
         surface, dim = body.surface, fluid.dim
         part = slice(start, start + surface.vertices)
         start = part.stop
-        if body.motion is None:
+        if body.deforms:
             continue
         x, v = fluid.cut.motion.x[part], fluid.cut.motion.v[part]
         force = forces.get(surface.name, np.zeros_like(x))

@@ -17,7 +17,7 @@ from solvers.constraint import Constraint
 from solvers.distributed import Nodal
 from solvers.newton import converge
 from solvers.rounding import rounding_error
-from solvers.rows import Numbering, TakenRows, gather, gather_at, transform_rows
+from solvers.rows import RowTransformation, TakenRows, gather, gather_at, transform_rows
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body
 from solvers.structure.energy import EnergyBalance
@@ -85,7 +85,6 @@ class Structure:
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is there already
         self._tangents = [body.create_tangent() for body in bodies]
         self._combined: PETSc.Mat | None = None
-        self._taken: TakenRows
         self._b, self._x = self.layout.vector(), self.layout.vector()
         self._method = linear.choose(settings.linear, self.dim, self.dofs())
         # the tangent of a follower pressure has an unsymmetric boundary term
@@ -274,18 +273,22 @@ class Structure:
     def advance(self) -> float:
         """One Newton step; returns |du| / |u|."""
         matrix, self._tangent = self._tangent or self.linearise(), None
-        self._b.array[:] = -self.residual_force
-        if self.constrained:
-            matrix = self.condense(matrix, self._b)
+        self._b.array[:] = self.right_side()
+        change, taken = self.row_transformation(), None
+        if change is not None:
+            with self.timer("contact"):
+                matrix, taken = transform_rows(matrix, self._b, change)
         self._x.array[:] = self.missing_displacement()
         matrix = self.held.impose(matrix, self._x, self._b)
         if self._method == "iterative":
             attach_rigid_modes(matrix, self.bodies, self.now.u)
         try:
             with self.timer("solve"):
-                linear.solve(self._constrained_ksp if self.constrained else self._ksp, matrix, self._b, self._x)
+                linear.solve(self._ksp if change is None else self._constrained_ksp, matrix, self._b, self._x)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
+        if taken is not None:
+            self.recover(taken, gather(self.comm, self._x.array))
         return self.update(self._x.array)
 
     def linearise(self) -> PETSc.Mat:
@@ -303,46 +306,38 @@ class Structure:
             part += body.cell_size
         return size
 
-    @property
-    def constrained(self) -> bool:
-        """Some constraint of contact may be active at the present iterate."""
-        return self.constraint is not None and self.constraint.near
-
     def missing_displacement(self) -> Array:
         """What the supports still ask of owned dofs [m], zero at free ones."""
         return self._target - self.held.part(self.now.u)
 
-    def update(self, increment: Array, everything: Array | None = None) -> float:
-        """Add an increment of the owned dofs; returns |du| / |u|.
+    def right_side(self) -> Array:
+        """What an increment has to make up for [N], without the new contact force where contact may be."""
+        if self.constraint is None or not self.constraint.near:
+            return -self.residual_force
+        return -(self.residual_force + self.time.force_weight * self.now.constraint)
 
-        `everything`: the increment of all unknowns that the constraint was condensed with, if there are others.
-        """
+    def row_transformation(self) -> RowTransformation | None:
+        """What takes the multipliers of contact out of the tangent's rows and `right_side`; None if nothing is near."""
+        if self.constraint is None or not self.constraint.near:
+            return None
+        with self.timer("contact"):
+            return self.constraint.condense(self.time.force_weight)
+
+    def recover(self, taken: TakenRows, du: Array) -> None:
+        """The multipliers of contact, from rows as they were and the increment of all unknowns of the system."""
+        assert self.constraint is not None
+        with self.timer("contact"):
+            dofs = self.constraint.dofs().ravel()
+            at_nodes = np.where(dofs >= 0, du[np.maximum(dofs, 0)], 0.0)
+            self.constraint.recover(taken.balance(du, len(dofs)), at_nodes)
+
+    def update(self, increment: Array) -> float:
+        """Add an increment of the owned dofs; returns |du| / |u|."""
         self._increment = increment.copy()
-        if self.constraint is not None and self.constrained:
-            with self.timer("contact"):
-                self._recover(gather(self.comm, self._increment) if everything is None else everything)
         self.now.u += self._increment
         self.now.u = self.held.free_part(self.now.u) + self._target
         size = self.norm(self.now.u)
         return self.norm(self._increment) / size if size > 0.0 else 0.0
-
-    def _recover(self, du: Array) -> None:
-        assert self.constraint is not None
-        dofs = self.constraint.dofs().ravel()
-        at_nodes = np.where(dofs >= 0, du[np.maximum(dofs, 0)], 0.0)
-        self.constraint.recover(self._taken.balance(du, len(dofs)), at_nodes)
-
-    def condense(self, matrix: PETSc.Mat, right: PETSc.Vec, numbering: Numbering | None = None) -> PETSc.Mat:
-        """The linear system without the multipliers of the constraint; `right` changes in place.
-
-        `numbering` places the structure's dofs in a system that has more unknowns.
-        """
-        assert self.constraint is not None
-        weight = self.time.force_weight
-        right.array[: self.layout.size] = -(self.residual_force + weight * self.now.constraint)
-        with self.timer("contact"):
-            matrix, self._taken = transform_rows(matrix, right, self.constraint.condense(weight), numbering)
-        return matrix
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""

@@ -1,0 +1,163 @@
+"""Elastic bodies as the solid of a coupled system: a structure with the surfaces that the fluid touches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from coupling.predict import Predictor
+from coupling.wetted import WettedSurface
+from solvers.api import Array, State, StepInfo
+from solvers.rows import RowTransformation, TakenRows, gather_at
+from solvers.structure.field import Structure
+from solvers.vertices import VertexJacobian
+
+
+class Elastic:
+    """A `Solid`. Each dof of a vertex is an unknown of the structure."""
+
+    def __init__(self, structure: Structure, surfaces: Sequence[WettedSurface]):
+        self.structure = structure
+        self.surfaces = {surface.name: surface.points for surface in surfaces}
+        self.dofs = np.concatenate([surface.dofs for surface in surfaces])  #: global ones, shape (n, dim)
+        self.predictor = Predictor()
+        self.name, self.comm, self.size = structure.name, structure.comm, structure.layout.size
+
+    @property
+    def force_weight(self) -> float:
+        return self.structure.time.force_weight
+
+    # ------------------------------------------------------------------------------------------------- steps
+
+    def initialise(self, t: float, dt: float) -> None:
+        self.structure.initialise(t, dt)
+
+    def begin_step(self, t: float, dt: float) -> None:
+        self.structure.begin_step(t, dt)
+        self.predictor.add(t, self.structure.old.u)
+
+    def predict(self, t: float) -> None:
+        """Displacements on a parabola, unless the structure has a predictor of its own."""
+        held, now = self.structure.held, self.structure.now
+        own_predictor = not np.array_equal(held.free_part(now.u), held.free_part(self.structure.old.u))
+        if not self.comm.allreduce(own_predictor, op=MPI.LOR):
+            now.u[:] = held.part(now.u) + held.free_part(self.predictor.at(t))
+
+    def solve(self) -> StepInfo:
+        return self.structure.solve()
+
+    def check(self, info: StepInfo) -> None:
+        self.structure.check_deformation(info.iterations, info.residuals)
+
+    def end_step(self) -> None:
+        self.structure.end_step()
+
+    # ---------------------------------------------------------------------------------------------- the surface
+
+    def displacement(self) -> Array:
+        return self._gather(self.structure.now.u)
+
+    def jacobian(self) -> VertexJacobian:
+        columns = self.dofs.reshape(-1, 1)
+        return VertexJacobian(columns, np.ones(columns.shape))
+
+    def load(self, force: Array) -> None:
+        self.structure.load(self.spread(force))
+
+    def spread(self, force: Array) -> Array:
+        """Forces [N] on vertices as owned dofs of the structure."""
+        local = self.dofs - self.structure.layout.start
+        mine = (local >= 0) & (local < self.size)
+        total = np.zeros(self.size)
+        np.add.at(total, local[mine], force[mine])
+        return total
+
+    def reduced(self, force: Array) -> Array:
+        return force.ravel()
+
+    def taken(self) -> Array:
+        return self._gather(self.structure.averaged_load()).ravel()
+
+    def taken_at_start(self) -> Array:
+        return self._gather(self.structure.load_at_start()).ravel()
+
+    def moved(self) -> Array:
+        return self._gather(self.structure.now.u - self.structure.old.u).ravel()
+
+    def _gather(self, owned: Array) -> Array:
+        """Values at the vertices from those at owned dofs of the structure, shape (n, dim)."""
+        return gather_at(self.comm, owned, self.structure.layout.start, self.dofs)
+
+    # ------------------------------------------------------------------------------------- rows of a larger system
+
+    def residual(self) -> float:
+        return self.structure.residual()
+
+    def linearise(self) -> PETSc.Mat:
+        return self.structure.linearise()
+
+    def right_side(self) -> Array:
+        return self.structure.right_side()
+
+    def advance(self) -> float:
+        return self.structure.advance()
+
+    def update(self, increment: Array) -> float:
+        return self.structure.update(increment)
+
+    def retreat(self, fraction: float) -> None:
+        self.structure.retreat(fraction)
+
+    def settled(self) -> bool:
+        return self.structure.settled()
+
+    def round_off(self) -> float:
+        return self.structure.round_off()
+
+    def rounded(self) -> Array:
+        return self.structure.rounded()
+
+    def add_rounding(self, error: Array) -> None:
+        self.structure.add_rounding(error)
+
+    def worst(self) -> tuple[float, ...] | None:
+        return self.structure.worst()
+
+    def row_transformation(self) -> RowTransformation | None:
+        return self.structure.row_transformation()
+
+    def recover(self, taken: TakenRows, du: Array) -> None:
+        self.structure.recover(taken, du)
+
+    def missing(self) -> Array:
+        return self.structure.missing_displacement()
+
+    def impose_rows(self, blocks: Sequence[PETSc.Mat], x: Array, b: Array) -> list[PETSc.Mat]:
+        return self.structure.held.impose_rows(blocks, x, b)
+
+    # ------------------------------------------------------------------------------------------- results and state
+
+    def touching(self) -> NDArray[np.bool_] | None:
+        contact = self.structure.constraint
+        return None if contact is None else contact.active()
+
+    def numbers(self) -> dict[str, float]:
+        contact = self.structure.constraint
+        return {} if contact is None else contact.numbers()
+
+    def save(self) -> State:
+        """The predictor has three displacements at all times, so that all states have the same parts."""
+        displacements = [*self.predictor.displacements, *[self.structure.now.u] * 3][:3]
+        by_name: State = {str(i): self.structure.per_body(u) for i, u in enumerate(displacements)}
+        return self.structure.save() | {"predictor": by_name | {"times": list(self.predictor.times)}}
+
+    def restore(self, state: State) -> None:
+        self.structure.restore(state)
+        saved, self.predictor.times = state["predictor"], list(state["predictor"]["times"])
+        self.predictor.displacements = [
+            self.structure.from_bodies(saved[str(i)]) for i in range(len(self.predictor.times))
+        ]
