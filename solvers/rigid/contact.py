@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from solvers.api import Array
 from solvers.rows import RowTransformation
@@ -188,6 +187,8 @@ def pressures(K: Array, G: Array, f: Array) -> Array:
 
 def least_distance(E: Array, f: Array) -> Array:
     """z >= 0 of the shortest y = E^T z with E y >= f, shapes (m, n), (m,); few of them are not zero."""
+    from scipy.optimize import nnls  # a fifth of a second, which runs without contact do not need
+
     system = np.vstack([E.T, f])
     target = np.zeros(len(system))
     target[-1] = 1.0
