@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array
+from solvers.sparse import Sparse, sparse, sparse_from_entries, stack
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,9 @@ class RowTransformation:
     """
 
     dofs: NDArray[np.int64]  #: global dof of each of the n, -1 where it is no unknown
-    rows: sp.csr_matrix  #: L, shape (n, n)
-    stiffness: sp.csr_matrix  #: S, shape (n, n)
-    added: sp.csr_matrix  #: A, shape (n, n)
+    rows: Sparse  #: L, shape (n, n)
+    stiffness: Sparse  #: S, shape (n, n)
+    added: Sparse  #: A, shape (n, n)
     right: Array  #: c, shape (n,)
     replaced: NDArray[np.bool_]  #: whose rows are not what they were with something added, shape (n,)
 
@@ -33,7 +33,7 @@ class TakenRows:
     """Rows of J and b as they were before the transformation, where they are needed again."""
 
     at: NDArray[np.int64]  #: which of the n dofs
-    rows: sp.csr_matrix  #: columns are all unknowns
+    rows: Sparse  #: columns are all unknowns
     right: Array
 
     def balance(self, du: Array, n: int) -> Array:
@@ -48,10 +48,10 @@ class RowChanges:
     """Rows of a linear system to replace and to add to, the same on every process; columns are all unknowns."""
 
     replaced: NDArray[np.int64]  #: global rows to replace, each once
-    replaced_rows: sp.csr_matrix
+    replaced_rows: Sparse
     replaced_right: Array
     added: NDArray[np.int64]  #: global rows to add to, each once
-    added_rows: sp.csr_matrix
+    added_rows: Sparse
     added_right: Array
 
 
@@ -64,14 +64,16 @@ def transform_rows(
     """
     comm, (start, end) = matrix.comm.tompi4py(), matrix.getOwnershipRange()
     unknowns, dofs = matrix.size[1], change.dofs
-    at = np.flatnonzero(change.replaced)
-    J = fetch_rows(matrix, dofs[at]) if numbering is None else numbering.fetch_rows(matrix, dofs[at])
+    at, own = np.flatnonzero(change.replaced), owned_rows(matrix)
+    J = _on_all(comm, own, start, dofs[at])
+    J = J if numbering is None else numbering.as_unknowns(J)
     taken = TakenRows(at, J, gather_at(comm, b.array[: end - start], start, dofs[at]))
 
     others = np.flatnonzero(~change.replaced & (dofs >= 0))
-    stiffness, added = (place_columns(part, dofs, unknowns) for part in (change.stiffness, change.added))
+    stiffness, added = (part.with_columns(dofs, unknowns) for part in (change.stiffness, change.added))
     J = J + stiffness[at]
-    rows, right = change.rows[:, at], change.right + change.rows[:, at] @ taken.right
+    rows = change.rows.columns(at)
+    right = change.right + rows @ taken.right
     total = rows @ J + added
     changes = RowChanges(
         replaced=dofs[at],
@@ -81,70 +83,52 @@ def transform_rows(
         added_rows=(total + stiffness)[others],
         added_right=right[others],
     )
-    return change_rows(matrix, b, changes if numbering is None else numbering.place(changes)), taken
+    return change_rows(matrix, own, b, changes if numbering is None else numbering.place(changes)), taken
 
 
-def place_columns(matrix: sp.csr_matrix, columns: NDArray[np.int64], unknowns: int) -> sp.csr_matrix:
-    """Columns to their place among the unknowns; columns that are no unknowns (-1) drop out."""
-    entries = matrix.tocoo()
-    target = columns[entries.col]
-    keep = target >= 0
-    return sp.csr_matrix((entries.data[keep], (entries.row[keep], target[keep])), shape=(matrix.shape[0], unknowns))
-
-
-def fetch_rows(matrix: PETSc.Mat, rows: NDArray[np.int64]) -> sp.csr_matrix:
-    """Whole rows of a distributed matrix on every process, shape (len(rows), unknowns). Collective."""
-    comm, unknowns = matrix.comm.tompi4py(), matrix.size[1]
-    start, end = matrix.getOwnershipRange()
-    if comm.size == 1:
-        indptr, indices, data = matrix.getValuesCSR()
-        return sp.csr_matrix((data, indices, indptr), shape=matrix.size)[rows]
-    wanted = rows[(rows >= start) & (rows < end)] - start
+def owned_rows(matrix: PETSc.Mat) -> Sparse:
+    """A copy of the rows of this process, columns in order: those of several blocks need not be."""
     indptr, indices, data = matrix.getValuesCSR()
-    owned = sp.csr_matrix((data, indices, indptr), shape=(end - start, unknowns))[wanted]
-    parts = comm.allgather((wanted + start, owned))
+    return sparse((data, indices, indptr), (len(indptr) - 1, matrix.size[1])).ordered()
+
+
+def _on_all(comm: MPI.Comm, own: Sparse, start: int, rows: NDArray[np.int64]) -> Sparse:
+    """Rows of a distributed matrix on every process, shape (len(rows), unknowns). Collective."""
+    if comm.size == 1:
+        return own[rows]
+    wanted = rows[(rows >= start) & (rows < start + own.shape[0])]
+    parts = comm.allgather((wanted, own[wanted - start]))
     order = np.argsort(np.concatenate([numbers for numbers, _ in parts]))
-    found = sp.vstack([part for _, part in parts], format="csr")[order]
-    return found[np.argsort(np.argsort(rows))]
+    return stack([part for _, part in parts])[order][np.argsort(np.argsort(rows))]
 
 
-def change_rows(matrix: PETSc.Mat, b: PETSc.Vec, changes: RowChanges) -> PETSc.Mat:
-    """The changed matrix; `b` is changed in place and `matrix` is used up. Collective."""
+def change_rows(matrix: PETSc.Mat, own: Sparse, b: PETSc.Vec, changes: RowChanges) -> PETSc.Mat:
+    """The changed matrix; `own`: a copy of this process' rows, used up. b changes in place. Collective."""
     start, end = matrix.getOwnershipRange()
 
     def owned(rows: NDArray[np.int64]) -> NDArray[np.bool_]:
         return (rows >= start) & (rows < end)
 
     replace, add = owned(changes.replaced), owned(changes.added)
-    place = np.concatenate([changes.replaced[replace], changes.added[add]]) - start
-    values = sp.vstack([changes.replaced_rows[replace], changes.added_rows[add]], format="csr")
-    into = sp.csr_matrix((np.ones(len(place)), (place, np.arange(len(place)))), shape=(end - start, len(place)))
-    local = (into @ values).tocsr()
-    if matrix.comm.size == 1:
-        changed = _change_local(matrix, changes.replaced, local)
-    else:
-        matrix.zeroRows(changes.replaced[replace].astype(PETSc.IntType), 0.0)
-        changed = PETSc.Mat().createAIJ(
-            (matrix.getSizes()[0], matrix.getSizes()[1]),
-            csr=(local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data),
-            comm=matrix.comm,
-        )
-        changed.axpy(1.0, matrix, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    replaced, added = changes.replaced[replace] - start, changes.added[add] - start
+    new = stack([changes.replaced_rows[replace], changes.added_rows[add]])
+    for row in replaced:
+        own.data[own.indptr[row] : own.indptr[row + 1]] = 0.0
+    total = own + new.with_rows(np.concatenate([replaced, added]), end - start).ordered()
     right = b.array
-    right[changes.replaced[replace] - start] = changes.replaced_right[replace]
-    right[changes.added[add] - start] += changes.added_right[add]
-    return changed
+    right[replaced] = changes.replaced_right[replace]
+    right[added] += changes.added_right[add]
+    return distributed(total, matrix.getSizes(), matrix.comm)
 
 
-def _change_local(matrix: PETSc.Mat, replaced: NDArray[np.int64], local: sp.csr_matrix) -> PETSc.Mat:
-    indptr, indices, data = matrix.getValuesCSR()
-    keep = np.ones(local.shape[0], dtype=bool)
-    keep[replaced] = False
-    data = data * np.repeat(keep, np.diff(indptr))
-    total = sp.csr_matrix((data, indices, indptr), shape=local.shape) + local
-    total.sort_indices()
-    csr = (total.indptr.astype(PETSc.IntType), total.indices.astype(PETSc.IntType), total.data)
-    return PETSc.Mat().createAIJ(total.shape, csr=csr, comm=matrix.comm)
+def distributed(own: Sparse, sizes, comm) -> PETSc.Mat:
+    """A matrix from the rows of each process; on one process it uses their arrays. Collective."""
+    indptr, indices = (part.astype(PETSc.IntType, copy=False) for part in (own.indptr, own.indices))
+    if comm.size == 1:
+        matrix = PETSc.Mat().createAIJWithArrays(sizes, (indptr, indices, own.data), comm=comm)
+        matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)  # a held dof may get a diagonal entry
+        return matrix
+    return PETSc.Mat().createAIJ(sizes, csr=(indptr, indices, own.data), comm=comm)
 
 
 def from_entries(
@@ -161,9 +145,8 @@ def from_entries(
         )
         mine = (rows >= start) & (rows < end)
         rows, columns, data = rows[mine], columns[mine], data[mine]
-    local = sp.csr_matrix((data, (rows - start, columns)), shape=(owned[0], comm.allreduce(owned[1])))
-    csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
-    return PETSc.Mat().createAIJ(((owned[0], None), (owned[1], None)), csr=csr, comm=comm)
+    own = sparse_from_entries(rows - start, columns, data, (owned[0], comm.allreduce(owned[1])))
+    return distributed(own, ((owned[0], None), (owned[1], None)), comm)
 
 
 class Numbering:
@@ -186,17 +169,15 @@ class Numbering:
         self.first = PETSc.IS().createStride(first, start, 1, comm=comm)
         self.second = PETSc.IS().createStride(second, start + first, 1, comm=comm)
 
-    def fetch_rows(self, matrix: PETSc.Mat, rows: NDArray[np.int64]) -> sp.csr_matrix:
-        """Rows of a matrix with these columns, columns in the order of the unknowns (collective)."""
-        found = fetch_rows(matrix, rows).tocoo()
-        return sp.csr_matrix((found.data, (found.row, self._unknown[found.col])), shape=found.shape)
+    def as_unknowns(self, rows: Sparse) -> Sparse:
+        """Rows of a matrix with these columns, columns in the order of the unknowns."""
+        return rows.with_columns(self._unknown, rows.shape[1])
 
     def place(self, changes: RowChanges) -> RowChanges:
         """Changes by unknowns as changes of a matrix with these columns."""
 
-        def columns(rows: sp.csr_matrix) -> sp.csr_matrix:
-            entries = rows.tocoo()
-            return sp.csr_matrix((entries.data, (entries.row, self.placed[entries.col])), shape=rows.shape)
+        def columns(rows: Sparse) -> Sparse:
+            return rows.with_columns(self.placed, rows.shape[1])
 
         return replace(changes, replaced_rows=columns(changes.replaced_rows), added_rows=columns(changes.added_rows))
 

@@ -5,44 +5,31 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.sparse import Sparse, nothing, sparse_from_entries
 
 #: A sparse matrix and the numbers of its rows and columns in a larger one.
-Part = tuple[sp.csr_matrix, NDArray[np.int64], NDArray[np.int64]]
+Part = tuple[Sparse, NDArray[np.int64], NDArray[np.int64]]
 
 
-def expand(matrix: sp.csr_matrix, dim: int) -> sp.csr_matrix:
+def expand(matrix: Sparse, dim: int) -> Sparse:
     """matrix (x) I: the same for every component of a vector."""
-    matrix, axes = matrix.tocsr(), np.arange(dim)
-    rows, columns = (dim * at[:, None] + axes for at in (row_numbers(matrix), matrix.indices))
-    shape = dim * matrix.shape[0], dim * matrix.shape[1]
-    return sp.csr_matrix((matrix.data.repeat(dim), (rows.ravel(), columns.ravel())), shape=shape)
+    rows, columns = matrix.shape
+    repeated = matrix[np.repeat(np.arange(rows), dim)]
+    indices = dim * repeated.indices + repeated.row_numbers() % dim
+    return Sparse(repeated.data, indices, repeated.indptr, (dim * rows, dim * columns))
 
 
-def row_numbers(matrix: sp.csr_matrix) -> NDArray[np.int64]:
-    """The row of each entry."""
-    return np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
-
-
-def add_up(parts: Sequence[Part], shape: tuple[int, int]) -> sp.csr_matrix:
-    """The sum of matrices whose rows and columns have other numbers in it: (matrix, rows, columns) each.
-
-    All entries become one matrix at once: that of a small problem costs as much as all its numbers.
-    """
+def add_up(parts: Sequence[Part], shape: tuple[int, int]) -> Sparse:
+    """The sum of matrices whose rows and columns have other numbers in it: (matrix, rows, columns) each."""
     if not parts:
-        return sp.csr_matrix(shape)
+        return nothing(shape)
     data = np.concatenate([matrix.data for matrix, _, _ in parts])
-    rows = np.concatenate([rows[row_numbers(matrix)] for matrix, rows, _ in parts])
+    rows = np.concatenate([rows[matrix.row_numbers()] for matrix, rows, _ in parts])
     columns = np.concatenate([columns[matrix.indices] for matrix, _, columns in parts])
-    return sp.csr_matrix((data, (rows, columns)), shape=shape)
-
-
-def vstack(parts: Sequence[sp.csr_matrix]) -> sp.csr_matrix:
-    """Matrices one below the other."""
-    return parts[0] if len(parts) == 1 else sp.vstack(parts, format="csr")
+    return sparse_from_entries(rows, columns, data, shape)
 
 
 def components(items: NDArray[np.int64], dim: int) -> NDArray[np.int64]:
@@ -50,50 +37,53 @@ def components(items: NDArray[np.int64], dim: int) -> NDArray[np.int64]:
     return (dim * items[:, None] + np.arange(dim)).ravel()
 
 
-def block_diagonal(blocks: Array) -> sp.csr_matrix:
+def block_diagonal(blocks: Array) -> Sparse:
     """Blocks of shape (m, rows, columns) along the diagonal."""
     m, rows, columns = blocks.shape
-    return sp.bsr_matrix((blocks, np.arange(m), np.arange(m + 1)), shape=(m * rows, m * columns)).tocsr()
+    place = np.arange(m * columns, dtype=np.int32).reshape(m, 1, columns)
+    indptr = np.arange(0, m * rows * columns + 1, columns, dtype=np.int32)
+    return Sparse(blocks.ravel(), np.broadcast_to(place, blocks.shape).ravel(), indptr, (m * rows, m * columns))
 
 
-def scale_rows(matrix: sp.csr_matrix, factors: Array) -> sp.csr_matrix:
-    """The rows times factors, shape (rows,)."""
-    data = matrix.data * factors.repeat(np.diff(matrix.indptr))
-    return sp.csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
-
-
-def block_columns(vectors: Array) -> sp.csr_matrix:
-    """Vectors of shape (m, dim) as columns, one after and below the other, shape (dim * m, m)."""
-    return block_diagonal(vectors[:, :, None])
-
-
-def inverse(matrix: sp.csr_matrix) -> sp.csr_matrix:
+def inverse(matrix: Sparse) -> Sparse:
     """The inverse of a matrix that is block diagonal up to the order of its rows and columns.
 
     Coupled unknowns are found as connected parts of its graph; each part is inverted densely.
     """
     n = matrix.shape[0]
-    if n == 0:
-        return sp.csr_matrix((0, 0))
-    _, part = sp.csgraph.connected_components(matrix, directed=False)
+    row, column = matrix.row_numbers(), matrix.indices
+    part = _connected(row, column, n)
     order = np.argsort(part, kind="stable")
-    sizes = np.bincount(part)
-    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    entries = matrix[order][:, order].tocoo()
-    of_part = np.repeat(np.arange(len(sizes)), sizes)
+    sizes = np.bincount(part, minlength=n)
+    starts = np.cumsum(sizes) - sizes
+    at = np.empty(n, dtype=np.int64)  # place within the part
+    at[order] = np.arange(n) - starts[part[order]]
     rows, columns, data = [], [], []
-    for size in np.unique(sizes):
+    for size in np.unique(sizes[sizes > 0]):
         chosen = np.flatnonzero(sizes == size)
-        place = np.full(len(sizes), -1)
-        place[chosen] = np.arange(len(chosen))
-        mine = place[of_part[entries.row]] >= 0
-        row, column = entries.row[mine], entries.col[mine]
-        block = place[of_part[row]]
+        block = np.full(n, -1)
+        block[chosen] = np.arange(len(chosen))
+        mine = block[part[row]] >= 0
         dense = np.zeros((len(chosen), size, size))
-        np.add.at(dense, (block, row - starts[of_part[row]], column - starts[of_part[column]]), entries.data[mine])
-        places = starts[chosen][:, None] + np.arange(size)
-        rows.append(np.repeat(places, size, axis=1).ravel())
-        columns.append(np.tile(places, (1, size)).ravel())
+        dense[block[part[row[mine]]], at[row[mine]], at[column[mine]]] = matrix.data[mine]
+        members = order[starts[chosen][:, None] + np.arange(size)]
+        rows.append(np.repeat(members, size, axis=1).ravel())
+        columns.append(np.tile(members, (1, size)).ravel())
         data.append(np.linalg.inv(dense).ravel())
-    found = (np.concatenate(data), (order[np.concatenate(rows)], order[np.concatenate(columns)]))
-    return sp.csr_matrix(found, shape=(n, n))
+    if not data:
+        return nothing((0, 0))
+    return sparse_from_entries(np.concatenate(rows), np.concatenate(columns), np.concatenate(data), (n, n))
+
+
+def _connected(row: NDArray[np.int32], column: NDArray[np.int32], n: int) -> NDArray[np.int64]:
+    """The smallest number of all that each of n unknowns is connected with, itself included."""
+    part = np.arange(n)
+    across = row != column
+    row, column = row[across], column[across]
+    while True:
+        least, before = np.minimum(part[row], part[column]), part.copy()
+        np.minimum.at(part, row, least)
+        np.minimum.at(part, column, least)
+        part = part[part]
+        if (part == before).all():
+            return part

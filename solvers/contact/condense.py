@@ -27,10 +27,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from solvers.api import Array
 from solvers.contact.blocks import inverse
+from solvers.sparse import Sparse, diagonal
 
 #: Entries of L below this are rounding of 1 - 1.
 ROUNDING = 1e-13
@@ -41,26 +41,26 @@ class Linearised:
     """What m multipliers with K degrees of freedom add to a Newton step; n = dim * N interface dofs."""
 
     weight: float  #: w
-    force: sp.csr_matrix  #: F, shape (n, dim * m)
-    dforce: sp.csr_matrix  #: derivative of the contact force at fixed z, shape (n, n)
-    basis: sp.csr_matrix  #: P, shape (dim * m, K)
-    turning: sp.csr_matrix  #: Z, shape (dim * m, n)
-    felt: sp.csr_matrix  #: Q, shape (n, K)
-    by_multiplier: sp.csr_matrix  #: G, shape (K, K)
-    by_displacement: sp.csr_matrix  #: H, shape (K, n)
+    force: Sparse  #: F, shape (n, dim * m)
+    dforce: Sparse  #: derivative of the contact force at fixed z, shape (n, n)
+    basis: Sparse  #: P, shape (dim * m, K)
+    turning: Sparse  #: Z, shape (dim * m, n)
+    felt: Sparse  #: Q, shape (n, K)
+    by_multiplier: Sparse  #: G, shape (K, K)
+    by_displacement: Sparse  #: H, shape (K, n)
     residual: Array  #: r, shape (K,)
-    transformation: sp.csr_matrix | None = None  #: of the rows to the basis that multipliers are dual to, shape (n, n)
+    transformation: Sparse | None = None  #: of the rows to the basis that multipliers are dual to, shape (n, n)
 
 
 @dataclass(frozen=True)
 class Condensed:
     """The transformation of the rows and what it takes to get the multipliers back."""
 
-    rows: sp.csr_matrix  #: L, shape (n, n)
-    stiffness: sp.csr_matrix  #: of contact, to be added to J first, shape (n, n)
-    added: sp.csr_matrix  #: Q H, shape (n, n)
+    rows: Sparse  #: L, shape (n, n)
+    stiffness: Sparse  #: of contact, to be added to J first, shape (n, n)
+    added: Sparse  #: Q H, shape (n, n)
     right: Array  #: - Q r, shape (n,)
-    inverse: sp.csr_matrix  #: B^-1 Q^T / w, shape (K, n)
+    inverse: Sparse  #: B^-1 Q^T / w, shape (K, n)
 
 
 def condense(terms: Linearised) -> Condensed:
@@ -68,17 +68,15 @@ def condense(terms: Linearised) -> Condensed:
     Q, FP, to_basis = terms.felt, terms.force @ terms.basis, terms.transformation
     if to_basis is not None:
         FP = to_basis.T @ FP
-    inverted = inverse((Q.T @ FP).tocsr()) @ Q.T
-    law = Q @ terms.by_multiplier / terms.weight
-    rows = (sp.identity(Q.shape[0]) - (FP - law) @ inverted).tocsr()
-    rows.data[np.abs(rows.data) < ROUNDING] = 0.0
-    rows.eliminate_zeros()
+    inverted = inverse(Q.T @ FP) @ Q.T
+    law = Q @ (terms.by_multiplier * (1.0 / terms.weight))
+    rows = (diagonal(np.ones(Q.shape[0])) - (FP - law) @ inverted).without_small(ROUNDING)
     return Condensed(
-        rows=rows if to_basis is None else (rows @ to_basis.T).tocsr(),
-        stiffness=(-terms.weight * (terms.dforce + terms.force @ terms.turning)).tocsr(),
-        added=(Q @ terms.by_displacement).tocsr(),
+        rows=rows if to_basis is None else rows @ to_basis.T,
+        stiffness=-terms.weight * (terms.dforce + terms.force @ terms.turning),
+        added=Q @ terms.by_displacement,
         right=-(Q @ terms.residual),
-        inverse=((inverted if to_basis is None else inverted @ to_basis.T) / terms.weight).tocsr(),
+        inverse=(inverted if to_basis is None else inverted @ to_basis.T) * (1.0 / terms.weight),
     )
 
 

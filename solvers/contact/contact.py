@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.sparse as sp
 from mpi4py import MPI
 from numpy.typing import NDArray
 
@@ -28,6 +27,7 @@ from solvers.contact.slip import Sliding, Slip
 from solvers.contact.terms import Terms, find_normals, total_terms
 from solvers.contact.ties import Ties
 from solvers.rows import RowTransformation
+from solvers.sparse import Sparse, nothing, sparse_from_entries
 
 #: Gap, as a share of the extent of all surfaces, up to which nodes without pressure touch: rounding of positions.
 TOUCHING = 1e-12
@@ -76,7 +76,7 @@ class Contact:
         self._blocked = np.zeros(count, dtype=bool)
         facets = [patch.multipliers[patch.facets] for patch in self.multipliers.patches]
         self._redistribution = Redistribution(facets, count)
-        self._shared: sp.csr_matrix | None = None  # redistribution at the latest evaluation
+        self._shared: Sparse | None = None  # redistribution at the latest evaluation
         self._shares = Shares(comm)
         laws = [(mortar, self.interface.law_of(mortar.patch)) for mortar in self.interface.mortars]
         self._mortars = [mortar for mortar, law in laws if not isinstance(law, Tied)]
@@ -228,14 +228,14 @@ class Contact:
 
     # ------------------------------------------------------------------------------------- what the balance needs
 
-    def _force_matrix(self) -> sp.csr_matrix:
+    def _force_matrix(self) -> Sparse:
         """Forces on the nodes per unit multiplier [m^(dim-1)], shape (N, C)."""
         assert self.terms is not None
         count = len(self.z)
-        on_slave = sp.csr_matrix((-self.terms.D, (self.multipliers.node, np.arange(count))), shape=(self.size, count))
+        on_slave = sparse_from_entries(self.multipliers.node, np.arange(count), -self.terms.D, (self.size, count))
         if self.interface.basis is not None:
             on_slave = self.interface.basis[1].T @ on_slave
-        return (on_slave + self.terms.M.T).tocsr()
+        return on_slave + self.terms.M.T
 
     def force(self) -> Array:
         """Contact force [N] on all nodes for the present multipliers, shape (N, dim)."""
@@ -272,7 +272,7 @@ class Contact:
         """What multipliers in contact add to a Newton step."""
         assert self.terms is not None
         count, n, dgap = len(self.z), self.dim * self.size, self._redistributed(self.terms.dgap)
-        slip = sp.csr_matrix((self.dim * count, n)) if self._slip is None else self._slip.slopes
+        slip = nothing((self.dim * count, n)) if self._slip is None else self._slip.slopes
         slopes = Slopes(gap=dgap, normals=self.terms.dnormals, slip=slip)
         force = self._force_matrix()
         if self._shared is not None:

@@ -10,10 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.contact.blocks import block_diagonal
+from solvers.sparse import Sparse, sparse_from_entries
 
 #: Least sine of the angle between a normal and what is taken already (supports, other normals): below, a node that is
 #: to close its gap would have to move a hundred times as far.
@@ -24,9 +25,9 @@ LEAST_FREE = 1e-2
 class Directions:
     """For m multipliers with K degrees of freedom zeta: z = P zeta + Z du, felt in the directions Q of the nodes."""
 
-    basis: sp.csr_matrix  #: P, shape (dim * m, K)
-    felt: sp.csr_matrix  #: Q, orthonormal, shape (dim * N, K)
-    turning: sp.csr_matrix  #: Z = turning @ (derivatives of the normals), shape (dim * m, dim * m)
+    basis: Sparse  #: P, shape (dim * m, K)
+    felt: Sparse  #: Q, orthonormal, shape (dim * N, K)
+    turning: Sparse  #: Z = turning @ (derivatives of the normals), shape (dim * m, dim * m)
     of_multiplier: NDArray[np.int64]  #: multiplier that each zeta belongs to, shape (K,)
 
 
@@ -88,18 +89,18 @@ def find_directions(
     if partly.any():
         _span_partly(np.flatnonzero(partly), z, normals, held[node], P, Q, turn)
 
-    def columns(blocks: Array, rows: NDArray[np.int64], count: int) -> sp.csr_matrix:
+    def columns(blocks: Array, rows: NDArray[np.int64], count: int) -> Sparse:
         at = np.cumsum(used.ravel()).reshape(used.shape) - 1
         multiplier, column = np.nonzero(used)
         entries = blocks[multiplier, :, column]
         row = dim * rows[multiplier][:, None] + np.arange(dim)
         place = np.repeat(at[multiplier, column][:, None], dim, axis=1)
-        return sp.csr_matrix((entries.ravel(), (row.ravel(), place.ravel())), shape=(count, int(used.sum())))
+        return sparse_from_entries(row.ravel(), place.ravel(), entries.ravel(), (count, int(used.sum())))
 
     return Directions(
         basis=columns(P, np.arange(m), dim * m),
         felt=columns(Q, node, dim * len(held)),
-        turning=sp.bsr_matrix((turn, np.arange(m), np.arange(m + 1)), shape=(dim * m, dim * m)).tocsr(),
+        turning=block_diagonal(turn),
         of_multiplier=np.nonzero(used)[0],
     )
 

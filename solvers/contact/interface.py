@@ -17,9 +17,10 @@ from solvers.contact.patch import Multipliers, Patch, number_multipliers
 from solvers.contact.search import Search
 from solvers.contact.self_search import SelfSearch
 from solvers.contact.surface import Nodes, Surface, longest_edge, number_nodes
+from solvers.sparse import Sparse, sparse
 
 #: T with N~ = N T over all nodes, and its inverse
-Basis = tuple[sp.csr_matrix, sp.csr_matrix]
+Basis = tuple[Sparse, Sparse]
 
 
 @dataclass(frozen=True)
@@ -137,9 +138,9 @@ def _nodal_basis(multipliers: Multipliers, size: int) -> Basis | None:
     for which in (0, 1):
         total = sp.identity(size, format="lil")
         for patch in curved:
-            entries = patch.basis()[which].tocoo()
-            total[patch.nodes[entries.row], patch.nodes[entries.col]] = entries.data
-        both.append(total.tocsr())
+            entries = patch.basis()[which]
+            total[patch.nodes[entries.row_numbers()], patch.nodes[entries.indices]] = entries.data
+        both.append(sparse(total.tocsr(), (size, size)))
     return both[0], both[1]
 
 

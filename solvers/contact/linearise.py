@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.contact.blocks import block_diagonal, components, expand, vstack
+from solvers.contact.blocks import block_diagonal, components, expand
 from solvers.contact.condense import Linearised
 from solvers.contact.directions import find_directions
 from solvers.contact.interface import Interface
 from solvers.contact.law.law import Law, Point, Slopes, Statuses
+from solvers.sparse import Sparse, nothing, stack
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Part:
 
 
 def linearise(
-    interface: Interface, parts: Sequence[Part], slopes: Slopes, force: sp.csr_matrix, dforce: sp.csr_matrix, w: float
+    interface: Interface, parts: Sequence[Part], slopes: Slopes, force: Sparse, dforce: Sparse, w: float
 ) -> Linearised:
     """What they add to a Newton step.
 
@@ -46,21 +46,19 @@ def linearise(
     P = directions.basis
     return Linearised(
         weight=w,
-        force=expand(force[:, which], dim),
+        force=expand(force.columns(which), dim),
         dforce=dforce,
         basis=P,
         turning=turning,
         felt=directions.felt,
-        by_multiplier=(P.T @ by_z @ P).tocsr(),
-        by_displacement=(P.T @ (by_u + by_z @ turning)).tocsr(),
+        by_multiplier=P.T @ by_z @ P,
+        by_displacement=P.T @ (by_u + by_z @ turning),
         residual=P.T @ (residual - by_z @ z.ravel()),
         transformation=None if interface.basis is None else expand(interface.basis[0], dim),
     )
 
 
-def _law_rows(
-    parts: Sequence[Part], slopes: Slopes, weight: float, columns: int
-) -> tuple[sp.csr_matrix, sp.csr_matrix, Array]:
+def _law_rows(parts: Sequence[Part], slopes: Slopes, weight: float, columns: int) -> tuple[Sparse, Sparse, Array]:
     """(by z, by u, residual) of all multipliers in contact, law by law."""
     by_z, by_u, residual = [], [], []
     for part in parts:
@@ -71,5 +69,5 @@ def _law_rows(
         by_u.append(rows.by_u)
         residual.append(rows.residual.ravel())
     if not by_z:
-        return sp.csr_matrix((0, 0)), sp.csr_matrix((0, columns)), np.zeros(0)
-    return block_diagonal(np.concatenate(by_z)), vstack(by_u), np.concatenate(residual)
+        return nothing((0, 0)), nothing((0, columns)), np.zeros(0)
+    return block_diagonal(np.concatenate(by_z)), stack(by_u), np.concatenate(residual)

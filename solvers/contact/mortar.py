@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.contact.blocks import expand
 from solvers.contact.patch import Patch
 from solvers.contact.surface import KERNEL_TYPES, Surface
 from solvers.kernels import MortarResult, mortar
+from solvers.sparse import Sparse, nothing, sparse, stack
 
 #: Slave facets take part when a master is nearer than this share of the longest edge (and the motion of the step).
 NEAR = 0.3
@@ -30,10 +31,10 @@ class MortarTerms:
     """Mortar integrals; columns are dofs of the patch, then of the masters (dim * node + component)."""
 
     D: Array  #: diagonal of D [m^(dim-1)], shape (ns,)
-    M: sp.csr_matrix  #: coupling [m^(dim-1)], shape (ns, nm)
+    M: Sparse  #: coupling [m^(dim-1)], shape (ns, nm)
     gap: Array  #: weighted gap [m^dim], positive where open, shape (ns,)
-    dgap: sp.csr_matrix  #: shape (ns, dim * (ns + nm))
-    dforce: sp.csr_matrix  #: derivative of the contact force at fixed multipliers, shape (dim * (ns + nm),) * 2
+    dgap: Sparse  #: shape (ns, dim * (ns + nm))
+    dforce: Sparse  #: derivative of the contact force at fixed multipliers, shape (dim * (ns + nm),) * 2
     area: Array  #: covered area of each slave facet [m^(dim-1)], shape (k,)
     used: NDArray[np.int32]  #: facet pairs that took part, shape (p, 2)
 
@@ -138,7 +139,7 @@ class Mortar:
         self,
         x: Array,
         normals: Array,
-        dnormals: sp.csr_matrix,
+        dnormals: Sparse,
         facet_pairs: NDArray[np.int32],
         motion: float,
         z: Array,
@@ -151,11 +152,11 @@ class Mortar:
         columns = dim * (ns + nm)
         dforce = self._total(result.dforce, result.dforce_dn, dnormals, columns, columns)
         if self._types[0] == "tri6":
-            back = sp.kron(self.patch.basis()[1].T, sp.identity(dim))
-            dforce = (sp.block_diag([back, sp.identity(dim * nm)]) @ dforce).tocsr()
+            back, of_slave = expand(self.patch.basis()[1].T, dim), np.arange(columns) < dim * ns
+            dforce = stack([back @ dforce[of_slave], dforce[~of_slave]])
         return MortarTerms(
             D=result.D,
-            M=sp.csr_matrix(result.M, shape=(ns, nm)),
+            M=sparse(result.M, (ns, nm)),
             gap=result.gap,
             dgap=self._total(result.dgap, result.dgap_dn, dnormals, ns, columns),
             dforce=dforce,
@@ -168,41 +169,37 @@ class Mortar:
         surfaces = slave, self.facets, self._types[0], master, self.masters.facets, self._types[1]
         return mortar(*surfaces, normals, facet_pairs, method=self.integration, **settings)
 
-    def tie(
-        self, x: Array, normals: Array, facet_pairs: NDArray[np.int32]
-    ) -> tuple[MortarTerms, sp.csr_matrix, sp.csr_matrix]:
+    def tie(self, x: Array, normals: Array, facet_pairs: NDArray[np.int32]) -> tuple[MortarTerms, Sparse, Sparse]:
         """(terms, W, M) at the positions x [m]; forces follow from D and M, and have no derivatives."""
         slave, master = self.patch.nodes, self.masters.nodes
         ns, nm, columns = len(slave), len(master), x.shape[1] * (len(slave) + len(master))
         result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(0.0))
-        W = sp.csr_matrix(result.W, shape=(ns, ns)) @ self.patch.basis()[1]
-        M = sp.csr_matrix(result.M, shape=(ns, nm))
-        nothing = sp.csr_matrix((ns, columns)), sp.csr_matrix((columns, columns))
+        W = sparse(result.W, (ns, ns)) @ self.patch.basis()[1]
+        M = sparse(result.M, (ns, nm))
+        none = nothing((ns, columns)), nothing((columns, columns))
         used = facet_pairs[result.used.astype(bool)]
-        return MortarTerms(result.D, M, np.zeros(ns), *nothing, result.area, used), W.tocsr(), M
+        return MortarTerms(result.D, M, np.zeros(ns), *none, result.area, used), W, M
 
     def _reach(self, motion: float) -> dict[str, float]:
         return {"reach": self._edge + motion, "near": NEAR * self._edge + motion}
 
     @staticmethod
-    def _total(direct, by_normals, dnormals: sp.csr_matrix, rows: int, columns: int) -> sp.csr_matrix:
+    def _total(direct, by_normals, dnormals: Sparse, rows: int, columns: int) -> Sparse:
         """Derivative with respect to positions, directly and through the normals."""
-        derivative = sp.csr_matrix(direct, shape=(rows, columns))
-        through = sp.csr_matrix(by_normals, shape=(rows, dnormals.shape[0])) @ dnormals
-        return derivative + _widen(through, columns) if through.nnz else derivative
+        derivative = sparse(direct, (rows, columns))
+        through = sparse(by_normals, (rows, dnormals.shape[0])) @ dnormals
+        return derivative + _widen(through, columns) if len(through.data) else derivative
 
-    def begin(
-        self, x: Array, normals: Array, facet_pairs: NDArray[np.int32]
-    ) -> tuple[Array, sp.csr_matrix, sp.csr_matrix]:
+    def begin(self, x: Array, normals: Array, facet_pairs: NDArray[np.int32]) -> tuple[Array, Sparse, Sparse]:
         """(D, W, M) at the beginning of a step. Facets count from farther away than for contact: they may come."""
         slave, master = self.patch.nodes, self.masters.nodes
         result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(self._edge))
-        W = sp.csr_matrix(result.W, shape=(len(slave), len(slave))) @ self.patch.basis()[1]
-        return result.D, W.tocsr(), sp.csr_matrix(result.M, shape=(len(slave), len(master)))
+        W = sparse(result.W, (len(slave), len(slave))) @ self.patch.basis()[1]
+        return result.D, W, sparse(result.M, (len(slave), len(master)))
 
     def gap_vectors(
-        self, x: Array, normals: Array, dnormals: sp.csr_matrix, used: NDArray[np.int32]
-    ) -> tuple[Array, list[sp.csr_matrix]]:
+        self, x: Array, normals: Array, dnormals: Sparse, used: NDArray[np.int32]
+    ) -> tuple[Array, list[Sparse]]:
         """int Phi (x_m - x_s), shape (ns, dim), over facet pairs that took part, and derivatives of each component."""
         ns, nm, dim = len(self.patch.nodes), len(self.masters.nodes), x.shape[1]
         values, slopes = np.zeros((ns, dim)), []
@@ -214,5 +211,5 @@ class Mortar:
         return values, slopes
 
 
-def _widen(matrix: sp.csr_matrix, columns: int) -> sp.csr_matrix:
-    return sp.csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape=(matrix.shape[0], columns))
+def _widen(matrix: Sparse, columns: int) -> Sparse:
+    return Sparse(matrix.data, matrix.indices, matrix.indptr, (matrix.shape[0], columns))

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.contact.surface import KERNEL_TYPES, Nodes, Surface, nodal_areas
 from solvers.kernels import basis_transformation, nodal_normals
+from solvers.sparse import Sparse, sparse
 
 #: Slave surfaces with common nodes are one patch if their normals there have a product above this (45 degrees).
 SMOOTH = np.sqrt(0.5)
@@ -28,17 +28,17 @@ class Patch:
     areas: Array  #: reference area around each node [m^(dim-1)], shape (n,)
     mask: Array | None  #: 0 for components that a plane of symmetry forbids, 1 for others, shape (n, dim)
 
-    def normals(self, x: Array) -> tuple[Array, sp.csr_matrix]:
+    def normals(self, x: Array) -> tuple[Array, Sparse]:
         """Averaged unit normals at positions x [m] of its nodes, and their derivatives (dim * n, dim * n)."""
         x = np.ascontiguousarray(x)
         found, slopes = nodal_normals(x, self.facets, KERNEL_TYPES[self.facet_type], self.mask)
-        return found, sp.csr_matrix(slopes, shape=(x.size, x.size))
+        return found, sparse(slopes, (x.size, x.size))
 
-    def basis(self) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    def basis(self) -> tuple[Sparse, Sparse]:
         """T with N~ = N T, the basis that multipliers are dual to, and its inverse; the identity but for tri6."""
         n = len(self.nodes)
         return tuple(  # type: ignore[return-value]
-            sp.csr_matrix(csr, shape=(n, n)) for csr in basis_transformation(self.facets, self._kernel_type, n)
+            sparse(csr, (n, n)) for csr in basis_transformation(self.facets, self._kernel_type, n)
         )
 
     @property

@@ -9,9 +9,10 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.contact.blocks import expand
+from solvers.sparse import Sparse, sparse
 
 
-def redistributed(rows, shares: sp.csr_matrix | None):
+def redistributed(rows, shares: Sparse | None):
     """Rows of multipliers, one each or one for each component, plus those that are redistributed to them."""
     if shares is None:
         return rows
@@ -36,9 +37,9 @@ class Redistribution:
         row, column = np.concatenate(rows), np.concatenate(columns)
         self._beside = sp.csr_matrix((np.ones(len(row)), (row, column)), shape=(count, count))
         self._beside.data[:] = 1.0
-        self._latest: tuple[bytes, sp.csr_matrix | None] = (b"", None)
+        self._latest: tuple[bytes, Sparse | None] = (b"", None)
 
-    def shares(self, receive: NDArray[np.bool_], give: NDArray[np.bool_]) -> sp.csr_matrix | None:
+    def shares(self, receive: NDArray[np.bool_], give: NDArray[np.bool_]) -> Sparse | None:
         """Shares, rows of those that receive and columns of those that give, shape (C, C); None if there are none."""
         if not receive.any():
             return None
@@ -47,13 +48,13 @@ class Redistribution:
             self._latest = key, self._spread(receive, give)
         return self._latest[1]
 
-    def _spread(self, receive: NDArray[np.bool_], give: NDArray[np.bool_]) -> sp.csr_matrix | None:
+    def _spread(self, receive: NDArray[np.bool_], give: NDArray[np.bool_]) -> Sparse | None:
         own = sp.diags(give.astype(float)).tocsr()
         served, shares = give, own
         while True:  # a corner may have only neighbours that receive: it comes after them
             count = np.where(receive & ~served, self._beside @ served.astype(float), 0.0)
             if not count.any():
-                return (shares - own).tocsr() if (served & receive).any() else None
+                return sparse((shares - own).tocsr(), shares.shape) if (served & receive).any() else None
             mean = sp.diags(np.divide(1.0, count, out=np.zeros_like(count), where=count > 0.0)) @ self._beside
             shares = (shares + mean @ sp.diags(served.astype(float)) @ shares).tocsr()
             served = served | (count > 0.0)

@@ -16,23 +16,23 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.contact.blocks import add_up, components, expand, scale_rows
+from solvers.contact.blocks import add_up, components, expand
 from solvers.contact.mortar import Mortar
 from solvers.contact.patch import Multipliers
 from solvers.contact.share import Shares
 from solvers.contact.terms import Normals, find_normals
+from solvers.sparse import Sparse
 
 
 @dataclass(frozen=True)
 class Beginning:
     """The integrals at the beginning of a step."""
 
-    difference: sp.csr_matrix  #: (W^n, -M^n) over all nodes, shape (C, N)
-    slopes: sp.csr_matrix  #: the same for all components, shape (dim * C, dim * N)
+    difference: Sparse  #: (W^n, -M^n) over all nodes, shape (C, N)
+    slopes: Sparse  #: the same for all components, shape (dim * C, dim * N)
     D: Array  #: shape (C,)
 
 
@@ -41,7 +41,7 @@ class Slip:
     """The slip of the step up to an iterate."""
 
     values: Array  #: [m], shape (C, dim), zero where it is not known
-    slopes: sp.csr_matrix  #: derivatives, shape (dim * C, dim * N)
+    slopes: Sparse  #: derivatives, shape (dim * C, dim * N)
     defined: NDArray[np.bool_]  #: multipliers that saw a master at the beginning, shape (C,)
 
     def plus(self, other: Slip) -> Slip:
@@ -99,5 +99,5 @@ class Sliding:
         known = D > 0.0
         share = np.divide(1.0, D, out=np.zeros_like(D), where=known)
         values = share[:, None] * redistributed(self._beginning.difference @ x + gap)
-        slopes = scale_rows(redistributed(self._beginning.slopes + dgap), share.repeat(dim))
+        slopes = redistributed(self._beginning.slopes + dgap).scaled_rows(share.repeat(dim))
         return Slip(values, slopes, known)

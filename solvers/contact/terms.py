@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
@@ -14,6 +13,7 @@ from solvers.contact.blocks import add_up, components
 from solvers.contact.mortar import Mortar, MortarTerms
 from solvers.contact.patch import Multipliers, Patch
 from solvers.contact.share import Shares
+from solvers.sparse import Sparse
 
 
 @dataclass(frozen=True)
@@ -21,10 +21,10 @@ class Normals:
     """Averaged unit normals at the multipliers."""
 
     values: Array  #: shape (C, dim)
-    slopes: sp.csr_matrix  #: derivatives with respect to all nodes, shape (dim * C, dim * N)
-    of_patch: tuple[tuple[Array, sp.csr_matrix], ...]  #: the same by patch, in its own numbers
+    slopes: Sparse  #: derivatives with respect to all nodes, shape (dim * C, dim * N)
+    of_patch: tuple[tuple[Array, Sparse], ...]  #: the same by patch, in its own numbers
 
-    def at(self, multipliers: Multipliers, patch: Patch) -> tuple[Array, sp.csr_matrix]:
+    def at(self, multipliers: Multipliers, patch: Patch) -> tuple[Array, Sparse]:
         """Those of a patch."""
         return self.of_patch[next(k for k, other in enumerate(multipliers.patches) if other is patch)]
 
@@ -35,12 +35,12 @@ class Terms:
 
     D: Array  #: shape (C,), zero where no master is seen
     D_of_pair: Array  #: the part of D that each pair has, shape (pairs, C)
-    M: sp.csr_matrix  #: shape (C, N)
+    M: Sparse  #: shape (C, N)
     gap: Array  #: weighted gap [m^dim], shape (C,)
     normals: Array  #: shape (C, dim)
-    dgap: sp.csr_matrix  #: shape (C, dim * N)
-    dforce: sp.csr_matrix  #: derivative of the contact force at fixed multipliers, shape (dim * N,) * 2
-    dnormals: sp.csr_matrix  #: shape (dim * C, dim * N)
+    dgap: Sparse  #: shape (C, dim * N)
+    dforce: Sparse  #: derivative of the contact force at fixed multipliers, shape (dim * N,) * 2
+    dnormals: Sparse  #: shape (dim * C, dim * N)
 
 
 def find_normals(multipliers: Multipliers, x: Array) -> Normals:
@@ -82,6 +82,6 @@ def total_terms(
     return Terms(D, D_of_pair, M, gap, normals.values, dgap, dforce, normals.slopes)
 
 
-def renumber(matrix: sp.csr_matrix, rows: NDArray, columns: NDArray, shape: tuple[int, int]) -> sp.csr_matrix:
+def renumber(matrix: Sparse, rows: NDArray, columns: NDArray, shape: tuple[int, int]) -> Sparse:
     """The entries of a matrix at other rows and columns."""
     return add_up([(matrix, rows, columns)], shape)

@@ -17,11 +17,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.contact.blocks import expand, scale_rows
+from solvers.contact.blocks import expand
 from solvers.contact.coverage import Coverage
 from solvers.contact.interface import describe_interface
 from solvers.contact.mortar import Mortar, MortarTerms
@@ -30,6 +29,7 @@ from solvers.contact.patch import Multipliers
 from solvers.contact.redistribute import redistributed
 from solvers.contact.slip import Slip
 from solvers.contact.terms import find_normals, renumber
+from solvers.sparse import Sparse, nothing
 
 
 class Ties:
@@ -40,9 +40,9 @@ class Ties:
         N, C = len(x), len(multipliers.node)
         self._reference = reference
         self.D = np.zeros(C)  #: covered area [m^(dim-1)]
-        self.difference = sp.csr_matrix((C, N))  #: (W, -M) over all nodes
-        self._shares: sp.csr_matrix | None = None  # redistribution that the slopes are made with
-        self._slopes: tuple[sp.csr_matrix, sp.csr_matrix, NDArray[np.bool_]] | None = None
+        self.difference = nothing((C, N))  #: (W, -M) over all nodes
+        self._shares: Sparse | None = None  # redistribution that the slopes are made with
+        self._slopes: tuple[Sparse, Sparse, NDArray[np.bool_]] | None = None
         normals = find_normals(multipliers, x) if mortars else None
         for mortar in mortars:
             assert normals is not None
@@ -53,12 +53,12 @@ class Ties:
             self.D[rows] += found.D
             self.difference = self.difference + renumber(W, rows, slave, (C, N)) - renumber(M, rows, master, (C, N))
 
-    def slip(self, x: Array, shares: sp.csr_matrix | None) -> Slip:
+    def slip(self, x: Array, shares: Sparse | None) -> Slip:
         """Since the reference configuration, at the positions x [m] of all nodes; shares: of redistribution."""
         if self._slopes is None or self._shares is not shares:
             D = redistributed(self.D, shares)
             share = np.divide(1.0, D, out=np.zeros_like(D), where=D > 0.0)
-            mean = scale_rows(redistributed(self.difference, shares), share)
+            mean = redistributed(self.difference, shares).scaled_rows(share)
             self._shares, self._slopes = shares, (mean, expand(mean, x.shape[1]), D > 0.0)
         mean, slopes, defined = self._slopes
         return Slip(mean @ (x - self._reference), slopes, defined)

@@ -16,11 +16,11 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-import scipy.sparse as sp
 
 from solvers.api import Array
-from solvers.contact.blocks import components, vstack
+from solvers.contact.blocks import components
 from solvers.contact.law.law import OPEN, SLIP, STICK, Point, Rows, Slopes, Statuses, along
+from solvers.sparse import Sparse, sparse, stack
 
 #: A trial traction on the rim of the disc, to this share of its radius, means slip. That of a node that slides is there
 #: at the beginning of the next step, but for the tolerance of Newton's method: it goes on sliding.
@@ -83,15 +83,15 @@ def friction_rows(law: Bound, at: Point, slopes: Slopes, status: Statuses, weigh
     return Rows(friction_residual(law, at, status, weight), factor * in_z, in_u)
 
 
-def _in_displacements(by_gap: Array, by_normal: Array, by_slip: Array, slopes: Slopes) -> sp.csr_matrix:
+def _in_displacements(by_gap: Array, by_normal: Array, by_slip: Array, slopes: Slopes) -> Sparse:
     """by_gap dg + by_normal dn + by_slip du_t; shapes (m, dim), (m, dim, dim), (m, dim, dim): one sparse product."""
     m, dim = by_gap.shape
     entries = np.concatenate([by_gap[:, :, None], by_normal, by_slip], axis=2)
     vectors = m + components(np.arange(m), dim).reshape(m, dim)
     columns = np.concatenate([np.arange(m)[:, None], vectors, dim * m + vectors], axis=1)
     indices, indptr = columns.repeat(dim, axis=0).ravel(), (1 + 2 * dim) * np.arange(dim * m + 1)
-    combination = sp.csr_matrix((entries.ravel(), indices, indptr), shape=(dim * m, (1 + 2 * dim) * m))
-    return combination @ vstack([slopes.gap, slopes.normals, slopes.slip])
+    combination = sparse((entries.ravel(), indices, indptr), (dim * m, (1 + 2 * dim) * m))
+    return combination @ stack([slopes.gap, slopes.normals, slopes.slip])
 
 
 def _on_disc(q: Array, status: Statuses, radius: Array, *, derivatives: bool = False):

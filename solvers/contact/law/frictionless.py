@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from solvers.api import Array
-from solvers.contact.blocks import block_columns, scale_rows
+from solvers.contact.blocks import block_diagonal
 from solvers.contact.law.law import OPEN, SLIP, Point, Rows, Slopes, Span, Statuses, along
 
 
@@ -31,7 +31,7 @@ class Frictionless:
 
     def rows(self, at: Point, slopes: Slopes, status: Statuses, weight: float) -> Rows:
         dim = at.z.shape[1]
-        closing = block_columns(at.stiffness[:, None] * at.normals) @ slopes.gap
-        turning = scale_rows(slopes.normals, np.repeat(weight * at.D * at.pressure, dim))
+        closing = block_diagonal((at.stiffness[:, None] * at.normals)[:, :, None]) @ slopes.gap
+        turning = slopes.normals.scaled_rows(np.repeat(weight * at.D * at.pressure, dim))
         by_z = (weight * at.D)[:, None, None] * along(at.normals)
-        return Rows(self.residual(at, status, weight), by_z, (closing - turning).tocsr())
+        return Rows(self.residual(at, status, weight), by_z, closing - turning)

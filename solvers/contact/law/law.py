@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.sparse import Sparse
 
 #: Status of a multiplier: no contact; contact, free to slide; contact, no sliding
 OPEN, SLIP, STICK = 0, 1, 2
@@ -52,9 +52,9 @@ class Point:
 class Slopes:
     """Derivatives with respect to the displacements of all nodes, dim * N columns."""
 
-    gap: sp.csr_matrix  #: shape (m, dim * N)
-    normals: sp.csr_matrix  #: shape (dim * m, dim * N)
-    slip: sp.csr_matrix  #: shape (dim * m, dim * N)
+    gap: Sparse  #: shape (m, dim * N)
+    normals: Sparse  #: shape (dim * m, dim * N)
+    slip: Sparse  #: shape (dim * m, dim * N)
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Rows:
 
     residual: Array  #: shape (m, dim)
     by_z: Array  #: shape (m, dim, dim)
-    by_u: sp.csr_matrix  #: shape (dim * m, dim * N)
+    by_u: Sparse  #: shape (dim * m, dim * N)
 
 
 class Law(Protocol):

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import scipy.sparse as sp
 
 from solvers.api import Array
 from solvers.contact.law.law import OPEN, STICK, Point, Rows, Slopes, Span, Statuses
@@ -30,5 +29,5 @@ class Tied:
 
     def rows(self, at: Point, slopes: Slopes, status: Statuses, weight: float) -> Rows:
         m, dim = at.z.shape
-        by_u = sp.diags(np.repeat(at.stiffness * at.D, dim)) @ slopes.slip
-        return Rows(self.residual(at, status, weight), np.zeros((m, dim, dim)), by_u.tocsr())
+        by_u = slopes.slip.scaled_rows(np.repeat(at.stiffness * at.D, dim))
+        return Rows(self.residual(at, status, weight), np.zeros((m, dim, dim)), by_u)

@@ -1,0 +1,206 @@
+"""Sparse matrices of an interface: compressed rows, and the few operations that contact and coupling need.
+
+Sums and products are those of scipy's compiled routines. What scipy's own classes put around them (choice of index
+types, checks of every argument, a new check of every result) takes 20 to 100 microseconds per matrix, ten times what
+the numbers of a small interface take, and contact makes a hundred matrices in a Newton step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import _sparsetools as compiled
+
+from solvers.api import Array
+
+Indices = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Sparse:
+    """Row i has the entries data[k] in the columns indices[k], k = indptr[i] ... indptr[i + 1] - 1, each column once.
+
+    Arrays are contiguous and never changed.
+    """
+
+    data: Array
+    indices: Indices
+    indptr: Indices
+    shape: tuple[int, int]
+
+    def __matmul__(self, other):
+        """Product with a matrix, a vector or several vectors side by side."""
+        if not isinstance(other, Sparse):
+            return self._times(other)
+        (rows, inner), columns = self.shape, other.shape[1]
+        if inner != other.shape[0]:
+            raise ValueError(f"shapes do not fit: {self.shape} @ {other.shape}")
+        left, right = (self.indptr, self.indices), (other.indptr, other.indices)
+        room = compiled.csr_matmat_maxnnz(rows, columns, *left, *right)
+        data, indices, indptr = _empty(rows, room)
+        compiled.csr_matmat(rows, columns, *left, self.data, *right, other.data, indptr, indices, data)
+        return _trimmed(data, indices, indptr, (rows, columns))
+
+    def _times(self, values: Array) -> Array:
+        if values.shape[0] != self.shape[1]:
+            raise ValueError(f"shapes do not fit: {self.shape} @ {values.shape}")
+        values = np.ascontiguousarray(values, dtype=float)
+        out = np.zeros((self.shape[0], *values.shape[1:]))
+        entries = self.indptr, self.indices, self.data
+        if values.ndim == 1:
+            compiled.csr_matvec(*self.shape, *entries, values, out)
+        else:
+            compiled.csr_matvecs(*self.shape, values.shape[1], *entries, values.ravel(), out.ravel())
+        return out
+
+    def __add__(self, other: Sparse) -> Sparse:
+        return self._combined(other, compiled.csr_plus_csr)
+
+    def __sub__(self, other: Sparse) -> Sparse:
+        return self._combined(other, compiled.csr_minus_csr)
+
+    def _combined(self, other: Sparse, operation) -> Sparse:
+        if self.shape != other.shape:
+            raise ValueError(f"shapes do not fit: {self.shape}, {other.shape}")
+        data, indices, indptr = _empty(self.shape[0], len(self.data) + len(other.data))
+        entries = (part for matrix in (self, other) for part in (matrix.indptr, matrix.indices, matrix.data))
+        operation(*self.shape, *entries, indptr, indices, data)
+        return _trimmed(data, indices, indptr, self.shape)
+
+    def __mul__(self, factor: float) -> Sparse:
+        return Sparse(factor * self.data, self.indices, self.indptr, self.shape)
+
+    __rmul__ = __mul__
+
+    def __neg__(self) -> Sparse:
+        return Sparse(-self.data, self.indices, self.indptr, self.shape)
+
+    def __getitem__(self, rows: NDArray) -> Sparse:
+        """Some rows, by number or by a mask."""
+        if rows.dtype == bool:
+            rows = np.flatnonzero(rows)
+        chosen = np.ascontiguousarray(rows, dtype=np.int32)
+        indptr = np.zeros(len(chosen) + 1, dtype=np.int32)
+        np.cumsum(self.indptr[chosen + 1] - self.indptr[chosen], out=indptr[1:])
+        data, indices, _ = _empty(0, int(indptr[-1]))
+        compiled.csr_row_index(len(chosen), chosen, self.indptr, self.indices, self.data, indices, data)
+        return Sparse(data, indices, indptr, (len(chosen), self.shape[1]))
+
+    @property
+    def T(self) -> Sparse:
+        """Transposed; the columns of its rows are in order."""
+        rows, columns = self.shape
+        data, indices, indptr = _empty(columns, len(self.data))
+        compiled.csr_tocsc(rows, columns, self.indptr, self.indices, self.data, indptr, indices, data)
+        return Sparse(data, indices, indptr, (columns, rows))
+
+    def row_numbers(self) -> Indices:
+        """The row of each entry."""
+        return np.repeat(np.arange(self.shape[0], dtype=np.int32), self.indptr[1:] - self.indptr[:-1])
+
+    def with_columns(self, numbers: NDArray[np.int64], columns: int) -> Sparse:
+        """Column j becomes column numbers[j] of as many as said; where that is -1 it drops out."""
+        target = numbers[self.indices]
+        keep = target >= 0
+        if keep.all():
+            return Sparse(self.data, target.astype(np.int32), self.indptr, (self.shape[0], columns))
+        before = np.zeros(len(keep) + 1, dtype=np.int32)
+        np.cumsum(keep, out=before[1:])
+        return Sparse(self.data[keep], target[keep].astype(np.int32), before[self.indptr], (self.shape[0], columns))
+
+    def columns(self, which: NDArray[np.int64]) -> Sparse:
+        """Some columns, each at most once."""
+        numbers = np.full(self.shape[1], -1)
+        numbers[which] = np.arange(len(which))
+        return self.with_columns(numbers, len(which))
+
+    def with_rows(self, numbers: NDArray[np.int64], rows: int) -> Sparse:
+        """Row i becomes row numbers[i] of as many as said, all others are empty; each number once."""
+        row = np.full(rows, -1, dtype=np.int64)
+        row[numbers] = np.arange(self.shape[0])
+        return _with_empty_row(self)[np.where(row < 0, self.shape[0], row)]
+
+    def scaled_rows(self, factors: Array) -> Sparse:
+        """The rows times factors, shape (rows,)."""
+        data = self.data * np.repeat(factors, self.indptr[1:] - self.indptr[:-1])
+        return Sparse(data, self.indices, self.indptr, self.shape)
+
+    def ordered(self) -> Sparse:
+        """The same with the columns of each row in order."""
+        if compiled.csr_has_sorted_indices(self.shape[0], self.indptr, self.indices):
+            return self
+        data, indices = self.data.copy(), self.indices.copy()
+        compiled.csr_sort_indices(self.shape[0], self.indptr, indices, data)
+        return Sparse(data, indices, self.indptr, self.shape)
+
+    def without_small(self, limit: float) -> Sparse:
+        """Without entries of at most this size."""
+        keep = np.abs(self.data) > limit
+        before = np.zeros(len(keep) + 1, dtype=np.int32)
+        np.cumsum(keep, out=before[1:])
+        return Sparse(self.data[keep], self.indices[keep], before[self.indptr], self.shape)
+
+    def toarray(self) -> Array:
+        """All entries, zeros included."""
+        out = np.zeros(self.shape)
+        compiled.csr_todense(*self.shape, self.indptr, self.indices, self.data, out)
+        return out
+
+
+def sparse(csr, shape: tuple[int, int]) -> Sparse:
+    """From (data, indices, indptr) of the kernels or a matrix of scipy."""
+    data, indices, indptr = csr if isinstance(csr, tuple) else (csr.data, csr.indices, csr.indptr)
+    indices, indptr = (np.ascontiguousarray(part, dtype=np.int32) for part in (indices, indptr))
+    return Sparse(np.ascontiguousarray(data, dtype=float), indices, indptr, shape)
+
+
+def sparse_from_entries(rows: NDArray, columns: NDArray, data: Array, shape: tuple[int, int]) -> Sparse:
+    """Entries of equal places add up; the columns of each row are in order."""
+    rows, columns = (np.ascontiguousarray(part, dtype=np.int32) for part in (rows, columns))
+    out, indices, indptr = _empty(shape[0], len(data))
+    compiled.coo_tocsr(*shape, len(data), rows, columns, np.ascontiguousarray(data), indptr, indices, out)
+    compiled.csr_sort_indices(shape[0], indptr, indices, out)
+    compiled.csr_sum_duplicates(*shape, indptr, indices, out)
+    return _trimmed(out, indices, indptr, shape)
+
+
+def nothing(shape: tuple[int, int]) -> Sparse:
+    """A matrix without entries."""
+    return Sparse(*_empty(0, 0)[:2], np.zeros(shape[0] + 1, dtype=np.int32), shape)
+
+
+def diagonal(values: Array) -> Sparse:
+    """The values on the diagonal of a square matrix."""
+    n = len(values)
+    return Sparse(values, np.arange(n, dtype=np.int32), np.arange(n + 1, dtype=np.int32), (n, n))
+
+
+def stack(parts: list[Sparse]) -> Sparse:
+    """Matrices one below the other."""
+    if len(parts) == 1:
+        return parts[0]
+    starts = np.cumsum([0] + [len(part.data) for part in parts])
+    indptr = [part.indptr[1:] + np.int32(start) for part, start in zip(parts, starts, strict=False)]
+    return Sparse(
+        np.concatenate([part.data for part in parts]),
+        np.concatenate([part.indices for part in parts]),
+        np.concatenate([np.zeros(1, dtype=np.int32), *indptr]),
+        (sum(part.shape[0] for part in parts), parts[0].shape[1]),
+    )
+
+
+def _with_empty_row(matrix: Sparse) -> Sparse:
+    indptr = np.append(matrix.indptr, matrix.indptr[-1])
+    return Sparse(matrix.data, matrix.indices, indptr, (matrix.shape[0] + 1, matrix.shape[1]))
+
+
+def _empty(rows: int, entries: int) -> tuple[Array, Indices, Indices]:
+    return np.empty(entries), np.empty(entries, dtype=np.int32), np.empty(rows + 1, dtype=np.int32)
+
+
+def _trimmed(data: Array, indices: Indices, indptr: Indices, shape: tuple[int, int]) -> Sparse:
+    """The room that no entry has taken given back."""
+    used = int(indptr[-1])
+    return Sparse(data[:used], indices[:used], indptr, shape)
