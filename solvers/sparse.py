@@ -166,6 +166,14 @@ def sparse_from_entries(rows: NDArray, columns: NDArray, data: Array, shape: tup
     return _trimmed(out, indices, indptr, shape)
 
 
+def sparse_from_array(values: Array) -> Sparse:
+    """All entries of an array, zeros included."""
+    rows, columns = values.shape
+    indices = np.tile(np.arange(columns, dtype=np.int32), rows)
+    indptr = np.arange(rows + 1, dtype=np.int32) * np.int32(columns)
+    return Sparse(values.ravel(), indices, indptr, (rows, columns))
+
+
 def nothing(shape: tuple[int, int]) -> Sparse:
     """A matrix without entries."""
     return Sparse(*_empty(0, 0)[:2], np.zeros(shape[0] + 1, dtype=np.int32), shape)

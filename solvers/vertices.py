@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.sparse import sparse_from_entries
 
 
 @dataclass(frozen=True)
@@ -53,5 +53,5 @@ class VertexJacobian:
         if self.columns.shape[1] == 1 or not len(rows):
             return rows, columns, values
         shape = (int(rows.max()) + 1, len(self.columns))
-        summed = sp.csr_matrix((values, (rows, columns)), shape=shape).tocoo()
-        return summed.row.astype(np.int64), summed.col.astype(np.int64), summed.data
+        summed = sparse_from_entries(rows, columns, values, shape)
+        return summed.row_numbers().astype(np.int64), summed.indices.astype(np.int64), summed.data

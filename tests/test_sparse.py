@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from solvers.sparse import diagonal, nothing, sparse, sparse_from_entries, stack
+from solvers.sparse import diagonal, nothing, sparse, sparse_from_array, sparse_from_entries, stack
 
 NUMBERS = np.random.default_rng(3)
 
@@ -40,6 +40,7 @@ C, DENSE_C = random(7, 5)
         (A.without_small(0.5), np.where(DENSE_A > 0.5, DENSE_A, 0.0)),
         (stack([A, C]), np.vstack([DENSE_A, DENSE_C])),
         (nothing((2, 3)) @ sparse_from_entries(np.zeros(0), np.zeros(0), np.zeros(0), (3, 4)), np.zeros((2, 4))),
+        (sparse_from_array(DENSE_A), DENSE_A),
         (diagonal(np.arange(5.0)) @ B, np.arange(5.0)[:, None] * DENSE_B),
         (sparse_from_entries([1, 0, 1], [2, 1, 2], np.array([1.0, 2.0, 4.0]), (2, 3)), [[0, 2, 0], [0, 0, 5]]),
     ],

@@ -17,11 +17,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.rows import RowTransformation
+from solvers.sparse import nothing, sparse_from_array
 
 
 @dataclass(frozen=True)
@@ -147,9 +147,9 @@ class Contact:
         back = np.linalg.solve(G @ inverse @ G.T, G).T
         return RowTransformation(
             dofs=np.arange(n),
-            rows=sp.csr_matrix(np.eye(n) - back @ G @ inverse),
-            stiffness=sp.csr_matrix((n, n)),
-            added=sp.csr_matrix(back @ G),
+            rows=sparse_from_array(np.eye(n) - back @ G @ inverse),
+            stiffness=nothing((n, n)),
+            added=sparse_from_array(back @ G),
             right=-back @ g,
             replaced=np.ones(n, dtype=bool),
         )
