@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from petsc4py import PETSc
 
@@ -15,7 +17,11 @@ def rounding_error(matrix: PETSc.Mat, values: Array) -> Array:
     eps (sum_j (a_ij x_j)^2)^(1/2). Row i of A times x with random signs has this size. The signs are always the same.
     """
     x, y = matrix.createVecs()
-    signs = np.random.default_rng(matrix.comm.rank).choice((-1.0, 1.0), len(values))
-    x.array[:] = signs * values
+    x.array[:] = _signs(matrix.comm.rank, len(values)) * values
     matrix.mult(x, y)
     return float(np.finfo(float).eps) * np.abs(y.array)
+
+
+@lru_cache(maxsize=8)
+def _signs(rank: int, n: int) -> Array:
+    return np.random.default_rng(rank).choice((-1.0, 1.0), n)

@@ -39,6 +39,14 @@ def count(data) -> int:
     return 1 + sum((1 if isinstance(data, dict) else 0) + count(part) for part in parts)
 
 
+def test_a_number_whose_square_overflows(tmp_path):
+    text = BLOCK.replace("step: 1, end: 1", "step: 1e+300, end: 1")
+    assert text != BLOCK
+    assert "'step' must be at most 1e+100 in size, not 1e+300" in message(tmp_path, text)
+    text = BLOCK.replace("end: 1", "start: -2e100, end: 1")
+    assert "'start' must be at most 1e+100 in size, not -2e+100" in message(tmp_path, text)
+
+
 def test_a_long_file(tmp_path):
     assert "the file is larger than 1 MB" in message(tmp_path, "# " + "x" * 1_100_000)
 
@@ -59,7 +67,7 @@ def test_a_pipe_is_not_waited_for(tmp_path):
     assert found == [f"{tmp_path}/case.yaml: is not a file"]
 
 
-@pytest.mark.parametrize("time", ["step: 1, end: 1e300", "step: 1e-300, end: 1", "start: -1e20, step: 1, end: 0"])
+@pytest.mark.parametrize("time", ["step: 1, end: 1e90", "step: 1e-300, end: 1", "start: -1e20, step: 1, end: 0"])
 def test_a_step_that_time_does_not_feel(tmp_path, time):
     assert "is lost in rounding" in message(tmp_path, BLOCK.replace("step: 1, end: 1", time))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
@@ -23,6 +24,9 @@ from fsci.case.errors import did_you_mean, listed
 from fsci.case.section import fault
 from fsci.expression import VARIABLES, Expression, ExpressionError
 
+#: Size above which cubes of a number and products of three overflow.
+LARGEST = 1e100
+
 
 def spoken(value: Any) -> str:
     """A value as an error message names it."""
@@ -32,7 +36,7 @@ def spoken(value: Any) -> str:
         case bool():
             return "true" if value else "false"
         case int() | float():
-            return f"{value:.12g}" if abs(value) < 1e300 else "a number without bound"
+            return f"{value:.12g}" if abs(value) <= sys.float_info.max else "a number without bound"
         case str():
             text = value if len(value) <= 40 else value[:37] + "..."
             return f"'{text}'"
@@ -66,6 +70,8 @@ def _number(allowed: Callable[[float], bool], words: str) -> BeforeValidator:
         assert number is not None, "an expression without variables is constant"
         if not allowed(number):
             raise fault(f"must be {words}, not {spoken(float(number))}")
+        if abs(number) > LARGEST:
+            raise fault(f"must be at most {LARGEST:g} in size, not {spoken(float(number))}")
         return float(number)
 
     return BeforeValidator(read)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.connected import connected_parts
 from solvers.sparse import Sparse, nothing, sparse_from_entries
 
 #: A sparse matrix and the numbers of its rows and columns in a larger one.
@@ -52,7 +53,7 @@ def inverse(matrix: Sparse) -> Sparse:
     """
     n = matrix.shape[0]
     row, column = matrix.row_numbers(), matrix.indices
-    part = _connected(row, column, n)
+    part = connected_parts(row, column, n)
     order = np.argsort(part, kind="stable")
     sizes = np.bincount(part, minlength=n)
     starts = np.cumsum(sizes) - sizes
@@ -73,17 +74,3 @@ def inverse(matrix: Sparse) -> Sparse:
     if not data:
         return nothing((0, 0))
     return sparse_from_entries(np.concatenate(rows), np.concatenate(columns), np.concatenate(data), (n, n))
-
-
-def _connected(row: NDArray[np.int32], column: NDArray[np.int32], n: int) -> NDArray[np.int64]:
-    """The smallest number of all that each of n unknowns is connected with, itself included."""
-    part = np.arange(n)
-    across = row != column
-    row, column = row[across], column[across]
-    while True:
-        least, before = np.minimum(part[row], part[column]), part.copy()
-        np.minimum.at(part, row, least)
-        np.minimum.at(part, column, least)
-        part = part[part]
-        if (part == before).all():
-            return part

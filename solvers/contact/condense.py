@@ -65,10 +65,10 @@ class Condensed:
 
 def condense(terms: Linearised) -> Condensed:
     """Eliminate the multipliers."""
-    Q, FP, to_basis = terms.felt, terms.force @ terms.basis, terms.transformation
+    Q, back, FP, to_basis = terms.felt, terms.felt.T, terms.force @ terms.basis, terms.transformation
     if to_basis is not None:
         FP = to_basis.T @ FP
-    inverted = inverse(Q.T @ FP) @ Q.T
+    inverted = inverse(back @ FP) @ back
     law = Q @ (terms.by_multiplier * (1.0 / terms.weight))
     rows = (diagonal(np.ones(Q.shape[0])) - (FP - law) @ inverted).without_small(ROUNDING)
     return Condensed(

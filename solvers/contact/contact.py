@@ -66,6 +66,7 @@ class Contact:
         self.x = self.nodes.points.copy()
         self._x_old = self.x.copy()
         self.active_set = ActiveSet(count)
+        self._among_several = ~self.multipliers.alone & (self.interface.spans == "normal")
         self._keep_overlap = keep_overlap
         self._gap = np.zeros(count)  # weighted gap at the latest evaluation
         self._mean_gap = np.zeros(count)  # the same over D [m], zero where no master is seen
@@ -183,7 +184,9 @@ class Contact:
     def _drop_dependent(self, status: Statuses) -> None:
         """Of several multipliers at a node whose normals depend on each other the later ones are not in contact."""
         assert self.terms is not None
-        several = np.flatnonzero((status != OPEN) & ~self.multipliers.alone & (self.interface.spans == "normal"))
+        several = np.flatnonzero((status != OPEN) & self._among_several)
+        if len(several) == 0:
+            return
         left = free_normals(self.terms.normals[several], self.multipliers.node[several], self.nodes.held)
         status[several[~left.any(axis=1)]] = OPEN
 

@@ -81,8 +81,9 @@ def find_directions(
     P, Q = np.zeros((m, dim, dim)), np.zeros((m, dim, dim))
     used = np.zeros((m, dim), dtype=bool)
     used[wide] = np.arange(dim) < (dim - holds[wide])[:, None]
-    Q[wide] = _free_directions(held[node][wide]) * used[wide][:, None, :]
-    P[whole] = Q[whole]
+    if wide.any():
+        Q[wide] = _free_directions(held[node][wide]) * used[wide][:, None, :]
+        P[whole] = Q[whole]
     P[alone, :, 0] = normals[alone]
     Q[alone, :, 0] = free_normals(normals[alone], node[alone], held)
     used[alone, 0] = True

@@ -43,7 +43,7 @@ def linearise(
     directions = find_directions(z, normals, node, held, interface.spans[which])
     turning = directions.turning @ slopes.normals[components(which, dim)]
     by_z, by_u, residual = _law_rows(parts, slopes, w, dim * N)
-    P = directions.basis
+    P, across = directions.basis, directions.basis.T
     return Linearised(
         weight=w,
         force=expand(force.columns(which), dim),
@@ -51,9 +51,9 @@ def linearise(
         basis=P,
         turning=turning,
         felt=directions.felt,
-        by_multiplier=P.T @ by_z @ P,
-        by_displacement=P.T @ (by_u + by_z @ turning),
-        residual=P.T @ (residual - by_z @ z.ravel()),
+        by_multiplier=across @ by_z @ P,
+        by_displacement=across @ (by_u + by_z @ turning),
+        residual=across @ (residual - by_z @ z.ravel()),
         transformation=None if interface.basis is None else expand(interface.basis[0], dim),
     )
 

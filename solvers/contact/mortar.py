@@ -129,7 +129,7 @@ class Mortar:
         motion = max(float(np.abs(x[nodes] - x_previous[nodes]).max(initial=0.0)) for nodes in (slave, master))
         found = self._search.pairs(x[slave], x[master], self._edge + motion, x_previous[slave], x_previous[master])
         codes = self._codes(found)
-        if np.isin(self._kept, codes).all():
+        if len(self._kept) == 0 or np.isin(self._kept, codes).all():
             return found, motion
         together = np.union1d(codes, self._kept)
         count = len(self.masters.facets)

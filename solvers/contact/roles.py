@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
+
+from solvers.connected import connected_parts
 
 SLAVE, MASTER = 1, 2
 
@@ -22,9 +23,7 @@ def choose_roles(roles: Roles, pressed: NDArray[np.int64], pairs: NDArray[np.int
     """
     k = len(roles)
     i, j = pairs.T
-    rows, columns = np.concatenate([i, i + k]), np.concatenate([j + k, j])
-    graph = sp.coo_matrix((np.ones(2 * len(pairs)), (rows, columns)), shape=(2 * k, 2 * k))
-    _, part = sp.csgraph.connected_components(graph, directed=False)
+    part = connected_parts(np.concatenate([i, i + k]), np.concatenate([j + k, j]), 2 * k)
     first, second = part[:k], part[k:]
     low = np.minimum(first, second)
     # pressed facets speak for themselves as slaves, roles that are fixed count for more than all of them

@@ -12,7 +12,7 @@ from solvers.api import Array
 from solvers.fluid.cut import Cut
 from solvers.fluid.grid import FACES, DistributedGrid
 from solvers.fluid.space import Unknowns
-from solvers.fluid.wet_faces import wet_face
+from solvers.fluid.wet_faces import WetFace, wet_face
 from solvers.gauss import gauss
 
 
@@ -83,19 +83,20 @@ def covered_faces(
         middles = fem.facet_midpoints(grid.domain, facets)
         for face in FACES[: 2 * grid.dim]:
             on = grid.on_face(middles, face)
-            part, touched = _covered(grid, cut, face, points, cells[on])
-            free[np.flatnonzero(on)[touched]] = False
-            covered += [part] if len(part.cells) else []
+            found = wet_face(grid.grid, face, gauss(points)[0], cut.facets, cut.motion) if on.any() else None
+            if found is not None and len(found.cells):
+                part, touched = _covered(grid, found, face, points, cells[on])
+                free[np.flatnonzero(on)[touched]] = False
+                covered += [part] if len(part.cells) else []
     return free, covered
 
 
 def _covered(
-    grid: DistributedGrid, cut: Cut, face: str, points_per_direction: int, cells: NDArray[np.int32]
+    grid: DistributedGrid, found: WetFace, face: str, points_per_direction: int, cells: NDArray[np.int32]
 ) -> tuple[CoveredFaces, NDArray[np.int64]]:
     """(the covered ones of the faces of local cells, which of the cells they belong to)."""
     axis, side = "xyz".index(face[0]), int(face[1] == "+")
     points = gauss(points_per_direction)[0]
-    found = wet_face(grid.grid, face, points, cut.facets, cut.motion)
     places = np.unravel_index(grid.numbers[cells], grid.grid.shape, order="F")
     others = [i for i in range(grid.dim) if i != axis]
     shape = [grid.grid.shape[i] for i in others]

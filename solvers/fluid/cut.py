@@ -56,6 +56,8 @@ class Cutter:
         own[grid.numbers] = True
         self._own = grid.grid.as_box(own)
         self._special = np.zeros(grid.grid.size, dtype=bool)
+        sizes = grid.grid.cell_sizes()
+        self._slivers = NOTHING * sizes.prod(axis=1) / sizes.max(axis=1)  # areas of surface that do not count
 
     def begin_step(self) -> None:
         """Forget where the surfaces have been."""
@@ -149,9 +151,8 @@ class Cutter:
 
     def _cut_cells(self, moments, cells, touched) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Box cells that are cut, and those whose pieces of surface are more than slivers."""
-        sizes = self.grid.grid.cell_sizes()
-        area = np.bincount(cells[touched], moments.piece_mass[touched].sum(axis=(1, 2)), len(sizes))
-        in_use = area > NOTHING * sizes.prod(axis=1) / sizes.max(axis=1)
+        area = np.bincount(cells[touched], moments.piece_mass[touched].sum(axis=(1, 2)), len(self._slivers))
+        in_use = area > self._slivers
         return (moments.fraction > NOTHING) & (moments.fraction < 1.0 - NOTHING) | in_use, in_use
 
     def _facing(self, moments, counts, normal) -> NDArray[np.bool_]:
@@ -211,6 +212,6 @@ def _tensor_weights(points: Array, dim: int) -> Array:
 
 def _grow(marked: NDArray[np.bool_], layers: int) -> NDArray[np.bool_]:
     """Marked cells and their neighbours across vertices, as many layers as wanted."""
-    if layers == 0:
+    if layers == 0 or marked.all():
         return marked
     return ndimage.binary_dilation(marked, np.ones((3,) * marked.ndim, dtype=bool), iterations=layers)

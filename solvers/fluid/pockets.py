@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, sparse
-from scipy.sparse import csgraph
+from scipy import ndimage
 
+from solvers.connected import connected_parts
 from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
 
@@ -78,8 +78,8 @@ def _join(
     meetings = np.concatenate([these[1] for _, these in gathered])
     _, meetings = np.unique(meetings, return_inverse=True)
     size = len(firsts) + int(meetings.max(initial=-1)) + 1
-    graph = sparse.coo_matrix((np.ones(len(parts)), (parts, len(firsts) + meetings)), shape=(size, size))
-    whole, joined = csgraph.connected_components(graph, directed=False)
+    _, joined = np.unique(connected_parts(parts, len(firsts) + meetings, size), return_inverse=True)
+    whole = int(joined.max(initial=-1)) + 1
     order = np.full(whole, np.iinfo(np.int64).max)
     np.minimum.at(order, joined[: len(firsts)], firsts)
     number = np.argsort(np.argsort(order)) + 1

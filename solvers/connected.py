@@ -1,0 +1,26 @@
+"""Connected parts of a graph."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def connected_parts(first: NDArray, second: NDArray, n: int) -> NDArray[np.int64]:
+    """The smallest of all numbers that each of n is connected with, itself included; edges: first - second.
+
+    The smaller number goes along every edge, and everything takes over the part of its part, until nothing changes.
+    """
+    part = np.arange(n)
+    across = first != second
+    first, second = first[across], second[across]
+    while len(first):
+        before = part.copy()
+        least = np.minimum(part[first], part[second])
+        for end in (first, second):
+            np.minimum.at(part, part[end], least)
+            np.minimum.at(part, end, least)
+        part = part[part]
+        if (part == before).all():
+            break
+    return part
