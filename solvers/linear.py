@@ -15,6 +15,12 @@ Method = Literal["auto", "direct", "iterative", "ilu"]
 DIRECT_LIMIT = {2: 400_000, 3: 30_000}
 
 
+# Newer PETSc takes several dot products at once by BLAS, whose sums depend on where the vectors lie in memory. The same
+# run would then end with other last digits each time, and a resumed run with others than an uninterrupted one.
+for _option in ("vec_mdot_use_gemv", "vec_maxpy_use_gemv"):
+    PETSc.Options()[_option] = False
+
+
 class LinearSolveFailed(ArithmeticError):
     """The linear system has no usable solution: the matrix is singular, or the Krylov method stalled."""
 
