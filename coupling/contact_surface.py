@@ -9,8 +9,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from solvers.blocks import Layout
+from solvers.cell_types import CELL_TYPES
 from solvers.contact.surface import Surface
-from solvers.mesh_topology import FACET_TYPE, cut_out
+from solvers.mesh_topology import cut_out
 from solvers.structure.body import Body
 from solvers.structure.supports import prescribe, symmetric_dofs
 
@@ -32,7 +33,7 @@ def contact_surface(bodies: Sequence[Body], body: str, *surfaces: str) -> Surfac
         ".".join([body, *surfaces]),
         points,
         facets,
-        FACET_TYPE[chosen.domain.cell_type],
+        CELL_TYPES[chosen.domain.cell_type].facet,
         dofs,
         held=_held(comm, start, chosen, dofs),
         symmetric=np.isin(dofs, np.concatenate(comm.allgather(start + symmetric_dofs(chosen)))),

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.api import Array
+from solvers.cell_types import CELL_TYPES, reference_nodes
 from solvers.mesh import Mesh
-from solvers.mesh_topology import FIRST_ORDER, reference_nodes
 
 #: Distance, as a share of the mesh's extent, up to which a point beside the mesh counts as a point of it: a formula
 #: for a point on the boundary is seldom exact.
@@ -27,7 +27,7 @@ def locate(mesh: Mesh, point: Array) -> tuple[int, Array] | None:
     extent = float(np.ptp(mesh.points, axis=0).max())
     nodes = (mesh.points[mesh.cells] - point) / extent
     low, high = nodes.min(axis=1), nodes.max(axis=1)
-    room = BULGE[_degree(mesh.cell_type)] * (high - low).max(axis=1, keepdims=True) + TOLERANCE
+    room = BULGE[CELL_TYPES[mesh.cell_type].degree] * (high - low).max(axis=1, keepdims=True) + TOLERANCE
     near = np.flatnonzero(((low - room <= 0.0) & (high + room >= 0.0)).all(axis=1))
     if not len(near):
         return None
@@ -60,20 +60,16 @@ def _pull_back(cell_type: str, nodes: Array) -> tuple[Array, Array]:
 def _clip(cell_type: str, reference: Array) -> Array:
     """The points moved into the unit cell."""
     clipped = np.clip(reference, 0.0, 1.0)
-    if FIRST_ORDER[cell_type] in ("triangle", "tetra"):
+    if CELL_TYPES[cell_type].shape.simplex:
         clipped = clipped / np.maximum(clipped.sum(axis=1, keepdims=True), 1.0)
     return clipped
 
 
-def _degree(cell_type: str) -> int:
-    return 1 if FIRST_ORDER[cell_type] == cell_type else 2
-
-
 def _exponents(cell_type: str) -> Array:
     """Of the monomials that span the shape functions, shape (functions, dim)."""
-    dim, degree = reference_nodes(cell_type).shape[1], _degree(cell_type)
+    dim, degree = reference_nodes(cell_type).shape[1], CELL_TYPES[cell_type].degree
     powers = np.stack(np.meshgrid(*[np.arange(degree + 1)] * dim, indexing="ij"), axis=-1).reshape(-1, dim)
-    simplex = FIRST_ORDER[cell_type] in ("triangle", "tetra")
+    simplex = CELL_TYPES[cell_type].shape.simplex
     return powers[powers.sum(axis=1) <= degree] if simplex else powers
 
 

@@ -1,9 +1,4 @@
-"""Which nodes make the facets of a cell, and which facets make the boundary of a mesh: tables and pure numpy.
-
-Cells and facets follow VTK's node order, second-order nodes included. Facets are oriented outward: in 3D
-their nodes run counterclockwise seen from outside; in 2D the body lies on the left of the way from the first
-node to the second, so that the outward normal of an edge (dx, dy) is (dy, -dx).
-"""
+"""Which facets a mesh has, and which of them make its boundary and its named surfaces."""
 
 from __future__ import annotations
 
@@ -13,131 +8,26 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.cell_types import CELL_TYPES, Group
 from solvers.mesh import Mesh
 
 Indices = NDArray[np.int64]
-Group = tuple[int, ...]
-
-
-def _corners(count: int) -> tuple[Group, ...]:
-    return tuple((corner,) for corner in range(count))
-
-
-#: Every node of a cell as the corners whose middle it is, in VTK's order: (2,) a corner, (0, 1) a mid node.
-NODES: dict[str, tuple[Group, ...]] = {
-    "line": _corners(2),
-    "line3": (*_corners(2), (0, 1)),
-    "triangle": _corners(3),
-    "triangle6": (*_corners(3), (0, 1), (1, 2), (2, 0)),
-    "quad": _corners(4),
-    "quad9": (*_corners(4), (0, 1), (1, 2), (2, 3), (3, 0), (0, 1, 2, 3)),
-    "tetra": _corners(4),
-    "tetra10": (*_corners(4), (0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
-    "hexahedron": _corners(8),
-    "hexahedron27": (
-        *_corners(8),
-        *((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)),
-        *((0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7)),
-        (0, 1, 2, 3, 4, 5, 6, 7),
-    ),
-}
-
-#: Cell type of the same shape and first order: the cell of the corners.
-FIRST_ORDER = {
-    "line": "line",
-    "line3": "line",
-    "triangle": "triangle",
-    "triangle6": "triangle",
-    "quad": "quad",
-    "quad9": "quad",
-    "tetra": "tetra",
-    "tetra10": "tetra",
-    "hexahedron": "hexahedron",
-    "hexahedron27": "hexahedron",
-}
-
-#: Number of corners.
-CORNERS = {cell_type: len(NODES[first]) for cell_type, first in FIRST_ORDER.items()}
-
-#: Type of the facets.
-FACET_TYPE = {
-    "triangle": "line",
-    "triangle6": "line3",
-    "quad": "line",
-    "quad9": "line3",
-    "tetra": "triangle",
-    "tetra10": "triangle6",
-    "hexahedron": "quad",
-    "hexahedron27": "quad9",
-}
-
-_CORNER_POSITIONS: dict[str, tuple[tuple[float, ...], ...]] = {
-    "line": ((0,), (1,)),
-    "triangle": ((0, 0), (1, 0), (0, 1)),
-    "quad": ((0, 0), (1, 0), (1, 1), (0, 1)),
-    "tetra": ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
-    "hexahedron": (
-        *((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)),
-        *((0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)),
-    ),
-}
-
-_CORNER_FACETS: dict[str, tuple[Group, ...]] = {
-    "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
-    "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
-    "hexahedron": (
-        *((0, 3, 2, 1), (4, 5, 6, 7)),
-        *((0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
-    ),
-}
-
-_CORNER_MIRROR: dict[str, Group] = {
-    "triangle": (0, 2, 1),
-    "quad": (0, 3, 2, 1),
-    "tetra": (0, 2, 1, 3),
-    "hexahedron": (0, 3, 2, 1, 4, 7, 6, 5),
-}
-
-
-def _follow(cell_type: str, part_type: str, corners: Group) -> Group:
-    """Local nodes of that part (facet, mirrored cell) of a cell which has these corners."""
-    position = {frozenset(group): node for node, group in enumerate(NODES[cell_type])}
-    return tuple(position[frozenset(corners[i] for i in group)] for group in NODES[part_type])
-
-
-#: Local nodes of every facet of a cell, outward oriented, in the order of the facet's type.
-FACETS: dict[str, tuple[Group, ...]] = {
-    cell_type: tuple(_follow(cell_type, facet_type, facet) for facet in _CORNER_FACETS[FIRST_ORDER[cell_type]])
-    for cell_type, facet_type in FACET_TYPE.items()
-}
-
-#: Local nodes of the cell turned inside out: makes a cell of negative volume positive.
-MIRROR: dict[str, Group] = {
-    cell_type: _follow(cell_type, cell_type, _CORNER_MIRROR[FIRST_ORDER[cell_type]]) for cell_type in FACET_TYPE
-}
-
-
-def reference_nodes(cell_type: str) -> NDArray[np.float64]:
-    """Positions of the nodes in the unit cell (edges from 0 to 1), shape (nodes, dim)."""
-    corners = np.array(_CORNER_POSITIONS[FIRST_ORDER[cell_type]], dtype=float)
-    return np.array([corners[list(group)].mean(axis=0) for group in NODES[cell_type]])
 
 
 def signed_volumes(mesh: Mesh) -> NDArray[np.float64]:
     """Volumes (2D: areas) of the cells with straight edges, negative if inside out, shape (cells,)."""
-    first = FIRST_ORDER[mesh.cell_type]
-    corners = mesh.points[mesh.cells[:, : CORNERS[first]]]
+    shape = CELL_TYPES[mesh.cell_type].shape
+    corners = mesh.points[mesh.cells[:, : len(shape.corners)]]
     corners = corners - corners[:, :1]
     # the cell is the sum of the simplices between its first corner and its facets
-    simplices = [list(simplex) for facet in _CORNER_FACETS[first] for simplex in _simplices(facet)]
+    simplices = [list(simplex) for facet in shape.facets for simplex in _simplices(facet)]
     determinants = sum(np.linalg.det(corners[:, simplex]) for simplex in simplices)
     return np.asarray(determinants / factorial(mesh.points.shape[1]))
 
 
 def cell_facets(mesh: Mesh) -> Indices:
     """All facets, cell by cell, outward oriented, shape (cells * facets per cell, nodes per facet)."""
-    facets = np.array(FACETS[mesh.cell_type])
+    facets = np.array(CELL_TYPES[mesh.cell_type].facets)
     return mesh.cells[:, facets].reshape(-1, facets.shape[1])
 
 
@@ -196,7 +86,7 @@ def _simplices(facet: Group) -> list[Group]:
 
 
 def _sorted_corners(mesh: Mesh, facets: Indices) -> Indices:
-    return np.sort(facets[:, : CORNERS[FACET_TYPE[mesh.cell_type]]], axis=1)
+    return np.sort(facets[:, : CELL_TYPES[CELL_TYPES[mesh.cell_type].facet].corners], axis=1)
 
 
 def _row_ids(rows: Indices) -> Indices:

@@ -7,21 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.cell_types import CELL_TYPES
 from solvers.mesh import Mesh
-from solvers.mesh_topology import FACET_TYPE, boundary_facets, surface_facets
+from solvers.mesh_topology import boundary_facets, surface_facets
 
 Indices = NDArray[np.int64]
-
-#: Facet type -> its segments or triangles, oriented like the facet, through all of its nodes. Triangles of a
-#: second-order quad meet in its middle node, so that no diagonal is preferred.
-SIMPLICES: dict[str, tuple[tuple[int, ...], ...]] = {
-    "line": ((0, 1),),
-    "line3": ((0, 2), (2, 1)),
-    "triangle": ((0, 1, 2),),
-    "triangle6": ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
-    "quad": ((0, 1, 2), (0, 2, 3)),
-    "quad9": ((0, 4, 8), (4, 1, 8), (1, 5, 8), (5, 2, 8), (2, 6, 8), (6, 3, 8), (3, 7, 8), (7, 0, 8)),
-}
 
 
 def tessellate(mesh: Mesh, names: Sequence[str] | None = None) -> tuple[Indices, Indices]:
@@ -32,7 +22,7 @@ def tessellate(mesh: Mesh, names: Sequence[str] | None = None) -> tuple[Indices,
     """
     parts = [boundary_facets(mesh)] if names is None else [surface_facets(mesh, name) for name in names]
     facets = np.concatenate(parts)
-    split = np.array(SIMPLICES[FACET_TYPE[mesh.cell_type]])
+    split = np.array(CELL_TYPES[CELL_TYPES[mesh.cell_type].facet].simplices)
     simplices = facets[:, split].reshape(-1, split.shape[1])
     nodes, local = np.unique(simplices, return_inverse=True)
     return local.reshape(simplices.shape).astype(np.int64), nodes.astype(np.int64)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -23,3 +23,14 @@ def evaluate(value: Value, x: Array, t: float) -> Array:
 def evaluate_components(values: Sequence[Value], x: Array, t: float) -> Array:
     """A vector at points, shape (components, n)."""
     return np.stack([evaluate(value, x, t) for value in values])
+
+
+def combine(function: Callable[..., Any], *values: Value) -> Value:
+    """function(*values): a number if all of them are, else a function of place and time."""
+    if not any(callable(value) for value in values):
+        return float(function(*values))
+
+    def combined(x: Array, t: float) -> Array:
+        return function(*(value(x, t) if callable(value) else value for value in values))
+
+    return combined

@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fsci import shapes
-from solvers import fem
+from solvers.cell_types import reference_nodes
 from solvers.mesh import Mesh
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
@@ -57,7 +57,7 @@ def corner_count(mesh: Mesh) -> int:
 
 def corner_shape_functions(mesh: Mesh) -> np.ndarray:
     """Linear shape functions of the corners at all nodes of a cell, shape (nodes, corners)."""
-    nodes = np.array(fem.VTK_POINTS[mesh.cell_type], dtype=float)
+    nodes = reference_nodes(mesh.cell_type)
     corners = nodes[: corner_count(mesh)]
     if mesh.cell_type[:4] in ("tria", "tetr"):
         return np.column_stack([1 - nodes.sum(axis=1), nodes])

@@ -13,7 +13,8 @@ from solvers.contact.law.law import STICK
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
-from solvers.structure.materials import StVenantKirchhoff, lame
+from solvers.structure.elastic_constants import lame
+from solvers.structure.materials import StVenantKirchhoff
 
 E, NU, RADIUS, MU = 1000.0, 0.3, 200.0, 0.4
 HALF, EQUAL = 12.0, 1.3  # half the size of a block; cells are equal up to here

@@ -19,7 +19,8 @@ from solvers.contact.law.tresca import Tresca
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
-from solvers.structure.materials import StVenantKirchhoff, lame
+from solvers.structure.elastic_constants import lame
+from solvers.structure.materials import StVenantKirchhoff
 
 ZERO = constant(0)
 LOOSER = SolverSettings(Tolerance(residual=1e-11, residual_absolute=1e-10, max_iterations=15), linear="direct")

@@ -8,7 +8,8 @@ from structure_setup import constant, vector
 from fsci import shapes
 from solvers.contact.surface import Surface
 from solvers.structure.body import Support, Symmetry
-from solvers.structure.materials import StVenantKirchhoff, lame
+from solvers.structure.elastic_constants import lame
+from solvers.structure.materials import StVenantKirchhoff
 
 ZERO = constant(0)
 MATERIAL = StVenantKirchhoff(*lame(1e9, 0.0), 1.0)

@@ -11,7 +11,8 @@ from fsci.run.history import read_history
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
-from solvers.structure.materials import NeoHooke, lame
+from solvers.structure.elastic_constants import lame
+from solvers.structure.materials import NeoHooke
 
 ZERO = constant(0.0)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from contact_cases import BEFORE, COLLISION, PLATE, run
 
-from solvers.structure.materials import lame
+from solvers.structure.elastic_constants import lame
 
 
 @pytest.mark.parametrize(("step", "end"), [("0.02", "1.0"), ("0.005", "1.0"), ("0.00125", "0.15")])

@@ -25,7 +25,8 @@ from structure_setup import CELL_TYPES, constant, distort, vector
 from fsci import shapes
 from solvers.contact.surface import Surface
 from solvers.structure.body import Support, Traction
-from solvers.structure.materials import StVenantKirchhoff, lame
+from solvers.structure.elastic_constants import lame
+from solvers.structure.materials import StVenantKirchhoff
 
 STRETCH = 0.95
 MIXED = [

@@ -17,7 +17,8 @@ from fsci.case import load_case
 from fsci.run.checkpoint import read_checkpoint
 from fsci.run.history import read_history
 from fsci.run.run import FINISHED, resume_run, run_case
-from solvers.structure.materials import NeoHooke, lame
+from solvers.structure.elastic_constants import lame
+from solvers.structure.materials import NeoHooke
 
 
 @pytest.fixture(scope="module")

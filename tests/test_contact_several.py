@@ -13,7 +13,8 @@ from fsci import shapes
 from solvers.contact.surface import Surface
 from solvers.kernels import mortar, nodal_normals
 from solvers.structure.body import Support, Traction
-from solvers.structure.materials import NeoHooke, StVenantKirchhoff, lame
+from solvers.structure.elastic_constants import lame
+from solvers.structure.materials import NeoHooke, StVenantKirchhoff
 
 ZERO = constant(0)
 STIFF = StVenantKirchhoff(*lame(1e5, 0.0), 1.0)

@@ -13,7 +13,8 @@ from fsci import shapes
 from fsci.run.history import read_history
 from solvers.contact.surface import Surface
 from solvers.structure.body import Support
-from solvers.structure.materials import NeoHooke, lame
+from solvers.structure.elastic_constants import lame
+from solvers.structure.materials import NeoHooke
 
 NU = 0.3
 #: E and the radii of the layers

@@ -20,7 +20,8 @@ from fsci import shapes
 from fsci.run.history import read_history
 from solvers.mesh import Mesh
 from solvers.structure.body import Support
-from solvers.structure.materials import NeoHooke, lame
+from solvers.structure.elastic_constants import lame
+from solvers.structure.materials import NeoHooke
 
 ZERO = constant(0)
 SOFT, STIFF = (NeoHooke(*lame(E, 0.32)) for E in (68.96, 689.6))

@@ -10,7 +10,8 @@ from test_structure_tangent import tangent_error
 from fsci import shapes
 from fsci.run.history import read_history
 from solvers.structure.body import Pressure, Support, Symmetry, Traction
-from solvers.structure.materials import LinearElastic, PlaneStressLinearElastic, lame, plane_stress_lambda
+from solvers.structure.elastic_constants import lame, plane_stress_lambda
+from solvers.structure.materials import LinearElastic, PlaneStressLinearElastic
 from solvers.structure.time import Dynamics
 from solvers.time import GeneralisedAlpha
 

@@ -15,7 +15,8 @@ from solvers.api import StepFailed
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Pressure, Support, Traction
-from solvers.structure.materials import LinearElastic, NeoHooke, lame
+from solvers.structure.elastic_constants import lame
+from solvers.structure.materials import LinearElastic, NeoHooke
 from solvers.structure.time import Dynamics
 from solvers.time import GeneralisedAlpha
 

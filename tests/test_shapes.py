@@ -7,13 +7,11 @@ import pytest
 from cell_geometry import smallest_determinant, volume, vtk_nodes
 
 from fsci import shapes
+from solvers.cell_types import CELL_TYPES
 from solvers.mesh import Mesh
 from solvers.mesh_topology import (
-    FACET_TYPE,
-    FACETS,
     boundary_facets,
     cell_facets,
-    reference_nodes,
     signed_volumes,
     surface_facets,
 )
@@ -195,13 +193,13 @@ def test_impossible_shape_is_refused(make, message):
         make()
 
 
-@pytest.mark.parametrize("cell_type", FACETS)
+@pytest.mark.parametrize("cell_type", [name for name, record in CELL_TYPES.items() if record.facet])
 def test_nodes_and_facets_are_those_of_vtk(cell_type):
     nodes = vtk_nodes(cell_type)
-    assert np.allclose(reference_nodes(cell_type), nodes)
-    corners = {"line": 2, "line3": 2, "triangle": 3, "triangle6": 3, "quad": 4, "quad9": 4}[FACET_TYPE[cell_type]]
-    pattern = reference_nodes(FACET_TYPE[cell_type])
-    for facet in FACETS[cell_type]:
+    assert np.allclose(CELL_TYPES[cell_type].reference_nodes, nodes)
+    corners = {"line": 2, "line3": 2, "triangle": 3, "triangle6": 3, "quad": 4, "quad9": 4}[CELL_TYPES[cell_type].facet]
+    pattern = CELL_TYPES[CELL_TYPES[cell_type].facet].reference_nodes
+    for facet in CELL_TYPES[cell_type].facets:
         x = nodes[list(facet)]
         # the nodes lie on the facet as on the unit cell of its type
         span = (x[[1, 2]] if corners == 3 else x[[1, corners - 1]]) - x[0]

@@ -5,14 +5,13 @@ import pytest
 from structure_setup import block, constant, distort, make_structure, vector
 
 from solvers.structure.body import Pressure, Support
+from solvers.structure.elastic_constants import lame, plane_stress_lambda
 from solvers.structure.materials import (
     CoupNeoHooke,
     MooneyRivlin,
     NeoHooke,
     PlaneStressStVenantKirchhoff,
     StVenantKirchhoff,
-    lame,
-    plane_stress_lambda,
 )
 from solvers.structure.time import Damping, Dynamics
 from solvers.time import GeneralisedAlpha

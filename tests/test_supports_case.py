@@ -10,7 +10,7 @@ from fsci.case import CaseError, load_case
 from fsci.meshes.mesh import build_mesh, extract_region
 from fsci.run.history import read_history
 from fsci.run.run import FINISHED, run_case
-from solvers.structure.materials import lame
+from solvers.structure.elastic_constants import lame
 
 ROOT = Path(__file__).parents[1]
 

@@ -18,9 +18,9 @@ from structure_setup import distort
 
 from fsci import shapes
 from solvers import fem
-from solvers.contact.surface import KERNEL_TYPES
+from solvers.cell_types import CELL_TYPES
 from solvers.kernels import basis_transformation, mortar, nodal_normals
-from solvers.mesh_topology import FACET_TYPE, cut_out
+from solvers.mesh_topology import cut_out
 
 
 def tie(xs, fs, slave, xm, fm, master):
@@ -144,7 +144,7 @@ def condensation(parts, n):
     (xs, fs, slave), (xm, fm, master) = (
         cut_out(piece.mesh, [name]) for piece, name in zip(parts, ("top", "bottom"), strict=True)
     )
-    types = [KERNEL_TYPES[FACET_TYPE[piece.mesh.cell_type]] for piece in parts]
+    types = [CELL_TYPES[CELL_TYPES[piece.mesh.cell_type].facet].kernel for piece in parts]
     P = sp.coo_matrix(tie(xs, fs, types[0], xm, fm, types[1]))
     slave, master = parts[0].dofs[slave], n[0] + parts[1].dofs[master]
     keep = np.ones(sum(n))

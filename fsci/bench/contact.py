@@ -12,10 +12,10 @@ import numpy as np
 from fsci import shapes
 from fsci.bench.program import run_case
 from fsci.bench.table import Row
+from solvers.cell_types import CELL_TYPES
 from solvers.contact.search import Search, measure_search
-from solvers.contact.surface import KERNEL_TYPES
 from solvers.kernels import mortar, nodal_normals
-from solvers.mesh_topology import FACET_TYPE, surface_facets
+from solvers.mesh_topology import surface_facets
 
 TORI = Path(__file__).parents[2] / "cases" / "two_tori"
 
@@ -45,7 +45,7 @@ def _wavy_side(cell: str, order: int, cells: int, name: str) -> tuple[Any, Any, 
     x, y, z = mesh.points.T
     bent = np.ascontiguousarray(np.stack([x, y, z + 0.05 * np.sin(3 * x) * np.cos(2 * y)], axis=1))
     facets = np.ascontiguousarray(surface_facets(mesh, name), dtype=np.int64)
-    return bent, facets, KERNEL_TYPES[FACET_TYPE[mesh.cell_type]]
+    return bent, facets, CELL_TYPES[CELL_TYPES[mesh.cell_type].facet].kernel
 
 
 def measure_kernel(slave: tuple[Any, Any, str], master: tuple[Any, Any, str]) -> Row:

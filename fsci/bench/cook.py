@@ -13,9 +13,10 @@ from fsci.bench.table import Row
 from solvers.mesh import Mesh
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body, Support, Traction
+from solvers.structure.elastic_constants import lame
 from solvers.structure.elements import Formulation
 from solvers.structure.field import Structure
-from solvers.structure.materials import LinearElastic, lame
+from solvers.structure.materials import LinearElastic
 
 #: cell, order, element, cells along an edge
 MESHES: tuple[tuple[str, int, Formulation, tuple[int, ...]], ...] = (

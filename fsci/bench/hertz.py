@@ -24,8 +24,9 @@ from solvers.mesh import Mesh
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body, Support
+from solvers.structure.elastic_constants import lame
 from solvers.structure.field import Structure
-from solvers.structure.materials import NeoHooke, lame
+from solvers.structure.materials import NeoHooke
 
 Array = np.ndarray
 

@@ -20,9 +20,10 @@ from fsci.case import Case, CaseError
 from fsci.case.contact import Pair, Side
 from fsci.case.material import Material
 from fsci.case.supports import Support
-from fsci.expression import Expression
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body
 from solvers.mesh import Mesh
+from solvers.structure.elastic_constants import young
+from solvers.values import combine, evaluate
 
 Array = NDArray[np.float64]
 
@@ -155,16 +156,4 @@ def _holds(support: Support, face: Face) -> bool:
 
 def _youngs_modulus(material: Material, points: Array) -> float:
     """The mean of Young's modulus [Pa] at these points, shape (dim, n), for small strains."""
-
-    def at(formula: Expression | None) -> Array:
-        return np.zeros(points.shape[1]) if formula is None else formula(points, 0.0)
-
-    if material.law == "mooney_rivlin":
-        shear, bulk = 2.0 * (at(material.c10) + at(material.c01)), at(material.bulk)
-        return float(np.mean(9.0 * bulk * shear / (3.0 * bulk + shear)))
-    if material.E is not None:
-        return float(np.mean(at(material.E)))
-    mu, lmbda = at(material.mu), at(material.lmbda)
-    if material.lmbda is None:
-        return float(np.mean(2.0 * mu * (1.0 + at(material.nu))))
-    return float(np.mean(mu * (3.0 * lmbda + 2.0 * mu) / (lmbda + mu)))
+    return float(np.mean(evaluate(combine(young, *material.lame), points, 0.0)))

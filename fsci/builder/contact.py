@@ -14,6 +14,7 @@ from fsci.case import Case, CaseError
 from fsci.case.contact import Pair as PairSettings
 from fsci.meshes.of_case import read_obstacle, read_rigid_body
 from solvers.api import Array
+from solvers.cell_types import CELL_TYPES
 from solvers.contact.contact import Contact
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless
@@ -22,7 +23,7 @@ from solvers.contact.law.tied import Tied
 from solvers.contact.law.tresca import Tresca
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
-from solvers.mesh_topology import FACET_TYPE, cut_out
+from solvers.mesh_topology import cut_out
 from solvers.structure.body import Body
 
 
@@ -83,7 +84,7 @@ def _rigid_mesh(case: Case, name: str) -> tuple[Array, NDArray[np.int64], str]:
         assert case.fluid is not None
         mesh = read_rigid_body(case, name)[0]
         points, facets, _ = cut_out(mesh, case.fluid.bodies[name].on)
-    return points, facets, FACET_TYPE[mesh.cell_type]
+    return points, facets, CELL_TYPES[mesh.cell_type].facet
 
 
 def _motion(case: Case, name: str, points: Array) -> Callable[[float], Array] | None:

@@ -13,18 +13,38 @@ from fsci.builder.locations import Locations, find_locations
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.probes import Probe
+from fsci.case.structure import Body as BodySettings
+from fsci.case.values import value_of
 from fsci.meshes.of_case import VECTORS, read_body
 from solvers.constraint import Constraint
 from solvers.mesh import Mesh
 from solvers.solver_settings import SolverSettings
-from solvers.structure import materials, probes
+from solvers.structure import probes
 from solvers.structure.body import Body
+from solvers.structure.elastic_constants import plane_stress_lambda
 from solvers.structure.field import Structure
+from solvers.structure.materials import (
+    CoupNeoHooke,
+    LinearElastic,
+    Material,
+    MooneyRivlin,
+    NeoHooke,
+    PlaneStressLinearElastic,
+    PlaneStressStVenantKirchhoff,
+    StVenantKirchhoff,
+)
 from solvers.structure.supports import SupportError
 from solvers.structure.time import Damping, Dynamics, Statics, TimeScheme
 from solvers.time import GeneralisedAlpha
 from solvers.timing import Timer
-from solvers.values import Value
+from solvers.values import combine
+
+LAWS: dict[str, Callable[..., Material]] = {
+    "st_venant_kirchhoff": StVenantKirchhoff,
+    "neo_hooke": NeoHooke,
+    "coup_neo_hooke": CoupNeoHooke,
+    "mooney_rivlin": MooneyRivlin,
+}
 
 
 def build_bodies(case: Case, comm: MPI.Comm) -> list[Body]:
@@ -90,59 +110,16 @@ def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Loca
     return meshes, locations
 
 
-def _material(body, plane: str) -> materials.Material:
+def _material(body: BodySettings, plane: str) -> Material:
     settings = body.material
-    density = _parameter(settings.density) if settings.density is not None else 0.0
+    density = 0.0 if settings.density is None else value_of(settings.density)
+    mu, lmbda = settings.lame
+    if plane == "stress":
+        law = PlaneStressLinearElastic if body.kinematics == "linear" else PlaneStressStVenantKirchhoff
+        return law(mu, combine(plane_stress_lambda, mu, lmbda), density)
     if body.kinematics == "linear":
-        mu, lmbda = _lame(settings)
-        if plane == "stress":
-            return materials.PlaneStressLinearElastic(mu, _combine(materials.plane_stress_lambda, mu, lmbda), density)
-        return materials.LinearElastic(mu, lmbda, density)
-    if settings.law == "mooney_rivlin":
-        c10, c01, bulk = (_parameter(p) for p in (settings.c10, settings.c01, settings.bulk))
-        return materials.MooneyRivlin(c10, c01, bulk, density)
-    mu, lmbda = _lame(settings)
-    if settings.law == "st_venant_kirchhoff" and plane == "stress":
-        lmbda = _combine(materials.plane_stress_lambda, mu, lmbda)
-        return materials.PlaneStressStVenantKirchhoff(mu, lmbda, density)
-    law: Any = {
-        "st_venant_kirchhoff": materials.StVenantKirchhoff,
-        "neo_hooke": materials.NeoHooke,
-        "coup_neo_hooke": materials.CoupNeoHooke,
-    }[settings.law]
-    return law(mu, lmbda, density)
-
-
-def _lame(settings) -> tuple[Value, Value]:
-    """(mu, lambda) at small strain from the constants that the case gives."""
-    if settings.law == "mooney_rivlin":
-        c10, c01, bulk = (_parameter(p) for p in (settings.c10, settings.c01, settings.bulk))
-        mu = _combine(lambda c10, c01: 2 * (c10 + c01), c10, c01)
-        return mu, _combine(lambda bulk, mu: bulk - 2 * mu / 3, bulk, mu)
-    if settings.E is not None:
-        E, nu = _parameter(settings.E), _parameter(settings.nu)
-        pair = [_combine(lambda E, nu, i=i: materials.lame(E, nu)[i], E, nu) for i in (0, 1)]
-        return pair[0], pair[1]
-    mu = _parameter(settings.mu)
-    if settings.lmbda is not None:
-        return mu, _parameter(settings.lmbda)
-    return mu, _combine(lambda mu, nu: 2.0 * mu * nu / (1.0 - 2.0 * nu), mu, _parameter(settings.nu))
-
-
-def _parameter(expression) -> Value:
-    return expression if expression.constant is None else float(expression.constant)
-
-
-def _combine(function: Callable[..., Any], *parameters: Value) -> Value:
-    """function(*parameters), where some may be fields."""
-    numbers = [p for p in parameters if not callable(p)]
-    if len(numbers) == len(parameters):
-        return float(function(*numbers))
-
-    def combined(x, t):
-        return function(*(p(x, t) if callable(p) else p for p in parameters))
-
-    return combined
+        return LinearElastic(mu, lmbda, density)
+    return LAWS[settings.law](*settings.parameters, density)
 
 
 # ---------------------------------------------------------------------------------------------------------- probes

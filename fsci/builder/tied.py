@@ -9,12 +9,13 @@ import numpy as np
 
 from fsci.case import Case
 from fsci.meshes.of_case import read_obstacle
+from solvers.cell_types import CELL_TYPES
 from solvers.contact.law.tied import Tied
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
 from solvers.contact.ties import relocated
 from solvers.mesh import Mesh
-from solvers.mesh_topology import FACET_TYPE, cut_out
+from solvers.mesh_topology import cut_out
 
 #: Motion of nodes, relative to the surface, that is none.
 ROUNDING = 1e-13
@@ -35,7 +36,7 @@ def join_tied(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
             mesh = meshes[side.body] if side.body is not None else read_obstacle(case, side.obstacle or "")
             names = side.on or contact.obstacles[side.obstacle or ""].on
             points, facets, at = cut_out(mesh, names)
-            sides.append(Surface(name, points, facets, FACET_TYPE[mesh.cell_type], None))
+            sides.append(Surface(name, points, facets, CELL_TYPES[mesh.cell_type].facet, None))
             nodes.append(at)
         moved = relocated(Pair(sides[0], sides[1], settings.integration, Tied()))
         if moved is None:

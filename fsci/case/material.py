@@ -7,10 +7,18 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import NotNegativeFormula, PoissonFormula, PositiveFormula, SpaceFormula, chosen
+from fsci.case.values import NotNegativeFormula, PoissonFormula, PositiveFormula, SpaceFormula, chosen, value_of
+from fsci.expression import Expression
+from solvers.structure import elastic_constants as constants
+from solvers.values import Value, combine
 
 DENSITY = "mass per reference volume; default: 0, which does for statics without gravity and probes of mass"
 PAIRS = ({"E", "nu"}, {"lambda", "mu"}, {"mu", "nu"})
+
+
+def _values(*settings: Expression | None) -> list[Value]:
+    """Of those settings that are given."""
+    return [value_of(setting) for setting in settings if setting is not None]
 
 
 class Elastic(Section):
@@ -30,8 +38,8 @@ class Elastic(Section):
 
     @model_validator(mode="after")
     def _two_constants(self) -> Elastic:
-        constants = {"E": self.E, "nu": self.nu, "lambda": self.lmbda, "mu": self.mu}
-        given = [name for name, value in constants.items() if value is not None]
+        settings = {"E": self.E, "nu": self.nu, "lambda": self.lmbda, "mu": self.mu}
+        given = [name for name, value in settings.items() if value is not None]
         if set(given) not in PAIRS:
             raise fault(
                 f"law '{self.law}' needs two constants, either E and nu, or lambda and mu, or mu and nu; "
@@ -42,10 +50,22 @@ class Elastic(Section):
             if lmbda is not None and mu is not None and lmbda <= -2 * mu / 3:
                 raise fault(f"must be greater than -2/3 mu, {-2 * mu / 3:g}, not {lmbda:g}", "lambda")
         for name in ("nu", "lambda"):
-            value = constants[name]
+            value = settings[name]
             if self.law == "coup_neo_hooke" and value and value.constant is not None and value.constant < 0:
                 raise fault("must be at least 0 for the law 'coup_neo_hooke'", name)
         return self
+
+    @property
+    def lame(self) -> tuple[Value, Value]:
+        """(mu, lambda)."""
+        [mu] = _values(self.mu) or [combine(constants.shear, *_values(self.E, self.nu))]
+        [lmbda] = _values(self.lmbda) or [combine(constants.lambda_of_poisson, mu, *_values(self.nu))]
+        return mu, lmbda
+
+    @property
+    def parameters(self) -> tuple[Value, ...]:
+        """The arguments of the law before the density."""
+        return self.lame
 
 
 class MooneyRivlin(Section):
@@ -63,6 +83,18 @@ class MooneyRivlin(Section):
         if c10 is not None and c01 is not None and c10 + c01 <= 0:
             raise fault(f"the sum of c10 and c01 must be greater than 0, not {c10 + c01:g}", "c10")
         return self
+
+    @property
+    def lame(self) -> tuple[Value, Value]:
+        """(mu, lambda) at small strains."""
+        c10, c01, bulk = self.parameters
+        mu = combine(lambda c10, c01: 2 * (c10 + c01), c10, c01)
+        return mu, combine(constants.lambda_of_bulk, mu, bulk)
+
+    @property
+    def parameters(self) -> tuple[Value, ...]:
+        """The arguments of the law before the density."""
+        return value_of(self.c10), value_of(self.c01), value_of(self.bulk)
 
 
 def has_mass(material: Elastic | MooneyRivlin) -> bool:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fsci.case.case import Case
-from fsci.case.material import Elastic, Material
+from fsci.case.material import Material
 from fsci.case.mesh import FileMesh, Shape
 from fsci.case.plausible_flow import flow_doubts
 from fsci.case.structure import Body
 from fsci.case.yaml_text import Keys
 from fsci.check.estimate import aspect
+from solvers.structure.elastic_constants import poisson, young
 
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from aerogel to osmium, with a margin
 STIFFNESSES = (1.0, 2e12)  #: [Pa] Young's modulus from the softest gel to diamond, with a margin
@@ -35,8 +36,11 @@ def doubts(case: Case) -> Iterator[tuple[Keys, str]]:
 
 
 def _locking(body: Body, keys: Keys) -> Iterator[tuple[Keys, str]]:
-    nu = poisson(body.material)
-    if nu is None or nu < LOCKING or body.element == "mixed" or body.mesh.order > 1 or _order_from_file(body.mesh):
+    constants = _constants(body.material)
+    if constants is None or body.element == "mixed" or body.mesh.order > 1 or _order_from_file(body.mesh):
+        return
+    nu = poisson(*constants)
+    if nu < LOCKING:
         return
     simplices = isinstance(body.mesh, Shape) and body.mesh.cell in ("tri", "tet")
     remedy = "'order: 2'" if simplices else "'element: mixed' or 'order: 2'"
@@ -54,40 +58,13 @@ def _material(case: Case, material: Material, keys: Keys) -> Iterator[tuple[Keys
         unit = f"{units.mass}/{units.length}^3"
         value = f"{density:g} {unit} is {density * units.density:.3g} kg/m^3"
         yield (*keys, "density"), f"implausible density: {value}; check 'units'"
-    stiffness = young(material)
-    if stiffness is not None and not STIFFNESSES[0] <= stiffness * units.stress <= STIFFNESSES[1]:
-        key = "E" if isinstance(material, Elastic) and material.E is not None else "law"
-        yield (
-            (*keys, key),
-            f"implausible stiffness: Young's modulus is {stiffness * units.stress:.3g} Pa; check 'units'",
-        )
+    constants = _constants(material)
+    if constants is not None and not STIFFNESSES[0] <= (E := young(*constants) * units.stress) <= STIFFNESSES[1]:
+        key = "E" if getattr(material, "E", None) is not None else "law"
+        yield (*keys, key), f"implausible stiffness: Young's modulus is {E:.3g} Pa; check 'units'"
 
 
-def young(material: Material) -> float | None:
-    """Young's modulus at small strains, in the case's unit; None if it varies."""
-    nu, mu = poisson(material), shear(material)
-    return None if nu is None or mu is None else 2 * mu * (1 + nu)
-
-
-def shear(material: Material) -> float | None:
-    """The shear modulus at small strains, in the case's unit; None if it varies."""
-    if not isinstance(material, Elastic):
-        c10, c01 = material.c10.constant, material.c01.constant
-        return None if c10 is None or c01 is None else 2 * (c10 + c01)
-    if material.mu is not None:
-        return material.mu.constant
-    E, nu = None if material.E is None else material.E.constant, poisson(material)
-    return None if E is None or nu is None else E / 2 / (1 + nu)
-
-
-def poisson(material: Material) -> float | None:
-    """Poisson's ratio at small strains; None if it varies."""
-    if isinstance(material, Elastic) and material.nu is not None:
-        return material.nu.constant
-    mu = shear(material)
-    if isinstance(material, Elastic):
-        lmbda = None if material.lmbda is None else material.lmbda.constant
-    else:
-        bulk = material.bulk.constant
-        lmbda = None if bulk is None or mu is None else bulk - 2 * mu / 3
-    return None if mu is None or lmbda is None else lmbda / (2 * (lmbda + mu))
+def _constants(material: Material) -> tuple[float, float] | None:
+    """(mu, lambda) at small strains, in the case's unit; None if they vary."""
+    mu, lmbda = material.lame
+    return None if callable(mu) or callable(lmbda) else (mu, lmbda)

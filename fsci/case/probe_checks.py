@@ -9,7 +9,7 @@ from fsci.case.errors import did_you_mean, listed
 from fsci.case.fluid import Fluid
 from fsci.case.material import has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, surface_mistakes
-from fsci.case.probes import COEFFICIENTS, RESERVED, Probe, Reference
+from fsci.case.probes import RESERVED, Probe, Reference
 from fsci.case.structure import Structure
 from fsci.case.verify import (
     BODY_COLUMN,
@@ -20,9 +20,6 @@ from fsci.case.verify import (
     RUN_COLUMNS,
 )
 from fsci.case.yaml_text import Keys
-
-OF_BODIES = ("force", "moment", *COEFFICIENTS)
-NEEDS_MASS = ("momentum", "angular_momentum", "mass", "centre")
 
 
 def field_of(case: Case, probe: Probe) -> str | None:
@@ -79,16 +76,17 @@ def _of_structure(structure: Structure, name: str, probe: Probe) -> Iterator[Mis
     measured = [bodies[probe.body]] if probe.body else list(bodies.values())
     if probe.on is not None:
         yield from surface_mistakes(measured[0].mesh, probe.on, (*keys, "on"))
-    if probe.quantity in ("velocity", "acceleration") and structure.dynamics is None:
+    needs = probe.measured.needs
+    if "dynamics" in needs and structure.dynamics is None:
         yield (*keys, "quantity"), f"quantity '{probe.quantity}' needs 'dynamics' in 'structure'"
-    if probe.quantity in NEEDS_MASS and not all(has_mass(body.material) for body in measured):
+    if "density" in needs and not all(has_mass(body.material) for body in measured):
         yield (*keys, "quantity"), f"quantity '{probe.quantity}' needs the 'density' of the material"
 
 
 def _of_fluid(case: Case, fluid: Fluid, name: str, probe: Probe) -> Iterator[Mistake]:
     keys, grid = ("probes", name), fluid.grid
     bodies = [*fluid.bodies, *(case.elastic_bodies if case.coupling is not None else ())]
-    if probe.quantity not in OF_BODIES:
+    if "body" not in probe.measured.needs:
         if probe.body is not None:
             yield (*keys, "body"), f"quantity '{probe.quantity}' of the fluid is not that of a body"
     elif probe.body is not None and probe.body not in bodies:

@@ -2,37 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from pydantic import model_validator
 
+from fsci.case.quantities import FIELDS, PLACES, QUANTITIES, Field, Quantity, described
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import Name, NumberVector, Positive, Text
 
-#: what can be measured where, by the setting that says where; "" is none of them
-STRUCTURE = {
-    "at": ("displacement", "velocity", "acceleration"),
-    "on": ("reaction", "traction", "displacement", "area"),
-    "pair": ("gap", "pressure", "first_contact"),
-    "": ("energy", "momentum", "angular_momentum", "mass", "volume", "centre"),
-}
-FLUID = {
-    "at": ("velocity", "pressure"),
-    "on": ("pressure",),
-    "through": ("flow_rate",),
-    "": ("force", "drag_coefficient", "lift_coefficient", "moment", "kinetic_energy", "dissipation", "volume"),
-}
-FIELDS = {"structure": STRUCTURE, "fluid": FLUID}
-PLACES = {"pair": "'pair: PAIR'", "at": "'at: [..]'", "on": "'on: SURFACE'", "through": "'through: PATCH'"}
-COEFFICIENTS = ("drag_coefficient", "lift_coefficient")
-ENERGIES = ("kinetic", "internal", "work", "total")
-#: quantities of one column
-SCALARS = (
-    *("area", "gap", "first_contact", "mass", "volume", "pressure", "flow_rate", "kinetic_energy", "dissipation"),
-    *COEFFICIENTS,
-)
 #: columns of history.csv that cannot be names of probes
 RESERVED = ("step", "time", "dt", "iterations", "wall", "residual")
+
+if TYPE_CHECKING:
+    QuantityName: TypeAlias = str
+else:
+    QuantityName = Literal[tuple(QUANTITIES)]
 
 
 class Reference(Section):
@@ -50,61 +34,28 @@ class Reference(Section):
 
 
 class Probe(Section):
-    """A quantity that every step writes to history.csv.
+    __doc__ = f"""A quantity that every step writes to history.csv.
 
-    Of the structure:
+Of the structure, points being those of the reference configuration:
 
-    - with `at`, at a point (reference coordinates): displacement, velocity, acceleration
-    - with `on`, on a surface: reaction (force of supports and springs), traction (integral of P N over the reference
-      surface), displacement (mean over the area), area
-    - with `pair`, of a pair of contact: gap (distance of the slave nodes to the master) and pressure (at the slave
-      nodes), the `extreme` of all nodes, or at the node nearest to the point `at`; first_contact (time of the end of
-      the first step in which the pair touches, nan before)
-    - with none of them, of the body: energy, momentum, angular_momentum, mass, volume, centre (of mass)
+{described("structure")}
 
-    Of the fluid:
+Of a pair of contact it is the `extreme` of all slave nodes, or the value of the node nearest to the point `at`.
 
-    - with `at`, at a point: velocity, pressure; nan while a body covers the point; with `minus` too, the difference
-    - with `on`, on a patch: pressure (mean over the area)
-    - with `through`, out of the box through a patch: flow_rate (volume per time)
-    - with none of them: force of the fluid on the `body` and its moment; drag_coefficient and lift_coefficient of
-      that force, which need a `reference`; kinetic_energy, dissipation (power) and volume of all fluid
+Of the fluid; at a point that a body covers it is nan, with `minus` it is a difference:
 
-    Vectors have the columns NAME.x, NAME.y, NAME.z (the last one in 3D); energy, always of all bodies, has
-    NAME.kinetic, NAME.internal, NAME.work (of loads and supports) and NAME.total (kinetic + internal); all others,
-    angular_momentum and moment in 2D too, have the column NAME. In 2D everything is per unit of depth.
-    """
+{described("fluid")}
 
-    field: Literal["structure", "fluid"] | None = setting(
-        None, "which field is measured, where quantity and body do not tell"
-    )
+Vectors have the columns NAME.x, NAME.y, NAME.z (the last one in 3D); energy has NAME.kinetic, NAME.internal, NAME.work
+(of loads and supports) and NAME.total (kinetic + internal); all others, angular_momentum and moment in 2D too, have the
+column NAME. In 2D everything is per unit of depth.
+"""
+
+    field: Field | None = setting(None, "which field is measured, where quantity and body do not tell")
     body: Name | None = setting(
         None, "name of the body; default: the only one, or all bodies together where neither `at` nor `on` is given"
     )
-    quantity: Literal[
-        "displacement",
-        "velocity",
-        "acceleration",
-        "reaction",
-        "traction",
-        "area",
-        "energy",
-        "momentum",
-        "angular_momentum",
-        "mass",
-        "volume",
-        "centre",
-        "pressure",
-        "flow_rate",
-        "force",
-        "drag_coefficient",
-        "lift_coefficient",
-        "moment",
-        "kinetic_energy",
-        "dissipation",
-        "gap",
-        "first_contact",
-    ] = setting(..., "what is measured")
+    quantity: QuantityName = setting(..., "what is measured")
     at: NumberVector | None = setting(None, "point; of a structure, in reference coordinates", unit="m")
     on: Text | None = setting(None, "name of a surface, or of a patch of the fluid")
     minus: NumberVector | None = setting(
@@ -126,7 +77,12 @@ class Probe(Section):
     @property
     def fields(self) -> list[str]:
         """The fields in which there is such a quantity at such a place."""
-        return [name for name, table in FIELDS.items() if self.quantity in table.get(self.place, ())]
+        return [field for field in FIELDS if self.place in self.measured.places(field)]
+
+    @property
+    def measured(self) -> Quantity:
+        """What is known of its quantity."""
+        return QUANTITIES[self.quantity]
 
     @model_validator(mode="after")
     def _measurable(self) -> Probe:
@@ -138,18 +94,17 @@ class Probe(Section):
         if self.about is not None and self.quantity != "moment":
             raise fault(f"'about' is for the quantity 'moment', not '{self.quantity}'", "about")
         self._check_extreme()
-        if self.quantity in COEFFICIENTS and self.reference is None:
+        needed = "reference" in self.measured.needs
+        if needed and self.reference is None:
             raise fault(f"quantity '{self.quantity}' needs the setting 'reference'")
-        if self.quantity not in COEFFICIENTS and self.reference is not None:
+        if not needed and self.reference is not None:
             raise fault(f"'reference' is for coefficients of drag and lift, not for '{self.quantity}'", "reference")
         if self.minus is not None and self.place != "at":
             raise fault("'minus' is the second point of a difference: give the first one as 'at'", "minus")
         if self.fields:
             return self
-        possible = [
-            words for name, words in PLACES.items() if any(self.quantity in t.get(name, ()) for t in FIELDS.values())
-        ]
-        whole = "fluid" if self.quantity in ("kinetic_energy", "dissipation") else "body"
+        possible = [words for name, words in PLACES.items() if any(name in self.measured.places(f) for f in FIELDS)]
+        whole = "body" if self.measured.structure or "body" in self.measured.needs else "fluid"
         whole = f"belongs to the whole {whole}: no 'at', no 'on'"
         wanted = f"needs {' or '.join(possible)}" if possible else whole
         raise fault(f"quantity '{self.quantity}' {wanted}", self.place or "quantity")
@@ -165,11 +120,4 @@ class Probe(Section):
 
     def columns(self, name: str, dimension: int) -> tuple[str, ...]:
         """The columns of history.csv that the probe called `name` fills."""
-        match self.quantity:
-            case "energy":
-                return tuple(f"{name}.{part}" for part in ENERGIES)
-            case _ if self.quantity in SCALARS:
-                return (name,)
-            case "angular_momentum" | "moment" if dimension == 2:
-                return (name,)
-        return tuple(f"{name}.{axis}" for axis in "xyz"[:dimension])
+        return self.measured.columns(name, dimension)

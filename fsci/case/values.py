@@ -23,6 +23,7 @@ from pydantic_core.core_schema import no_info_before_validator_function
 from fsci.case.errors import did_you_mean, listed
 from fsci.case.section import fault
 from fsci.expression import VARIABLES, Expression, ExpressionError
+from solvers.values import Value
 
 #: Size above which cubes of a number and products of three overflow.
 LARGEST = 1e100
@@ -44,6 +45,11 @@ def spoken(value: Any) -> str:
             return "a section"
         case _:
             return "a list"
+
+
+def value_of(expression: Expression) -> Value:
+    """A number where the expression is one, else the expression itself: a function of place and time."""
+    return expression if expression.constant is None else float(expression.constant)
 
 
 def _expression(value: Any, wanted: str, variables: str, functions: Mapping[str, Any] | None = None) -> Expression:

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from solvers.cell_types import CELL_TYPES
 from solvers.contact.dual_tree import neighbours
 from solvers.mesh import Mesh
-from solvers.mesh_topology import CORNERS, FACET_TYPE, cut_out
+from solvers.mesh_topology import cut_out
 
 #: Angle between neighbouring facets from which on an edge is sharp [degrees]; a ring of five facets has 72.
 SHARP = 75.0
@@ -18,7 +19,7 @@ def sharpest_edge(mesh: Mesh, names: Sequence[str]) -> float:
     """Largest angle [degrees] by which the normal turns from a facet to its neighbour; 0 for one facet."""
     points, facets, _ = cut_out(mesh, names)
     dim = points.shape[1]
-    corners = facets[:, : CORNERS[FACET_TYPE[mesh.cell_type]]]
+    corners = facets[:, : CELL_TYPES[CELL_TYPES[mesh.cell_type].facet].corners]
     x = points[corners]
     if dim == 2:
         along = x[:, 1] - x[:, 0]

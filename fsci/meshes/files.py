@@ -15,19 +15,18 @@ from numpy.typing import NDArray
 
 from fsci.meshes.scripts import RefusedScript, require_harmless
 from fsci.meshes.serendipity import FULL, complete
+from solvers.cell_types import CELL_TYPES, reference_nodes
 from solvers.mesh import Mesh
 from solvers.mesh_topology import (
-    CORNERS,
-    FACET_TYPE,
-    FIRST_ORDER,
-    MIRROR,
     boundary_facets,
     find_facets,
-    reference_nodes,
     signed_volumes,
 )
 
 Indices = NDArray[np.int64]
+
+#: Types of cells that a mesh may have.
+MESHED = tuple(name for name, cell_type in CELL_TYPES.items() if cell_type.facet)
 
 #: Endings of gmsh's scripts.
 SCRIPTS = (".geo", ".geo_unrolled")
@@ -52,6 +51,12 @@ class Block:
     cell_type: str
     dim: int
     nodes: Indices  #: shape (cells, nodes per cell)
+
+    @property
+    def first_order(self) -> str:
+        """Type of the cell of the corners; none of an unknown type."""
+        known = CELL_TYPES.get(self.cell_type)
+        return "" if known is None else known.first_order
 
 
 @dataclass(frozen=True)
@@ -97,8 +102,8 @@ def _mesh(content: Content) -> Mesh:
     if dim < 2:
         raise MeshError("the file has no cells of two or three dimensions")
     types = sorted({block.cell_type for block in content.blocks if block.dim == dim})
-    if len(types) > 1 or types[0] not in FACET_TYPE:
-        allowed = ", ".join(FACET_TYPE)
+    if len(types) > 1 or types[0] not in MESHED:
+        allowed = ", ".join(MESHED)
         raise MeshError(f"the cells are {' and '.join(types)}; all must be of one type, one of {allowed}")
     cell_type = types[0]
 
@@ -151,7 +156,7 @@ def _positive(mesh: Mesh) -> Indices:
     volumes = signed_volumes(mesh)
     if (volumes == 0).any():
         raise MeshError(f"cells without volume: {np.count_nonzero(volumes == 0)}")
-    return np.where(volumes[:, None] > 0, mesh.cells, mesh.cells[:, MIRROR[mesh.cell_type]])
+    return np.where(volumes[:, None] > 0, mesh.cells, mesh.cells[:, CELL_TYPES[mesh.cell_type].mirror])
 
 
 def _regions(content: Content, dim: int, place: Indices) -> dict[str, Indices]:
@@ -167,11 +172,11 @@ def _regions(content: Content, dim: int, place: Indices) -> dict[str, Indices]:
 
 def _surfaces(content: Content, mesh: Mesh, index: Indices) -> dict[str, Indices]:
     """Groups of facets, and sets of points that cover facets; `index` takes the file's nodes to the mesh's."""
-    facet_type = FACET_TYPE[mesh.cell_type]
-    count = CORNERS[facet_type]
+    facet_type = CELL_TYPES[mesh.cell_type].facet
+    count = CELL_TYPES[facet_type].corners
     parts: dict[str, list[Indices]] = {}
     for name, block, cells in content.groups:
-        if FIRST_ORDER.get(content.blocks[block].cell_type) == FIRST_ORDER[facet_type]:
+        if content.blocks[block].first_order == CELL_TYPES[facet_type].first_order:
             parts.setdefault(name, []).append(index[content.blocks[block].nodes[cells, :count]])
     surfaces = {}
     for name, corners in parts.items():
@@ -189,7 +194,7 @@ def _lines(content: Content, index: Indices) -> dict[str, Indices]:
     """Groups of lines, those that lie in the mesh; `index` takes the file's nodes to the mesh's."""
     parts: dict[str, list[Indices]] = {}
     for name, block, cells in content.groups:
-        if FIRST_ORDER.get(content.blocks[block].cell_type) == "line":
+        if content.blocks[block].first_order == "line":
             parts.setdefault(name, []).append(index[content.blocks[block].nodes[cells]])
     lines = {name: np.unique(np.concatenate(nodes), axis=0) for name, nodes in parts.items()}
     inside = {name: nodes[(nodes >= 0).all(axis=1)] for name, nodes in lines.items()}

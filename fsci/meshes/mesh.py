@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from fsci import shapes
 from fsci.meshes.files import MeshError, read_mesh, unknown
+from solvers.cell_types import CELL_TYPES
 from solvers.mesh import Mesh
-from solvers.mesh_topology import CORNERS, FACET_TYPE, find_facets
+from solvers.mesh_topology import find_facets
 
 __all__ = ["MeshError", "build_mesh", "extract_region", "place", "require_region", "require_surface", "rotation_matrix"]
 
@@ -91,7 +92,7 @@ def extract_region(mesh: Mesh, name: str) -> Mesh:
 
     index = np.full(len(mesh.points), -1)
     index[used] = np.arange(len(used))
-    corners = CORNERS[FACET_TYPE[mesh.cell_type]]
+    corners = CELL_TYPES[CELL_TYPES[mesh.cell_type].facet].corners
     surfaces = {key: find_facets(part, index[facets])[:, :corners] for key, facets in mesh.surfaces.items()}
     regions = {key: np.flatnonzero(np.isin(chosen, of)) for key, of in mesh.regions.items()}
     lines = {key: index[of][(index[of] >= 0).all(axis=1)] for key, of in mesh.lines.items()}

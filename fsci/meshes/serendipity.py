@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.mesh_topology import NODES
+from solvers.cell_types import CELL_TYPES
 
 Indices = NDArray[np.int64]
 
@@ -18,7 +18,7 @@ FULL = {"quad8": "quad9", "hexahedron20": "hexahedron27"}
 
 def missing(cell_type: str) -> list[tuple[list[int], NDArray[np.float64]]]:
     """(nodes, their weights) of each node that the full cell has besides, in its order."""
-    nodes, given = NODES[FULL[cell_type]], int(cell_type.removeprefix("quad").removeprefix("hexahedron"))
+    nodes, given = CELL_TYPES[FULL[cell_type]].nodes, int(cell_type.removeprefix("quad").removeprefix("hexahedron"))
     place = {frozenset(group): index for index, group in enumerate(nodes[:given])}
     found = []
     for corners in nodes[given:]:

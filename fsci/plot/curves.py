@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fsci.case.quantities import QUANTITIES
 from fsci.run.history import COLUMNS, History
 
 SIZE = (8.0, 5.0)  #: of a picture in inches; 1600 x 1000 pixels
@@ -32,32 +33,14 @@ STYLE: Any = {
     "mathtext.default": "regular",
 }
 
-#: exponents of length, mass and time; in 2D forces, energies and masses are those of a unit thickness
-DIMENSIONS = {
+#: exponents of length, mass and time: those of probes, of time and of fields
+POWERS = {
+    **{quantity.name: quantity.powers for quantity in QUANTITIES.values()},
     "time": (0, 0, 1),
-    "displacement": (1, 0, 0),
-    "centre": (1, 0, 0),
-    "velocity": (1, 0, -1),
-    "acceleration": (1, 0, -2),
-    "area": (2, 0, 0),
-    "volume": (3, 0, 0),
-    "mass": (0, 1, 0),
-    "flow_rate": (3, 0, -1),
-    "force": (1, 1, -2),
-    "moment": (2, 1, -2),
-    "dissipation": (2, 1, -3),
-    "kinetic_energy": (2, 1, -2),
-    "momentum": (1, 1, -1),
-    "angular_momentum": (2, 1, -1),
-    "reaction": (1, 1, -2),
-    "traction": (1, 1, -2),
-    "energy": (2, 1, -2),
-    "pressure": (-1, 1, -2),
     "von_mises": (-1, 1, -2),
     "contact_pressure": (-1, 1, -2),
     "contact_traction": (-1, 1, -2),
     "contact_gap": (1, 0, 0),
-    "gap": (1, 0, 0),
 }
 
 #: balances in the history -> what they are; all would be zero without errors of solvers and time steps
@@ -89,9 +72,9 @@ DERIVED = {
 def label(text: str, quantity: str, units: Mapping[str, str]) -> str:
     """A text with the unit of a quantity in brackets; without them if the quantity is not known."""
     text = text.replace("von_mises", "von Mises stress").replace("_", " ")
-    if quantity not in DIMENSIONS:
+    powers = POWERS.get(quantity, (0, 0, 0))
+    if not any(powers):
         return text
-    powers = DIMENSIONS[quantity]
     base = (units["length"], units["mass"], units["time"])
     for named, derived in zip(((1, 1, -2), (2, 1, -2), (-1, 1, -2)), DERIVED.get(base, ()), strict=False):
         if powers == named:

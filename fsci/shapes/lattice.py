@@ -11,14 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.cell_types import CELL_TYPES, reference_nodes
 from solvers.mesh import Mesh
-from solvers.mesh_topology import CORNERS, FACET_TYPE, NODES, boundary_facets, reference_nodes
+from solvers.mesh_topology import boundary_facets
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 #: Directions -> name of a cell -> its types of first and second order.
-CELL_TYPES = {
+LATTICE_CELLS = {
     2: {"quad": ("quad", "quad9"), "tri": ("triangle", "triangle6")},
     3: {"hex": ("hexahedron", "hexahedron27"), "tet": ("tetra", "tetra10")},
 }
@@ -131,9 +132,9 @@ def ball(cells: int, radial: int, order: int) -> Lattice:
 def mesh(lattice: Lattice, cell: str) -> Mesh:
     """The mesh of a lattice of 2 directions (cell quad or tri) or 3 (hex or tet), its sides as surfaces."""
     directions = lattice.blocks[0].ndim
-    if cell not in CELL_TYPES[directions]:
-        raise ValueError(f"unknown cell '{cell}'; there are: {', '.join(CELL_TYPES[directions])}")
-    cell_type = CELL_TYPES[directions][cell][lattice.order - 1]
+    if cell not in LATTICE_CELLS[directions]:
+        raise ValueError(f"unknown cell '{cell}'; there are: {', '.join(LATTICE_CELLS[directions])}")
+    cell_type = LATTICE_CELLS[directions][cell][lattice.order - 1]
     window = (lattice.order + 1,) * directions
     every = (slice(None, None, lattice.order),) * directions
     windows = [np.lib.stride_tricks.sliding_window_view(block, window)[every] for block in lattice.blocks]
@@ -144,7 +145,7 @@ def mesh(lattice: Lattice, cell: str) -> Mesh:
     else:
         cells = _simplices(nodes, cell_type, lattice.order)
     plain = Mesh(np.ascontiguousarray(lattice.points), np.ascontiguousarray(cells), cell_type)
-    facets = boundary_facets(plain)[:, : CORNERS[FACET_TYPE[cell_type]]]
+    facets = boundary_facets(plain)[:, : CELL_TYPES[CELL_TYPES[cell_type].facet].corners]
     surfaces = {name: facets[np.isin(facets, side).all(axis=1)] for name, side in lattice.sides.items()}
     return replace(plain, surfaces=surfaces)
 
@@ -172,7 +173,7 @@ def _simplices(nodes: Indices, cell_type: str, order: int) -> Indices:
     corners[inside_out] = corners[inside_out][:, [0, 2, 1, *range(3, directions + 1)]]
 
     # the sum of two corners (0 or 1) is the middle between them, counted in half cells
-    groups = [(group[0], group[-1]) for group in NODES[cell_type]]
+    groups = [(group[0], group[-1]) for group in CELL_TYPES[cell_type].nodes]
     position = np.stack([corners[:, :, a] + corners[:, :, b] for a, b in groups], axis=2) * order // 2
     cell = np.arange(count)[:, None, None]
     return nodes[(cell, *np.moveaxis(position, -1, 0))].reshape(-1, len(groups))

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.tessellation import SIMPLICES
+from solvers.cell_types import CELL_TYPES
 
 
 def distances(points: Array, x: Array, facets: NDArray[np.int64], facet_type: str) -> Array:
     """Distances [m] of points (n, dim) to facets with nodes at x, taken as flat pieces through their nodes."""
-    simplices = np.array(SIMPLICES[facet_type])
+    simplices = np.array(CELL_TYPES[facet_type].simplices)
     corners = x[facets[:, simplices].reshape(-1, simplices.shape[1])]
     closest = np.full(len(points), np.inf)
     for simplex in corners:

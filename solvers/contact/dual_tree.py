@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.mesh_topology import CORNERS
-from solvers.tessellation import SIMPLICES
+from solvers.cell_types import CELL_TYPES
 
 #: Facets can touch if the product of their normals is below this.
 OPPOSED = -0.2
@@ -46,10 +45,10 @@ class DualTree:
 
     def __init__(self, facets: Indices, facet_type: str, points: Array):
         """facets (k, nodes per facet) with nodes at the reference positions points [m], shape (n, dim)."""
-        self.facets, self._simplices = facets, np.array(SIMPLICES[facet_type])
+        self.facets, self._simplices = facets, np.array(CELL_TYPES[facet_type].simplices)
         dim = points.shape[1]
         self._samples, self._directions = _sample_vectors(dim), _directions(dim)
-        corners = facets[:, : CORNERS[facet_type]]
+        corners = facets[:, : CELL_TYPES[facet_type].corners]
         self.levels = _join(len(facets), neighbours(corners, dim), points[corners].mean(axis=1))
         self.tests = 0  #: comparisons of two nodes, or of a node with itself, in the latest search
 

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.cell_types import CELL_TYPES
 from solvers.contact.blocks import expand
 from solvers.contact.patch import Patch
-from solvers.contact.surface import KERNEL_TYPES, Surface
+from solvers.contact.surface import Surface
 from solvers.kernels import MortarResult, mortar
 from solvers.sparse import Sparse, nothing, sparse, stack
 
@@ -97,7 +98,7 @@ class Mortar:
     ):
         self.patch, self.masters, self.integration = patch, masters, integration
         self._search = search
-        self._types = KERNEL_TYPES[patch.facet_type], KERNEL_TYPES[masters.facet_type]
+        self._types = CELL_TYPES[patch.facet_type].kernel, CELL_TYPES[masters.facet_type].kernel
         self.facets = np.ascontiguousarray(facets, dtype=np.int64)
         self._edge = edge
         self._evaluations = 0

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.contact.surface import KERNEL_TYPES, Nodes, Surface, nodal_areas
+from solvers.cell_types import CELL_TYPES
+from solvers.contact.surface import Nodes, Surface, nodal_areas
 from solvers.kernels import basis_transformation, nodal_normals
 from solvers.sparse import Sparse, sparse
 
@@ -31,7 +32,7 @@ class Patch:
     def normals(self, x: Array) -> tuple[Array, Sparse]:
         """Averaged unit normals at positions x [m] of its nodes, and their derivatives (dim * n, dim * n)."""
         x = np.ascontiguousarray(x)
-        found, slopes = nodal_normals(x, self.facets, KERNEL_TYPES[self.facet_type], self.mask)
+        found, slopes = nodal_normals(x, self.facets, CELL_TYPES[self.facet_type].kernel, self.mask)
         return found, sparse(slopes, (x.size, x.size))
 
     def basis(self) -> tuple[Sparse, Sparse]:
@@ -43,7 +44,7 @@ class Patch:
 
     @property
     def _kernel_type(self) -> str:
-        return KERNEL_TYPES[self.facet_type]
+        return CELL_TYPES[self.facet_type].kernel
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ def _join(slaves: Sequence[Surface], numbers: Sequence[NDArray[np.int64]], kinds
 
 def _reference_normals(surface: Surface) -> Array:
     facets = np.ascontiguousarray(surface.facets, dtype=np.int64)
-    return nodal_normals(surface.points, facets, KERNEL_TYPES[surface.facet_type], None, derivatives=False)[0]
+    return nodal_normals(surface.points, facets, CELL_TYPES[surface.facet_type].kernel, None, derivatives=False)[0]
 
 
 def _mask(surfaces: Sequence[Surface], at: Sequence[NDArray[np.int64]], shape: tuple[int, int]) -> Array | None:

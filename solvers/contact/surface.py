@@ -9,17 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.mesh_topology import CORNERS
-
-#: Meshio facet type -> name in the kernels
-KERNEL_TYPES = {
-    "line": "line2",
-    "line3": "line3",
-    "triangle": "tri3",
-    "triangle6": "tri6",
-    "quad": "quad4",
-    "quad9": "quad9",
-}
+from solvers.cell_types import CELL_TYPES
 
 
 @dataclass(frozen=True)
@@ -44,7 +34,7 @@ class Surface:
     @property
     def corners(self) -> Array:
         """Reference positions [m] of the corners of the facets, shape (k, corners, dim)."""
-        return self.points[self.facets[:, : CORNERS[self.facet_type]]]
+        return self.points[self.facets[:, : CELL_TYPES[self.facet_type].corners]]
 
 
 @dataclass(frozen=True)

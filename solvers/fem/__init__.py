@@ -8,8 +8,6 @@ import mpi4py.MPI  # noqa: F401  (DOLFINx from PyPI finds its MPI only after thi
 
 from solvers.fem.compiling import listening
 from solvers.fem.domain import (
-    CELLS,
-    VTK_POINTS,
     Domain,
     boundary_facets,
     distribute,
@@ -62,9 +60,7 @@ from solvers.fem.spaces import (
 )
 
 __all__ = [
-    "CELLS",
     "COMPILE_OPTIONS",
-    "VTK_POINTS",
     "Domain",
     "Entities",
     "Integral",

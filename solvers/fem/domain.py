@@ -11,58 +11,18 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.cell_types import CELL_TYPES
 from solvers.fem.calls import calls
 from solvers.mesh import Mesh
-from solvers.mesh_topology import CORNERS, FACET_TYPE
-
-#: Meshio cell type -> (UFL cell, degree)
-CELLS = {
-    "triangle": ("triangle", 1),
-    "triangle6": ("triangle", 2),
-    "quad": ("quadrilateral", 1),
-    "quad9": ("quadrilateral", 2),
-    "tetra": ("tetrahedron", 1),
-    "tetra10": ("tetrahedron", 2),
-    "hexahedron": ("hexahedron", 1),
-    "hexahedron27": ("hexahedron", 2),
-}
-
-_SQUARE: list[tuple[float, ...]] = [(0, 0), (1, 0), (1, 1), (0, 1)]
-_QUAD9: list[tuple[float, ...]] = [*_SQUARE, (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5), (0.5, 0.5)]
-_TRIANGLE6: list[tuple[float, ...]] = [(0, 0), (1, 0), (0, 1), (0.5, 0), (0.5, 0.5), (0, 0.5)]
-_CUBE: list[tuple[float, ...]] = [(x, y, z) for z in (0, 1) for x, y in _SQUARE]
-
-#: Reference coordinates of VTK's nodes: matching them with basix' points gives the node permutation of any version.
-VTK_POINTS: dict[str, list[tuple[float, ...]]] = {
-    "triangle": _TRIANGLE6[:3],
-    "triangle6": _TRIANGLE6,
-    "quad": list(_SQUARE),
-    "quad9": _QUAD9,
-    "tetra": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
-    "tetra10": [
-        *[(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
-        *[(0.5, 0, 0), (0.5, 0.5, 0), (0, 0.5, 0), (0, 0, 0.5), (0.5, 0, 0.5), (0, 0.5, 0.5)],
-    ],
-    "hexahedron": list(_CUBE),
-    "hexahedron27": [
-        *_CUBE,
-        *[(x, y, 0) for x, y in _QUAD9[4:8]],
-        *[(x, y, 1) for x, y in _QUAD9[4:8]],
-        *[(x, y, 0.5) for x, y in _SQUARE],
-        *[(0, 0.5, 0.5), (1, 0.5, 0.5), (0.5, 0, 0.5), (0.5, 1, 0.5), (0.5, 0.5, 0), (0.5, 0.5, 1)],
-        (0.5, 0.5, 0.5),
-    ],
-}
 
 
 def vtk_from_basix(cell_type: str) -> NDArray[np.int64]:
     """Permutation p with nodes_vtk = nodes_basix[p]."""
-    name, degree = CELLS[cell_type]
-    element = basix.create_element(
-        basix.ElementFamily.P, getattr(basix.CellType, name), degree, basix.LagrangeVariant.equispaced
-    )
-    vtk = np.array(VTK_POINTS[cell_type], dtype=float)
-    distance = np.linalg.norm(vtk[:, None, :] - element.points[None, :, :], axis=2)
+    record = CELL_TYPES[cell_type]
+    shape = getattr(basix.CellType, record.shape.name)
+    element = basix.create_element(basix.ElementFamily.P, shape, record.degree, basix.LagrangeVariant.equispaced)
+    # matching positions gives the permutation of any version
+    distance = np.linalg.norm(record.reference_nodes[:, None, :] - element.points[None, :, :], axis=2)
     return np.argmin(distance, axis=1)
 
 
@@ -90,14 +50,14 @@ def distribute(comm: MPI.Comm, mesh: Mesh | None) -> Domain:
     """Distribute a mesh that rank 0 holds (other ranks pass None)."""
     header = comm.bcast(None if mesh is None else (mesh.cell_type, mesh.points.shape, mesh.surfaces), root=0)
     cell_type, (nodes, dim), named = header
-    name, degree = CELLS[cell_type]
+    record = CELL_TYPES[cell_type]
     vtk = vtk_from_basix(cell_type)
     if mesh is not None:
         cells, points = np.ascontiguousarray(mesh.cells[:, np.argsort(vtk)], dtype=np.int64), mesh.points
     else:
         cells, points = np.empty((0, len(vtk)), dtype=np.int64), np.empty((0, dim))
-    distributed = calls.create_mesh(comm, cells, points, name, degree)
-    domain = Domain(distributed, cell_type, degree, nodes, source=mesh)
+    distributed = calls.create_mesh(comm, cells, points, record.shape.name, record.degree)
+    domain = Domain(distributed, cell_type, record.degree, nodes, source=mesh)
     return Domain(**{**vars(domain), "surfaces": _find_surfaces(domain, named)})
 
 
@@ -108,7 +68,7 @@ def _find_surfaces(domain: Domain, named: dict[str, NDArray[np.int64]]) -> dict[
     mesh.topology.create_connectivity(dim - 1, dim)
     exterior = np.sort(exterior_facets(domain))
     corners = input_nodes(domain)[calls.facet_nodes(mesh, exterior)]
-    corners = np.sort(corners.reshape(len(exterior), CORNERS[FACET_TYPE[domain.cell_type]]), axis=1)
+    corners = np.sort(corners.reshape(len(exterior), CELL_TYPES[CELL_TYPES[domain.cell_type].facet].corners), axis=1)
     facet_of = {tuple(corner): facet for corner, facet in zip(corners.tolist(), exterior, strict=True)}
     found = {}
     for name, facets in named.items():

@@ -18,7 +18,11 @@ from solvers.fem.calls import calls
 from solvers.fem.compiling import compiling
 from solvers.fem.domain import Domain
 
-COMPILE_OPTIONS = {"cffi_extra_compile_args": ["-O3", "-march=native"]}
+#: Sums may be reordered: newer form compilers write a product per term, and a tangent of the flow takes 24 instead of
+#: 59 us per cell once common factors are taken out. Infinities and NaN keep their meaning.
+COMPILE_OPTIONS = {
+    "cffi_extra_compile_args": ["-O3", "-march=native", "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math"]
+}
 
 
 def compile_form(form: ufl.Form, what: str = "a form") -> Any:

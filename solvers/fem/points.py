@@ -10,8 +10,9 @@ from dolfinx import fem
 from dolfinx import mesh as dolfinx_mesh
 
 from solvers.api import Array
+from solvers.cell_types import CELL_TYPES
 from solvers.fem.calls import calls
-from solvers.fem.domain import CELLS, Domain, input_cells, owned_cells
+from solvers.fem.domain import Domain, input_cells, owned_cells
 from solvers.fem.ghosts import accumulate
 from solvers.fem.spaces import cell_blocks, function
 from solvers.locate import locate
@@ -33,9 +34,9 @@ def locate_point(domain: Domain, point: Array) -> tuple[int, Array] | None:
 
 def tabulate(domain: Domain, reference: Array) -> Array:
     """Shape functions of the displacement at a reference point, in the order of the cell's dof blocks."""
-    name, degree = CELLS[domain.cell_type]
+    name = CELL_TYPES[domain.cell_type].shape.name
     element = basix.create_element(
-        basix.ElementFamily.P, getattr(basix.CellType, name), degree, basix.LagrangeVariant.gll_warped
+        basix.ElementFamily.P, getattr(basix.CellType, name), domain.degree, basix.LagrangeVariant.gll_warped
     )
     return element.tabulate(0, reference[None, :])[0, 0, :, 0]
 
@@ -70,9 +71,9 @@ def average_at_nodes(domain: Domain, space: Any, expression: fem.Expression, *, 
 
 def reference_nodes(domain: Domain) -> Array:
     """Reference coordinates of a cell's nodes, in the order of its dof blocks."""
-    name, degree = CELLS[domain.cell_type]
+    name = CELL_TYPES[domain.cell_type].shape.name
     return basix.create_element(
-        basix.ElementFamily.P, getattr(basix.CellType, name), degree, basix.LagrangeVariant.equispaced
+        basix.ElementFamily.P, getattr(basix.CellType, name), domain.degree, basix.LagrangeVariant.equispaced
     ).points
 
 

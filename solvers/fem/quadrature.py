@@ -10,7 +10,8 @@ from dolfinx import fem
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.fem.domain import CELLS, Domain
+from solvers.cell_types import CELL_TYPES
+from solvers.fem.domain import Domain
 from solvers.fem.spaces import block_points, cell_blocks, quadrature_points, tabulate_lagrange
 
 #: Number of corners -> type of a facet.
@@ -65,7 +66,7 @@ def facet_quadrature(domain: Domain, space: fem.FunctionSpace, surface: str, deg
 
 def _facets(domain: Domain, space: fem.FunctionSpace, number: int, cells: NDArray[np.int32], degree: int) -> Entities:
     """The facets with this number in the given cells."""
-    cell_type = getattr(basix.CellType, CELLS[domain.cell_type][0])
+    cell_type = getattr(basix.CellType, CELL_TYPES[domain.cell_type].shape.name)
     element = basix.create_element(basix.ElementFamily.P, cell_type, domain.degree, basix.LagrangeVariant.gll_warped)
     corners = basix.geometry(cell_type)[basix.topology(cell_type)[domain.dim - 1][number]]
     local, rule = basix.make_quadrature(FACETS[len(corners)], degree)

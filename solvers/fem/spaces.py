@@ -11,14 +11,15 @@ from dolfinx import fem
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.cell_types import CELL_TYPES
 from solvers.fem.calls import calls
 from solvers.fem.compiling import compiling
-from solvers.fem.domain import CELLS, Domain, input_nodes
+from solvers.fem.domain import Domain, input_nodes
 
 
 def cell_of(domain: Domain) -> str:
     """UFL's name of the cells."""
-    return CELLS[domain.cell_type][0]
+    return CELL_TYPES[domain.cell_type].shape.name
 
 
 def vector_space(domain: Domain) -> Any:
@@ -106,7 +107,7 @@ def component_dofs(
     # not DOLFINx's `collapse`, which fails on a process without cells
     by_cell = [component_cell_dofs(space, component) for component in components]
     _, place = np.unique(by_cell[0], return_index=True)
-    cell = getattr(basix.CellType, CELLS[domain.cell_type][0])
+    cell = getattr(basix.CellType, CELL_TYPES[domain.cell_type].shape.name)
     element = basix.create_element(basix.ElementFamily.P, cell, degree, basix.LagrangeVariant.gll_warped)
     shapes, _ = tabulate_lagrange(domain, 1, element.points)
     corners = domain.mesh.geometry.x[calls.geometry_nodes(domain.mesh)].reshape(-1, shapes.shape[1], 3)
@@ -127,7 +128,7 @@ def tabulate_lagrange(domain: Domain, degree: int, points: Array) -> tuple[Array
     """Scalar shape functions (points, functions) and their reference gradients (points, functions, dim)."""
     element = basix.create_element(
         basix.ElementFamily.P,
-        getattr(basix.CellType, CELLS[domain.cell_type][0]),
+        getattr(basix.CellType, CELL_TYPES[domain.cell_type].shape.name),
         degree,
         basix.LagrangeVariant.gll_warped,
     )
@@ -153,7 +154,7 @@ def quadrature_space(domain: Domain, degree: int, shape: tuple[int, ...] = ()) -
 
 def quadrature_points(domain: Domain, degree: int) -> tuple[Array, Array]:
     """(points of shape (n, dim), weights) on the reference cell that a measure of this degree uses."""
-    return basix.make_quadrature(getattr(basix.CellType, CELLS[domain.cell_type][0]), degree)
+    return basix.make_quadrature(getattr(basix.CellType, CELL_TYPES[domain.cell_type].shape.name), degree)
 
 
 def function(space: Any) -> fem.Function:

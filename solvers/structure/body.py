@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from solvers import fem
 from solvers.api import Array
+from solvers.cell_types import CELL_TYPES
 from solvers.mesh import Mesh
 from solvers.structure import forms
 from solvers.structure.element import Element
@@ -21,18 +22,6 @@ from solvers.structure.materials import Material, parameters
 from solvers.structure.springs import Spring, Springs
 from solvers.structure.supports import Roller, Support, Symmetry
 from solvers.values import Value, evaluate_components
-
-#: Cell type -> quadrature degree of (internal forces, mass): full integration of the affine cell.
-QUADRATURE = {
-    "triangle": (1, 2),
-    "triangle6": (2, 4),
-    "quad": (3, 3),
-    "quad9": (5, 5),
-    "tetra": (1, 2),
-    "tetra10": (2, 4),
-    "hexahedron": (3, 3),
-    "hexahedron27": (5, 5),
-}
 
 
 class Body:
@@ -70,7 +59,7 @@ class Body:
         self.nodes = fem.node_of_block(domain, self.space)
         self.points = fem.block_points(self.space)
         self.owned = self.space.dofmap.index_map.size_local
-        self.stiffness_degree, self.mass_degree = QUADRATURE[domain.cell_type]
+        self.stiffness_degree, self.mass_degree = CELL_TYPES[domain.cell_type].quadrature
         self.density = self._parameter(material.density)
         self.parameters = {k: self._parameter(p) for k, p in parameters(material).items()}
         self._compile()

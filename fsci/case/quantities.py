@@ -1,0 +1,95 @@
+"""What probes can measure: each quantity with its places, unit, columns and needs, said once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+Field = Literal["structure", "fluid"]
+FIELDS: tuple[Field, ...] = ("structure", "fluid")
+
+#: the setting that says where -> how messages name it
+PLACES = {"pair": "'pair: PAIR'", "at": "'at: [..]'", "on": "'on: SURFACE'", "through": "'through: PATCH'"}
+WHOLE = ""  #: none of them: a body, or all fluid
+
+ENERGIES = ("kinetic", "internal", "work", "total")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Something that a probe measures.
+
+    parts: `one` column NAME; a `vector` NAME.x, NAME.y and in 3D NAME.z; the `axis` of a rotation is a vector in 3D and
+    one column in 2D; `energies` are those of ENERGIES.
+    """
+
+    name: str
+    powers: tuple[int, int, int]  #: of length, mass and time in its unit; in 2D per unit of thickness
+    parts: Literal["one", "vector", "axis", "energies"]
+    structure: tuple[str, ...] = ()  #: settings that say where in a structure
+    fluid: tuple[str, ...] = ()  #: settings that say where in a fluid
+    needs: tuple[str, ...] = ()  #: of a structure dynamics or density; of a fluid body or reference
+    meaning: str = ""  #: what the name does not tell
+
+    def places(self, field: Field) -> tuple[str, ...]:
+        """The settings that say where in a field it can be measured."""
+        return self.structure if field == "structure" else self.fluid
+
+    def columns(self, name: str, dimension: int) -> tuple[str, ...]:
+        """The columns of history.csv of a probe with this name."""
+        if self.parts == "energies":
+            return tuple(f"{name}.{part}" for part in ENERGIES)
+        if self.parts == "one" or (self.parts == "axis" and dimension == 2):
+            return (name,)
+        return tuple(f"{name}.{axis}" for axis in "xyz"[:dimension])
+
+
+_LENGTH, _SPEED, _FORCE, _ENERGY, _STRESS = (1, 0, 0), (1, 0, -1), (1, 1, -2), (2, 1, -2), (-1, 1, -2)
+_ALL = (
+    Quantity("displacement", _LENGTH, "vector", ("at", "on"), meaning="of a surface the mean over its area"),
+    Quantity("velocity", _SPEED, "vector", ("at",), ("at",), ("dynamics",)),
+    Quantity("acceleration", (1, 0, -2), "vector", ("at",), needs=("dynamics",)),
+    Quantity("reaction", _FORCE, "vector", ("on",), meaning="force of supports and springs"),
+    Quantity("traction", _FORCE, "vector", ("on",), meaning="integral of P N over the reference surface"),
+    Quantity("area", (2, 0, 0), "one", ("on",)),
+    Quantity("gap", _LENGTH, "one", ("pair",), meaning="distance of the slave nodes to the master"),
+    Quantity("pressure", _STRESS, "one", ("pair",), ("at", "on"), meaning="of a patch the mean over its area"),
+    Quantity(
+        "first_contact", (0, 0, 1), "one", ("pair",), meaning="time of the end of the first step with contact, else nan"
+    ),
+    Quantity("energy", _ENERGY, "energies", (WHOLE,), meaning="of all bodies"),
+    Quantity("momentum", (1, 1, -1), "vector", (WHOLE,), needs=("density",)),
+    Quantity("angular_momentum", (2, 1, -1), "axis", (WHOLE,), needs=("density",), meaning="about the origin"),
+    Quantity("mass", (0, 1, 0), "one", (WHOLE,), needs=("density",)),
+    Quantity("volume", (3, 0, 0), "one", (WHOLE,), (WHOLE,)),
+    Quantity("centre", _LENGTH, "vector", (WHOLE,), needs=("density",), meaning="of mass"),
+    Quantity("flow_rate", (3, 0, -1), "one", (), ("through",), meaning="volume per time, out of the box"),
+    Quantity("force", _FORCE, "vector", (), (WHOLE,), ("body",), "of the fluid on the `body`"),
+    Quantity("moment", _ENERGY, "axis", (), (WHOLE,), ("body",), "of that force"),
+    Quantity("drag_coefficient", (0, 0, 0), "one", (), (WHOLE,), ("body", "reference"), "of that force"),
+    Quantity("lift_coefficient", (0, 0, 0), "one", (), (WHOLE,), ("body", "reference"), "of that force"),
+    Quantity("kinetic_energy", _ENERGY, "one", (), (WHOLE,), meaning="of all fluid"),
+    Quantity("dissipation", (2, 1, -3), "one", (), (WHOLE,), meaning="power of the viscous stress in all fluid"),
+)
+QUANTITIES = {quantity.name: quantity for quantity in _ALL}
+
+
+def described(field: Field) -> str:
+    """A list with an entry for each place of a field: what can be measured there."""
+    return "\n".join(_lines(field))
+
+
+def _lines(field: Field) -> Iterator[str]:
+    words = {
+        "at": "with `at`, at a point",
+        "on": f"with `on`, on a {'surface' if field == 'structure' else 'patch'}",
+        "pair": "with `pair`, of a pair of contact",
+        "through": "with `through`, through a patch",
+        WHOLE: "with none of them, of the whole",
+    }
+    for place, beginning in words.items():
+        there = [q for q in _ALL if place in q.places(field)]
+        if there:
+            listed = ", ".join(q.name + (f" ({q.meaning})" if q.meaning else "") for q in there)
+            yield f"- {beginning}: {listed}"

@@ -1,0 +1,22 @@
+"""Hyperelastic materials, a law in a file each."""
+
+from solvers.structure.materials.coup_neo_hooke import CoupNeoHooke
+from solvers.structure.materials.linear_elastic import LinearElastic, PlaneStressLinearElastic
+from solvers.structure.materials.material import Material, Tensor, in_space, parameters
+from solvers.structure.materials.mooney_rivlin import MooneyRivlin
+from solvers.structure.materials.neo_hooke import NeoHooke
+from solvers.structure.materials.st_venant_kirchhoff import PlaneStressStVenantKirchhoff, StVenantKirchhoff
+
+__all__ = [
+    "CoupNeoHooke",
+    "LinearElastic",
+    "Material",
+    "MooneyRivlin",
+    "NeoHooke",
+    "PlaneStressLinearElastic",
+    "PlaneStressStVenantKirchhoff",
+    "StVenantKirchhoff",
+    "Tensor",
+    "in_space",
+    "parameters",
+]

@@ -1,0 +1,68 @@
+"""What a material law has to say, and its parameters.
+
+Energies are per reference volume [J/m^3], functions of the deformation gradient F. Values are numbers or functions of
+the reference position; `energy` receives them as UFL coefficients by name. In 2D, F is 2x2: plane strain completes it
+with F_33 = 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Any, ClassVar, Protocol, TypeAlias
+
+import ufl
+
+from solvers.values import Value
+
+Tensor: TypeAlias = Any  #: a UFL expression
+
+
+class Material(Protocol):
+    """What a body is made of."""
+
+    #: the energy is one of two dimensions with S_33 = 0
+    plane_stress: ClassVar[bool]
+    #: the energy is one of small displacements: a function of sym(F) - I that does not tell rotation from strain
+    linear: ClassVar[bool]
+
+    @property
+    def density(self) -> Value:
+        """Reference density [kg/m^3]."""
+        ...
+
+    @property
+    def energy(self) -> Callable[..., Tensor]:
+        """Stored energy W(F, parameters by name)."""
+        ...
+
+    def volume_ratio(self, F: Tensor) -> Tensor:
+        """J = det F, or the law's own measure of it: 1 + tr of its strain."""
+        ...
+
+    @property
+    def volumetric(self) -> Callable[..., Tensor]:
+        """Its part of a pure change of volume: U(J, parameters by name) = W(F) where F = s I has this J."""
+        ...
+
+    @property
+    def distortional(self) -> Callable[..., Tensor]:
+        """The rest of it, W(F) - U(J)."""
+        ...
+
+
+def parameters(material: Material) -> dict[str, Value]:
+    """The parameters of the energy by name."""
+    return {f.name: getattr(material, f.name) for f in fields(material) if f.name != "density"}  # type: ignore[arg-type]
+
+
+def in_space(F: Tensor) -> Tensor:
+    """F in three dimensions: plane strain leaves the third direction undeformed."""
+    if F.ufl_shape == (3, 3):
+        return F
+    return ufl.as_tensor([[F[0, 0], F[0, 1], 0], [F[1, 0], F[1, 1], 0], [0, 0, 1]])
+
+
+def cube_root(J: Tensor) -> Tensor:
+    """J^(1/3)."""
+    return ufl.exp(ufl.ln(J) / 3)
