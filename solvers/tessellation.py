@@ -12,6 +12,7 @@ from solvers.mesh import Mesh
 from solvers.mesh_topology import boundary_facets, surface_facets
 
 Indices = NDArray[np.int64]
+Array = NDArray[np.float64]
 
 
 def tessellate(mesh: Mesh, names: Sequence[str] | None = None) -> tuple[Indices, Indices]:
@@ -26,6 +27,24 @@ def tessellate(mesh: Mesh, names: Sequence[str] | None = None) -> tuple[Indices,
     simplices = facets[:, split].reshape(-1, split.shape[1])
     nodes, local = np.unique(simplices, return_inverse=True)
     return local.reshape(simplices.shape).astype(np.int64), nodes.astype(np.int64)
+
+
+def area_vectors(corners: Array) -> Array:
+    """Normal times length of segments [m] or area of triangles [m^2], shape (..., dim, dim) -> (..., dim).
+
+    It points to the right of a segment, and to where a triangle is seen to run counterclockwise.
+    """
+    edges = corners[..., 1:, :] - corners[..., :1, :]
+    if corners.shape[-1] == 2:
+        return np.stack([edges[..., 0, 1], -edges[..., 0, 0]], axis=-1)
+    return 0.5 * np.cross(edges[..., 0, :], edges[..., 1, :])
+
+
+def unit_normals(corners: Array) -> Array:
+    """Unit normals of segments or triangles, shape (..., dim, dim) -> (..., dim); zero where there is no extent."""
+    along = area_vectors(corners)
+    size = np.linalg.norm(along, axis=-1, keepdims=True)
+    return np.divide(along, size, out=np.zeros_like(along), where=size > 0.0)
 
 
 def is_closed(simplices: Indices) -> bool:

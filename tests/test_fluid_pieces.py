@@ -7,7 +7,7 @@ from fluid_setup import block
 from solvers import kernels
 from solvers.fluid.grid import uniform
 from solvers.fluid.pieces import put_where_fluid_is
-from solvers.fluid.surface import normals
+from solvers.tessellation import unit_normals
 
 
 def pieces(dim, points, low, high):
@@ -15,7 +15,7 @@ def pieces(dim, points, low, high):
     grid = uniform([0] * dim, [1] * dim, [4] * dim)
     x, facets = block(low, high)
     found = kernels.moments(grid.edges, points, x, facets, np.ones(grid.size, dtype=bool))
-    normal = -normals(x, facets)[found.piece_facet]
+    normal = -unit_normals(x[facets])[found.piece_facet]
     cell, moments = put_where_fluid_is(grid, points, found, normal, found.fraction >= 1 - 1e-10)
     order = np.lexsort((found.piece_facet, cell))
     order = order[(cell[order] >= 0) & (found.piece_mass[order].sum(axis=(1, 2)) > 1e-10)]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from solvers.mesh import Mesh
 from solvers.mesh_topology import surface_facets
-from solvers.tessellation import is_closed, tessellate
+from solvers.tessellation import area_vectors, is_closed, tessellate
 
 Array = NDArray[np.float64]
 
@@ -44,11 +44,7 @@ def face(mesh: Mesh, names: Sequence[str] | None) -> Face:
     """Named surfaces of a mesh as one, or all of its boundary."""
     simplices, nodes = tessellate(mesh, names)
     x = mesh.points[nodes][simplices]
-    edges = x[:, 1:] - x[:, :1]
-    if x.shape[2] == 2:
-        along = np.stack([edges[:, 0, 1], -edges[:, 0, 0]], axis=1)
-    else:
-        along = 0.5 * np.cross(edges[:, 0], edges[:, 1])
+    along = area_vectors(x)
     measure = np.linalg.norm(along, axis=1)
     middles = x.mean(axis=1)
     volume = np.einsum("md,md->", middles - middles.mean(axis=0), along)

@@ -10,6 +10,7 @@ from solvers.cell_types import CELL_TYPES
 from solvers.contact.dual_tree import neighbours
 from solvers.mesh import Mesh
 from solvers.mesh_topology import cut_out
+from solvers.tessellation import unit_normals
 
 #: Angle between neighbouring facets from which on an edge is sharp [degrees]; a ring of five facets has 72.
 SHARP = 75.0
@@ -20,13 +21,7 @@ def sharpest_edge(mesh: Mesh, names: Sequence[str]) -> float:
     points, facets, _ = cut_out(mesh, names)
     dim = points.shape[1]
     corners = facets[:, : CELL_TYPES[CELL_TYPES[mesh.cell_type].facet].corners]
-    x = points[corners]
-    if dim == 2:
-        along = x[:, 1] - x[:, 0]
-        normals = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    else:
-        normals = np.cross(x[:, 1] - x[:, 0], x[:, -1] - x[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = unit_normals(points[corners[:, [0, 1, -1][:dim]]])
     i, j = neighbours(corners, dim).T
     least = np.einsum("ed,ed->e", normals[i], normals[j]).min(initial=1.0)
     return float(np.degrees(np.arccos(np.clip(least, -1.0, 1.0))))

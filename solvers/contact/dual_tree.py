@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
+from solvers.tessellation import unit_normals
 
 #: Facets can touch if the product of their normals is below this.
 OPPOSED = -0.2
@@ -54,13 +55,7 @@ class DualTree:
 
     def normals(self, x: Array) -> Array:
         """Unit normals of the flat pieces of all facets, shape (k, pieces, dim)."""
-        corners = x[self.facets[:, self._simplices]]
-        edges = corners[..., 1:, :] - corners[..., :1, :]
-        if x.shape[1] == 2:
-            along = np.stack([edges[..., 0, 1], -edges[..., 0, 0]], axis=-1)
-        else:
-            along = np.cross(edges[..., 0, :], edges[..., 1, :])
-        return along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), np.finfo(float).tiny)
+        return unit_normals(x[self.facets[:, self._simplices]])
 
     def pairs(self, x: Array, inflation: float, x_previous: Array | None = None) -> Indices:
         """Facets i < j whose ways from x_previous to x come closer than `inflation` [m], or little more, shape (p, 2).

@@ -12,8 +12,9 @@ from solvers import kernels
 from solvers.api import Array
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.pieces import FLUSH, Pieces, put_where_fluid_is
-from solvers.fluid.surface import Motion, normals
+from solvers.fluid.surface import Motion
 from solvers.gauss import gauss
+from solvers.tessellation import unit_normals
 
 #: Share of a cell (of its face) below which fluid (surface) in it is rounding error of the geometry.
 NOTHING = 1e-10
@@ -75,7 +76,7 @@ class Cutter:
             return self._whole(facets, motion)
         wanted = _grow(self._own, layers + 2)
         moments = kernels.moments(box.edges, self.points, motion.x, facets, wanted.ravel(order="F"))
-        normal = -normals(motion.x, facets)
+        normal = -unit_normals(motion.x[facets])
         off = self._off_boundary(motion.x[facets])
         counts = off if wet is None else off & wet
         overlap = moments.fraction > 1.0 + NOTHING

@@ -7,6 +7,7 @@ import numpy as np
 from solvers.api import Array, Snapshot
 from solvers.distributed import Nodal, gather_nodal
 from solvers.fluid.field import Fluid
+from solvers.tessellation import area_vectors
 
 
 def snapshots(fluid: Fluid) -> list[Snapshot]:
@@ -76,9 +77,7 @@ def _bodies(fluid: Fluid) -> list[Snapshot]:
 
 def vertex_areas(x: Array, facets: np.ndarray) -> Array:
     """Share of each vertex in the area [m^2] (length in 2D) of segments or triangles: int N_b ds, shape (n,)."""
-    edges = x[facets[:, 1:]] - x[facets[:, :1]]
-    dim = x.shape[1]
-    size = np.linalg.norm(edges[:, 0] if dim == 2 else 0.5 * np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    dim, size = x.shape[1], np.linalg.norm(area_vectors(x[facets]), axis=1)
     return np.asarray(np.bincount(facets.ravel(), weights=np.repeat(size / dim, dim), minlength=len(x)), dtype=float)
 
 

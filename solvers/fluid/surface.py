@@ -47,14 +47,3 @@ def wetness(surfaces: Sequence[Surface]) -> NDArray[np.bool_]:
 def offsets(surfaces: Sequence[Surface]) -> NDArray[np.int64]:
     """First vertex of each surface among all, and their number."""
     return np.concatenate([[0], np.cumsum([s.vertices for s in surfaces])]).astype(np.int64)
-
-
-def normals(x: Array, facets: NDArray[np.int64]) -> Array:
-    """Unit normals of segments or triangles out of the solid, shape (m, dim); zero for a facet without extent."""
-    edges = x[facets[:, 1:]] - x[facets[:, :1]]
-    if x.shape[1] == 2:
-        normal = np.stack([edges[:, 0, 1], -edges[:, 0, 0]], axis=1)
-    else:
-        normal = np.cross(edges[:, 0], edges[:, 1])
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0.0)
