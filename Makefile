@@ -98,7 +98,7 @@ lint: setup
 	$(BIN)/lint-imports --no-logo
 
 bench: setup
-	$(BIN)/python -m fsci.bench
+	$(BIN)/fsci bench all
 
 docs: $(DOCS_STAMP)
 	mkdir -p docs/reference

@@ -100,6 +100,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     plot.add_argument("--movie", action="store_true", help="make an animation too")
 
+    bench = command(_bench, "measure run time against error, in a copy of the repository")
+    bench.add_argument("names", metavar="NAME", nargs="*", help="which benchmark, 'all', or none: list them")
+    bench.add_argument("-o", "--out", metavar="FILE", type=Path, help="write the results as JSON")
+    bench.add_argument("--against", metavar="FILE", type=Path, help="compare with the results in this file")
+    bench.add_argument("--plot", metavar="FOLDER", type=Path, help="draw error against time, unknowns and memory")
+
     schema = command(_schema, "print the JSON schema of case files, for editors")
     schema.add_argument("--markdown", action="store_true", help="print the input reference instead")
     return parser
@@ -202,6 +208,23 @@ def _plot(options: argparse.Namespace) -> int:
     except (ValueError, RuntimeError) as error:
         return _fail(f"fsci plot: {error}")
     print("\n".join(str(path) for path in files))
+    return 0
+
+
+def _bench(options: argparse.Namespace) -> int:
+    try:
+        from fsci.bench.run import BenchmarkError, describe, run
+    except ModuleNotFoundError as error:
+        if error.name != "fsci.bench":
+            raise
+        return _fail("fsci bench: the benchmarks are in the repository of fsci, not in what is installed here")
+    if not options.names:
+        print(describe())
+        return 0
+    try:
+        run(options.names, options.out, options.against, options.plot)
+    except BenchmarkError as error:
+        return _fail(f"fsci bench: {error}")
     return 0
 
 

@@ -1,10 +1,15 @@
 """Benchmarks: their tables and command line; the small ones run."""
 
 import json
-import subprocess
-import sys
+from dataclasses import replace
+
+from programs import fsci
 
 from fsci.bench import linear, small
+from fsci.bench.compare import compare
+from fsci.bench.families import FAMILIES
+from fsci.bench.family import front
+from fsci.bench.front_plot import plot_front
 from fsci.bench.table import show, text
 from fsci.shapes import box
 
@@ -32,20 +37,57 @@ def test_numbers():
 
 def test_command_line(tmp_path):
     out = tmp_path / "bench.json"
-    done = subprocess.run(
-        [sys.executable, "-m", "fsci.bench", "search", "-o", out], capture_output=True, text=True, timeout=60
-    )
+    done = fsci("bench", "search", "-o", out)
     assert done.returncode == 0, done.stderr
     data = json.loads(out.read_text())
-    assert data.keys() == {"machine", "versions", "results"}
+    assert data.keys() == {"machine", "versions", "commit", "results"}
     assert [row["facets"] for row in data["results"]["search"]] == [1024, 10000, 99856]
     assert done.stdout.splitlines()[1].startswith("search: ")
 
 
-def test_unknown_name():
-    done = subprocess.run([sys.executable, "-m", "fsci.bench", "sercah"], capture_output=True, text=True, timeout=60)
+def test_mistakes(tmp_path):
+    done = fsci("bench", "sercah")
     assert done.returncode == 2
-    assert "unknown benchmark 'sercah' (available: small, static, linear," in done.stderr
+    assert done.stderr == "fsci bench: there is no benchmark 'sercah'; did you mean 'search'?\n"
+    (tmp_path / "old.json").write_text("{}")
+    done = fsci("bench", "search", "--against", tmp_path / "old.json")
+    assert done.returncode == 2
+    assert done.stderr == f"fsci bench: {tmp_path}/old.json has no results of benchmarks (KeyError)\n"
+
+
+def test_list():
+    done = fsci("bench")
+    assert done.returncode == 0
+    assert done.stdout.startswith("small           one time step of small problems")
+
+
+def test_front():
+    """Cost and error: (3, 2) costs more and errs more than (2, 1); two that are the same are both on the front."""
+    assert front([(1.0, 5.0), (2.0, 1.0), (3.0, 2.0), (2.0, 1.0), (4.0, 0.5)]) == [True, True, False, True, True]
+
+
+def test_a_family_measures_each_option_and_resolution(tmp_path):
+    csm1 = FAMILIES["csm1"]
+    rows = replace(csm1, resolutions=dict([*csm1.resolutions.items()][:1])).run()
+    assert [(row["option"], row["resolution"], row["unknowns"]) for row in rows] == [
+        ("quad9", "35 x 2", 710),
+        ("quad4", "35 x 2", 216),
+    ]
+    errors = [row["error [%]"] for row in rows]
+    assert errors[0] < 1.0 < 30.0 < errors[1]
+    assert all(row["error [%]"] == max(row["A.x final [%]"], row["A.y final [%]"]) for row in rows)
+    assert rows[0]["front"] == "*"
+    plot_front(rows, "two runs", tmp_path / "front.png")
+    assert (tmp_path / "front.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_ratios_to_earlier_results():
+    now = {"a": [{"option": "x", "time [s]": 1.0, "error [%]": 3.0, "dofs": 5, "front": "*"}], "b": [{"time [s]": 1.0}]}
+    before = {"a": [{"option": "y", "time [s]": 9.0}, {"option": "x", "time [s]": 2.0, "error [%]": 1.5, "dofs": 5}]}
+    assert [(row["column"], row["now/before"]) for row in compare(now, before)] == [
+        ("time [s]", 0.5),
+        ("error [%]", 2.0),
+    ]
 
 
 def test_small_row():

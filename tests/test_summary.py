@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fsci.run.summary import RunRecord, Timer, memory_mb, summarize, write_summary
+from fsci.run.summary import RunRecord, Timer, memory_mb, shares, summarize, write_summary
 from solvers.api import StepInfo
 
 
@@ -108,3 +108,8 @@ def test_memory_is_the_peak_the_kernel_reports():
     status = Path("/proc/self/status").read_text()
     kilobytes = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM"))
     assert memory_mb() == pytest.approx(kilobytes / 1024, rel=0.01)
+
+
+def test_where_the_time_went():
+    assert shares(10.0, {"assembly": 3.0, "solve": 5.04, "output": 0.04}) == "solve 50 %, assembly 30 %, other 20 %"
+    assert shares(0.0, {}) == "other 100 %"

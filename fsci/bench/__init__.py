@@ -1,1 +1,1 @@
-"""Time and memory: `python -m fsci.bench`."""
+"""Time, memory and accuracy: `fsci bench`."""

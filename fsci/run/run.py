@@ -23,7 +23,7 @@ from fsci.run.output import FieldWriter, write_text
 from fsci.run.processes import describe
 from fsci.run.results_folder import keep_case, prepare_folder
 from fsci.run.stop import StopWatch
-from fsci.run.summary import RunRecord, memory_mb, summarize, write_summary
+from fsci.run.summary import RunRecord, memory_mb, shares, summarize, write_summary
 from fsci.run.verify import evaluate
 from solvers.api import State, StepFailed, StepInfo
 
@@ -362,6 +362,7 @@ class Run:
         if status == "finished":
             message = f"finished in {self.record.wall():.3g} s; results in {self.out}"
             message += "; the verification was missed" if missed else ""
+            self.monitor.say(f"time: {shares(self.record.wall(), self.record.timer.seconds)}")
         self.monitor.finish(message, ok=status == "finished" and not missed)
         return {"finished": FAILED if missed else FINISHED, "stopped": STOPPED, "failed": FAILED}[status]
 

@@ -116,6 +116,14 @@ def summarize(
     }
 
 
+def shares(total: float, parts: Mapping[str, float]) -> str:
+    """Where the time of a run went: "solve 40 %, assembly 35 %, other 25 %", the largest first, from 1 % on."""
+    percent = {name: round(100 * seconds / total) for name, seconds in parts.items()} if total else {}
+    percent = {name: share for name, share in sorted(percent.items(), key=lambda part: -part[1]) if share}
+    rest = max(100 - sum(percent.values()), 0)
+    return ", ".join(f"{name} {share} %" for name, share in [*percent.items(), ("other", rest)])
+
+
 def write_summary(path: Path, data: Mapping[str, Any]) -> None:
     """Writes JSON, whole or not at all; numbers that are not finite become null."""
     write_text(path, json.dumps(plain(data), indent=2, allow_nan=False) + "\n")

@@ -1,16 +1,21 @@
-"""Run benchmarks, print their tables, and write them as JSON: `python -m fsci.bench [NAME ...] [-o FILE]`."""
+"""Run benchmarks, print their tables, write them as JSON, draw and compare them: the command `fsci bench`."""
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
-from collections.abc import Callable
+import subprocess
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from fsci.bench import contact, cook, flag, fluid, hertz, linear, moments, small, static
+from fsci.bench.compare import compare
+from fsci.bench.families import FAMILIES
+from fsci.bench.front_plot import plot_front
 from fsci.bench.table import Row, show
+from fsci.case.errors import did_you_mean
 from fsci.run.summary import plain, versions
 
 #: Name -> (what it measures, how). One column of a row is one number or word.
@@ -29,28 +34,57 @@ BENCHMARKS: dict[str, tuple[str, Callable[[], list[Row]]]] = {
     "cylinder_2d1": ("Schaefer-Turek 2D-1: error against time, four meshes of both elements", fluid.run_steady),
     "cut_stokes": ("Stokes flow around a disc by the direct solver: seconds by size", fluid.run_stokes),
     "channel": ("a ring moves through a channel in 3D: seconds of one time step by part", fluid.run_channel),
+    **{name: (f"{family.words}: error against time", family.run) for name, family in FAMILIES.items()},
 }
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m fsci.bench", description="Measure time and memory.")
-    parser.add_argument("names", metavar="NAME", nargs="*", help=f"which: {', '.join(BENCHMARKS)} (default: all)")
-    parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="write the results as JSON")
-    options = parser.parse_args()
-    unknown = [name for name in options.names if name not in BENCHMARKS]
-    if unknown:
-        parser.error(f"unknown benchmark '{unknown[0]}' (available: {', '.join(BENCHMARKS)})")
+class BenchmarkError(Exception):
+    """What was asked for cannot be measured."""
 
+
+def describe() -> str:
+    """The benchmarks there are."""
+    return "\n".join(f"{name:15} {words}" for name, (words, _) in BENCHMARKS.items())
+
+
+def run(names: Sequence[str], out: Path | None, against: Path | None, plots: Path | None) -> None:
+    """Run benchmarks by name and show what they give. Raises BenchmarkError."""
+    names = list(BENCHMARKS) if list(names) == ["all"] else names
+    for name in names:
+        if name not in BENCHMARKS:
+            raise BenchmarkError(f"there is no benchmark '{name}'{did_you_mean(name, BENCHMARKS)}")
+    before = {} if against is None else _results(against)
     results: dict[str, list[Row]] = {}
-    for name in options.names or BENCHMARKS:
+    for name in names:
         words, function = BENCHMARKS[name]
         print(f"\n{name}: {words}", flush=True)
         results[name] = function()
         print(show(results[name]), flush=True)
-    if options.out is not None:
+        if plots is not None and name in FAMILIES:
+            plots.mkdir(parents=True, exist_ok=True)
+            plot_front(results[name], FAMILIES[name].words, plots / f"{name}.png")
+    if rows := compare(results, before):
+        print(f"\nagainst {against}:\n{show(rows)}", flush=True)
+    if out is not None:
         machine = {"cores": os.cpu_count(), "machine": platform.machine(), "processor": processor()}
-        data = {"machine": machine, "versions": versions(), "results": results}
-        options.out.write_text(json.dumps(plain(data), indent=2) + "\n")
+        data = {"machine": machine, "versions": versions(), "commit": commit(), "results": results}
+        out.write_text(json.dumps(plain(data), indent=2) + "\n")
+
+
+def _results(path: Path) -> Mapping[str, Any]:
+    try:
+        return json.loads(path.read_text())["results"]
+    except (OSError, ValueError, KeyError) as error:
+        raise BenchmarkError(f"{path} has no results of benchmarks ({type(error).__name__})") from None
+
+
+def commit() -> str:
+    """The state of the repository that these files are in, with a + if files have been changed since."""
+    command = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty=+"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
 
 
 def processor() -> str:
@@ -58,7 +92,3 @@ def processor() -> str:
     path = Path("/proc/cpuinfo")
     lines = path.read_text().splitlines() if path.exists() else []
     return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,81 @@
+"""Which cases show what accuracy costs, with which options, on which grids and steps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fsci.bench.family import Family
+
+
+def _grid_2d1(scale: float) -> dict[str, Any]:
+    """Cells of cylinder_2d1, this many times as many along each direction as on its own grid."""
+    return {
+        f"fluid.grid.{axis}.{i}.cells": max(4, round(scale * cells))
+        for axis, counts in {"x": (24, 80, 90), "y": (36, 80, 38)}.items()
+        for i, cells in enumerate(counts)
+    }
+
+
+def _grid_fsi1(scale: float) -> dict[str, Any]:
+    return {
+        f"fluid.grid.{axis}.{i}.cells": max(2, round(scale * cells))
+        for axis, counts in {"x": (8, 43, 4, 10, 4, 30), "y": (8, 3, 2, 16, 2, 3, 8)}.items()
+        for i, cells in enumerate(counts)
+    }
+
+
+def _steps(*steps: float) -> dict[str, dict[str, Any]]:
+    return {f"{step:g} s": {"time.step": step} for step in steps}
+
+
+FLAG = "structure.bodies.flag.mesh"
+
+FAMILIES = {
+    "csm1": Family(
+        "csm1",
+        "Turek-Hron CSM1, a flag under its weight",
+        {"quad9": {f"{FLAG}.order": 2}, "quad4": {f"{FLAG}.order": 1}},
+        {f"{35 * n} x {2 * n}": {f"{FLAG}.parameters.refine": n} for n in (1, 2, 4, 8)},
+    ),
+    "csm3": Family(
+        "csm3",
+        "Turek-Hron CSM3, a flag that swings",
+        {f"quad9, {35 * n} x {2 * n}": {f"{FLAG}.parameters.refine": n} for n in (1, 2)},
+        _steps(0.04, 0.02, 0.01, 0.005),
+    ),
+    "2d1": Family(
+        "cylinder_2d1",
+        "Schaefer-Turek 2D-1, steady flow past a cylinder",
+        {element: {"fluid.element": element} for element in ("q1q1", "q2q1")},
+        {f"{round(66.7 * n)} cells per diameter": _grid_2d1(n) for n in (0.15, 0.3, 0.6, 1.0)},
+        values=("drag", "dp"),
+    ),
+    "2d2": Family(
+        "cylinder_2d2",
+        "Schaefer-Turek 2D-2, vortices behind a cylinder",
+        {scheme: {"fluid.scheme": scheme} for scheme in ("backward_euler", "bdf2")},
+        _steps(0.02, 0.01, 0.005),
+    ),
+    "fsi1": Family(
+        "fsi1",
+        "Turek-Hron FSI1, a flag bent by a steady flow",
+        {"q2q1, monolithic": {}, "q1q1, monolithic": {"fluid.element": "q1q1"}},
+        {f"{n:g} x": _grid_fsi1(n) for n in (0.5, 1.0, 1.5)},
+    ),
+    "bar_column": Family(
+        "elastic_bar_column",
+        "an elastic bar that moves a column of fluid of its own mass",
+        {
+            "monolithic": {"coupling.scheme": "monolithic"},
+            "Aitken": {"coupling": {"scheme": "partitioned", "accelerator": "aitken", "wetted": {"bar": ["right"]}}},
+            "IQN-ILS": {"coupling": {"scheme": "partitioned", "accelerator": "iqn", "wetted": {"bar": ["right"]}}},
+        },
+        _steps(0.24, 0.12, 0.06),
+    ),
+    "falling_sphere": Family(
+        "falling_sphere",
+        "an elastic sphere falls in oil, experiment of ten Cate et al., Re 4.1",
+        {"bdf2": {"fluid.scheme": "bdf2"}, "backward_euler": {"fluid.scheme": "backward_euler"}},
+        _steps(0.1, 0.05),
+    ),
+}

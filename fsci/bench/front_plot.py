@@ -1,0 +1,35 @@
+"""Error against time, unknowns and memory of a family of runs, on logarithmic axes; the front is ringed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from fsci.bench.family import ERROR, FRONT, MEMORY, TIME, UNKNOWNS
+from fsci.bench.table import Row
+
+
+def plot_front(rows: Sequence[Row], title: str, path: Path) -> None:
+    """Writes a picture with a panel for each cost and a curve for each option."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    from fsci.plot.curves import COLOURS, DOTS, STYLE
+
+    with plt.rc_context(STYLE):
+        figure, panels = plt.subplots(1, 3, figsize=(12.0, 4.2), sharey=True, layout="constrained")
+        options = list(dict.fromkeys(str(row["option"]) for row in rows))
+        for panel, cost in zip(panels, (TIME, UNKNOWNS, MEMORY), strict=True):
+            for number, option in enumerate(options):
+                points = [(float(row[cost]), float(row[ERROR])) for row in rows if row["option"] == option]
+                panel.loglog(*zip(*points, strict=True), "o-", color=COLOURS[number % len(COLOURS)], label=option)
+            best = [(float(row[cost]), float(row[ERROR])) for row in rows if row[FRONT]]
+            panel.loglog(*zip(*best, strict=True), "o", ms=12, mfc="none", mec="black", label="front of time and error")
+            panel.set_xlabel(cost)
+        panels[0].set_ylabel("largest error of all values [%]")
+        panels[0].legend()
+        figure.suptitle(title)
+        figure.savefig(path, dpi=DOTS)
+        plt.close(figure)
