@@ -13,7 +13,8 @@ from solvers.contact.directions import find_directions
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.law import SLIP
 from solvers.structure.body import Support
-from solvers.structure.materials import NeoHooke, lame
+from solvers.structure.elastic_constants import lame
+from solvers.structure.materials import NeoHooke
 from solvers.structure.supports import Symmetry
 
 ZERO = constant(0)

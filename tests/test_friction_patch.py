@@ -12,8 +12,9 @@ from solvers.contact.law.law import SLIP, STICK
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
+from solvers.structure.elastic_constants import lame
 from solvers.structure.loads import Traction
-from solvers.structure.materials import StVenantKirchhoff, lame
+from solvers.structure.materials import StVenantKirchhoff
 
 SETTINGS = SolverSettings(Tolerance(residual=1e-11, residual_absolute=1e-10, max_iterations=15), linear="direct")
 MATERIAL = StVenantKirchhoff(*lame(1000.0, 0.3), 1.0)
