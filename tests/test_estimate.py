@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter
 
-from fsci.case.mesh import Shape
-from fsci.check.estimate import aspect, size
+from fsci.case.shapes import Shape
 from fsci.meshes.mesh import build_mesh
 
 SHAPES: list[dict[str, Any]] = [
@@ -36,13 +35,13 @@ def test_cells_nodes_and_surfaces(settings, tmp_path):
         cell = {2: ("quad", "tri"), 3: ("hex", "tet")}[shape(settings).dimension][simplex]
         model = shape(settings | {"order": order, "cell": cell})
         mesh = build_mesh(model, tmp_path)
-        assert size(model) == (len(mesh.cells), len(mesh.points))
+        assert model.counts == (len(mesh.cells), len(mesh.points))
         assert set(model.surfaces) == set(mesh.surfaces)
 
 
 def test_aspect():
-    assert aspect(shape({"shape": "rectangle", "size": [2, 1], "cells": [2, 10]})) == pytest.approx(10)
-    assert aspect(shape({"shape": "box", "size": [1, 1, 1], "cells": [1, 2, 4]})) == pytest.approx(4)
+    assert shape({"shape": "rectangle", "size": [2, 1], "cells": [2, 10]}).aspect == pytest.approx(10)
+    assert shape({"shape": "box", "size": [1, 1, 1], "cells": [1, 2, 4]}).aspect == pytest.approx(4)
     # a sixth of the middle circle is 2 pi 1.5/6 = pi/2 long, the layers are 0.1 thick
     ring = {"shape": "ring", "inner_radius": 1, "outer_radius": 2, "cells": [6, 10]}
-    assert aspect(shape(ring)) == pytest.approx(5 * 3.14159265)
+    assert shape(ring).aspect == pytest.approx(5 * 3.14159265)

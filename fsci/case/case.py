@@ -14,10 +14,10 @@ from fsci.case.curve import Curve, CurveName
 from fsci.case.document import Document, override
 from fsci.case.errors import CaseError, Place
 from fsci.case.fluid import Fluid
-from fsci.case.mesh import Shape
 from fsci.case.output import Output
 from fsci.case.probes import Probe
 from fsci.case.section import Section, setting
+from fsci.case.shapes import Shape
 from fsci.case.solver import Solver
 from fsci.case.structure import Body, Structure
 from fsci.case.time import Time

@@ -11,9 +11,9 @@ from fsci.case.coupling_checks import coupling_mistakes
 from fsci.case.errors import did_you_mean
 from fsci.case.fluid_checks import fluid_mistakes
 from fsci.case.material import has_mass
-from fsci.case.mesh import Shape
 from fsci.case.mesh_checks import Mistake, length_mistakes, mesh_mistakes, surfaces_mistakes
 from fsci.case.probe_checks import probe_mistakes, verify_mistakes
+from fsci.case.shapes import Shape
 from fsci.case.structure import NO_MIXED_SIMPLICES, Body, Structure
 from fsci.case.yaml_text import Keys
 

@@ -7,20 +7,7 @@ from typing import Annotated, Any, get_args
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from fsci.case.section import fault, setting
-from fsci.case.shapes import (
-    Beam,
-    Box,
-    Cylinder,
-    Disc,
-    HollowSphere,
-    HollowTorus,
-    Placed,
-    Rectangle,
-    Ring,
-    SolidTorus,
-    Sphere,
-    Tube,
-)
+from fsci.case.shapes import Placed, Shape
 from fsci.case.values import Name, Number, Order, Text, chosen, spoken
 
 
@@ -37,7 +24,6 @@ class FileMesh(Placed):
     parameters: dict[Name, Number] = setting(dict, "values for the script's DefineConstant names (.geo only)")
 
 
-Shape = Rectangle | Disc | Ring | Box | Beam | Cylinder | Tube | SolidTorus | HollowTorus | HollowSphere | Sphere
 SHAPES = [name for shape in get_args(Shape) for name in get_args(shape.model_fields["shape"].annotation)]
 
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from fsci.case.errors import did_you_mean
-from fsci.case.mesh import FileMesh, Mesh, Shape
+from fsci.case.mesh import FileMesh, Mesh
+from fsci.case.shapes import Shape
 from fsci.case.yaml_text import Keys
 
 Mistake = tuple[Keys, str]  #: path of the setting, message

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from fsci.case.case import Case
 from fsci.case.material import Material
-from fsci.case.mesh import FileMesh, Shape
+from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import flow_doubts
+from fsci.case.shapes import Shape
 from fsci.case.structure import Body
 from fsci.case.yaml_text import Keys
-from fsci.check.estimate import aspect
 from solvers.structure.elastic_constants import poisson, young
 
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from aerogel to osmium, with a margin
@@ -29,7 +29,7 @@ def doubts(case: Case) -> Iterator[tuple[Keys, str]]:
         keys: Keys = ("structure", "bodies", name)
         yield from _material(case, body.material, (*keys, "material"))
         yield from _locking(body, (*keys, "mesh"))
-        if isinstance(body.mesh, Shape) and (ratio := aspect(body.mesh)) > 50:
+        if isinstance(body.mesh, Shape) and (ratio := body.mesh.aspect) > 50:
             yield (*keys, "mesh", "cells"), f"the cells are {ratio:.0f} times longer than wide"
     if case.fluid is not None:
         yield from flow_doubts(case, case.fluid)

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from fsci.case.case import Case
 from fsci.case.fluid import Fluid, Movement, Patch
-from fsci.case.mesh import Shape
+from fsci.case.shapes import Shape
 from fsci.case.yaml_text import Keys
-from fsci.check.estimate import thickness
 from solvers.fluid.fast_bodies import MOST_CELLS
 
 MOST_CELLS_PER_STEP = 10.0  #: that a flow or a body may cross in a time step without being asked about it
@@ -75,7 +74,7 @@ def _thin_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
     for (section, kind, name), (mesh, moves) in (moving | elastic).items():
         if not isinstance(mesh, Shape) or name in one_sided:
             continue
-        if doubt := thin_body(fluid, thickness(mesh), moves=moves):
+        if doubt := thin_body(fluid, mesh.thickness, moves=moves):
             yield (section, kind, name, "mesh"), doubt
 
 

@@ -8,9 +8,9 @@ from math import ceil
 from fsci.case import Case
 from fsci.case.contact import Pair
 from fsci.case.fluid import Fluid
-from fsci.case.mesh import Mesh, Shape
+from fsci.case.mesh import Mesh
+from fsci.case.shapes import Shape
 from fsci.case.structure import Structure
-from fsci.check.estimate import size
 from solvers.mesh import Mesh as BodyMesh
 
 Row = tuple[str, str]
@@ -53,7 +53,7 @@ def _structure(case: Case, structure: Structure, meshes: Mapping[str, BodyMesh])
     for name, body in structure.bodies.items():
         text = f"{_name(body.mesh)}, {body.material.law}"
         if isinstance(body.mesh, Shape):
-            cells, nodes = size(body.mesh)
+            cells, nodes = body.mesh.counts
             total += nodes * body.mesh.dimension
             text += f", {_count(cells, 'cell')} (order {body.mesh.order} {body.mesh.cell})"
         elif name in meshes:

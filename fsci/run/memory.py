@@ -6,9 +6,8 @@ import os
 from typing import Any
 
 from fsci.case import Case
-from fsci.case.mesh import Shape
+from fsci.case.shapes import Shape
 from fsci.case.yaml_text import Keys
-from fsci.check.estimate import size
 
 #: Memory [bytes] that an unknown takes at least: its row of a matrix in 2D with its nine neighbours, twice. In 3D with
 #: factors or a preconditioner it is up to twenty times as much.
@@ -23,7 +22,7 @@ def unknowns(case: Case) -> dict[Keys, int]:
     found: dict[Keys, int] = {}
     for name, body in case.elastic_bodies.items():
         if isinstance(body.mesh, Shape):
-            found["structure", "bodies", name, "mesh"] = size(body.mesh)[1] * body.mesh.dimension
+            found["structure", "bodies", name, "mesh"] = body.mesh.counts[1] * body.mesh.dimension
     if case.fluid is not None:
         found["fluid", "grid"] = case.fluid.dofs
     return found

@@ -1,0 +1,253 @@
+"""Built-in meshes of three dimensions: one section for each shape."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Annotated, Literal
+
+from pydantic import model_validator
+
+from fsci.case.section import fault, setting
+from fsci.case.shapes.built_in import (
+    Cells2,
+    Cells3,
+    Counts,
+    Solid,
+    across_disc,
+    along,
+    product,
+    require_around,
+    require_wall,
+)
+from fsci.case.values import Entries, Number, Positive
+
+
+class Box(Solid):
+    """Box with the surfaces left, right (x), front, back (y), bottom, top (z)."""
+
+    sides = ("left", "right", "front", "back", "bottom", "top")
+    shape: Literal["box"] = setting(..., "kind of shape")
+    size: Annotated[tuple[Positive, ...], Entries(3, 3)] = setting(..., "extent along x, y and z", unit="m")
+    cells: Cells3 = setting(..., "number of cells along x, y and z")
+    origin: Annotated[tuple[Number, ...], Entries(3, 3)] = setting((0.0, 0.0, 0.0), "lower corner", unit="m")
+
+    @property
+    def lattice(self) -> Counts:
+        n, order = self.cells, self.order
+        return product(*(along(count, order) for count in n))
+
+    @property
+    def extents(self) -> tuple[float, ...]:
+        return self.size
+
+    @property
+    def thickness(self) -> float:
+        return min(self.size)
+
+
+class Beam(Solid):
+    """Box along the x axis, from x = 0, with the surfaces left, right (x), front, back (y), bottom, top (z)."""
+
+    sides = ("left", "right", "front", "back", "bottom", "top")
+    shape: Literal["beam"] = setting(..., "kind of shape")
+    length: Positive = setting(..., "extent along x", unit="m")
+    width: Positive = setting(..., "extent along y", unit="m")
+    height: Positive = setting(..., "extent along z", unit="m")
+    cells: Cells3 = setting(..., "number of cells along x, y and z")
+
+    @property
+    def lattice(self) -> Counts:
+        n, order = self.cells, self.order
+        return product(*(along(count, order) for count in n))
+
+    @property
+    def extents(self) -> tuple[float, ...]:
+        return self.length, self.width, self.height
+
+    @property
+    def thickness(self) -> float:
+        return min(self.extents)
+
+
+class Cylinder(Solid):
+    """Cylinder about the z axis, from z = 0, with the surfaces outer, bottom, top."""
+
+    sides = ("outer", "bottom", "top")
+    shape: Literal["cylinder"] = setting(..., "kind of shape")
+    radius: Positive = setting(..., "radius", unit="m")
+    height: Positive = setting(..., "extent along z", unit="m")
+    cells: Cells3 = setting(..., "number of cells around (a multiple of 4), through the shell, and along")
+
+    @model_validator(mode="after")
+    def _possible(self) -> Cylinder:
+        require_around(self.cells, 0, disc=True)
+        return self
+
+    @property
+    def lattice(self) -> Counts:
+        n, order = self.cells, self.order
+        return product(across_disc(n[0], n[1], order), along(n[2], order))
+
+    @property
+    def aspect(self) -> float:
+        around, high = 2 * pi * self.radius / self.cells[0], self.height / self.cells[2]
+        return max(around, high) / min(around, high)
+
+    @property
+    def thickness(self) -> float:
+        return min(2 * self.radius, self.height)
+
+
+class Tube(Solid):
+    """Tube (or annulus) about the z axis, from z = 0, with the surfaces inner, outer, bottom, top."""
+
+    sides = ("inner", "outer", "bottom", "top")
+    shape: Literal["tube", "annulus"] = setting(..., "kind of shape")
+    inner_radius: Positive = setting(..., "inner radius", unit="m")
+    outer_radius: Positive = setting(..., "outer radius", unit="m")
+    height: Positive = setting(..., "extent along z", unit="m")
+    cells: Cells3 = setting(..., "number of cells around, through the wall, and along")
+
+    @model_validator(mode="after")
+    def _possible(self) -> Tube:
+        require_wall(self.inner_radius, self.outer_radius)
+        require_around(self.cells, 0)
+        return self
+
+    @property
+    def lattice(self) -> Counts:
+        n, order = self.cells, self.order
+        return product(along(n[0], order, closed=True), along(n[1], order), along(n[2], order))
+
+    @property
+    def extents(self) -> tuple[float, ...]:
+        return pi * (self.inner_radius + self.outer_radius), self.outer_radius - self.inner_radius, self.height
+
+    @property
+    def thickness(self) -> float:
+        return min(self.outer_radius - self.inner_radius, self.height)
+
+
+class SolidTorus(Solid):
+    """Torus about the y axis, with the surface outer."""
+
+    sides = ("outer",)
+    shape: Literal["solid_torus"] = setting(..., "kind of shape")
+    major_radius: Positive = setting(..., "radius of the circle of section centres", unit="m")
+    minor_radius: Positive = setting(..., "radius of the section", unit="m")
+    cells: Cells2 = setting(..., "number of cells around the y axis, and around the section (a multiple of 4)")
+
+    @model_validator(mode="after")
+    def _possible(self) -> SolidTorus:
+        if self.minor_radius >= self.major_radius:
+            raise fault(
+                f"must be less than 'major_radius', {self.major_radius:g}, not {self.minor_radius:g}",
+                "minor_radius",
+            )
+        require_around(self.cells, 0)
+        require_around(self.cells, 1, disc=True)
+        return self
+
+    @property
+    def lattice(self) -> Counts:
+        n, order = self.cells, self.order
+        return product(along(n[0], order, closed=True), across_disc(n[1], max(1, n[1] // 8), order))
+
+    @property
+    def extents(self) -> tuple[float, ...]:
+        return 2 * pi * self.major_radius, 2 * pi * self.minor_radius
+
+    @property
+    def thickness(self) -> float:
+        return 2 * self.minor_radius
+
+
+class HollowTorus(Solid):
+    """Torus about the y axis with a wall, with the surfaces inner, outer."""
+
+    sides = ("inner", "outer")
+    shape: Literal["hollow_torus"] = setting(..., "kind of shape")
+    major_radius: Positive = setting(..., "radius of the circle of section centres", unit="m")
+    inner_radius: Positive = setting(..., "inner radius of the section", unit="m")
+    outer_radius: Positive = setting(..., "outer radius of the section", unit="m")
+    cells: Cells3 = setting(..., "number of cells around the y axis, around the section, and through the wall")
+
+    @model_validator(mode="after")
+    def _possible(self) -> HollowTorus:
+        require_wall(self.inner_radius, self.outer_radius)
+        if self.outer_radius >= self.major_radius:
+            raise fault(
+                f"must be less than 'major_radius', {self.major_radius:g}, not {self.outer_radius:g}",
+                "outer_radius",
+            )
+        require_around(self.cells, 0)
+        require_around(self.cells, 1)
+        return self
+
+    @property
+    def lattice(self) -> Counts:
+        n, order = self.cells, self.order
+        return product(along(n[0], order, closed=True), along(n[1], order, closed=True), along(n[2], order))
+
+    @property
+    def extents(self) -> tuple[float, ...]:
+        return (
+            2 * pi * self.major_radius,
+            pi * (self.inner_radius + self.outer_radius),
+            self.outer_radius - self.inner_radius,
+        )
+
+    @property
+    def thickness(self) -> float:
+        return self.outer_radius - self.inner_radius
+
+
+class HollowSphere(Solid):
+    """Spherical shell about the origin (a cubed sphere), with the surfaces inner, outer."""
+
+    sides = ("inner", "outer")
+    shape: Literal["hollow_sphere"] = setting(..., "kind of shape")
+    inner_radius: Positive = setting(..., "inner radius", unit="m")
+    outer_radius: Positive = setting(..., "outer radius", unit="m")
+    cells: Cells2 = setting(..., "number of cells along an edge of the cube, and through the wall")
+
+    @model_validator(mode="after")
+    def _possible(self) -> HollowSphere:
+        require_wall(self.inner_radius, self.outer_radius)
+        return self
+
+    @property
+    def lattice(self) -> Counts:
+        n, order = self.cells, self.order
+        return product((6 * n[0] ** 2, 6 * (order * n[0]) ** 2 + 2), along(n[1], order))
+
+    @property
+    def extents(self) -> tuple[float, ...]:
+        return pi / 4 * (self.inner_radius + self.outer_radius), self.outer_radius - self.inner_radius
+
+    @property
+    def thickness(self) -> float:
+        return self.outer_radius - self.inner_radius
+
+
+class Sphere(Solid):
+    """Ball about the origin, a cubic core in a round shell, with the surface outer."""
+
+    sides = ("outer",)
+    shape: Literal["sphere"] = setting(..., "kind of shape")
+    radius: Positive = setting(..., "radius", unit="m")
+    cells: Cells2 = setting(..., "number of cells along an edge of the core, and through the shell")
+
+    @property
+    def lattice(self) -> Counts:
+        face, edge = 6 * self.cells[0] ** 2, self.order * self.cells[0]
+        layers = self.cells[1]
+        return self.cells[0] ** 3 + face * layers, (edge + 1) ** 3 + (6 * edge**2 + 2) * self.order * layers
+
+    @property
+    def aspect(self) -> float:
+        return 1.0
+
+    @property
+    def thickness(self) -> float:
+        return 2 * self.radius
