@@ -1,8 +1,13 @@
 """Fluid and structure together: what they exchange, and the schemes that bring them into balance."""
 
-from coupling.contact_surface import contact_surface
-from coupling.couple import couple, couple_rigid
-from coupling.monolithic import Monolithic
-from coupling.partitioned import Partitioned
+from solvers.lazy import lazy_names
 
-__all__ = ["Monolithic", "Partitioned", "contact_surface", "couple", "couple_rigid"]
+__getattr__, __all__ = lazy_names(
+    __name__,
+    {
+        "contact_surfaces": ["contact_surface"],
+        "parts": ["couple", "couple_rigid"],
+        "monolithic": ["Monolithic"],
+        "partitioned": ["Partitioned"],
+    },
+)

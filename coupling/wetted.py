@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coupling.contact_surface import global_dofs
+from coupling.contact_surfaces import global_dofs
 from solvers.api import Array
 from solvers.blocks import Layout
 from solvers.fluid.immersed import ImmersedBody

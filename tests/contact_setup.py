@@ -10,7 +10,7 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from structure_setup import block, corner_count, corner_shape_functions
 
-from coupling.contact_surface import contact_surface
+from coupling.contact_surfaces import contact_surface
 from solvers.contact.contact import Contact
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import Law

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from coupling.couple import couple
 from coupling.coupled import Coupled
+from coupling.parts import couple
 from fsci import shapes
 from solvers.fluid.grid import Grid, uniform
 from solvers.fluid.patches import Patch

@@ -11,7 +11,7 @@ from contact_cases import COLLISION, PISTON, PLATE, run
 from programs import fsci
 from structure_setup import make_structure
 
-from coupling.contact_surface import contact_surface
+from coupling.contact_surfaces import contact_surface
 from fsci import shapes
 from fsci.case import load_case
 from fsci.run.checkpoint import read_checkpoint

@@ -11,9 +11,10 @@ import numpy as np
 
 from fsci import shapes
 from fsci.bench.program import run_case
+from fsci.bench.search import measure_search
 from fsci.bench.table import Row
 from solvers.cell_types import CELL_TYPES
-from solvers.contact.search import Search, measure_search
+from solvers.contact.search import Search
 from solvers.kernels import mortar, nodal_normals
 from solvers.mesh_topology import surface_facets
 

@@ -14,7 +14,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy.optimize import brentq
 
-from coupling.contact_surface import contact_surface
+from coupling.contact_surfaces import contact_surface
 from fsci import shapes
 from fsci.bench.table import Row
 from solvers.contact.contact import Contact

@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from coupling.contact_surface import contact_surface
+from coupling.contact_surfaces import contact_surface
 from fsci.builder.rigid_motion import rigid_motion
 from fsci.case import Case, CaseError
 from fsci.case.contact import Pair as PairSettings

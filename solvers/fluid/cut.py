@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,7 @@ class Cutter:
     """Cuts one grid again and again; `points` (n,) are the 1D points of the rule on cut cells.
 
     Within a step no cell leaves the ghost penalty that once was under it: iterates that go to and fro across a cell's
-    face would otherwise solve two systems in turn and never settle.
+    face would otherwise solve two systems in turn and never settle. Surfaces that have not moved are not cut again.
     """
 
     def __init__(self, grid: DistributedGrid, points: Array):
@@ -59,6 +59,7 @@ class Cutter:
         self._special = np.zeros(grid.grid.size, dtype=bool)
         sizes = grid.grid.cell_sizes()
         self._slivers = NOTHING * sizes.prod(axis=1) / sizes.max(axis=1)  # areas of surface that do not count
+        self._first: _First | None = None
 
     def begin_step(self) -> None:
         """Forget where the surfaces have been."""
@@ -71,9 +72,20 @@ class Cutter:
 
         Facets that are not `wet`, and those on the boundary of the box, only close the solid.
         """
-        grid, box = self.grid, self.grid.grid
         if not len(facets):
             return self._whole(facets, motion)
+        first, begins = self._first, not self._special.any()
+        if first is not None and (begins or np.array_equal(self._special, first.special)):
+            if (same := first.where(facets, motion, layers)) is not None:
+                self._first = same
+                self._special[:] = same.special
+                return same.cut
+        cut = self._cut(facets, motion, layers, wet)
+        self._first = _First(cut, layers, self._special.copy()) if begins else None
+        return cut
+
+    def _cut(self, facets: NDArray[np.int64], motion: Motion, layers: int, wet: NDArray[np.bool_] | None) -> Cut:
+        grid, box = self.grid, self.grid.grid
         wanted = _grow(self._own, layers + 2)
         moments = kernels.moments(box.edges, self.points, motion.x, facets, wanted.ravel(order="F"))
         normal = -unit_normals(motion.x[facets])
@@ -179,6 +191,26 @@ class Cutter:
         known = moments.cells[row] == numbers if len(moments.cells) else np.zeros(len(cut), dtype=bool)
         fluid[known] = 1.0 - moments.solid[row[known]] / weights
         return fluid
+
+
+@dataclass(frozen=True)
+class _First:
+    """The first cut of a step: it serves as long as the surfaces stay where they were."""
+
+    cut: Cut
+    layers: int
+    special: NDArray[np.bool_]  #: box cells under the ghost penalty
+
+    def where(self, facets: NDArray[np.int64], motion: Motion, layers: int) -> _First | None:
+        """It for surfaces that are where they were, with the velocities that they have now; None if they moved."""
+        cut = self.cut
+        if (
+            layers != self.layers
+            or not np.array_equal(cut.motion.x, motion.x)
+            or not np.array_equal(cut.facets, facets)
+        ):
+            return None
+        return self if np.array_equal(cut.motion.v, motion.v) else replace(self, cut=replace(cut, motion=motion))
 
 
 def _cells_between(box: Grid, low: Array, high: Array) -> NDArray[np.int64]:

@@ -182,6 +182,8 @@ class FlowSystem:
 
     def set_cut(self, cut: Cut) -> None:
         """Take a cut; cells, faces and the matrix follow."""
+        if cut is self.cut:
+            return
         self.cut, grid = cut, self.grid
         active = np.zeros(len(grid.numbers), dtype=bool)
         active[cut.active] = True

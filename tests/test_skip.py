@@ -1,0 +1,130 @@
+"""What a scene does not need is not imported, searched, cut, assembled or written: shown by counting."""
+
+import os
+import subprocess
+import sys
+from collections import Counter
+
+import pytest
+from mpi4py import MPI
+
+import solvers.fluid.cut
+from fsci.bench.small import BEAM, BLOCK, FLOW, POST
+from fsci.builder.build import build
+from fsci.case import load_case
+from fsci.run.run import FINISHED, Run, run_case
+from solvers.contact.mortar import Mortar
+from solvers.contact.search import Search
+from solvers.fluid.system import FlowSystem
+from solvers.timing import Timer
+
+DISC = """\
+  bodies:
+    disc: {mesh: {shape: disc, radius: 0.2, cells: [16, 2], translate: [0.78, 0.51]}MOTION}
+"""
+RESTING, MOVING = DISC.replace("MOTION", ""), DISC.replace("MOTION", ', motion: {displacement: ["0.1*sin(t)", 0]}')
+FAR = BLOCK.replace("0.001", "5")
+PLOTTING = ("pyvista", "matplotlib", "gmsh")
+#: numbers that `fsci check` needs, too
+LIGHT = ("solvers.structure.elastic_constants", "solvers.fluid.fast_bodies")
+
+
+def written(tmp_path, text, end):
+    (tmp_path / "case.yaml").write_text("title: a scene\n" + text)
+    return load_case(tmp_path, [("time.end", str(end))])
+
+
+def counted(monkeypatch, **methods):
+    """Counts calls of CLASS__METHOD=class."""
+    calls = Counter()
+    for name, owner in methods.items():
+        method = name.split("__", 1)[1]
+        original = getattr(owner, method)
+
+        def counting(*arguments, _name=name, _original=original, **keywords):
+            calls[_name] += 1
+            return _original(*arguments, **keywords)
+
+        monkeypatch.setattr(owner, method, counting)
+    return calls
+
+
+def iterations_of(case, steps):
+    """Newton steps of a few time steps."""
+    simulation = build(case, MPI.COMM_WORLD, Timer())
+    dt = case.time.step
+    simulation.initialise(0.0, dt)
+    return [simulation.scheme.step(n * dt, dt).iterations for n in range(steps)]
+
+
+@pytest.mark.parametrize(
+    ("text", "absent"),
+    [
+        (BEAM, ("solvers.fluid.", "solvers.contact", "solvers.rigid", "coupling")),
+        (BLOCK, ("solvers.fluid.", "solvers.rigid", "coupling.monolithic", "coupling.partitioned")),
+        (FLOW, ("solvers.structure.", "solvers.contact", "solvers.rigid", "coupling")),
+        (FLOW + POST, ("solvers.contact.contact", "solvers.contact.mortar")),
+    ],
+    ids=["beam", "block", "flow", "post"],
+)
+def test_modules_of_absent_parts_are_not_imported(text, absent, tmp_path):
+    written(tmp_path, text, 0.05)
+    code = (
+        "import sys; from fsci.cli import execute;"
+        "execute(['run', sys.argv[1], '-o', sys.argv[1] + '/out', '--set', 'time.end=0.05']); print(*sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, tmp_path], capture_output=True, text=True, env=os.environ)
+    modules = done.stdout.splitlines()[-1].split()
+    assert "solvers.newton" in modules, done.stdout + done.stderr
+    assert [name for name in modules if name.startswith((*absent, *PLOTTING)) and name not in LIGHT] == []
+
+
+def test_bodies_far_apart_cost_a_comparison_of_boxes(tmp_path, monkeypatch):
+    calls = counted(monkeypatch, search__pairs=Search, mortar___kernel=Mortar)
+    iterations = sum(iterations_of(written(tmp_path, FAR, 0.05), 3))
+    assert calls["search__pairs"] <= 2 * iterations + 6
+    assert calls["mortar___kernel"] == 0
+
+
+def test_bodies_at_rest_are_cut_once(tmp_path, monkeypatch):
+    calls = Counter()
+    moments = solvers.fluid.cut.kernels.moments
+
+    def counting(*arguments, **keywords):
+        calls["moments"] += 1
+        return moments(*arguments, **keywords)
+
+    monkeypatch.setattr(solvers.fluid.cut.kernels, "moments", counting)
+    iterations_of(written(tmp_path, FLOW + RESTING, 0.1), 4)
+    assert calls["moments"] == 1
+    iterations_of(written(tmp_path, FLOW + MOVING, 0.1), 4)
+    assert calls["moments"] > 4
+
+
+def test_no_tangent_where_only_a_residual_is_needed(tmp_path, monkeypatch):
+    """A Newton step needs one tangent, convergence none."""
+    calls = counted(monkeypatch, flow__tangent=FlowSystem, flow__residual=FlowSystem)
+    iterations = sum(iterations_of(written(tmp_path, FLOW + RESTING, 0.1), 3))
+    assert calls["flow__tangent"] <= iterations
+    assert calls["flow__residual"] <= iterations + 3
+
+
+def test_output_only_when_asked(tmp_path, monkeypatch):
+    calls = counted(monkeypatch, run___write_fields=Run, run___write_checkpoint=Run)
+    case = written(tmp_path, BEAM + "output: {fields_every: 0}\n", 0.2)
+    assert run_case(case, tmp_path / "out") == FINISHED
+    assert calls["run___write_fields"] == 2  # the first and the last state
+    assert calls["run___write_checkpoint"] == 1  # the last one
+
+
+def test_rigid_bodies_have_no_unknowns(tmp_path):
+    def unknowns(text):
+        return build(written(tmp_path, text, 0.1), MPI.COMM_WORLD, Timer()).dofs
+
+    assert unknowns(FLOW + RESTING) == unknowns(FLOW)
+
+
+def test_slow_flow_has_no_convection(tmp_path):
+    """Without convection the equations are linear: one Newton step each."""
+    case = written(tmp_path, FLOW.replace("density: 1", "density: 1\n  flow: stokes") + RESTING, 0.1)
+    assert iterations_of(case, 3) == [1, 1, 1]
