@@ -27,6 +27,9 @@ SMALLER = {
 }
 
 
+SMALLER["falling_rigid_sphere"] = SMALLER["falling_sphere"]
+
+
 @pytest.mark.parametrize(
     "folder",
     [pytest.param(f, id=f.name, marks=[pytest.mark.slow] if f.name in LONG else []) for f in CASES],

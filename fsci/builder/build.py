@@ -44,7 +44,7 @@ def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
         case = with_pairs(case, comm)
     if case.coupling is not None:
-        return _coupled(case, comm, timer)
+        return _coupled_rigid(case, comm, timer) if case.rigid else _coupled(case, comm, timer)
     if case.fluid is not None:
         return _fluid_alone(case, comm, timer)
     return _structure_alone(case, comm, timer)
@@ -115,6 +115,27 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         dofs={"fluid": fluid.dofs(), "structure": structure.dofs()},
         notes=_notes(bodies),
         imbalance=lambda: {} if contact is None else contact.imbalance,
+    )
+
+
+def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
+    from fsci.builder import fluid as build_fluid
+    from fsci.builder import rigid as build_rigid
+    from fsci.builder.coupling import build_coupled_rigid, start
+    from solvers.fluid.probes import mass_balance
+    from solvers.fluid.snapshot import snapshots
+
+    bodies = build_rigid.build_free_bodies(case, comm, timer)
+    scheme, fluid = build_coupled_rigid(case, comm, bodies, timer)
+    mass = mass_balance(fluid)
+    probes = [build_rigid.build_probes(case, bodies), build_fluid.build_probes(case, fluid)]
+    return Simulation(
+        scheme=scheme,
+        initialise=partial(start, case, scheme, fluid),
+        snapshots=lambda: snapshots(fluid),
+        probes=lambda: {column: value for measure in probes for column, value in measure().items()},
+        balances=lambda: {**mass(), **scheme.coupled.balance.numbers()},
+        dofs={"fluid": fluid.dofs(), "rigid": bodies.unknowns},
     )
 
 

@@ -26,6 +26,7 @@ from fsci.meshes.of_case import require_inside_period
 from solvers.fluid.field import Fluid
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.surface import Surface
+from solvers.rigid.field import RigidBodies
 from solvers.skin import Skin
 from solvers.structure.body import Body
 from solvers.structure.field import Structure
@@ -47,12 +48,28 @@ def build_coupled(
     dry_sides = [_dry_side(s, c) for s, (_, c) in zip(surfaces, skins, strict=True) if c is not None]
     immersed += [ImmersedBody(_dry_line(side), None, deforms=True) for side in dry_sides]
     fluid = build_fluid(case, comm, timer, immersed)
-    coupled = Coupled(fluid, Elastic(structure, surfaces), dry_sides)
+    return _scheme(case, Coupled(fluid, Elastic(structure, surfaces), dry_sides)), fluid
+
+
+def build_coupled_rigid(
+    case: Case, comm: MPI.Comm, bodies: RigidBodies, timer: Timer
+) -> tuple[Monolithic | Partitioned, Fluid]:
+    """The same for rigid bodies that the flow moves. Raises CaseError (collective)."""
+    assert case.fluid is not None
+    moved = [(Surface(body.name, body.facets, len(body.points)), body.points) for body in bodies.bodies]
+    box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
+    immersed = immerse(moved, build_rigid_bodies(case, comm), box, case.time.start, deform=False)
+    fluid = build_fluid(case, comm, timer, immersed)
+    return _scheme(case, Coupled(fluid, bodies)), fluid
+
+
+def _scheme(case: Case, coupled: Coupled) -> Monolithic | Partitioned:
+    assert case.coupling is not None
     if case.coupling.scheme == "monolithic":
-        return Monolithic(coupled, build_tolerance(case)), fluid
+        return Monolithic(coupled, build_tolerance(case))
     settings = case.coupling
     tolerance = FixedPointTolerance(settings.tolerance, settings.tolerance_absolute, settings.max_iterations)
-    return Partitioned(coupled, _accelerator(case), tolerance), fluid
+    return Partitioned(coupled, _accelerator(case), tolerance)
 
 
 def start(case: Case, scheme: Monolithic | Partitioned, fluid: Fluid, t: float, dt: float) -> None:

@@ -32,8 +32,10 @@ Array = NDArray[np.float64]
 
 
 def build_rigid_bodies(case: Case, comm: MPI.Comm) -> list[ImmersedBody]:
-    """The rigid bodies of a case. Raises CaseError (collective)."""
-    return [] if case.fluid is None else [_body(case, name, comm) for name in case.fluid.bodies]
+    """The rigid bodies of a case that the flow does not move. Raises CaseError (collective)."""
+    if case.fluid is None:
+        return []
+    return [_body(case, name, comm) for name in case.fluid.bodies if name not in case.fluid.free_bodies]
 
 
 def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[ImmersedBody]) -> Fluid:
@@ -86,9 +88,8 @@ def _patches(settings: Section) -> list[Patch]:
 # ---------------------------------------------------------------------------------------------------------- bodies
 
 
-def _body(case: Case, name: str, comm: MPI.Comm) -> ImmersedBody:
-    """A rigid body, whole on every process."""
-    assert case.fluid is not None
+def read_surface(case: Case, name: str, comm: MPI.Comm) -> tuple[Array, NDArray[np.int64]]:
+    """Points [m] and facets of a rigid body, whole on every process. Raises CaseError (collective)."""
     found: Any = None
     if comm.rank == 0:
         try:
@@ -98,7 +99,12 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> ImmersedBody:
     found = comm.bcast(found, root=0)
     if isinstance(found, Exception):
         raise found
-    points, facets = found
+    return found
+
+
+def _body(case: Case, name: str, comm: MPI.Comm) -> ImmersedBody:
+    assert case.fluid is not None
+    points, facets = read_surface(case, name, comm)
     movement = case.fluid.bodies[name].motion
     if movement is None:
         require_inside_period(case, ("fluid", "bodies", name), points)

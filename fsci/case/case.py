@@ -14,6 +14,7 @@ from fsci.case.curve import Curve, CurveName
 from fsci.case.document import Document, override
 from fsci.case.errors import CaseError, Place
 from fsci.case.fluid import Fluid
+from fsci.case.free_body import Free
 from fsci.case.output import Output
 from fsci.case.probes import Probe
 from fsci.case.section import Section, setting
@@ -64,6 +65,11 @@ class Case(Section):
     def elastic_bodies(self) -> dict[str, Body]:
         """The bodies of the structure; none without one."""
         return {} if self.structure is None else self.structure.bodies
+
+    @property
+    def rigid(self) -> dict[str, Free] | None:
+        """Rigid bodies that the flow moves; None without any."""
+        return (self.fluid.free_bodies or None) if self.fluid is not None else None
 
     @property
     def dimension(self) -> int | None:

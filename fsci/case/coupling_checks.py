@@ -15,7 +15,7 @@ from fsci.case.yaml_text import Keys
 def coupling_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
     """All of them."""
     for section in ("fluid", "structure"):
-        if getattr(case, section) is None:
+        if getattr(case, section) is None and not (section == "structure" and case.rigid):
             yield ("coupling",), f"'coupling' needs the section '{section}'"
     bodies = case.elastic_bodies
     for name, surfaces in coupling.wetted.items():

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import model_validator
 
 from fsci.case.errors import listed
+from fsci.case.free_body import Free, RigidDynamics
 from fsci.case.grid import Grid
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
@@ -131,13 +132,20 @@ def _one_of(section: Section, first: str, second: str) -> None:
 
 
 class RigidBody(Section):
-    """A rigid body in the flow, at rest or moved as given."""
+    """A rigid body in the flow: at rest, moved as given, or free."""
 
     mesh: Mesh = setting(..., "mesh file or built-in shape; only its surface counts, as fine as it is meshed")
     on: Surfaces | None = setting(
         None, "names of the surfaces that enclose the body; default: the whole boundary of the mesh"
     )
     motion: Movement | None = setting(None, "motion from the place of the mesh; default: at rest")
+    free: Free | None = setting(None, "instead of a motion: the flow and other forces move it")
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> RigidBody:
+        if self.motion is not None and self.free is not None:
+            raise fault("give either 'motion' or 'free', not both", "free")
+        return self
 
 
 class Fluid(Section):
@@ -157,9 +165,15 @@ class Fluid(Section):
         ..., "conditions on the boundary of the box by name; where patches meet, the one named last decides"
     )
     bodies: dict[Name, RigidBody] = setting(dict, "rigid bodies by name")
+    dynamics: RigidDynamics = setting(RigidDynamics, "time integration of free bodies")
     gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
     body_force: Vector | None = setting(None, "force per volume", unit="N/m^3")
     initial_velocity: Vector | None = setting(None, "velocity at the start; default: at rest", unit="m/s")
+
+    @property
+    def free_bodies(self) -> dict[str, Free]:
+        """Those that the flow moves."""
+        return {name: body.free for name, body in self.bodies.items() if body.free is not None}
 
     @property
     def dofs(self) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 from fsci.case.case import Case
 from fsci.case.errors import listed
 from fsci.case.fluid import FACES, Fluid, RigidBody
+from fsci.case.free_body import PLANE, Free
 from fsci.case.mesh_checks import Mistake, axis_mistakes, length_mistakes, mesh_mistakes, surface_mistakes
 from fsci.case.yaml_text import Keys
 
@@ -27,6 +28,8 @@ def fluid_mistakes(case: Case, fluid: Fluid) -> Iterator[Mistake]:
         for i, surface in enumerate(body.on or ()):
             yield from surface_mistakes(body.mesh, surface, (*keys, "on", i))
         yield from _motion(fluid, body, keys)
+        if body.free is not None:
+            yield from _free(case, fluid, body.free, (*keys, "free"))
 
 
 def _patches(fluid: Fluid) -> Iterator[Mistake]:
@@ -72,6 +75,27 @@ def _periods(fluid: Fluid, name: str) -> Iterator[Mistake]:
         for other, patch in fluid.patches.items():
             if patch.periodic and other != name and face in patch.on:
                 yield ("fluid", "patches", name, "on", i), f"the face '{face}' is periodic by the patch '{other}'"
+
+
+def _free(case: Case, fluid: Fluid, free: Free, keys: Keys) -> Iterator[Mistake]:
+    dimension = fluid.grid.dimension
+    if case.coupling is None:
+        yield keys, "a free body needs the section 'coupling'; 'coupling: {}' for its defaults"
+    if case.structure is not None:
+        yield keys, "a flow moves either rigid bodies or elastic ones: give this one a material, or a 'motion'"
+    if fluid.scheme == "steady":
+        yield keys, "a free body needs a flow in time: choose the scheme bdf2"
+    for name in ("gravity", "initial_velocity"):
+        yield from length_mistakes(getattr(free, name), dimension, (*keys, name))
+    for i, spring in enumerate(free.springs):
+        for name in ("at", "stiffness"):
+            yield from length_mistakes(getattr(spring, name), dimension, (*keys, "springs", i, name))
+    for i, way in enumerate(free.held):
+        if dimension == 2 and way not in PLANE:
+            yield (*keys, "held", i), f"a body in 2D has no '{way}': {listed(PLANE)}"
+    spins = 1 if dimension == 2 else 3
+    if free.initial_spin is not None and len(free.initial_spin) != spins:
+        yield (*keys, "initial_spin"), f"'initial_spin' has {spins} in {dimension}D, not {len(free.initial_spin)}"
 
 
 def _motion(fluid: Fluid, body: RigidBody, keys: Keys) -> Iterator[Mistake]:

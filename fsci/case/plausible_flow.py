@@ -68,7 +68,8 @@ def fast_body(case: Case, fluid: Fluid, motion: Movement, points: NDArray[np.flo
 
 def _thin_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
     """Built-in shapes through which fluid passes; of files only the mesh tells."""
-    moving = {("fluid", "bodies", name): (body.mesh, body.motion is not None) for name, body in fluid.bodies.items()}
+    rigid = fluid.bodies.items()
+    moving = {("fluid", "bodies", name): (body.mesh, bool(body.motion or body.free)) for name, body in rigid}
     elastic = {("structure", "bodies", name): (body.mesh, True) for name, body in case.elastic_bodies.items()}
     one_sided = set(case.coupling.dry_side) if case.coupling is not None else set()
     for (section, kind, name), (mesh, moves) in (moving | elastic).items():
@@ -92,7 +93,7 @@ def thin_body(fluid: Fluid, extent: float, *, moves: bool) -> str | None:
 
 def _driven(fluid: Fluid) -> bool:
     loads = (fluid.gravity, fluid.body_force, fluid.initial_velocity)
-    moved = any(body.motion is not None for body in fluid.bodies.values())
+    moved = any(body.motion or body.free for body in fluid.bodies.values())
     return any(loads) or moved or any(p.velocity or p.traction or p.pressure for p in fluid.patches.values())
 
 

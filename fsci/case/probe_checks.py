@@ -27,6 +27,10 @@ def field_of(case: Case, probe: Probe) -> str | None:
     if probe.field is not None:
         return probe.field if probe.field in probe.fields and getattr(case, probe.field) is not None else None
     there = [name for name in probe.fields if getattr(case, name) is not None]
+    if "rigid" in there and probe.body in (case.rigid or {}):
+        return "rigid"
+    if probe.body is None and len(there) > 1:
+        there = [name for name in there if name != "rigid"]
     if len(there) == 2 and probe.body is not None:  # of a point in a body, or of its volume
         return "structure"
     return there[0] if len(there) == 1 else None
@@ -48,6 +52,10 @@ def probe_mistakes(case: Case) -> Iterator[Mistake]:
                 yield from _of_structure(case.structure, name, probe)
             case "fluid" if case.fluid is not None:
                 yield from _of_fluid(case, case.fluid, name, probe)
+            case "rigid" if case.rigid is not None:
+                if probe.body not in case.rigid:
+                    hint = did_you_mean(probe.body or "", case.rigid)
+                    yield keys, f"'{name}' is measured on a free body: name it as 'body'{hint}"
             case _:
                 yield from _of_none(case, name, probe)
 

@@ -42,6 +42,10 @@ Of the structure, points being those of the reference configuration:
 
 Of a pair of contact it is the `extreme` of all slave nodes, or the value of the node nearest to the point `at`.
 
+Of a rigid `body` that the flow moves, points being those of the start:
+
+{described("rigid")}
+
 Of the fluid; at a point that a body covers it is nan, with `minus` it is a difference:
 
 {described("fluid")}

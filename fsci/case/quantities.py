@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-Field = Literal["structure", "fluid"]
-FIELDS: tuple[Field, ...] = ("structure", "fluid")
+Field = Literal["structure", "fluid", "rigid"]
+FIELDS: tuple[Field, ...] = ("structure", "fluid", "rigid")
 
 #: the setting that says where -> how messages name it
 PLACES = {"pair": "'pair: PAIR'", "at": "'at: [..]'", "on": "'on: SURFACE'", "through": "'through: PATCH'"}
@@ -31,10 +31,11 @@ class Quantity:
     fluid: tuple[str, ...] = ()  #: settings that say where in a fluid
     needs: tuple[str, ...] = ()  #: of a structure dynamics or density; of a fluid body or reference
     meaning: str = ""  #: what the name does not tell
+    rigid: tuple[str, ...] = ()  #: settings that say where on a rigid body that the flow moves
 
     def places(self, field: Field) -> tuple[str, ...]:
         """The settings that say where in a field it can be measured."""
-        return self.structure if field == "structure" else self.fluid
+        return {"structure": self.structure, "fluid": self.fluid, "rigid": self.rigid}[field]
 
     def columns(self, name: str, dimension: int) -> tuple[str, ...]:
         """The columns of history.csv of a probe with this name."""
@@ -47,8 +48,10 @@ class Quantity:
 
 _LENGTH, _SPEED, _FORCE, _ENERGY, _STRESS = (1, 0, 0), (1, 0, -1), (1, 1, -2), (2, 1, -2), (-1, 1, -2)
 _ALL = (
-    Quantity("displacement", _LENGTH, "vector", ("at", "on"), meaning="of a surface the mean over its area"),
-    Quantity("velocity", _SPEED, "vector", ("at",), ("at",), ("dynamics",)),
+    Quantity(
+        "displacement", _LENGTH, "vector", ("at", "on"), meaning="of a surface the mean over its area", rigid=("at",)
+    ),
+    Quantity("velocity", _SPEED, "vector", ("at",), ("at",), ("dynamics",), rigid=("at",)),
     Quantity("acceleration", (1, 0, -2), "vector", ("at",), needs=("dynamics",)),
     Quantity("reaction", _FORCE, "vector", ("on",), meaning="force of supports and springs"),
     Quantity("traction", _FORCE, "vector", ("on",), meaning="integral of P N over the reference surface"),
@@ -59,11 +62,13 @@ _ALL = (
         "first_contact", (0, 0, 1), "one", ("pair",), meaning="time of the end of the first step with contact, else nan"
     ),
     Quantity("energy", _ENERGY, "energies", (WHOLE,), meaning="of all bodies"),
-    Quantity("momentum", (1, 1, -1), "vector", (WHOLE,), needs=("density",)),
-    Quantity("angular_momentum", (2, 1, -1), "axis", (WHOLE,), needs=("density",), meaning="about the origin"),
-    Quantity("mass", (0, 1, 0), "one", (WHOLE,), needs=("density",)),
+    Quantity("momentum", (1, 1, -1), "vector", (WHOLE,), needs=("density",), rigid=(WHOLE,)),
+    Quantity(
+        "angular_momentum", (2, 1, -1), "axis", (WHOLE,), needs=("density",), meaning="about the origin", rigid=(WHOLE,)
+    ),
+    Quantity("mass", (0, 1, 0), "one", (WHOLE,), needs=("density",), rigid=(WHOLE,)),
     Quantity("volume", (3, 0, 0), "one", (WHOLE,), (WHOLE,)),
-    Quantity("centre", _LENGTH, "vector", (WHOLE,), needs=("density",), meaning="of mass"),
+    Quantity("centre", _LENGTH, "vector", (WHOLE,), needs=("density",), meaning="of mass", rigid=(WHOLE,)),
     Quantity("flow_rate", (3, 0, -1), "one", (), ("through",), meaning="volume per time, out of the box"),
     Quantity("force", _FORCE, "vector", (), (WHOLE,), ("body",), "of the fluid on the `body`"),
     Quantity("moment", _ENERGY, "axis", (), (WHOLE,), ("body",), "of that force"),

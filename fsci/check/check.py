@@ -76,7 +76,8 @@ def _fluid(fluid: Fluid) -> Iterator[Row]:
     kinds = [f"{name} ({patch.kind.replace('_', ' ')})" for name, patch in fluid.patches.items()]
     yield "patches", ", ".join(kinds)
     for name, body in fluid.bodies.items():
-        yield f"body {name}", f"{_name(body.mesh)}, rigid, {'at rest' if body.motion is None else 'moved'}"
+        kind = "free" if body.free else "moved" if body.motion else "at rest"
+        yield f"body {name}", f"{_name(body.mesh)}, rigid, {kind}"
     yield "dofs", f"{fluid.dofs:,} with those inside of bodies"
 
 

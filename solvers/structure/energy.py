@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from solvers.api import State
-
-if TYPE_CHECKING:
-    from solvers.structure.field import Structure
 
 
 class EnergyBalance:
@@ -16,24 +11,16 @@ class EnergyBalance:
     def __init__(self) -> None:
         self.kinetic = self.internal = self.work = self.damping = self.friction = self.initial = 0.0
 
-    def start(self, structure: Structure) -> None:
-        """Measure the initial energy."""
-        self._measure(structure)
-        self.friction = 0.0 if structure.constraint is None else structure.constraint.friction_work
-        self.initial = self.kinetic + self.internal + self.friction
+    def start(self, kinetic: float, internal: float, friction: float) -> None:
+        """The energies at the start [J]."""
+        self.kinetic, self.internal, self.friction = kinetic, internal, friction
+        self.initial = kinetic + internal + friction
 
-    def _measure(self, structure: Structure) -> None:
-        self.kinetic = structure.time.kinetic_energy(structure)
-        self.internal = sum(body.internal_energy() for body in structure.bodies)
-
-    def add_step(self, structure: Structure) -> None:
-        """Work of the averaged external forces and of the supports over the accepted step."""
-        du = structure.now.u - structure.old.u
-        external, damping = structure.time.averaged_forces(structure)
-        self.work += structure.dot(external, du) + structure.dot(structure.residual_force, structure.held.part(du))
-        self.damping += structure.dot(damping, du)
-        self.friction = 0.0 if structure.constraint is None else structure.constraint.friction_work
-        self._measure(structure)
+    def add_step(self, work: float, damping: float, kinetic: float, internal: float, friction: float) -> None:
+        """Work of loads and supports and loss by damping in an accepted step, and the energies at its end [J]."""
+        self.work += work
+        self.damping += damping
+        self.kinetic, self.internal, self.friction = kinetic, internal, friction
 
     @property
     def error(self) -> float:

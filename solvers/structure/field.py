@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body
 from solvers.structure.energy import EnergyBalance
 from solvers.structure.held import Held
+from solvers.structure.instant import Instant
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.supports import prescribe
 from solvers.structure.time import Statics, TimeScheme
@@ -29,31 +30,6 @@ from solvers.timing import Timer
 
 #: Displacement, in sizes of the largest body, that only a singular system gives.
 FLOWN_OFF = 1e6
-
-
-@dataclass
-class Instant:
-    """The structure at one time: owned dofs of all bodies, one body after the other."""
-
-    u: Array  #: displacement [m]
-    v: Array  #: velocity [m/s]
-    a: Array  #: acceleration [m/s^2]
-    internal: Array  #: internal force [N]
-    loads: Array  #: loads of its own [N]
-    surface: Array  #: load by another field [N]
-    constraint: Array  #: contact force [N]
-
-    @classmethod
-    def zeros(cls, size: int) -> Instant:
-        return cls(*(np.zeros(size) for _ in fields(cls)))
-
-    @property
-    def external(self) -> Array:
-        """All loads [N]."""
-        return self.loads + self.surface
-
-    def copy(self) -> Instant:
-        return Instant(**{name: array.copy() for name, array in vars(self).items()})
 
 
 class Structure:
@@ -131,7 +107,13 @@ class Structure:
         if self.constraint is not None:
             self.constraint.start(self.at_constraint(self.now.u), self.at_constraint(self._stiffness()), t)
         self.time.start(self, t, dt)
-        self.energy.start(self)
+        self.energy.start(*self._energies())
+
+    def _energies(self) -> tuple[float, float, float]:
+        """Kinetic and internal energy, and what friction has dissipated so far [J]."""
+        internal = sum(body.internal_energy() for body in self.bodies)
+        friction = 0.0 if self.constraint is None else self.constraint.friction_work
+        return self.time.kinetic_energy(self), internal, friction
 
     def settle(self, time: TimeScheme, held: Held, t: float, dt: float) -> None:
         """A step to the same t by another scheme and with other supports, to find the state that a run starts from.
@@ -218,7 +200,10 @@ class Structure:
         """Accept the step."""
         if self.constraint is not None:
             self.constraint.end_step(self.time.force_weight)
-        self.energy.add_step(self)
+        du = self.now.u - self.old.u
+        external, damping = self.time.averaged_forces(self)
+        work = self.dot(external, du) + self.dot(self.residual_force, self.held.part(du))
+        self.energy.add_step(work, self.dot(damping, du), *self._energies())
 
     def _set_time(self, t: float) -> None:
         for body in self.bodies:

@@ -8,17 +8,13 @@ Source: Khenous, Laborde & Renard, Eur. J. Mech. A/Solids 27 (2008).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array
-
-if TYPE_CHECKING:
-    from solvers.structure.field import Structure
+from solvers.structure.instant import Moving
 
 #: Smallest factor of a density, relative to the mean one. For linear cells (F M + M F) / 2 is positive definite as long
 #: as the factors of neighbours differ by less than 7 + 4 sqrt(3); those of a body differ by about twice the inverse of
@@ -37,7 +33,7 @@ class NoMassLeft(ValueError):
         self.body = body
 
 
-def massless_dofs(structure: Structure) -> list[NDArray[np.bool_]]:
+def massless_dofs(structure: Moving) -> list[NDArray[np.bool_]]:
     """Owned dofs of each body that have no mass: those of all contact surfaces, collective.
 
     If these are all nodes of a body, as those of a sheet of one cell between two others, its slave surfaces alone.
@@ -56,7 +52,7 @@ def massless_dofs(structure: Structure) -> list[NDArray[np.bool_]]:
     return found
 
 
-def _owned(structure: Structure, dofs: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _owned(structure: Moving, dofs: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which owned dofs of the structure are among these global ones."""
     local = dofs[dofs >= 0] - structure.layout.start
     among = np.zeros(structure.layout.size, dtype=bool)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
@@ -17,10 +16,8 @@ from numpy.typing import NDArray
 
 from solvers import fem
 from solvers.api import Array
+from solvers.structure.meshed import Meshed
 from solvers.values import Value, evaluate
-
-if TYPE_CHECKING:
-    from solvers.structure.body import Body
 
 #: Where something acts: a named surface, or nodes by their numbers in the mesh.
 Where = str | NDArray[np.int64]
@@ -125,7 +122,7 @@ class _Condition:
     value: Value
 
 
-def prescribe(body: Body) -> Prescribed:
+def prescribe(body: Meshed) -> Prescribed:
     """Collect the supports of a body (collective). Raises SupportError."""
     conditions = [condition for support in body.supports for condition in _conditions(body, support)]
     turned = [c.blocks for c in conditions if c.axis is None]
@@ -139,7 +136,7 @@ def prescribe(body: Body) -> Prescribed:
     return Prescribed(dofs.astype(np.int32), tuple(entries), _orthonormal(body, conditions, oblique))
 
 
-def symmetric_dofs(body: Body) -> NDArray[np.int32]:
+def symmetric_dofs(body: Meshed) -> NDArray[np.int32]:
     """Owned dofs that planes of symmetry normal to an axis hold, local (collective). Raises SupportError."""
     found = [np.empty(0, dtype=np.int32)]
     for support in body.supports:
@@ -151,7 +148,7 @@ def symmetric_dofs(body: Body) -> NDArray[np.int32]:
     return np.unique(np.concatenate(found)).astype(np.int32)
 
 
-def owned_blocks(body: Body, where: Where) -> NDArray[np.int32]:
+def owned_blocks(body: Meshed, where: Where) -> NDArray[np.int32]:
     """Owned dof blocks of a body on a named surface, or of nodes (collective)."""
     if isinstance(where, str):
         blocks = fem.surface_blocks(body.domain, body.space, where)
@@ -159,7 +156,7 @@ def owned_blocks(body: Body, where: Where) -> NDArray[np.int32]:
     return np.flatnonzero(np.isin(body.nodes[: body.owned], where)).astype(np.int32)
 
 
-def _conditions(body: Body, support: Support | Symmetry | Roller) -> list[_Condition]:
+def _conditions(body: Meshed, support: Support | Symmetry | Roller) -> list[_Condition]:
     blocks = owned_blocks(body, support.where)
     axes = np.eye(body.dim)
 
@@ -187,7 +184,7 @@ def _conditions(body: Body, support: Support | Symmetry | Roller) -> list[_Condi
     return [_Condition(blocks, None, normals, support.displacement)]
 
 
-def _orthonormal(body: Body, conditions: list[_Condition], oblique: NDArray[np.int32]) -> Oblique:
+def _orthonormal(body: Meshed, conditions: list[_Condition], oblique: NDArray[np.int32]) -> Oblique:
     """The conditions at nodes with an oblique one."""
     basis = np.zeros((len(oblique), body.dim, body.dim))
     found = np.zeros(len(oblique), dtype=np.int64)
@@ -207,7 +204,7 @@ def _orthonormal(body: Body, conditions: list[_Condition], oblique: NDArray[np.i
     return Oblique(oblique, basis, tuple(shares) if len(oblique) else ())
 
 
-def symmetry_normal(body: Body, support: Symmetry, blocks: NDArray[np.int32]) -> Array:
+def symmetry_normal(body: Meshed, support: Symmetry, blocks: NDArray[np.int32]) -> Array:
     """Normal of the plane of symmetry, exactly an axis if it is one (collective). Raises SupportError if it is none."""
     points = body.points[: body.dim, blocks]
     extent = _extent(body, points)
@@ -224,14 +221,14 @@ def symmetry_normal(body: Body, support: Symmetry, blocks: NDArray[np.int32]) ->
     )
 
 
-def _extent(body: Body, values: Array) -> Array:
+def _extent(body: Meshed, values: Array) -> Array:
     """Largest minus smallest value of each row over all processes."""
     low, high = values.min(axis=1, initial=np.inf), values.max(axis=1, initial=-np.inf)
     gathered = body.domain.comm.allgather((low, high))
     return np.asarray(np.max([h for _, h in gathered], axis=0) - np.min([low for low, _ in gathered], axis=0))
 
 
-def _normals_by_node(body: Body, surface: str) -> list[tuple[NDArray[np.int32], Array]]:
+def _normals_by_node(body: Meshed, surface: str) -> list[tuple[NDArray[np.int32], Array]]:
     """(blocks, int N^2 n dA) of facets of one number: squares, for the mean of a shape function may be zero or less."""
     x = np.ascontiguousarray(body.points[: body.dim].T)
     found = []
@@ -241,7 +238,7 @@ def _normals_by_node(body: Body, surface: str) -> list[tuple[NDArray[np.int32], 
     return found
 
 
-def _nodal_normals(body: Body, surface: str) -> Array:
+def _nodal_normals(body: Meshed, surface: str) -> Array:
     """Outward unit normals in the reference configuration at owned nodes, zero off the surface, shape (owned, dim)."""
     total = fem.function(body.space)
     normals = total.x.array.reshape(-1, body.dim)

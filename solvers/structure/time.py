@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +11,21 @@ from petsc4py import PETSc
 
 from solvers.api import Array
 from solvers.blocks import block_diagonal
+from solvers.structure.held import Held
+from solvers.structure.instant import Instant, Moving
 from solvers.structure.massless import massless_dofs, move_mass_inwards
 from solvers.time import GeneralisedAlpha
 
-if TYPE_CHECKING:
-    from solvers.structure.field import Instant, Structure
-
-
 #: Time, in first steps, in which velocities and accelerations at the start are measured.
 SHORT = 1e-3
+
+
+class Settling(Moving, Protocol):
+    """A structure whose first state a scheme can have found."""
+
+    def settle(self, time: TimeScheme, held: Held, t: float, dt: float) -> None:
+        """A step to the same t by another scheme and with other supports. Raises StepFailed."""
+        ...
 
 
 class TimeScheme(Protocol):
@@ -30,39 +36,39 @@ class TimeScheme(Protocol):
         """Weight of the forces at the end of the step in the balance; those at its start have the rest."""
         ...
 
-    def mass(self, structure: Structure) -> PETSc.Mat:
+    def mass(self, structure: Moving) -> PETSc.Mat:
         """The mass matrix [kg] of all bodies. Raises NoMassLeft."""
         ...
 
-    def start(self, structure: Structure, t: float, dt: float) -> None:
+    def start(self, structure: Settling, t: float, dt: float) -> None:
         """Prepare; velocity and acceleration at the start."""
         ...
 
-    def predict(self, structure: Structure, dt: float) -> None:
+    def predict(self, structure: Moving, dt: float) -> None:
         """First iterate of a step of size dt."""
         ...
 
-    def balance(self, structure: Structure) -> Array:
+    def balance(self, structure: Moving) -> Array:
         """The residual [N] at the present iterate; velocity and acceleration follow the displacement."""
         ...
 
-    def averaged_load(self, structure: Structure) -> Array:
+    def averaged_load(self, structure: Moving) -> Array:
         """The balance [N] without loads by another field, all forces averaged over the step."""
         ...
 
-    def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
+    def tangent(self, structure: Moving, stiffness: PETSc.Mat) -> PETSc.Mat:
         """d(balance)/du from the static stiffness, which may be overwritten."""
         ...
 
-    def reaction(self, structure: Structure) -> Array:
+    def reaction(self, structure: Moving) -> Array:
         """The out-of-balance force [N] at the present time: what the supports hold."""
         ...
 
-    def averaged_forces(self, structure: Structure) -> tuple[Array, Array]:
+    def averaged_forces(self, structure: Moving) -> tuple[Array, Array]:
         """(external, damping) force [N] of the step's balance."""
         ...
 
-    def kinetic_energy(self, structure: Structure) -> float:
+    def kinetic_energy(self, structure: Moving) -> float:
         """v.M v / 2 [J]."""
         ...
 
@@ -72,33 +78,33 @@ class Statics:
 
     force_weight = 1.0
 
-    def mass(self, structure: Structure) -> PETSc.Mat:
+    def mass(self, structure: Moving) -> PETSc.Mat:
         return block_diagonal([body.mass() for body in structure.bodies])
 
-    def start(self, structure: Structure, t: float, dt: float) -> None: ...
-    def predict(self, structure: Structure, dt: float) -> None: ...
+    def start(self, structure: Settling, t: float, dt: float) -> None: ...
+    def predict(self, structure: Moving, dt: float) -> None: ...
 
-    def balance(self, structure: Structure) -> Array:
+    def balance(self, structure: Moving) -> Array:
         return self.reaction(structure)
 
-    def averaged_load(self, structure: Structure) -> Array:
+    def averaged_load(self, structure: Moving) -> Array:
         return structure.now.internal - structure.now.loads - structure.now.constraint
 
-    def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
+    def tangent(self, structure: Moving, stiffness: PETSc.Mat) -> PETSc.Mat:
         return stiffness
 
-    def reaction(self, structure: Structure) -> Array:
+    def reaction(self, structure: Moving) -> Array:
         return structure.now.internal - structure.now.external - structure.now.constraint
 
-    def averaged_forces(self, structure: Structure) -> tuple[Array, Array]:
+    def averaged_forces(self, structure: Moving) -> tuple[Array, Array]:
         external = 0.5 * (structure.now.external + structure.old.external)
         return external, np.zeros_like(external)
 
-    def kinetic_energy(self, structure: Structure) -> float:
+    def kinetic_energy(self, structure: Moving) -> float:
         return 0.0
 
 
-class Settling(Statics):
+class FirstState(Statics):
     """f_int(u) + C v = f_ext(t): the first state of nodes without mass, which move from u_0 in a short time dt.
 
     Without damping they are at once where the forces on them are in balance. With damping they are still where they
@@ -109,7 +115,7 @@ class Settling(Statics):
         """moving: owned dofs without mass."""
         self._moving, self._damping, self._dt = moving, damping, dt
 
-    def balance(self, structure: Structure) -> Array:
+    def balance(self, structure: Moving) -> Array:
         force = self.reaction(structure)
         if self._damping is None:
             return force
@@ -119,7 +125,7 @@ class Settling(Statics):
         self._damping.mult(v, damping)
         return force + damping.array
 
-    def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
+    def tangent(self, structure: Moving, stiffness: PETSc.Mat) -> PETSc.Mat:
         if self._damping is not None:
             stiffness.axpy(1.0 / self._dt, self._damping, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         return stiffness
@@ -159,7 +165,7 @@ class Dynamics:
 
     # ------------------------------------------------------------------------------------------------- start
 
-    def mass(self, structure: Structure) -> PETSc.Mat:
+    def mass(self, structure: Moving) -> PETSc.Mat:
         matrices = [body.mass() for body in structure.bodies]
         if structure.constraint is None:
             return block_diagonal(matrices)
@@ -172,7 +178,7 @@ class Dynamics:
             body.move_mass(change)
         return block_diagonal(matrices)
 
-    def start(self, structure: Structure, t: float, dt: float) -> None:
+    def start(self, structure: Settling, t: float, dt: float) -> None:
         """Places of nodes without mass, then M a_0 = -C v_0 - f_0; prescribed dofs follow their functions.
 
         A load on a node without mass acts on those with mass by internal forces alone. If these were not in balance
@@ -183,12 +189,12 @@ class Dynamics:
         self._effective = None
         self._start_supports(structure, t, SHORT * dt)
         if structure.comm.allreduce(len(self._massless)):
-            settling = Settling(self._massless, self._damping_matrix, SHORT * dt)
+            first = FirstState(self._massless, self._damping_matrix, SHORT * dt)
             others = np.setdiff1d(np.arange(structure.layout.size), self._massless)
-            structure.settle(settling, structure.held.stopped(others, structure.now.u), t, SHORT * dt)
+            structure.settle(first, structure.held.stopped(others, structure.now.u), t, SHORT * dt)
         self._solve_acceleration(structure)
 
-    def _assemble_damping(self, structure: Structure) -> PETSc.Mat | None:
+    def _assemble_damping(self, structure: Moving) -> PETSc.Mat | None:
         if self.damping == Damping():
             return None
         damping = structure.mass.copy()
@@ -197,14 +203,14 @@ class Dynamics:
             damping.axpy(self.damping.stiffness, _initial_stiffness(structure))
         return damping
 
-    def _start_supports(self, structure: Structure, t: float, h: float) -> None:
+    def _start_supports(self, structure: Moving, t: float, h: float) -> None:
         """One-sided differences, so that a support that starts to move does not ring."""
         held, now = structure.held, structure.now
         u = [held.displacement(t + k * h) for k in range(4)]
         now.v[:] = held.free_part(now.v) + (-3.0 * u[0] + 4.0 * u[1] - u[2]) / (2.0 * h)
         now.a[:] = held.free_part(now.a) + (2.0 * u[0] - 5.0 * u[1] + 4.0 * u[2] - u[3]) / h**2
 
-    def _solve_acceleration(self, structure: Structure) -> None:
+    def _solve_acceleration(self, structure: Moving) -> None:
         now, (x, b) = structure.now, self._work
         b.array[:] = now.external + now.constraint - now.internal - self._damping_force(now.v)
         x.array[:] = now.a
@@ -222,13 +228,13 @@ class Dynamics:
 
     # ------------------------------------------------------------------------------------------------- steps
 
-    def predict(self, structure: Structure, dt: float) -> None:
+    def predict(self, structure: Moving, dt: float) -> None:
         """Displacement unchanged, or moved on with the velocity."""
         self._dt = dt
         if self.predictor == "constant_velocity":
             structure.now.u += dt * structure.held.free_part(structure.now.v)
 
-    def balance(self, structure: Structure) -> Array:
+    def balance(self, structure: Moving) -> Array:
         scheme, dt, now, old = self.scheme, self._dt, structure.now, structure.old
         du = now.u - old.u
         now.a = scheme.acceleration(du, old.v, old.a, dt)
@@ -238,23 +244,23 @@ class Dynamics:
         before[self._massless] = 0.0
         return self._inertia(structure) + (1.0 - scheme.alpha_f) * present + scheme.alpha_f * before
 
-    def averaged_load(self, structure: Structure) -> Array:
+    def averaged_load(self, structure: Moving) -> Array:
         present, before = (self._own_forces(at) for at in (structure.now, structure.old))
         return self._inertia(structure) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
 
-    def _inertia(self, structure: Structure) -> Array:
+    def _inertia(self, structure: Moving) -> Array:
         share = self.scheme.alpha_m
         return self._times(structure.mass, (1.0 - share) * structure.now.a + share * structure.old.a)
 
     def _own_forces(self, at: Instant) -> Array:
         return at.internal - at.loads - at.constraint + self._damping_force(at.v)
 
-    def averaged_forces(self, structure: Structure) -> tuple[Array, Array]:
+    def averaged_forces(self, structure: Moving) -> tuple[Array, Array]:
         alpha, now, old = self.scheme.alpha_f, structure.now, structure.old
         external = (1.0 - alpha) * now.external + alpha * old.external
         return external, self._damping_force((1.0 - alpha) * now.v + alpha * old.v)
 
-    def tangent(self, structure: Structure, stiffness: PETSc.Mat) -> PETSc.Mat:
+    def tangent(self, structure: Moving, stiffness: PETSc.Mat) -> PETSc.Mat:
         """(1 - alpha_f) K + mass_factor M + damping_factor C."""
         same = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
         if self._effective is None or self._effective_dt != self._dt:
@@ -276,14 +282,14 @@ class Dynamics:
         matrix.diagonalScale(None, slope)
         return matrix
 
-    def reaction(self, structure: Structure) -> Array:
+    def reaction(self, structure: Moving) -> Array:
         """M a + C v + f_int - f_ext at the present time."""
         now = structure.now
         dynamic = self._times(structure.mass, now.a) + self._damping_force(now.v)
         return dynamic + now.internal - now.external - now.constraint
 
-    def kinetic_energy(self, structure: Structure) -> float:
-        return 0.5 * structure.dot(structure.now.v, self._times(structure.mass, structure.now.v))
+    def kinetic_energy(self, structure: Moving) -> float:
+        return 0.5 * structure.comm.allreduce(float(structure.now.v @ self._times(structure.mass, structure.now.v)))
 
     def _damping_force(self, v: Array) -> Array:
         return np.zeros_like(v) if self._damping_matrix is None else self._times(self._damping_matrix, v)
@@ -295,9 +301,9 @@ class Dynamics:
         return y.array.copy()
 
 
-def _initial_stiffness(structure: Structure) -> PETSc.Mat:
+def _initial_stiffness(structure: Moving) -> PETSc.Mat:
     matrices = []
-    for body, u in zip(structure.bodies, structure.split(structure.now.u), strict=True):
+    for body, u in zip(structure.bodies, structure.layout.split(structure.now.u), strict=True):
         body.set_displacement(np.zeros_like(u))
         matrices.append(body.create_tangent())
         body.assemble_tangent(matrices[-1])

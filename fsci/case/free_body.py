@@ -1,0 +1,54 @@
+"""Rigid bodies that the flow moves: what is said of them besides their shape."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from fsci.case.section import Section, setting
+from fsci.case.values import Entries, NotNegative, Number, NumberVector, Positive, Share, Vector
+
+#: Ways that can be held, and which of the six they are.
+HELD = {
+    "x": ("x",),
+    "y": ("y",),
+    "z": ("z",),
+    "rotation": ("rotation_x", "rotation_y", "rotation_z"),
+    "rotation_x": ("rotation_x",),
+    "rotation_y": ("rotation_y",),
+    "rotation_z": ("rotation_z",),
+}
+
+
+class PointSpring(Section):
+    """Between a point of the body and the place where that is at the start."""
+
+    at: NumberVector = setting(..., "the point", unit="m")
+    stiffness: Annotated[tuple[NotNegative, ...], Entries(2, 3)] = setting(
+        ..., "along each axis; in 2D per depth", unit="N/m"
+    )
+    damping: NotNegative = setting(0.0, "force by velocity over force by displacement", unit="s")
+
+
+class Free(Section):
+    """The body follows from forces and moments on it: those of the flow, its weight, and springs."""
+
+    density: Positive = setting(..., "mass per volume", unit="kg/m^3")
+    gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
+    springs: tuple[PointSpring, ...] = setting(tuple, "springs and dampers at points")
+    held: tuple[Literal["x", "y", "z", "rotation", "rotation_x", "rotation_y", "rotation_z"], ...] = setting(
+        tuple, "ways in which it does not move"
+    )
+    initial_velocity: NumberVector | None = setting(None, "velocity of the centre at the start", unit="m/s")
+    initial_spin: Annotated[tuple[Number, ...], Entries(1, 3)] | None = setting(
+        None, "angular velocity at the start: one number in 2D, three in 3D", unit="rad/s"
+    )
+
+
+class RigidDynamics(Section):
+    """Generalised-alpha time integration of rigid bodies."""
+
+    rho_inf: Share = setting(1.0, "spectral radius at infinite frequency: 1 keeps energy, smaller damps", unit="1")
+
+
+#: Ways that there are in 2D.
+PLANE = ("x", "y", "rotation")

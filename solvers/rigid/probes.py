@@ -1,0 +1,49 @@
+"""What can be measured on rigid bodies: functions without arguments that return the values by component."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from solvers.api import Array
+from solvers.rigid import motion
+from solvers.rigid.field import RigidBodies
+
+Probe = Callable[[], dict[str, float]]
+
+
+def at_point(bodies: RigidBodies, index: int, quantity: str, point: Sequence[float]) -> Probe:
+    """displacement [m] or velocity [m/s] of a point of a body, given where it is at the start."""
+    body, at = bodies.bodies[index], np.array([point], dtype=float)
+
+    def probe() -> dict[str, float]:
+        now = bodies.now[index]
+        arm = body.arms(now.R, at)[0]
+        if quantity == "velocity":
+            return _components((now.v[:3] + np.cross(motion.spin(now), arm))[: bodies.dim])
+        return _components((now.shift + arm - body.arms(np.eye(3), at)[0])[: bodies.dim])
+
+    return probe
+
+
+def of_body(bodies: RigidBodies, index: int, quantity: str) -> Probe:
+    """mass [kg], centre [m], momentum [kg m/s] or angular_momentum [kg m^2/s] about the origin."""
+    body = bodies.bodies[index]
+
+    def probe() -> dict[str, float]:
+        now = bodies.now[index]
+        if quantity == "mass":
+            return {"": body.inertia.mass}
+        centre = np.pad(body.inertia.centre, (0, 3 - bodies.dim)) + now.shift
+        momentum = motion.momentum(body, now.R, now.v)
+        if quantity == "angular_momentum":
+            total = momentum[3:] + np.cross(centre, momentum[:3])
+            return _components(total) if bodies.dim == 3 else {"": float(total[2])}
+        return _components((centre if quantity == "centre" else momentum)[: bodies.dim])
+
+    return probe
+
+
+def _components(values: Array) -> dict[str, float]:
+    return {axis: float(value) for axis, value in zip("xyz", values, strict=False)}
