@@ -175,3 +175,47 @@ def test_three_bodies_at_one_place():
     parts = structure.split(structure.residual_force)
     assert down[1] == pytest.approx(-parts[2][2 * held[2] + 1].sum(), rel=1e-9)
     assert down[1] == pytest.approx(sum(parts[i][2 * held[i] + 1].sum() for i in (0, 1)), rel=1e-9)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_masters_side_by_side_that_overlap(dim):
+    """Both count where they overlap: as many Newton steps as without, and a force that goes on smoothly.
+
+    Chosen one or the other, from 0.1 % of a facet's diameter between them on, no step converges.
+    """
+
+    def block(name, size, cells, start, supports):
+        if dim == 2:
+            return make_body(name, shapes.rectangle(size, cells, start), supports=supports)
+        size, cells, start = ([*a[:1], b, *a[1:]] for a, b in ((size, 1.0), (cells, 2), (start, 0.0)))
+        return make_body(name, shapes.box(size, cells, start), supports=supports)
+
+    forces, along = [], [ZERO] * (dim - 1)
+    for overlap in (0.0, 0.02, 0.1):
+        top = block("top", [2.0, 1.0], [5, 2], [-1.0, 0.0], [Support("top", (*along, constant(-0.05)))])
+        held = [Support("bottom", (*along, ZERO))]
+        left = block("left", [2.0 + overlap, 1.0], [4, 2], [-2.0, -1.0], held)
+        right = block("right", [2.0, 1.0], [5, 2], [0.0, -1.0], held)
+        structure, contact = make_contact(
+            [top, left, right], [(("top", "bottom"), (b.name, "top")) for b in (left, right)]
+        )
+        assert solve_step(structure).iterations <= 4
+        forces.append(sum(contact.resultant(i) for i in range(2))[-1])
+    growth = np.diff(forces) / [0.02, 0.08]
+    assert growth[0] == pytest.approx(growth[1], rel=0.05)
+    assert forces[2] == pytest.approx(forces[0], rel=0.03)
+
+
+@pytest.mark.parametrize(("thickness", "mean"), [(0.01, 0.005), (0.02, 0.01), (0.03, 0.0), (0.1, 0.0)])
+def test_layers_thinner_than_a_twentieth_of_a_facet_count_together(thickness, mean):
+    """nu = 0: the block bears E (s^2 - 1) s / 2, s its stretch, which is that of half a thickness less there."""
+    down = Support("top", (ZERO, constant(-0.02)))
+    body = make_body("block", brick("quad", 2, [1.0] * 2, [0.0] * 2, 0.0), STIFF, supports=[down])
+    near, far = wall(2, 1), wall(2, 1)
+    far = replace(far, name="far", points=2.0 * far.points - thickness * np.eye(2)[1])
+    structure, contact = make_contact([body], [(("block", "bottom"), near), (("block", "bottom"), far)])
+    solve_step(structure)
+    stretch = 1.0 - 0.02 + mean
+    assert contact.resultant(0)[1] + contact.resultant(1)[1] == pytest.approx(
+        0.5e5 * (1.0 - stretch**2) * stretch, rel=1e-9
+    )
