@@ -11,9 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import _sparsetools as compiled
 
 from solvers.api import Array
+
+try:
+    from scipy.sparse import _sparsetools as compiled  # private, but the same since scipy 0.14
+except ImportError:
+    from solvers import sparse_public as compiled
 
 Indices = NDArray[np.int32]
 

@@ -1,9 +1,14 @@
 """Sparse matrices of an interface against dense ones."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from solvers import sparse as module
+from solvers import sparse_public
 from solvers.sparse import diagonal, nothing, sparse, sparse_from_array, sparse_from_entries, stack
 
 NUMBERS = np.random.default_rng(3)
@@ -77,3 +82,45 @@ def test_in_order():
 def test_shapes_that_do_not_fit(wrong):
     with pytest.raises(ValueError, match="shapes do not fit"):
         wrong()
+
+
+# ------------------------------------------------------------------------------------------------------------------
+# scipy's compiled routines are private: what happens when they change
+
+
+def test_scipy_still_has_the_compiled_routines():
+    """If not, results stay and small contacts take three times as long: `solvers/sparse.py` has to learn new names."""
+    assert module.compiled.__name__ == "scipy.sparse._sparsetools"
+    used = {name for name in vars(sparse_public) if name.startswith(("csr_", "coo_"))}
+    assert used <= set(dir(module.compiled))
+
+
+def operations(seed):
+    """What all operations give, one after the other."""
+    chance = np.random.default_rng(seed)
+    rows, columns = chance.integers(9, size=60), chance.integers(9, size=60)
+    a, b = (sparse_from_entries(rows, columns, chance.normal(size=60), (9, 9)) for _ in range(2))
+    found = [a, b.T @ a, a + b, a - b.T, (a @ b)[np.array([4, 0, 0])], ((a @ b) + b).ordered()]
+    return [
+        part
+        for m in found
+        for part in (m.data, m.indices, m.indptr, m.toarray(), m @ np.arange(9.0), m @ np.ones((9, 2)))
+    ]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_public_classes_give_the_same_bits(seed, monkeypatch):
+    compiled = operations(seed)
+    monkeypatch.setattr(module, "compiled", sparse_public)
+    for found, expected in zip(operations(seed), compiled, strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_without_the_compiled_routines_the_public_classes_serve():
+    code = (
+        "import scipy.sparse, sys; from solvers.api import Array; import numpy\n"
+        "del scipy.sparse._sparsetools; sys.modules['scipy.sparse._sparsetools'] = None\n"
+        "from solvers import sparse; print(sparse.compiled.__name__)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "solvers.sparse_public", done.stderr
