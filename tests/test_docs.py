@@ -1,0 +1,115 @@
+"""What the pages name exists: settings, files, options of commands; their YAML blocks are cases that can be run."""
+
+import re
+from contextlib import redirect_stdout
+from functools import cache
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from docs_pages import PAGES, ROOT, SCHEMA, fits_somewhere, has_setting, in_backticks, is_case, parsed, yaml_blocks
+
+from fsci.case import load_case
+from fsci.case.verify import BODY_COLUMN, CONTACT_COLUMNS, COUPLING_COLUMNS, FIELD_COLUMNS, FRICTION_COLUMNS
+from fsci.check.meshes import check_meshes
+from fsci.cli import execute
+
+READMES = sorted(ROOT.glob("cases/*/README.md"))
+SECTIONS = set(SCHEMA["properties"])
+FOLDERS = ("cases", "docs", "tests", "solvers", "fsci", "coupling")
+MADE = ("docs/_build", "docs/reference", "cases/stage")  #: by make docs
+NOT_OF_CASES = ("changelog", "library")  #: pages that name settings that are gone, and attributes in Python
+COLUMNS = {BODY_COLUMN, *FIELD_COLUMNS.values(), *COUPLING_COLUMNS, *CONTACT_COLUMNS, *FRICTION_COLUMNS}
+SUFFIXES = (".py", ".yaml", ".md", ".cpp")
+
+
+def by_name(pages):
+    return [pytest.param(page, id=page.relative_to(ROOT).as_posix()) for page in pages]
+
+
+@pytest.mark.parametrize("page", by_name(PAGES))
+def test_yaml_blocks(page, tmp_path):
+    """Whole cases pass `fsci check`; parts of cases have settings that exist."""
+    for block in yaml_blocks(page):
+        if not is_case(block):
+            assert fits_somewhere(parsed(block)), block
+            continue
+        (tmp_path / "case.yaml").write_text(block)
+        case = load_case(tmp_path)
+        assert not check_meshes(case).problems, block
+
+
+@pytest.mark.parametrize("page", by_name(page for page in PAGES if page.stem not in NOT_OF_CASES))
+def test_settings_in_backticks_exist(page):
+    """`name: value` and dotted names that begin with a section, unless they are columns of the history."""
+    for text in in_backticks(page):
+        section, dot, rest = text.partition(".")
+        if dot and section in SECTIONS and re.fullmatch(r"[\w.]+", rest) and not rest.endswith(SUFFIXES):
+            column = text in COLUMNS or text.startswith("contact.NAME.")
+            assert has_setting(text.split("."), SCHEMA) or column, text
+        value = parsed(text) if re.match(r"\w+: ", text) else None
+        if isinstance(value, dict):
+            assert fits_somewhere(value), text
+
+
+@pytest.mark.parametrize("page", by_name([*PAGES, *READMES]))
+def test_files_exist(page):
+    """Paths from the top of the repository; capitals stand for names, stars for many."""
+    named = re.findall(rf"(?<![\w./-])(?:{'|'.join(FOLDERS)})/[\w*./-]*[\w*/]", page.read_text())
+    for path in sorted(set(named)):
+        if not re.search(r"[A-Z]{2}", path.replace("README", "")) and not path.startswith(MADE):
+            assert list(ROOT.glob(path)) or path.endswith("_"), path
+
+
+@pytest.mark.parametrize("page", by_name([*PAGES, *READMES]))
+def test_links_lead_to_headings(page):
+    """Files that links name exist, and so do the headings after #."""
+    for target, _, anchor in re.findall(r"\]\((?!https?:)([^)#]*)(#([\w-]+))?\)", page.read_text()):
+        file = page.parent / target if target else page
+        if target == "reference/case.md":
+            continue
+        assert file.exists(), target
+        assert not anchor or anchor in anchors(file), f"{target}#{anchor}"
+
+
+def anchors(page: Path) -> set[str]:
+    """What links may name in a page: its headings as slugs."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", by_name([*PAGES, *READMES]))
+def test_commands_exist(page):
+    """Of each line that calls fsci: the command, its options, and the settings that --set names."""
+    for line in command_lines(page):
+        command, *words = line.split("fsci ", 1)[1].split()
+        options = subcommands().get(command)
+        assert options is not None or command == "COMMAND", line
+        for word, after in zip(words, [*words, ""][1:], strict=True):
+            assert not word.startswith("--") or word in options, line
+            name = after.strip("'\"").partition("=")[0]
+            assert word != "--set" or name in ("NAME", "a.b") or has_setting(name.split("."), SCHEMA), line
+
+
+def command_lines(page: Path) -> list[str]:
+    """Lines of shell blocks, indented lines and words in backticks that call fsci."""
+    text = page.read_text().replace("\\\n", " ")
+    blocks = re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    indented = re.findall(r"^    (.*)$", text, re.MULTILINE) if page.name == "README.md" else []
+    lines = [*"\n".join(blocks).splitlines(), *indented, *in_backticks(page)]
+    calls = [one for line in lines for one in re.split(r" && |  #", line)]
+    return [call for call in calls if re.match(r"(mpirun -n \d+ )?fsci [a-zA-Z]", call)]
+
+
+@cache
+def subcommands() -> dict[str, set[str]]:
+    """Subcommand -> its options, from the help that it prints."""
+    return {
+        name: set(re.findall(r"--?[a-z]+", help_of(name))) for name in re.findall(r"^    ([a-z]+) ", help_of(), re.M)
+    }
+
+
+def help_of(*command: str) -> str:
+    with redirect_stdout(StringIO()) as text, pytest.raises(SystemExit):
+        execute([*command, "--help"])
+    return text.getvalue()
