@@ -91,6 +91,9 @@ def test_form_that_another_process_compiles_is_waited_for(cache):
 def test_process_killed_while_it_compiles(tmp_path):
     process = start(tmp_path)
     assert process.stdout.readline() == "compiling form 1 of 2 of the test\n"
+    while not list((tmp_path / "fenics").glob("libffcx_forms_*.c")):
+        assert process.poll() is None
+        time.sleep(0.001)
     process.kill()
     process.communicate()
     done = compile_in(tmp_path)
