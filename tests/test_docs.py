@@ -45,7 +45,7 @@ def test_settings_in_backticks_exist(page):
     for text in in_backticks(page):
         section, dot, rest = text.partition(".")
         if dot and section in SECTIONS and re.fullmatch(r"[\w.]+", rest) and not rest.endswith(SUFFIXES):
-            column = text in COLUMNS or text.startswith("contact.NAME.")
+            column = text in COLUMNS or re.fullmatch(r"contact\.\w+\.[xyz]", text)
             assert has_setting(text.split("."), SCHEMA) or column, text
         value = parsed(text) if re.match(r"\w+: ", text) else None
         if isinstance(value, dict):
@@ -113,3 +113,14 @@ def help_of(*command: str) -> str:
     with redirect_stdout(StringIO()) as text, pytest.raises(SystemExit):
         execute([*command, "--help"])
     return text.getvalue()
+
+
+def test_the_gallery_has_every_case():
+    page = (ROOT / "docs" / "gallery.md").read_text()
+    named = set(re.findall(r"`([a-z]\w+)`", page)) - {"verify"}
+    assert named == {path.parent.name for path in READMES}
+
+
+def test_the_quickstart_has_every_section():
+    table = (ROOT / "docs" / "quickstart.md").read_text().split("| section | says |")[1].split("\n\n")[0]
+    assert set(re.findall(r"^\| `([a-z]+)` \|", table, re.MULTILINE)) == SECTIONS

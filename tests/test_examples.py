@@ -22,9 +22,10 @@ def numbers(name: str) -> list[list[float]]:
 
 def test_all_are_tested_and_shown():
     names = {path.stem for path in EXAMPLES.glob("*.py")}
-    assert names == {"cylinder", "flap", "own_material", "parameter_study", "torus_and_wall", "two_blocks"}
-    page = (EXAMPLES.parent / "library.md").read_text()
-    assert all(f"examples/{name}.py" in page for name in names)
+    library = {"cylinder", "flap", "own_material", "parameter_study", "torus_and_wall", "two_blocks"}
+    assert names == {*library, "post_process"}
+    pages = [(EXAMPLES.parent / name).read_text() for name in ("library.md", "howto.md")]
+    assert all(f"examples/{name}.py" in pages[name not in library] for name in names)
 
 
 def test_two_blocks():

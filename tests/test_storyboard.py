@@ -119,3 +119,21 @@ def test_all_pictures_of_the_run(out):
         "before_contact_velocity.png",
         "final_contact_pressure.png",
     ]
+
+
+def test_contact_pressure_beside_a_rigid_body_in_the_plane(tmp_path):
+    """The rigid body is a line without pressure; between nodes of a second-order cell no pressure is negative."""
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    data = {"velocity": corners, "pressure": corners[:, 0]}
+    flow = Snapshot("fluid", corners, np.array([[0, 1, 2, 3]]), "quad", data, {"fluid_fraction": np.ones(1)})
+    nodes = np.array([[x, y, 0.0] for y in (0, 1, 2) for x in (0, 1, 2)]) / 4
+    order = np.array([[0, 2, 8, 6, 1, 5, 7, 3, 4]])
+    pressure = np.where(np.arange(9) == 5, 10.0, 0.0)
+    acting = {"contact_pressure": pressure, "contact_traction": pressure[:, None] * [1.0, 0, 0]}
+    body = Snapshot("body", nodes, order, "quad9", acting)
+    stop = Snapshot(
+        "stop", corners[:2] + np.array([0.5, 0, 0]), np.array([[0, 1]]), "line", {"velocity": np.zeros((2, 3))}
+    )
+    fields = FieldWriter(tmp_path / "fields")
+    fields.write(1, 0.1, [flow, body, stop])
+    assert "final_contact_pressure.png" in {path.name for path in plot_run(tmp_path)}

@@ -1,0 +1,66 @@
+"""The cases of the tutorials: the first two as a whole, of the others the first steps; their pages show them."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from programs import fsci
+
+from fsci.run.history import read_history
+
+DOCS = Path(__file__).parents[1] / "docs"
+STAGES = ("solid", "contact", "flow", "coupled", "together")
+
+
+def test_each_case_has_its_page():
+    assert {path.parent.name for path in DOCS.glob("tutorials/*/case.yaml")} == set(STAGES)
+    for number, stage in enumerate(STAGES, start=1):
+        page = (DOCS / f"tutorial_{number}_{stage}.md").read_text()
+        assert f"literalinclude}} tutorials/{stage}/case.yaml" in page
+        assert f"fsci run docs/tutorials/{stage} " in page
+
+
+@pytest.mark.parametrize(
+    "stage",
+    [*STAGES[:2], *(pytest.param(stage, marks=pytest.mark.slow) for stage in STAGES[2:])],
+)
+def test_it_reaches_what_the_page_says(stage, tmp_path):
+    done = fsci("run", DOCS / "tutorials" / stage, "-o", tmp_path, timeout=600)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "repeated" not in done.stdout
+
+
+@pytest.mark.parametrize("stage", STAGES[2:])
+def test_first_steps(stage, tmp_path):
+    short = ("--set", "time.end=0.06", "--set", "verify=[]")
+    done = fsci("run", DOCS / "tutorials" / stage, "-o", tmp_path, *short)
+    assert done.returncode == 0, done.stdout + done.stderr
+    history = read_history(tmp_path / "history.csv")
+    assert len(history["step"]) == 3
+    assert max(abs(history["fluid.mass"])) < 1e-9
+
+
+def test_post_processing(tmp_path):
+    """The example of the how-tos reads what a run wrote."""
+    assert fsci("run", DOCS / "tutorials" / "solid", "-o", tmp_path).returncode == 0
+    example = [sys.executable, DOCS / "examples" / "post_process.py", tmp_path]
+    done = subprocess.run(example, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == [
+        "columns: step time dt iterations wall residual tip.x tip.y clamp.x clamp.y structure.energy",
+        "steps, last time: 4 1.0",
+        "flap 20 cells; displacement velocity von_mises",
+    ]
+
+
+def test_forces_balance_in_contact(tmp_path):
+    """Pressure p on the left side from a to b pushes with p (b_y - a_y): clamp + contact + pressure = 0."""
+    probe = "probes.corner={quantity: displacement, at: [1, 0.6]}"
+    done = fsci("run", DOCS / "tutorials" / "contact", "-o", tmp_path, "--set", probe)
+    assert done.returncode == 0, done.stdout + done.stderr
+    history = {name: values[-1] for name, values in read_history(tmp_path / "history.csv").items()}
+    along = history["clamp.x"] + history["contact.stop.x"] + 8 * (0.6 + history["corner.y"])
+    across = history["clamp.y"] + history["contact.stop.y"] - 8 * history["corner.x"]
+    assert abs(along) < 1e-6
+    assert abs(across) < 1e-6
