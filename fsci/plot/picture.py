@@ -122,7 +122,7 @@ def plot_mesh(path: Path, moment: Moment, labels: Labels) -> Path:
 
 def plot_pressure(path: Path, moment: Moment, labels: Labels) -> Path:
     """Draws the contact pressure on the bodies that have some, seen from the side where it acts."""
-    loaded = [load_body(file, PRESSURE) for time, file in moment if has_contact([(time, file)])]
+    loaded = [load_body(file, PRESSURE) for time, file in moment if has_contact(((time, file),))]
     # between the nodes of second-order cells the interpolated pressure may be negative
     bodies = [replace(body, values=np.maximum(body.values, 0.0)) for body in loaded if body.values is not None]
     towards = np.sum([np.sum(body.surface.point_data["contact_traction"], axis=0) for body in bodies], axis=0)
