@@ -100,6 +100,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     plot.add_argument("--movie", action="store_true", help="make an animation too")
 
+    report = command(_report, "write one page of a run: pictures, curves, balances, verification, time")
+    report.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
+
     bench = command(_bench, "measure run time against error, in a copy of the repository")
     bench.add_argument("names", metavar="NAME", nargs="*", help="which benchmark, 'all', or none: list them")
     bench.add_argument("-o", "--out", metavar="FILE", type=Path, help="write the results as JSON")
@@ -208,6 +211,16 @@ def _plot(options: argparse.Namespace) -> int:
     except (ValueError, RuntimeError) as error:
         return _fail(f"fsci plot: {error}")
     print("\n".join(str(path) for path in files))
+    return 0
+
+
+def _report(options: argparse.Namespace) -> int:
+    from fsci.report.report import write_report
+
+    try:
+        print(write_report(options.out))
+    except (OSError, ValueError, RuntimeError) as error:
+        return _fail(f"fsci report: {error}")
     return 0
 
 

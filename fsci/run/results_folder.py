@@ -21,7 +21,7 @@ MARKER_TEXT = "The results of a run of fsci. Another run into this folder replac
 #: Names of the pictures in a folder, one a line: `fsci plot` draws them, the next run removes them.
 PICTURE_LIST = ".fsci-pictures"
 
-FILES = ("case.yaml", "summary.json", "history.csv", "log.txt", "STOP")
+FILES = ("case.yaml", "summary.json", "history.csv", "log.txt", "report.html", "STOP")
 FOLDERS = ("fields", "checkpoint", "failure", "pictures")
 
 
