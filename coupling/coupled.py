@@ -15,9 +15,8 @@ class Coupled:
 
     def __init__(self, flow: Flow, solid: Solid, dry_sides: Sequence[DrySide] = ()):
         self.flow, self.solid = flow, solid
-        self.interface = Interface(solid, dry_sides)
+        self.interface = Interface(solid, flow.scheme.times, dry_sides)
         self.balance = Balance(flow, solid, self.interface)
-        self._dt = 0.0
 
     def initialise(self, t: float, dt: float, *, with_solid: bool = False) -> None:
         """Both at the first time, the flow around the solid as it starts; with_solid: solved as one."""
@@ -29,9 +28,8 @@ class Coupled:
 
     def begin_step(self, t: float, dt: float) -> None:
         """Boundary and loads at t + dt, both as they were at t."""
-        self._dt = dt
         self.flow.begin_step(t, dt)
-        self.interface.begin_step(self.flow.difference)
+        self.interface.begin_step(self.flow.current.difference)
         self.solid.begin_step(t, dt)
 
     def predict(self, t: float) -> None:
@@ -46,7 +44,7 @@ class Coupled:
         """Accept the step."""
         self.solid.end_step()
         self.flow.end_step()
-        self.balance.add_step(self._dt)
+        self.balance.add_step(self.flow.current.dt)
 
     def force(self) -> Array:
         """Force [N] of the fluid on the vertices, shape (n, dim)."""

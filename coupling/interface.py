@@ -10,7 +10,7 @@ import numpy as np
 from coupling.ports import Solid
 from solvers.api import Array, State
 from solvers.fluid.surface import Motion
-from solvers.fluid.time import Difference
+from solvers.fluid.time import STEADY, Difference
 
 
 @dataclass(frozen=True)
@@ -37,24 +37,26 @@ class Interface:
     """All wetted surfaces, vertices of one after those of the other; `dry_sides` close those with two ends.
 
     The velocity that the fluid sees follows from the displacements by the fluid's own time rule,
-    g = alpha d_{n+1} - beta_0 d_n - beta_1 d_{n-1}, so that fluid and surface sweep the same volume.
+    g = alpha d_{n+1} - sum_k beta_k d_{n-k}, so that fluid and surface sweep the same volume.
     """
 
-    def __init__(self, solid: Solid, dry_sides: Sequence[DrySide] = ()):
+    def __init__(self, solid: Solid, times: int, dry_sides: Sequence[DrySide] = ()):
+        """times: how many times behind the rule may ask for."""
         self.solid, self.surfaces, self.dry_sides = solid, list(solid.surfaces), list(dry_sides)
         self.points = np.concatenate(list(solid.surfaces.values()))
         self._ends = np.cumsum([len(points) for points in solid.surfaces.values()])[:-1]
-        self.now, self.old, self.older = (np.zeros_like(self.points) for _ in range(3))
-        self._difference = Difference(0.0, 0.0, 0.0)
+        self.now = np.zeros_like(self.points)
+        self.past = [self.now] * max(1, times)  #: displacements [m] at the times behind, the last one first
+        self._difference = STEADY
 
     def initialise(self) -> None:
         """The solid is where it starts."""
         self.now = self.displacement()
-        self.old = self.now.copy()
+        self.past = [self.now] * len(self.past)
 
     def begin_step(self, difference: Difference) -> None:
-        """Remember the displacements of the last two times."""
-        self.older, self.old = self.old, self.now.copy()
+        """Remember the displacements."""
+        self.past = [self.now, *self.past][: len(self.past)]
         self._difference = difference
 
     def displacement(self) -> Array:
@@ -64,7 +66,10 @@ class Interface:
     def velocity(self, d: Array) -> Array:
         """Velocity [m/s] of the vertices for displacements d at the end of the step."""
         rule = self._difference
-        return rule.alpha * d - rule.beta_0 * self.old - rule.beta_1 * self.older
+        g = rule.alpha * d
+        for beta, past in zip(rule.beta, self.past, strict=False):
+            g = g - beta * past
+        return g
 
     def move(self, d: Array) -> dict[str, Motion]:
         """Take displacements d [m] and say how each surface moves."""
@@ -81,7 +86,8 @@ class Interface:
         return np.concatenate([by_surface[name] for name in self.surfaces])
 
     def save(self) -> State:
-        return {"now": self.now.copy(), "old": self.old.copy()}
+        return {"now": self.now.copy(), "past": {str(k): d.copy() for k, d in enumerate(self.past)}}
 
     def restore(self, state: State) -> None:
-        self.now, self.old = state["now"].copy(), state["old"].copy()
+        self.now = state["now"].copy()
+        self.past = [state["past"][str(k)].copy() for k in range(len(self.past))]

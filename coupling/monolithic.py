@@ -46,6 +46,7 @@ class Monolithic:
         self._fresh_iterations = self._linear_iterations = 0
         #: rounding errors of the residuals of solid and flow [N], as far as this step knows
         self._noise: Array | None = None
+        self._found, self._largest = np.zeros(2), np.zeros(2)  #: residuals of solid and flow: now, largest of the step
         self._prepared: Blocks | None = None  #: the matrix at the present iterate, if it is there already
 
     # ------------------------------------------------------------------------------------------------- steps

@@ -46,7 +46,7 @@ class Partitioned:
         coupled.begin_step(t, dt)
         self.accelerator.begin_step()
         if not coupled.flow.steady:
-            coupled.flow.move(interface.move(interface.old))
+            coupled.flow.move(interface.move(interface.past[0]))
             coupled.predict(t + dt)
         d = interface.displacement()
         history: list[float] = []
@@ -75,7 +75,7 @@ class Partitioned:
         return StepInfo(len(history), tuple(history), numbers, tuple(coupled.flow.notes))
 
     def _small(self, found: Array) -> float:
-        return max(self.tolerance.relative * _mean(found - self.coupled.interface.old), self.tolerance.absolute)
+        return max(self.tolerance.relative * _mean(found - self.coupled.interface.past[0]), self.tolerance.absolute)
 
     def save(self) -> State:
         return {**self.coupled.save(), "accelerator": self.accelerator.save()}

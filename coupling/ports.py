@@ -18,7 +18,7 @@ from solvers.api import Array, Stateful, StepInfo
 from solvers.fluid.coupling_entries import InterfaceEntries
 from solvers.fluid.krylov import Ladder
 from solvers.fluid.surface import Motion
-from solvers.fluid.time import Difference
+from solvers.fluid.time import Step, TimeScheme
 from solvers.newton import System
 from solvers.rows import RowTransformation, TakenRows
 from solvers.timing import Timer
@@ -163,9 +163,11 @@ class Flow(Part, Protocol):
     notes: list[str]  #: what the user should know of this step
 
     @property
-    def difference(self) -> Difference:
-        """The rule by which it takes derivatives in time in this step."""
+    def scheme(self) -> TimeScheme:
+        """How it takes derivatives in time."""
         ...
+
+    current: Step  #: the step that it computes, with the rule for derivatives in time
 
     def predict(self) -> None:
         """A first guess for the end of the step."""

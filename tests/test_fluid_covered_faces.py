@@ -77,9 +77,9 @@ def test_outflow_of_a_face_without_cover_is_that_of_the_form(side):
     cells = fluid.boundary.cells[1]
     points, rule = gauss(8)
     reference = np.stack([points, np.full(8, float(side))], axis=1)
-    whole = CoveredFaces(cells, 1, side, reference, np.tile(rule / 3.0, (len(cells), 1)))
-    carried = 1.3 * whole.velocity(fluid.grid, unknowns, fluid.velocity())
-    blocks, dofs = whole.outflow(fluid.grid, unknowns, MU, carried), unknowns.cell_velocity[cells]
+    whole = CoveredFaces(fluid.grid, unknowns, cells, 1, side, reference, np.tile(rule / 3.0, (len(cells), 1)))
+    carried = 1.3 * whole.velocity(fluid.velocity())
+    blocks, dofs = whole.outflow(MU, carried), unknowns.cell_velocity[cells]
     found = np.zeros_like(expected)
     np.add.at(found, dofs, np.einsum("caibk,cbk->cai", blocks, fluid.flow[dofs]))
     assert np.abs(expected).max() > 0.1

@@ -69,9 +69,8 @@ def test_share_of_the_mass_where_no_velocity_was_known():
     for fluid in fluids:
         system = fluid.system
         nothing = np.ones(fluid.unknowns.local, dtype=bool)
-        system.set_time(1e-3, fluid.difference, fluid.history.rate(fluid.difference), nothing)
-        system.set_scales(fluid.velocity())
-        system.set_penalties()
+        rate = fluid.history.rate(fluid.current.difference)
+        system.begin_step(fluid.current, rate, nothing, fluid.velocity())
         fluid.residual()
         rows.append(momentum(fluid))
     shares = [ghost_rows(fluid) for fluid in fluids]

@@ -9,6 +9,7 @@ from solvers.fluid.grid import uniform
 from solvers.fluid.history import Past
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.surface import Motion, Surface
+from solvers.fluid.time import Step
 
 VELOCITY, DT = field(2.0, 0.0), 0.01
 
@@ -85,8 +86,8 @@ def test_initial_velocity_is_known_where_bodies_are():
     place(fluid, points, 0.0)
     fluid.begin_step(0.0, DT)
     x, y = fluid.unknowns.velocity.dofs.T
-    assert np.array_equal(fluid.history.rate(fluid.difference)[x], np.full(len(x), 2.0 / DT))
-    assert np.array_equal(fluid.history.rate(fluid.difference)[y], np.zeros(len(y)))
+    assert np.array_equal(fluid.history.rate(fluid.current.difference)[x], np.full(len(x), 2.0 / DT))
+    assert np.array_equal(fluid.history.rate(fluid.current.difference)[y], np.zeros(len(y)))
 
 
 def test_first_guess_goes_on_as_in_the_last_step():
@@ -97,10 +98,10 @@ def test_first_guess_goes_on_as_in_the_last_step():
     missing = np.zeros(fluid.unknowns.local, dtype=bool)
     missing[x[inside][0]] = True
     values = [np.where(np.isin(np.arange(fluid.unknowns.local), x), value, 0.0) for value in (3.0, 5.0)]
-    fluid.history.old, fluid.history.now = Past(values[0], ~missing), Past(values[1], ~missing)
+    fluid.history.past = [Past(values[1], ~missing), Past(values[0], ~missing)]
     fluid.history.steps = (DT, DT)
     fluid.flow[:] = values[1]
-    fluid.dt, fluid.difference = 0.5 * DT, fluid.history.begin_step(0.5 * DT)
+    fluid.current = Step(0.5 * DT, 0.5 * DT, fluid.history.difference(0.5 * DT))
     fluid.predict()
     guess = fluid.flow[x[inside]]
     assert guess[0] == 5.0

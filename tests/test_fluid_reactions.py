@@ -43,7 +43,7 @@ def scene(dim, element, scheme, *, convection=True):
 
 def momentum_rate(fluid):
     """int rho (u_t + u . grad u) - f over the fluid, by a rule of its own."""
-    unknowns, difference = fluid.unknowns, fluid.difference
+    unknowns, difference = fluid.unknowns, fluid.current.difference
     rule = fluid_rule(fluid)
     u, du, _ = values(fluid, rule)
     keep = fluid.flow.copy()

@@ -49,7 +49,6 @@ def at_random_state(case):
     fluid.flow[:] = rng.normal(size=len(fluid.flow)) * fluid.system.active_dofs
     velocity = fluid.velocity()
     fluid.system.set_scales(velocity)
-    fluid.system.set_penalties()
     return fluid, rng
 
 

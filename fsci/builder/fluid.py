@@ -78,11 +78,7 @@ def _body_force(settings: Section) -> tuple[Value, ...] | None:
 
 
 def _patches(settings: Section) -> list[Patch]:
-    found = []
-    for name, patch in settings.patches.items():
-        value = patch.velocity or patch.traction or (None if patch.pressure is None else (patch.pressure,))
-        found.append(Patch(name, patch.on, patch.kind, value, patch.where))
-    return found
+    return [Patch(name, patch.on, patch.kind, patch.value, patch.where) for name, patch in settings.patches.items()]
 
 
 # ---------------------------------------------------------------------------------------------------------- bodies

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from fsci.case.case import Case
 from fsci.case.coupling import Coupling
 from fsci.case.errors import did_you_mean, listed
-from fsci.case.fluid import OPEN
 from fsci.case.mesh_checks import Mistake, surface_mistakes
 from fsci.case.yaml_text import Keys
+from solvers.fluid.patch_kinds import PATCH_KINDS
 
 
 def coupling_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
@@ -35,10 +35,11 @@ def coupling_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
         yield ("fluid", "scheme"), "a steady flow goes with a static structure: remove 'dynamics', or choose bdf2"
     if static and not steady:
         yield ("fluid", "scheme"), "a flow in time needs 'dynamics' in 'structure', or choose the scheme steady"
-    kinds = {patch.kind for patch in case.fluid.patches.values()}
-    if (steady or coupling.scheme == "partitioned") and not kinds & set(OPEN):
+    is_open = any(patch.open for patch in case.fluid.patches.values())
+    if (steady or coupling.scheme == "partitioned") and not is_open:
         where, why = closed_in(case)
-        yield where, f"the boundary encloses the fluid, and {why}, or give a patch with {listed(OPEN)}"
+        kinds = listed([name for name, kind in PATCH_KINDS.items() if kind.open])
+        yield where, f"the boundary encloses the fluid, and {why}, or give a patch with {kinds}"
 
 
 def closed_in(case: Case) -> Mistake:

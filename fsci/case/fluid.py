@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import model_validator
 
@@ -26,12 +26,11 @@ from fsci.case.values import (
     TimeVector,
     Vector,
 )
+from solvers.fluid.patch_kinds import PATCH_KINDS
 
 FACES = ("x-", "x+", "y-", "y+", "z-", "z+")
 Face = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
-KINDS = ("velocity", "no_slip", "slip", "symmetry", "traction", "pressure", "outflow", "periodic")
-#: kinds of patches that say how high the pressure is
-OPEN = ("traction", "pressure", "outflow")
+KINDS = tuple(PATCH_KINDS)
 
 
 class Patch(Section):
@@ -77,15 +76,20 @@ class Patch(Section):
                 raise fault(f"'{face}' is periodic with '{other}': put both into 'on'", "on", index)
 
     @property
-    def kind(self) -> Literal["velocity", "no_slip", "slip", "traction", "pressure", "outflow", "periodic"]:
-        """Which condition it is."""
-        if self.velocity is not None:
-            return "velocity"
-        if self.traction is not None:
-            return "traction"
-        if self.pressure is not None:
-            return "pressure"
-        return "no_slip" if self.no_slip else "outflow" if self.outflow else "periodic" if self.periodic else "slip"
+    def kind(self) -> str:
+        """Which condition it is, of `PATCH_KINDS`."""
+        return next(kind for kind in KINDS if getattr(self, kind) not in (None, False))
+
+    @property
+    def value(self) -> tuple[Any, ...] | None:
+        """What it is given, by components."""
+        value = getattr(self, self.kind) if PATCH_KINDS[self.kind].value else None
+        return value if value is None or isinstance(value, tuple) else (value,)
+
+    @property
+    def open(self) -> bool:
+        """It says how high the pressure is."""
+        return PATCH_KINDS[self.kind].open
 
 
 class Turn(Section):

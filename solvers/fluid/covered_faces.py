@@ -20,6 +20,8 @@ from solvers.gauss import gauss
 class CoveredFaces:
     """Those on one face of the box, with Gauss points and weights of their wet part."""
 
+    grid: DistributedGrid
+    unknowns: Unknowns
     cells: NDArray[np.int32]  #: local cells
     axis: int
     side: int  #: 0 or 1
@@ -31,34 +33,40 @@ class CoveredFaces:
         keep = marked[self.cells]
         return replace(self, cells=self.cells[keep], weights=self.weights[keep])
 
-    def velocity(self, grid: DistributedGrid, unknowns: Unknowns, values: Array) -> Array:
+    def velocity(self, values: Array) -> Array:
         """Of values at local dofs, at the points, shape (cells, points, dim)."""
-        shapes, _ = fem.tabulate_lagrange(grid.domain, unknowns.degree, self.reference)
-        return np.einsum("qa,cai->cqi", shapes, values[unknowns.cell_velocity[self.cells]])
+        shapes, _ = fem.tabulate_lagrange(self.grid.domain, self.unknowns.degree, self.reference)
+        return np.einsum("qa,cai->cqi", shapes, values[self.unknowns.cell_velocity[self.cells]])
 
-    def pressure(self, grid: DistributedGrid, unknowns: Unknowns, values: Array) -> Array:
+    def pressure(self, values: Array) -> Array:
         """The same of the pressure, shape (cells, points)."""
-        shapes, _ = fem.tabulate_lagrange(grid.domain, 1, self.reference)
-        return values[unknowns.cell_pressure[self.cells]] @ shapes.T
+        shapes, _ = fem.tabulate_lagrange(self.grid.domain, 1, self.reference)
+        return values[self.unknowns.cell_pressure[self.cells]] @ shapes.T
 
     def outward(self, vectors: Array) -> Array:
         """Components of vectors along the normal that points out of the box."""
         normal: Array = vectors[..., self.axis]
         return normal if self.side else -normal
 
-    def load(self, grid: DistributedGrid, unknowns: Unknowns, traction: Array) -> tuple[NDArray[np.int32], Array]:
-        """(local dofs, int t . v over the wet part) with tractions t [Pa] at the points, shape (cells, points, dim)."""
-        shapes, _ = fem.tabulate_lagrange(grid.domain, unknowns.degree, self.reference)
-        weighted = self.weights[:, :, None] * traction
-        return unknowns.cell_velocity[self.cells], np.einsum("qa,cqi->cai", shapes, weighted)
+    def along_normal(self, values: Array) -> Array:
+        """Vectors of some lengths along that normal."""
+        vectors = np.zeros((*values.shape, self.grid.dim))
+        vectors[..., self.axis] = values if self.side else -values
+        return vectors
 
-    def outflow(self, grid: DistributedGrid, unknowns: Unknowns, mu: float, carried: Array) -> Array:
-        """d/du of `forms.outflow` over the wet part [Pa s m^(dim-2)], shape (cells, functions, dim, functions, dim).
+    def load(self, traction: Array) -> tuple[NDArray[np.int32], Array]:
+        """(local dofs, int t . v over the wet part) with tractions t [Pa] at the points, shape (cells, points, dim)."""
+        shapes, _ = fem.tabulate_lagrange(self.grid.domain, self.unknowns.degree, self.reference)
+        weighted = self.weights[:, :, None] * traction
+        return self.unknowns.cell_velocity[self.cells], np.einsum("qa,cqi->cai", shapes, weighted)
+
+    def outflow(self, mu: float, carried: Array) -> Array:
+        """d/du of the outflow's form over the wet part [Pa s m^(dim-2)], shape (cells, functions, dim, functions, dim).
 
         -<mu (grad u)^T n, v> - <min(0, rho a . n) u, v> / 2; carried: rho a at the points, shape (cells, points, dim).
         """
-        shapes, slopes = fem.tabulate_lagrange(grid.domain, unknowns.degree, self.reference)
-        slopes = slopes / grid.sizes[self.cells][:, None, None, :]
+        shapes, slopes = fem.tabulate_lagrange(self.grid.domain, self.unknowns.degree, self.reference)
+        slopes = slopes / self.grid.sizes[self.cells][:, None, None, :]
         (cells, _, functions, dim), w = slopes.shape, self.weights
         block = np.zeros((cells, functions, dim, functions, dim))
         normal = 1.0 if self.side else -1.0
@@ -71,7 +79,12 @@ class CoveredFaces:
 
 
 def covered_faces(
-    grid: DistributedGrid, cut: Cut, points: int, facets: NDArray[np.int32], cells: NDArray[np.int32]
+    grid: DistributedGrid,
+    unknowns: Unknowns,
+    cut: Cut,
+    points: int,
+    facets: NDArray[np.int32],
+    cells: NDArray[np.int32],
 ) -> tuple[NDArray[np.bool_], list[CoveredFaces]]:
     """(which of some outer facets no body covers, the others), with Gauss points in each direction of a face.
 
@@ -85,14 +98,19 @@ def covered_faces(
             on = grid.on_face(middles, face)
             found = wet_face(grid.grid, face, gauss(points)[0], cut.facets, cut.motion) if on.any() else None
             if found is not None and len(found.cells):
-                part, touched = _covered(grid, found, face, points, cells[on])
+                part, touched = _covered(grid, unknowns, found, face, points, cells[on])
                 free[np.flatnonzero(on)[touched]] = False
                 covered += [part] if len(part.cells) else []
     return free, covered
 
 
 def _covered(
-    grid: DistributedGrid, found: WetFace, face: str, points_per_direction: int, cells: NDArray[np.int32]
+    grid: DistributedGrid,
+    unknowns: Unknowns,
+    found: WetFace,
+    face: str,
+    points_per_direction: int,
+    cells: NDArray[np.int32],
 ) -> tuple[CoveredFaces, NDArray[np.int64]]:
     """(the covered ones of the faces of local cells, which of the cells they belong to)."""
     axis, side = "xyz".index(face[0]), int(face[1] == "+")
@@ -109,4 +127,4 @@ def _covered(
         reference[:, i] = np.tile(np.repeat(points, len(points) ** k), len(points) ** (len(others) - 1 - k))
     areas = grid.sizes[cells[touched]][:, others].prod(axis=1)
     weights = found.weights[row[number[touched]]] * areas[:, None]
-    return CoveredFaces(cells[touched], axis, side, reference, weights), touched
+    return CoveredFaces(grid, unknowns, cells[touched], axis, side, reference, weights), touched

@@ -15,26 +15,26 @@ from petsc4py import PETSc
 from solvers import fem, linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.distributed import Nodal
-from solvers.fluid import time
 from solvers.fluid.balances import Balances
 from solvers.fluid.coupling_entries import InterfaceEntries, interface_entries
-from solvers.fluid.cut import NOTHING, Cut, Cutter
+from solvers.fluid.cut import Cut, Cutter
 from solvers.fluid.fast_bodies import FastBodies
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.history import History, Past
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.krylov import FlowKrylov, Ladder, rungs
 from solvers.fluid.patches import Boundary, Patch, periodic_axes
-from solvers.fluid.pressure_level import hold_pressure, spread_excess
-from solvers.fluid.space import Nodes, Unknowns
+from solvers.fluid.pressure_level import Hold, hold_pressure, spread_excess
+from solvers.fluid.reach import require_known, require_within_period, strip_layers
+from solvers.fluid.space import Nodes, Unknowns, set_velocity
 from solvers.fluid.surface import Motion, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
+from solvers.fluid.time import STEADY, Step, TimeScheme
 from solvers.lagged import LaggedFactors
 from solvers.newton import converge
 from solvers.rounding import rounding_error
 from solvers.solver_settings import SolverSettings
 from solvers.timing import Timer
-from solvers.values import evaluate
 
 #: Share of the largest residual of a steady flow below which Newton's method takes over from Picard's.
 NEWTON_FROM = 0.02
@@ -76,7 +76,9 @@ class Fluid:
         self.cutter = Cutter(self.grid, self.system.weights.points)
         self.velocity_mask = np.zeros(self.unknowns.local, dtype=bool)
         self.velocity_mask[self.unknowns.velocity.dofs] = True
-        self.history = History(settings.scheme, self.unknowns.local)
+        self.history = History(settings.time, self.unknowns.local)
+        self.current = Step(0.0, 0.0, STEADY)  #: the step that is computed now or was last
+        self.started = False  #: a step was accepted, so that there are forces
         self._smallest = min(float(np.diff(edge).min()) for edge in grid.edges)
         self._motions: list[Motion] = []
         self._wet = wetness([body.surface for body in self.bodies])
@@ -88,6 +90,11 @@ class Fluid:
         self._direct = LaggedFactors(comm, fresh=math.inf if settings.steady else 1)
         self.rounding: Array | None = None  #: rounding error of `residual_rows`, as far as this step knows
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is there already
+        owned = self.unknowns.owned
+        self.held = np.zeros(owned, dtype=bool)  #: owned dofs with rows of the identity
+        self._holds: list[Hold] = []
+        self.residual_rows, self._increment, self._diagonal = (np.zeros(owned) for _ in range(3))
+        self._size = self._largest = 0.0  #: norm of the residual: now, and its largest of the step
 
     # ------------------------------------------------------------------------------------------------- the state
 
@@ -106,13 +113,12 @@ class Fluid:
         return self.settings.steady
 
     @property
-    def linear_tolerance(self) -> float:
-        return self.solver.linear_tolerance
+    def scheme(self) -> TimeScheme:
+        return self.settings.time
 
     @property
-    def started(self) -> bool:
-        """A step was computed, so that there are forces."""
-        return hasattr(self, "residual_rows")
+    def linear_tolerance(self) -> float:
+        return self.solver.linear_tolerance
 
     @property
     def flow(self) -> Array:
@@ -131,13 +137,9 @@ class Fluid:
     def initialise(self, t: float, dt: float) -> None:
         """The initial velocity, known everywhere."""
         if self.settings.initial_velocity is not None:
-            points = np.zeros((3, len(self.unknowns.velocity.points)))
-            points[: self.dim] = self.unknowns.velocity.points.T
-            for axis, component in enumerate(self.settings.initial_velocity):
-                self.flow[self.unknowns.velocity.dofs[:, axis]] = evaluate(component, points, t)
-        self.history.now.velocity = self.velocity()
-        self._t, self.dt = t, dt
-        self.difference = time.STEADY if self.settings.steady else time.backward_euler(dt)
+            set_velocity(self.flow, self.unknowns.velocity, self.settings.initial_velocity, t)
+        self.history.start(self.velocity())
+        self.current = Step(t, dt, self.history.difference(dt))
         if not self._coupled:
             self.move({})
 
@@ -157,14 +159,12 @@ class Fluid:
 
     def begin_step(self, t: float, dt: float) -> None:
         """Remember the state at t; boundary, loads and moving bodies at t + dt."""
-        self._t, self.dt = t + dt, dt
+        difference, last = self.history.difference(dt), self.history.past[0].velocity
+        self.current = Step(t + dt, dt, difference)
         self.cutter.begin_step()
-        self.difference = self.history.begin_step(dt)
-        rate, unknown = self.history.rate(self.difference), self.history.unknown(self.difference)
-        self.system.set_time(t + dt, self.difference, rate, unknown)
+        self.system.begin_step(self.current, self.history.rate(difference), self.history.missing(difference), last)
         self.flow[self.boundary.dofs] = self.boundary.velocity(t + dt)
-        self.system.set_scales(self.history.old.velocity)
-        self._fresh, self._largest = True, 0.0
+        self._largest = 0.0
         self.rounding = self._tangent = None  # not part of the saved state: a resumed run must start alike
         self._direct.begin_step()
         self.notes.clear()
@@ -176,12 +176,12 @@ class Fluid:
 
     def predict(self) -> None:
         """Let the velocity go on as in the last step, where it was known before that too."""
-        old, older = self.history.old, self.history.older
-        if self.difference.beta_1 == 0.0:
+        if len(self.current.difference.beta) < 2:
             return
-        continued = old.valid & older.valid
+        old, older = self.history.past[:2]
+        continued = old.found & older.found
         continued[self.boundary.dofs] = False
-        growth = self.dt / self.history.steps[-1]
+        growth = self.current.dt / self.history.steps[0]
         self.flow[continued] += growth * (old.velocity - older.velocity)[continued]
 
     def move(self, coupled: Mapping[str, Motion], *, with_solid: bool = False) -> None:
@@ -190,15 +190,15 @@ class Fluid:
         with_solid: their equations are solved with these, and bound the pressure in closed pockets. Raises StepFailed
         if surfaces ran out of the strip.
         """
-        motions = [coupled[b.surface.name] if b.motion is None else b.motion(self._t) for b in self.bodies]
-        self._motions, self._fresh = motions, True
+        motions = [coupled[b.surface.name] if b.motion is None else b.motion(self.current.t) for b in self.bodies]
+        self._motions = motions
         with self.timer("cut"):
             facets, motion = together([body.surface for body in self.bodies], motions, self.dim)
             cut = self.cutter(facets, motion, self._layers(motion), self._wet)
         with self.timer("weights"):
             self.system.set_cut(cut)
-            self._check_strip(cut)
-            self._check_period(cut)
+            require_known(self.unknowns, cut, self.history.missing(self.current.difference))
+            require_within_period(self.unknowns, cut)
             self.flow[~self.system.active_dofs] = 0.0
             self.held = np.zeros(self.unknowns.owned, dtype=bool)
             prescribed = self.boundary.dofs[self.boundary.dofs < self.unknowns.owned]
@@ -210,39 +210,21 @@ class Fluid:
         """Cells behind the surface that the next two steps may uncover."""
         if self.settings.steady or all(body.rests for body in self.bodies):
             return 0
-        fastest = float(np.linalg.norm(motion.v, axis=1).max(initial=0.0))
-        steps = 2.0 if self.settings.scheme == "bdf2" else 1.0
-        layers = 1.25 * steps * fastest * self.dt / self._smallest
-        return math.ceil(min(max(1.0, layers), max(self.grid.grid.shape)))  # no more than there are
-
-    def _check_strip(self, cut: Cut) -> None:
-        blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)
-        blocks[self.unknowns.cell_blocks[np.concatenate([cut.uncut, cut.cut])]] = True
-        used = self.unknowns.expand(blocks) & self.velocity_mask
-        missing = bool((used & self.history.unknown(self.difference)).any())
-        if self.comm.allreduce(missing, op=MPI.LOR):
-            reason = "a body moved farther in one step than the flow behind it is known: take a smaller time step"
-            raise StepFailed(self.name, reason)
-
-    def _check_period(self, cut: Cut) -> None:
-        """Bodies stay within the period: their surfaces know nothing of the cells at the other end."""
-        changed = cut.fraction < 1.0 - NOTHING
-        changed[np.concatenate([cut.cut, cut.strip])] = True
-        places = np.unravel_index(self.grid.numbers[changed], self.grid.grid.shape, order="F")
-        for axis in self.unknowns.periodic:
-            at_end = np.isin(places[axis], [0, self.grid.grid.shape[axis] - 1]).any()
-            if self.comm.allreduce(bool(at_end), op=MPI.LOR):
-                raise StepFailed(self.name, f"a body reaches the periodic faces {'xyz'[axis]}- and {'xyz'[axis]}+")
+        times = self.settings.time.times
+        return strip_layers(self.grid, motion, times * self.current.dt, self._smallest)
 
     def _hold_pressure(self, *, known_by_bodies: bool) -> None:
         elastic = np.concatenate([np.full(b.surface.vertices, b.deforms) for b in self.bodies] + [[]]) > 0.0
         self._holds = hold_pressure(self.system, elastic, known_by_bodies=known_by_bodies)
-        #: a body that another field moves could know the pressure that is held here
-        self.level_unknown = any(hold.elastic for hold in self._holds)
         for hold in self._holds:
             self.held[hold.dofs] = True
             if not hold.keeps_level:
                 self.flow[hold.dofs] = 0.0
+
+    @property
+    def level_unknown(self) -> bool:
+        """A body that another field moves could know the pressure that is held."""
+        return any(hold.elastic for hold in self._holds)
 
     def solve(self) -> StepInfo:
         """Newton to the tolerance. Raises StepFailed."""
@@ -254,25 +236,23 @@ class Fluid:
 
     def _note_fast_bodies(self) -> None:
         if not self.settings.steady:
-            self.notes += self._fast_bodies.notes({body.surface.name: m for body, m in self._moved()}, self.dt)
+            self.notes += self._fast_bodies.notes({body.surface.name: m for body, m in self._moved()}, self.current.dt)
 
     def end_step(self) -> None:
         """Accept the step. Fluid that comes between surfaces which touch now will have been at rest."""
         if self._coupled:
             self._note_fast_bodies()
-        known = self.system.active_dofs | self.system.dofs_of(self.cut.contact_cells)
-        self.history.end_step(self.dt, self.velocity(), known)
+        found = self.system.active_dofs | self.system.dofs_of(self.cut.contact_cells)
+        self.history.end_step(self.current.dt, self.velocity(), found)
+        self.started = True
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
     def residual(self) -> float:
         """Norm [N] of the momentum rows and of the continuity rows times the impedance of a cell."""
         with self.timer("assembly"):
-            if self._fresh or self.settings.steady:
-                if self.settings.steady:
-                    self.system.set_scales(self.velocity())
-                self.system.set_penalties()
-                self._fresh = False
+            if self.settings.steady:
+                self.system.set_scales(self.velocity())
             self.residual_rows = self.system.residual()
         spread_excess(self.comm, self._holds, self.residual_rows)
         self.residual_rows[self.held] = 0.0
@@ -282,7 +262,9 @@ class Fluid:
 
     def _norm(self, rows: Array) -> float:
         settings, h = self.settings, self._smallest
-        impedance = settings.viscosity / h + settings.density * (self.system.fastest + h * self.difference.alpha)
+        impedance = settings.viscosity / h + settings.density * (
+            self.system.fastest + h * self.current.difference.alpha
+        )
         scaled = np.where(self.velocity_mask[: len(rows)], rows, impedance * rows)
         return math.sqrt(self.comm.allreduce(float(scaled @ scaled)))
 
@@ -394,7 +376,7 @@ class Fluid:
     def interface_entries(self, surfaces: Sequence[str]) -> InterfaceEntries:
         """Derivatives of rows and force by the motion of some bodies (collective)."""
         operator, held, vertices = self.system.interface, self.held_everywhere(), self.vertices_of(surfaces)
-        return interface_entries(operator, self.unknowns, self.flow, self.difference.alpha, held, vertices)
+        return interface_entries(operator, self.unknowns, self.flow, self.current.difference.alpha, held, vertices)
 
     def balances(self) -> tuple[Array, float]:
         """(force [N] on all bodies by momentum, shape (dim,); power [W] that the method takes) (collective)."""
@@ -413,15 +395,14 @@ class Fluid:
         def nodal(values: Array, nodes) -> Nodal:
             return Nodal(values[nodes.dofs[: nodes.owned]].astype(float), nodes.numbers[: nodes.owned])
 
-        known = np.stack([self.history.now.valid, self.history.old.valid], axis=1)[velocity.dofs[:, 0]]
+        found = np.stack([past.found for past in self.history.past], axis=1)[velocity.dofs[:, 0]]
         return {
-            "velocity": nodal(self.history.now.velocity, velocity),
+            "velocity": {str(k): nodal(past.velocity, velocity) for k, past in enumerate(self.history.past)},
             "pressure": nodal(self.flow, pressure),
-            "old_velocity": nodal(self.history.old.velocity, velocity),
-            "valid": Nodal(known[: velocity.owned].astype(float), velocity.numbers[: velocity.owned]),
+            "found": Nodal(found[: velocity.owned].astype(float), velocity.numbers[: velocity.owned]),
             "pattern": Nodal(self.system.pattern_state(), self.grid.numbers[: self.grid.owned]),
             "steps": list(self.history.steps),
-            "time": self._t,
+            "time": self.current.t,
             "linear_solver": self.ladder.rung,
             "motion": {body.surface.name: {"x": m.x, "v": m.v} for body, m in self._moved()},
         }
@@ -431,18 +412,15 @@ class Fluid:
 
     def restore(self, state: State) -> None:
         """Back to a saved state."""
-        velocity, pressure = self.unknowns.velocity, self.unknowns.pressure
-        known = state["valid"].values
-        self.flow[:] = self._at_nodes(velocity, state["velocity"].values)
-        self.flow[:] += self._at_nodes(pressure, state["pressure"].values)
-        old_velocity = self._at_nodes(velocity, state["old_velocity"].values)
-        self.history.now, self.history.old = (
-            Past(values, self._at_nodes(velocity, known[:, [column]]) > 0.5)
-            for column, values in enumerate((self.velocity(), old_velocity))
-        )
-        self.history.steps, self._t = tuple(state["steps"]), state["time"]
+        velocity, found = self.unknowns.velocity, state["found"].values
+        past = [self._at_nodes(velocity, state["velocity"][str(k)].values) for k in range(len(self.history.past))]
+        self.history.past = [
+            Past(values, self._at_nodes(velocity, found[:, [k]]) > 0.5) for k, values in enumerate(past)
+        ]
+        self.flow[:] = past[0] + self._at_nodes(self.unknowns.pressure, state["pressure"].values)
+        self.history.steps = tuple(state["steps"])
+        self.current = Step(state["time"], 0.0, STEADY)
         self.ladder.rung = state["linear_solver"]
-        self.difference = time.STEADY
         self.system.restore_pattern(state["pattern"].values)
         self.cutter.begin_step()
         kept = self.flow.copy()

@@ -1,4 +1,4 @@
-"""The equations of the flow on a cut grid: bulk, stabilisation, interface, ghost penalty, outer faces.
+"""The equations of the flow on a cut grid: bulk, stabilisation, interface, ghost penalty.
 
 sigma(u, p) = 2 mu eps(u) - p I, n outward normal of the fluid, g velocity of the interface, h edge length of the cell.
 The time derivative is alpha u - history, alpha = 0 if the flow is steady; `a` is the velocity that scales
@@ -177,26 +177,3 @@ def _jump(field: Expr, n: Expr, order: int) -> Expr:
     for _ in range(order):
         jumped = dot(jumped, n("+"))
     return jumped
-
-
-def traction(t: Expr, v: Expr) -> Expr:
-    """Integrand of -<t, v> on an outer face with the given traction [Pa]."""
-    return -dot(t, v)
-
-
-def pressure(flow: Flow, p: Expr, v: Expr) -> Expr:
-    """Integrand of <p, n . v> on an outer face with the given pressure [Pa]: n . sigma n = -p."""
-    return p * dot(ufl.FacetNormal(flow.mesh), v)
-
-
-def outflow(flow: Flow, u: Expr, v: Expr) -> Expr:
-    """Integrand on an outer face that a parallel flow leaves unharmed: mu d_n u - p n = 0, and no energy comes back.
-
-    -<mu (grad u)^T n, v> - rho/2 <min(0, u . n) u, v>. Source: Braack, Mucha, J. Comput. Math. 32 (2014) 507-521.
-    """
-    n = ufl.FacetNormal(flow.mesh)
-    terms = -flow.mu * dot(dot(n, grad(u)), v)
-    if flow.convection:
-        back = 0.5 * (dot(flow.a, n) - abs(dot(flow.a, n)))
-        terms -= 0.5 * flow.rho * back * dot(u, v)
-    return terms

@@ -1,4 +1,4 @@
-"""The velocities of the steps behind: how many there are decides how the next step takes its time derivative."""
+"""The velocities at the times behind, which the rate of a step asks for."""
 
 from __future__ import annotations
 
@@ -8,54 +8,51 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.fluid import time
+from solvers.fluid.time import Difference, TimeScheme
 
 Mask = NDArray[np.bool_]
 
 
-@dataclass
+@dataclass(frozen=True)
 class Past:
-    """Velocities [m/s] of a time behind, at local dofs, and where they are known."""
+    """Velocities [m/s] of a time behind, at local dofs, and where a step has found them."""
 
     velocity: Array
-    valid: Mask
+    found: Mask
 
 
 class History:
-    """What BDF2 needs of two times behind, backward Euler of one.
+    """Velocities and lengths of the accepted steps, the last one first: as many as the time scheme asks for."""
 
-    BDF2 starts with two steps of backward Euler: both keep its order, and after only one it would take back half of
-    what a flow that starts at once gained in it.
-    """
-
-    def __init__(self, scheme: str, size: int):
+    def __init__(self, scheme: TimeScheme, size: int):
         self.scheme = scheme
-        #: at the end of the last accepted step, and at the two times that the present step takes its rate from
-        self.now, self.old, self.older = (Past(np.zeros(size), np.ones(size, dtype=bool)) for _ in range(3))
-        self.steps: tuple[float, ...] = ()  #: lengths [s] of the last accepted steps, two at most
+        self.past = [Past(np.zeros(size), np.ones(size, dtype=bool)) for _ in range(max(1, scheme.times))]
+        self.steps: tuple[float, ...] = ()  #: lengths [s]
 
-    def begin_step(self, dt: float) -> time.Difference:
-        """The time derivative in a step of length dt from now on."""
-        self.older, self.old = self.old, self.now
-        if self.scheme == "steady":
-            return time.STEADY
-        if self.scheme == "backward_euler" or len(self.steps) < 2:
-            return time.backward_euler(dt)
-        return time.bdf2(dt, self.steps[-1])
+    def difference(self, dt: float) -> Difference:
+        """The rule of a step of length dt from now on."""
+        return self.scheme.difference(dt, self.steps)
 
-    def end_step(self, dt: float, velocity: Array, known: Mask) -> None:
+    def start(self, velocity: Array) -> None:
+        """The initial velocity, known everywhere."""
+        self.past[0] = Past(velocity, np.ones(len(velocity), dtype=bool))
+
+    def end_step(self, dt: float, velocity: Array, found: Mask) -> None:
         """Accept a step that found the flow at some local dofs."""
-        self.now = Past(velocity, known)
-        self.steps = (*self.steps, dt)[-2:]
+        self.past = [Past(velocity, found), *self.past][: len(self.past)]
+        self.steps = (dt, *self.steps)[: self.scheme.times]
 
-    def rate(self, difference: time.Difference) -> Array:
-        """What u_t takes from the times behind, beta_0 u_n + beta_1 u_{n-1} [m/s^2]."""
-        return difference.beta_0 * self.old.velocity + difference.beta_1 * self.older.velocity
+    def rate(self, difference: Difference) -> Array:
+        """What u_t takes from the times behind, sum_k beta_k u_{n-k} [m/s^2]."""
+        total = np.zeros(len(self.past[0].velocity))
+        for weight, past in zip(difference.beta, self.past, strict=False):
+            total += weight * past.velocity
+        return total
 
-    def unknown(self, difference: time.Difference) -> Mask:
+    def missing(self, difference: Difference) -> Mask:
         """Where that asks for a velocity that no step has found."""
-        unknown = np.zeros(len(self.old.valid), dtype=bool)
-        for weight, past in ((difference.beta_0, self.old), (difference.beta_1, self.older)):
+        missing = np.zeros(len(self.past[0].found), dtype=bool)
+        for weight, past in zip(difference.beta, self.past, strict=False):
             if weight:
-                unknown |= ~past.valid
-        return unknown
+                missing |= ~past.found
+        return missing

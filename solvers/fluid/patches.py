@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,32 +11,33 @@ from numpy.typing import NDArray
 from solvers import fem
 from solvers.api import Array
 from solvers.fluid.grid import FACES, DistributedGrid
+from solvers.fluid.patch_kinds import PATCH_KINDS, PatchKind
 from solvers.fluid.space import Unknowns
 from solvers.values import Value, evaluate
-
-Kind = Literal["velocity", "no_slip", "slip", "traction", "pressure", "outflow", "periodic"]
-
-#: Kinds of patches with free normal flow: they determine the level of the pressure.
-OPEN = ("traction", "pressure", "outflow")
 
 
 @dataclass(frozen=True)
 class Patch:
     """Part of the box's boundary with one condition.
 
-    velocity: all components; no_slip: zero; slip: no flow through, no shear; traction [Pa]: sigma n;
+    velocity: all components; no_slip: zero; slip, symmetry: no flow through, no shear; traction [Pa]: sigma n;
     pressure [Pa]: n . sigma n = -p, no velocity along the face; outflow: what a parallel flow does, without energy
-    coming back in; periodic: the flow goes on at the opposite face, which belongs to the patch, too.
+    coming back in; periodic: the flow goes on at the opposite face, which belongs to the patch, too. Or your own kind.
     """
 
     name: str
     faces: tuple[str, ...]
-    kind: Kind
+    kind: str | PatchKind
     value: Sequence[Value] | None = None  #: velocity, traction or pressure
     where: Value | None = None  #: positive on the part of the faces that belongs to it; default: all
 
     def __post_init__(self) -> None:
         assert set(self.faces) <= set(FACES)
+
+    @property
+    def record(self) -> PatchKind:
+        """What its kind is."""
+        return PATCH_KINDS[self.kind] if isinstance(self.kind, str) else self.kind
 
 
 class UncoveredFaces(ValueError):
@@ -50,7 +50,7 @@ class UncoveredFaces(ValueError):
 
 def periodic_axes(patches: Sequence[Patch]) -> tuple[int, ...]:
     """Directions (0, 1, 2) along which the flow repeats."""
-    faces = {face for patch in patches if patch.kind == "periodic" for face in patch.faces}
+    faces = {face for patch in patches if patch.record.periodic for face in patch.faces}
     assert all(face[0] + other in faces for face in faces for other in "-+"), "both ends of a period"
     return tuple(sorted({"xyz".index(face[0]) for face in faces}))
 
@@ -76,7 +76,7 @@ class Boundary:
         self.cells = [self._cells[patch_of == number] for number in range(len(patches))]
         last = np.any([grid.on_face(midpoints, f"{axis}+") for axis in "xyz"[: grid.dim]], axis=0)
         #: of these, those that count as the section of a flow: of a period only its end
-        self.at_end = [last[patch_of == n] | (patch.kind != "periodic") for n, patch in enumerate(patches)]
+        self.at_end = [last[patch_of == n] | (not patch.record.periodic) for n, patch in enumerate(patches)]
         self._imposed = np.full(unknowns.local, -1)
         for number, patch in enumerate(patches):
             for component in self._held(grid, patch, midpoints[patch_of == number]):
@@ -98,23 +98,23 @@ class Boundary:
 
     def _held(self, grid: DistributedGrid, patch: Patch, midpoints: Array):
         """(which facets of the patch, component that they hold)."""
-        if patch.kind in ("velocity", "no_slip"):
+        prescribed = patch.record.prescribed
+        if prescribed == "all":
             return [(np.ones(len(midpoints), dtype=bool), axis) for axis in range(grid.dim)]
         on = [(grid.on_face(midpoints, face), "xyz".index(face[0])) for face in patch.faces]
-        if patch.kind == "slip":
+        if prescribed == "normal":
             return on
-        if patch.kind == "pressure":
+        if prescribed == "tangential":
             return [(face, axis) for face, normal in on for axis in range(grid.dim) if axis != normal]
         return []
 
     def closed(self) -> bool:
         """The velocity is prescribed all round, so that the pressure has no level."""
-        return all(patch.kind not in OPEN for patch in self.patches)
+        return not any(patch.record.open for patch in self.patches)
 
     def open_cells(self) -> NDArray[np.int32]:
         """Local cells at the rest of the boundary."""
-        kinds = [patch.kind for patch in self.patches]
-        cells = [c for c, kind in zip(self.cells, kinds, strict=True) if kind in OPEN]
+        cells = [cells for cells, patch in zip(self.cells, self.patches, strict=True) if patch.record.open]
         return np.concatenate([np.empty(0, dtype=np.int32), *cells]).astype(np.int32)
 
     def velocity(self, t: float) -> Array:
@@ -123,7 +123,7 @@ class Boundary:
         owner = self._imposed[self.dofs]
         node, axis = self._place[self.dofs].T
         for number, patch in enumerate(self.patches):
-            if patch.kind != "velocity":
+            if patch.record.value != "velocity":
                 continue
             assert patch.value is not None
             for component, value in enumerate(patch.value):

@@ -93,7 +93,7 @@ def on_patch(fluid: Fluid, quantity: str, patch: str) -> Probe:
     force, area = (fem.Integral(domain, f * ds) for f in (p, fem.constant(domain, 1.0)))
 
     def pressure(part: CoveredFaces) -> Array:
-        return part.pressure(fluid.grid, fluid.unknowns, fluid.flow)
+        return part.pressure(fluid.flow)
 
     def probe() -> dict[str, float]:
         facets, covered = _facets(fluid, [patch])
@@ -113,7 +113,7 @@ def flow_rate(fluid: Fluid) -> Callable[[Sequence[str]], float]:
     )
 
     def outflow(part: CoveredFaces) -> Array:
-        return part.outward(part.velocity(fluid.grid, fluid.unknowns, fluid.flow))
+        return part.outward(part.velocity(fluid.flow))
 
     def rate(patches: Sequence[str]) -> float:
         facets, covered = _facets(fluid, patches)
@@ -133,7 +133,7 @@ def _facets(fluid: Fluid, patches: Sequence[str]) -> tuple[np.ndarray, list[Cove
     facets, cells = facets[order], cells[order]
     wet = np.zeros(len(grid.numbers), dtype=bool)
     wet[np.concatenate([cut.uncut, cut.cut])] = True
-    free, covered = covered_faces(grid, cut, fluid.unknowns.degree + 1, facets, cells)
+    free, covered = covered_faces(grid, fluid.unknowns, cut, fluid.unknowns.degree + 1, facets, cells)
     return facets[wet[cells] & free], covered
 
 
@@ -144,7 +144,7 @@ def mass_balance(fluid: Fluid) -> Callable[[], dict[str, float]]:
     the volume that passes through their surfaces: an error of the grid.
     """
     rate = flow_rate(fluid)
-    everywhere = [patch.name for patch in fluid.boundary.patches if patch.kind != "periodic"]
+    everywhere = [patch.name for patch in fluid.boundary.patches if not patch.record.periodic]
 
     def balance() -> dict[str, float]:
         cut = fluid.cut

@@ -13,6 +13,7 @@ from solvers import fem
 from solvers.api import Array
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.periodic import LatticeNodes, join_ends
+from solvers.values import Value, evaluate
 
 Dofs = NDArray[np.int32]
 
@@ -96,3 +97,11 @@ class Unknowns:
     def expand(self, blocks: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """A mark per local dof from one per local block."""
         return np.repeat(blocks, self.block_size)
+
+
+def set_velocity(values: Array, nodes: Nodes, components: Sequence[Value], t: float) -> None:
+    """Set components of a vector at the nodes to given values; `values`: local dofs, changed in place."""
+    points = np.zeros((3, len(nodes.points)))
+    points[: nodes.points.shape[1]] = nodes.points.T
+    for axis, component in enumerate(components):
+        values[nodes.dofs[:, axis]] = evaluate(component, points, t)

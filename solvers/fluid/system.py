@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,17 +15,18 @@ from petsc4py import PETSc
 from solvers import fem
 from solvers.api import Array
 from solvers.fluid import forms
-from solvers.fluid.covered_faces import CoveredFaces, covered_faces
+from solvers.fluid.cell_forms import cell_forms
 from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.interface import Interface
 from solvers.fluid.matrix import Pattern, choose_pattern, create_matrix, fits, pattern_of
+from solvers.fluid.outer_faces import OuterFaces
 from solvers.fluid.patches import Boundary
 from solvers.fluid.pieces import Pieces
-from solvers.fluid.space import Unknowns
-from solvers.fluid.time import Difference
+from solvers.fluid.space import Unknowns, set_velocity
+from solvers.fluid.time import SCHEMES, Step, TimeScheme
 from solvers.fluid.weights import Weights
-from solvers.values import Value, evaluate
+from solvers.values import Value
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class FlowSettings:
     viscosity: float  #: [Pa s]
     element: Literal["q1q1", "q2q1"] = "q1q1"
     convection: bool = True  #: False: Stokes
-    scheme: Literal["steady", "backward_euler", "bdf2"] = "bdf2"
+    scheme: Literal["steady", "backward_euler", "bdf2"] | TimeScheme = "bdf2"
     body_force: Sequence[Value] | None = None  #: [N/m^3]
     initial_velocity: Sequence[Value] | None = None  #: [m/s]
     penalties: forms.Penalties = forms.Penalties()
@@ -46,12 +47,16 @@ class FlowSettings:
         return 1 if self.element == "q1q1" else 2
 
     @property
+    def time(self) -> TimeScheme:
+        return SCHEMES[self.scheme] if isinstance(self.scheme, str) else self.scheme
+
+    @property
     def steady(self) -> bool:
-        return self.scheme == "steady"
+        return self.time.steady
 
 
 class FlowSystem:
-    """Assembles the flow at the function `flow` (velocity and pressure) for the cut that `set_cut` took last."""
+    """Assembles the flow at the function `flow` (velocity and pressure) for the step, scales and cut taken last."""
 
     def __init__(
         self,
@@ -67,11 +72,22 @@ class FlowSystem:
         self.grid, self.settings, self.boundary, self.unknowns = grid, settings, boundary, unknowns
         domain, space = grid.domain, unknowns.space
         self.flow, self._history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
-        self._alpha = fem.constant(domain, 0.0)
-        self._newton = fem.constant(domain, 1.0)
+        self._alpha, self._newton = fem.constant(domain, 0.0), fem.constant(domain, 1.0)
         self._phi, self._carried, self._known = (fem.function(fem.cellwise_space(domain)) for _ in range(3))
         self.weights = Weights(grid, settings.degree)
-        self._compile()
+        self.terms = self._terms()
+        scales = forms.GhostScales(self._phi, self._carried, self._known)
+        on_cut = (self.weights, scales) if with_bodies else None
+        self._forms = cell_forms(unknowns, self.terms, self.flow, settings.penalties, on_cut=on_cut)
+        self._outer = OuterFaces(grid, boundary, unknowns, self.terms, self.flow)
+        fem.compile_integrals([*self._forms.integrals(), *self._outer.integrals()], "the flow")
+        #: forms over the cells and outer faces of the cut
+        self._residuals: list = []
+        self._outer_residuals: list = []
+        self._tangents: list = []
+        self.speed = np.zeros(len(grid.numbers))  #: largest one of a cell's scales [m/s]
+        self.fastest = 0.0
+        self.active_dofs = np.zeros(unknowns.local, dtype=bool)
         #: the ghost penalty's share of the residual is a matrix times the flow, less what the history has of it
         self._remembered = np.zeros(unknowns.local)
         self._out = np.zeros(unknowns.local)
@@ -80,20 +96,16 @@ class FlowSystem:
         self._pattern: Pattern | None = None
         self._penalised: NDArray[np.int32] | None = None  #: faces that the ghost penalty is assembled for
         self.cut: Cut | None = None
+        self._interface: Interface | None = None
+        self._current = False  #: weights, interface and ghost penalty are those of cut and scales
 
-    # ------------------------------------------------------------------------------------------------- the forms
-
-    def _compile(self) -> None:
-        settings, unknowns, domain = self.settings, self.unknowns, self.grid.domain
-        (u, p), (a, _), (history, _), (force, _) = (
-            unknowns.parts(f) for f in (self.flow, self._scale_velocity, self._history, self._force)
-        )
-        test, trial = ufl.TestFunction(unknowns.space), ufl.TrialFunction(unknowns.space)
-        v, q = unknowns.parts(test)
+    def _terms(self) -> forms.Flow:
+        settings, domain = self.settings, self.grid.domain
+        a, history, force = (self.unknowns.parts(f)[0] for f in (self._scale_velocity, self._history, self._force))
         rho, mu = fem.constant(domain, settings.density), fem.constant(domain, settings.viscosity)
         if settings.body_force is None:
             force = ufl.as_vector([fem.constant(domain, 0.0)] * self.grid.dim)
-        self.terms = forms.Flow(
+        return forms.Flow(
             rho=rho,
             mu=mu,
             alpha=self._alpha,
@@ -106,69 +118,27 @@ class FlowSystem:
             degree=settings.degree,
             mesh=domain.mesh.ufl_domain(),
         )
-        flow = self.terms
-        everywhere = forms.bulk(flow, u, p, v, q) + forms.residual_based(flow, u, p, v, q)
-        dx = fem.measure(domain, "dx", 2 * settings.degree + 1)
-        dx_cut = fem.measure(domain, "dx", self.weights.degree)
-        cell_forms = [everywhere * dx]
-        if self.with_bodies:
-            on_interface = forms.interface(flow, self.weights, u, p, v, q)
-            cell_forms.append(self.weights.fluid * everywhere * dx_cut + on_interface * dx_cut)
-            dS = fem.measure(domain, "dS", 2 * settings.degree)
-            du, dp = unknowns.parts(trial)
-            scales = forms.GhostScales(self._phi, self._carried, self._known)
-            ghost = forms.ghost_penalty(flow, settings.penalties, scales, du, dp, v, q) * dS
-            self._ghost_penalty, remembered = fem.Integral(domain, ufl.lhs(ghost)), ufl.rhs(ghost)
-            self._ghost_history = None if remembered.empty() else fem.Integral(domain, remembered)
-        self._residuals = [fem.Integral(domain, form) for form in cell_forms]
-        self._tangents = [fem.Integral(domain, ufl.derivative(form, self.flow, trial)) for form in cell_forms]
-        self._compile_outer_faces(v, u, trial)
-        fem.compile_integrals(self._integrals(), "the flow")
-
-    def _integrals(self) -> list[fem.Integral]:
-        found = [*self._residuals, *self._tangents, *(form for *_, form in self._tractions)]
-        found += [self._outflow_form, self._outflow_tangent] if self._outflow else []
-        ghost = [self._ghost_penalty, self._ghost_history] if self.with_bodies else []
-        return found + [form for form in ghost if form is not None]
-
-    def _compile_outer_faces(self, v, u, trial) -> None:
-        domain, ds = self.grid.domain, fem.measure(self.grid.domain, "ds", 2 * self.settings.degree + 1)
-        patches = self.boundary.patches
-        self._tractions = []
-        for number, patch in enumerate(patches):
-            if patch.kind in ("traction", "pressure"):
-                t = fem.function(self.unknowns.space)
-                given = self.unknowns.parts(t)[0]
-                term = forms.traction(given, v) if patch.kind == "traction" else forms.pressure(self.terms, given[0], v)
-                self._tractions.append((number, t, fem.Integral(domain, term * ds)))
-        #: (which traction, faces that bodies cover in part)
-        self._covered: list[tuple[int, CoveredFaces]] = []
-        self._covered_outflow: list[CoveredFaces] = []
-        self._outflow = [number for number, patch in enumerate(patches) if patch.kind == "outflow"]
-        if self._outflow:
-            form = forms.outflow(self.terms, u, v) * ds
-            self._outflow_form = fem.Integral(domain, form)
-            self._outflow_tangent = fem.Integral(domain, ufl.derivative(form, self.flow, trial))
 
     # ------------------------------------------------------------------------------------------------- a new step
 
-    def set_time(self, t: float, difference: Difference, history: Array, unknown: NDArray[np.bool_]) -> None:
-        """Loads at time t; u_t = alpha u - history [m/s^2], local dofs, `unknown` where no step has found them."""
-        self._alpha.value = difference.alpha
-        self._history.x.array[:] = history
-        self._known.x.array[:] = ~unknown[self.unknowns.cell_velocity].any(axis=(1, 2))
-        nodes = self.unknowns.velocity
+    def begin_step(self, step: Step, rate: Array, missing: NDArray[np.bool_], velocity: Array) -> None:
+        """Loads at the end of a step; all arrays at local dofs (collective).
+
+        u_t = alpha u - rate [m/s^2]; missing: where no step has found what the rate asks for; velocity [m/s]: for the
+        scales.
+        """
+        self._alpha.value = step.difference.alpha
+        self._history.x.array[:] = rate
+        self._known.x.array[:] = ~missing[self.unknowns.cell_velocity].any(axis=(1, 2))
         if self.settings.body_force is not None:
-            _set_velocity(self._force, nodes, self.settings.body_force, t)
-        for number, function, _ in self._tractions:
-            value = self.boundary.patches[number].value
-            assert value is not None
-            _set_velocity(function, nodes, value, t)
+            set_velocity(self._force.x.array, self.unknowns.velocity, self.settings.body_force, step.t)
+        self._outer.begin_step(step.t)
+        self.set_scales(velocity)
 
     def set_scales(self, velocity: Array) -> None:
         """Take local velocity dofs [m/s] that scale stabilisation and penalties from now on (collective)."""
         settings, unknowns = self.settings, self.unknowns
-        self._scale_velocity.x.array[:], self._penalised = velocity, None
+        self._scale_velocity.x.array[:], self._penalised, self._current = velocity, None, False
         h = self.grid.sizes.min(axis=1)
         speed = np.linalg.norm(velocity[unknowns.velocity.dofs], axis=1)
         by_dof = np.zeros(unknowns.local)
@@ -184,16 +154,18 @@ class FlowSystem:
         """Take a cut; cells, faces and the matrix follow."""
         if cut is self.cut:
             return
-        self.cut, grid = cut, self.grid
+        self.cut, self._current, grid = cut, False, self.grid
         active = np.zeros(len(grid.numbers), dtype=bool)
         active[cut.active] = True
         self.active_dofs = self.dofs_of(cut.active)
         cells = [some[some < grid.owned] for some in (cut.uncut, cut.cut)]
-        self._residual_forms, self._tangent_forms = (
+        self._residuals, self._tangents = (
             [form.on(cell=some) for form, some in zip(integrals, cells, strict=False)]
-            for integrals in (self._residuals, self._tangents)
+            for integrals in (self._forms.residuals, self._forms.tangents)
         )
-        self._add_outer_faces(active)
+        self._outer.set_cut(cut, active)
+        self._outer_residuals = self._outer.residuals()
+        self._tangents += self._outer.tangents()
         if not fits(self.unknowns, self._pattern, cut):
             self._allocate(choose_pattern(self.unknowns, cut))
 
@@ -224,10 +196,10 @@ class FlowSystem:
         """A matrix that has all entries of a pattern, with values that do not matter."""
         matrix = create_matrix(self.unknowns, pattern, blocked=self._blocked)
         cells = np.flatnonzero(pattern.cells[: self.grid.owned]).astype(np.int32)
-        fem.assemble_matrix(matrix, self._tangents[0].on(cell=cells))
-        if self.with_bodies:
+        fem.assemble_matrix(matrix, self._forms.tangents[0].on(cell=cells))
+        if self._forms.ghost_penalty is not None:
             faces = self.grid.interior_faces[0][pattern.faces]
-            fem.assemble_matrix(matrix, self._ghost_penalty.on(interior_facet=faces))
+            fem.assemble_matrix(matrix, self._forms.ghost_penalty.on(interior_facet=faces))
         diagonal = matrix.createVecLeft()
         diagonal.set(1.0)
         matrix.setDiagonal(diagonal, addv=PETSc.InsertMode.ADD_VALUES)
@@ -235,73 +207,38 @@ class FlowSystem:
         matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
         return matrix
 
-    def _add_outer_faces(self, active) -> None:
-        boundary = self.boundary
-        self._covered = []
-        for index, (number, _, form) in enumerate(self._tractions):
-            cells = boundary.cells[number]
-            free, covered = self._covered_faces(boundary.facets[number], cells, active)
-            self._covered += [(index, part) for part in covered]
-            self._residual_forms.append(form.on(exterior_facet=np.sort(boundary.facets[number][active[cells] & free])))
-        if self._outflow:
-            facets, cells = (
-                np.concatenate([parts[n] for n in self._outflow]) for parts in (boundary.facets, boundary.cells)
-            )
-            free, self._covered_outflow = self._covered_faces(facets, cells, active)
-            faces = np.sort(facets[active[cells] & free])
-            self._residual_forms.append(self._outflow_form.on(exterior_facet=faces))
-            self._tangent_forms.append(self._outflow_tangent.on(exterior_facet=faces))
+    @property
+    def interface(self) -> Interface:
+        """Terms of the surfaces on the present cut (collective)."""
+        self._follow()
+        assert self._interface is not None
+        return self._interface
 
-    def _covered_faces(self, facets, cells, active) -> tuple[NDArray[np.bool_], list[CoveredFaces]]:
-        assert self.cut is not None
-        free, covered = covered_faces(self.grid, self.cut, 2 * self.unknowns.degree + 1, facets, cells)
-        with_fluid = [part.only(active) for part in covered]
-        return free, [part for part in with_fluid if len(part.cells)]
-
-    def _add_covered(self, out: Array) -> None:
-        """-<t, v>, <p, n . v> and the terms of outflow over the wet part of faces that bodies cover."""
-        for index, part in self._covered:
-            number, given, _ = self._tractions[index]
-            traction = part.velocity(self.grid, self.unknowns, given.x.array)
-            if self.boundary.patches[number].kind == "pressure":
-                pressure = traction[:, :, 0].copy()
-                traction[:] = 0.0
-                traction[:, :, part.axis] = -pressure if part.side else pressure
-            dofs, load = part.load(self.grid, self.unknowns, traction)
-            np.subtract.at(out, dofs, load)
-        for dofs, block in self._outflow_blocks():
-            np.add.at(out, dofs, np.einsum("caibk,cbk->cai", block, self.flow.x.array[dofs]))
-
-    def _outflow_blocks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
-        """(local dofs, derivatives) of the terms of outflow on faces that bodies cover in part."""
-        settings, unknowns = self.settings, self.unknowns
-        for part in self._covered_outflow:
-            density = settings.density if settings.convection else 0.0
-            carried = density * part.velocity(self.grid, unknowns, self._scale_velocity.x.array)
-            yield unknowns.cell_velocity[part.cells], part.outflow(self.grid, unknowns, settings.viscosity, carried)
-
-    def set_penalties(self) -> None:
-        """Weights of the interface and the ghost penalty, after the cut or the scales changed."""
+    def _follow(self) -> None:
+        """Weights and ghost penalty as cut and scales ask for."""
+        if self._current:
+            return
         assert self.cut is not None
         assert self._ghost is not None
-        pieces, cut = self.cut.pieces, self.cut
+        cut = self.cut
         if self.with_bodies:
-            penalty = self._interface_penalties(pieces, cut)
+            penalty = self._interface_penalties(cut.pieces, cut)
             self.weights.set(cut, penalty)
-            self.interface = Interface(self.grid, self.unknowns, self.weights, cut, self.settings.viscosity, penalty)
+            self._interface = Interface(self.grid, self.unknowns, self.weights, cut, self.settings.viscosity, penalty)
         if not self._same_faces(cut):
             self._penalised = cut.ghost_faces
             self._ghost.zeroEntries()
             if self.with_bodies:
                 self._assemble_ghost_penalty(cut.ghost_faces)
             self._ghost.assemble()
-            self._in, self._through = self._ghost.createVecs()
+        self._current = True
 
     def _assemble_ghost_penalty(self, faces: NDArray[np.int32]) -> None:
-        fem.assemble_matrix(self._ghost, self._ghost_penalty.on(interior_facet=faces))
-        if self._ghost_history is not None:
+        assert self._forms.ghost_penalty is not None
+        fem.assemble_matrix(self._ghost, self._forms.ghost_penalty.on(interior_facet=faces))
+        if self._forms.ghost_history is not None:
             self._remembered[:] = 0.0
-            fem.assemble_vector(self._ghost_history.on(interior_facet=faces), self._remembered)
+            fem.assemble_vector(self._forms.ghost_history.on(interior_facet=faces), self._remembered)
 
     def _same_faces(self, cut: Cut) -> bool:
         """The ghost penalty is assembled for these faces already, on every process (collective)."""
@@ -341,33 +278,36 @@ class FlowSystem:
 
     def residual(self) -> Array:
         """Left-hand side of the equations at owned dofs: forces [N] of velocity rows, volume rates of pressure rows."""
+        self._follow()
         assert self._ghost is not None
         assert self.cut is not None
         np.negative(self._remembered, out=self._out)
-        for form in self._residual_forms:
+        for form in [*self._residuals, *self._outer_residuals]:
             fem.assemble_vector(form, self._out)
         if self.with_bodies:
             self._out += self.interface.velocity_terms(self.cut.motion.v)
         self._add_covered(self._out)
         fem.add_ghosts(self.unknowns.space, self._out)
         owned = self.unknowns.owned
-        self._in.array[:] = self.flow.x.array[:owned]
-        self._ghost.mult(self._in, self._through)
-        return self._out[:owned] + self._through.array
+        flow, through = self._ghost.createVecs()
+        flow.array[:] = self.flow.x.array[:owned]
+        self._ghost.mult(flow, through)
+        return self._out[:owned] + through.array
 
     def tangent(self, identity: Array, *, picard: bool) -> PETSc.Mat:
         """d(residual)/d(flow), with rows of the identity at the marked owned dofs; the next call overwrites it.
 
         Picard: the velocity that carries momentum is taken as known; right if it is that of `set_scales`.
         """
+        self._follow()
         assert self._matrix is not None
         assert self._ghost is not None
         self._newton.value = 0.0 if picard else 1.0
         matrix = self._matrix
         self._ghost.copy(matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        for form in self._tangent_forms:
+        for form in self._tangents:
             fem.assemble_matrix(matrix, form)
-        for dofs, blocks in self._outflow_blocks():
+        for dofs, blocks in self._outer.slopes(*self._outer_scales()):
             for at, block in zip(dofs.reshape(len(dofs), -1).astype(PETSc.IntType), blocks, strict=True):
                 matrix.setValuesLocal(at, at, block.reshape(len(at), -1), PETSc.InsertMode.ADD_VALUES)
         self._newton.value = 1.0
@@ -386,14 +326,14 @@ class FlowSystem:
     def outer_rows(self) -> Array:
         """Rows of tractions and outflow alone at local dofs, the ghosts' share still there."""
         out = np.zeros(self.unknowns.local)
-        for form in self._residual_forms[len(self._residuals) :]:
+        for form in self._outer_residuals:
             fem.assemble_vector(form, out)
         self._add_covered(out)
         return out
 
+    def _add_covered(self, out: Array) -> None:
+        self._outer.add_covered(out, self.flow.x.array, *self._outer_scales())
 
-def _set_velocity(function, nodes, value: Sequence[Value], t: float) -> None:
-    points = np.zeros((3, len(nodes.points)))
-    points[: nodes.points.shape[1]] = nodes.points.T
-    for axis, component in enumerate(value):
-        function.x.array[nodes.dofs[:, axis]] = evaluate(component, points, t)
+    def _outer_scales(self) -> tuple[float, float, Array]:
+        settings = self.settings
+        return settings.viscosity, settings.density if settings.convection else 0.0, self._scale_velocity.x.array

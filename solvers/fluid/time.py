@@ -1,25 +1,46 @@
-"""Backward differentiation formulas for the time derivative of the velocity."""
+"""Backward differentiation formulas for the time derivative of the velocity.
+
+A scheme says from the lengths of the steps how much of which velocity counts. Another one is another `TimeScheme`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+
+from solvers import step
 
 
 @dataclass(frozen=True)
 class Difference:
-    """u_t at t_{n+1} = alpha u_{n+1} - (beta_0 u_n + beta_1 u_{n-1}); all in 1/s."""
+    """u_t at t_{n+1} = alpha u_{n+1} - sum_k beta[k] u_{n-k}; all in 1/s."""
 
     alpha: float
-    beta_0: float
-    beta_1: float
+    beta: tuple[float, ...] = ()
 
 
-STEADY = Difference(0.0, 0.0, 0.0)
+@dataclass(frozen=True)
+class Step(step.Step):
+    """A step of the flow, with its rule for derivatives in time."""
+
+    difference: Difference
+
+
+@dataclass(frozen=True)
+class TimeScheme:
+    """difference(dt, before): the rule of a step of length dt [s], from the lengths of those before, the last first."""
+
+    difference: Callable[[float, Sequence[float]], Difference]
+    times: int  #: largest number of velocities u_n, u_{n-1}, ... in a rule, and of lengths that it asks for
+    steady: bool = False  #: each step is a flow at rest of its own
+
+
+STEADY = Difference(0.0)
 
 
 def backward_euler(dt: float) -> Difference:
     """(u_{n+1} - u_n) / dt."""
-    return Difference(1.0 / dt, 1.0 / dt, 0.0)
+    return Difference(1.0 / dt, (1.0 / dt,))
 
 
 def bdf2(dt: float, dt_before: float) -> Difference:
@@ -29,4 +50,20 @@ def bdf2(dt: float, dt_before: float) -> Difference:
     Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, III.5.
     """
     r = dt / dt_before
-    return Difference((1.0 + 2.0 * r) / (1.0 + r) / dt, (1.0 + r) / dt, -(r**2) / (1.0 + r) / dt)
+    return Difference((1.0 + 2.0 * r) / (1.0 + r) / dt, ((1.0 + r) / dt, -(r**2) / (1.0 + r) / dt))
+
+
+def _bdf2_started(dt: float, before: Sequence[float]) -> Difference:
+    """The first two steps are backward Euler.
+
+    Both keep the order, and after only one BDF2 would take back half of what a flow that starts at once gained in it.
+    """
+    return backward_euler(dt) if len(before) < 2 else bdf2(dt, before[0])
+
+
+#: By their names in `FlowSettings`.
+SCHEMES: Mapping[str, TimeScheme] = {
+    "steady": TimeScheme(lambda dt, before: STEADY, times=0, steady=True),
+    "backward_euler": TimeScheme(lambda dt, before: backward_euler(dt), times=1),
+    "bdf2": TimeScheme(_bdf2_started, times=2),
+}

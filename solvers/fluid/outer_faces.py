@@ -1,0 +1,131 @@
+"""What the patches of the box add to the equations of the flow: stresses that act on it from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import ufl
+from numpy.typing import NDArray
+
+from solvers import fem
+from solvers.api import Array
+from solvers.fluid import forms
+from solvers.fluid.covered_faces import CoveredFaces, covered_faces
+from solvers.fluid.cut import Cut
+from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.patch_kinds import PatchKind
+from solvers.fluid.patches import Boundary, Patch
+from solvers.fluid.space import Unknowns, set_velocity
+
+
+@dataclass(frozen=True)
+class Term:
+    """The form of patches of one kind: of one patch with its value, or of all that are given none."""
+
+    kind: PatchKind
+    patches: tuple[int, ...]
+    value: Any  #: function on the flow's space, its velocity is the given value; None without one
+    residual: fem.Integral
+    tangent: fem.Integral | None  #: of forms with u
+
+
+@dataclass(frozen=True)
+class OnCut:
+    """The outer faces as bodies leave them."""
+
+    free: tuple[NDArray[np.int32], ...]  #: by term: local faces with fluid that no body covers
+    covered: tuple[tuple[int, CoveredFaces], ...]  #: (which term, faces that bodies cover in part)
+
+
+class OuterFaces:
+    """All terms of the patches on one grid."""
+
+    def __init__(self, grid: DistributedGrid, boundary: Boundary, unknowns: Unknowns, flow: forms.Flow, function: Any):
+        """flow: what the forms share; function: velocity and pressure."""
+        self.grid, self.boundary, self.unknowns = grid, boundary, unknowns
+        ds, test = fem.measure(grid.domain, "ds", 2 * unknowns.degree + 1), ufl.TestFunction(unknowns.space)
+        u, v, n = unknowns.parts(function)[0], unknowns.parts(test)[0], ufl.FacetNormal(flow.mesh)
+
+        def term(kind: PatchKind, patches: tuple[int, ...], given: Any) -> Term:
+            value: Any = None if given is None else unknowns.parts(given)[0]
+            assert kind.form is not None
+            form = kind.form(flow, u, value[0] if kind.value == "number" else value, n, v) * ds
+            slope = ufl.derivative(form, function, ufl.TrialFunction(unknowns.space)) if kind.depends_on_flow else None
+            tangent = None if slope is None else fem.Integral(grid.domain, slope)
+            return Term(kind, patches, given, fem.Integral(grid.domain, form), tangent)
+
+        with_form = [(n, patch) for n, patch in enumerate(boundary.patches) if patch.record.form is not None]
+        self.terms = [
+            term(patch.record, (n,), fem.function(unknowns.space)) for n, patch in with_form if patch.record.value
+        ]
+        for kind in dict.fromkeys(patch.record for _, patch in with_form if not patch.record.value):
+            self.terms.append(term(kind, tuple(n for n, patch in with_form if patch.record == kind), None))
+        self._on_cut = OnCut((), ())
+
+    def integrals(self) -> list[fem.Integral]:
+        """What is to be compiled."""
+        return [form for term in self.terms for form in (term.residual, term.tangent) if form is not None]
+
+    def begin_step(self, t: float) -> None:
+        """The given values at a time."""
+        nodes = self.unknowns.velocity
+        for term in self.terms:
+            if term.value is not None:
+                value = self.boundary.patches[term.patches[0]].value
+                assert value is not None
+                set_velocity(term.value.x.array, nodes, value, t)
+
+    def set_cut(self, cut: Cut, active: NDArray[np.bool_]) -> None:
+        """Take a cut; active: which local cells have unknowns."""
+        free, covered, points = [], [], 2 * self.unknowns.degree + 1
+        by_patch = self.boundary.facets, self.boundary.cells
+        for index, term in enumerate(self.terms):
+            facets, cells = (np.concatenate([parts[n] for n in term.patches]) for parts in by_patch)
+            uncovered, parts = covered_faces(self.grid, self.unknowns, cut, points, facets, cells)
+            free.append(np.sort(facets[active[cells] & uncovered]))
+            with_fluid = [part.only(active) for part in parts]
+            covered += [(index, part) for part in with_fluid if len(part.cells)]
+        for term in (self.terms[index] for index, _ in covered):
+            if (term.kind.slope if term.kind.depends_on_flow else term.kind.stress) is None:
+                raise CannotBeCovered([self.boundary.patches[n] for n in term.patches])
+        self._on_cut = OnCut(tuple(free), tuple(covered))
+
+    def residuals(self) -> list:
+        """Forms over faces that no body covers."""
+        parts = zip(self.terms, self._on_cut.free, strict=True)
+        return [term.residual.on(exterior_facet=faces) for term, faces in parts]
+
+    def tangents(self) -> list:
+        """Their derivatives by the flow."""
+        parts = zip(self.terms, self._on_cut.free, strict=True)
+        return [term.tangent.on(exterior_facet=faces) for term, faces in parts if term.tangent is not None]
+
+    def add_covered(self, out: Array, flow: Array, mu: float, rho: float, a: Array) -> None:
+        """Add the same over the wet part of the others to local dofs; for rho, a see `slopes`."""
+        for index, part in self._on_cut.covered:
+            term = self.terms[index]
+            if term.kind.stress is not None and term.value is not None:
+                dofs, load = part.load(term.kind.stress(part, part.velocity(term.value.x.array)))
+                np.subtract.at(out, dofs, load)
+        for dofs, block in self.slopes(mu, rho, a):
+            np.add.at(out, dofs, np.einsum("caibk,cbk->cai", block, flow[dofs]))
+
+    def slopes(self, mu: float, rho: float, a: Array) -> Iterator[tuple[NDArray[np.int32], Array]]:
+        """(local dofs, derivatives) of terms with u there.
+
+        mu [Pa s]; rho [kg/m^3], zero without convection; a [m/s]: velocity of the step before, at local dofs.
+        """
+        for index, part in self._on_cut.covered:
+            slope = self.terms[index].kind.slope
+            if slope is not None:
+                yield self.unknowns.cell_velocity[part.cells], slope(part, mu, rho * part.velocity(a))
+
+
+class CannotBeCovered(ValueError):
+    """A body covers part of a patch whose kind does not say what is to be done there."""
+
+    def __init__(self, patches: list[Patch]):
+        super().__init__("a body covers part of " + ", ".join(f"patch '{patch.name}'" for patch in patches))

@@ -1,0 +1,86 @@
+"""Kinds of conditions on the faces of the box. All that a kind is, its record says; yours may be another one.
+
+A kind prescribes components of the velocity, or the stress t = sigma n [Pa] that acts on the fluid from outside. The
+equations then have -<t, v> with the test functions v of the velocity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from solvers.api import Array
+
+if TYPE_CHECKING:
+    from solvers.fluid.covered_faces import CoveredFaces
+    from solvers.fluid.forms import Flow
+
+Expr = Any
+
+
+@dataclass(frozen=True)
+class PatchKind:
+    """One condition. n: outward normal."""
+
+    prescribed: Literal["all", "normal", "tangential", "none"] = "none"  #: components of the velocity
+    value: Literal["velocity", "vector", "number"] | None = None  #: what a patch of this kind is given
+    open: bool = False  #: the flow through it is free: it determines the level of the pressure
+    periodic: bool = False
+    #: (flow, u, value, n, v) -> integrand of -<t, v>; a number comes as such
+    form: Callable[[Flow, Expr, Expr, Expr, Expr], Expr] | None = None
+    depends_on_flow: bool = False  #: the form has u, and is linear in it
+    #: Where bodies cover part of a cell's face the same is integrated over points of the wet part, with numbers:
+    #: (faces, values at the points) -> t [Pa], shape (cells, points, dim); not for forms with u
+    stress: Callable[[CoveredFaces, Array], Array] | None = None
+    #: (faces, mu, rho a) -> d<-t, v>/du; a: velocity of the step before; for forms with u
+    slope: Callable[[CoveredFaces, float, Array], Array] | None = None
+
+
+def _traction(flow: Flow, u: Expr, t: Expr, n: Expr, v: Expr) -> Expr:
+    """-<t, v> with the given traction [Pa]."""
+    return -_dot(t, v)
+
+
+def _pressure(flow: Flow, u: Expr, p: Expr, n: Expr, v: Expr) -> Expr:
+    """<p, n . v> with the given pressure [Pa]: n . sigma n = -p."""
+    return p * _dot(n, v)
+
+
+def _outflow(flow: Flow, u: Expr, value: Expr, n: Expr, v: Expr) -> Expr:
+    """What a parallel flow leaves unharmed, mu d_n u - p n = 0, and no energy comes back.
+
+    -<mu (grad u)^T n, v> - rho/2 <min(0, u . n) u, v>. Source: Braack, Mucha, J. Comput. Math. 32 (2014) 507-521.
+    """
+    import ufl
+
+    terms = -flow.mu * _dot(_dot(n, ufl.grad(u)), v)
+    if flow.convection:
+        back = 0.5 * (_dot(flow.a, n) - abs(_dot(flow.a, n)))
+        terms -= 0.5 * flow.rho * back * _dot(u, v)
+    return terms
+
+
+def _dot(a: Expr, b: Expr) -> Expr:
+    import ufl  # here: the case file asks for the names of the kinds, and shall not wait for it
+
+    return ufl.dot(a, b)
+
+
+#: By their names in `Patch` and in the case file.
+PATCH_KINDS: Mapping[str, PatchKind] = {
+    "velocity": PatchKind("all", value="velocity"),
+    "no_slip": PatchKind("all"),
+    "slip": PatchKind("normal"),
+    "symmetry": PatchKind("normal"),
+    "traction": PatchKind(value="vector", open=True, form=_traction, stress=lambda faces, t: t),
+    "pressure": PatchKind(
+        "tangential", value="number", open=True, form=_pressure,
+        stress=lambda faces, p: -faces.along_normal(p[:, :, 0]),
+    ),
+    "outflow": PatchKind(
+        open=True, form=_outflow, depends_on_flow=True,
+        slope=lambda faces, mu, carried: faces.outflow(mu, carried),
+    ),
+    "periodic": PatchKind(periodic=True),
+}  # fmt: skip

@@ -1,0 +1,49 @@
+"""How far bodies may move: not beyond the flow behind them that is known, and not beyond the period."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from solvers.api import StepFailed
+from solvers.fluid.cut import NOTHING, Cut
+from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.space import Unknowns
+from solvers.fluid.surface import Motion
+
+
+def strip_layers(grid: DistributedGrid, motion: Motion, time: float, smallest: float) -> int:
+    """Cells behind the surfaces that they may uncover within some time [s]; smallest: edge of a cell [m]."""
+    fastest = float(np.linalg.norm(motion.v, axis=1).max(initial=0.0))
+    layers = 1.25 * time * fastest / smallest
+    return math.ceil(min(max(1.0, layers), max(grid.grid.shape)))  # no more than there are
+
+
+def require_known(unknowns: Unknowns, cut: Cut, missing: NDArray[np.bool_]) -> None:
+    """Raise StepFailed where the flow needs a velocity at a time behind that no step has found (collective).
+
+    missing: local dofs without one.
+    """
+    velocity = np.zeros(unknowns.local, dtype=bool)
+    velocity[unknowns.velocity.dofs] = True
+    blocks = np.zeros(unknowns.local // unknowns.block_size, dtype=bool)
+    blocks[unknowns.cell_blocks[np.concatenate([cut.uncut, cut.cut])]] = True
+    used = unknowns.expand(blocks) & velocity
+    if unknowns.grid.comm.allreduce(bool((used & missing).any()), op=MPI.LOR):
+        reason = "a body moved farther in one step than the flow behind it is known: take a smaller time step"
+        raise StepFailed("fluid", reason)
+
+
+def require_within_period(unknowns: Unknowns, cut: Cut) -> None:
+    """Raise StepFailed where bodies reach its end: their surfaces know nothing of the cells beyond (collective)."""
+    grid = unknowns.grid
+    changed = cut.fraction < 1.0 - NOTHING
+    changed[np.concatenate([cut.cut, cut.strip])] = True
+    places = np.unravel_index(grid.numbers[changed], grid.grid.shape, order="F")
+    for axis in unknowns.periodic:
+        at_end = np.isin(places[axis], [0, grid.grid.shape[axis] - 1]).any()
+        if grid.comm.allreduce(bool(at_end), op=MPI.LOR):
+            raise StepFailed("fluid", f"a body reaches the periodic faces {'xyz'[axis]}- and {'xyz'[axis]}+")

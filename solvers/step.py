@@ -1,0 +1,13 @@
+"""A step of time, as fields hand it on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Step:
+    """From t - dt to t."""
+
+    t: float  #: its end [s]
+    dt: float  #: its length [s]
