@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
 
 from petsc4py import PETSc
 
@@ -36,18 +38,31 @@ def choose(method: Method, dim: int, dofs: int) -> Literal["direct", "iterative"
     return method
 
 
+#: (communicator, task) -> solver
+Maker: TypeAlias = Callable[[Any, "Task"], PETSc.KSP]
+
 #: Unknowns of a plane problem below which PETSc's own factorisation is as fast as MUMPS or up to 6 times faster, on one
 #: process. Nested dissection: by bandwidth a slender body is 1.5 times faster, but a square one 5 times slower.
 SMALL_PLANE = 4_000
 
 
-def direct_solver(comm, *, dim: int, dofs: int, symmetric: bool) -> PETSc.KSP:
+@dataclass(frozen=True)
+class Task:
+    """What a solver is for."""
+
+    dim: int
+    dofs: int  #: unknowns on all processes
+    symmetric: bool
+    tolerance: float  #: |b - A x| < tolerance |b|, of Krylov methods
+
+
+def direct_solver(comm, task: Task) -> PETSc.KSP:
     """LDL^T of a symmetric matrix, LU otherwise: by PETSc for small plane problems on one process, by MUMPS above."""
     ksp = PETSc.KSP().create(comm)
     ksp.setType(PETSc.KSP.Type.PREONLY)
     preconditioner = ksp.getPC()
-    preconditioner.setType(PETSc.PC.Type.CHOLESKY if symmetric else PETSc.PC.Type.LU)
-    if dim == 2 and dofs < SMALL_PLANE and comm.size == 1:
+    preconditioner.setType(PETSc.PC.Type.CHOLESKY if task.symmetric else PETSc.PC.Type.LU)
+    if task.dim == 2 and task.dofs < SMALL_PLANE and comm.size == 1:
         preconditioner.setFactorOrdering("nd")
     else:
         preconditioner.setFactorSolverType("mumps")
@@ -65,7 +80,7 @@ MULTIGRID = {
 }
 
 
-def elastic_solver(comm, *, tolerance: float) -> PETSc.KSP:
+def elastic_solver(comm, task: Task) -> PETSc.KSP:
     """GMRES with algebraic multigrid until |b - A x| < tolerance |b|; the matrix carries the rigid-body modes.
 
     Not CG: an iterate of Newton's method that went too far may have an indefinite tangent.
@@ -75,7 +90,7 @@ def elastic_solver(comm, *, tolerance: float) -> PETSc.KSP:
     ksp.setType(PETSc.KSP.Type.GMRES)
     ksp.setPCSide(PETSc.PC.Side.RIGHT)
     ksp.setGMRESRestart(100)
-    ksp.setTolerances(rtol=tolerance, max_it=500)
+    ksp.setTolerances(rtol=task.tolerance, max_it=500)
     return ksp
 
 
@@ -133,13 +148,17 @@ def flexible_solver(comm, *, tolerance: float) -> PETSc.KSP:
     return ksp
 
 
-def incomplete_solver(comm, *, tolerance: float) -> PETSc.KSP:
+def incomplete_solver(comm, task: Task) -> PETSc.KSP:
     """GMRES with overlapping subdomains and incomplete factors for solids: cheap, but stalls where multigrid does not.
 
     Measured with contact: 4 times faster than LU for bodies in motion and for compact ones (16 and 90 iterations), not
     faster for thin bodies at rest. Numbered along the band, it takes 2/3 of the iterations of the mesh's numbering.
     """
-    return _schwarz_solver(comm, "incomplete_", tolerance, sub_pc_factor_mat_ordering_type="rcm")
+    return _schwarz_solver(comm, "incomplete_", task.tolerance, sub_pc_factor_mat_ordering_type="rcm")
+
+
+#: Solvers for solids, by the names of methods; a field takes a function like these, too.
+SOLVERS: Mapping[str, Maker] = {"direct": direct_solver, "iterative": elastic_solver, "ilu": incomplete_solver}
 
 
 def _schwarz_solver(comm, prefix: str, tolerance: float, **more: str | int) -> PETSc.KSP:

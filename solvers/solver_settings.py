@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from solvers.linear import Method
+from solvers.linear import Maker, Method
 from solvers.newton import Tolerance
 
 
@@ -13,5 +13,5 @@ class SolverSettings:
     """How the nonlinear and the linear systems are solved."""
 
     newton: Tolerance = Tolerance()
-    linear: Method = "auto"
+    linear: Method | Maker = "auto"  #: a function makes a solver for solids
     linear_tolerance: float = 1e-8

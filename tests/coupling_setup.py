@@ -14,10 +14,11 @@ from solvers.fluid.system import FlowSettings
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body, Support, Symmetry
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.elastic_constants import lame
 from solvers.structure.field import Structure
 from solvers.structure.materials import StVenantKirchhoff
-from solvers.structure.time import Dynamics, TimeScheme
+from solvers.structure.time import TimeScheme
 from solvers.time import GeneralisedAlpha
 
 TIGHT = Tolerance(1e-10)

@@ -14,7 +14,7 @@ import solvers.contact.search
 from fsci import shapes
 from solvers.contact.surface import Surface
 from solvers.structure.body import Support
-from solvers.structure.time import Dynamics
+from solvers.structure.dynamics import Dynamics
 from solvers.time import GeneralisedAlpha
 
 ZERO = constant(0)

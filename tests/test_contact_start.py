@@ -15,9 +15,9 @@ from solvers.contact.surface import Surface
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
+from solvers.structure.dynamics import Damping, Dynamics
 from solvers.structure.loads import Pressure, Traction
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
-from solvers.structure.time import Damping, Dynamics
 from solvers.time import GeneralisedAlpha
 
 TIGHT = SolverSettings(Tolerance(residual=1e-12, residual_absolute=1e-13), linear="direct")

@@ -7,7 +7,8 @@ from contact_setup import brick, make_body, make_contact
 
 from solvers.contact.surface import Surface
 from solvers.structure.body import Support
-from solvers.structure.time import Dynamics, Statics
+from solvers.structure.dynamics import Dynamics
+from solvers.structure.time import Statics
 from solvers.time import GeneralisedAlpha
 
 OVERLAP = 0.03

@@ -13,9 +13,9 @@ from solvers.fluid.grid import uniform
 from solvers.fluid.patches import Patch
 from solvers.fluid.system import FlowSettings
 from solvers.structure.body import Body, Symmetry
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.elastic_constants import lame
 from solvers.structure.materials import StVenantKirchhoff
-from solvers.structure.time import Dynamics
 from solvers.time import GeneralisedAlpha
 from tests.coupling_setup import TIGHT, couple_one
 

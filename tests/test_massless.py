@@ -13,9 +13,9 @@ from fsci import shapes
 from solvers.blocks import Layout
 from solvers.contact.surface import Surface
 from solvers.structure.body import Support
+from solvers.structure.dynamics import Damping, Dynamics
 from solvers.structure.massless import NoMassLeft, massless_dofs, move_mass_inwards
 from solvers.structure.materials import StVenantKirchhoff
-from solvers.structure.time import Damping, Dynamics
 from solvers.time import GeneralisedAlpha
 
 TRAPEZOIDAL = GeneralisedAlpha.from_rho_inf(1.0)

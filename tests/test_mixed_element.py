@@ -15,9 +15,9 @@ from solvers.api import StepFailed
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Pressure, Support, Traction
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.elastic_constants import lame
 from solvers.structure.materials import LinearElastic, NeoHooke
-from solvers.structure.time import Dynamics
 from solvers.time import GeneralisedAlpha
 
 LAWS = {name: law for name, law in MATERIALS.items() if name != "varying"} | {"linear": LinearElastic(3.0, 5.0, 2.0)}

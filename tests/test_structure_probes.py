@@ -10,9 +10,9 @@ from fsci import shapes
 from solvers.api import StepFailed
 from solvers.structure import probes
 from solvers.structure.body import Pressure, Support, Symmetry, Traction
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
 from solvers.structure.supports import SupportError
-from solvers.structure.time import Dynamics
 from solvers.time import GeneralisedAlpha
 
 MATERIAL = NeoHooke(30.0, 50.0, 2.0)

@@ -7,8 +7,8 @@ from test_structure_supports import MATERIAL, rotation, turned
 
 from solvers.structure import probes
 from solvers.structure.body import Spring, Symmetry, Traction
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
-from solvers.structure.time import Dynamics
 from solvers.time import GeneralisedAlpha
 
 

@@ -9,8 +9,8 @@ from structure_setup import TIGHT, block, constant, distort, load_step, make_str
 
 from fsci import shapes
 from solvers.structure.body import Pressure, Roller, Support, Symmetry, Traction
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.materials import NeoHooke
-from solvers.structure.time import Dynamics
 from solvers.time import GeneralisedAlpha
 
 MATERIAL = NeoHooke(80.0, 120.0, 2.0)

@@ -5,6 +5,7 @@ import pytest
 from structure_setup import block, constant, distort, make_structure, vector
 
 from solvers.structure.body import Pressure, Support
+from solvers.structure.dynamics import Damping, Dynamics
 from solvers.structure.elastic_constants import lame, plane_stress_lambda
 from solvers.structure.materials import (
     CoupNeoHooke,
@@ -13,7 +14,6 @@ from solvers.structure.materials import (
     PlaneStressStVenantKirchhoff,
     StVenantKirchhoff,
 )
-from solvers.structure.time import Damping, Dynamics
 from solvers.time import GeneralisedAlpha
 
 MATERIALS = {

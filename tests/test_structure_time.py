@@ -9,8 +9,8 @@ from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure import probes
 from solvers.structure.body import Support
+from solvers.structure.dynamics import Damping, Dynamics
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
-from solvers.structure.time import Damping, Dynamics
 from solvers.time import GeneralisedAlpha
 
 TIGHT = SolverSettings(Tolerance(residual=1e-12), linear="direct")

@@ -9,7 +9,8 @@ from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.tied import Tied
 from solvers.structure.body import Support
-from solvers.structure.time import Dynamics, Statics
+from solvers.structure.dynamics import Dynamics
+from solvers.structure.time import Statics
 from solvers.time import GeneralisedAlpha
 
 ZERO = constant(0)

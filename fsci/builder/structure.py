@@ -21,6 +21,7 @@ from solvers.mesh import Mesh
 from solvers.solver_settings import SolverSettings
 from solvers.structure import probes
 from solvers.structure.body import Body
+from solvers.structure.dynamics import Damping, Dynamics
 from solvers.structure.elastic_constants import plane_stress_lambda
 from solvers.structure.field import Structure
 from solvers.structure.materials import (
@@ -34,7 +35,7 @@ from solvers.structure.materials import (
     StVenantKirchhoff,
 )
 from solvers.structure.supports import SupportError
-from solvers.structure.time import Damping, Dynamics, Statics, TimeScheme
+from solvers.structure.time import Statics, TimeScheme
 from solvers.time import GeneralisedAlpha
 from solvers.timing import Timer
 from solvers.values import combine

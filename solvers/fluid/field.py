@@ -31,6 +31,7 @@ from solvers.fluid.surface import Motion, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
 from solvers.fluid.time import STEADY, Step, TimeScheme
 from solvers.lagged import LaggedFactors
+from solvers.largest import position_of_largest
 from solvers.newton import converge
 from solvers.rounding import rounding_error
 from solvers.solver_settings import SolverSettings
@@ -63,7 +64,8 @@ class Fluid:
         self.unknowns = Unknowns(self.grid, settings.degree, periodic_axes(patches))
         self.boundary = Boundary(self.grid, self.unknowns, patches)
         degree, steady = settings.degree, settings.steady
-        method = linear.choose_flow(solver.linear, self.dim, self.dofs(), degree=degree, steady=steady)
+        wanted = solver.linear if isinstance(solver.linear, str) else "auto"
+        method = linear.choose_flow(wanted, self.dim, self.dofs(), degree=degree, steady=steady)
         self.system = FlowSystem(
             self.grid,
             settings,
@@ -347,11 +349,7 @@ class Fluid:
         """Position [m] of the node with the largest momentum residual (collective)."""
         nodes = self.unknowns.velocity
         size = np.abs(np.nan_to_num(self.residual_rows[nodes.dofs[: nodes.owned]], nan=np.inf)).max(axis=1)
-        index = int(np.argmax(size)) if len(size) else 0
-        largest = float(size[index]) if len(size) else -1.0
-        _, rank = self.comm.allreduce((largest, self.comm.rank), op=MPI.MAXLOC)
-        place = tuple(nodes.points[index].tolist()) if rank == self.comm.rank else None
-        return self.comm.bcast(place, root=rank)
+        return position_of_largest(self.comm, size, nodes.points)
 
     def held_everywhere(self) -> NDArray[np.bool_]:
         """`held` for all local dofs, ghosts too (collective)."""

@@ -124,7 +124,7 @@ class FlowKrylov:
     def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> PETSc.KSP:
         comm, rung = self.ladder.comm, self.ladder.here
         if rung == "direct":
-            return linear.direct_solver(comm, dim=3, dofs=self._unknowns.size(), symmetric=False)
+            return linear.direct_solver(comm, linear.Task(3, self._unknowns.size(), False, self._tolerance))
         if rung != "multigrid":
             return linear.flow_solver(comm, tolerance=self._tolerance, fill=rung == "fill")
         ksp = linear.flexible_solver(comm, tolerance=self._tolerance)

@@ -12,6 +12,7 @@ __getattr__, __all__ = lazy_names(
         "materials": ["CoupNeoHooke", "LinearElastic", "MooneyRivlin", "NeoHooke", "StVenantKirchhoff"],
         "springs": ["Spring"],
         "supports": ["Roller", "Support", "Symmetry"],
-        "time": ["Damping", "Dynamics", "Statics"],
+        "dynamics": ["Damping", "Dynamics"],
+        "time": ["Statics"],
     },
 )

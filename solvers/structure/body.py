@@ -74,7 +74,8 @@ class Body:
             self._dead.add_lines(line)
         for point in point_forces:
             self._dead.add_points(point)
-        self._dead_load: Array | None = None
+        self._dead_load = np.zeros(self.size)
+        self._loads_at: float | None = None  #: time that the loads are evaluated for
         self._gravity = gravity
         self._moved: PETSc.Mat | None = None  # mass that is elsewhere than the density says [kg]
         self.pressures = [FollowerPressure(domain, self.space, pressure) for pressure in pressures]
@@ -151,13 +152,16 @@ class Body:
         self.u.x.scatter_forward()
         self.element.update()
 
-    def set_time(self, t: float) -> None:
-        """Evaluate the loads at time t."""
-        if self.domain.comm.allreduce(self._dead.update(t)):
+    def _evaluate_loads(self, t: float) -> None:
+        if t == self._loads_at:
+            return
+        changed = self._dead.update(t) or self._loads_at is None
+        if self.domain.comm.allreduce(changed, op=MPI.LOR):
             self._force.x.array[:] = self._dead.force
             self._dead_load = self._summed() + self._moved_weight(t)
         for pressure in self.pressures:
             pressure.set_time(t)
+        self._loads_at = t
 
     # ---------------------------------------------------------------------------------------------- assembly
 
@@ -180,9 +184,9 @@ class Body:
         """What the body exerts on its springs [N], shape (size,); 0 without any (collective)."""
         return 0.0 if self._spring_matrix is None else self._spring_matrix.force(self.u.x.array[: self.size])
 
-    def external_force(self) -> Array:
-        """Loads at the time of `set_time` and the present displacement [N], shape (size,)."""
-        assert self._dead_load is not None, "set_time comes first"
+    def external_force(self, t: float) -> Array:
+        """Loads at a time and the present displacement [N], shape (size,) (collective)."""
+        self._evaluate_loads(t)
         if not self.pressures:
             return self._dead_load.copy()
         self._force.x.array[:] = 0.0
@@ -204,7 +208,7 @@ class Body:
 
     def move_mass(self, change: PETSc.Mat) -> None:
         """Gravity acts on mass where the time scheme has it: `change` [kg] is its mass matrix minus `mass()`."""
-        self._moved = change
+        self._moved, self._loads_at = change, None
 
     def _moved_weight(self, t: float) -> Array | float:
         if self._moved is None or not self._gravity:
@@ -218,8 +222,9 @@ class Body:
         """An empty matrix for `assemble_tangent`."""
         return fem.create_matrix(self._tangent)
 
-    def assemble_tangent(self, matrix: PETSc.Mat) -> None:
-        """d(internal - external force)/du [N/m]."""
+    def assemble_tangent(self, matrix: PETSc.Mat, t: float) -> None:
+        """d(internal - external force)/du [N/m] at a time (collective)."""
+        self._evaluate_loads(t)
         self.element.linearise()
         matrix.zeroEntries()
         fem.assemble_matrix(matrix, self._tangent)

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers import linear
@@ -15,21 +16,22 @@ from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.blocks import Layout, block_diagonal
 from solvers.constraint import Constraint
 from solvers.distributed import Nodal
+from solvers.largest import position_of_largest
 from solvers.newton import converge
 from solvers.rounding import rounding_error
 from solvers.rows import RowTransformation, TakenRows, gather, gather_at, transform_rows
 from solvers.solver_settings import SolverSettings
+from solvers.step import Step
 from solvers.structure.body import Body
+from solvers.structure.deformation import flown_off, inverted, largest_extent
 from solvers.structure.energy import EnergyBalance
 from solvers.structure.held import Held
 from solvers.structure.instant import Instant
+from solvers.structure.massless import mass_matrices
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.supports import prescribe
 from solvers.structure.time import Statics, TimeScheme
 from solvers.timing import Timer
-
-#: Displacement, in sizes of the largest body, that only a singular system gives.
-FLOWN_OFF = 1e6
 
 
 class Structure:
@@ -53,6 +55,7 @@ class Structure:
         self.layout = Layout(comm, [body.size for body in bodies])
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
+        self.current = Step(0.0, 0.0)  #: the step that is computed now or was last
         self.energy = EnergyBalance()
         self.residual_force = np.zeros(self.layout.size)  #: left-hand side of the balance, supports included [N]
         self._target = np.zeros(self.layout.size)
@@ -61,19 +64,17 @@ class Structure:
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is there already
         self._tangents = [body.create_tangent() for body in bodies]
         self._combined: PETSc.Mat | None = None
+        self._dynamic: tuple[TimeScheme, float, PETSc.Mat | None] | None = None
         self._b, self._x = self.layout.vector(), self.layout.vector()
-        self._method = linear.choose(settings.linear, self.dim, self.dofs())
+        method = settings.linear
+        self._method = linear.choose(method, self.dim, self.dofs()) if isinstance(method, str) else method
         # the tangent of a follower pressure has an unsymmetric boundary term
         self._ksp = self._linear_solver(symmetric=not any(body.pressures for body in self.bodies))
         self._constrained_ksp = None if contact is None else self._linear_solver(symmetric=False)
 
     def _linear_solver(self, *, symmetric: bool) -> PETSc.KSP:
-        tolerance = self.settings.linear_tolerance
-        if self._method == "iterative":
-            return linear.elastic_solver(self.comm, tolerance=tolerance)
-        if self._method == "ilu":
-            return linear.incomplete_solver(self.comm, tolerance=tolerance)
-        return linear.direct_solver(self.comm, dim=self.dim, dofs=self.dofs(), symmetric=symmetric)
+        make = linear.SOLVERS[self._method] if isinstance(self._method, str) else self._method
+        return make(self.comm, linear.Task(self.dim, self.dofs(), symmetric, self.settings.linear_tolerance))
 
     def dofs(self) -> int:
         """Unknowns of all bodies on all processes, prescribed ones included."""
@@ -81,14 +82,26 @@ class Structure:
 
     @cached_property
     def _extent(self) -> float:
-        """Size [m] of the largest body (collective)."""
-        sizes = (np.ptp(body.points, axis=1).max() for body in self.bodies if body.points.size)
-        return self.comm.allreduce(max(sizes, default=0.0), op=MPI.MAX)
+        return largest_extent(self.comm, self.bodies)
+
+    @cached_property
+    def massless(self) -> NDArray[np.int64]:
+        """Owned dofs without mass."""
+        return self.time.massless(self)
+
+    @cached_property
+    def _masses(self) -> list[tuple[PETSc.Mat, PETSc.Mat | None]]:
+        return mass_matrices(self)
 
     @cached_property
     def mass(self) -> PETSc.Mat:
         """Mass matrix of all bodies [kg]."""
-        return self.time.mass(self)
+        return block_diagonal([mass for mass, _ in self._masses])
+
+    @cached_property
+    def damping(self) -> PETSc.Mat | None:
+        """Damping matrix of all bodies [N s/m], None without damping."""
+        return self.time.damping_matrix(self)
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -101,8 +114,10 @@ class Structure:
             ):
                 if value is not None:
                     target[:] = body.nodal(value, t)[: body.owned].ravel()
-        self.mass  # noqa: B018  gravity must know it
-        self._set_time(t)
+        for body, (_, moved) in zip(self.bodies, self._masses, strict=True):
+            if moved is not None:
+                body.move_mass(moved)  # gravity acts on it
+        self.current = Step(t, dt)
         self._assemble_bodies()
         if self.constraint is not None:
             self.constraint.start(self.at_constraint(self.now.u), self.at_constraint(self._stiffness()), t)
@@ -133,7 +148,7 @@ class Structure:
     def _stiffness(self) -> Array:
         """Diagonal of the static tangent [N/m]."""
         for body, matrix in zip(self.bodies, self._tangents, strict=True):
-            body.assemble_tangent(matrix)
+            body.assemble_tangent(matrix, self.current.t)
         return np.concatenate([matrix.getDiagonal().array for matrix in self._tangents])
 
     def step(self, t: float, dt: float) -> StepInfo:
@@ -148,13 +163,12 @@ class Structure:
         self.old = self.now.copy()
         for body in self.bodies:
             body.element.begin_step()
-        self._time = t + dt
+        self.current = Step(t + dt, dt)
         self.rounding = self._tangent = None  # not part of the saved state: a resumed run must start alike
         if self.constraint is not None:
             self.constraint.begin_step()
-        self._set_time(t + dt)
         self._target = self.held.displacement(t + dt)
-        self.time.predict(self, dt)
+        self.now.u += self.time.guess(self, dt)
 
     def load(self, force: Array) -> None:
         """Take forces [N] at owned dofs that another field exerts at the end of the step, besides the loads."""
@@ -186,15 +200,13 @@ class Structure:
 
     def check_deformation(self, iteration: int, history: tuple[float, ...]) -> None:
         """Raise StepFailed if a body flies off, as one does that nothing holds, or is turned inside out anywhere."""
-        farthest = self.comm.allreduce(float(np.abs(self.now.u).max(initial=0.0)), op=MPI.MAX)
-        if farthest > FLOWN_OFF * self._extent:
-            reason = f"a displacement of {farthest:.3g} m is out of all proportion: is a body not held?"
-            raise StepFailed(self.name, reason, iteration=iteration, where=self.worst(), history=history)
-        worst = min((body.smallest_jacobian() for body in self.bodies), key=lambda jacobian: jacobian[0])
-        volume_ratio, name, place = worst
-        if not volume_ratio > 0.0:
-            reason = f"element of body '{name}' inverted (volume ratio {volume_ratio:.3g})"
-            raise StepFailed(self.name, reason, iteration=iteration, where=place, history=history)
+        reason, where = flown_off(self.comm, self.now.u, self._extent), None
+        if reason is not None:
+            where = self.worst()
+        elif found := inverted(self.bodies):
+            reason, where = found
+        if reason is not None:
+            raise StepFailed(self.name, reason, iteration=iteration, where=where, history=history)
 
     def end_step(self) -> None:
         """Accept the step."""
@@ -204,10 +216,6 @@ class Structure:
         external, damping = self.time.averaged_forces(self)
         work = self.dot(external, du) + self.dot(self.residual_force, self.held.part(du))
         self.energy.add_step(work, self.dot(damping, du), *self._energies())
-
-    def _set_time(self, t: float) -> None:
-        for body in self.bodies:
-            body.set_time(t)
 
     def split(self, array: Array) -> list[Array]:
         """Views of the bodies' parts of an array of owned dofs."""
@@ -221,12 +229,12 @@ class Structure:
         for body, u, internal, loads in parts:
             body.set_displacement(u)
             internal[:] = body.internal_force()
-            loads[:] = body.external_force()
+            loads[:] = body.external_force(self.current.t)
 
     def _assemble_constraint(self) -> None:
         if self.constraint is None:
             return
-        self.constraint.evaluate(self.at_constraint(self.now.u), self._time)
+        self.constraint.evaluate(self.at_constraint(self.now.u), self.current.t)
         dofs, force = self.constraint.dofs(), self.constraint.force()
         local = dofs - self.layout.start
         mine = (local >= 0) & (local < self.layout.size) & (dofs >= 0)
@@ -244,6 +252,7 @@ class Structure:
             self._assemble_bodies()
         with self.timer("contact"):
             self._assemble_constraint()
+        self.now.v, self.now.a = self.time.motion(self, self.current.dt)
         self.residual_force = self.time.balance(self)
         missed = 0.0 if self.constraint is None else self.constraint.violation(self.time.force_weight)
         return float(np.hypot(self.norm(self.held.free_part(self.residual_force)), missed))
@@ -251,9 +260,22 @@ class Structure:
     def tangent(self) -> PETSc.Mat:
         """d(balance)/du, supports not yet imposed; the next call overwrites the matrix."""
         for body, matrix in zip(self.bodies, self._tangents, strict=True):
-            body.assemble_tangent(matrix)
+            body.assemble_tangent(matrix, self.current.t)
         self._combined = block_diagonal(self._tangents, self._combined)
-        return self.time.tangent(self, self._combined)
+        weight, added = self.time.force_weight, self._dynamic_stiffness()
+        if weight != 1.0:
+            self._combined.scale(weight)
+        if added is not None:
+            self._combined.axpy(1.0, added, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        return self._combined
+
+    def _dynamic_stiffness(self) -> PETSc.Mat | None:
+        """The same matrix as long as scheme and length of the step are."""
+        time, dt, _ = self._dynamic or (None, 0.0, None)
+        if time is not self.time or dt != self.current.dt:
+            self._dynamic = self.time, self.current.dt, self.time.dynamic_stiffness(self, self.current.dt)
+        assert self._dynamic is not None
+        return self._dynamic[2]
 
     def advance(self) -> float:
         """One Newton step; returns |du| / |u|."""
@@ -349,15 +371,8 @@ class Structure:
     def worst(self) -> tuple[float, ...] | None:
         """Reference position [m] of the node with the largest residual (collective)."""
         size = np.abs(self.held.free_part(np.nan_to_num(self.residual_force, nan=np.inf)))
-        index = int(np.argmax(size)) if len(size) else 0
-        largest = float(size[index]) if len(size) else -1.0
-        _, rank = self.comm.allreduce((largest, self.comm.rank), op=MPI.MAXLOC)
-        place = None
-        if rank == self.comm.rank:
-            block = int(np.searchsorted(self.layout.offsets, index, side="right")) - 1
-            node = (index - int(self.layout.offsets[block])) // self.dim
-            place = tuple(float(c) for c in self.bodies[block].points[: self.dim, node])
-        return self.comm.bcast(place, root=rank)
+        points = [body.points[: self.dim, : body.owned].T for body in self.bodies]
+        return position_of_largest(self.comm, size, np.repeat(np.concatenate(points), self.dim, axis=0))
 
     def norm(self, array: Array) -> float:
         """Euclidean norm of owned dofs over all processes."""

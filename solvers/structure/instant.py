@@ -7,11 +7,13 @@ from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array
 from solvers.blocks import Layout
 from solvers.constraint import Constraint
+from solvers.step import Step
 from solvers.structure.body import Body
 from solvers.structure.held import Held
 
@@ -51,8 +53,27 @@ class Moving(Protocol):
     constraint: Constraint | None
     now: Instant
     old: Instant
+    current: Step
+
+    @property
+    def massless(self) -> NDArray[np.int64]:
+        """Owned dofs without mass."""
+        ...
 
     @property
     def mass(self) -> PETSc.Mat:
         """Mass matrix of all bodies [kg]."""
         ...
+
+    @property
+    def damping(self) -> PETSc.Mat | None:
+        """Damping matrix [N s/m] of all bodies, None without damping."""
+        ...
+
+
+def times(matrix: PETSc.Mat, array: Array) -> Array:
+    """A matrix times an array of owned dofs."""
+    x, y = matrix.createVecs()
+    x.array[:] = array
+    matrix.mult(x, y)
+    return y.array

@@ -60,6 +60,21 @@ def _owned(structure: Moving, dofs: NDArray[np.int64]) -> NDArray[np.bool_]:
     return among
 
 
+def mass_matrices(structure: Moving) -> list[tuple[PETSc.Mat, PETSc.Mat | None]]:
+    """By body: its mass matrix [kg], and what of that is moved inwards; None where all has its mass (collective)."""
+    found: list[tuple[PETSc.Mat, PETSc.Mat | None]] = []
+    marked = np.zeros(structure.layout.size, dtype=bool)
+    marked[structure.massless] = True
+    for body, massless in zip(structure.bodies, np.split(marked, structure.layout.offsets[1:-1]), strict=True):
+        mass, moved = body.mass(), None
+        if structure.comm.allreduce(bool(len(structure.massless)), op=MPI.LOR):
+            consistent, points = mass, body.points[: body.dim, : body.owned].T
+            mass, moved = move_mass_inwards(consistent, massless, points), consistent
+            moved.aypx(-1.0, mass, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        found.append((mass, moved))
+    return found
+
+
 def move_mass_inwards(mass: PETSc.Mat, massless: NDArray[np.bool_], points: Array) -> PETSc.Mat:
     """The mass matrix [kg] of a body whose surface has none: (F M' + M' F) / 2, as sparse as M. Collective.
 

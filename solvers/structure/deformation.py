@@ -1,0 +1,36 @@
+"""Deformations that cannot be solutions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+
+from solvers.api import Array
+from solvers.structure.body import Body
+
+#: Displacement, in sizes of the largest body, that only a singular system gives.
+FLOWN_OFF = 1e6
+
+
+def largest_extent(comm: MPI.Comm, bodies: Sequence[Body]) -> float:
+    """Size [m] of the largest body (collective)."""
+    sizes = (np.ptp(body.points, axis=1).max() for body in bodies if body.points.size)
+    return comm.allreduce(max(sizes, default=0.0), op=MPI.MAX)
+
+
+def flown_off(comm: MPI.Comm, u: Array, extent: float) -> str | None:
+    """Why displacements u [m] cannot be, for bodies of this size [m]; None if they can (collective)."""
+    farthest = comm.allreduce(float(np.abs(u).max(initial=0.0)), op=MPI.MAX)
+    if farthest > FLOWN_OFF * extent:
+        return f"a displacement of {farthest:.3g} m is out of all proportion: is a body not held?"
+    return None
+
+
+def inverted(bodies: Sequence[Body]) -> tuple[str, tuple[float, ...]] | None:
+    """(why the deformation cannot be, reference position [m]) if a body is turned inside out anywhere (collective)."""
+    volume_ratio, name, place = min((body.smallest_jacobian() for body in bodies), key=lambda jacobian: jacobian[0])
+    if volume_ratio > 0.0:
+        return None
+    return f"element of body '{name}' inverted (volume ratio {volume_ratio:.3g})", place

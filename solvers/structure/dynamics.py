@@ -1,0 +1,174 @@
+"""Structures in motion: the generalised-alpha method, with damping, and surfaces in contact without mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from solvers.api import Array
+from solvers.blocks import block_diagonal
+from solvers.structure.first_state import FirstState
+from solvers.structure.instant import Instant, Moving, times
+from solvers.structure.massless import massless_dofs
+from solvers.structure.time import Settling
+from solvers.time import GeneralisedAlpha
+
+#: Time, in first steps, in which velocities and accelerations at the start are measured.
+SHORT = 1e-3
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Rayleigh damping C = mass * M + stiffness * K(u = 0)."""
+
+    mass: float = 0.0  #: [1/s]
+    stiffness: float = 0.0  #: [s]
+
+
+@dataclass(frozen=True)
+class Dynamics:
+    """Generalised-alpha: M a_{1-alpha_m} + C v_{1-alpha_f} + (1 - alpha_f) f_{n+1} + alpha_f f_n = 0.
+
+    The forces f = f_int - f_ext - f_contact are averaged, not evaluated in the middle.
+
+    Contact surfaces have no mass. Their rows are static balances at n+1, times 1 - alpha_f: the old forces there are in
+    balance and drop out; if they were not, they would ring for ever. Their velocity is (u_{n+1} - u_n) / dt.
+    """
+
+    scheme: GeneralisedAlpha
+    damping: Damping = Damping()
+    predictor: Literal["constant_displacement", "constant_velocity"] = "constant_displacement"
+
+    @property
+    def force_weight(self) -> float:
+        return 1.0 - self.scheme.alpha_f
+
+    # ------------------------------------------------------------------------------------------------- start
+
+    def massless(self, structure: Moving) -> NDArray[np.int64]:
+        if structure.constraint is None:
+            return np.empty(0, dtype=np.int64)
+        return np.flatnonzero(np.concatenate(massless_dofs(structure)))
+
+    def damping_matrix(self, structure: Moving) -> PETSc.Mat | None:
+        if self.damping == Damping():
+            return None
+        damping = structure.mass.copy()
+        damping.scale(self.damping.mass)
+        if self.damping.stiffness:
+            damping.axpy(self.damping.stiffness, _initial_stiffness(structure))
+        return damping
+
+    def start(self, structure: Settling, t: float, dt: float) -> None:
+        """Places of nodes without mass, then M a_0 = -C v_0 - f_0; prescribed dofs follow their functions.
+
+        A load on a node without mass acts on those with mass by internal forces alone. If these were not in balance
+        with it at t, the part of its impulse that belongs to the start of the first step would be lost.
+        """
+        self._start_supports(structure, t, SHORT * dt)
+        if structure.comm.allreduce(len(structure.massless)):
+            others = np.setdiff1d(np.arange(structure.layout.size), structure.massless)
+            held = structure.held.stopped(others, structure.now.u)
+            structure.settle(FirstState(structure.massless, structure.damping), held, t, SHORT * dt)
+        self._solve_acceleration(structure)
+
+    def _start_supports(self, structure: Moving, t: float, h: float) -> None:
+        """One-sided differences, so that a support that starts to move does not ring."""
+        held, now = structure.held, structure.now
+        u = [held.displacement(t + k * h) for k in range(4)]
+        now.v[:] = held.free_part(now.v) + (-3.0 * u[0] + 4.0 * u[1] - u[2]) / (2.0 * h)
+        now.a[:] = held.free_part(now.a) + (2.0 * u[0] - 5.0 * u[1] + 4.0 * u[2] - u[3]) / h**2
+
+    def _solve_acceleration(self, structure: Moving) -> None:
+        now, (x, b) = structure.now, structure.mass.createVecs()
+        b.array[:] = now.external + now.constraint - now.internal - _damping_force(structure, now.v)
+        x.array[:] = now.a
+        x.array[structure.massless] = 0.0
+        matrix = structure.held.impose(structure.mass.copy(), x, b)
+        rows = (structure.layout.start + structure.massless).astype(PETSc.IntType)
+        matrix.zeroRowsColumns(rows, 1.0, x, b)
+        ksp = PETSc.KSP().create(structure.comm)
+        ksp.setOperators(matrix)
+        ksp.setType(PETSc.KSP.Type.CG)
+        ksp.getPC().setType(PETSc.PC.Type.JACOBI)
+        ksp.setTolerances(rtol=1e-15, atol=0.0, max_it=1000)
+        ksp.solve(b, x)
+        now.a[:] = x.array
+
+    # ------------------------------------------------------------------------------------------------- steps
+
+    def guess(self, structure: Moving, dt: float) -> Array:
+        """Nothing, or on with the velocity."""
+        if self.predictor == "constant_displacement":
+            return np.zeros(structure.layout.size)
+        return dt * structure.held.free_part(structure.now.v)
+
+    def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
+        """Newmark's relations; without mass v = (u_{n+1} - u_n) / dt."""
+        old, massless = structure.old, structure.massless
+        du = structure.now.u - old.u
+        a, v = (rule(du, old.v, old.a, dt) for rule in (self.scheme.acceleration, self.scheme.velocity))
+        a[massless], v[massless] = 0.0, du[massless] / dt
+        return v, a
+
+    def balance(self, structure: Moving) -> Array:
+        present, before = (_own_forces(structure, at) - at.surface for at in (structure.now, structure.old))
+        before[structure.massless] = 0.0
+        return self._inertia(structure) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
+
+    def averaged_load(self, structure: Moving) -> Array:
+        present, before = (_own_forces(structure, at) for at in (structure.now, structure.old))
+        return self._inertia(structure) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
+
+    def _inertia(self, structure: Moving) -> Array:
+        share = self.scheme.alpha_m
+        return times(structure.mass, (1.0 - share) * structure.now.a + share * structure.old.a)
+
+    def averaged_forces(self, structure: Moving) -> tuple[Array, Array]:
+        alpha, now, old = self.scheme.alpha_f, structure.now, structure.old
+        external = (1.0 - alpha) * now.external + alpha * old.external
+        return external, _damping_force(structure, (1.0 - alpha) * now.v + alpha * old.v)
+
+    def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat:
+        """mass_factor M + damping_factor C; columns without mass: (1 - alpha_f) / dt C."""
+        matrix = structure.mass.copy()
+        matrix.scale(self.scheme.mass_factor(dt))
+        if structure.damping is not None:
+            by_displacement, (slope, _) = structure.damping.copy(), structure.damping.createVecs()
+            slope.array[:] = self.scheme.damping_factor(dt)
+            slope.array[structure.massless] = (1.0 - self.scheme.alpha_f) / dt
+            by_displacement.diagonalScale(None, slope)
+            matrix.axpy(1.0, by_displacement, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        return matrix
+
+    def reaction(self, structure: Moving) -> Array:
+        """M a + C v + f_int - f_ext at the present time."""
+        now = structure.now
+        dynamic = times(structure.mass, now.a) + _damping_force(structure, now.v)
+        return dynamic + now.internal - now.external - now.constraint
+
+    def kinetic_energy(self, structure: Moving) -> float:
+        v = structure.now.v
+        return 0.5 * structure.comm.allreduce(float(v @ times(structure.mass, v)))
+
+
+def _own_forces(structure: Moving, at: Instant) -> Array:
+    return at.internal - at.loads - at.constraint + _damping_force(structure, at.v)
+
+
+def _damping_force(structure: Moving, v: Array) -> Array:
+    return np.zeros_like(v) if structure.damping is None else times(structure.damping, v)
+
+
+def _initial_stiffness(structure: Moving) -> PETSc.Mat:
+    matrices = []
+    for body, u in zip(structure.bodies, structure.layout.split(structure.now.u), strict=True):
+        body.set_displacement(np.zeros_like(u))
+        matrices.append(body.create_tangent())
+        body.assemble_tangent(matrices[-1], structure.current.t)
+        body.set_displacement(u)
+    return block_diagonal(matrices)

@@ -1,0 +1,40 @@
+"""The first state of a structure some nodes of which have no mass."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from solvers.api import Array
+from solvers.structure.instant import Moving, times
+from solvers.structure.time import Statics
+
+
+class FirstState(Statics):
+    """f_int(u) + C v = f_ext(t): nodes without mass move from u_0 in a short time dt.
+
+    Without damping they are at once where the forces on them are in balance. With damping they are still where they
+    were, and v = (u - u_0) / dt is the velocity with which they start. v of the others is given.
+    """
+
+    def __init__(self, moving: NDArray[np.int64], damping: PETSc.Mat | None):
+        """moving: owned dofs without mass; damping: C."""
+        self._moving, self._damping = moving, damping
+
+    def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
+        v = structure.now.v.copy()
+        if self._damping is not None:
+            v[self._moving] = (structure.now.u - structure.old.u)[self._moving] / dt
+        return v, structure.now.a
+
+    def balance(self, structure: Moving) -> Array:
+        force = self.reaction(structure)
+        return force if self._damping is None else force + times(self._damping, structure.now.v)
+
+    def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat | None:
+        if self._damping is None:
+            return None
+        matrix = self._damping.copy()
+        matrix.scale(1.0 / dt)
+        return matrix
