@@ -80,10 +80,18 @@ class Elastic:
         return force.ravel()
 
     def taken(self) -> Array:
-        return self._gather(self.structure.averaged_load()).ravel()
+        """What inertia, damping, inner forces, own loads and contact leave open, averaged over the step.
+
+        Supports would fill any gap: where they hold, it is the load that was handed over.
+        """
+        structure, weight = self.structure, self.force_weight
+        handed_over = weight * structure.now.surface + (1.0 - weight) * structure.old.surface
+        free = structure.held.free_part(structure.time.averaged_load(structure))
+        return self._gather(free + structure.held.part(handed_over)).ravel()
 
     def taken_at_start(self) -> Array:
-        return self._gather(self.structure.load_at_start()).ravel()
+        structure = self.structure
+        return self._gather(structure.held.free_part(structure.time.reaction(structure))).ravel()
 
     def moved(self) -> Array:
         return self._gather(self.structure.now.u - self.structure.old.u).ravel()

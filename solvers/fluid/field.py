@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -20,13 +20,13 @@ from solvers.fluid.coupling_entries import InterfaceEntries, interface_entries
 from solvers.fluid.cut import Cut, Cutter
 from solvers.fluid.fast_bodies import FastBodies
 from solvers.fluid.grid import DistributedGrid, Grid
-from solvers.fluid.history import History, Past
+from solvers.fluid.history import History
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.krylov import FlowKrylov, Ladder, rungs
 from solvers.fluid.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.pressure_level import Hold, hold_pressure, spread_excess
 from solvers.fluid.reach import require_known, require_within_period, strip_layers
-from solvers.fluid.space import Nodes, Unknowns, set_velocity
+from solvers.fluid.space import Unknowns, set_velocity
 from solvers.fluid.surface import Motion, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
 from solvers.fluid.time import STEADY, Step, TimeScheme
@@ -82,7 +82,7 @@ class Fluid:
         self.current = Step(0.0, 0.0, STEADY)  #: the step that is computed now or was last
         self.started = False  #: a step was accepted, so that there are forces
         self._smallest = min(float(np.diff(edge).min()) for edge in grid.edges)
-        self._motions: list[Motion] = []
+        self.motions: list[Motion] = []
         self._wet = wetness([body.surface for body in self.bodies])
         self._fast_bodies = FastBodies(grid)
         self.notes: list[str] = []  #: what the user should know of this step
@@ -193,7 +193,7 @@ class Fluid:
         if surfaces ran out of the strip.
         """
         motions = [coupled[b.surface.name] if b.motion is None else b.motion(self.current.t) for b in self.bodies]
-        self._motions = motions
+        self.motions = motions
         with self.timer("cut"):
             facets, motion = together([body.surface for body in self.bodies], motions, self.dim)
             cut = self.cutter(facets, motion, self._layers(motion), self._wet)
@@ -238,7 +238,7 @@ class Fluid:
 
     def _note_fast_bodies(self) -> None:
         if not self.settings.steady:
-            self.notes += self._fast_bodies.notes({body.surface.name: m for body, m in self._moved()}, self.current.dt)
+            self.notes += self._fast_bodies.notes({body.surface.name: m for body, m in self.moved()}, self.current.dt)
 
     def end_step(self) -> None:
         """Accept the step. Fluid that comes between surfaces which touch now will have been at rest."""
@@ -355,7 +355,7 @@ class Fluid:
         """`held` for all local dofs, ghosts too (collective)."""
         mark = np.zeros(self.unknowns.local)
         mark[: self.unknowns.owned] = self.held
-        return self._shared(mark) > 0.5
+        return fem.share_owned(self.unknowns.space, mark) > 0.5
 
     # ---------------------------------------------------------------------------------------------- reactions
 
@@ -388,35 +388,19 @@ class Fluid:
 
     def save(self) -> State:
         """Everything a step starts from."""
-        velocity, pressure = self.unknowns.velocity, self.unknowns.pressure
-
-        def nodal(values: Array, nodes) -> Nodal:
-            return Nodal(values[nodes.dofs[: nodes.owned]].astype(float), nodes.numbers[: nodes.owned])
-
-        found = np.stack([past.found for past in self.history.past], axis=1)[velocity.dofs[:, 0]]
-        return {
-            "velocity": {str(k): nodal(past.velocity, velocity) for k, past in enumerate(self.history.past)},
-            "pressure": nodal(self.flow, pressure),
-            "found": Nodal(found[: velocity.owned].astype(float), velocity.numbers[: velocity.owned]),
+        return self.history.save(self.unknowns) | {
+            "pressure": self.unknowns.to_nodes(self.flow, self.unknowns.pressure),
             "pattern": Nodal(self.system.pattern_state(), self.grid.numbers[: self.grid.owned]),
-            "steps": list(self.history.steps),
             "time": self.current.t,
             "linear_solver": self.ladder.rung,
-            "motion": {body.surface.name: {"x": m.x, "v": m.v} for body, m in self._moved()},
+            "motion": {body.surface.name: {"x": m.x, "v": m.v} for body, m in self.moved()},
         }
-
-    def _moved(self):
-        return zip(self.bodies, self._motions, strict=True)
 
     def restore(self, state: State) -> None:
         """Back to a saved state."""
-        velocity, found = self.unknowns.velocity, state["found"].values
-        past = [self._at_nodes(velocity, state["velocity"][str(k)].values) for k in range(len(self.history.past))]
-        self.history.past = [
-            Past(values, self._at_nodes(velocity, found[:, [k]]) > 0.5) for k, values in enumerate(past)
-        ]
-        self.flow[:] = past[0] + self._at_nodes(self.unknowns.pressure, state["pressure"].values)
-        self.history.steps = tuple(state["steps"])
+        self.history.restore(self.unknowns, state)
+        self.flow[:] = self.history.past[0].velocity
+        self.flow[:] += self.unknowns.from_nodes(state["pressure"].values, self.unknowns.pressure)
         self.current = Step(state["time"], 0.0, STEADY)
         self.ladder.rung = state["linear_solver"]
         self.system.restore_pattern(state["pattern"].values)
@@ -425,12 +409,6 @@ class Fluid:
         self.move({name: Motion(m["x"], m["v"]) for name, m in state["motion"].items()})
         self.flow[:] = kept
 
-    def _at_nodes(self, nodes: Nodes, values: Array) -> Array:
-        """Local dofs from values at owned nodes, zero elsewhere."""
-        owned = np.zeros(self.unknowns.local)
-        owned[nodes.dofs[: nodes.owned]] = values
-        return self._shared(owned)
-
-    def _shared(self, owned: Array) -> Array:
-        """Local dofs from owned ones."""
-        return fem.share_owned(self.unknowns.space, owned)
+    def moved(self) -> Iterator[tuple[ImmersedBody, Motion]]:
+        """Bodies with their present motions."""
+        return zip(self.bodies, self.motions, strict=True)

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array
+from solvers.api import Array, State
+from solvers.distributed import Nodal
+from solvers.fluid.space import Unknowns
 from solvers.fluid.time import Difference, TimeScheme
 
 Mask = NDArray[np.bool_]
@@ -56,3 +58,25 @@ class History:
             if weight:
                 missing |= ~past.found
         return missing
+
+    def save(self, unknowns: Unknowns) -> State:
+        """Velocities of all times, where they were found, and the lengths of the steps."""
+        nodes = unknowns.velocity
+        found = np.stack([past.found for past in self.past], axis=1)[nodes.dofs[:, 0]]
+        return {
+            "velocity": {str(k): unknowns.to_nodes(past.velocity, nodes) for k, past in enumerate(self.past)},
+            "found": Nodal(found[: nodes.owned].astype(float), nodes.numbers[: nodes.owned]),
+            "steps": list(self.steps),
+        }
+
+    def restore(self, unknowns: Unknowns, state: State) -> None:
+        """Back to a saved state (collective)."""
+        nodes, found = unknowns.velocity, state["found"].values
+        self.past = [
+            Past(
+                unknowns.from_nodes(state["velocity"][str(k)].values, nodes),
+                unknowns.from_nodes(found[:, [k]], nodes) > 0.5,
+            )
+            for k in range(len(self.past))
+        ]
+        self.steps = tuple(state["steps"])

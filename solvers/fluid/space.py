@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from solvers import fem
 from solvers.api import Array
+from solvers.distributed import Nodal
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.periodic import LatticeNodes, join_ends
 from solvers.values import Value, evaluate
@@ -97,6 +98,18 @@ class Unknowns:
     def expand(self, blocks: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """A mark per local dof from one per local block."""
         return np.repeat(blocks, self.block_size)
+
+    # ---------------------------------------------------------------------------------------------- to save values
+
+    def to_nodes(self, values: Array, nodes: Nodes) -> Nodal:
+        """Values at local dofs as those of owned nodes."""
+        return Nodal(values[nodes.dofs[: nodes.owned]].astype(float), nodes.numbers[: nodes.owned])
+
+    def from_nodes(self, values: Array, nodes: Nodes) -> Array:
+        """Values at local dofs from those of owned nodes, zero elsewhere (collective)."""
+        owned = np.zeros(self.local)
+        owned[nodes.dofs[: nodes.owned]] = values
+        return fem.share_owned(self.space, owned)
 
 
 def set_velocity(values: Array, nodes: Nodes, components: Sequence[Value], t: float) -> None:

@@ -174,20 +174,6 @@ class Structure:
         """Take forces [N] at owned dofs that another field exerts at the end of the step, besides the loads."""
         self.now.surface[:] = force
 
-    def averaged_load(self) -> Array:
-        """Force [N] of another field that the bodies took in this step, averaged over it, at owned dofs.
-
-        It is what inertia, damping, inner forces, own loads and contact leave open. Supports would fill any gap: where
-        they hold, it is the load that was handed over.
-        """
-        weight = self.time.force_weight
-        handed_over = weight * self.now.surface + (1.0 - weight) * self.old.surface
-        return self.held.free_part(self.time.averaged_load(self)) + self.held.part(handed_over)
-
-    def load_at_start(self) -> Array:
-        """The same [N] for the state that the first step starts from."""
-        return self.held.free_part(self.time.reaction(self))
-
     def solve(self) -> StepInfo:
         """Newton to the tolerance. Raises StepFailed."""
         try:
