@@ -21,7 +21,7 @@ from coupling.coupled import Coupled
 from coupling.ports import Part
 from solvers import linear
 from solvers.api import Array, State, StepFailed, StepInfo
-from solvers.lagged import LaggedFactors
+from solvers.lagged import Lagged, LaggedFactors
 from solvers.newton import Tolerance, converge
 from solvers.rounding import rounding_error
 from solvers.rows import Numbering, from_entries
@@ -41,9 +41,8 @@ class Monolithic:
         # in time the matrix of the first guess is too far from the later ones to serve for all of them
         self._direct = LaggedFactors(self.comm, fresh=math.inf if flow.steady else 2)
         self._farther: Part = flow
-        self._krylov: PETSc.KSP | None = None
-        self._preconditioned_by: PETSc.Mat | None = None
-        self._fresh_iterations = self._linear_iterations = 0
+        self._krylov = Lagged()
+        self._linear_iterations = 0  #: of this step
         #: rounding errors of the residuals of solid and flow [N], as far as this step knows
         self._noise: Array | None = None
         self._found, self._largest = np.zeros(2), np.zeros(2)  #: residuals of solid and flow: now, largest of the step
@@ -58,8 +57,9 @@ class Monolithic:
     def step(self, t: float, dt: float) -> StepInfo:
         coupled = self.coupled
         coupled.begin_step(t, dt)
-        self._largest, self._krylov, self._linear_iterations = np.zeros(2), None, 0
+        self._largest, self._linear_iterations = np.zeros(2), 0
         self._noise = self._prepared = None
+        self._krylov.begin_step()
         self._direct.begin_step()
         unmoved = 0.0
         if not coupled.flow.steady:
@@ -112,38 +112,23 @@ class Monolithic:
         ladder = self.coupled.flow.ladder
         while ladder.here != "direct":
             try:
-                self._iterate(blocks, b, x)
+                self._linear_iterations += self._krylov.solve(
+                    blocks.nested(), b, x, lambda matrix: self._krylov_solver(matrix, blocks)
+                )
                 return
             except linear.LinearSolveFailed as failure:
                 ladder.climb(failure)
         self._direct.solve(blocks.assembled(), b, x)
 
-    def _iterate(self, blocks: Blocks, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Preconditioned by the first matrix of the step as long as that serves."""
-        flow, matrix = self.coupled.flow, blocks.nested()
-        if self._krylov is not None:
-            try:
-                linear.solve(self._krylov, matrix, b, x, self._preconditioned_by)
-            except linear.LinearSolveFailed:
-                self._krylov = None
-            else:
-                iterations = self._krylov.getIterationNumber()
-                self._linear_iterations += iterations
-                if iterations > 2 * self._fresh_iterations:
-                    self._krylov = None
-                return
+    def _krylov_solver(self, matrix: PETSc.Mat, blocks: Blocks) -> PETSc.KSP:
+        flow, parts = self.coupled.flow, (self._numbering.first, self._numbering.second)
         rung, tolerance = flow.ladder.here, flow.linear_tolerance
-        parts = self._numbering.first, self._numbering.second
         krylov = linear.coupled_solver(self.comm, *parts, tolerance=tolerance, fill=rung == "fill")
         if rung == "multigrid":
             krylov.setOperators(matrix)
             krylov.getPC().setUp()
             flow.set_up_multigrid(krylov.getPC().getFieldSplitSubKSP()[1].getPC(), blocks.flow)
-        linear.solve(krylov, matrix, b, x)
-        linear.keep_factors(krylov)
-        self._krylov, self._preconditioned_by = krylov, matrix
-        self._fresh_iterations = krylov.getIterationNumber()
-        self._linear_iterations += self._fresh_iterations
+        return krylov
 
     def _blocks(self) -> Blocks:
         solid, flow = self.coupled.solid, self.coupled.flow

@@ -1,44 +1,77 @@
-"""LU factors that serve for several matrices of a time step."""
+"""Preconditioners and factors that serve for several matrices of a time step."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 from petsc4py import PETSc
 
-from solvers.linear import LinearSolveFailed, solve
+from solvers import linear
 
 
-class LaggedFactors:
-    """LU by MUMPS (velocity and pressure need pivoting), later matrices of a step by GMRES with the factors there are.
+class Lagged:
+    """Solves with the preconditioner of an earlier matrix of the step, as long as that serves.
 
-    `fresh`: matrices of a step that are factored in any case, because those after them are far away. A matrix for which
-    GMRES takes too long is factored too. Nothing is kept from step to step, so that resumed runs are the same.
+    The first `fresh` matrices of a step get one of their own in any case, because those after them are far away. Then
+    the last one serves until a solve fails or takes `patience` times the iterations that it took with its own matrix.
+    Nothing is kept from step to step, so that resumed runs are the same.
     """
 
-    def __init__(self, comm, *, fresh: float):
-        self.fresh = fresh
-        self.factored = 0  #: matrices of this step so far
-        self._ksp = PETSc.KSP().create(comm)
-        self._ksp.setType(PETSc.KSP.Type.GMRES)
-        self._ksp.setPCSide(PETSc.PC.Side.RIGHT)
-        self._ksp.setTolerances(rtol=1e-8, max_it=20)
-        self._ksp.getPC().setType(PETSc.PC.Type.LU)
-        self._ksp.getPC().setFactorSolverType("mumps")
+    def __init__(self, *, fresh: float = 1, patience: float = 2.0):
+        self.fresh, self.patience = fresh, patience
+        self.made = 0  #: preconditioners of this step so far
+        self._kept: tuple[PETSc.KSP, PETSc.Mat, int] | None = None  # with its matrix and iterations
 
     def begin_step(self) -> None:
         """The next matrix is one of another step."""
-        self.factored = 0
+        self.made, self._kept = 0, None
+
+    def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, make: Callable[[PETSc.Mat], PETSc.KSP]) -> int:
+        """Solve matrix x = b; how many iterations that took. Raises LinearSolveFailed.
+
+        make: a solver for a matrix, whose preconditioner is made of that.
+        """
+        if self._kept is not None and self.made >= self.fresh:
+            ksp, made_of, first = self._kept
+            try:
+                linear.solve(ksp, matrix, b, x, made_of)
+            except linear.LinearSolveFailed:
+                pass
+            else:
+                iterations = int(ksp.getIterationNumber())
+                if iterations > self.patience * first:
+                    self._kept = None
+                return iterations
+        self._kept = None
+        ksp = make(matrix)
+        linear.solve(ksp, matrix, b, x)
+        linear.keep_preconditioner(ksp)
+        self.made += 1
+        first = int(ksp.getIterationNumber())
+        self._kept = ksp, matrix, first
+        return first
+
+
+class LaggedFactors:
+    """The same with LU factors by MUMPS (velocity and pressure need pivoting), which serve for 20 iterations."""
+
+    def __init__(self, comm, *, fresh: float):
+        self._lagged, self._ksp = Lagged(fresh=fresh, patience=math.inf), linear.factored_solver(comm, iterations=20)
+
+    @property
+    def factored(self) -> int:
+        """Matrices of this step so far."""
+        return self._lagged.made
+
+    def begin_step(self) -> None:
+        """The next matrix is one of another step."""
+        self._lagged.begin_step()
 
     def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> int:
         """Solve matrix x = b; how many iterations that took. Raises LinearSolveFailed."""
-        if self.factored >= self.fresh:
-            self._ksp.getPC().setReusePreconditioner(True)
-            try:
-                solve(self._ksp, matrix, b, x)
-            except LinearSolveFailed:
-                pass
-            else:
-                return int(self._ksp.getIterationNumber())
-        self._ksp.getPC().setReusePreconditioner(False)
-        self.factored += 1
-        solve(self._ksp, matrix, b, x)
-        return int(self._ksp.getIterationNumber())
+        return self._lagged.solve(matrix, b, x, self._factor)
+
+    def _factor(self, matrix: PETSc.Mat) -> PETSc.KSP:
+        self._ksp.getPC().setReusePreconditioner(False)  # the order of elimination stays
+        return self._ksp

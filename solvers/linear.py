@@ -207,10 +207,23 @@ def coupled_solver(comm, structure, flow, *, tolerance: float, fill: bool = Fals
     return ksp
 
 
-def keep_factors(ksp: PETSc.KSP) -> None:
-    """From now on a `coupled_solver` keeps its incomplete factors although the blocks of its matrix change."""
-    for part in ksp.getPC().getFieldSplitSubKSP():
-        part.getPC().setReusePreconditioner(True)
+def factored_solver(comm, *, iterations: int) -> PETSc.KSP:
+    """GMRES with LU factors by MUMPS, for their own matrix and for later ones."""
+    ksp = PETSc.KSP().create(comm)
+    ksp.setType(PETSc.KSP.Type.GMRES)
+    ksp.setPCSide(PETSc.PC.Side.RIGHT)
+    ksp.setTolerances(rtol=1e-8, max_it=iterations)
+    ksp.getPC().setType(PETSc.PC.Type.LU)
+    ksp.getPC().setFactorSolverType("mumps")
+    return ksp
+
+
+def keep_preconditioner(ksp: PETSc.KSP) -> None:
+    """From now on a solver keeps its preconditioner although its matrix changes; a split one those of its blocks."""
+    own = ksp.getPC()
+    split = own.getType() == PETSc.PC.Type.FIELDSPLIT
+    for preconditioner in [part.getPC() for part in own.getFieldSplitSubKSP()] if split else [own]:
+        preconditioner.setReusePreconditioner(True)
 
 
 def solve(

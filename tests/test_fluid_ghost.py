@@ -44,7 +44,7 @@ def test_share_of_the_mass():
 
 
 def momentum(fluid):
-    return fluid.residual_rows[fluid.velocity_mask[: len(fluid.residual_rows)]]
+    return fluid.residual_rows[fluid.unknowns.velocity_mask[: len(fluid.residual_rows)]]
 
 
 @pytest.mark.parametrize("memory", [1.0, 0.9])
@@ -53,7 +53,7 @@ def test_share_of_the_mass_is_one_of_the_acceleration(memory):
     fluids = [kinked_flow(1e-3, ghost_mass=factor, ghost_memory=memory) for factor in (0.0, 1.0)]
     for growth in (1.0, 1.25):
         for fluid in fluids:
-            fluid.flow[fluid.velocity_mask] *= growth
+            fluid.flow[fluid.unknowns.velocity_mask] *= growth
             fluid.residual()
         without, with_mass = (momentum(fluid) for fluid in fluids)
         share = np.subtract(*(ghost_rows(fluid) for fluid in reversed(fluids)))
@@ -83,4 +83,4 @@ def ghost_rows(fluid):
     u, out = fluid.system._ghost.createVecs()
     u.array[:] = fluid.flow[: fluid.unknowns.owned]
     fluid.system._ghost.mult(u, out)
-    return np.where(fluid.held, 0.0, out.array)[fluid.velocity_mask[: fluid.unknowns.owned]]
+    return np.where(fluid.held, 0.0, out.array)[fluid.unknowns.velocity_mask[: fluid.unknowns.owned]]

@@ -22,7 +22,7 @@ from solvers.fluid.fast_bodies import FastBodies
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.history import History
 from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.krylov import FlowKrylov, Ladder, rungs
+from solvers.fluid.krylov import FlowSolver, Ladder, rungs
 from solvers.fluid.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.pressure_level import Hold, hold_pressure, spread_excess
 from solvers.fluid.reach import require_known, require_within_period, strip_layers
@@ -30,7 +30,6 @@ from solvers.fluid.space import Unknowns, set_velocity
 from solvers.fluid.surface import Motion, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
 from solvers.fluid.time import STEADY, Step, TimeScheme
-from solvers.lagged import LaggedFactors
 from solvers.largest import position_of_largest
 from solvers.newton import converge
 from solvers.rounding import rounding_error
@@ -58,10 +57,9 @@ class Fluid:
         comm: MPI.Comm = MPI.COMM_WORLD,
     ):
         self.comm, self.settings, self.solver, self.timer = comm, settings, solver, timer or Timer()
-        self.bodies = list(bodies)
-        self.grid = DistributedGrid(comm, grid)
-        self.dim = grid.dim
+        self.bodies, self.grid, self.dim = list(bodies), DistributedGrid(comm, grid), grid.dim
         self.unknowns = Unknowns(self.grid, settings.degree, periodic_axes(patches))
+        self.size = self.unknowns.owned  #: unknowns that this process owns
         self.boundary = Boundary(self.grid, self.unknowns, patches)
         degree, steady = settings.degree, settings.steady
         wanted = solver.linear if isinstance(solver.linear, str) else "auto"
@@ -76,8 +74,6 @@ class Fluid:
             blocked=method != "direct" and self.unknowns.block_size > 1,
         )
         self.cutter = Cutter(self.grid, self.system.weights.points)
-        self.velocity_mask = np.zeros(self.unknowns.local, dtype=bool)
-        self.velocity_mask[self.unknowns.velocity.dofs] = True
         self.history = History(settings.time, self.unknowns.local)
         self.current = Step(0.0, 0.0, STEADY)  #: the step that is computed now or was last
         self.started = False  #: a step was accepted, so that there are forces
@@ -87,9 +83,8 @@ class Fluid:
         self._fast_bodies = FastBodies(grid)
         self.notes: list[str] = []  #: what the user should know of this step
         self.ladder = Ladder(comm, rungs(method, settings.degree), self.dofs(), self.notes.append)
-        self.krylov = None if method == "direct" else FlowKrylov(self.unknowns, self.ladder, solver.linear_tolerance)
+        self.linear_solver = FlowSolver(self.unknowns, self.ladder, solver.linear_tolerance, steady=settings.steady)
         self.linear_iterations = 0  #: of the last linear system
-        self._direct = LaggedFactors(comm, fresh=math.inf if settings.steady else 1)
         self.rounding: Array | None = None  #: rounding error of `residual_rows`, as far as this step knows
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is there already
         owned = self.unknowns.owned
@@ -103,11 +98,6 @@ class Fluid:
     def dofs(self) -> int:
         """Unknowns on all processes, inactive ones included."""
         return self.unknowns.size()
-
-    @property
-    def size(self) -> int:
-        """Unknowns that this process owns."""
-        return self.unknowns.owned
 
     @property
     def steady(self) -> bool:
@@ -134,7 +124,7 @@ class Fluid:
 
     def velocity(self) -> Array:
         """Velocity [m/s] at local dofs, zero at those of the pressure."""
-        return np.where(self.velocity_mask, self.flow, 0.0)
+        return np.where(self.unknowns.velocity_mask, self.flow, 0.0)
 
     def initialise(self, t: float, dt: float) -> None:
         """The initial velocity, known everywhere."""
@@ -168,10 +158,8 @@ class Fluid:
         self.flow[self.boundary.dofs] = self.boundary.velocity(t + dt)
         self._largest = 0.0
         self.rounding = self._tangent = None  # not part of the saved state: a resumed run must start alike
-        self._direct.begin_step()
+        self.linear_solver.begin_step()
         self.notes.clear()
-        if self.krylov is not None:
-            self.krylov.begin_step()
         if not self._coupled:
             self.predict()
             self.move({})
@@ -267,7 +255,7 @@ class Fluid:
         impedance = settings.viscosity / h + settings.density * (
             self.system.fastest + h * self.current.difference.alpha
         )
-        scaled = np.where(self.velocity_mask[: len(rows)], rows, impedance * rows)
+        scaled = np.where(self.unknowns.velocity_mask[: len(rows)], rows, impedance * rows)
         return math.sqrt(self.comm.allreduce(float(scaled @ scaled)))
 
     def advance(self) -> float:
@@ -277,7 +265,7 @@ class Fluid:
         b.array[:] = self.right_side()
         try:
             with self.timer("solve"):
-                self._solve(matrix, b, x)
+                self.linear_iterations = self.linear_solver.solve(matrix, b, x, self.held)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         return self.update(x.array)
@@ -310,16 +298,9 @@ class Fluid:
         """The iterate of a steady flow is not yet where Newton's method converges."""
         return self.settings.steady and self.settings.convection and self._size > NEWTON_FROM * self._largest
 
-    def _solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        if self.krylov is None:
-            self.linear_iterations = self._direct.solve(matrix, b, x)
-        else:
-            self.linear_iterations = self.krylov.solve(matrix, b, x, self.held)
-
     def set_up_multigrid(self, preconditioner: PETSc.PC, matrix: PETSc.Mat) -> None:
         """Make a preconditioner a cycle of multigrid for the tangent (collective)."""
-        assert self.krylov is not None
-        self.krylov.multigrid.set_up(preconditioner, matrix, self.held)
+        self.linear_solver.multigrid.set_up(preconditioner, matrix, self.held)
 
     def _add(self, owned: Array) -> None:
         self.flow[: self.unknowns.owned] += owned
@@ -359,17 +340,20 @@ class Fluid:
 
     # ---------------------------------------------------------------------------------------------- reactions
 
+    def _vertices(self) -> dict[str, slice]:
+        """Of each body among those of all."""
+        starts = offsets([body.surface for body in self.bodies])
+        return {body.surface.name: slice(a, b) for body, a, b in zip(self.bodies, starts, starts[1:], strict=False)}
+
     def vertices_of(self, names: Sequence[str]) -> NDArray[np.int64]:
         """Numbers among all vertices of those of some bodies, in the order of the names."""
-        starts = offsets([body.surface for body in self.bodies])
-        place = {body.surface.name: range(a, b) for body, a, b in zip(self.bodies, starts, starts[1:], strict=False)}
-        return np.concatenate([np.asarray(place[name], dtype=np.int64) for name in names])
+        place = self._vertices()
+        return np.concatenate([np.arange(place[name].start, place[name].stop, dtype=np.int64) for name in names])
 
     def force(self) -> dict[str, Array]:
         """Force [N] (per depth in 2D) of the fluid on the vertices of each body, shape (n, dim) (collective)."""
         total = self.system.surface_force()
-        starts = offsets([body.surface for body in self.bodies])
-        return {body.surface.name: total[a:b] for body, a, b in zip(self.bodies, starts, starts[1:], strict=False)}
+        return {name: total[part] for name, part in self._vertices().items()}
 
     def interface_entries(self, surfaces: Sequence[str]) -> InterfaceEntries:
         """Derivatives of rows and force by the motion of some bodies (collective)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -15,6 +16,7 @@ from petsc4py import PETSc
 from solvers import linear
 from solvers.fluid.multigrid import Multigrid
 from solvers.fluid.space import Unknowns
+from solvers.lagged import Lagged, LaggedFactors
 
 Rung = Literal["multigrid", "ilu", "fill", "direct"]
 
@@ -70,16 +72,16 @@ def free_memory(comm: MPI.Comm) -> float:
     return float(comm.allreduce(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"), op=MPI.MIN))
 
 
-class FlowKrylov:
-    """Krylov method preconditioned with an earlier matrix of the step, as long as that serves.
+class FlowSolver:
+    """Solves with the solver that the ladder stands at, preconditioned with an earlier matrix of the step if possible.
 
     Nothing but the rung of the ladder is kept from step to step, so that resumed runs are the same.
     """
 
-    def __init__(self, unknowns: Unknowns, ladder: Ladder, tolerance: float):
+    def __init__(self, unknowns: Unknowns, ladder: Ladder, tolerance: float, *, steady: bool):
         self.ladder, self._unknowns, self._tolerance = ladder, unknowns, tolerance
-        self._ksp: PETSc.KSP | None = None
-        self._fresh = 0  #: iterations with the matrix that the preconditioner is made of
+        self._krylov = Lagged()
+        self._direct = LaggedFactors(ladder.comm, fresh=math.inf if steady else 1)
 
     @cached_property
     def multigrid(self) -> Multigrid:
@@ -88,43 +90,23 @@ class FlowKrylov:
 
     def begin_step(self) -> None:
         """The next matrix is one of another step."""
-        self._ksp = None
+        self._krylov.begin_step()
+        self._direct.begin_step()
 
     def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, held: NDArray[np.bool_]) -> int:
         """Solve matrix x = b; how many iterations that took. Raises LinearSolveFailed.
 
         held: owned unknowns whose rows are those of the identity.
         """
-        if self._ksp is not None:
+        while self.ladder.here != "direct":
             try:
-                linear.solve(self._ksp, matrix, b, x)
-            except linear.LinearSolveFailed:
-                self._ksp = None
-            else:
-                iterations = int(self._ksp.getIterationNumber())
-                if iterations > 2 * self._fresh:
-                    self._ksp = None
-                return iterations
-        while True:
-            try:
-                return self._solve_anew(matrix, b, x, held)
+                return self._krylov.solve(matrix, b, x, lambda matrix: self._create(matrix, held))
             except linear.LinearSolveFailed as failure:
                 self.ladder.climb(failure)
-
-    def _solve_anew(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, held: NDArray[np.bool_]) -> int:
-        x.set(0.0)
-        ksp = self._create(matrix, held)
-        linear.solve(ksp, matrix, b, x)
-        self._fresh = int(ksp.getIterationNumber())
-        if self.ladder.here != "direct":
-            ksp.getPC().setReusePreconditioner(True)
-            self._ksp = ksp
-        return self._fresh
+        return self._direct.solve(matrix, b, x)
 
     def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> PETSc.KSP:
         comm, rung = self.ladder.comm, self.ladder.here
-        if rung == "direct":
-            return linear.direct_solver(comm, linear.Task(3, self._unknowns.size(), False, self._tolerance))
         if rung != "multigrid":
             return linear.flow_solver(comm, tolerance=self._tolerance, fill=rung == "fill")
         ksp = linear.flexible_solver(comm, tolerance=self._tolerance)

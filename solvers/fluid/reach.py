@@ -27,11 +27,9 @@ def require_known(unknowns: Unknowns, cut: Cut, missing: NDArray[np.bool_]) -> N
 
     missing: local dofs without one.
     """
-    velocity = np.zeros(unknowns.local, dtype=bool)
-    velocity[unknowns.velocity.dofs] = True
     blocks = np.zeros(unknowns.local // unknowns.block_size, dtype=bool)
     blocks[unknowns.cell_blocks[np.concatenate([cut.uncut, cut.cut])]] = True
-    used = unknowns.expand(blocks) & velocity
+    used = unknowns.expand(blocks) & unknowns.velocity_mask
     if unknowns.grid.comm.allreduce(bool((used & missing).any()), op=MPI.LOR):
         reason = "a body moved farther in one step than the flow behind it is known: take a smaller time step"
         raise StepFailed("fluid", reason)

@@ -59,6 +59,8 @@ class Unknowns:
         self.cell_velocity: Dofs = np.stack(by_component[: self.dim], axis=2)
         self.cell_pressure: Dofs = by_component[self.dim]
         self.velocity, self.pressure = (self._nodes(some) for some in nodes)
+        self.velocity_mask = np.zeros(self.local, dtype=bool)  #: which local dofs are velocities
+        self.velocity_mask[self.velocity.dofs] = True
 
     # ------------------------------------------------------------------------------------------- nodes of the lattice
 

@@ -108,10 +108,7 @@ class Structure:
     def initialise(self, t: float, dt: float) -> None:
         """Initial displacement and velocity, and the acceleration that is in balance with the loads at t."""
         for body, u, v in zip(self.bodies, self.split(self.now.u), self.split(self.now.v), strict=True):
-            for target, value in (
-                (u, body.initial_displacement),
-                (v, body.initial_velocity),
-            ):
+            for target, value in ((u, body.initial_displacement), (v, body.initial_velocity)):
                 if value is not None:
                     target[:] = body.nodal(value, t)[: body.owned].ravel()
         for body, (_, moved) in zip(self.bodies, self._masses, strict=True):
