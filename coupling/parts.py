@@ -31,6 +31,7 @@ def couple(
     *,
     rigid_bodies: Sequence[ImmersedBody] = (),
     wetted: Mapping[str, Sequence[str]] = {},
+    start: float = 0.0,
     solver: SolverSettings = SolverSettings(),
     timer: Timer | None = None,
 ) -> Coupled:
@@ -38,7 +39,7 @@ def couple(
 
     grid: the box of cells around the bodies. patches: conditions on the faces of the box. rigid_bodies: others that the
     flow does not move. wetted: body -> names of the surfaces that the fluid touches; by default it touches all that is
-    neither in another body nor on the boundary of the box.
+    neither in another body nor on the boundary of the box, where the bodies are at the first time, `start` [s].
     """
     comm, bodies = structure.comm, structure.bodies
     surfaces = []
@@ -46,7 +47,7 @@ def couple(
         mesh = body.domain.source
         skin = comm.bcast(None if mesh is None else cut_out_skin(mesh, wetted.get(body.name)), root=0)
         surfaces.append(wetted_surface(bodies, index, skin))
-    immersed = immerse([surface.at_start for surface in surfaces], rigid_bodies, _box(grid))
+    immersed = immerse([surface.at_start for surface in surfaces], rigid_bodies, _box(grid), start)
     fluid = Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=comm)
     return Coupled(fluid, Elastic(structure, surfaces))
 
@@ -58,12 +59,13 @@ def couple_rigid(
     patches: Sequence[Patch],
     *,
     rigid_bodies: Sequence[ImmersedBody] = (),
+    start: float = 0.0,
     solver: SolverSettings = SolverSettings(),
     timer: Timer | None = None,
 ) -> Coupled:
     """Rigid bodies that the flow moves, for `Monolithic` or `Partitioned`; all else as in `couple` (collective)."""
     moved = [(Surface(body.name, body.facets, len(body.points)), body.points) for body in bodies.bodies]
-    immersed = immerse(moved, rigid_bodies, _box(grid), deform=False)
+    immersed = immerse(moved, rigid_bodies, _box(grid), start, deform=False)
     return Coupled(Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=bodies.comm), bodies)
 
 

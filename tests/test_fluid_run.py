@@ -9,9 +9,9 @@ import pytest
 from programs import fsci
 
 from fsci import shapes
-from fsci.builder.rigid_motion import rigid_motion
 from fsci.case import CaseError, load_case
 from fsci.case.fluid import Movement
+from fsci.case.rigid_motion import rigid_motion
 from fsci.meshes.mesh import place
 from fsci.plot.picture import plot_run
 from fsci.plot.scene import UPRIGHT

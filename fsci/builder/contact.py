@@ -9,9 +9,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from coupling.contact_surfaces import contact_surface
-from fsci.builder.rigid_motion import rigid_motion
 from fsci.case import Case, CaseError
 from fsci.case.contact import Pair as PairSettings
+from fsci.case.rigid_motion import rigid_motion
 from fsci.meshes.of_case import read_obstacle, read_rigid_body
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES

@@ -10,11 +10,11 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fsci.builder.columns import Numbers, columns
-from fsci.builder.rigid_motion import rigid_motion
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.fluid import Fluid as Section
 from fsci.case.probes import Reference
+from fsci.case.rigid_motion import rigid_motion
 from fsci.meshes.of_case import read_rigid_body, require_inside_period
 from solvers.fluid import probes
 from solvers.fluid.field import Fluid

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from fsci.builder.locations import Locations
 from fsci.case.structure import Body as Section
 from fsci.case.supports import Spring as SpringSection
 from fsci.case.supports import Support as SupportSection
+from fsci.meshes.locations import Locations
 from solvers.structure.body import Spring, Support, Symmetry
 from solvers.structure.loads import LineForce, PointForce, Pressure, Traction
 from solvers.structure.supports import Roller

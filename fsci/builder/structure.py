@@ -9,12 +9,12 @@ from mpi4py import MPI
 
 from fsci.builder.columns import Numbers, columns
 from fsci.builder.loads import build_loads
-from fsci.builder.locations import Locations, find_locations
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.probes import Probe
 from fsci.case.structure import Body as BodySettings
 from fsci.case.values import value_of
+from fsci.meshes.locations import Locations, find_locations
 from fsci.meshes.of_case import VECTORS, read_body
 from solvers.constraint import Constraint
 from solvers.mesh import Mesh

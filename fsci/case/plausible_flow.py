@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fsci.case.case import Case
 from fsci.case.fluid import Fluid, Movement, Patch
+from fsci.case.rigid_motion import rigid_motion
 from fsci.case.shapes import Shape
 from fsci.case.yaml_text import Keys
 from solvers.fluid.fast_bodies import MOST_CELLS
@@ -49,8 +50,6 @@ def _fast_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
 
 def fast_body(case: Case, fluid: Fluid, motion: Movement, points: NDArray[np.float64]) -> str | None:
     """Whether any of some points [m] of a body, shape (n, dim), crosses too many cells in a step."""
-    from fsci.builder.rigid_motion import rigid_motion
-
     smallest = np.array([float(np.diff(edges).min()) for edges in fluid.grid.planes])
     time = case.time
     moved, cells = rigid_motion(points, motion, time.start, time.step), 0.0

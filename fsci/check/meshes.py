@@ -13,13 +13,13 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.builder.rigid_motion import rigid_motion
 from fsci.builder.skin import find_skin
 from fsci.case import Case, CaseError
 from fsci.case.contact import Pair
 from fsci.case.errors import Problem
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import fast_body, thin_body
+from fsci.case.rigid_motion import rigid_motion
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body, require_inside_period, slave_surfaces
 from solvers.fluid.inside import PointInBody, require_outside
 from solvers.fluid.surface import Motion, Surface

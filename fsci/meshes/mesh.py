@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from fsci import shapes
 from fsci.meshes.files import MeshError, read_mesh, unknown
+from fsci.rotation import rotation_matrix
 from solvers.cell_types import CELL_TYPES
 from solvers.mesh import Mesh
 from solvers.mesh_topology import find_facets
 
-__all__ = ["MeshError", "build_mesh", "extract_region", "place", "require_region", "require_surface", "rotation_matrix"]
+__all__ = ["MeshError", "build_mesh", "extract_region", "place", "require_region", "require_surface"]
 
 
 def build_mesh(settings: Any, folder: Path) -> Mesh:
@@ -47,27 +48,15 @@ def place(mesh: Mesh, rotate: Any = None, translate: Sequence[float] | None = No
     points = mesh.points
     dim = points.shape[1]
     for rotation in rotate if isinstance(rotate, list | tuple) else [rotate] if rotate else []:
-        points = points @ rotation_matrix(getattr(rotation, "axis", None), rotation.angle, dim).T
+        try:
+            points = points @ rotation_matrix(getattr(rotation, "axis", None), rotation.angle, dim).T
+        except ValueError as error:
+            raise MeshError(str(error)) from None
     if translate is not None:
         if len(translate) != dim:
             raise MeshError(f"translate has {len(translate)} numbers, the mesh has {dim} dimensions")
         points = points + np.asarray(translate, dtype=float)
     return replace(mesh, points=points)
-
-
-def rotation_matrix(axis: Sequence[float] | None, angle: float, dim: int) -> NDArray[np.float64]:
-    """Matrix of the right-handed rotation by `angle` degrees about k: cos I + sin [k] + (1 - cos) k k^T."""
-    if axis is None and dim == 3:
-        raise MeshError("rotate: a mesh of three dimensions needs an axis")
-    k = np.array([0, 0, 1] if axis is None else axis, dtype=float)
-    if k.shape != (3,) or not k.any():
-        raise MeshError(f"rotate: the axis must be three numbers, not all zero, got {list(k)}")
-    if dim == 2 and k[:2].any():
-        raise MeshError("rotate: a mesh of two dimensions turns in its plane, give the angle only")
-    k /= np.linalg.norm(k)
-    cos, sin = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    cross = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
-    return (cos * np.eye(3) + sin * cross + (1 - cos) * np.outer(k, k))[:dim, :dim]
 
 
 def require_surface(mesh: Mesh, name: str) -> NDArray[np.int64]:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.builder.locations import find_locations
 from fsci.case import Case
 from fsci.case.checks import load_vectors
 from fsci.case.structure import NO_MIXED_SIMPLICES
+from fsci.meshes.locations import find_locations
 from fsci.meshes.mesh import MeshError, build_mesh, extract_region, require_surface
 from solvers.mesh import Mesh
 from solvers.mesh_topology import surface_facets

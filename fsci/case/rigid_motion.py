@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fsci.case.fluid import Movement, Turn
 from fsci.expression import Expression
-from fsci.meshes.mesh import rotation_matrix
+from fsci.rotation import rotation_matrix
 
 Array = NDArray[np.float64]
 Course = Callable[[float], tuple[float, float]]  #: t -> (value, its rate)
