@@ -5,6 +5,7 @@ r = D(d) - d is the residual of the interface. All arrays are whole on every pro
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 import numpy as np
@@ -146,3 +147,11 @@ class QuasiNewton:
         starts = ends - state["lengths"]
         self._steps = [(list(state["V"][a:b]), list(state["W"][a:b])) for a, b in zip(starts, ends, strict=True)]
         self._before = None
+
+
+#: Name in the case file -> accelerator, from the share of the first correction that is taken and the steps reused.
+ACCELERATORS: Mapping[str, Callable[[float, int], Accelerator]] = {
+    "iqn": QuasiNewton,
+    "aitken": lambda first, reuse: Aitken(first),
+    "constant": lambda first, reuse: Relaxation(first),
+}

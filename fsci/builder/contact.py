@@ -9,18 +9,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from coupling.contact_surfaces import contact_surface
+from fsci.builder.named import named
 from fsci.case import Case, CaseError
-from fsci.case.contact import Pair as PairSettings
 from fsci.case.rigid_motion import rigid_motion
 from fsci.meshes.of_case import read_obstacle, read_rigid_body
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
+from solvers.contact import law as laws
 from solvers.contact.contact import Contact
-from solvers.contact.law.coulomb import Coulomb
-from solvers.contact.law.frictionless import Frictionless
-from solvers.contact.law.law import Law
-from solvers.contact.law.tied import Tied
-from solvers.contact.law.tresca import Tresca
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
 from solvers.mesh_topology import cut_out
@@ -41,21 +37,12 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
             elif key not in found:
                 found[key] = contact_surface(bodies, side.body or "", *(side.on or ()))
             sides.append(found[key])
-        pairs.append(Pair(sides[0], sides[1], settings.integration, _law(settings)))
+        law = named(laws, settings.law)(*settings.law_parameters)
+        pairs.append(Pair(sides[0], sides[1], settings.integration, law))
     assert case.structure is not None
     moves = case.structure.dynamics is not None
     names = tuple(case.contact.pairs)
     return Contact(pairs, names=names, c_n=case.contact.c_n, keep_overlap=moves, comm=comm)
-
-
-def _law(settings: PairSettings) -> Law:
-    if settings.tied:
-        return Tied()
-    if settings.friction.coefficient is not None:
-        return Coulomb(settings.friction.coefficient)
-    if settings.friction.bound is not None:
-        return Tresca(settings.friction.bound)
-    return Frictionless()
 
 
 def _obstacle(case: Case, comm: MPI.Comm, name: str) -> Surface:

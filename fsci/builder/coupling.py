@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from coupling.accelerate import Accelerator, Aitken, QuasiNewton, Relaxation
+from coupling.accelerate import ACCELERATORS
 from coupling.coupled import Coupled
 from coupling.elastic import Elastic
 from coupling.interface import DrySide
@@ -69,7 +69,8 @@ def _scheme(case: Case, coupled: Coupled) -> Monolithic | Partitioned:
         return Monolithic(coupled, build_tolerance(case))
     settings = case.coupling
     tolerance = FixedPointTolerance(settings.tolerance, settings.tolerance_absolute, settings.max_iterations)
-    return Partitioned(coupled, _accelerator(case), tolerance)
+    accelerator = ACCELERATORS[settings.accelerator](settings.relaxation, settings.reuse)
+    return Partitioned(coupled, accelerator, tolerance)
 
 
 def start(case: Case, scheme: Monolithic | Partitioned, fluid: Fluid, t: float, dt: float) -> None:
@@ -104,11 +105,3 @@ def _dry_line(side: DrySide) -> Surface:
     vertices = np.arange(len(side.corners) + 2)
     segments = np.stack([vertices[:-1], vertices[1:]], axis=1)
     return Surface(side.name, segments, len(vertices), np.zeros(len(segments), dtype=bool))
-
-
-def _accelerator(case: Case) -> Accelerator:
-    assert case.coupling is not None
-    settings = case.coupling
-    if settings.accelerator == "iqn":
-        return QuasiNewton(settings.relaxation, settings.reuse)
-    return Aitken(settings.relaxation) if settings.accelerator == "aitken" else Relaxation(settings.relaxation)

@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from fsci.builder.columns import Numbers, columns
 from fsci.builder.loads import build_loads
+from fsci.builder.named import named
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.probes import Probe
@@ -19,33 +20,22 @@ from fsci.meshes.of_case import VECTORS, read_body
 from solvers.constraint import Constraint
 from solvers.mesh import Mesh
 from solvers.solver_settings import SolverSettings
-from solvers.structure import probes
+from solvers.structure import materials, probes
 from solvers.structure.body import Body
 from solvers.structure.dynamics import Damping, Dynamics
 from solvers.structure.elastic_constants import plane_stress_lambda
 from solvers.structure.field import Structure
 from solvers.structure.materials import (
-    CoupNeoHooke,
     LinearElastic,
     Material,
-    MooneyRivlin,
-    NeoHooke,
     PlaneStressLinearElastic,
     PlaneStressStVenantKirchhoff,
-    StVenantKirchhoff,
 )
 from solvers.structure.supports import SupportError
 from solvers.structure.time import Statics, TimeScheme
 from solvers.time import GeneralisedAlpha
 from solvers.timing import Timer
 from solvers.values import combine
-
-LAWS: dict[str, Callable[..., Material]] = {
-    "st_venant_kirchhoff": StVenantKirchhoff,
-    "neo_hooke": NeoHooke,
-    "coup_neo_hooke": CoupNeoHooke,
-    "mooney_rivlin": MooneyRivlin,
-}
 
 
 def build_bodies(case: Case, comm: MPI.Comm) -> list[Body]:
@@ -120,7 +110,7 @@ def _material(body: BodySettings, plane: str) -> Material:
         return law(mu, combine(plane_stress_lambda, mu, lmbda), density)
     if body.kinematics == "linear":
         return LinearElastic(mu, lmbda, density)
-    return LAWS[settings.law](*settings.parameters, density)
+    return named(materials, settings.law)(*settings.parameters, density)
 
 
 # ---------------------------------------------------------------------------------------------------------- probes

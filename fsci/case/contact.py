@@ -61,6 +61,21 @@ class Pair(Section):
     tied: bool = setting(False, "true: one body where they lie on each other at the start")
 
     @property
+    def law(self) -> str:
+        """Name of its law, of a file in solvers/contact/law/."""
+        if self.tied:
+            return "tied"
+        if self.friction.coefficient is not None:
+            return "coulomb"
+        return "frictionless" if self.friction.bound is None else "tresca"
+
+    @property
+    def law_parameters(self) -> tuple[float, ...]:
+        """The arguments of the law."""
+        given = () if self.tied else (self.friction.coefficient, self.friction.bound)
+        return tuple(value for value in given if value is not None)
+
+    @property
     def sides(self) -> tuple[tuple[str, Side], tuple[str, Side]]:
         """(setting, surface) of the slave and of the master."""
         if self.itself is not None:

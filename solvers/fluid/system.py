@@ -37,7 +37,7 @@ class FlowSettings:
     viscosity: float  #: [Pa s]
     element: Literal["q1q1", "q2q1"] = "q1q1"
     convection: bool = True  #: False: Stokes
-    scheme: Literal["steady", "backward_euler", "bdf2"] | TimeScheme = "bdf2"
+    scheme: str | TimeScheme = "bdf2"  #: one of `SCHEMES`, or another
     body_force: Sequence[Value] | None = None  #: [N/m^3]
     initial_velocity: Sequence[Value] | None = None  #: [m/s]
     penalties: forms.Penalties = forms.Penalties()

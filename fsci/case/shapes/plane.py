@@ -107,3 +107,6 @@ class Ring(Plane):
     @property
     def thickness(self) -> float:
         return self.outer_radius - self.inner_radius
+
+
+PlaneShape = Rectangle | Disc | Ring

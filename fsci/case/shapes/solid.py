@@ -251,3 +251,6 @@ class Sphere(Solid):
     @property
     def thickness(self) -> float:
         return 2 * self.radius
+
+
+SolidShape = Box | Beam | Cylinder | Tube | SolidTorus | HollowTorus | HollowSphere | Sphere
