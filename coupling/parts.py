@@ -14,7 +14,7 @@ from solvers.fluid.field import Fluid
 from solvers.fluid.grid import Grid
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.patches import Patch
-from solvers.fluid.surface import Surface
+from solvers.fluid.surface import ImmersedSurface
 from solvers.fluid.system import FlowSettings
 from solvers.rigid.field import RigidBodies
 from solvers.skin import cut_out_skin
@@ -64,7 +64,7 @@ def couple_rigid(
     timer: Timer | None = None,
 ) -> Coupled:
     """Rigid bodies that the flow moves, for `Monolithic` or `Partitioned`; all else as in `couple` (collective)."""
-    moved = [(Surface(body.name, body.facets, len(body.points)), body.points) for body in bodies.bodies]
+    moved = [(ImmersedSurface(body.name, body.facets, len(body.points)), body.points) for body in bodies.bodies]
     immersed = immerse(moved, rigid_bodies, _box(grid), start, deform=False)
     return Coupled(Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=bodies.comm), bodies)
 

@@ -13,7 +13,7 @@ from solvers.api import Array
 from solvers.blocks import Layout
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.inside import winding
-from solvers.fluid.surface import Motion, Surface
+from solvers.fluid.surface import ImmersedSurface, Motion
 from solvers.skin import Skin
 from solvers.structure.body import Body
 
@@ -35,9 +35,9 @@ class WettedSurface:
     wet: NDArray[np.bool_] | None = None  #: facets that the fluid touches; None: found by `find_wet`
 
     @property
-    def at_start(self) -> tuple[Surface, Array]:
+    def at_start(self) -> tuple[ImmersedSurface, Array]:
         """The surface in the flow, and positions of its vertices [m]."""
-        return Surface(self.name, self.facets, len(self.points), self.wet), self.points
+        return ImmersedSurface(self.name, self.facets, len(self.points), self.wet), self.points
 
 
 def wetted_surface(bodies: Sequence[Body], index: int, skin: Skin) -> WettedSurface:
@@ -48,7 +48,7 @@ def wetted_surface(bodies: Sequence[Body], index: int, skin: Skin) -> WettedSurf
 
 
 def immerse(
-    moved: Sequence[tuple[Surface, Array]],
+    moved: Sequence[tuple[ImmersedSurface, Array]],
     given: Sequence[ImmersedBody],
     box: tuple[Array, Array],
     t: float = 0.0,
@@ -66,7 +66,7 @@ def immerse(
     return found + [ImmersedBody(surface, None, deforms=deform) for surface in wet[len(given) :]]
 
 
-def find_wet(surfaces: Sequence[tuple[Surface, Array]], box: tuple[Array, Array]) -> list[Surface]:
+def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]], box: tuple[Array, Array]) -> list[ImmersedSurface]:
     """Surfaces, given with the positions of their vertices [m], with the facets marked that the fluid touches.
 
     It does not touch facets in other bodies, where bodies are one piece, nor those on the box's boundary. What a

@@ -27,8 +27,8 @@ def locate(mesh: Mesh, point: Array) -> tuple[int, Array] | None:
     extent = float(np.ptp(mesh.points, axis=0).max())
     nodes = (mesh.points[mesh.cells] - point) / extent
     low, high = nodes.min(axis=1), nodes.max(axis=1)
-    room = BULGE[CELL_TYPES[mesh.cell_type].degree] * (high - low).max(axis=1, keepdims=True) + TOLERANCE
-    near = np.flatnonzero(((low - room <= 0.0) & (high + room >= 0.0)).all(axis=1))
+    margin = BULGE[CELL_TYPES[mesh.cell_type].degree] * (high - low).max(axis=1, keepdims=True) + TOLERANCE
+    near = np.flatnonzero(((low - margin <= 0.0) & (high + margin >= 0.0)).all(axis=1))
     if not len(near):
         return None
     reference, missed = _pull_back(mesh.cell_type, nodes[near])

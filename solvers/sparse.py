@@ -42,8 +42,8 @@ class Sparse:
         if inner != other.shape[0]:
             raise ValueError(f"shapes do not fit: {self.shape} @ {other.shape}")
         left, right = (self.indptr, self.indices), (other.indptr, other.indices)
-        room = compiled.csr_matmat_maxnnz(rows, columns, *left, *right)
-        data, indices, indptr = _empty(rows, room)
+        capacity = compiled.csr_matmat_maxnnz(rows, columns, *left, *right)
+        data, indices, indptr = _empty(rows, capacity)
         compiled.csr_matmat(rows, columns, *left, self.data, *right, other.data, indptr, indices, data)
         return _trimmed(data, indices, indptr, (rows, columns))
 
@@ -213,6 +213,6 @@ def _empty(rows: int, entries: int) -> tuple[Array, Indices, Indices]:
 
 
 def _trimmed(data: Array, indices: Indices, indptr: Indices, shape: tuple[int, int]) -> Sparse:
-    """The room that no entry has taken given back."""
+    """The capacity that no entry has taken given back."""
     used = int(indptr[-1])
     return Sparse(data[:used], indices[:used], indptr, shape)

@@ -14,7 +14,7 @@ from solvers.fluid.field import Fluid
 from solvers.fluid.grid import Grid
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.patches import Patch
-from solvers.fluid.surface import Motion, Surface
+from solvers.fluid.surface import ImmersedSurface, Motion
 from solvers.fluid.system import FlowSettings
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
@@ -79,7 +79,7 @@ def body(name: str, points, facets, *, motion=None, velocity=0.0, wet=None) -> I
     Without a motion, t -> (positions, velocities), it rests, its surface moving in itself by `velocity`.
     """
     points = np.ascontiguousarray(points, dtype=float)
-    surface = Surface(name, np.asarray(facets, dtype=np.int64), len(points), wet)
+    surface = ImmersedSurface(name, np.asarray(facets, dtype=np.int64), len(points), wet)
     if motion is None:
         slip = np.zeros_like(points) + velocity
         return ImmersedBody(surface, lambda t: Motion(points, slip), rests=True)

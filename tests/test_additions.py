@@ -27,7 +27,7 @@ from solvers.contact import Contact, Frictionless, Pair
 from solvers.fluid.grid import uniform
 from solvers.fluid.patch_kinds import PatchKind
 from solvers.fluid.patches import Patch
-from solvers.fluid.surface import Surface
+from solvers.fluid.surface import ImmersedSurface
 from solvers.fluid.time import Difference, TimeScheme
 from solvers.march import march
 from solvers.mesh import Mesh
@@ -268,7 +268,7 @@ def test_kind_of_body():
     points, facets = block([0.31, 0.32], [0.57, 0.66])
     patches = [Patch("in", ("x-",), "velocity", (1.0, 0.0)), SIDES, Patch("out", ("x+",), "outflow")]
     settings = {"solver": SolverSettings(TIGHT.newton, "direct"), "dt": 0.1}
-    moved = [(Surface("block", facets, len(points)), points)]
+    moved = [(ImmersedSurface("block", facets, len(points)), points)]
     immersed = immerse(moved, [], (np.zeros(2), np.ones(2)), deform=False)
     still = Still(points)
     alone = make_fluid(

@@ -8,7 +8,7 @@ import pytest
 from coupling import accelerate
 from coupling.monolithic import Monolithic
 from coupling.partitioned import FixedPointTolerance, Partitioned
-from solvers.fluid.interface import Interface
+from solvers.fluid.interface import InterfaceTerms
 from solvers.structure.field import Structure
 from tests.coupling_setup import TIGHT, post_in_flow
 
@@ -68,8 +68,8 @@ def test_a_load_of_the_step_before_shows(scheme, monkeypatch):
 
 def test_a_wrong_force_of_the_fluid_shows_in_its_momentum(monkeypatch):
     """A hundredth more than the fluid's own equations say; the structure takes it, and balances."""
-    right = Interface.force
-    monkeypatch.setattr(Interface, "force", lambda *arguments: 1.01 * right(*arguments))
+    right = InterfaceTerms.force
+    monkeypatch.setattr(InterfaceTerms, "force", lambda *arguments: 1.01 * right(*arguments))
     force, momentum, _, _, given, _ = advance("partitioned", post_in_flow(E=1e5), 2)
     total = np.array([np.linalg.norm(vertices.sum(axis=0)) for vertices in given])
     assert momentum == pytest.approx(total * 0.01 / 1.01, rel=1e-6)

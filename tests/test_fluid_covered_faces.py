@@ -78,8 +78,8 @@ def test_outflow_of_a_face_without_cover_is_that_of_the_form(side):
     points, rule = gauss(8)
     reference = np.stack([points, np.full(8, float(side))], axis=1)
     whole = CoveredFaces(fluid.grid, unknowns, cells, 1, side, reference, np.tile(rule / 3.0, (len(cells), 1)))
-    carried = 1.3 * whole.velocity(fluid.velocity())
-    blocks, dofs = whole.outflow(MU, carried), unknowns.cell_velocity[cells]
+    mass_flux = 1.3 * whole.velocity(fluid.velocity())
+    blocks, dofs = whole.outflow(MU, mass_flux), unknowns.cell_velocity[cells]
     found = np.zeros_like(expected)
     np.add.at(found, dofs, np.einsum("caibk,cbk->cai", blocks, fluid.flow[dofs]))
     assert np.abs(expected).max() > 0.1

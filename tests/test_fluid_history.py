@@ -8,7 +8,7 @@ from solvers.api import StepFailed
 from solvers.fluid.grid import uniform
 from solvers.fluid.history import Past
 from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.surface import Motion, Surface
+from solvers.fluid.surface import ImmersedSurface, Motion
 from solvers.fluid.time import Step
 
 VELOCITY, DT = field(2.0, 0.0), 0.01
@@ -17,7 +17,7 @@ VELOCITY, DT = field(2.0, 0.0), 0.01
 def carried():
     """A block that another field moves with the flow, in a flow that does not notice it."""
     points, facets = block([0.23, 0.32], [0.57, 0.66])
-    body = ImmersedBody(Surface("block", facets, len(points)), motion=None)
+    body = ImmersedBody(ImmersedSurface("block", facets, len(points)), motion=None)
     fluid = make_fluid(
         uniform([0, 0], [1, 1], [20, 20]), [wall(VELOCITY)], [body], dt=DT, initial_velocity=VELOCITY, mu=0.1
     )

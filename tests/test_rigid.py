@@ -10,7 +10,7 @@ from solvers.march import march
 from solvers.newton import Tolerance
 from solvers.rigid import motion
 from solvers.rigid.body import RigidBody, Spring
-from solvers.rigid.contact import Contact, Obstacle, Pair
+from solvers.rigid.contact import Obstacle, RigidContact, RigidPair
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.inertia import Inertia, inertia_of_surface
 from solvers.rigid.rotation import rotation, skew, vector_rate
@@ -212,7 +212,7 @@ FLOOR = Obstacle("floor", np.array([[5.0, -1.0], [-5.0, -1.0]]), np.array([[0, 1
 
 
 def falling_square(rho_inf=1.0, restitution=0.0, **settings) -> RigidBodies:
-    contact = Contact([Pair(0, 4, FLOOR)], 3, restitution=restitution)
+    contact = RigidContact([RigidPair(0, 4, FLOOR)], 3, restitution=restitution)
     return field(square(gravity=(0.0, -10.0), **settings), rho_inf=rho_inf, contact=contact)
 
 
@@ -247,7 +247,7 @@ def test_a_tilted_square_topples_onto_its_side():
     body = RigidBody(
         "square", points, turned.facets, inertia_of_surface(points, turned.facets, 3.0), gravity=(0.0, -10.0)
     )
-    bodies = field(body, rho_inf=0.5, contact=Contact([Pair(0, 4, FLOOR)], 3))
+    bodies = field(body, rho_inf=0.5, contact=RigidContact([RigidPair(0, 4, FLOOR)], 3))
     for _ in march(bodies, 2.0, 200):
         assert (points + bodies.displacement())[:, 1].min() > -1.0 - 1e-8
     heights = np.sort((points + bodies.displacement())[:, 1])

@@ -16,7 +16,7 @@ from solvers.fluid.system import FlowSettings
 from solvers.march import march
 from solvers.newton import Tolerance
 from solvers.rigid.body import RigidBody, Spring
-from solvers.rigid.contact import Contact, Obstacle, Pair
+from solvers.rigid.contact import Obstacle, RigidContact, RigidPair
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.inertia import inertia_of_surface
 from solvers.solver_settings import SolverSettings
@@ -156,7 +156,7 @@ def test_a_rigid_disc_lands_in_a_flow():
     lowest = {}
     for name, make in SCHEMES.items():
         floor = Obstacle("floor", np.array([[1.0, 0.25], [0.0, 0.25]]), np.array([[0, 1]]))
-        contact = Contact([Pair(0, 24, floor)], 3)
+        contact = RigidContact([RigidPair(0, 24, floor)], 3)
         coupled = swimming("backward_euler", 0.0, patches=OPEN, mu=0.05, contact=contact, gravity=(0.0, -10.0))
         for _ in march(make(coupled), 0.3, 15):
             height = coupled.solid.displacement()[:, 1] + coupled.solid.bodies[0].points[:, 1]

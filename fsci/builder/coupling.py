@@ -25,7 +25,7 @@ from fsci.case.coupling_checks import closed_in
 from fsci.meshes.of_case import require_inside_period
 from solvers.fluid.field import Fluid
 from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.surface import Surface
+from solvers.fluid.surface import ImmersedSurface
 from solvers.rigid.field import RigidBodies
 from solvers.skin import Skin
 from solvers.structure.body import Body
@@ -56,7 +56,7 @@ def build_coupled_rigid(
 ) -> tuple[Monolithic | Partitioned, Fluid]:
     """The same for rigid bodies that the flow moves. Raises CaseError (collective)."""
     assert case.fluid is not None
-    moved = [(Surface(body.name, body.facets, len(body.points)), body.points) for body in bodies.bodies]
+    moved = [(ImmersedSurface(body.name, body.facets, len(body.points)), body.points) for body in bodies.bodies]
     box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
     immersed = immerse(moved, build_rigid_bodies(case, comm), box, case.time.start, deform=False)
     fluid = build_fluid(case, comm, timer, immersed)
@@ -100,8 +100,8 @@ def _dry_side(surface: WettedSurface, corners: Array) -> DrySide:
     return DrySide(f"{surface.name}.dry_side", surface.name, find_ends(surface.facets), corners)
 
 
-def _dry_line(side: DrySide) -> Surface:
+def _dry_line(side: DrySide) -> ImmersedSurface:
     """Its segments, which fluid never touches."""
     vertices = np.arange(len(side.corners) + 2)
     segments = np.stack([vertices[:-1], vertices[1:]], axis=1)
-    return Surface(side.name, segments, len(vertices), np.zeros(len(segments), dtype=bool))
+    return ImmersedSurface(side.name, segments, len(vertices), np.zeros(len(segments), dtype=bool))

@@ -22,7 +22,7 @@ from fsci.case.plausible_flow import fast_body, thin_body
 from fsci.case.rigid_motion import rigid_motion
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body, require_inside_period, slave_surfaces
 from solvers.fluid.inside import PointInBody, require_outside
-from solvers.fluid.surface import Motion, Surface
+from solvers.fluid.surface import ImmersedSurface, Motion
 from solvers.locate import locate
 from solvers.mesh import Mesh
 from solvers.mesh_topology import signed_volumes, surface_facets
@@ -195,7 +195,7 @@ def _rigid(case: Case, found: Findings) -> None:
         found.attempt(partial(require_inside_period, case, keys, x))
         if isinstance(body.mesh, FileMesh):
             _against_grid(case, found, keys, mesh, moves=body.motion is not None)
-        surfaces.append(Surface(name, facets, len(x)))
+        surfaces.append(ImmersedSurface(name, facets, len(x)))
         motions.append(Motion(x, np.zeros_like(x)))
     for key, setting, at in points:
         try:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.fluid.interface import Interface
+from solvers.fluid.interface import InterfaceTerms
 from solvers.fluid.shape import shape_derivatives
 from solvers.fluid.space import Unknowns
 from solvers.vertices import Entries
@@ -30,7 +30,7 @@ class InterfaceEntries:
 
 
 def interface_entries(
-    operator: Interface,
+    operator: InterfaceTerms,
     unknowns: Unknowns,
     flow: Array,
     alpha: float,

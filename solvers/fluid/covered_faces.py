@@ -60,10 +60,10 @@ class CoveredFaces:
         weighted = self.weights[:, :, None] * traction
         return self.unknowns.cell_velocity[self.cells], np.einsum("qa,cqi->cai", shapes, weighted)
 
-    def outflow(self, mu: float, carried: Array) -> Array:
+    def outflow(self, mu: float, mass_flux: Array) -> Array:
         """d/du of the outflow's form over the wet part [Pa s m^(dim-2)], shape (cells, functions, dim, functions, dim).
 
-        -<mu (grad u)^T n, v> - <min(0, rho a . n) u, v> / 2; carried: rho a at the points, shape (cells, points, dim).
+        -<mu (grad u)^T n, v> - <min(0, rho a . n) u, v> / 2; mass_flux: rho a at the points, (cells, points, dim).
         """
         shapes, slopes = fem.tabulate_lagrange(self.grid.domain, self.unknowns.degree, self.reference)
         slopes = slopes / self.grid.sizes[self.cells][:, None, None, :]
@@ -71,7 +71,7 @@ class CoveredFaces:
         block = np.zeros((cells, functions, dim, functions, dim))
         normal = 1.0 if self.side else -1.0
         block[..., self.axis] = -mu * normal * np.einsum("cq,qa,cqbi->caib", w, shapes, slopes)
-        back = 0.5 * np.minimum(0.0, self.outward(carried))
+        back = 0.5 * np.minimum(0.0, self.outward(mass_flux))
         mass = np.einsum("cq,qa,qb->cab", w * back, shapes, shapes)
         for i in range(dim):
             block[:, :, i, :, i] -= mass
@@ -115,10 +115,10 @@ def _covered(
     """(the covered ones of the faces of local cells, which of the cells they belong to)."""
     axis, side = "xyz".index(face[0]), int(face[1] == "+")
     points = gauss(points_per_direction)[0]
-    places = np.unravel_index(grid.numbers[cells], grid.grid.shape, order="F")
+    indices = np.unravel_index(grid.numbers[cells], grid.grid.shape, order="F")
     others = [i for i in range(grid.dim) if i != axis]
     shape = [grid.grid.shape[i] for i in others]
-    number = np.ravel_multi_index([places[i] for i in others], shape, order="F")
+    number = np.ravel_multi_index([indices[i] for i in others], shape, order="F")
     row = np.full(int(np.prod(shape)), -1)
     row[found.cells] = np.arange(len(found.cells))
     touched = np.flatnonzero(row[number] >= 0)

@@ -166,7 +166,7 @@ class Fluid:
 
     def predict(self) -> None:
         """Let the velocity go on as in the last step, where it was known before that too."""
-        if len(self.current.difference.beta) < 2:
+        if len(self.current.difference.beta) < 2 or not self.history.steps:
             return
         old, older = self.history.past[:2]
         continued = old.found & older.found

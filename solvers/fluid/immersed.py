@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.fluid.surface import Motion, Surface
+from solvers.fluid.surface import ImmersedSurface, Motion
 
 
 @dataclass(frozen=True)
 class ImmersedBody:
     """A surface in the flow; `motion` gives its vertices at a time, None if another field moves it."""
 
-    surface: Surface
+    surface: ImmersedSurface
     motion: Callable[[float], Motion] | None
     rests: bool = False  #: it never moves
     deforms: bool = False  #: its volume may change
@@ -35,7 +35,7 @@ def rigid_body(
     motion: t [s] -> (positions [m], velocities [m/s]) of the vertices, each of shape (n, dim); None: it rests.
     """
     points = np.ascontiguousarray(points, dtype=float)
-    surface = Surface(name, np.asarray(facets, dtype=np.int64), len(points))
+    surface = ImmersedSurface(name, np.asarray(facets, dtype=np.int64), len(points))
     if motion is None:
         return ImmersedBody(surface, lambda t: Motion(points, np.zeros_like(points)), rests=True)
     given = motion

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.fluid.surface import Motion, Surface, together
+from solvers.fluid.surface import ImmersedSurface, Motion, together
 
 #: winding number above which a point is in a body; in a dent of the surface it is more than 0.5
 INSIDE = 1.0 - 1e-6
@@ -18,7 +18,7 @@ class PointInBody(ValueError):
     """There is no fluid at a probe's point."""
 
 
-def require_outside(x: Array, surfaces: Sequence[Surface], motions: Sequence[Motion]) -> None:
+def require_outside(x: Array, surfaces: Sequence[ImmersedSurface], motions: Sequence[Motion]) -> None:
     """Raises PointInBody if the point x [m] is in one of the bodies."""
     facets, motion = together(surfaces, motions, len(x))
     if winding(x, motion, facets) > INSIDE:

@@ -27,7 +27,7 @@ from solvers.fluid.weights import Weights
 CouplingBlocks = tuple[Array, Array]
 
 
-class Interface:
+class InterfaceTerms:
     """The operators of one cut, over the pieces in cells that this process owns."""
 
     def __init__(self, grid: DistributedGrid, unknowns: Unknowns, rule: Weights, cut: Cut, mu: float, penalty: Array):

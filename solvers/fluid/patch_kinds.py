@@ -80,7 +80,7 @@ PATCH_KINDS: Mapping[str, PatchKind] = {
     ),
     "outflow": PatchKind(
         open=True, form=_outflow, depends_on_flow=True,
-        slope=lambda faces, mu, carried: faces.outflow(mu, carried),
+        slope=lambda faces, mu, mass_flux: faces.outflow(mu, mass_flux),
     ),
     "periodic": PatchKind(periodic=True),
 }  # fmt: skip

@@ -40,8 +40,8 @@ def require_within_period(unknowns: Unknowns, cut: Cut) -> None:
     grid = unknowns.grid
     changed = cut.fraction < 1.0 - NOTHING
     changed[np.concatenate([cut.cut, cut.strip])] = True
-    places = np.unravel_index(grid.numbers[changed], grid.grid.shape, order="F")
+    indices = np.unravel_index(grid.numbers[changed], grid.grid.shape, order="F")
     for axis in unknowns.periodic:
-        at_end = np.isin(places[axis], [0, grid.grid.shape[axis] - 1]).any()
+        at_end = np.isin(indices[axis], [0, grid.grid.shape[axis] - 1]).any()
         if grid.comm.allreduce(bool(at_end), op=MPI.LOR):
             raise StepFailed("fluid", f"a body reaches the periodic faces {'xyz'[axis]}- and {'xyz'[axis]}+")

@@ -15,11 +15,11 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.api import Array
-from solvers.fluid.interface import CouplingBlocks, Interface
+from solvers.fluid.interface import CouplingBlocks, InterfaceTerms
 
 
-def shape_derivatives(interface: Interface, flow: Array) -> tuple[CouplingBlocks, Array]:
-    """(dr/dd, df/dd) by pieces, as `Interface` has them; `flow` at local dofs."""
+def shape_derivatives(interface: InterfaceTerms, flow: Array) -> tuple[CouplingBlocks, Array]:
+    """(dr/dd, df/dd) by pieces, as `InterfaceTerms` has them; `flow` at local dofs."""
     at, n, mu, P = interface, interface.n, interface.mu, interface.penalty
     u, p = flow[at.u], flow[at.p]
     area = at.psi.sum(axis=(1, 2))
@@ -28,13 +28,13 @@ def shape_derivatives(interface: Interface, flow: Array) -> tuple[CouplingBlocks
     pressure = np.einsum("pa,pa,p->p", p, at.psi.sum(axis=2), share)
     grad_p = np.einsum("pa,paj,p->pj", p, at.pressure_slope, share)
 
-    carried = P @ grad_u
-    rows_u = np.einsum("pav,pkj->pakvj", at.phi, carried)
+    penalised = P @ grad_u
+    rows_u = np.einsum("pav,pkj->pakvj", at.phi, penalised)
     rows_u -= mu * np.einsum("pav,pkj->pakvj", at.normal_slope, grad_u)
     rows_u -= mu * np.einsum("pavj,pk->pakvj", at.grad @ grad_u[:, None], n)
     rows_p = -np.einsum("pav,pj->pavj", at.psi, np.einsum("pi,pij->pj", n, grad_u))
 
-    field = n[:, :, None] * grad_p[:, None, :] + carried
+    field = n[:, :, None] * grad_p[:, None, :] + penalised
     stress = pressure[:, None, None] * np.eye(at.dim) - mu * (grad_u + np.swapaxes(grad_u, 1, 2))
     turned = np.einsum("pil,plvj->pivj", stress, _normal_derivative(at.x, n))
     load = np.einsum("pbv,pij->pbivj", at.mass_of_pieces, field) + np.einsum(

@@ -12,7 +12,7 @@ from solvers.api import Array
 
 
 @dataclass(frozen=True)
-class Surface:
+class ImmersedSurface:
     """One body's surface; the right-hand normal of each facet points out of the solid."""
 
     name: str
@@ -29,7 +29,9 @@ class Motion:
     v: Array  #: velocities [m/s], shape (n, dim)
 
 
-def together(surfaces: Sequence[Surface], motions: Sequence[Motion], dim: int) -> tuple[NDArray[np.int64], Motion]:
+def together(
+    surfaces: Sequence[ImmersedSurface], motions: Sequence[Motion], dim: int
+) -> tuple[NDArray[np.int64], Motion]:
     """All surfaces as one: (facets, motion), vertices of one surface after those of the other."""
     if not surfaces:
         return np.empty((0, dim), dtype=np.int64), Motion(np.empty((0, dim)), np.empty((0, dim)))
@@ -38,12 +40,12 @@ def together(surfaces: Sequence[Surface], motions: Sequence[Motion], dim: int) -
     return facets, Motion(np.concatenate([m.x for m in motions]), np.concatenate([m.v for m in motions]))
 
 
-def wetness(surfaces: Sequence[Surface]) -> NDArray[np.bool_]:
+def wetness(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_]:
     """Which facets of all surfaces the fluid touches."""
     parts = [np.ones(len(s.facets), dtype=bool) if s.wet is None else s.wet for s in surfaces]
     return np.concatenate([*parts, np.empty(0, dtype=bool)])
 
 
-def offsets(surfaces: Sequence[Surface]) -> NDArray[np.int64]:
+def offsets(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.int64]:
     """First vertex of each surface among all, and their number."""
     return np.concatenate([[0], np.cumsum([s.vertices for s in surfaces])]).astype(np.int64)

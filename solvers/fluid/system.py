@@ -18,7 +18,7 @@ from solvers.fluid import forms
 from solvers.fluid.cell_forms import cell_forms
 from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
-from solvers.fluid.interface import Interface
+from solvers.fluid.interface import InterfaceTerms
 from solvers.fluid.matrix import Pattern, choose_pattern, create_matrix, fits, pattern_of
 from solvers.fluid.outer_faces import OuterFaces
 from solvers.fluid.patches import Boundary
@@ -96,7 +96,7 @@ class FlowSystem:
         self._pattern: Pattern | None = None
         self._penalised: NDArray[np.int32] | None = None  #: faces that the ghost penalty is assembled for
         self.cut: Cut | None = None
-        self._interface: Interface | None = None
+        self._interface: InterfaceTerms | None = None
         self._current = False  #: weights, interface and ghost penalty are those of cut and scales
 
     def _terms(self) -> forms.Flow:
@@ -208,7 +208,7 @@ class FlowSystem:
         return matrix
 
     @property
-    def interface(self) -> Interface:
+    def interface(self) -> InterfaceTerms:
         """Terms of the surfaces on the present cut (collective)."""
         self._follow()
         assert self._interface is not None
@@ -224,7 +224,9 @@ class FlowSystem:
         if self.with_bodies:
             penalty = self._interface_penalties(cut.pieces, cut)
             self.weights.set(cut, penalty)
-            self._interface = Interface(self.grid, self.unknowns, self.weights, cut, self.settings.viscosity, penalty)
+            self._interface = InterfaceTerms(
+                self.grid, self.unknowns, self.weights, cut, self.settings.viscosity, penalty
+            )
         if not self._same_faces(cut):
             self._penalised = cut.ghost_faces
             self._ghost.zeroEntries()

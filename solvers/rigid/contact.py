@@ -85,7 +85,7 @@ def _nearest(x: Array, facet: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Pair:
+class RigidPair:
     """Vertices of one body, by its number, and an obstacle."""
 
     body: int
@@ -93,10 +93,10 @@ class Pair:
     obstacle: Obstacle
 
 
-class Contact:
+class RigidContact:
     """All pairs; arrays over all vertices of one pair after those of the other, shape (m,)."""
 
-    def __init__(self, pairs: Sequence[Pair], unknowns: int, *, restitution: float = 0.0):
+    def __init__(self, pairs: Sequence[RigidPair], unknowns: int, *, restitution: float = 0.0):
         self.pairs, self.restitution = list(pairs), restitution
         count = sum(pair.vertices for pair in pairs)
         self.z = np.zeros(count)  #: pressures [N]

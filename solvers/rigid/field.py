@@ -14,11 +14,12 @@ from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.newton import Tolerance, converge
 from solvers.rigid import motion
 from solvers.rigid.body import RigidBody, in_space
-from solvers.rigid.contact import Contact
+from solvers.rigid.contact import RigidContact
 from solvers.rigid.motion import Instant
 from solvers.rigid.rotation import vector_rate
 from solvers.rounding import rounding_error
 from solvers.rows import RowTransformation, TakenRows
+from solvers.step import Step
 from solvers.time import GeneralisedAlpha
 from solvers.timing import Timer
 from solvers.vertices import VertexJacobian
@@ -45,7 +46,7 @@ class RigidBodies:
         scheme: GeneralisedAlpha = GeneralisedAlpha.from_rho_inf(1.0),
         tolerance: Tolerance = Tolerance(),
         *,
-        contact: Contact | None = None,
+        contact: RigidContact | None = None,
         timer: Timer | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ):
@@ -63,7 +64,7 @@ class RigidBodies:
         self._forces = [np.zeros((len(body.points), self.dim)) for body in bodies]  #: on the vertices [N]
         self._u, self._last = np.zeros((len(bodies), 6)), np.zeros((len(bodies), 6))
         self._held_u = np.zeros((len(bodies), 6))  #: increments of the held ways in this step
-        self._t, self._dt = 0.0, 0.0
+        self.current = Step(0.0, 0.0)  #: the step that is computed now or was last
         free = np.ones((len(bodies), 6), dtype=bool)
         for index, body in enumerate(bodies):
             free[index, body.held_ways] = False
@@ -86,9 +87,9 @@ class RigidBodies:
             start = Instant.at_rest()
             load = body.own_load(t, start.shift, start.R, v[:3], v[3:])
             rate, ways, h = load.copy(), body.held_ways, 1e-3 * dt
-            places = [body.held_at(t + k * h) for k in range(4)]
-            v[ways] = (-3.0 * places[0] + 4.0 * places[1] - places[2]) / (2.0 * h)
-            course = (2.0 * places[0] - 5.0 * places[1] + 4.0 * places[2] - places[3]) / h**2
+            x = [body.held_at(t + k * h) for k in range(4)]
+            v[ways] = (-3.0 * x[0] + 4.0 * x[1] - x[2]) / (2.0 * h)
+            course = (2.0 * x[0] - 5.0 * x[1] + 4.0 * x[2] - x[3]) / h**2
             rate[ways] = np.diag(motion.mass(body, start.R))[ways] * course
             self.now[index] = Instant(start.shift, start.R, v, rate, load)
         self.old = list(self.now)
@@ -104,7 +105,7 @@ class RigidBodies:
     def begin_step(self, t: float, dt: float) -> None:
         """Remember the state at t; held ways are where they will be at t + dt."""
         self.old, self.on_surface_old = list(self.now), self.on_surface.copy()
-        self._t, self._dt, self._noise = t + dt, dt, None
+        self.current, self._noise = Step(t + dt, dt), None
         self._u[:] = self._held_u[:] = 0.0
         for u, body in zip(self._held_u, self.bodies, strict=True):
             u[body.held_ways] = body.held_at(t + dt) - body.held_at(t)
@@ -112,7 +113,7 @@ class RigidBodies:
 
     def predict(self, t: float) -> None:
         """Free ways go on with their velocity."""
-        u, way = self._held_u.copy(), self._dt * self._velocity(self.old)
+        u, way = self._held_u.copy(), self.current.dt * self._velocity(self.old)
         u[:, self.ways] += np.where(self._free, way, 0.0).reshape(len(u), -1)
         self._place(u)
 
@@ -120,7 +121,7 @@ class RigidBodies:
         """Go to the increments u since the start of the step, shape (bodies, 6)."""
         self._u = u
         self.now = [
-            motion.moved(body, self.scheme, old, part, self._t, self._dt)
+            motion.moved(body, self.scheme, old, part, self.current.t, self.current.dt)
             for body, old, part in zip(self.bodies, self.old, u, strict=True)
         ]
 
@@ -153,7 +154,7 @@ class RigidBodies:
             for some, by_flow in ((self.now, self.on_surface), (self.old, self.on_surface_old))
         )
         pushed = np.linalg.solve(mass, weight * force + (1.0 - weight) * force_before)
-        without = np.where(self._free, before + self._dt * pushed, self._velocity(self.now))
+        without = np.where(self._free, before + self.current.dt * pushed, self._velocity(self.now))
         velocity, rate = self.contact.after_impact(mass, before, without, force)
         rate = np.where(self._free, rate, self._of_ways(np.array([now.p for now in self.now])))
         for index, now in enumerate(self.now):
@@ -171,10 +172,8 @@ class RigidBodies:
 
     def _positions(self) -> list[Array]:
         """Of the vertices [m], by body, shape (n, dim)."""
-        places = zip(self.bodies, self.now, strict=True)
-        return [
-            body.inertia.centre + (now.shift + body.arms(now.R, body.points))[:, : self.dim] for body, now in places
-        ]
+        pairs = zip(self.bodies, self.now, strict=True)
+        return [body.inertia.centre + (now.shift + body.arms(now.R, body.points))[:, : self.dim] for body, now in pairs]
 
     def displacement(self) -> Array:
         """Of all vertices [m], shape (n, dim)."""
@@ -257,7 +256,7 @@ class RigidBodies:
         if self.contact is None:
             return self._norm(self._balance)
         arms = [body.arms(now.R, body.points) for body, now in zip(self.bodies, self.now, strict=True)]
-        self.contact.measure(self._positions(), arms, self.ways, self._t)
+        self.contact.measure(self._positions(), arms, self.ways, self.current.t)
         self.contact.G[:, ~self._free] = 0.0
         self.contact.press(self._system(), -self._balance)
         return self._norm(self._balance - self.contact.force)
@@ -271,8 +270,8 @@ class RigidBodies:
         found, n, weight = np.zeros((self.unknowns, self.unknowns)), len(self.ways), self.force_weight
         parts = zip(self.bodies, self.old, self.now, self._u, self._forces, strict=True)
         for index, (body, old, now, u, force) in enumerate(parts):
-            own = motion.inertia_tangent(body, self.scheme, old, now, u[3:], self._dt)
-            rate = motion.velocity_rate(self.scheme, old, now, u[3:], self._dt)
+            own = motion.inertia_tangent(body, self.scheme, old, now, u[3:], self.current.dt)
+            rate = motion.velocity_rate(self.scheme, old, now, u[3:], self.current.dt)
             own -= weight * body.own_load_tangent(now.shift, now.R, now.v[:3], motion.spin(now), rate)
             arms = body.arms(now.R, body.points)
             turned = arms.T @ in_space(force)  # sum of [f] [r] = r f^T - (f . r) 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import ufl
@@ -62,7 +63,11 @@ class Body:
         self.stiffness_degree, self.mass_degree = CELL_TYPES[domain.cell_type].quadrature
         self.density = self._parameter(material.density)
         self.parameters = {k: self._parameter(p) for k, p in parameters(material).items()}
-        self._compile()
+        self.element = self._element(fem.volume_measure(domain, self.stiffness_degree))
+        self._energy, self._internal, self._tangent, self._mass = self._compiled()
+        self._force = fem.function(self.space)
+        gradient = forms.deformation_gradient(self.u)
+        self._jacobian = fem.compile_expression(ufl.det(gradient), fem.reference_nodes(domain))
         self._dead = DeadLoads(domain, self.space, self.nodes[: self.owned])
         if body_force:
             self._dead.add_volume(body_force)
@@ -123,22 +128,17 @@ class Body:
             return Mixed(self.domain, self.u, self.material, self.parameters, dx)
         return Displacement(self.material, self.parameters)
 
-    def _compile(self) -> None:
+    def _compiled(self) -> Sequence[Any]:
+        """Energy, internal force, its tangent and the mass."""
         v, du = ufl.TestFunction(self.space), ufl.TrialFunction(self.space)
         dx = fem.volume_measure(self.domain, self.stiffness_degree)
-        mass_dx = fem.volume_measure(self.domain, self.mass_degree)
-        self.element = self._element(dx)
         wanted = [
             forms.stored_energy(self.u, self.element, dx),
             forms.internal_force(self.u, self.element, v, dx),
             forms.tangent(self.u, self.element, v, du, dx),
-            forms.inertia(du, v, self.density, mass_dx),
+            forms.inertia(du, v, self.density, fem.volume_measure(self.domain, self.mass_degree)),
         ]
-        compiled = fem.compile_forms(wanted, f"body '{self.name}'")
-        self._energy, self._internal, self._tangent, self._mass = compiled
-        self._force = fem.function(self.space)
-        nodes = fem.reference_nodes(self.domain)
-        self._jacobian = fem.compile_expression(ufl.det(forms.deformation_gradient(self.u)), nodes)
+        return fem.compile_forms(wanted, f"body '{self.name}'")
 
     # ------------------------------------------------------------------------------------------------- state
 
