@@ -13,6 +13,8 @@ from pathlib import Path
 
 from ruamel.yaml import YAML
 
+from fsci.bench.small import CHANNEL, COLUMN
+
 BEAM = """\
 time: {step: 0.1, end: 0.1}
 structure:
@@ -79,23 +81,11 @@ probes:
   out: {field: fluid, quantity: flow_rate, through: outlet}
 """
 
+COARSE = (("[20, 10]", "[10, 5]"), ("*min(t/0.1, 1)", ""), ("cells: [3, 5]", "cells: [2, 3]"))
+
 POST = """\
 time: {step: 0.02, end: 0.02, retry: {halvings: 1}}
-fluid:
-  density: 1
-  viscosity: 0.05
-  grid: {from: [0, 0], to: [2, 1], cells: [10, 5]}
-  patches:
-    inlet: {on: x-, velocity: ["4*y*(1 - y)", 0]}
-    outlet: {on: x+, outflow: true}
-    walls: {on: [y-, y+], no_slip: true}
-structure:
-  dynamics: {rho_inf: 0.8}
-  bodies:
-    post:
-      mesh: {shape: rectangle, size: [0.23, 0.41], origin: [0.62, 0], cells: [2, 3]}
-      material: {law: st_venant_kirchhoff, E: 1000, nu: 0.3, density: 10}
-      supports: [{on: bottom, displacement: [0, 0]}]
+CHANNEL
 contact:
   obstacles:
     wall: {mesh: {shape: rectangle, size: [0.1, 1], cells: [1, 1], origin: [0.86, 0]}, on: left}
@@ -105,7 +95,9 @@ coupling: {scheme: monolithic}
 probes:
   tip: {quantity: displacement, at: [0.735, 0.41]}
   force: {quantity: force}
-"""
+""".replace("CHANNEL\n", CHANNEL + COLUMN)
+for _fine, _coarse in COARSE:
+    POST = POST.replace(_fine, _coarse)
 
 CASES = (BEAM, PRESS, FLOW, POST)
 

@@ -4,6 +4,7 @@ NUMBERS were computed with DOLFINx 0.5.2, PETSc 3.18 and Open MPI 4.1. Newton's 
 """
 
 import pytest
+from coupled_case import post
 from programs import fsci
 
 from fsci.run.history import read_history
@@ -74,31 +75,7 @@ probes:
 solver: {newton: {residual: 1.0e-12}}
 """
 
-POST = """\
-title: a post in a channel
-time: {step: 0.02, end: 0.06}
-fluid:
-  density: 1
-  viscosity: 0.05
-  grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
-  patches:
-    inlet: {on: x-, velocity: ["4*y*(1 - y)*min(t/0.1, 1)", 0]}
-    outlet: {on: x+, outflow: true}
-    walls: {on: [y-, y+], no_slip: true}
-structure:
-  dynamics: {rho_inf: 0.8}
-  bodies:
-    post:
-      mesh: {shape: rectangle, size: [0.23, 0.41], origin: [0.62, 0], cells: [3, 5]}
-      material: {law: st_venant_kirchhoff, E: 1000, nu: 0.3, density: 10}
-      supports: [{on: bottom, displacement: [0, 0]}]
-COUPLING
-probes:
-  tip: {quantity: displacement, at: [0.735, 0.41]}
-  force: {quantity: force}
-  outflow: {quantity: flow_rate, through: outlet}
-solver: {newton: {residual: 1.0e-11}}
-"""
+SOLVER = "solver: {newton: {residual: 1.0e-11}}\n"
 
 WALL = """\
 coupling: {scheme: monolithic}
@@ -113,9 +90,9 @@ CASES = {
     "pressed": PRESSED,
     "flow q1q1": FLOW.replace("ELEMENT", "q1q1"),
     "flow q2q1": FLOW.replace("ELEMENT", "q2q1"),
-    "post monolithic": POST.replace("COUPLING", "coupling: {scheme: monolithic}"),
-    "post partitioned": POST.replace("COUPLING", "coupling: {scheme: partitioned, tolerance: 1.0e-10}"),
-    "stopped post": POST.replace("COUPLING", WALL),
+    "post monolithic": post(0.06, rest=SOLVER),
+    "post partitioned": post(0.06, "coupling: {scheme: partitioned, tolerance: 1.0e-10}\n", SOLVER),
+    "stopped post": post(0.06, WALL, SOLVER),
 }
 
 #: case -> column of history.csv -> value at the end

@@ -40,8 +40,7 @@ contact:
     floor: {slave: {body: block, on: bottom}, master: {obstacle: floor}}
 """
 
-FLOW = """\
-time: {step: 0.02, end: 1}
+CHANNEL = """\
 fluid:
   density: 1
   viscosity: 0.05
@@ -52,12 +51,14 @@ fluid:
     walls: {on: [y-, y+], no_slip: true}
 """
 
+FLOW = "time: {step: 0.02, end: 1}\n" + CHANNEL
+
 DISC = """\
   bodies:
     disc: {mesh: {shape: disc, radius: 0.2, cells: [16, 2], translate: [0.78, 0.51]}}
 """
 
-POST = """\
+COLUMN = """\
 structure:
   dynamics: {rho_inf: 0.8}
   bodies:
@@ -65,8 +66,9 @@ structure:
       mesh: {shape: rectangle, size: [0.23, 0.41], origin: [0.62, 0], cells: [3, 5]}
       material: {law: st_venant_kirchhoff, E: 1000, nu: 0.3, density: 10}
       supports: [{on: bottom, displacement: [0, 0]}]
-coupling: {scheme: monolithic}
 """
+
+POST = COLUMN + "coupling: {scheme: monolithic}\n"
 
 #: what -> (case, step [s])
 CASES = {
