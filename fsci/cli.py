@@ -103,6 +103,15 @@ def _parser() -> argparse.ArgumentParser:
     report = command(_report, "write one page of a run: pictures, curves, balances, verification, time")
     report.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
 
+    explain = command(_explain, "say why a step failed, or where the time of a run went")
+    explain.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
+    explain.add_argument(
+        "--replay",
+        metavar="FOLDER",
+        type=Path,
+        help="make a folder from which fsci resume computes the failed step alone",
+    )
+
     bench = command(_bench, "measure run time against error, in a copy of the repository")
     bench.add_argument("names", metavar="NAME", nargs="*", help="which benchmark, 'all', or none: list them")
     bench.add_argument("-o", "--out", metavar="FILE", type=Path, help="write the results as JSON")
@@ -221,6 +230,16 @@ def _report(options: argparse.Namespace) -> int:
         print(write_report(options.out))
     except (OSError, ValueError, RuntimeError) as error:
         return _fail(f"fsci report: {error}")
+    return 0
+
+
+def _explain(options: argparse.Namespace) -> int:
+    from fsci.explain.explain import explain
+
+    try:
+        print(explain(options.out, options.replay))
+    except (OSError, ValueError) as error:
+        return _fail(f"fsci explain: {error}")
     return 0
 
 

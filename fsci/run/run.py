@@ -301,7 +301,8 @@ class Run:
         clock = self.clock
         if self.root:
             with self.stop.files:
-                write_checkpoint(self.out / "failure", self.good | {"clock": clock.save()}, self.good_at)
+                state = self.good | {"clock": clock.save(), "record": self.record.save()}
+                write_checkpoint(self.out / "failure", state, self.good_at)
         message = f"step {clock.step + 1} from time {clock.time:g} failed with dt = {clock.dt:.3g}: {failure}"
         return self._end("failed", message)
 

@@ -1,0 +1,1 @@
+"""Why a step failed or a run is slow: `fsci explain`."""

@@ -1,0 +1,78 @@
+"""What to try: from the reason of a failure and the course of its residuals, or from where the time of a run went."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from fsci.case import Case
+from fsci.explain.residuals import Course
+
+#: part of a reason -> what to try
+REASONS = {
+    "inverted": (
+        "a smaller time.step: the load or the motion of a step is too large for the elements",
+        "a finer mesh, or rounder corners, where the element is",
+    ),
+    "out of all proportion": ("supports or weak springs: a static body that nothing holds has no solution",),
+    "goes in circles": (
+        "a smaller time.step",
+        "slave and master exchanged: the slave should be the softer or the finer side",
+        "a finer slave surface at the edge of the contact zone",
+    ),
+    "moved farther in one step": ("a smaller time.step: a body should cross less than two cells in a step",),
+    "periodic faces": ("a longer box, or an earlier time.end",),
+    "did not agree": (
+        "coupling.scheme=monolithic",
+        "coupling.accelerator=iqn, or a larger coupling.max_iterations",
+    ),
+    "not a number": ("a smaller time.step", "loads and inflow that grow from zero, as ramp(t, 0, 0.5) does"),
+    "singular": ("supports or weak springs: a body that nothing holds has no solution in statics",),
+    "linear solver": ("solver.linear.method=direct", "solver.linear.tolerance=1e-6"),
+}
+
+#: course of the residuals -> what it means, what to try
+COURSES = {
+    "not finite": ("the residual is not a number: it cannot be evaluated at the last iterate", ()),
+    "diverges": ("the residuals grow", ("a smaller time.step", "loads that grow from zero: ramp(t, 0, 0.5)")),
+    "oscillates": (
+        "the residuals go up and down: the active set or an interface changes from iterate to iterate",
+        ("a smaller time.step", "a finer slave surface, or slave and master exchanged"),
+    ),
+    "stagnates": (
+        "the residuals do not fall any more: rounding error, or a kink in a law or an expression",
+        ("solver.newton.residual_absolute at the size where they stay", "expressions without kinks"),
+    ),
+}
+
+
+def of_failure(reason: str, course: Course, residuals: tuple[float, ...], case: Case) -> Iterator[str]:
+    """Suggestions for a failed step."""
+    for part, words in REASONS.items():
+        if part in reason:
+            yield from words
+    if course.kind in COURSES and "did not converge" in reason:
+        yield from COURSES[course.kind][1]
+    goal = case.solver.newton.residual * max(residuals, default=0.0)
+    more = course.remaining(residuals[-1], goal) if residuals else None
+    if more is not None:
+        most = case.solver.newton.max_iterations + more
+        yield f"solver.newton.max_iterations={most}: at this rate it takes {more} iterations more"
+
+
+def of_run(summary: Mapping[str, Any]) -> Iterator[str]:
+    """Suggestions for a run that is slow. The bounds are shares from which a part dominates."""
+    steps, newton, wall = summary["steps"], summary["newton"], summary["wall"]
+    if steps["retried"] > 0.1 * steps["accepted"]:
+        yield "a smaller time.step: more than a tenth of the steps were repeated with half of it"
+    if newton["total"] > 8 * max(steps["accepted"], 1):
+        yield "a smaller time.step: more than 8 Newton iterations per step are rarely worth it"
+    share = {name: seconds / wall["total"] for name, seconds in wall.items() if name != "total" and wall["total"]}
+    if share.get("output", 0.0) > 0.2:
+        yield "output.fields_every=10: writing fields takes more than a fifth of the time"
+    if share.get("start", 0.0) > 0.5:
+        yield "nothing: more than half of the time is the start, of which forms are compiled only once"
+    if share.get("solve", 0.0) > 0.6 and summary["processes"] == 1:
+        yield "mpirun -n 2: linear systems take more than 60 % of the time"
+    if share.get("contact", 0.0) > 0.4:
+        yield "integration: elements in the contact pairs, or smaller slave surfaces: contact takes more than 40 %"

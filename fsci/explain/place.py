@@ -1,0 +1,60 @@
+"""What is at the place of a failure: body, node, cell, its fields, and the contact pairs of that body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsci.case import Case
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The node of the written fields nearest to a place."""
+
+    part: str  #: body, or fluid
+    node: int
+    cell: int
+    distance: float  #: [m]
+    values: dict[str, NDArray[np.float64]]  #: point fields there
+
+
+def nearest_node(fields: Path, where: Sequence[float]) -> Nearest | None:
+    """The nearest node of all parts in a folder of fields, in the undeformed bodies; None without fields."""
+    import meshio
+
+    point = np.pad(np.asarray(where, dtype=float), (0, 3 - len(where)))
+    found: list[Nearest] = []
+    for path in sorted(fields.glob("*.vtu")):
+        mesh = meshio.read(path)
+        displacement = mesh.point_data.get("displacement", np.zeros_like(mesh.points))
+        distances = np.linalg.norm(mesh.points - displacement - point, axis=1)
+        if len(distances) == 0 or np.all(np.isnan(distances)):
+            continue
+        node = int(np.nanargmin(distances))
+        cells = [row for block in mesh.cells for row in block.data]
+        cell = next((number for number, nodes in enumerate(cells) if node in nodes), -1)
+        values = {name: np.asarray(data[node], dtype=float) for name, data in mesh.point_data.items()}
+        found.append(Nearest(path.stem.rpartition("_")[0], node, cell, float(distances[node]), values))
+    return min(found, key=lambda one: one.distance, default=None)
+
+
+def pairs_of(case: Case, body: str) -> list[str]:
+    """The contact pairs of the case file that a body takes part in."""
+    pairs = {} if case.contact is None else case.contact.pairs
+    return [name for name, pair in pairs.items() if body in (pair.sides[0][1].body, pair.sides[1][1].body)]
+
+
+def describe(near: Nearest, case: Case) -> list[str]:
+    """Lines that say what is there."""
+    lines = [f"nearest node   {near.node} of {near.part}, in its cell {near.cell}, {near.distance:.3g} m away"]
+    for name, value in near.values.items():
+        numbers = ", ".join(f"{component:.4g}" for component in np.atleast_1d(value))
+        lines.append(f"  {name:17s} {numbers}")
+    if pairs := pairs_of(case, near.part):
+        lines.append(f"contact pairs  {', '.join(pairs)}")
+    return lines

@@ -1,0 +1,62 @@
+"""How an iteration went, from its residuals: kind, rate and a curve in text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from statistics import median
+from typing import Literal
+
+Kind = Literal["none", "not finite", "diverges", "stagnates", "oscillates", "converges"]
+
+WINDOW = 6  #: last iterations that decide
+GROWTH = 10.0  #: of the residual over its least value that is called divergence
+STILL = 0.9  #: rate from which an iteration stagnates
+WIDTH = 40  #: characters of the largest bar
+
+
+@dataclass(frozen=True)
+class Course:
+    """The course of an iteration."""
+
+    kind: Kind
+    rate: float = math.nan  #: median of r_(k+1) / r_k over the last iterations
+
+    def remaining(self, residual: float, goal: float) -> int | None:
+        """Iterations until the goal at this rate, if it converges: log(goal / residual) / log(rate)."""
+        if self.kind != "converges" or not 0.0 < goal < residual:
+            return None
+        return math.ceil(math.log(goal / residual) / math.log(self.rate))
+
+
+def course(residuals: Sequence[float]) -> Course:
+    """What the last iterations did."""
+    if len(residuals) < 2:
+        return Course("none")
+    if not all(math.isfinite(r) for r in residuals):
+        return Course("not finite")
+    last = residuals[-WINDOW:]
+    ratios = [after / before for before, after in pairwise(last) if before > 0]
+    rate = median(ratios) if ratios else 0.0
+    turns = sum((a > 1) != (b > 1) for a, b in pairwise(ratios))
+    if residuals[-1] > GROWTH * min(residuals):
+        return Course("diverges", rate)
+    if len(ratios) > 2 and turns >= len(ratios) - 2 and max(ratios) > 1:
+        return Course("oscillates", rate)
+    return Course("stagnates" if rate > STILL else "converges", rate)
+
+
+def curve(residuals: Sequence[float]) -> list[str]:
+    """A line for each iteration: number, residual, and a bar that is longer by a step for each power of ten."""
+    finite = [r for r in residuals if math.isfinite(r) and r > 0]
+    if not finite:
+        return [f"  {number:3d}  {r:9.2e}" for number, r in enumerate(residuals)]
+    low, high = math.log10(min(finite)), math.log10(max(finite))
+    span = max(high - low, 1.0)
+    lines = []
+    for number, r in enumerate(residuals):
+        share = (math.log10(r) - low) / span if math.isfinite(r) and r > 0 else 0.0
+        lines.append(f"  {number:3d}  {r:9.2e}  {'#' * round(1 + share * (WIDTH - 1))}")
+    return lines

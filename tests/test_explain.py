@@ -1,0 +1,122 @@
+"""`fsci explain`: a step that fails is named with place, residuals and remedies, and can be computed alone."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+from programs import fsci
+from small_cases import PLATE
+
+from fsci.case import load_case
+from fsci.explain import advice
+from fsci.explain.residuals import course, curve
+
+#: steps that have a solution until half the time is over, and one whose load turns elements inside out
+HEAVY = PLATE.replace('"1e-6*t"', '"where(t > 0.5, -50, 0.01*t)"').replace("time: {", "time: {retry: {halvings: 1}, ")
+
+
+@pytest.fixture(scope="module")
+def failed(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("heavy")
+    (folder / "case.yaml").write_text("title: a plate\n" + HEAVY)
+    done = fsci("run", folder, "-o", folder / "out")
+    assert done.returncode == 1, done.stdout + done.stderr
+    return folder / "out"
+
+
+def test_a_failed_step(failed):
+    done = fsci("explain", failed)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    what = json.loads((failed / "failure" / "failure.json").read_text())
+    assert lines[0] == "a plate: failed"
+    assert "steps          3, 1 repeated; " in lines[1]
+    assert "failed step    4, from time 0.5 with dt 0.1" in lines
+    assert "field          structure" in lines
+    assert f"reason         {what['reason']}, at iteration {what['iteration']}" in lines
+    assert any(line.startswith("nearest node   ") and "of plate, in its cell " in line for line in lines)
+    assert len([line for line in lines if line.startswith("try ")]) >= 1
+    assert lines[-1] == f"to compute the step alone: fsci explain {failed} --replay FOLDER"
+
+
+def test_the_failed_step_alone(failed, tmp_path):
+    """It fails in the same way, with the same residuals; with a load that is as before it does not."""
+    what = json.loads((failed / "failure" / "failure.json").read_text())
+    done = fsci("explain", failed, "--replay", tmp_path / "alone")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1].endswith(f"fsci resume {tmp_path / 'alone'}")
+    assert fsci("resume", tmp_path / "alone").returncode == 1
+    again = json.loads((tmp_path / "alone" / "failure" / "failure.json").read_text())
+    assert json.dumps(again) == json.dumps(what), "nan is not equal to itself"
+    case = load_case(tmp_path / "alone")
+    assert (case.time.step, case.time.end) == (what["dt"], what["time"] + what["dt"])
+    text = (tmp_path / "alone" / "case.yaml").read_text()
+    (tmp_path / "alone" / "case.yaml").write_text(text.replace("-50", "0.005"))
+    assert fsci("resume", tmp_path / "alone").returncode == 0
+    assert fsci("explain", failed, "--replay", tmp_path / "alone").returncode == 2, "a folder that exists stays"
+
+
+def test_a_run_that_did_not_fail(tmp_path):
+    (tmp_path / "case.yaml").write_text("title: a plate\n" + PLATE)
+    assert fsci("run", tmp_path, "-o", tmp_path / "out").returncode == 0
+    lines = fsci("explain", tmp_path / "out").stdout.splitlines()
+    assert lines[0] == "a plate: finished"
+    assert sum(line.startswith("slow step ") for line in lines) == 3
+    done = fsci("explain", tmp_path / "out", "--replay", tmp_path / "alone")
+    assert (done.returncode, done.stderr) == (2, "fsci explain: there is no failed step to replay\n")
+    done = fsci("explain", tmp_path)
+    assert done.stderr == f"fsci explain: '{tmp_path}' has no summary.json: no run has ended there\n"
+
+
+@pytest.mark.parametrize(
+    ("residuals", "kind"),
+    [
+        ((), "none"),
+        ((1.0, math.nan), "not finite"),
+        ((1.0, 1e-2, 1e-4, 1e-8), "converges"),
+        ((1.0, 0.5, 2.0, 40.0), "diverges"),
+        ((1.0, 1e-3, 9.9e-4, 9.8e-4, 9.9e-4, 9.85e-4, 9.84e-4), "stagnates"),
+        ((1.0, 0.5, 1.1, 0.4, 1.2, 0.5, 1.0), "oscillates"),
+    ],
+)
+def test_courses(residuals, kind):
+    assert course(residuals).kind == kind
+
+
+def test_iterations_that_are_missing():
+    """Residuals 1, 1/2, 1/4, 1/8 need 10 more iterations to 1e-4: 2^-13 is the first below."""
+    found = course((1.0, 0.5, 0.25, 0.125))
+    assert found.rate == pytest.approx(0.5)
+    assert found.remaining(0.125, 1.1e-4) == math.ceil(math.log(1.1e-4 / 0.125) / math.log(0.5)) == 11
+    assert course((1.0, 30.0)).remaining(30.0, 1.0) is None
+
+
+def test_the_curve_is_logarithmic():
+    lengths = [line.count("#") for line in curve((1.0, 1e-2, 1e-4))]
+    assert lengths in ([40, 20, 1], [40, 21, 1])
+    assert curve((1.0, math.nan))[1].split() == ["1", "nan", "#"]
+
+
+def test_what_to_try(tmp_path):
+    (tmp_path / "case.yaml").write_text("title: a plate\n" + PLATE)
+    case = load_case(tmp_path)
+    slow = (1.0, 0.5, 0.25, 0.125)
+    words = list(advice.of_failure("Newton did not converge in 25 iterations", course(slow), slow, case))
+    assert words == ["solver.newton.max_iterations=49: at this rate it takes 24 iterations more"]
+    for reason, remedies in advice.REASONS.items():
+        assert list(advice.of_failure(f"so {reason} it is", course(()), (), case)) == list(remedies)
+    run = {
+        "steps": {"accepted": 10, "retried": 3},
+        "newton": {"total": 100},
+        "wall": {"total": 10.0, "output": 3.0, "solve": 6.5, "start": 0.1},
+        "processes": 1,
+    }
+    assert [text.split(":")[0] for text in advice.of_run(run)] == [
+        "a smaller time.step",
+        "a smaller time.step",
+        "output.fields_every=10",
+        "mpirun -n 2",
+    ]
