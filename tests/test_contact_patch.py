@@ -138,6 +138,28 @@ def test_irregular_quadrilaterals(cell_type):
     check(structure, contact, exact, pressure, nodes=slave_nodes(contact), tolerance=1e-6)
 
 
+@pytest.mark.parametrize("cell_type", ["hexahedron", "hexahedron27"])
+def test_irregular_quadrilaterals_with_more_points(cell_type):
+    """What is missing is quadrature: a plane cut into ever more facets has ever more cells of integration."""
+    F, pressure, _ = pressed(3, STRETCH)
+    exact = deformation(F)
+    supports = [Support("top", (None, None, exact[2])), Support("left", (exact[0], None, None))]
+    supports += [Support("front", (None, exact[1], None))]
+    errors = []
+    for n in (1, 4, 16):
+        body = make_body("block", brick(cell_type, 2, [1.0, 1.0, 0.5], [0.0] * 3, 0.15), supports=supports)
+        x, y = np.meshgrid(np.linspace(-0.31, 1.33, n + 1), np.linspace(-0.27, 1.29, n + 1), indexing="ij")
+        node = np.arange(x.size).reshape(x.shape)
+        quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)
+        plane = Surface("plane", np.stack([x, y, 0.0 * x], axis=-1).reshape(-1, 3), quads, "quad", None)
+        structure, contact = make_contact([body], [(("block", "bottom"), plane)])
+        solve_step(structure)
+        errors.append(np.abs(pressures(contact) / pressure - 1.0).max())
+    assert errors[0] < 1e-5
+    assert errors[2] < 1e-8
+    assert errors[2] < 0.03 * errors[0]
+
+
 @pytest.mark.parametrize("cell_type", ["quad", "triangle", "hexahedron", "tetra", "quad9"])
 @pytest.mark.parametrize("slave", ["upper", "lower"])
 def test_slave_nodes_held_entirely(cell_type, slave):

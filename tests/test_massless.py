@@ -149,12 +149,15 @@ def exact_tip(t):
     return np.interp(t, [0, 1, 2, 3], [0.5, 0, 0, 0.5])
 
 
-@pytest.mark.parametrize(("steps_per_cell", "until"), [(1.4, 3.0), (2.5, 1.6)])
-def test_bar_impact(steps_per_cell, until):
+@pytest.mark.parametrize(
+    ("steps_per_cell", "until", "most", "ringing"), [(1.4, 3.0, 0.525, 0.001), (2.5, 1.6, 0.8, 0.06)]
+)
+def test_bar_impact(steps_per_cell, until, most, ringing):
     """The pressure is 1/2 throughout: no overshoot, no ringing, nothing gained, hardly anything lost.
 
     steps_per_cell: in which a wave crosses a cell. With many, waves of a few cells' length run ahead of the one that
-    comes back from the other end; overshoot and ringing are those `until` they arrive.
+    comes back from the other end: `until` they arrive the bounds are sharp. Over the whole contact the pressure is at
+    most `most` (measured 0.52 and 0.77), its standard deviation below `ringing` (0.0004 and 0.058).
     """
     (t, tip, force, energy), structure, _ = bar(40, 1.0 / 40.0 / steps_per_cell)
     body, touching = structure.bodies[0], (t > 1.1) & (t < 1.9)
@@ -164,6 +167,8 @@ def test_bar_impact(steps_per_cell, until):
     assert force[t < until].max() < 0.5 * 1.05
     assert force[touching].mean() == pytest.approx(0.5, rel=0.04)
     assert force[touching & (t < until)].std() < 0.002
+    assert force.max() < most
+    assert force[touching].std() < ringing
     assert not force[(t < 0.9) | (t > 2.1)].any()
     # the stress at the free end is relieved at the start, and next to nothing is gained afterwards
     assert energy.max() < energy[0] * (1 + 1e-4) < 0.125

@@ -9,6 +9,7 @@ from structure_setup import constant
 from fsci.case import CaseError, load_case
 from fsci.run.history import read_history
 from fsci.run.run import FINISHED, run_case
+from solvers.contact import ties
 from solvers.contact.law.tied import Tied
 from solvers.structure.body import Support
 
@@ -45,6 +46,24 @@ def test_patch(slave, master):
     # integrands on irregular quadrilaterals are no polynomials: the rule for segments is exact to 3e-10
     assert displacement_error(structure, exact) < (1e-9 if slave == "hexahedron" else 1e-10)
     assert info.iterations <= 6
+
+
+def test_integrals_of_a_tie_are_made_once(monkeypatch):
+    """They change with the redistribution only: one product for all evaluations of all steps."""
+    made, expand = [], ties.expand
+    monkeypatch.setattr(ties, "expand", lambda matrix, dim: made.append(1) or expand(matrix, dim))
+    exact = affine(2)
+    bodies = [
+        make_body(
+            name, brick("quad", n, [1.0, 0.5], [0.0, low]), supports=[Support(far, exact), Support("left", exact)]
+        )
+        for name, n, low, far in (("lower", 3, 0.0, "bottom"), ("upper", 2, 0.5, "top"))
+    ]
+    structure, _ = make_contact(bodies, [(("lower", "top"), ("upper", "bottom"))], law=Tied())
+    structure.initialise(0.0, 1.0)
+    iterations = [solve_step(structure, float(step), first=False).iterations for step in range(2)]
+    assert sum(iterations) >= 4
+    assert len(made) == 1
 
 
 #: Two rings, one around the other, in meshes that do not match, turn together.

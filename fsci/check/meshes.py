@@ -117,25 +117,8 @@ def _elastic(case: Case, found: Findings) -> None:
         if case.coupling is not None:
             _wet(case, found, keys, mesh)
     _one_dimension(case, found)
-    _sharp_edges(case, found)
     if not found.problems:
         found.attempt(partial(_tied, case, found.meshes))
-
-
-def _sharp_edges(case: Case, found: Findings) -> None:
-    """Doubts about slaves, of meshes that were read."""
-    for name, pair in {} if case.contact is None else case.contact.pairs.items():
-        where, side = pair.sides[0]
-        if pair.tied or side.body not in found.meshes:
-            continue
-        from fsci.check.edges import SHARP, sharpest_edge
-
-        angle = sharpest_edge(found.meshes[side.body], side.on or ())
-        if angle > SHARP:
-            found.warnings.append(
-                f"{case.place('contact', 'pairs', name, where)}: the surface has edges of {angle:.0f} degrees; contact "
-                "at their nodes takes a mean normal, which can give energy: name the faces apart, or round the edges"
-            )
 
 
 def _tied(case: Case, meshes: dict[str, Mesh]) -> None:

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
-from solvers.contact.blocked import find_blocked
 from solvers.contact.condense import Condensed, Linearised, condense, recover
-from solvers.contact.coverage import Coverage
+from solvers.contact.constraints import Constraints
 from solvers.contact.directions import answered, free_normals
 from solvers.contact.distance import distances
 from solvers.contact.friction_work import FrictionWork
@@ -21,7 +20,7 @@ from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
 from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import Part, linearise
 from solvers.contact.pair import Pair
-from solvers.contact.redistribute import Redistribution, redistributed
+from solvers.contact.redistribute import redistributed
 from solvers.contact.share import Shares
 from solvers.contact.slip import Sliding, Slip
 from solvers.contact.terms import Terms, find_normals, total_terms
@@ -66,17 +65,15 @@ class Contact:
         self.x = self.nodes.points.copy()
         self._x_old = self.x.copy()
         self.active_set = ActiveSet(count)
-        self._among_several = ~self.multipliers.alone & (self.interface.spans == "normal")
+        self._spans = self.interface.spans  # at the latest evaluation
         self._keep_overlap = keep_overlap
         self._gap = np.zeros(count)  # weighted gap at the latest evaluation
         self._mean_gap = np.zeros(count)  # the same over D [m], zero where no master is seen
         self._kept = np.zeros(count)  # mean gap that may stay in this step [m], <= 0
-        self._coverage = Coverage(self.multipliers.areas)
+        self._constraints = Constraints(self.interface)
+        self.merged = np.zeros(count, dtype=bool)  #: multipliers that act with another one of their node
         self._stiffness = np.zeros(count)
         self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
-        self._blocked = np.zeros(count, dtype=bool)
-        facets = [patch.multipliers[patch.facets] for patch in self.multipliers.patches]
-        self._redistribution = Redistribution(facets, count)
         self._shared: Sparse | None = None  # redistribution at the latest evaluation
         self._shares = Shares(comm)
         laws = [(mortar, self.interface.law_of(mortar.patch)) for mortar in self.interface.mortars]
@@ -87,10 +84,6 @@ class Contact:
         sliding = [mortar for mortar, law in laws if law.slips]
         self._sliding = Sliding(sliding, self.multipliers, self._shares, (self.size, self.dim))
         self._slip: Slip | None = None  # at the latest evaluation
-        held = self.nodes.held[self.multipliers.node].any(axis=(1, 2))
-        self._narrow = np.zeros(count, dtype=bool)  # multipliers without all directions of their law
-        for law, which in self.interface.laws:
-            self._narrow[which] = (law.span != "normal") & (held | (self.interface.spans == "normal"))[which]
         self._weight = 1.0  # of the new contact force in the balance
         self.work = FrictionWork((count, self.dim))
         self.time = np.nan  #: of the latest evaluation [s]
@@ -105,7 +98,7 @@ class Contact:
         self._stiffness = np.divide(at_node, areas, out=np.zeros_like(areas), where=areas > 0.0)
         self.x = self.positions(u, t)
         self._x_old = self.x.copy()
-        self._blocked = find_blocked(self.interface, self.x)
+        self._constraints.start(self.x)
 
     def positions(self, u: Array, t: float) -> Array:
         """Current positions [m] of all nodes from the displacements of the deformable ones, shape (N, dim)."""
@@ -120,7 +113,7 @@ class Contact:
         self._x_old = self.x.copy()
         if self._keep_overlap:
             self._kept = np.minimum(0.0, self._mean_gap)
-        self._coverage.begin_step()
+        self._constraints.begin_step()
         self.active_set.begin_step()
         self._shares.begin_step()
         for mortar in self._mortars:
@@ -184,7 +177,7 @@ class Contact:
     def _drop_dependent(self, status: Statuses) -> None:
         """Of several multipliers at a node whose normals depend on each other the later ones are not in contact."""
         assert self.terms is not None
-        several = np.flatnonzero((status != OPEN) & self._among_several)
+        several = np.flatnonzero((status != OPEN) & ~self.multipliers.alone & (self._spans == "normal"))
         if len(several) == 0:
             return
         left = free_normals(self.terms.normals[several], self.multipliers.node[several], self.nodes.held)
@@ -219,8 +212,9 @@ class Contact:
             return None
         pieces += self._ties.pieces if self.comm.rank == 0 else []
         terms = total_terms(pieces, normals, self._shares, (len(self.pairs), len(self.z), self.size))
-        self._covers = self._coverage.judge(terms.D) & ~self._blocked
-        self._shared = self._redistribution.shares((terms.D != 0.0) & ~self._covers, self._covers)
+        judged = self._constraints.judge(terms)
+        terms, self._covers, self._shared = judged.terms, judged.covers, judged.shared
+        self._spans, self.merged = judged.spans, judged.merged
         if self._sliding.mortars:
             used = [(mortar, found.used) for mortar, found in pieces]
             self._slip = self._sliding.evaluate(self.x, normals, used, self._redistributed)
@@ -258,10 +252,10 @@ class Contact:
         total = 0.0
         for part in self.in_contact():
             missed = part.law.residual(part.point, part.status, weight)
-            if (less := self._narrow[part.which]).any():
-                which = part.which[less]
-                held, spans = self.nodes.held[self.multipliers.node[which]], self.interface.spans[which]
-                missed[less] = answered(missed[less], part.point.normals[less], held, spans)
+            if part.law.span != "normal":
+                held, spans = self.nodes.held[self.multipliers.node[part.which]], self._spans[part.which]
+                less = held.any(axis=(1, 2)) | (spans == "normal")  # not all directions of its law
+                missed[less] = answered(missed[less], part.point.normals[less], held[less], spans[less])
             total += float(np.sum(missed**2))
         return float(np.sqrt(total))
 
@@ -280,7 +274,7 @@ class Contact:
         force = self._force_matrix()
         if self._shared is not None:
             force = force + force @ self._shared
-        return linearise(self.interface, parts, slopes, force, self.terms.dforce, weight)
+        return linearise(self.interface, self._spans, parts, slopes, force, self.terms.dforce, weight)
 
     def condense(self, weight: float) -> RowTransformation:
         """What makes rows without multipliers of the linearised balance without the new contact force.
@@ -368,7 +362,7 @@ class Contact:
         """
         pair = self.pairs[index]
         if pair.master is pair.slave:
-            return self.mean_gap()[self.interface.multipliers_of(pair.slave)]
+            return self.interface.at_nodes(pair.slave, self.mean_gap(), np.fmin)
         slave, master = (self.interface.nodes_of(surface) for surface in (pair.slave, pair.master))
         return distances(self.x[slave], self.x[master], pair.master.facets, pair.master.facet_type)
 
@@ -381,7 +375,7 @@ class Contact:
         """Mean gap [m] at each multiplier, NaN where no master is near, shape (C,)."""
         if self.terms is None:
             return np.full(len(self.z), np.nan)
-        covered = self._coverage.enough(self.terms.D)
+        covered = self._constraints.coverage.enough(self.terms.D)
         return np.divide(self.terms.gap, self.terms.D, out=np.full(len(self.z), np.nan), where=covered)
 
     def save(self) -> State:

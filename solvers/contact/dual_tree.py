@@ -16,10 +16,8 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
+from solvers.contact.search import OPPOSED
 from solvers.tessellation import unit_normals
-
-#: Facets can touch if the product of their normals is below this.
-OPPOSED = -0.2
 
 #: Two normals that both have this product with a vector are not opposed: cos(2 a) = OPPOSED.
 CONE = np.sqrt(0.5 * (1.0 + OPPOSED))

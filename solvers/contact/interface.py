@@ -32,9 +32,10 @@ class Interface:
     nodes: Nodes
     multipliers: Multipliers
     laws: tuple[tuple[Law, NDArray[np.int64]], ...]  #: each with its multipliers
-    spans: NDArray[np.str_]  #: directions that each multiplier may have: normal, surface, space
+    spans: NDArray[np.str_]  #: directions that each multiplier may have by its law: normal, surface, space
     mortars: tuple[Mortar, ...]
     patch_of: dict[int, int]  #: patch of each slave surface, by its id
+    facets_of: dict[int, NDArray[np.int64]]  #: facets of each slave surface in numbers of its patch, by its id
     basis: Basis | None  #: that multipliers are dual to, where it is not the nodal one (tri6)
 
     def nodes_of(self, surface: Surface) -> NDArray[np.int64]:
@@ -53,10 +54,30 @@ class Interface:
         """Of a patch: all its multipliers have the same."""
         return next(law for law, which in self.laws if np.isin(patch.multipliers, which).all())
 
+    def spans_among(self, constrained: NDArray[np.bool_]) -> NDArray[np.str_]:
+        """Directions of multipliers where those given (C,) have constraints: of several at a node each its normal."""
+        if self.multipliers.alone.all():
+            return self.spans
+        node = self.multipliers.node
+        several = np.bincount(node[constrained], minlength=len(node))[node] > 1
+        return np.where(several & (self.spans == "surface"), "normal", self.spans)
+
     def multipliers_of(self, slave: Surface) -> NDArray[np.int64]:
-        """Multipliers at the nodes of a slave surface."""
+        """Multipliers of a slave surface, in the order of its nodes; several where it has a sharp edge."""
+        return self._places(slave)[0]
+
+    def at_nodes(self, slave: Surface, values: Array, join: np.ufunc) -> Array:
+        """Values at the nodes of a slave surface from those (C,) of all multipliers, shape (n,)."""
+        which, node = self._places(slave)
+        found = np.full(len(slave.points), np.nan)
+        join.at(found, node, values[which])
+        return found
+
+    def _places(self, slave: Surface) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(multipliers of a slave surface, the nodes of the surface that they belong to)."""
         patch = self.multipliers.patches[self.patch_of[id(slave)]]
-        return patch.multipliers[np.searchsorted(patch.nodes, self.nodes_of(slave))]
+        places, first = np.unique(self.facets_of[id(slave)], return_index=True)
+        return patch.multipliers[places], slave.facets.ravel()[first]
 
 
 def describe_interface(pairs: Sequence[Pair]) -> Interface:
@@ -70,7 +91,7 @@ def describe_interface(pairs: Sequence[Pair]) -> Interface:
     laws = _multipliers_by_law(multipliers, law_of_slave)
     mortars: list[Mortar] = []
     for k, slave in enumerate(slaves):
-        mortars += _mortars_of(slave, k, pairs, numbers, multipliers, nodes.points)
+        mortars += _mortars_of(slave, k, pairs, numbers, multipliers)
     return Interface(
         pairs=tuple(pairs),
         surfaces=tuple(surfaces),
@@ -80,6 +101,7 @@ def describe_interface(pairs: Sequence[Pair]) -> Interface:
         spans=_spans(multipliers, laws),
         mortars=tuple(mortars),
         patch_of={id(slave): patch for slave, patch in zip(slaves, multipliers.patch_of_surface, strict=True)},
+        facets_of={id(slave): own for slave, own in zip(slaves, multipliers.facets_of_surface, strict=True)},
         basis=_nodal_basis(multipliers, len(nodes.points)),
     )
 
@@ -96,11 +118,9 @@ def _multipliers_by_law(multipliers: Multipliers, law_of_slave: Sequence[Law]) -
 
 
 def _spans(multipliers: Multipliers, laws: Sequence[tuple[Law, NDArray[np.int64]]]) -> NDArray[np.str_]:
-    """Several multipliers at a node go along their normals."""
     spans = np.full(len(multipliers.node), "normal", dtype="<U7")
     for law, which in laws:
         spans[which] = law.span
-    spans[~multipliers.alone & (spans == "surface")] = "normal"
     return spans
 
 
@@ -110,10 +130,9 @@ def _mortars_of(
     pairs: Sequence[Pair],
     numbers: dict[int, NDArray[np.int64]],
     multipliers: Multipliers,
-    points: Array,
 ) -> list[Mortar]:
     patch = multipliers.patches[multipliers.patch_of_surface[index]]
-    facets = np.searchsorted(patch.nodes, numbers[id(slave)])[slave.facets]
+    facets = multipliers.facets_of_surface[index]
     edge = longest_edge(slave.corners)
     found = []
     for integration in ("segments", "elements"):
@@ -123,7 +142,7 @@ def _mortars_of(
         for joined in join_masters(masters, [numbers[id(master)] for master in masters], mine):
             search: FacetSearch
             if masters[0] is slave and mine[0] in joined.pair:
-                search = SelfSearch(facets, slave.facet_type, points[patch.nodes], joined.facets[len(facets) :])
+                search = SelfSearch(slave.facets, slave.facet_type, slave.points, joined.facets[len(facets) :])
             else:
                 search = Search(facets, joined.facets)
             found.append(Mortar(patch, facets, edge, joined, integration, search))

@@ -28,19 +28,26 @@ class Part:
 
 
 def linearise(
-    interface: Interface, parts: Sequence[Part], slopes: Slopes, force: Sparse, dforce: Sparse, w: float
+    interface: Interface,
+    spans: NDArray[np.str_],
+    parts: Sequence[Part],
+    slopes: Slopes,
+    force: Sparse,
+    dforce: Sparse,
+    w: float,
 ) -> Linearised:
     """What they add to a Newton step.
 
-    slopes: of all multipliers; force: on the nodes per unit multiplier [m^(dim-1)], shape (N, C); dforce: derivative of
-    the contact force at fixed multipliers; w: weight of the contact force in the balance.
+    spans: directions of all multipliers; slopes: of all multipliers; force: on the nodes per unit multiplier
+    [m^(dim-1)], shape (N, C); dforce: derivative of the contact force at fixed multipliers; w: weight of the contact
+    force in the balance.
     """
     N, dim = interface.nodes.points.shape
     which = np.concatenate([part.which for part in parts] or [np.empty(0, dtype=np.int64)])
     z = np.concatenate([part.point.z for part in parts] or [np.empty((0, dim))])
     normals = np.concatenate([part.point.normals for part in parts] or [np.empty((0, dim))])
     node, held = interface.multipliers.node[which], interface.nodes.held
-    directions = find_directions(z, normals, node, held, interface.spans[which])
+    directions = find_directions(z, normals, node, held, spans[which])
     turning = directions.turning @ slopes.normals[components(which, dim)]
     by_z, by_u, residual = _law_rows(parts, slopes, w, dim * N)
     P, across = directions.basis, directions.basis.T

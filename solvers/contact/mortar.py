@@ -13,6 +13,7 @@ from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
 from solvers.contact.blocks import expand
 from solvers.contact.patch import Patch
+from solvers.contact.search import OPPOSED
 from solvers.contact.surface import Surface
 from solvers.kernels import MortarResult, mortar
 from solvers.sparse import Sparse, nothing, sparse, stack
@@ -182,7 +183,7 @@ class Mortar:
         return MortarTerms(result.D, M, np.zeros(ns), *none, result.area, used), W, M
 
     def _reach(self, motion: float) -> dict[str, float]:
-        return {"reach": self._edge + motion, "near": NEAR * self._edge + motion}
+        return {"reach": self._edge + motion, "near": NEAR * self._edge + motion, "facing": OPPOSED}
 
     @staticmethod
     def _total(direct, by_normals, dnormals: Sparse, rows: int, columns: int) -> Sparse:

@@ -1,4 +1,4 @@
-"""Slave patches: surfaces with one field of normals, and the multipliers at their nodes."""
+"""Slave patches: surfaces that hang together, and the multipliers at their nodes, one on each side of a sharp edge."""
 
 from __future__ import annotations
 
@@ -10,21 +10,20 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
-from solvers.contact.surface import Nodes, Surface, nodal_areas
+from solvers.contact.law.law import Law
+from solvers.contact.pieces import cut_at_edges
+from solvers.contact.surface import Nodes, Surface, facet_areas
 from solvers.kernels import basis_transformation, nodal_normals
 from solvers.sparse import Sparse, sparse
-
-#: Slave surfaces with common nodes are one patch if their normals there have a product above this (45 degrees).
-SMOOTH = np.sqrt(0.5)
 
 
 @dataclass(frozen=True)
 class Patch:
-    """A slave surface, or several that continue each other smoothly."""
+    """Slave surfaces that hang together; a node on a sharp edge has several places (see `cut_at_edges`)."""
 
-    nodes: NDArray[np.int64]  #: among all nodes, shape (n,)
+    nodes: NDArray[np.int64]  #: of each place, among all nodes, shape (n,)
     multipliers: NDArray[np.int64]  #: among all multipliers, shape (n,)
-    facets: NDArray[np.int64]  #: of all its surfaces, in numbers of the patch
+    facets: NDArray[np.int64]  #: of all its surfaces, in numbers of the places
     facet_type: str
     areas: Array  #: reference area around each node [m^(dim-1)], shape (n,)
     mask: Array | None  #: 0 for components that a plane of symmetry forbids, 1 for others, shape (n, dim)
@@ -49,15 +48,16 @@ class Patch:
 
 @dataclass(frozen=True)
 class Multipliers:
-    """All multipliers: one for each node and slave patch.
+    """All multipliers: one for each place of a slave patch.
 
-    The first N belong to the N nodes (most of which have none in use), the others to nodes of several patches.
+    The first N belong to the N nodes (most of which have none in use), the others to nodes with several places.
     """
 
     node: NDArray[np.int64]  #: of each multiplier, shape (C,)
     areas: Array  #: reference area around the node in the patch [m^(dim-1)], zero if there is none, shape (C,)
     patches: tuple[Patch, ...]
     patch_of_surface: tuple[int, ...]  #: patch of each slave surface
+    facets_of_surface: tuple[NDArray[np.int64], ...]  #: of each slave surface, in numbers of its patch
 
     @property
     def alone(self) -> NDArray[np.bool_]:
@@ -66,62 +66,69 @@ class Multipliers:
 
 
 def number_multipliers(
-    slaves: Sequence[Surface], numbers: Sequence[NDArray[np.int64]], nodes: Nodes, kinds: Sequence[object]
+    slaves: Sequence[Surface], numbers: Sequence[NDArray[np.int64]], nodes: Nodes, laws: Sequence[Law]
 ) -> Multipliers:
-    """Join slave surfaces to patches where they are smooth and of one kind, and number the multipliers.
+    """Join slave surfaces of one law that have common nodes to patches, and number the multipliers.
 
-    numbers: of the nodes of each surface; kinds: what surfaces must agree in to be joined.
+    numbers: of the nodes of each surface; laws: of each surface.
     """
-    size = len(nodes.points)
-    members = _join(slaves, numbers, kinds)
-    node = list(range(size))
-    areas = [0.0] * size
-    patches = []
-    for group in members:
-        patch_nodes = np.unique(np.concatenate([numbers[i] for i in group]))
-        at = [np.searchsorted(patch_nodes, numbers[i]) for i in group]
-        share = np.zeros(len(patch_nodes))
-        for i, places in zip(group, at, strict=True):
-            share[places] += nodal_areas(slaves[i])
-        multipliers = np.empty(len(patch_nodes), dtype=np.int64)
-        for k, (number, area) in enumerate(zip(patch_nodes.tolist(), share.tolist(), strict=True)):
-            if areas[number] > 0.0:
+    node = list(range(len(nodes.points)))
+    areas = [0.0] * len(node)
+    patches: list[Patch] = []
+    of_surface = [0] * len(slaves)
+    facets_of_surface = [np.empty((0, 0), dtype=np.int64)] * len(slaves)
+    for group in _join(slaves, numbers, laws):
+        facets, number, owner = _facets([slaves[i] for i in group], [numbers[i] for i in group])
+        facet_type = slaves[group[0]].facet_type
+        # what is tied may go any way: there a sharp edge matters only between surfaces that a case names apart
+        pieces = cut_at_edges(nodes.points, facets, facet_type, owner if laws[group[0]].span == "space" else None)
+        share = np.zeros(len(pieces.nodes))
+        np.add.at(share, pieces.facets, facet_areas(nodes.points, facets, facet_type)[:, None] / facets.shape[1])
+        multipliers = np.empty(len(pieces.nodes), dtype=np.int64)
+        for k, (at, area) in enumerate(zip(pieces.nodes.tolist(), share.tolist(), strict=True)):
+            if areas[at] > 0.0:
                 multipliers[k] = len(node)
-                node.append(number)
+                node.append(at)
                 areas.append(area)
             else:
-                multipliers[k] = number
-                areas[number] = area
-        facets = np.concatenate([places[slaves[i].facets] for i, places in zip(group, at, strict=True)])
-        facets = facets[np.sort(np.unique(np.sort(facets, axis=1), axis=0, return_index=True)[1])]
-        mask = _mask([slaves[i] for i in group], at, (len(patch_nodes), nodes.dim))
-        patches.append(Patch(patch_nodes, multipliers, facets, slaves[group[0]].facet_type, share, mask))
-    of_surface = [next(k for k, group in enumerate(members) if i in group) for i in range(len(slaves))]
-    return Multipliers(np.array(node), np.array(areas), tuple(patches), tuple(of_surface))
+                multipliers[k] = at
+                areas[at] = area
+        mask = _mask([slaves[i] for i in group], [numbers[i] for i in group], nodes)[pieces.nodes]
+        for i, own in zip(group, number, strict=True):
+            of_surface[i], facets_of_surface[i] = len(patches), pieces.facets[own]
+        mine = pieces.nodes, multipliers, pieces.facets, facet_type, share
+        patches.append(Patch(*mine, None if mask.all() else mask))
+    return Multipliers(np.array(node), np.array(areas), tuple(patches), tuple(of_surface), tuple(facets_of_surface))
 
 
-def _join(slaves: Sequence[Surface], numbers: Sequence[NDArray[np.int64]], kinds: Sequence[object]) -> list[list[int]]:
-    """Groups of surfaces that share nodes, all of them with nearly the same normals."""
+def _join(slaves: Sequence[Surface], numbers: Sequence[NDArray[np.int64]], laws: Sequence[Law]) -> list[list[int]]:
+    """Groups of surfaces that share nodes."""
     group = list(range(len(slaves)))
     for i in range(len(slaves)):
         for j in range(i):
-            common, at_i, at_j = np.intersect1d(numbers[i], numbers[j], return_indices=True)
-            if len(common) == 0 or kinds[i] != kinds[j] or slaves[i].facet_type != slaves[j].facet_type:
-                continue
-            products = np.einsum("nd,nd->n", _reference_normals(slaves[i])[at_i], _reference_normals(slaves[j])[at_j])
-            if (products > SMOOTH).all():
+            alike = laws[i] == laws[j] and slaves[i].facet_type == slaves[j].facet_type
+            if alike and len(np.intersect1d(numbers[i], numbers[j])):
                 group = [group[j] if g == group[i] else g for g in group]
     return [[i for i, g in enumerate(group) if g == first] for first in sorted(set(group))]
 
 
-def _reference_normals(surface: Surface) -> Array:
-    facets = np.ascontiguousarray(surface.facets, dtype=np.int64)
-    return nodal_normals(surface.points, facets, CELL_TYPES[surface.facet_type].kernel, None, derivatives=False)[0]
+def _facets(
+    surfaces: Sequence[Surface], numbers: Sequence[NDArray[np.int64]]
+) -> tuple[NDArray[np.int64], list[NDArray[np.int64]], NDArray[np.int64]]:
+    """(facets of surfaces, each once; the numbers of those of each surface; the first surface of each)."""
+    every = np.concatenate([own[surface.facets] for surface, own in zip(surfaces, numbers, strict=True)])
+    owner = np.arange(len(surfaces)).repeat([len(surface.facets) for surface in surfaces])
+    _, first, number = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    ends = np.cumsum([len(surface.facets) for surface in surfaces])[:-1]
+    return every[first[order]], np.split(place[number.ravel()], ends), owner[first[order]]
 
 
-def _mask(surfaces: Sequence[Surface], at: Sequence[NDArray[np.int64]], shape: tuple[int, int]) -> Array | None:
-    mask = np.ones(shape)
-    for surface, places in zip(surfaces, at, strict=True):
+def _mask(surfaces: Sequence[Surface], numbers: Sequence[NDArray[np.int64]], nodes: Nodes) -> Array:
+    mask = np.ones(nodes.points.shape)
+    for surface, own in zip(surfaces, numbers, strict=True):
         if surface.symmetric is not None:
-            mask[places] = np.where(surface.symmetric, 0.0, mask[places])
-    return None if mask.all() else mask
+            mask[own] = np.where(surface.symmetric, 0.0, mask[own])
+    return mask

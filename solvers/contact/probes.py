@@ -35,12 +35,12 @@ def at_slave(contact: Contact, pair: int, quantity: str, where: Sequence[float] 
 
 
 def pressures(contact: Contact, pair: int) -> Array:
-    """Contact pressure [Pa] at the slave nodes of a pair, shape (n,)."""
+    """Contact pressure [Pa] at the slave nodes of a pair, the largest on sharp edges, shape (n,)."""
     slave = contact.pairs[pair].slave
     if contact.terms is None:
         return np.zeros(len(slave.points))
-    which = contact.interface.multipliers_of(slave)
-    return np.einsum("nd,nd->n", contact.z[which], contact.terms.normals[which])
+    found = np.einsum("nd,nd->n", contact.z, contact.terms.normals)
+    return contact.interface.at_nodes(slave, found, np.fmax)
 
 
 def first_contact(contact: Contact, pair: int) -> Probe:

@@ -39,22 +39,35 @@ class Redistribution:
         self._beside.data[:] = 1.0
         self._latest: tuple[bytes, Sparse | None] = (b"", None)
 
-    def shares(self, receive: NDArray[np.bool_], give: NDArray[np.bool_]) -> Sparse | None:
-        """Shares, rows of those that receive and columns of those that give, shape (C, C); None if there are none."""
-        if not receive.any():
+    def shares(self, receive: NDArray[np.bool_], give: NDArray[np.bool_], into: NDArray[np.int64]) -> Sparse | None:
+        """Shares, rows of those that receive and columns of those that give, shape (C, C); None if there are none.
+
+        into: the multiplier in which each is merged, mostly itself.
+        """
+        merged = into != np.arange(len(into))
+        if not receive.any() and not merged.any():
             return None
-        key = np.packbits([receive, give]).tobytes()
+        key = np.packbits([receive, give]).tobytes() + into[merged].tobytes()
         if self._latest[0] != key:
-            self._latest = key, self._spread(receive, give)
+            self._latest = key, self._spread(receive, give, into, merged)
         return self._latest[1]
 
-    def _spread(self, receive: NDArray[np.bool_], give: NDArray[np.bool_]) -> Sparse | None:
+    def _spread(
+        self,
+        receive: NDArray[np.bool_],
+        give: NDArray[np.bool_],
+        into: NDArray[np.int64],
+        merged: NDArray[np.bool_],
+    ) -> Sparse | None:
         own = sp.diags(give.astype(float)).tocsr()
-        served, shares = give, own
+        whole = sp.csr_matrix((merged[merged].astype(float), (np.flatnonzero(merged), into[merged])), shape=own.shape)
+        served, shares = give | merged, own + whole
         while True:  # a corner may have only neighbours that receive: it comes after them
             count = np.where(receive & ~served, self._beside @ served.astype(float), 0.0)
             if not count.any():
-                return sparse((shares - own).tocsr(), shares.shape) if (served & receive).any() else None
+                return (
+                    sparse((shares - own).tocsr(), shares.shape) if (served & receive).any() or merged.any() else None
+                )
             mean = sp.diags(np.divide(1.0, count, out=np.zeros_like(count), where=count > 0.0)) @ self._beside
             shares = (shares + mean @ sp.diags(served.astype(float)) @ shares).tocsr()
             served = served | (count > 0.0)

@@ -24,13 +24,13 @@ def surface_fields(contact: Contact) -> PartFields:
     normals = np.zeros_like(z) if contact.terms is None else contact.terms.normals
     values: dict[str, tuple[Array, np.ufunc]] = {
         "contact_pressure": (np.einsum("nd,nd->n", z, normals), np.fmax),
-        "contact_traction": (-z, np.add),
+        "contact_traction": (-z * ~contact.merged[:, None], np.add),
         "contact_gap": (gap, np.fmin),
         "contact_status": (contact.active_set.status.astype(float), np.fmax),
     }
     if any(law.slips for law, _ in contact.interface.laws):
         pressure = np.einsum("nd,nd->n", z, normals)
-        values["contact_friction"] = (pressure[:, None] * normals - z, np.add)
+        values["contact_friction"] = ((pressure[:, None] * normals - z) * ~contact.merged[:, None], np.add)
         values["contact_slip"] = (contact.work.slip, np.add)
     nodal = {name: _at_nodes(contact, array, join) for name, (array, join) in values.items()}
     found: PartFields = {}

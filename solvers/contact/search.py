@@ -13,6 +13,9 @@ from solvers.kernels import KdopTree2, KdopTree3
 #: Build a tree anew once its nodes cover this many times as much as when it was new (a build costs 4 refits).
 REBUILD_ABOVE = 2.0
 
+#: Facets can touch if the product of their unit normals is below this (they face each other within 60 degrees).
+OPPOSED = -0.5
+
 Facets = NDArray[np.int64]  #: node indices in VTK order, shape (k, nodes per facet)
 Tree: TypeAlias = KdopTree2 | KdopTree3
 

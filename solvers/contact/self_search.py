@@ -6,11 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array, StepFailed
-from solvers.contact.dual_tree import OPPOSED, DualTree
+from solvers.contact.dual_tree import DualTree
 from solvers.contact.roles import MASTER, SLAVE, choose_roles
-from solvers.contact.search import Search
+from solvers.contact.search import OPPOSED, Search
 
 Indices = NDArray[np.int64]
+
+#: A pair that overlaps by more than this share of the wall's thickness is the wall.
+THROUGH = 0.5
 
 #: Facets whose distances from all others are found together.
 CHUNK = 256
@@ -24,11 +27,11 @@ class SelfSearch:
     """
 
     def __init__(self, facets: Indices, facet_type: str, points: Array, others: Indices | None = None):
-        """points: reference positions [m] of the nodes, shape (n, dim); others: masters of other bodies, numbered after
-        its own facets."""
+        """points: reference positions [m] of the nodes, shape (n, dim); others: masters of other bodies, with nodes
+        numbered after these."""
         self.tree = DualTree(facets, facet_type, points)
         self._others = None if others is None or len(others) == 0 else Search(facets, others)
-        self._count = len(facets)
+        self._count, self._nodes = len(facets), len(points)
         self._thickness = wall_thickness(points[facets].mean(axis=1), self._normals(points))
         self.begin_step(np.zeros(self._count, dtype=np.int64))
 
@@ -41,11 +44,13 @@ class SelfSearch:
     def pairs(
         self, xs: Array, xm: Array, inflation: float, xs_previous: Array | None = None, xm_previous: Array | None = None
     ) -> NDArray[np.int32]:
-        """As those of `Search`; the own facets among the masters have the nodes of the slaves."""
-        own = self._own_pairs(xs, inflation, xs_previous)
+        """As those of `Search`; among the masters its own nodes come first, and only there are they each once."""
+        n = self._nodes
+        own_x, own_previous = xm[:n], None if xm_previous is None else xm_previous[:n]
+        own = self._own_pairs(own_x, inflation, own_previous)
         if self._others is None:
             return own
-        beside = self._others.pairs(xs, xm, inflation, xs_previous, xm_previous)
+        beside = self._others.pairs(own_x, xm, inflation, own_previous, xm_previous)
         found = np.concatenate([own, beside + np.array([0, self._count], dtype=np.int32)])
         return np.ascontiguousarray(found[np.lexsort(found.T[::-1])])
 
@@ -74,7 +79,7 @@ class SelfSearch:
         normals, middles = self._normals(x), x[self.tree.facets].mean(axis=1)
         i, j = pairs.T
         overlap = -0.5 * np.einsum("pd,pd->p", middles[j] - middles[i], normals[i] - normals[j])
-        return overlap > 0.5 * np.minimum(self._thickness[i], self._thickness[j])
+        return overlap > THROUGH * np.minimum(self._thickness[i], self._thickness[j])
 
 
 def wall_thickness(middles: Array, normals: Array) -> Array:

@@ -89,16 +89,9 @@ def number_nodes(surfaces: Sequence[Surface]) -> Nodes:
     return Nodes(np.concatenate(points), np.concatenate(dofs), np.concatenate(held), tuple(numbers))
 
 
-def nodal_areas(surface: Surface) -> Array:
-    """Reference area around each node [m^(dim-1)], shape (n,). Every node of a facet has an equal part of it."""
-    areas = np.zeros(len(surface.points))
-    share = _facet_measures(surface.corners) / surface.facets.shape[1]
-    np.add.at(areas, surface.facets, share[:, None])
-    return areas
-
-
-def _facet_measures(corners: Array) -> Array:
+def facet_areas(points: Array, facets: NDArray[np.int64], facet_type: str) -> Array:
     """Area (2D: length) [m^(dim-1)] of each facet between its corners, shape (k,)."""
+    corners = points[facets[:, : CELL_TYPES[facet_type].corners]]
     if corners.shape[1] == 2:
         return np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
     diagonals = corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1]

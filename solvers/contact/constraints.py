@@ -1,0 +1,60 @@
+"""Which multipliers have constraints of their own in an iterate, and what becomes of the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.contact.blocked import find_blocked
+from solvers.contact.coverage import Coverage
+from solvers.contact.interface import Interface
+from solvers.contact.merge import Merging, with_mean_normals
+from solvers.contact.redistribute import Redistribution
+from solvers.contact.terms import Terms
+from solvers.sparse import Sparse
+
+
+@dataclass(frozen=True)
+class Constrained:
+    """The multipliers of one iterate."""
+
+    terms: Terms  #: with mean normals where multipliers are merged
+    covers: NDArray[np.bool_]  #: those with a constraint, shape (C,)
+    merged: NDArray[np.bool_]  #: those that act with another one of their node, shape (C,)
+    spans: NDArray[np.str_]  #: directions that each may have, shape (C,)
+    shared: Sparse | None  #: what the others get of those with a constraint, shape (C, C)
+
+
+class Constraints:
+    """Coverage, merging and redistribution; decisions of a step stay, see there."""
+
+    def __init__(self, interface: Interface):
+        self._interface = interface
+        multipliers = interface.multipliers
+        facets = [patch.multipliers[patch.facets] for patch in multipliers.patches]
+        self.coverage = Coverage(multipliers.areas)
+        self._merging = Merging(multipliers)
+        self._redistribution = Redistribution(facets, len(multipliers.node))
+        self._blocked = np.zeros(len(multipliers.node), dtype=bool)
+
+    def start(self, x: Array) -> None:
+        """All nodes are at x [m], shape (N, dim)."""
+        self._blocked = find_blocked(self._interface, x)
+
+    def begin_step(self) -> None:
+        self.coverage.begin_step()
+        self._merging.begin_step()
+
+    def judge(self, terms: Terms) -> Constrained:
+        """By the mortar integrals of an iterate."""
+        able = self.coverage.judge(terms.D) & ~self._blocked
+        into = self._merging.into(terms, able)
+        merged = into != np.arange(len(into))
+        if merged.any():
+            terms = with_mean_normals(terms, into)
+        covers = able & ~merged
+        shared = self._redistribution.shares((terms.D != 0.0) & ~able, covers, into)
+        return Constrained(terms, covers, merged, self._interface.spans_among(covers), shared)

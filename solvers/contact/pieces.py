@@ -1,0 +1,71 @@
+"""Surfaces cut at their sharp edges: a node on one has a place on each side, and no normal is a mean across it.
+
+Around a node, facets belong together if a way from one to the other crosses no sharp edge. So an edge may also end
+within a surface: its last node has one place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.cell_types import CELL_TYPES
+from solvers.connected import connected_parts
+from solvers.kernels import nodal_normals
+
+#: Angle by which normals turn over an edge from which on the edge is sharp [degrees].
+SHARP = 60.0
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Places (node, side of an edge), in the order of the nodes."""
+
+    nodes: Indices  #: of each place, shape (n,)
+    facets: Indices  #: in numbers of the places, shape (k, nodes per facet)
+
+
+def cut_at_edges(points: Array, facets: Indices, facet_type: str, among: Indices | None = None) -> Pieces:
+    """Facets (k, nodes per facet) of nodes at reference positions points [m], shape (n, dim).
+
+    among: numbers of the facets, between equal ones of which no edge counts as sharp, shape (k,).
+    """
+    k, n = facets.shape
+    of_facet, ends, normals = np.arange(k).repeat(n), facets.ravel(), _corner_normals(points, facets, facet_type)
+    i, j = _across_edges(facets, facet_type)
+    smooth = np.einsum("ed,ed->e", normals[i], normals[j]) > np.cos(np.radians(SHARP))
+    if among is not None:
+        smooth |= among[of_facet[i]] == among[of_facet[j]]
+    part = connected_parts(i[smooth], j[smooth], k * n)
+    places, number = np.unique(np.stack([ends, part], axis=1), axis=0, return_inverse=True)
+    return Pieces(places[:, 0], number.reshape(k, n).astype(np.int64))
+
+
+def _corner_normals(points: Array, facets: Indices, facet_type: str) -> Array:
+    """Unit normals of every facet at each of its nodes, shape (k * nodes per facet, dim)."""
+    alone = np.arange(facets.size).reshape(facets.shape)
+    x = np.ascontiguousarray(points[facets.ravel()])
+    return nodal_normals(x, alone, CELL_TYPES[facet_type].kernel, None, derivatives=False)[0]
+
+
+def _across_edges(facets: Indices, facet_type: str) -> tuple[Indices, Indices]:
+    """Nodes of facets (facet * nodes per facet + local node) that are one node of one edge (in 2D: one end)."""
+    k, n = facets.shape
+    corners = CELL_TYPES[facet_type].corners
+    edges = [(0,), (1,)] if corners == 2 else [(c, (c + 1) % corners) for c in range(corners)]
+    keys, nodes, entries = [], [], []
+    for edge in edges:
+        for local, group in enumerate(CELL_TYPES[facet_type].nodes):
+            if set(group) <= set(edge):
+                keys.append(np.sort(facets[:, edge], axis=1))
+                nodes.append(facets[:, local])
+                entries.append(np.arange(k) * n + local)
+    rows = np.column_stack([np.concatenate(keys), np.concatenate(nodes)])
+    entry, order = np.concatenate(entries), np.lexsort(rows.T)
+    same = (rows[order][1:] == rows[order][:-1]).all(axis=1)
+    return entry[order][:-1][same], entry[order][1:][same]

@@ -1,0 +1,124 @@
+"""Constants that are chosen, not derived: what depends on them is the same over a range around each."""
+
+import numpy as np
+import pytest
+from test_contact_start import end_of_a_pushed_bar
+from test_self_contact import CLAPPING, closing_c, fold, run
+
+from coupling import wetted
+from fsci import shapes
+from fsci.builder import facing
+from fsci.case import load_case
+from solvers.cell_types import CELL_TYPES
+from solvers.contact import dual_tree, mortar, pieces, self_search, share
+from solvers.contact.pieces import cut_at_edges
+from solvers.fluid.surface import ImmersedSurface
+from solvers.mesh_topology import cut_out
+from solvers.structure import dynamics
+from solvers.tessellation import tessellate
+
+
+def set_opposed(monkeypatch, value):
+    for module in (mortar, dual_tree, self_search):
+        monkeypatch.setattr(module, "OPPOSED", value)
+    monkeypatch.setattr(dual_tree, "CONE", np.sqrt(0.5 * (1.0 + value)))
+
+
+@pytest.mark.parametrize("angle", [30.0, 45.0, 75.0, 85.0])
+def test_angle_of_sharp_edges(monkeypatch, angle):
+    """Square bodies and fine round ones are the same with any angle; coarse round ones need a large one."""
+    found = []
+    for value in (angle, pieces.SHARP):
+        monkeypatch.setattr(pieces, "SHARP", value)
+        places = []
+        for mesh, names in (
+            (shapes.box([1, 1, 1], [2, 2, 2]), ["left", "right", "bottom", "top", "front", "back"]),
+            (shapes.ring(0.8, 1.0, [48, 3], 350, 5), ["inner", "outer", "start", "end"]),
+        ):
+            points, facets, _ = cut_out(mesh, names)
+            places.append(cut_at_edges(points, facets, CELL_TYPES[CELL_TYPES[mesh.cell_type].facet].name).nodes)
+        found.append(places)
+    assert all(np.array_equal(a, b) for a, b in zip(*found, strict=True))
+
+
+@pytest.mark.parametrize("opposed", [-0.35, -0.65])
+def test_facets_that_face_each_other(monkeypatch, tmp_path, opposed):
+    """A ring that claps together with all its corners: the same motion."""
+    text = CLAPPING.replace("on: [start, end]", "on: [inner, outer, start, end]")
+    wanted = run(text, tmp_path / "default")
+    set_opposed(monkeypatch, opposed)
+    found = run(text, tmp_path / "changed")
+    assert (wanted["contact.active"] > 0).sum() >= 2
+    for name in ("energy.total", "momentum.x", "contact.active"):
+        assert found[name] == pytest.approx(wanted[name], rel=1e-9), name
+
+
+@pytest.mark.parametrize("share_of_wall", [0.05, 0.2, 0.8])
+def test_share_of_a_wall(monkeypatch, share_of_wall):
+    """Walls drop out with any share that their curvature leaves, pairs of surfaces that are apart with none."""
+    for x, facets in (fold(30), closing_c(120)):
+        edge = np.linalg.norm(x[facets[:, 1]] - x[facets[:, 0]], axis=1).max()
+        wanted = self_search.SelfSearch(facets, "line", x).pairs(x, x, edge)
+        with monkeypatch.context() as patched:
+            patched.setattr(self_search, "THROUGH", share_of_wall)
+            found = self_search.SelfSearch(facets, "line", x).pairs(x, x, edge)
+        assert np.array_equal(found, wanted)
+
+
+@pytest.mark.parametrize("cost", [3.0, 30.0])
+def test_cost_of_pairs_that_overlap(monkeypatch, cost):
+    """Pairs divided by this cost, measured by the true one: as even as the bar of 1.2 asks for."""
+    rng = np.random.default_rng(3)
+    slave = np.sort(rng.integers(0, 400, 4000))
+    pairs = np.stack([slave, np.arange(4000)], axis=1).astype(np.int32)
+    met = rng.random(400) < np.exp(-((np.arange(400) / 80.0 - 2.0) ** 2))
+    true = np.where(met[slave], share.OVERLAP_COST, 1.0)
+    monkeypatch.setattr(share, "OVERLAP_COST", cost)
+    shares = share.Shares(type("Comm", (), {"size": 2, "rank": 0})())
+    shares._met[0] = met
+    work = np.bincount(shares._owners(0, pairs, 400), true, 2)
+    assert work.max() / work.mean() < 1.2
+
+
+@pytest.mark.parametrize("short", [1e-2, 1e-4])
+def test_short_step_of_the_first_state(monkeypatch, short):
+    """Differences over a share h of a step: they miss h^2 by their order, and 1e-16 / h^2 by rounding."""
+    wanted = end_of_a_pushed_bar(1.0, 0.0025)
+    monkeypatch.setattr(dynamics, "SHORT", short)
+    assert end_of_a_pushed_bar(1.0, 0.0025) == pytest.approx(wanted, abs=1e-8 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("inside", [0.51, 0.99])
+def test_winding_number_of_what_is_inside(monkeypatch, inside):
+    """Middles of facets are outside of other bodies (0), on their surface (1/2) or inside (1), not in between."""
+    surfaces = []
+    for mesh in (
+        shapes.rectangle([1, 1], [4, 4]),
+        shapes.rectangle([1, 1], [5, 5], [1.0, 0.1]),
+        shapes.disc(0.3, [16, 2]),
+    ):
+        facets, nodes = tessellate(mesh)
+        surfaces.append((ImmersedSurface(f"{len(surfaces)}", facets, len(nodes)), mesh.points[nodes]))
+    box = np.array([-2.0, -2.0]), np.array([3.0, 3.0])
+    wanted = [surface.wet for surface in wetted.find_wet(surfaces, box)]
+    monkeypatch.setattr(wetted, "INSIDE", inside)
+    found = [surface.wet for surface in wetted.find_wet(surfaces, box)]
+    assert not all(wet.all() for wet in wanted)
+    assert all(np.array_equal(a, b) for a, b in zip(found, wanted, strict=True))
+
+
+@pytest.mark.parametrize("opposed", [-0.05, -0.5])
+def test_surfaces_that_face_each_other_at_the_start(monkeypatch, opposed):
+    """The pairs that the program finds by itself in the cases that have contact between bodies."""
+    from fsci.builder.automatic_pairs import find_pairs
+    from fsci.meshes.of_case import read_body
+
+    for name in ("two_tori", "sphere_tube", "cattaneo_mindlin"):
+        case = load_case(f"cases/{name}/case.yaml")
+        case = case.model_copy(update={"contact": case.contact.model_copy(update={"pairs": {}, "bodies": "all"})})
+        meshes = {body: read_body(case, body) for body in case.elastic_bodies}
+        wanted = set(find_pairs(case, meshes))
+        with monkeypatch.context() as patched:
+            patched.setattr(facing, "OPPOSED", opposed)
+            assert set(find_pairs(case, meshes)) == wanted
+        assert wanted
