@@ -8,12 +8,14 @@ from typing import Any
 
 from fsci.case import Case
 from fsci.expression import FUNCTIONS
+from fsci.schema_examples import EXAMPLES
 
 INTRODUCTION = """\
 # Input reference
 
 A case is a YAML 1.2 file. This page is generated from the program: every setting with its type, default, unit and
-meaning. Units are those of SI; with `units:` they are the corresponding ones of length, mass and time.
+meaning, and an example of each section. Units are those of SI; with `units:` they are the corresponding ones of
+length, mass and time.
 
 - A *number* may be written as arithmetic: `2*pi/360`.
 - An *expression* may contain variables too, x, y, z being reference coordinates and t the time. There are the operators
@@ -39,7 +41,7 @@ def reference_markdown() -> str:
     schema = Case.model_json_schema()
     models = schema.pop("$defs")
     functions = ", ".join(f"`{name}`" for name in FUNCTIONS)
-    chapters = [INTRODUCTION.replace("{functions}", functions), _chapter("case.yaml", "case", schema, models)]
+    chapters = [INTRODUCTION.replace("{functions}", functions), _chapter("case.yaml", "Case", schema, models)]
     written: set[str] = set()
     for title, name in _sections("", schema, models):
         if name not in written:
@@ -84,7 +86,8 @@ def _chapter(title: str, name: str, model: dict[str, Any], models: dict[str, Any
         for schema in [model["properties"][key]]
     ]
     head = ["| setting | type | default | unit | meaning |", "|---|---|---|---|---|"]
-    lines = [f"(input-{name.lower()})=", f"## {title}", "", model["description"], "", *head, *rows, ""]
+    example = ["```yaml", EXAMPLES[name].rstrip("\n"), "```"]
+    lines = [f"(input-{name.lower()})=", f"## {title}", "", model["description"], "", *head, *rows, "", *example, ""]
     return "\n".join(lines)
 
 
@@ -116,5 +119,5 @@ def _default(key: str, schema: dict[str, Any], required: list[str]) -> str:
         return "required"
     if "default" in schema:
         value = schema["default"]
-        return "" if value is None else f"`{json.dumps(value)}`".replace('"', "")
+        return "" if value in (None, "") else f"`{json.dumps(value)}`".replace('"', "")
     return "" if "$ref" in schema else "none"

@@ -1,10 +1,15 @@
 """The generated descriptions of the case format are complete."""
 
 import json
+import re
+
+from ruamel.yaml import YAML
 
 from fsci.case import Case
 from fsci.case.mesh import SHAPES
+from fsci.case.section import Section
 from fsci.schema import json_schema, reference_markdown
+from fsci.schema_examples import EXAMPLES
 
 
 def properties(schema):
@@ -59,3 +64,27 @@ def test_json_schema():
     assert {"lambda", "E"} <= schema["$defs"]["Elastic"]["properties"].keys()
     shapes = schema["$defs"]["Body"]["properties"]["mesh"]["oneOf"][1]["discriminator"]["mapping"]
     assert sorted(shapes) == sorted(SHAPES)
+
+
+def sections(base=Section):
+    """Name -> class of all sections, at any depth below `base`."""
+    found = {}
+    for one in base.__subclasses__():
+        found |= {one.__name__: one, **sections(one)}
+    return found
+
+
+def test_every_section_has_an_example_that_it_accepts():
+    schema = Case.model_json_schema()
+    assert EXAMPLES.keys() == {"Case", *schema["$defs"]}
+    titles = dict(re.findall(r"^\(input-(\w+)\)=\n## (.*)$", reference_markdown(), re.MULTILINE))
+    for name, text in EXAMPLES.items():
+        value = YAML(typ="safe", pure=True).load(text)
+        title = titles[name.lower()].split("` with ")[0].strip("`")
+        if name != "Case":
+            (key,) = value
+            assert key in title, "the setting that holds the section"
+            value = value[key]
+        found = value.values() if title.endswith(".NAME") else value if isinstance(value, list) else [value]
+        for one in found:
+            sections()[name].model_validate(one, strict=False)

@@ -1,0 +1,121 @@
+"""An example for every section of the input reference: model -> YAML text, with the setting that holds the section."""
+
+from __future__ import annotations
+
+CASE = """\
+title: A block under its weight
+time: {step: 0.5, end: 1}
+structure:
+  bodies:
+    block:
+      mesh: {shape: rectangle, size: [1, 0.5], cells: [4, 2]}
+      material: {law: neo_hooke, E: 1e5, nu: 0.3, density: 1000}
+      supports: [{on: bottom, displacement: [0, 0]}]
+      gravity: [0, "-9.81*t"]
+"""
+
+BODY = """\
+bodies:
+  beam:
+    mesh: {shape: rectangle, size: [1, 0.1], cells: [20, 2], order: 2}
+    material: {law: st_venant_kirchhoff, E: 1e8, nu: 0.3, density: 1000}
+    supports: [{on: left, displacement: [0, 0]}]
+    gravity: [0, -9.81]
+"""
+
+STRUCTURE = """\
+structure:
+  dynamics: {rho_inf: 0.9}
+  bodies:
+    ball:
+      mesh: {shape: sphere, radius: 0.1, cells: [4, 2]}
+      material: {law: neo_hooke, E: 1e5, nu: 0.4, density: 1000}
+      initial_velocity: [0, 0, -1]
+"""
+
+FLUID = """\
+fluid:
+  density: 1000
+  viscosity: 1e-3
+  grid: {from: [0, 0], to: [2, 1], cells: [80, 40]}
+  patches:
+    inlet: {on: x-, velocity: ["4*y*(1 - y)*ramp(t, 0, 0.5)", 0]}
+    outlet: {on: x+, outflow: true}
+    walls: {on: [y-, y+], no_slip: true}
+"""
+
+CONTACT = """\
+contact:
+  obstacles:
+    floor: {mesh: {shape: rectangle, size: [3, 0.1], cells: [1, 1], origin: [-1.5, -0.1]}, on: top}
+  pairs:
+    floor: {slave: {body: ball, on: outer}, master: {obstacle: floor}}
+"""
+
+EXAMPLES = {
+    "Case": CASE,
+    "Units": "units: {length: mm, mass: t, time: s}   # stresses are in MPa",
+    "Time": "time: {step: 0.01, end: 2}",
+    "Retry": "retry: {halvings: 2}",
+    "Curve": "curves:\n  pulse: {table: [[0, 0], [0.1, 5], [0.3, 0]], smooth: true}   # then pulse(t) is an expression",
+    "Structure": STRUCTURE,
+    "Dynamics": "dynamics: {rho_inf: 0.8, damping: {stiffness: 1e-3}}",
+    "Damping": "damping: {mass: 0.1, stiffness: 1e-3}",
+    "Body": BODY,
+    "FileMesh": "mesh: {file: flag.geo, order: 2, parameters: {refine: 2}}",
+    "Rotation": "rotate: [{angle: 90, axis: [0, 0, 1]}, {angle: 30, axis: [1, 0, 0]}]",
+    "Rectangle": "mesh: {shape: rectangle, size: [2, 0.5], cells: [8, 2], order: 2}",
+    "Disc": "mesh: {shape: disc, radius: 0.5, cells: [32, 4], translate: [0, 1]}",
+    "Ring": "mesh: {shape: ring, inner_radius: 0.9, outer_radius: 1, angle: 90, cells: [16, 2]}",
+    "Box": "mesh: {shape: box, size: [1, 1, 0.2], cells: [8, 8, 2]}",
+    "Beam": "mesh: {shape: beam, length: 2, width: 0.1, height: 0.1, cells: [20, 2, 2], order: 2}",
+    "Cylinder": "mesh: {shape: cylinder, radius: 0.5, height: 2, cells: [16, 2, 10]}",
+    "Tube": "mesh: {shape: tube, inner_radius: 0.9, outer_radius: 1, height: 2, cells: [32, 2, 10]}",
+    "SolidTorus": "mesh: {shape: solid_torus, major_radius: 0.5, minor_radius: 0.2, cells: [24, 12]}",
+    "HollowTorus": (
+        "mesh: {shape: hollow_torus, major_radius: 76, inner_radius: 19.5, outer_radius: 24, cells: [40, 20, 1]}"
+    ),
+    "HollowSphere": "mesh: {shape: hollow_sphere, inner_radius: 9, outer_radius: 10, cells: [8, 1]}",
+    "Sphere": "mesh: {shape: sphere, radius: 1, cells: [4, 3]}",
+    "Elastic": "material: {law: neo_hooke, E: 4000, nu: 0.4, density: 1000}",
+    "MooneyRivlin": "material: {law: mooney_rivlin, c10: 3e5, c01: 1e5, bulk: 5e8, density: 1100}",
+    "Support": (
+        'supports:\n  - {on: bottom, displacement: [0, 0, 0]}\n  - {on: top, displacement: [null, null, "-0.1*t"]}\n'
+        "  - {on: left, symmetry: true}"
+    ),
+    "Spring": "springs:\n  - {on: left, stiffness: 1e4, normal: true}",
+    "Traction": 'tractions:\n  - {on: right, value: [0, "-1e3*ramp(t, 0, 1)"]}',
+    "Pressure": 'pressures:\n  - {on: [inner, start], value: "2e3*t"}',
+    "LineForce": "line_forces:\n  - {on: edge, value: [0, 0, -10]}",
+    "PointForce": "point_forces:\n  - {at: [1, 0.05], value: [0, -10]}",
+    "Fluid": FLUID,
+    "Grid": "grid:\n  from: [0, 0]\n  to: [2.2, 0.41]\n  cells: [null, 41]\n"
+    "  x: [{to: 0.1, cells: 10, ratio: 0.3}, {to: 0.3, cells: 50}, {to: 2.2, cells: 60, ratio: 12}]",
+    "Stretch": "x: [{to: 0.3, cells: 30}, {to: 2.2, cells: 60, ratio: 12}]",
+    "Patch": 'patches:\n  in: {on: x-, velocity: ["1 - y^2", 0]}\n  outlet: {on: x+, where: "y - 0.5", outflow: true}'
+    "\n  walls: {on: [y-, y+], no_slip: true}",
+    "RigidBody": "bodies:\n  cylinder: {mesh: {shape: disc, radius: 0.05, cells: [120, 1], translate: [0.2, 0.2]}}",
+    "Movement": 'motion: {displacement: [0, "0.02*sin(2*pi*t)"]}',
+    "Turn": 'rotation: {centre: [0.2, 0.2], angle: "30*sin(2*pi*t)"}',
+    "Free": "free: {density: 1120, gravity: [0, 0, -9.81], held: [x, y, rotation]}",
+    "PointSpring": "springs:\n  - {at: [0, 0, 0], stiffness: [1, 1, 1], damping: 0.1}",
+    "RigidDynamics": "dynamics: {rho_inf: 0.8}",
+    "Coupling": "coupling: {scheme: partitioned, accelerator: iqn, tolerance: 1e-7}",
+    "Contact": CONTACT,
+    "Pair": "pairs:\n  floor:\n    slave: {body: ball, on: outer}\n    master: {obstacle: floor}\n"
+    "    friction: {bound: 2}\n  glue: {slave: {body: lid, on: bottom}, master: {body: box, on: top}, tied: true}"
+    "\n  fold: {self: {body: strip, on: inside}}",
+    "Side": "slave: {body: ball, on: outer}",
+    "Friction": "friction: {coefficient: 0.3}",
+    "Obstacle": 'obstacles:\n  stamp: {mesh: {file: stamp.geo}, on: face, motion: [0, 0, "-0.1*t"]}',
+    "Probe": "probes:\n  tip: {quantity: displacement, at: [1, 0.05]}\n  clamp: {quantity: reaction, on: left}\n"
+    "  drag: {quantity: drag_coefficient, body: cylinder, reference: {velocity: 0.2, length: 0.1}}\n"
+    "  gap: {quantity: gap, pair: floor}",
+    "Reference": "reference: {velocity: 0.2, length: 0.1}",
+    "Output": "output: {fields_every: 5, checkpoint_every: 20}",
+    "Check": "verify:\n  - {value: tip.y, statistic: min, reference: -0.0661, relative: 0.001}\n"
+    "  - {value: fluid.mass, reference: 0, absolute: 1e-9}",
+    "Solver": "solver: {newton: {residual: 1e-10}, linear: {method: direct}}",
+    "Newton": "newton: {residual: 1e-10, max_iterations: 40, line_search: true}",
+    "Linear": "linear: {method: iterative, tolerance: 1e-10}",
+}
