@@ -63,7 +63,9 @@ class Partitioned:
             if residual <= self._small(found):
                 break
             if not math.isfinite(residual) or len(history) == self.tolerance.max_iterations:
-                reason = f"fluid and structure did not agree in {len(history)} iterations (residual {residual:.3g} m)"
+                reason = (
+                    f"the coupling iteration did not converge in {len(history)} iterations (residual {residual:.3g} m)"
+                )
                 raise StepFailed("coupling", reason, iteration=len(history), history=tuple(history))
             touching = coupled.solid.touching()
             if contact is not None and touching is not None and not np.array_equal(contact, touching):

@@ -244,7 +244,7 @@ def solve(
     if reason < 0:
         failed = PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED
         if ksp.getType() == PETSc.KSP.Type.PREONLY or reason == failed:
-            raise LinearSolveFailed("the linear system is singular: is a body not held?", singular=True)
+            raise LinearSolveFailed("the linear system is singular: is a body not supported?", singular=True)
         raise LinearSolveFailed(
             f"the linear solver stalled after {ksp.getIterationNumber()} iterations (PETSc reason {reason})"
         )

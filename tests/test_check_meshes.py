@@ -144,7 +144,7 @@ def test_symmetry_on_a_curve():
     case = SOLID[:start] + f"      {disc}\n      supports: [{{on: outer, symmetry: true}}]\n"
     found = check_meshes(load(case))
     assert [str(p).split("\n")[0] for p in found.problems] == [
-        "case.yaml:8:18: symmetry needs a plane, and this surface is curved; 'normal: true' holds such ones"
+        "case.yaml:8:18: a plane of symmetry must be plane, but this surface is curved; take 'normal: true'"
     ]
 
 

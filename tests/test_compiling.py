@@ -67,7 +67,7 @@ def test_form_of_a_killed_process_is_compiled_anew(cache, lock):
     begin = time.monotonic()
     done = compile_in(folder)
     assert time.monotonic() - begin < 60
-    assert "a process that compiled it before was killed; once more\ncompiling form" in done.stdout
+    assert "the process that was compiling it has been killed; compiling it again\ncompiling form" in done.stdout
     assert done.stdout.endswith("[2.0, 9.0]\n")
     assert compile_in(folder).stdout == "[2.0, 9.0]\n"
 
@@ -97,5 +97,5 @@ def test_process_killed_while_it_compiles(tmp_path):
     process.kill()
     process.communicate()
     done = compile_in(tmp_path)
-    assert "a process that compiled it before was killed; once more" in done.stdout
+    assert "the process that was compiling it has been killed; compiling it again" in done.stdout
     assert done.stdout.endswith("[2.0, 9.0]\n")

@@ -117,6 +117,6 @@ def test_no_balance_at_the_start(tmp_path):
         run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out")
     message = str(caught.value).split("\n")[0]
     assert message.startswith(
-        f"{tmp_path / 'case.yaml'}:14:1: surfaces of contact have no mass in dynamics, and find no balance with the "
-        "loads and the overlap that they have at the start; let these grow from zero: structure: Newton did not"
+        f"{tmp_path / 'case.yaml'}:14:1: contact surfaces have no mass in dynamics, and no equilibrium was "
+        "found for the loads and the overlap at the start; let both grow from zero: structure: Newton did not"
     )

@@ -99,7 +99,7 @@ contact:
 
 
 MISTAKES = [
-    ("pulse:", "sin:", "3:3: 'sin' must be another name: expressions know 'sin' already"),
+    ("pulse:", "sin:", "3:3: 'sin' must be another name: 'sin' is built into expressions"),
     ("pulse:", "a-b:", "3:3: 'a-b' must be a name without '-', which means minus in expressions, not 'a-b'"),
     (
         "[2, -1]]}",
@@ -131,7 +131,7 @@ def test_message(case, old, new, message):
         ("t, v\n0, 1\n", "'../data/inflow.csv' has 1 points, at least 2 are needed"),
         ("0, 1\n1, 2, 3\n", "'../data/inflow.csv', line 2: two numbers are expected, not '1, 2, 3'"),
         ("0, 1\n1, nan\n", "'../data/inflow.csv', line 2: two numbers are expected, not '1, nan'"),
-        ("0 1\n2 1\n1 3\n", "'../data/inflow.csv' must go on to later times, not from 2 to 1"),
+        ("0 1\n2 1\n1 3\n", "'../data/inflow.csv' must have increasing times, not go from 2 to 1"),
     ],
 )
 def test_message_about_a_file(case, text, message):

@@ -33,8 +33,10 @@ def test_three_cells_in_a_step(tmp_path):
     """0.3 m per step of 0.1 s in cells of 0.1 m."""
     warnings, log = run(tmp_path, "3")
     assert len(warnings) == 1
-    assert "the body moves 3 cells in a time step: forces are off; a 'step' below 0.067 keeps it" in warnings[0]
-    assert log.count("body 'disc' moves 3 cells in a time step") == 1
+    assert (
+        "the body crosses 3 cells in a time step: forces are inaccurate; a 'step' below 0.067 keeps it" in warnings[0]
+    )
+    assert log.count("body 'disc' crosses 3 cells in a time step") == 1
     assert "a step below 0.067 keeps it below 2 cells" in log
 
 
@@ -45,7 +47,10 @@ def test_a_rotation(tmp_path):
     case = load_case(tmp_path / "case.yaml")
     assert case.warnings == ()  # the mesh is not read yet
     (warning,) = check_meshes(case).warnings
-    assert "case.yaml:13:15: the body moves 3 cells in a time step: forces are off; a 'step' below 0.067" in warning
+    assert (
+        "case.yaml:13:15: the body crosses 3 cells in a time step: forces are inaccurate; a 'step' below 0.067"
+        in warning
+    )
     slow = load_case(tmp_path / "case.yaml", [("time.step", "0.06")])
     assert check_meshes(slow).warnings == []
 

@@ -85,7 +85,12 @@ MISTAKES = [
         "2",
     ),
     (GRID, "cells: [40, 2e5]", "6:9: 200000 cells along y are too many: 100000 are the most", "{from"),
-    ("to: [4, 1]", "to: [5e-324, 1]", "6:9: the box has no room for so many cells along x", "{from"),
+    (
+        "to: [4, 1]",
+        "to: [5e-324, 1]",
+        "6:9: the cells along x are smaller than rounding errors of their coordinates",
+        "{from",
+    ),
     (
         GRID,
         "cells: [null, 10], x: [{to: 4, cells: 2, ratio: 1e9}]",

@@ -42,7 +42,7 @@ def test_error_of_one_process_ends_all(tmp_path, processes, rank):
     process = disturbed("error", tmp_path, rank=rank, processes=processes)
     output, errors = process.communicate(timeout=60)
     assert process.returncode == 1, output + errors
-    assert f"process {rank} of {processes} failed, which ends all: Traceback" in errors
+    assert f"process {rank} of {processes} failed, and all processes end: Traceback" in errors
     assert "RuntimeError: injected error" in errors
 
 
@@ -50,7 +50,7 @@ def test_full_disk_of_one_process_is_said_without_a_traceback(tmp_path):
     process = disturbed("disk", tmp_path, rank=0, processes=2)
     output, errors = process.communicate(timeout=60)
     assert process.returncode == 1, output + errors
-    assert "process 0 of 2 failed, which ends all: No space left on device: 'history.csv'" in errors
+    assert "process 0 of 2 failed, and all processes end: No space left on device: 'history.csv'" in errors
     assert "Traceback" not in errors
 
 

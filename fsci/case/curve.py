@@ -44,7 +44,7 @@ class Curve(Section):
         if self.csv is not None:
             self._points = _read_csv((info.context or {}).get("folder", Path()), self.csv)
             if (late := _not_later(self._points)) is not None:
-                raise fault(f": '{self.csv}' must go on to later times, not from {late[0]:g} to {late[1]:g}", "csv")
+                raise fault(f": '{self.csv}' must have increasing times, not go from {late[0]:g} to {late[1]:g}", "csv")
             return self
         self._points = np.array(self.table)
         if (late := _not_later(self._points)) is not None:
@@ -106,7 +106,7 @@ def _numbers(line: str) -> tuple[float, float] | None:
 
 def _callable(name: str) -> str:
     if name in RESERVED:
-        raise fault(f"must be another name: expressions know '{name}' already")
+        raise fault(f"must be another name: '{name}' is built into expressions")
     if "-" in name:
         raise fault(f"must be a name without '-', which means minus in expressions, not '{name}'")
     return name

@@ -73,7 +73,7 @@ class Grid(Section):
             if count > MOST_CELLS:
                 raise fault(f"{count} cells along {name} are too many: {MOST_CELLS} are the most")
             if not np.all(np.diff(self.edges(axis)) > 0.0):
-                raise fault(f"the box has no room for so many cells along {name}")
+                raise fault(f"the cells along {name} are smaller than rounding errors of their coordinates")
         return self
 
     def _check_direction(self, axis: int) -> None:

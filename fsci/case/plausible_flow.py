@@ -60,7 +60,7 @@ def fast_body(case: Case, fluid: Fluid, motion: Movement, points: NDArray[np.flo
     if cells <= MOST_CELLS * (1.0 + 1e-9):
         return None
     return (
-        f"the body moves {cells:.2g} cells in a time step: forces are off; "
+        f"the body crosses {cells:.2g} cells in a time step: forces are inaccurate; "
         f"a 'step' below {MOST_CELLS * time.step / cells:.2g} keeps it below {MOST_CELLS:g} cells"
     )
 

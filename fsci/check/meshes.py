@@ -112,7 +112,7 @@ def _elastic(case: Case, found: Findings) -> None:
                 found.mistake(
                     case,
                     (*keys, "supports", i),
-                    "symmetry needs a plane, and this surface is curved; 'normal: true' holds such ones",
+                    "a plane of symmetry must be plane, but this surface is curved; take 'normal: true'",
                 )
         if case.coupling is not None:
             _wet(case, found, keys, mesh)

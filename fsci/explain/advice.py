@@ -14,15 +14,15 @@ REASONS = {
         "a smaller time.step: the load or the motion of a step is too large for the elements",
         "a finer mesh, or rounder corners, where the element is",
     ),
-    "out of all proportion": ("supports or weak springs: a static body that nothing holds has no solution",),
-    "goes in circles": (
+    "far larger than the body": ("supports or weak springs: a static body that nothing holds has no solution",),
+    "active set cycles": (
         "a smaller time.step",
         "slave and master exchanged: the slave should be the softer or the finer side",
         "a finer slave surface at the edge of the contact zone",
     ),
     "moved farther in one step": ("a smaller time.step: a body should cross less than two cells in a step",),
     "periodic faces": ("a longer box, or an earlier time.end",),
-    "did not agree": (
+    "coupling iteration did not converge": (
         "coupling.scheme=monolithic",
         "coupling.accelerator=iqn, or a larger coupling.max_iterations",
     ),

@@ -25,7 +25,7 @@ def ending_together(comm: Any, *shared: type[Exception]) -> Iterator[None]:
         if comm.size == 1 or isinstance(error, SystemExit) or (isinstance(error, shared) and _all_are_here(comm)):
             raise
         sys.stdout.flush()
-        print(f"process {comm.rank} of {comm.size} failed, which ends all: {describe(error)}", file=sys.stderr)
+        print(f"process {comm.rank} of {comm.size} failed, and all processes end: {describe(error)}", file=sys.stderr)
         sys.stderr.flush()
         comm.Abort(1)
 

@@ -34,8 +34,8 @@ FINISHED, FAILED, BAD_CASE, STOPPED = 0, 1, 2, 3  #: exit codes
 
 
 _NO_START = (
-    "surfaces of contact have no mass in dynamics, and find no balance with the loads and the overlap that they have "
-    "at the start; let these grow from zero"
+    "contact surfaces have no mass in dynamics, and no equilibrium was found for the loads and the overlap at the "
+    "start; let both grow from zero"
 )
 
 
@@ -124,7 +124,7 @@ class Run:
             return self._watched_loop()
 
     def _initialise(self, simulation: Simulation) -> None:
-        """The state at the first time. Raises CaseError if contact surfaces find no balance with the loads on them."""
+        """The state at the first time. Raises CaseError if contact surfaces have no equilibrium."""
         try:
             with self.record.timer("start"):
                 simulation.initialise(self.case.time.start, self.case.time.step)

@@ -42,7 +42,7 @@ class ActiveSet:
         self._seen, self._returns = [self.status.tobytes()], 0
 
     def choose(self, status: Statuses) -> None:
-        """Take the statuses of this iterate. Raises StepFailed if the set goes in circles."""
+        """Take the statuses of this iterate. Raises StepFailed if the set cycles."""
         self.changed = bool(np.any(status != self.status))
         self.changes += self.changed
         if self.changed:
@@ -52,6 +52,8 @@ class ActiveSet:
                 self.damping *= ON_RETURN
             if self._returns > MAX_RETURNS:
                 flickering = int(np.sum(status != self.status))
-                raise StepFailed("contact", f"the active set goes in circles: {flickering} nodes cannot decide")
+                raise StepFailed(
+                    "contact", f"the active set cycles: {flickering} nodes change their status without end"
+                )
             self._seen.append(known)
         self.status = status.copy()

@@ -13,7 +13,9 @@ else:
     from dolfinx import fem
 
     if not hasattr(fem, "create_form"):
-        raise ImportError("this DOLFINx is none that fsci knows: take 0.5 (Debian 12), or 0.9 (Debian 13) and later")
+        raise ImportError(
+            "this version of DOLFINx is not supported: install 0.5 (Debian 12), or 0.9 (Debian 13) and later"
+        )
     from solvers.fem import nanobind as calls  # type: ignore[no-redef]
 
 __all__ = ["calls"]

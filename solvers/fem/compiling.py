@@ -98,7 +98,7 @@ def _take(source: Path, what: str) -> IO[bytes] | None:
         lock.close()
         return None
     if source.exists():
-        _say("a process that compiled it before was killed; once more")
+        _say("the process that was compiling it has been killed; compiling it again")
     return lock
 
 

@@ -24,7 +24,7 @@ def flown_off(comm: MPI.Comm, u: Array, extent: float) -> str | None:
     """Why displacements u [m] cannot be, for bodies of this size [m]; None if they can (collective)."""
     farthest = comm.allreduce(float(np.abs(u).max(initial=0.0)), op=MPI.MAX)
     if farthest > FLOWN_OFF * extent:
-        return f"a displacement of {farthest:.3g} m is out of all proportion: is a body not held?"
+        return f"a displacement of {farthest:.3g} m is far larger than the body: is a body not supported?"
     return None
 
 

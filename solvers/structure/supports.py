@@ -217,7 +217,7 @@ def symmetry_normal(body: Meshed, support: Symmetry, blocks: NDArray[np.int32]) 
     if size > 0.0 and _extent(body, (normal / size @ points)[None])[0] <= 1e-9 * np.max(extent):
         return np.asarray(normal / size)
     raise SupportError(
-        body.name, support.where, "symmetry needs a plane, and this surface is curved; 'normal: true' holds such ones"
+        body.name, support.where, "a plane of symmetry must be plane, but this surface is curved; take 'normal: true'"
     )
 
 
