@@ -71,29 +71,65 @@ def test_forces_balance_and_nothing_penetrates():
 
 @pytest.mark.parametrize("accelerator", ["iqn", "aitken"])
 def test_both_schemes_agree(accelerator):
-    """The partitioned scheme gets through the changes of the active set, with the same result until facets open."""
+    """Each step from the same state: through first contact, more nodes and fewer, with the same result.
+
+    In one step (the ninth) they find two solutions. A slave facet at the edge of contact is just not near enough to
+    count, and pairs that took part in the third evaluation of a step stay until its end (KEEP_AFTER). An iterate of the
+    partitioned scheme comes nearer, so that there the facet counts and holds its nodes; the iterates of the monolithic
+    one do not. Its solution is one of the partitioned scheme, too.
+    """
     partitioned = {
         "coupling__scheme": "partitioned",
         "coupling__accelerator": accelerator,
         "coupling__tolerance": "1e-8",
     }
     one, two = start(), start(**partitioned)
-    sets = []
+    contacts = [simulation.scheme.coupled.solid.structure.constraint for simulation in (one, two)]
+    sets, apart = [], []
     for step in range(12):
+        before = one.scheme.coupled.save()
+        two.scheme.coupled.restore(before)
         for simulation in (one, two):
             simulation.scheme.step(step * DT, DT)
-        contacts = [simulation.scheme.coupled.solid.structure.constraint for simulation in (one, two)]
-        sets.append(contacts[0].active().sum())
-        moved = [simulation.scheme.coupled.interface.now for simulation in (one, two)]
-        if step < 8:
-            assert np.array_equal(contacts[0].active(), contacts[1].active())
-            assert contacts[1].resultant(0) == pytest.approx(contacts[0].resultant(0), rel=1e-7, abs=1e-7)
-            assert np.abs(moved[0] - moved[1]).max() < 1e-8
-        else:
-            # a dry patch that may open can also stay closed: here the schemes open it one step apart; what they differ
-            # by is less than a quarter of the ball's way in a step
-            assert np.abs(moved[0] - moved[1]).max() < 0.25 * 0.8 * DT
-    assert len(set(sets[:8])) > 1
+        sets.append(int(contacts[0].active().sum()))
+        if facets_that_count(contacts[0]) != facets_that_count(contacts[1]):
+            apart.append(step)
+            assert difference(one, two) < 0.25 * 0.8 * DT  # a quarter of the ball's way in a step
+            two.scheme.coupled.restore(before)
+            begin_at(two, one)
+            two.scheme.step(step * DT, DT)
+        assert np.array_equal(contacts[0].active(), contacts[1].active())
+        assert contacts[1].resultant(0) == pytest.approx(contacts[0].resultant(0), rel=1e-7, abs=1e-7)
+        assert difference(one, two) < 1e-8
+    assert sets[0] == 0
+    assert len(set(sets)) > 2
+    assert len(apart) <= 1
+
+
+def difference(one, two):
+    """Largest distance [m] between two solutions."""
+    return np.abs(one.scheme.coupled.interface.now - two.scheme.coupled.interface.now).max()
+
+
+def facets_that_count(contact):
+    """Slave nodes at which facets see a master."""
+    return () if contact.terms is None else tuple(np.flatnonzero(contact.terms.D > 0.0))
+
+
+def begin_at(simulation, other):
+    """The next step begins with the solution of another one as its first guess."""
+    coupled, found = simulation.scheme.coupled, other.scheme.coupled
+    u, flow, contact = found.solid.structure.now.u.copy(), found.flow.flow.copy(), found.solid.structure.constraint
+    z, status, predict = contact.z.copy(), contact.active_set.status.copy(), coupled.predict
+
+    def guess(t):
+        predict(t)
+        coupled.predict = predict
+        own = coupled.solid.structure.constraint
+        coupled.solid.structure.now.u[:], coupled.flow.flow[:], own.z[:] = u, flow, z
+        own.active_set.status[:] = status
+
+    coupled.predict = guess
 
 
 @pytest.mark.slow
