@@ -11,9 +11,9 @@ import pytest
 EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
 
 
-def numbers(name: str) -> list[list[float]]:
+def numbers(name: str, *arguments: Path) -> list[list[float]]:
     """The numbers of each line that an example prints."""
-    done = subprocess.run([sys.executable, EXAMPLES / f"{name}.py"], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, EXAMPLES / f"{name}.py", *arguments], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return [
         [float(text) for text in re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", line)] for line in done.stdout.splitlines()
@@ -76,6 +76,21 @@ def test_own_material():
     """Nearly incompressible: the stress of the incompressible bar within its compressibility."""
     for _, stress, exact in numbers("own_material"):
         assert stress == pytest.approx(exact, rel=5e-4)
+
+
+def test_own_probe():
+    """Small strains: the stress is that of the reference configuration within 1e-4."""
+    for _, stress, exact in numbers("own_probe"):
+        assert stress == pytest.approx(exact, rel=2e-4)
+
+
+def test_hertz(tmp_path):
+    """The largest pressure is Hertz's for the force there is."""
+    picture = tmp_path / "hertz.png"
+    lines = numbers("hertz", picture)
+    _, pressure, exact = lines[-1]
+    assert pressure == pytest.approx(exact, rel=0.03)
+    assert picture.stat().st_size > 5_000
 
 
 def test_parameter_study():

@@ -3,7 +3,7 @@
 import pytest
 
 from fsci.case.probes import Probe
-from fsci.case.quantities import FIELDS, PLACES, QUANTITIES
+from fsci.case.quantities import FIELDS, LOCATIONS, QUANTITIES
 from fsci.plot.curves import label
 from fsci.schema import reference_markdown
 
@@ -14,7 +14,7 @@ UNITS = {"length": "mm", "mass": "t", "time": "s"}
 def each_place():
     for quantity in QUANTITIES.values():
         for field in FIELDS:
-            for place in quantity.places(field):
+            for place in quantity.locations(field):
                 yield quantity.name, field, place
 
 
@@ -29,8 +29,8 @@ def test_every_quantity_can_be_asked_for_where_it_is(name, field, place):
 @pytest.mark.parametrize("name", QUANTITIES)
 def test_no_quantity_can_be_asked_for_elsewhere(name):
     quantity = QUANTITIES[name]
-    for place in (*PLACES, ""):
-        if not any(place in quantity.places(field) for field in FIELDS):
+    for place in (*LOCATIONS, ""):
+        if not any(place in quantity.locations(field) for field in FIELDS):
             reference = {"reference": {"velocity": 1.0}} if "reference" in quantity.needs else {}
             with pytest.raises(ValueError, match=f"'{name}'"):
                 Probe(quantity=name, **({place: WHERE[place]} if place else {}), **reference)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from pydantic import model_validator
 
-from fsci.case.quantities import FIELDS, PLACES, QUANTITIES, Field, Quantity, described
+from fsci.case.quantities import FIELDS, LOCATIONS, QUANTITIES, Field, Quantity, described
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import Name, NumberVector, Positive, Text
 
@@ -76,12 +76,12 @@ column NAME. In 2D everything is per unit of depth.
     @property
     def place(self) -> str:
         """The setting that says where: pair, at, on, through or none."""
-        return next((name for name in PLACES if getattr(self, name) is not None), "")
+        return next((name for name in LOCATIONS if getattr(self, name) is not None), "")
 
     @property
     def fields(self) -> list[str]:
         """The fields in which there is such a quantity at such a place."""
-        return [field for field in FIELDS if self.place in self.measured.places(field)]
+        return [field for field in FIELDS if self.place in self.measured.locations(field)]
 
     @property
     def measured(self) -> Quantity:
@@ -90,7 +90,7 @@ column NAME. In 2D everything is per unit of depth.
 
     @model_validator(mode="after")
     def _measurable(self) -> Probe:
-        given = [name for name in PLACES if getattr(self, name) is not None]
+        given = [name for name in LOCATIONS if getattr(self, name) is not None]
         if given[:2] == ["pair", "at"]:
             given.remove("at")  # a node of the pair
         if len(given) > 1:
@@ -107,7 +107,9 @@ column NAME. In 2D everything is per unit of depth.
             raise fault("'minus' is the second point of a difference: give the first one as 'at'", "minus")
         if self.fields:
             return self
-        possible = [words for name, words in PLACES.items() if any(name in self.measured.places(f) for f in FIELDS)]
+        possible = [
+            words for name, words in LOCATIONS.items() if any(name in self.measured.locations(f) for f in FIELDS)
+        ]
         whole = "body" if self.measured.structure or "body" in self.measured.needs else "fluid"
         whole = f"belongs to the whole {whole}: no 'at', no 'on'"
         wanted = f"needs {' or '.join(possible)}" if possible else whole

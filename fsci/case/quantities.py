@@ -10,7 +10,7 @@ Field = Literal["structure", "fluid", "rigid"]
 FIELDS: tuple[Field, ...] = ("structure", "fluid", "rigid")
 
 #: the setting that says where -> how messages name it
-PLACES = {"pair": "'pair: PAIR'", "at": "'at: [..]'", "on": "'on: SURFACE'", "through": "'through: PATCH'"}
+LOCATIONS = {"pair": "'pair: PAIR'", "at": "'at: [..]'", "on": "'on: SURFACE'", "through": "'through: PATCH'"}
 WHOLE = ""  #: none of them: a body, or all fluid
 
 ENERGIES = ("kinetic", "internal", "work", "total")
@@ -33,7 +33,7 @@ class Quantity:
     meaning: str = ""  #: what the name does not tell
     rigid: tuple[str, ...] = ()  #: settings that say where on a rigid body that the flow moves
 
-    def places(self, field: Field) -> tuple[str, ...]:
+    def locations(self, field: Field) -> tuple[str, ...]:
         """The settings that say where in a field it can be measured."""
         return {"structure": self.structure, "fluid": self.fluid, "rigid": self.rigid}[field]
 
@@ -94,7 +94,7 @@ def _lines(field: Field) -> Iterator[str]:
         WHOLE: "with none of them, of the whole",
     }
     for place, beginning in words.items():
-        there = [q for q in _ALL if place in q.places(field)]
+        there = [q for q in _ALL if place in q.locations(field)]
         if there:
             listed = ", ".join(q.name + (f" ({q.meaning})" if q.meaning else "") for q in there)
             yield f"- {beginning}: {listed}"
