@@ -18,7 +18,7 @@ from fsci.case.rigid_motion import rigid_motion
 from fsci.meshes.of_case import read_rigid_body, require_inside_period
 from solvers.fluid import probes
 from solvers.fluid.field import Fluid
-from solvers.fluid.forms import ELASTIC, Penalties
+from solvers.fluid.forms import choose_penalties
 from solvers.fluid.grid import Grid
 from solvers.fluid.immersed import ImmersedBody, rigid_body
 from solvers.fluid.inside import PointInBody
@@ -61,7 +61,7 @@ def _flow(settings: Section, *, elastic: bool) -> FlowSettings:
         scheme=settings.scheme,
         body_force=_body_force(settings),
         initial_velocity=settings.initial_velocity,
-        penalties=ELASTIC if elastic and settings.element == "q2q1" else Penalties(),
+        penalties=choose_penalties(settings.element, elastic=elastic),
     )
 
 

@@ -41,6 +41,11 @@ class Penalties:
 ELASTIC = Penalties(ghost_mass=2e-2, ghost_mass_second=1.0)
 
 
+def choose_penalties(element: str, *, elastic: bool) -> Penalties:
+    """Those of a flow around bodies of which some deform."""
+    return ELASTIC if elastic and element == "q2q1" else Penalties()
+
+
 @dataclass(frozen=True)
 class Flow:
     """What the terms share: functions, numbers and what the case leaves out."""
