@@ -89,6 +89,8 @@ class Contact:
         self.time = np.nan  #: of the latest evaluation [s]
         self.touched_at = np.full(len(self.pairs), np.inf)  #: when each pair first touched [s], as probes have noted it
         self.terms: Terms | None = None
+        self._D, self._covers = np.zeros(count), np.zeros(count, dtype=bool)  # at the latest evaluation
+        self._condensation: tuple[list[Part], Linearised, Condensed] | None = None  # the latest
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -281,28 +283,31 @@ class Contact:
 
         weight: of that force in the balance.
         """
-        self._parts = self.in_contact()
-        self._linearised = self.linearised(self._parts, weight)
-        self._condensed: Condensed = condense(self._linearised)
+        parts = self.in_contact()
+        linearised = self.linearised(parts, weight)
+        condensed = condense(linearised)
+        self._condensation = parts, linearised, condensed
         changed = np.zeros(self.size, dtype=bool)
         changed[self.multipliers.node[self.active_set.active]] = True
         if self.interface.basis is not None:
             changed[self.multipliers.node[self.multipliers.areas > 0.0]] = True
         return RowTransformation(
             dofs=self.nodes.dofs.ravel(),
-            rows=self._condensed.rows,
-            stiffness=self._condensed.stiffness,
-            added=self._condensed.added,
-            right=self._condensed.right,
+            rows=condensed.rows,
+            stiffness=condensed.stiffness,
+            added=condensed.added,
+            right=condensed.right,
             replaced=changed.repeat(self.dim),
         )
 
     def recover(self, balance: Array, du: Array) -> None:
         """Multipliers in contact from J du + R, the linearised balance, and du [m] at the nodes, shapes (N * dim,)."""
         own = np.zeros_like(self.z)
-        found = recover(self._linearised, self._condensed, balance, du)
-        if self._parts:
-            own[np.concatenate([part.which for part in self._parts])] = found.reshape(-1, self.dim)
+        assert self._condensation is not None, "condense comes first"
+        parts, linearised, condensed = self._condensation
+        found = recover(linearised, condensed, balance, du)
+        if parts:
+            own[np.concatenate([part.which for part in parts])] = found.reshape(-1, self.dim)
         self._set_multipliers(own)
 
     def dofs(self) -> NDArray[np.int64]:

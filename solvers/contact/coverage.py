@@ -21,7 +21,8 @@ class Coverage:
 
     def __init__(self, areas: Array):
         self._areas = np.maximum(areas, np.finfo(float).tiny)
-        self.begin_step()
+        self._seen = np.zeros(len(self._areas), dtype=bool)
+        self._evaluations = 0
 
     def begin_step(self) -> None:
         self._seen = np.zeros(len(self._areas), dtype=bool)

@@ -33,13 +33,15 @@ class SelfSearch:
         self._others = None if others is None or len(others) == 0 else Search(facets, others)
         self._count, self._nodes = len(facets), len(points)
         self._thickness = wall_thickness(points[facets].mean(axis=1), self._normals(points))
-        self.begin_step(np.zeros(self._count, dtype=np.int64))
+        self._pressed = np.zeros(self._count, dtype=np.int64)
+        self._roles = np.zeros(self._count, dtype=np.int8)
+        self._directed = np.empty(0, dtype=np.int64)  # codes of directed pairs, sorted
 
     def begin_step(self, pressed: NDArray[np.int64]) -> None:
         """pressed: how many multipliers of each facet are in contact; such facets are slaves again, shape (k,)."""
         self._pressed = pressed
         self._roles = np.zeros(self._count, dtype=np.int8)
-        self._directed = np.empty(0, dtype=np.int64)  # codes of directed pairs, sorted
+        self._directed = np.empty(0, dtype=np.int64)
 
     def pairs(
         self, xs: Array, xm: Array, inflation: float, xs_previous: Array | None = None, xm_previous: Array | None = None
