@@ -10,7 +10,7 @@ import numpy as np
 from coupling.ports import Solid
 from solvers.api import Array, State
 from solvers.fluid.surface import Motion
-from solvers.fluid.time import STEADY, Difference
+from solvers.fluid.time_scheme import STEADY, Difference
 
 
 @dataclass(frozen=True)

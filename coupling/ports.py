@@ -18,7 +18,7 @@ from solvers.api import Array, Stateful, StepInfo
 from solvers.fluid.coupling_entries import InterfaceEntries
 from solvers.fluid.krylov import Ladder
 from solvers.fluid.surface import Motion
-from solvers.fluid.time import Step, TimeScheme
+from solvers.fluid.time_scheme import Step, TimeScheme
 from solvers.newton import System
 from solvers.rows import RowTransformation, TakenRows
 from solvers.timing import Timer

@@ -22,7 +22,7 @@ from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body, Support
 from solvers.structure.field import Structure
 from solvers.structure.materials import NeoHooke
-from solvers.structure.time import Statics
+from solvers.structure.time_scheme import Statics
 
 SETTINGS = SolverSettings(Tolerance(residual=1e-11, residual_absolute=1e-11, max_iterations=15), linear="direct")
 MATERIAL = NeoHooke(mu=400.0, lmbda=600.0, density=1.0)

@@ -11,6 +11,7 @@ from fsci import shapes
 from solvers.fluid.grid import Grid, uniform
 from solvers.fluid.patches import Patch
 from solvers.fluid.system import FlowSettings
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body, Support, Symmetry
@@ -18,8 +19,7 @@ from solvers.structure.dynamics import Dynamics
 from solvers.structure.elastic_constants import lame
 from solvers.structure.field import Structure
 from solvers.structure.materials import StVenantKirchhoff
-from solvers.structure.time import TimeScheme
-from solvers.time import GeneralisedAlpha
+from solvers.structure.time_scheme import TimeScheme
 
 TIGHT = Tolerance(1e-10)
 

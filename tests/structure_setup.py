@@ -14,7 +14,7 @@ from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body, Support
 from solvers.structure.field import Structure
-from solvers.structure.time import Statics
+from solvers.structure.time_scheme import Statics
 
 CELL_TYPES = ("triangle", "triangle6", "quad", "quad9", "tetra", "tetra10", "hexahedron", "hexahedron27")
 TIGHT = SolverSettings(Tolerance(residual=1e-13), linear="direct")

@@ -28,12 +28,12 @@ from solvers.fluid.grid import uniform
 from solvers.fluid.patch_kinds import PatchKind
 from solvers.fluid.patches import Patch
 from solvers.fluid.surface import ImmersedSurface
-from solvers.fluid.time import Difference, TimeScheme
+from solvers.fluid.time_scheme import Difference, TimeScheme
 from solvers.march import march
 from solvers.mesh import Mesh
 from solvers.solver_settings import SolverSettings
 from solvers.structure import Body, NeoHooke, Structure, StVenantKirchhoff, Support, lame
-from solvers.structure.time import Statics
+from solvers.structure.time_scheme import Statics
 
 # ----------------------------------------------------------------------------------------------------- structure
 

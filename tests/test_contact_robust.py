@@ -13,9 +13,9 @@ import solvers.contact.patch
 import solvers.contact.search
 from fsci import shapes
 from solvers.contact.surface import Surface
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Support
 from solvers.structure.dynamics import Dynamics
-from solvers.time import GeneralisedAlpha
 
 ZERO = constant(0)
 

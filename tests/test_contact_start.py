@@ -12,13 +12,13 @@ from fsci.run.run import run_case
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.surface import Surface
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
 from solvers.structure.dynamics import Damping, Dynamics
 from solvers.structure.loads import Pressure, Traction
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
-from solvers.time import GeneralisedAlpha
 
 TIGHT = SolverSettings(Tolerance(residual=1e-12, residual_absolute=1e-13), linear="direct")
 TRAPEZOIDAL = GeneralisedAlpha.from_rho_inf(1.0)

@@ -13,11 +13,11 @@ from solvers.contact.contact import Contact
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Support
 from solvers.structure.dynamics import Dynamics
 from solvers.structure.field import Structure
-from solvers.structure.time import Statics
-from solvers.time import GeneralisedAlpha
+from solvers.structure.time_scheme import Statics
 
 OVERLAP = 0.03
 MIXED = [

@@ -9,7 +9,7 @@ from solvers.fluid.grid import uniform
 from solvers.fluid.history import Past
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.surface import ImmersedSurface, Motion
-from solvers.fluid.time import Step
+from solvers.fluid.time_scheme import Step
 
 VELOCITY, DT = field(2.0, 0.0), 0.01
 

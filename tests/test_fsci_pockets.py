@@ -12,11 +12,11 @@ from fsci import shapes
 from solvers.fluid.grid import uniform
 from solvers.fluid.patches import Patch
 from solvers.fluid.system import FlowSettings
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Body, Symmetry
 from solvers.structure.dynamics import Dynamics
 from solvers.structure.elastic_constants import lame
 from solvers.structure.materials import StVenantKirchhoff
-from solvers.time import GeneralisedAlpha
 from tests.coupling_setup import TIGHT, couple_one
 
 WEIGHT, DT = 3.0, 0.05

@@ -9,11 +9,11 @@ from test_structure_tangent import tangent_error
 
 from fsci import shapes
 from fsci.run.history import read_history
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Pressure, Support, Symmetry, Traction
 from solvers.structure.dynamics import Dynamics
 from solvers.structure.elastic_constants import lame, plane_stress_lambda
 from solvers.structure.materials import LinearElastic, PlaneStressLinearElastic
-from solvers.time import GeneralisedAlpha
 
 GRADIENT = np.array([[0.4, 0.9, 0.3], [-0.5, -0.7, 0.2], [0.1, -0.6, 0.5]])
 

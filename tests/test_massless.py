@@ -12,11 +12,11 @@ from structure_setup import CELL_TYPES, block, constant
 from fsci import shapes
 from solvers.blocks import Layout
 from solvers.contact.surface import Surface
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Support
 from solvers.structure.dynamics import Damping, Dynamics
 from solvers.structure.massless import NoMassLeft, massless_dofs, move_mass_inwards
 from solvers.structure.materials import StVenantKirchhoff
-from solvers.time import GeneralisedAlpha
 
 TRAPEZOIDAL = GeneralisedAlpha.from_rho_inf(1.0)
 

@@ -12,13 +12,13 @@ from fsci import shapes
 from fsci.case import CaseError, load_case
 from fsci.run.history import read_history
 from solvers.api import StepFailed
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Pressure, Support, Traction
 from solvers.structure.dynamics import Dynamics
 from solvers.structure.elastic_constants import lame
 from solvers.structure.materials import LinearElastic, NeoHooke
-from solvers.time import GeneralisedAlpha
 
 LAWS = {name: law for name, law in MATERIALS.items() if name != "varying"} | {"linear": LinearElastic(3.0, 5.0, 2.0)}
 CONSTANTS = {"c10": 1.0, "c01": 0.5, "bulk": 7.0}

@@ -10,7 +10,7 @@ from programs import fsci
 from fsci.builder.build import build
 from fsci.case import load_case
 from fsci.run.history import read_history
-from solvers.time import GeneralisedAlpha
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.timing import Timer
 
 

@@ -18,7 +18,7 @@ from solvers.contact.surface import Surface
 from solvers.mesh_topology import cut_out
 from solvers.structure.body import Support, Traction
 from solvers.structure.field import Structure
-from solvers.structure.time import Statics
+from solvers.structure.time_scheme import Statics
 
 ZERO = constant(0)
 

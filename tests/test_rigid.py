@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from solvers.api import StepFailed
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.march import march
 from solvers.newton import Tolerance
 from solvers.rigid import motion
@@ -14,7 +15,6 @@ from solvers.rigid.contact import Obstacle, RigidContact, RigidPair
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.inertia import Inertia, inertia_of_surface
 from solvers.rigid.rotation import rotation, skew, vector_rate
-from solvers.time import GeneralisedAlpha
 
 TIGHT = Tolerance(1e-12)
 CUBE = np.array([[x, y, z] for z in (0.0, 1.0) for y in (0.0, 1.0) for x in (0.0, 1.0)])

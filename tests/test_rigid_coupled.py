@@ -13,6 +13,7 @@ from solvers.fluid.grid import uniform
 from solvers.fluid.immersed import rigid_body
 from solvers.fluid.patches import Patch
 from solvers.fluid.system import FlowSettings
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.march import march
 from solvers.newton import Tolerance
 from solvers.rigid.body import RigidBody, Spring
@@ -20,7 +21,6 @@ from solvers.rigid.contact import Obstacle, RigidContact, RigidPair
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.inertia import inertia_of_surface
 from solvers.solver_settings import SolverSettings
-from solvers.time import GeneralisedAlpha
 from tests.fluid_setup import loop
 
 TIGHT = SolverSettings(Tolerance(1e-10))

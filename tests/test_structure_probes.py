@@ -8,12 +8,12 @@ from structure_setup import TIGHT, block, constant, load_step, make_structure, v
 
 from fsci import shapes
 from solvers.api import StepFailed
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure import probes
 from solvers.structure.body import Pressure, Support, Symmetry, Traction
 from solvers.structure.dynamics import Dynamics
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
 from solvers.structure.supports import SupportError
-from solvers.time import GeneralisedAlpha
 
 MATERIAL = NeoHooke(30.0, 50.0, 2.0)
 

@@ -5,11 +5,11 @@ import pytest
 from structure_setup import block, constant, distort, load_step, make_structure, vector
 from test_structure_supports import MATERIAL, rotation, turned
 
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure import probes
 from solvers.structure.body import Spring, Symmetry, Traction
 from solvers.structure.dynamics import Dynamics
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
-from solvers.time import GeneralisedAlpha
 
 
 @pytest.mark.parametrize("cell_type", ["triangle", "quad9", "tetra10", "hexahedron"])

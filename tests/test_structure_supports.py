@@ -8,10 +8,10 @@ from scipy.linalg import expm
 from structure_setup import TIGHT, block, constant, distort, load_step, make_structure, vector
 
 from fsci import shapes
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Pressure, Roller, Support, Symmetry, Traction
 from solvers.structure.dynamics import Dynamics
 from solvers.structure.materials import NeoHooke
-from solvers.time import GeneralisedAlpha
 
 MATERIAL = NeoHooke(80.0, 120.0, 2.0)
 

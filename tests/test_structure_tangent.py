@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from structure_setup import block, constant, distort, make_structure, vector
 
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Pressure, Support
 from solvers.structure.dynamics import Damping, Dynamics
 from solvers.structure.elastic_constants import lame, plane_stress_lambda
@@ -14,7 +15,6 @@ from solvers.structure.materials import (
     PlaneStressStVenantKirchhoff,
     StVenantKirchhoff,
 )
-from solvers.time import GeneralisedAlpha
 
 MATERIALS = {
     "st_venant_kirchhoff": StVenantKirchhoff(3.0, 5.0, 2.0),

@@ -5,13 +5,13 @@ import pytest
 from structure_setup import block, constant, make_structure, vector
 
 from fsci import shapes
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure import probes
 from solvers.structure.body import Support
 from solvers.structure.dynamics import Damping, Dynamics
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
-from solvers.time import GeneralisedAlpha
 
 TIGHT = SolverSettings(Tolerance(residual=1e-12), linear="direct")
 

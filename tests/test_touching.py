@@ -8,10 +8,10 @@ from structure_setup import constant
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.tied import Tied
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Support
 from solvers.structure.dynamics import Dynamics
-from solvers.structure.time import Statics
-from solvers.time import GeneralisedAlpha
+from solvers.structure.time_scheme import Statics
 
 ZERO = constant(0)
 LAWS = {"frictionless": Frictionless(), "coulomb": Coulomb(0.3), "tied": Tied()}

@@ -5,9 +5,9 @@ import numpy as np
 from coupling import Monolithic, couple
 from fsci.shapes import rectangle
 from solvers.fluid import FlowSettings, Patch, uniform
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.march import march
 from solvers.structure import Body, Dynamics, Structure, StVenantKirchhoff, Support, lame
-from solvers.time import GeneralisedAlpha
 
 mesh = rectangle([0.2, 0.5], [2, 8], origin=[0.9, 0.0])
 material = StVenantKirchhoff(*lame(E=1000.0, nu=0.3), density=2.0)

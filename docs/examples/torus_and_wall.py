@@ -6,9 +6,9 @@ from coupling import Monolithic, contact_surface, couple
 from fsci.shapes import solid_torus
 from solvers.contact import Contact, Pair, Surface
 from solvers.fluid import FlowSettings, Patch, uniform
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.march import march
 from solvers.structure import Body, Dynamics, NeoHooke, Structure, lame
-from solvers.time import GeneralisedAlpha
 
 mesh = solid_torus(0.5, 0.2, [16, 8])
 mesh.points[:, 2] -= 0.45

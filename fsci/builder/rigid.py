@@ -12,11 +12,11 @@ from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.free_body import HELD
 from fsci.meshes.of_case import require_inside_period
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.rigid import probes
 from solvers.rigid.body import RigidBody, Spring
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.inertia import inertia_of_surface
-from solvers.time import GeneralisedAlpha
 from solvers.timing import Timer
 
 

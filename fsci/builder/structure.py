@@ -18,6 +18,7 @@ from fsci.case.values import value_of
 from fsci.meshes.locations import Locations, find_locations
 from fsci.meshes.of_case import VECTORS, read_body
 from solvers.constraint import Constraint
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.mesh import Mesh
 from solvers.solver_settings import SolverSettings
 from solvers.structure import materials, probes
@@ -32,8 +33,7 @@ from solvers.structure.materials import (
     PlaneStressStVenantKirchhoff,
 )
 from solvers.structure.supports import SupportError
-from solvers.structure.time import Statics, TimeScheme
-from solvers.time import GeneralisedAlpha
+from solvers.structure.time_scheme import Statics, TimeScheme
 from solvers.timing import Timer
 from solvers.values import combine
 

@@ -24,7 +24,7 @@ from solvers.fluid.outer_faces import OuterFaces
 from solvers.fluid.patches import Boundary
 from solvers.fluid.pieces import Pieces
 from solvers.fluid.space import Unknowns, set_velocity
-from solvers.fluid.time import SCHEMES, Step, TimeScheme
+from solvers.fluid.time_scheme import SCHEMES, Step, TimeScheme
 from solvers.fluid.weights import Weights
 from solvers.values import Value
 

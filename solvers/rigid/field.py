@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array, State, StepFailed, StepInfo
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance, converge
 from solvers.rigid import motion
 from solvers.rigid.body import RigidBody, in_space
@@ -20,7 +21,6 @@ from solvers.rigid.rotation import vector_rate
 from solvers.rounding import rounding_error
 from solvers.rows import RowTransformation, TakenRows
 from solvers.step import Step
-from solvers.time import GeneralisedAlpha
 from solvers.timing import Timer
 from solvers.vertices import VertexJacobian
 

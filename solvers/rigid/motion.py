@@ -20,9 +20,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from solvers.api import Array
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.rigid.body import RigidBody
 from solvers.rigid.rotation import rotation, skew, vector_rate
-from solvers.time import GeneralisedAlpha
 
 
 @dataclass(frozen=True)

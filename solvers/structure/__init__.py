@@ -13,6 +13,6 @@ __getattr__, __all__ = lazy_names(
         "springs": ["Spring"],
         "supports": ["Roller", "Support", "Symmetry"],
         "dynamics": ["Damping", "Dynamics"],
-        "time": ["Statics"],
+        "time_scheme": ["Statics"],
     },
 )

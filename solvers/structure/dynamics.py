@@ -11,11 +11,11 @@ from petsc4py import PETSc
 
 from solvers.api import Array
 from solvers.blocks import block_diagonal
+from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.first_state import FirstState
 from solvers.structure.instant import Instant, Moving, times
 from solvers.structure.massless import massless_dofs
-from solvers.structure.time import Settling
-from solvers.time import GeneralisedAlpha
+from solvers.structure.time_scheme import Settling
 
 #: Time, in first steps, in which velocities and accelerations at the start are measured.
 SHORT = 1e-3

@@ -30,7 +30,7 @@ from solvers.structure.instant import Instant
 from solvers.structure.massless import mass_matrices
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.supports import prescribe
-from solvers.structure.time import Statics, TimeScheme
+from solvers.structure.time_scheme import Statics, TimeScheme
 from solvers.timing import Timer
 
 

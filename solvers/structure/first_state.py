@@ -8,7 +8,7 @@ from petsc4py import PETSc
 
 from solvers.api import Array
 from solvers.structure.instant import Moving, times
-from solvers.structure.time import Statics
+from solvers.structure.time_scheme import Statics
 
 
 class FirstState(Statics):
