@@ -22,7 +22,9 @@ def numbers(name: str, *arguments: Path) -> list[list[float]]:
 
 def test_all_are_tested_and_shown():
     names = {path.stem for path in EXAMPLES.glob("*.py")}
-    library = {"cylinder", "flap", "own_material", "parameter_study", "torus_and_wall", "two_blocks"}
+    library = {
+        "cylinder", "flap", "hertz", "own_material", "own_probe", "parameter_study", "torus_and_wall", "two_blocks",
+    }  # fmt: skip
     assert names == {*library, "post_process"}
     pages = [(EXAMPLES.parent / name).read_text() for name in ("library.md", "howto.md")]
     assert all(f"examples/{name}.py" in pages[name not in library] for name in names)
