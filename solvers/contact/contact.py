@@ -54,11 +54,8 @@ class Contact:
         self.comm, self.c_n = comm, c_n
         self.names = tuple(names) or tuple(f"pair{i}" for i in range(len(pairs)))
         self.interface: Interface = describe_interface(pairs)
-        self.pairs, self.nodes, self.multipliers = (
-            self.interface.pairs,
-            self.interface.nodes,
-            self.interface.multipliers,
-        )
+        self.pairs, self.nodes = self.interface.pairs, self.interface.nodes
+        self.multipliers = self.interface.multipliers
         self.size, self.dim = self.nodes.points.shape
         count = len(self.multipliers.node)
         self.z = np.zeros((count, self.dim))

@@ -34,7 +34,8 @@ class Merging:
         self._node = multipliers.node
         self._several = ~multipliers.alone
         self._any = bool(self._several.any())
-        self.begin_step()
+        self._kept = np.empty((0, 2), dtype=np.int64)  # merged pairs
+        self._evaluations = 0  # of this step
 
     def begin_step(self) -> None:
         self._kept = np.empty((0, 2), dtype=np.int64)
