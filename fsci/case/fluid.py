@@ -50,7 +50,9 @@ class Patch(Section):
     pressure: Formula | None = setting(
         None, "prescribed pressure of a flow that enters or leaves along the normal of the face", unit="Pa"
     )
-    outflow: Switch = setting(False, "true: the flow leaves as if it went on unchanged, at pressure 0")
+    outflow: Switch = setting(
+        False, "true: the flow leaves as a parallel flow does, at pressure 0 in the mean, at pressure 0"
+    )
     periodic: Switch = setting(
         False, "true: the flow goes on at the opposite face; the patch is on both and has all of them"
     )
