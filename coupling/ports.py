@@ -1,4 +1,4 @@
-"""What coupling asks of fields: of one that is solid, and of one that flows.
+"""The protocols that coupling needs: of a solid and of a flow.
 
 Each has unknowns of its own, distributed over the processes, and its surfaces consist of vertices that all processes
 know. The solid says where they are, the flow which force [N] it exerts on them. All calls are collective.

@@ -1,4 +1,4 @@
-"""Rows of a distributed matrix in the hands of every process: read some, replace some, add to some."""
+"""Rows of a distributed matrix on every process: read, replace or add to some of them."""
 
 from __future__ import annotations
 

@@ -124,3 +124,10 @@ def test_the_gallery_has_every_case():
 def test_the_quickstart_has_every_section():
     table = (ROOT / "docs" / "quickstart.md").read_text().split("| section | says |")[1].split("\n\n")[0]
     assert set(re.findall(r"^\| `([a-z]+)` \|", table, re.MULTILINE)) == SECTIONS
+
+
+def test_the_glossary_has_the_terms_of_the_field():
+    page = (ROOT / "docs" / "glossary.md").read_text()
+    defined = {word.strip() for line in re.findall(r"^(.*)\n: ", page, re.MULTILINE) for word in line.split(",")}
+    wanted = {"active set", "extrapolate", "ghost cell", "hydrostatic mode", "increment", "predictor", "rate"}
+    assert wanted | {"sparsity pattern", "added mass", "CutFEM", "dual basis", "ghost penalty", "leak"} <= defined

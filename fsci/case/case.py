@@ -28,9 +28,9 @@ from fsci.case.verify import Check
 
 
 class Case(Section):
-    """One simulation: of a structure, of a fluid."""
+    """One simulation of structure, fluid, contact, or all of them."""
 
-    title: Text = setting("", "what it is about, for pictures and tables")
+    title: Text = setting("", "title of the case, for pictures and tables")
     units: Units = setting(Units, "units of all numbers")
     time: Time = setting(..., "time interval and steps")
     curves: dict[CurveName, Curve] = setting(dict, "functions that expressions may call, by name")
@@ -39,7 +39,7 @@ class Case(Section):
     coupling: Coupling | None = setting(None, "how fluid and structure are solved together")
     contact: Contact | None = setting(None, "surfaces that may touch")
     probes: dict[Name, Probe] = setting(dict, "quantities that every step records, by name")
-    output: Output = setting(Output, "what is written, and how often")
+    output: Output = setting(Output, "which files are written, and how often")
     verify: tuple[Check, ...] = setting(tuple, "results that the run must reach")
     solver: Solver = setting(Solver, "how equations are solved")
 

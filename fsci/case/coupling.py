@@ -32,12 +32,14 @@ class Coupling(Section):
     accelerator: Literal["iqn", "aitken", "constant"] = setting(
         "iqn", "partitioned: interface quasi-Newton, Aitken's relaxation, or a constant one"
     )
-    relaxation: Positive = setting(0.5, "partitioned: share of the first correction that is taken", unit="1")
-    reuse: CountOrZero = setting(8, "partitioned, iqn: earlier steps whose iterations are still used")
+    relaxation: Positive = setting(0.5, "partitioned: relaxation factor of the first iteration", unit="1")
+    reuse: CountOrZero = setting(8, "partitioned, iqn: number of earlier steps whose iterations are reused")
     tolerance: Positive = setting(
-        1e-6, "partitioned: disagreement of the displacements, relative to those of the step", unit="1"
+        1e-6, "partitioned: tolerance of the interface residual, relative to the displacement of the step", unit="1"
     )
-    tolerance_absolute: NotNegative = setting(0.0, "partitioned: disagreement that is small in any case", unit="m")
+    tolerance_absolute: NotNegative = setting(
+        0.0, "partitioned: absolute tolerance of the interface residual", unit="m"
+    )
     max_iterations: Count = setting(50, "partitioned: iterations after which a step has failed")
 
     @model_validator(mode="after")

@@ -29,10 +29,10 @@ class Curve(Section):
         None, "points [t, value], one after the other"
     )
     csv: Text | None = setting(
-        None, "file with the points, relative to the case file: two columns, t and value, with or without a heading"
+        None, "file with the points, relative to the case file: two columns, t and value, with or without a header line"
     )
     smooth: Switch = setting(
-        False, "true: a smooth line through the points, level at extrema and at both ends; else straight lines"
+        False, "true: monotone cubic interpolation (C1), with zero slope at extrema and at both ends; else linear"
     )
 
     _points: Array = PrivateAttr()

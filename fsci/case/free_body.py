@@ -36,7 +36,7 @@ class Free(Section):
     gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
     springs: tuple[PointSpring, ...] = setting(tuple, "springs and dampers at points")
     held: tuple[Literal["x", "y", "z", "rotation", "rotation_x", "rotation_y", "rotation_z"], ...] = setting(
-        tuple, "ways in which it does not move"
+        tuple, "degrees of freedom that do not move"
     )
     initial_velocity: NumberVector | None = setting(None, "velocity of the centre at the start", unit="m/s")
     initial_spin: Annotated[tuple[Number, ...], Entries(1, 3)] | None = setting(

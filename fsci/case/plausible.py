@@ -1,4 +1,4 @@
-"""Doubts about a case that can be run: numbers that are probably slips."""
+"""Warnings about a case that can be run: numbers that are probably mistakes."""
 
 from __future__ import annotations
 

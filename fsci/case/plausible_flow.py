@@ -1,4 +1,4 @@
-"""Doubts about a flow that can be computed: cells too coarse, steps too long, nothing that drives it."""
+"""Warnings about a flow that can be computed: cells too coarse, steps too long, nothing that drives it."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _fast_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
 
 
 def fast_body(case: Case, fluid: Fluid, motion: Movement, points: NDArray[np.float64]) -> str | None:
-    """Whether any of some points [m] of a body, shape (n, dim), crosses too many cells in a step."""
+    """The warning if points [m] of a body, shape (n, dim), cross too many cells in a step, or None."""
     smallest = np.array([float(np.diff(edges).min()) for edges in fluid.grid.planes])
     time = case.time
     moved, cells = rigid_motion(points, motion, time.start, time.step), 0.0

@@ -11,9 +11,11 @@ from fsci.case.values import Count, NotNegative, Positive, Switch
 class Newton(Section):
     """When a time step is solved: the residual is small, and the increment too if that is asked for."""
 
-    residual: Positive = setting(1e-8, "residual, relative to the largest one of the step", unit="1")
-    residual_absolute: NotNegative = setting(0.0, "residual that is small enough in any case", unit="N")
-    increment: Positive | None = setting(None, "increment, relative to the solution; empty: any", unit="1")
+    residual: Positive = setting(1e-8, "tolerance of the residual, relative to the largest one of the step", unit="1")
+    residual_absolute: NotNegative = setting(0.0, "absolute tolerance of the residual", unit="N")
+    increment: Positive | None = setting(
+        None, "tolerance of the increment, relative to the solution; default: none", unit="1"
+    )
     max_iterations: Count = setting(25, "iterations after which a step has failed")
     line_search: Switch = setting(False, "halve increments that do not reduce the residual")
 

@@ -1,4 +1,4 @@
-"""What `fsci check` finds out by reading the meshes of a case: the mistakes that a run would stop at, and doubts.
+"""What `fsci check` finds by reading the meshes of a case: mistakes that would stop a run, and warnings.
 
 Meshes are read only where they can tell something: files always, built-in shapes where points or bodies depend on them.
 """
@@ -198,7 +198,7 @@ def _has_period(case: Case) -> bool:
 
 
 def _against_grid(case: Case, found: Findings, keys: Keys, mesh: Mesh, *, moves: bool) -> None:
-    """Doubts about the size and the place of a body in the flow."""
+    """Warnings about the size and the position of a body in the flow."""
     assert case.fluid is not None
     low, high = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
     if (mesh.points.max(axis=0) <= low).any() or (mesh.points.min(axis=0) >= high).any():

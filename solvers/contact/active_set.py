@@ -37,7 +37,7 @@ class ActiveSet:
         return self.status != OPEN
 
     def begin_step(self) -> None:
-        """Forget what was seen in the last step; the set itself stays."""
+        """Clear the sets seen in the last step; the set itself is kept."""
         self.changed, self.changes, self.damping = False, 0, 1.0
         self._seen, self._returns = [self.status.tobytes()], 0
 

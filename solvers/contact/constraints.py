@@ -1,4 +1,4 @@
-"""Which multipliers have constraints of their own in an iterate, and what becomes of the others."""
+"""Which multipliers have a constraint in an iterate, and which are means of their neighbours."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from solvers.sparse import Sparse, sparse
 
 @dataclass(frozen=True)
 class Patch:
-    """Slave surfaces that hang together; a node on a sharp edge has several places (see `cut_at_edges`)."""
+    """Connected slave surfaces; a node on a sharp edge has several places (see `cut_at_edges`)."""
 
     nodes: NDArray[np.int64]  #: of each place, among all nodes, shape (n,)
     multipliers: NDArray[np.int64]  #: among all multipliers, shape (n,)

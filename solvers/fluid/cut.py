@@ -169,7 +169,7 @@ class Cutter:
         return (moments.fraction > NOTHING) & (moments.fraction < 1.0 - NOTHING) | in_use, in_use
 
     def _facing(self, moments, counts, normal) -> NDArray[np.bool_]:
-        """Box cells with surfaces that face each other: if they part, fluid comes between."""
+        """Box cells with surfaces that face each other: fluid enters them if the surfaces separate."""
         number, size = moments.cells[moments.piece_cell], self.grid.grid.size
         area = moments.piece_mass.sum(axis=(1, 2)) * counts[moments.piece_facet]
         total = np.bincount(number, area, size)
@@ -177,7 +177,7 @@ class Cutter:
         return (total > 0.0) & (np.linalg.norm(net, axis=0) < 0.5 * total)
 
     def _covered(self, corners: Array) -> NDArray[np.bool_]:
-        """Box cells around facets that lie on the box's boundary: if these leave it, fluid comes between."""
+        """Box cells around facets on the box's boundary: fluid enters them if the facets leave it."""
         box = self.grid.grid
         marked = np.zeros(box.size, dtype=bool)
         marked[_cells_between(box, corners.min(axis=1), corners.max(axis=1))] = True

@@ -165,7 +165,7 @@ class Fluid:
             self.move({})
 
     def predict(self) -> None:
-        """Let the velocity go on as in the last step, where it was known before that too."""
+        """Extrapolate the velocity linearly from the last two steps, where both have it."""
         if len(self.current.difference.beta) < 2 or not self.history.steps:
             return
         old, older = self.history.past[:2]
@@ -229,7 +229,7 @@ class Fluid:
             self.notes += self._fast_bodies.notes({body.surface.name: m for body, m in self.moved()}, self.current.dt)
 
     def end_step(self) -> None:
-        """Accept the step. Fluid that comes between surfaces which touch now will have been at rest."""
+        """Accept the step. Between surfaces that touch now the velocity of this step is zero."""
         if self._coupled:
             self._note_fast_bodies()
         found = self.system.active_dofs | self.system.dofs_of(self.cut.contact_cells)

@@ -1,4 +1,4 @@
-"""The velocities at the times behind, which the rate of a step asks for."""
+"""The velocities of earlier steps, which the rate du/dt of a step needs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Past:
 
 
 class History:
-    """Velocities and lengths of the accepted steps, the last one first: as many as the time scheme asks for."""
+    """Velocities and lengths of the accepted steps, the last one first: as many as the time scheme needs."""
 
     def __init__(self, scheme: TimeScheme, size: int):
         self.scheme = scheme

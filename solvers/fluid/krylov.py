@@ -41,7 +41,7 @@ def rungs(method: Literal["direct", "multigrid", "ilu"], degree: int) -> tuple[R
 
 
 class Ladder:
-    """Which of several solvers is in use, and which comes next where that fails. Its `rung` is part of the state."""
+    """Which of several solvers is in use, and the next one if it fails. Its `rung` is part of the state."""
 
     def __init__(self, comm: MPI.Comm, rungs: Sequence[Rung], dofs: int, say: Callable[[str], None]):
         self.comm, self.rungs, self._dofs, self._say = comm, rungs, dofs, say

@@ -29,7 +29,7 @@ class Pattern:
 
 
 def choose_pattern(unknowns: Unknowns, cut: Cut) -> Pattern:
-    """Room for a cut and for those that its bodies may make in the next steps."""
+    """A sparsity pattern for a cut and for those that its bodies may make in the next steps."""
     cells = cut.reach.copy()
     cells[cut.active] = True
     return pattern_of(unknowns, cells, cut.reach)

@@ -62,7 +62,7 @@ def _hold(system: FlowSystem, pocket: Pocket, sizes: Array, *, keep_level: bool)
 
 
 def spread_excess(comm: MPI.Comm, holds: list[Hold], rows: Array) -> None:
-    """Take what surfaces let into a closed pocket, or displace there, from all of its fluid alike (collective).
+    """Balance the net flux into a closed pocket by a uniform source in its fluid (collective).
 
     Else the one node that fixes the pressure is all of the outlet: an error of pressure that no mesh cures.
     """

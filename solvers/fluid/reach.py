@@ -1,4 +1,4 @@
-"""How far bodies may move: not beyond the flow behind them that is known, and not beyond the period."""
+"""How far bodies may move in a step: within the cells to which the velocity is extrapolated, and within the period."""
 
 from __future__ import annotations
 

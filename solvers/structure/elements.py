@@ -1,4 +1,4 @@
-"""Elements: what a body's energy becomes when it is integrated cell by cell.
+"""Elements: the integrals of a body's energy over its cells.
 
 The plain element integrates W(F) as it is. Where the material hardly changes its volume, its cells are then too stiff
 ("locking"): every quadrature point asks for det F = 1, more conditions than the nodes of a cell can fulfil. The mixed

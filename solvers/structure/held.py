@@ -1,4 +1,4 @@
-"""What supports hold of all bodies together: parts of arrays, and their place in linear systems."""
+"""The dofs that supports prescribe, of all bodies: parts of arrays, and rows of linear systems."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Held:
         self._stopped_at: Array | None = None
 
     def stopped(self, dofs: NDArray[np.int64], u: Array) -> Held:
-        """These owned dofs are held too, and all that is held stays at the displacement u [m]."""
+        """Prescribe these owned dofs too; all prescribed dofs keep the displacement u [m]."""
         held = copy(self)
         held.dofs = np.union1d(self.dofs, dofs)
         held._stopped_at = held.part(u)

@@ -1,4 +1,4 @@
-"""Tied surfaces: points that were together stay together, whatever the traction between them.
+"""Tied surfaces: no relative motion, for any traction.
 
 Source: Puso & Laursen, Comput. Methods Appl. Mech. Engng 193 (2004), mesh tying with mortar elements.
 """
