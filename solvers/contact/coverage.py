@@ -29,7 +29,7 @@ class Coverage:
         self._evaluations = 0
 
     def enough(self, D: Array, least: float = LEAST_COVERED) -> NDArray[np.bool_]:
-        """Whether the covered areas D [m^(dim-1)] are more than slivers, which appear and vanish with iterates, shape (C,)."""
+        """Whether the covered areas D [m^(dim-1)] are more than slivers, shape (C,)."""
         return D > least * self._areas
 
     def judge(self, D: Array) -> NDArray[np.bool_]:
