@@ -24,7 +24,7 @@ from solvers.fluid.history import History
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.krylov import FlowSolver, Ladder, rungs
 from solvers.fluid.patches import Boundary, Patch, periodic_axes
-from solvers.fluid.pressure_level import Hold, hold_pressure, spread_excess
+from solvers.fluid.pressure_level import Hold, hold_pressure, keep_levels, spread_excess
 from solvers.fluid.reach import require_known, require_within_period, strip_layers
 from solvers.fluid.space import Unknowns, set_velocity
 from solvers.fluid.surface import Motion, offsets, together, wetness
@@ -220,6 +220,8 @@ class Fluid:
         """Newton to the tolerance. Raises StepFailed."""
         self._largest = 0.0
         info = converge(self, self.solver.newton)
+        keep_levels(self.comm, self._holds, self.flow[: self.unknowns.owned])
+        self.system.flow.x.scatter_forward()
         if not self._coupled:
             self._note_fast_bodies()
         return replace(info, notes=tuple(self.notes))

@@ -1,4 +1,4 @@
-"""The level of the pressure where nothing determines it: held at one node, and no node an outlet."""
+"""The level of the pressure where nothing determines it: held at one node meanwhile, and no node an outlet."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ class Hold:
     dofs: NDArray[np.int64]  #: owned dofs with identity rows, none or one
     inside: Mask  #: owned pressure dofs of the pocket
     shares: Array  #: of its fluid, at owned dofs; their sum on all processes is one
-    keeps_level: bool  #: the pressure stays what it was when the pocket closed; else zero
+    keeps_level: bool  #: the pressure stays what it was when the pocket closed; else zero at the node
+    known: Array  #: shares of where there was a pressure before, at owned dofs; their sum is one or zero
+    level: float  #: the mean pressure there [Pa]
     elastic: bool  #: a surface that another field moves bounds the pocket
 
 
@@ -55,10 +57,25 @@ def _hold(system: FlowSystem, pocket: Pocket, sizes: Array, *, keep_level: bool)
     choices = [had_pressure, numbers] if keep_level else [numbers]
     smallest = [comm.allreduce(int(choice.min(initial=last)), op=MPI.MIN) for choice in choices]
     best = next((number for number in smallest if number < last), last)
-    shares = np.where(inside, sizes, 0.0)
-    total = comm.allreduce(float(shares.sum()))
+    before = system.flow.x.array[: unknowns.owned]
+    shares, known = (_shares(comm, np.where(part, sizes, 0.0)) for part in (inside, inside & (before != 0.0)))
     at = dofs[nodes.numbers[: nodes.owned] == best].astype(np.int64)
-    return Hold(at, inside, shares / total if total > 0.0 else shares, keep_level, pocket.elastic)
+    return Hold(at, inside, shares, keep_level, known, comm.allreduce(float(known @ before)), pocket.elastic)
+
+
+def _shares(comm: MPI.Comm, sizes: Array) -> Array:
+    total = comm.allreduce(float(sizes.sum()))
+    return sizes / total if total > 0.0 else sizes
+
+
+def keep_levels(comm: MPI.Comm, holds: list[Hold], flow: Array) -> None:
+    """Shift the pressure of each pocket that keeps its level so that its mean does (collective).
+
+    One node has held it meanwhile. Which one must not matter: the flow turned around would have another level.
+    """
+    for hold in holds:
+        if hold.keeps_level and comm.allreduce(float(hold.known.sum())) > 0.0:
+            flow[hold.inside] += hold.level - comm.allreduce(float(hold.known @ flow))
 
 
 def spread_excess(comm: MPI.Comm, holds: list[Hold], rows: Array) -> None:
