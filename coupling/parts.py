@@ -39,14 +39,14 @@ def couple(
 
     grid: the box of cells around the bodies. patches: conditions on the faces of the box. rigid_bodies: others that the
     flow does not move. wetted: body -> names of the surfaces that the fluid touches; by default it touches all that is
-    neither in another body nor on the boundary of the box, where the bodies are at the first time, `start` [s].
+    neither in another body nor, without contact, on the boundary of the box at the first time, `start` [s].
     """
     comm, bodies = structure.comm, structure.bodies
     surfaces = []
     for index, body in enumerate(bodies):
         mesh = body.domain.source
         skin = comm.bcast(None if mesh is None else cut_out_skin(mesh, wetted.get(body.name)), root=0)
-        surfaces.append(wetted_surface(bodies, index, skin))
+        surfaces.append(wetted_surface(structure, index, skin))
     immersed = immerse([surface.at_start for surface in surfaces], rigid_bodies, _box(grid), start)
     fluid = Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=comm)
     return Coupled(fluid, Elastic(structure, surfaces))

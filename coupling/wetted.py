@@ -15,7 +15,7 @@ from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.inside import winding
 from solvers.fluid.surface import ImmersedSurface, Motion
 from solvers.skin import Skin
-from solvers.structure.body import Body
+from solvers.structure.field import Structure
 
 #: Distance to the face of the box, in sizes of the box, below which a facet is on it.
 ON_BOX = 1e-9
@@ -33,18 +33,23 @@ class WettedSurface:
     dofs: NDArray[np.int64]  #: their global dofs in the structure, shape (n, dim)
     facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
     wet: NDArray[np.bool_] | None = None  #: facets that the fluid touches; None: found by `find_wet`
+    may_part: NDArray[np.bool_] | None = None  #: facets in contact: what they lie on may let them go
 
     @property
     def at_start(self) -> tuple[ImmersedSurface, Array]:
         """The surface in the flow, and positions of its vertices [m]."""
-        return ImmersedSurface(self.name, self.facets, len(self.points), self.wet), self.points
+        return ImmersedSurface(self.name, self.facets, len(self.points), self.wet, self.may_part), self.points
 
 
-def wetted_surface(bodies: Sequence[Body], index: int, skin: Skin) -> WettedSurface:
+def wetted_surface(structure: Structure, index: int, skin: Skin) -> WettedSurface:
     """A skin with the dofs of its body, the one of that index among all of the structure (collective)."""
+    bodies, constraint = structure.bodies, structure.constraint
     body = bodies[index]
     layout = Layout(body.domain.comm, [other.size for other in bodies])
-    return WettedSurface(body.name, skin.points, global_dofs(layout, index, body, skin.nodes), skin.facets, skin.wet)
+    dofs = global_dofs(layout, index, body, skin.nodes)
+    touching = np.empty(0, dtype=np.int64) if constraint is None else constraint.touching_dofs()
+    may_part = np.isin(dofs[:, 0], touching)[skin.facets].all(axis=1)
+    return WettedSurface(body.name, skin.points, dofs, skin.facets, skin.wet, may_part)
 
 
 def immerse(
@@ -69,8 +74,8 @@ def immerse(
 def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]], box: tuple[Array, Array]) -> list[ImmersedSurface]:
     """Surfaces, given with the positions of their vertices [m], with the facets marked that the fluid touches.
 
-    It does not touch facets in other bodies, where bodies are one piece, nor those on the box's boundary. What a
-    surface says itself of its facets stays.
+    It does not touch facets in other bodies, where bodies are one piece, nor those on the box's boundary, unless they
+    are in contact with something there. What a surface says itself of its facets stays.
     """
     low, high = box
     found = []
@@ -79,6 +84,8 @@ def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]], box: tuple[Array
             middles = x[surface.facets].mean(axis=1)
             distance = np.abs(np.concatenate([middles - low, middles - high], axis=1)).min(axis=1)
             wet = distance > ON_BOX * (high - low).max()
+            if surface.may_part is not None:
+                wet |= surface.may_part
             for other, (body, at) in enumerate(surfaces):
                 if other == index:
                     continue

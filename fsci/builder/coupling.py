@@ -42,7 +42,7 @@ def build_coupled(
     assert case.coupling is not None
     assert case.fluid is not None
     skins = [_skin(case, comm, body) for body in bodies]
-    surfaces = [wetted_surface(bodies, index, skin) for index, (skin, _) in enumerate(skins)]
+    surfaces = [wetted_surface(structure, index, skin) for index, (skin, _) in enumerate(skins)]
     box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
     immersed = immerse([surface.at_start for surface in surfaces], build_rigid_bodies(case, comm), box, case.time.start)
     dry_sides = [_dry_side(s, c) for s, (_, c) in zip(surfaces, skins, strict=True) if c is not None]

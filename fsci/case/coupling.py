@@ -20,8 +20,8 @@ class Coupling(Section):
     )
     wetted: dict[Name, Surfaces] = setting(
         dict,
-        "surfaces that the fluid touches, by body; default: all but what lies in other bodies or on the boundary of "
-        "the box at the start",
+        "surfaces that the fluid touches, by body; default: all but what lies in other bodies or, without contact, "
+        "on the boundary of the box at the start",
     )
     dry_side: dict[Name, Annotated[tuple[NumberVector, ...], Entries(1, None)]] = setting(
         dict,

@@ -19,6 +19,7 @@ class ImmersedSurface:
     facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
     vertices: int
     wet: NDArray[np.bool_] | None = None  #: facets that the fluid touches; the others only close the solid; None: all
+    may_part: NDArray[np.bool_] | None = None  #: facets in contact: those on the boundary of the box may leave it
 
 
 @dataclass(frozen=True)
