@@ -118,6 +118,15 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument("--against", metavar="FILE", type=Path, help="compare with the results in this file")
     bench.add_argument("--plot", metavar="FOLDER", type=Path, help="draw error against time, unknowns and memory")
 
+    stress = command(_stress, "run hard cases drawn by chance, each against its twin, and count what goes wrong")
+    stress.add_argument("draws", metavar="N", type=_count, nargs="?", default=20, help="how many draws (default: 20)")
+    stress.add_argument("--seed", metavar="S", type=_count, default=0, help="number of the first one (default: 0)")
+    stress.add_argument("-o", "--out", metavar="FILE", type=Path, help="write all draws as JSON")
+    stress.add_argument("--keep", metavar="FOLDER", type=Path, help="keep the cases that went wrong")
+    stress.add_argument(
+        "--steps", metavar="STEPS", type=_count, help="instead of draws, so many steps of one case: do they drift?"
+    )
+
     schema = command(_schema, "print the JSON schema of case files, for editors")
     schema.add_argument("--markdown", action="store_true", help="print the input reference instead")
     return parser
@@ -128,6 +137,12 @@ def _override(text: str) -> tuple[str, str]:
     if not name or not equals:
         raise argparse.ArgumentTypeError(f"write NAME=VALUE, not '{text}'")
     return name, value
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"write a whole number, not '{text}'")
+    return int(text)
 
 
 def _version() -> str:
@@ -258,6 +273,20 @@ def _bench(options: argparse.Namespace) -> int:
     except BenchmarkError as error:
         return _fail(f"fsci bench: {error}")
     return 0
+
+
+def _stress(options: argparse.Namespace) -> int:
+    from fsci.stress.run import stress, stress_long, table, write
+
+    if options.steps is not None:
+        return stress_long(options.steps, options.out)
+    outcomes = stress(
+        range(options.seed, options.seed + options.draws), lambda line: print(line, flush=True), options.keep
+    )
+    print(table(outcomes))
+    if options.out is not None:
+        write(outcomes, options.out)
+    return int(any(outcome.verdict == "wrong" for outcome in outcomes))
 
 
 def _schema(options: argparse.Namespace) -> int:

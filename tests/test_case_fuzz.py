@@ -6,10 +6,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
-from run_fuzz import places
 
 from fsci.case import CaseError, load_case
 from fsci.check.check import summary
+from fsci.stress.mutants import places
 
 CASES = [
     """\

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 from programs import ENVIRONMENT
-from run_fuzz import CASES, mutant, trouble
+from run_fuzz import trouble
+
+from fsci.stress.mutants import CASES, mutant
 
 PROGRAM = Path(__file__).parent / "run_fuzz.py"
 

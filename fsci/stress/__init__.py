@@ -1,0 +1,1 @@
+"""Draws of hard cases, each against its twin: `fsci stress`."""

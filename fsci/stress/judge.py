@@ -1,0 +1,115 @@
+"""What a draw was: right, refused with a message, or wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal
+
+import numpy as np
+
+from fsci.run.history import History
+from fsci.stress.draw import Draw
+from fsci.stress.frame import Frame
+from fsci.stress.program import Ended
+
+#: edge: rounding decides, as where a surface lies in a plane of the grid; the results on both sides are near
+Verdict = Literal["right", "edge", "refused", "wrong"]
+
+#: Of the largest value of a probe: by how much twins may differ. Newton's method stops at 1e-10 of the first residual.
+AGREEMENT = 1e-6
+#: Of the largest flow or force: what a balance that only the solver disturbs may miss.
+BALANCE = 1e-6
+#: The same on either side of an edge: what another cut changes on these coarse grids.
+NEAR = 0.05
+#: Shifts [m] that change nothing but rounding: twins that differ although these agree are wrong.
+ROUNDING = ((1.3e-9, 0.7e-9), (-1.1e-9, 2.3e-9), (1 / 3, 1 / 7), (-0.1, 0.7))
+#: Energy that a body may gain from nothing, of what it ever had.
+GAIN = 0.05
+
+
+def ended_badly(run: Ended) -> str:
+    """What no run may do, whatever the case: hang, die, or end without a word."""
+    if run.code not in (0, 1, 2):
+        return f"exit code {run.code}: {run.message[-300:]}"
+    if "Traceback" in run.words:
+        return f"a traceback: {run.words.strip().splitlines()[-1]}"
+    if run.code and not run.message:
+        return "it failed without a word"
+    return ""
+
+
+def without_a_word(draw: Draw, run: Ended) -> str:
+    """A danger that the run should have warned of."""
+    missing = [words for words in draw.scene.must_warn if words not in run.words]
+    return f"no warning that has '{missing[0]}'" if missing else ""
+
+
+def out_of_balance(draw: Draw, run: Ended) -> str:
+    """The first balance that does not hold, in the scene's own frame."""
+    history = run.history
+    for name, values in history.items():
+        if not np.isfinite(values).all():
+            return f"{name} is not finite"
+    for name, error, scale in _balances(draw, history):
+        if error > scale:
+            return f"{name} misses {error:.3g}, more than {scale:.3g}"
+    return ""
+
+
+def _balances(draw: Draw, history: History) -> Iterator[tuple[str, float, float]]:
+    """Name, error and what is allowed."""
+    if "fluid.mass" in history:
+        flow = max(_largest(history, "out"), _swept(draw))
+        yield "fluid.mass", _largest(history, "fluid.mass"), BALANCE * flow
+    if "interface.momentum" in history:
+        force = max(_largest(history, "force.x"), _largest(history, "force.y"))
+        yield "interface.momentum", _largest(history, "interface.momentum"), BALANCE * force
+    if draw.scene.name == "press":
+        sums = [history[f"top.{i}"] + history[f"bottom.{i}"] for i in "xy"]
+        size = max(_largest(history, f"{name}.{i}") for name in ("top", "bottom") for i in "xy")
+        yield "the sum of reactions", float(np.abs(sums).max()), BALANCE * size
+    if draw.scene.name == "drop":
+        had = float((history["energy.kinetic"] + history["energy.internal"]).max())
+        yield "energy from nothing", float(history["structure.energy"].max()), GAIN * had
+
+
+def _swept(draw: Draw) -> float:
+    """Volume that a body that is moved takes from the fluid per time, at least."""
+    return float(draw.scene.parameters.get("cells per step", 0.0)) / draw.scene.parameters.get("dt", 1.0) * 0.01
+
+
+def _largest(history: Mapping[str, Any], name: str) -> float:
+    return float(np.abs(history[name]).max(initial=0.0)) if name in history else 0.0
+
+
+def other_bits(run: Ended, twin: Ended) -> str:
+    """Where a resumed run has another number than one that was not killed."""
+    for name, values in run.history.items():
+        if name != "wall" and not np.array_equal(twin.history.get(name, values[:0]), values):
+            return f"{name} has other bits"
+    return ""
+
+
+def distance(draw: Draw, run: Ended, twin: Ended, frame: Frame) -> tuple[float, str]:
+    """By how much of its largest value a probe differs, and which one; infinite if the runs end at other times."""
+    quantities = {name: probe["quantity"] for name, probe in draw.scene.probes.items()}
+    ours, theirs = Frame().back(run.history, quantities), frame.back(twin.history, quantities)
+    rows, others = _common(ours["time"], theirs["time"])
+    if not rows or abs(ours["time"][rows[-1]] / ours["time"][-1] - 1) > 1e-9:
+        return np.inf, "the last time"
+    worst, where = 0.0, ""
+    for name in quantities:
+        columns = [column for column in ours if column == name or column.startswith(f"{name}.")]
+        difference = max(float(np.abs(ours[c][rows] - theirs[c][others]).max()) for c in columns)
+        size = max(float(np.abs(ours[c]).max()) for c in columns)
+        if size > 0.0 and difference / size > worst:
+            worst, where = difference / size, name
+    return worst, where
+
+
+def _common(times: np.ndarray, others: np.ndarray) -> tuple[list[int], list[int]]:
+    """Rows of two histories with equal times."""
+    near = 1e-9 * times[-1]
+    pairs = [(i, int(np.argmin(np.abs(others - t)))) for i, t in enumerate(times)]
+    pairs = [(i, j) for i, j in pairs if abs(others[j] - times[i]) <= near]
+    return [i for i, _ in pairs], [j for _, j in pairs]

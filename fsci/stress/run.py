@@ -1,0 +1,160 @@
+"""Draw cases, run them and their twins, count what they were: the command `fsci stress`."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from fsci.stress.draw import SCENES, Draw, draw
+from fsci.stress.frame import Frame
+from fsci.stress.judge import (
+    AGREEMENT,
+    NEAR,
+    ROUNDING,
+    Verdict,
+    distance,
+    ended_badly,
+    other_bits,
+    out_of_balance,
+    without_a_word,
+)
+from fsci.stress.mutants import run_mutant
+from fsci.stress.program import Ended, run, run_killed
+
+VERDICTS: tuple[Verdict, ...] = ("right", "edge", "refused", "wrong")
+MUTANT = 5  #: every so many draws is a mutated case file
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a draw."""
+
+    seed: int
+    scene: str
+    twin: str
+    parameters: dict[str, Any]
+    verdict: Verdict
+    reason: str
+    seconds: float
+
+
+def stress(seeds: Sequence[int], say: Callable[[str], None], keep: Path | None = None) -> list[Outcome]:
+    """All draws, one after the other; what is wrong is said at once, and its cases go to the folder `keep`."""
+    outcomes = []
+    for seed in seeds:
+        outcome = judge(seed, keep)
+        if outcome.verdict == "wrong":
+            say(f"{seed} {outcome.scene}, {outcome.twin}: {outcome.reason}")
+        outcomes.append(outcome)
+    return outcomes
+
+
+def judge(seed: int, keep: Path | None = None) -> Outcome:
+    """One draw."""
+    begin = time.perf_counter()
+    with TemporaryDirectory() as folder:
+        if seed % MUTANT == MUTANT - 1:
+            ended = run_mutant(seed, Path(folder))
+            words = ended_badly(ended)
+            verdict: Verdict = "wrong" if words else "refused" if ended.code else "right"
+            found = Outcome(seed, "mutant", "none", {}, verdict, words or (ended.message if ended.code else ""), 0.0)
+        else:
+            one = draw(seed)
+            found = Outcome(seed, one.scene.name, one.how, one.scene.parameters, *_judge(one, Path(folder)), 0.0)
+        if keep is not None and found.verdict == "wrong":
+            _keep(Path(folder), keep / str(seed))
+    return Outcome(**{**asdict(found), "seconds": round(time.perf_counter() - begin, 2)})
+
+
+def _judge(one: Draw, folder: Path) -> tuple[Verdict, str]:
+    first = run(folder / "run", one.case(Frame()))
+    if words := ended_badly(first):
+        return "wrong", words
+    if first.code:
+        return "refused", first.message
+    if words := without_a_word(one, first) or out_of_balance(one, first):
+        return "wrong", words
+    twin = _twin(one, folder / "twin", float(first.history["wall"].mean()))
+    if words := ended_badly(twin):
+        return "wrong", f"twin: {words}"
+    if twin.code:
+        return "refused", f"twin: {twin.message}"
+    if one.twin == "resumed":
+        words = other_bits(first, twin)
+        return ("wrong", words) if words else ("right", "")
+    differs, where = distance(one, first, twin, one.frame)
+    if differs <= AGREEMENT:
+        return "right", ""
+    words = f"{where} differs by {differs:.2g}"
+    return ("edge" if differs <= NEAR and _rounding_decides(one, first, folder) else "wrong"), words
+
+
+def _rounding_decides(one: Draw, first: Ended, folder: Path) -> bool:
+    """Whether the results jump when only rounding is different."""
+    for number, shift in enumerate(ROUNDING):
+        frame = Frame(shift=shift)
+        other = run(folder / f"rounding{number}", one.case(frame))
+        if other.code == 0 and AGREEMENT < distance(one, first, other, frame)[0] <= NEAR:
+            return True
+    return False
+
+
+def _twin(one: Draw, folder: Path, step: float) -> Ended:
+    case = one.case(one.frame)
+    if one.twin == "resumed":
+        return run_killed(folder, case, steps=one.kill_after, delay=one.kill_delay * step)
+    return run(folder, case, processes=one.processes)
+
+
+def _keep(folder: Path, to: Path) -> None:
+    for path in folder.rglob("case.yaml"):
+        if path.parent.name != "out":
+            target = to / path.relative_to(folder)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(path.read_text())
+
+
+def table(outcomes: Sequence[Outcome]) -> str:
+    """Counts by scene, and what refusals said."""
+    names = [name for name in (*SCENES, "mutant") if any(o.scene == name for o in outcomes)]
+    counts = Counter((o.scene, o.verdict) for o in outcomes)
+    lines = [f"{'scene':10}{'draws':>8}" + "".join(f"{verdict:>10}" for verdict in VERDICTS)]
+    for name in (*names, "all"):
+        row = [sum(counts[n, v] for n in (names if name == "all" else [name])) for v in VERDICTS]
+        lines.append(f"{name:10}{sum(row):8}" + "".join(f"{number:10}" for number in row))
+    return "\n".join(lines)
+
+
+def stress_long(steps: int, out: Path | None) -> int:
+    """The table of one long run; returns the exit code."""
+    from fsci.stress.long_run import long_run
+
+    try:
+        rows = long_run(steps)
+    except RuntimeError as failed:
+        print(failed)
+        return 1
+    print("".join(f"{name:>17}" for name in rows[-1]))
+    for row in rows:
+        print("".join(f"{row[name]:17.4g}" if name in row else " " * 17 for name in rows[-1]))
+    if out is not None:
+        _write("steps", rows, out)
+    return 0
+
+
+def write(outcomes: Sequence[Outcome], path: Path) -> None:
+    """All draws as JSON."""
+    _write("outcomes", [asdict(outcome) for outcome in outcomes], path)
+
+
+def _write(name: str, rows: Sequence[Any], path: Path) -> None:
+    """With the versions that they were computed with."""
+    from fsci.run.summary import plain, versions
+
+    path.write_text(json.dumps(plain({"versions": versions(), name: rows}), indent=1) + "\n")

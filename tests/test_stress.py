@@ -1,0 +1,147 @@
+"""`fsci stress`: frames, draws, verdicts that can fall each way, and a few draws."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from programs import fsci
+
+from fsci.stress import long_run, run
+from fsci.stress.draw import SCENES, Draw, draw
+from fsci.stress.frame import Frame
+from fsci.stress.judge import distance, ended_badly, other_bits, out_of_balance, without_a_word
+from fsci.stress.program import NEVER_ENDED, Ended
+from fsci.stress.scenes import Scene
+
+FRAME = Frame(angle=30, shift=(3, -2), length=1e-3, mass=100.0, time=10.0)
+QUANTITIES = {"c": "centre", "f": "force", "u": "displacement", "e": "energy"}
+
+
+def test_frames_there_and_back():
+    """Centres are turned, shifted and scaled; forces are per metre of depth: kg/s^2."""
+    points, force, u = np.array([[1.0, 2.0], [0.5, -1.0]]), (3.0, 4.0), (0.1, 0.2)
+    centre = np.array([FRAME.point(x) for x in points])
+    turned = FRAME.rotation @ force * 100.0 / 10.0**2
+    history = {
+        "time": np.array([10.0, 20.0]),
+        "c.x": centre[:, 0],
+        "c.y": centre[:, 1],
+        **{f"f.{axis}": np.full(2, value) for axis, value in zip("xy", turned, strict=True)},
+        **{f"u.{axis}": np.full(2, v) for axis, v in zip("xy", FRAME.vector(u, (1, 0, 0)), strict=True)},
+        **{f"e.{part}": np.full(2, 7.0 * 1e-3 * 100.0 / 10.0**2) for part in ("kinetic", "internal", "work", "total")},
+    }
+    found = FRAME.back(history, QUANTITIES)
+    assert found["time"] == pytest.approx([1.0, 2.0])
+    assert np.stack([found["c.x"], found["c.y"]], axis=1) == pytest.approx(points)
+    assert (found["f.x"][0], found["f.y"][0]) == pytest.approx(force)
+    assert (found["u.x"][0], found["u.y"][0]) == pytest.approx(u)
+    assert found["e.total"] == pytest.approx([7.0, 7.0])
+
+
+def test_quarter_turns_are_exact():
+    frame = Frame(angle=90.0)
+    assert [frame.side(name) for name in ("x-", "x+", "y-", "y+")] == ["y-", "y+", "x+", "x-"]
+    assert frame.grid((0, 0), (2, 1), (20, 10)) == {"from": [-1.0, 0.0], "to": [0.0, 2.0], "cells": [10, 20]}
+    assert frame.vector((1, 0), (0, 0, 0)) == [0.0, 1.0]
+    assert frame.vector((1, 0), (0, 0, 0), "min(s_, 1)") == ["0.0*(min((t/1.0), 1))", "1.0*(min((t/1.0), 1))"]
+
+
+def test_draws_are_the_same_every_time():
+    draws = [draw(seed) for seed in range(200)]
+    assert {one.scene.name for one in draws} == SCENES.keys()
+    assert len({one.twin for one in draws}) == 5
+    for seed, one in enumerate(draws):
+        again = draw(seed)
+        assert json.dumps(again.case(again.frame)) == json.dumps(one.case(one.frame))
+        assert again.scene.parameters == one.scene.parameters
+
+
+SCENE = Scene("beam", {}, lambda frame: {}, {"tip": {"quantity": "displacement"}}, must_warn=("lock",))
+DRAW = Draw(0, SCENE, "shifted", Frame())
+HISTORY = {"time": np.array([1.0, 2.0]), "wall": np.ones(2), "tip.x": np.array([1.0, 2.0]), "tip.y": np.zeros(2)}
+GOOD = Ended(0, "warning: cells lock", HISTORY, {})
+
+
+def changed(name, values):
+    return replace(GOOD, history={**HISTORY, name: np.array(values)})
+
+
+def test_what_no_run_may_do():
+    assert ended_badly(GOOD) == ""
+    assert ended_badly(Ended(NEVER_ENDED, "", {}, {})) == "exit code -1000: it did not end"
+    assert ended_badly(Ended(-11, "Segmentation fault", {}, {})) == "exit code -11: Segmentation fault"
+    assert ended_badly(Ended(1, "Traceback\nKeyError", {}, {})) == "a traceback: KeyError"
+    assert ended_badly(Ended(1, "", {}, {})) == "it failed without a word"
+    assert ended_badly(Ended(1, "the step failed", {}, {})) == ""
+
+
+def test_dangers_have_to_be_named():
+    assert without_a_word(DRAW, GOOD) == ""
+    assert without_a_word(DRAW, replace(GOOD, words="")) == "no warning that has 'lock'"
+
+
+def test_balances():
+    assert out_of_balance(DRAW, GOOD) == ""
+    assert out_of_balance(DRAW, changed("tip.x", [1.0, np.nan])) == "tip.x is not finite"
+    leaking = replace(GOOD, history={**HISTORY, "fluid.mass": np.array([0.0, 1e-3]), "out": np.ones(2)})
+    assert out_of_balance(DRAW, leaking) == "fluid.mass misses 0.001, more than 1e-06"
+    pushing = {"interface.momentum": np.array([1.0, 0.0]), "force.x": np.ones(2), "force.y": np.ones(2)}
+    found = out_of_balance(DRAW, replace(GOOD, history={**HISTORY, **pushing}))
+    assert found == "interface.momentum misses 1, more than 1e-06"
+    bouncing = {"energy.kinetic": np.ones(2), "energy.internal": np.zeros(2), "structure.energy": np.array([0, 0.1])}
+    drop = replace(DRAW, scene=replace(SCENE, name="drop"))
+    found = out_of_balance(drop, replace(GOOD, history={**HISTORY, **bouncing}))
+    assert found == "energy from nothing misses 0.1, more than 0.05"
+
+
+def test_twins_have_to_agree():
+    assert distance(DRAW, GOOD, GOOD, Frame()) == (0.0, "")
+    assert distance(DRAW, GOOD, changed("tip.y", [0.0, 0.02]), Frame()) == (0.01, "tip")
+    assert distance(DRAW, GOOD, changed("time", [1.0, 1.5]), Frame()) == (np.inf, "the last time")
+    assert other_bits(GOOD, changed("wall", [3.0, 4.0])) == ""
+    assert other_bits(GOOD, changed("tip.y", [0.0, 1e-300])) == "tip.y has other bits"
+
+
+def test_the_twin_turned_the_wrong_way_is_noticed(tmp_path, monkeypatch):
+    """A whole draw whose twin is turned, but brought back as if it were not."""
+    seed = next(s for s in range(1000) if s % 5 != 4 and draw(s).twin == "rotated" and draw(s).scene.name == "beam")
+    assert run.judge(seed).verdict == "right"
+    monkeypatch.setattr(Frame, "back", lambda frame, history, quantities: history)
+    assert run.judge(seed).verdict == "wrong"
+
+
+def test_a_gate_that_closes_a_basin_turned_around():
+    """The pressure in the basin, which nothing determines, does not depend on the order of its nodes."""
+    one = run.judge(11)
+    assert (one.scene, one.twin, one.verdict) == ("gate", "rotated by 180 degrees", "right")
+
+
+def test_a_block_that_begins_on_the_floor_and_leaves_it():
+    """Fluid comes under it, although its bottom is on the boundary of the box at the start."""
+    one = run.judge(73)
+    assert (one.scene, one.parameters["height"], one.verdict) == ("fall", 0.0, "right")
+
+
+def test_command_line(tmp_path):
+    out = tmp_path / "stress.json"
+    done = fsci("stress", "2", "--seed", "3", "-o", out)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.splitlines()[0].split() == ["scene", "draws", "right", "edge", "refused", "wrong"]
+    assert done.stdout.splitlines()[-1].split()[:2] == ["all", "2"]
+    assert [one["seed"] for one in json.loads(out.read_text())["outcomes"]] == [3, 4]
+    assert "write a whole number, not 'x'" in fsci("stress", "x").stderr
+
+
+def test_many_steps():
+    """The rows of a run of 20 steps; thousands by `fsci stress --steps 10000`."""
+    rows = long_run.long_run(20, parts=2)
+    assert [row["up to step"] for row in rows] == [10, 20]
+    assert all(row["mass"] < 1e-6 and row["memory [MB]"] > 50 for row in rows)
+    assert rows[1]["step [ms]"] > 0
+
+
+@pytest.mark.slow
+def test_many_draws():
+    outcomes = run.stress(range(1000, 1025), print)
+    assert not [one for one in outcomes if one.verdict == "wrong"]
