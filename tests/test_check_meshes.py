@@ -3,6 +3,7 @@
 import meshio  # noqa: TID253
 import numpy as np
 import pytest
+from case_text import with_section, without
 
 from fsci import shapes
 from fsci.case import CaseError, load_case
@@ -140,8 +141,10 @@ def test_obstacles_are_read():
 def test_symmetry_on_a_curve():
     """Of a built-in shape, too."""
     disc = "mesh: {shape: disc, radius: 0.5, cells: [12, 1]}\n      material: {law: neo_hooke, E: 1, nu: 0}"
-    start = SOLID.index("      mesh")
-    case = SOLID[:start] + f"      {disc}\n      supports: [{{on: outer, symmetry: true}}]\n"
+    body = f"    lower:\n      {disc}\n      supports: [{{on: outer, symmetry: true}}]\n"
+    case = with_section(SOLID, body, "structure", "bodies", "lower")
+    for path in (("contact",), ("probes",), ("structure", "bodies", "upper")):
+        case = without(case, *path)
     found = check_meshes(load(case))
     assert [str(p).split("\n")[0] for p in found.problems] == [
         "case.yaml:8:18: a plane of symmetry must be plane, but this surface is curved; take 'normal: true'"

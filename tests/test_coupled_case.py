@@ -1,14 +1,14 @@
 """The section `coupling` of a case: each mistake with its message and the text it points at."""
 
 import pytest
+from case_text import section
 from coupled_case import POST
 
 from fsci.case import CaseError, load_case
 from fsci.check.check import summary
 
 COUPLING = "coupling: {scheme: monolithic}"
-STRUCTURE = POST[POST.index("structure:") : POST.index("coupling:")]
-FLUID = POST[POST.index("fluid:") : POST.index("structure:")]
+STRUCTURE, FLUID = section(POST, "structure"), section(POST, "fluid")
 RIGID = "  bodies: {post: {mesh: {shape: disc, radius: 0.1, cells: [8, 1], translate: [1.5, 0.5]}}}\nstructure:"
 
 #: what is replaced, by what, the message with line and column, the text that stands there

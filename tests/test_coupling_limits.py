@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from case_text import section, with_section
 from coupled_case import POST
 from test_coupled_run import BLOCK, run
 
@@ -13,10 +14,7 @@ from fsci.run.run import FINISHED, run_case
 SHORT = ("time.end", "0.1"), ("verify", "[]")
 
 
-FLUID, STRUCTURE, REST = (
-    POST[POST.index(a) : POST.index(b)]
-    for a, b in (("fluid:", "structure:"), ("structure:", "coupling:"), ("probes:", "verify:"))
-)
+FLUID, STRUCTURE, REST = (section(POST, name) for name in ("fluid", "structure", "probes"))
 COUPLING = "coupling: {scheme: monolithic}\n"
 TIP = "  tip: {quantity: displacement, at: [0.735, 0.41]}\n"
 
@@ -27,7 +25,7 @@ def test_a_stiff_body_is_a_rigid_one(tmp_path):
     The post goes through the floor, so that there are no facets on it, which the coupled run leaves dry.
     """
     mesh = "mesh: {shape: rectangle, size: [0.23, 0.46], origin: [0.62, -0.05], cells: [3, 5]}"
-    structure = STRUCTURE.replace(STRUCTURE[STRUCTURE.index("mesh:") : STRUCTURE.index("\n      material")], mesh)
+    structure = with_section(STRUCTURE, f"      {mesh}\n", "structure", "bodies", "post", "mesh")
     coupled = run(
         POST.replace(STRUCTURE, structure), tmp_path / "coupled", *SHORT, ("structure.bodies.post.material.E", "1e9")
     )

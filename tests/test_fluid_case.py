@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from case_text import with_section, without
 
 from fsci.case import CaseError, load_case
 from fsci.case.grid import Grid
@@ -33,6 +34,8 @@ probes:
 verify:
   - {value: force.x, statistic: max, reference: 1, relative: 0.1}
 """
+ALONE = without(without(CASE, "probes"), "verify")
+RESTING = without(ALONE, "fluid", "bodies", "cylinder", "motion")
 GRID = "cells: [40, 10]"
 KINDS = "'velocity', 'no_slip', 'slip', 'symmetry', 'traction', 'pressure', 'outflow' or 'periodic'"
 FACES = "'x-', 'x+', 'y-', 'y+', 'z-' or 'z+'"
@@ -296,14 +299,15 @@ def test_doubts(old, new, warning):
 
 
 def test_a_flow_that_nothing_drives():
-    still = CASE[: CASE.index("      motion")].replace('velocity: ["4*y*(1 - y)", 0]', "outflow: true")
+    still = RESTING.replace('velocity: ["4*y*(1 - y)", 0]', "outflow: true")
     assert load(still).warnings == (
         "case.yaml:7:3: nothing drives the flow: no velocity, traction, pressure, force or moving body",
     )
 
 
 def test_a_steady_flow_without_a_velocity_of_its_own():
-    periodic = CASE[: CASE.index("    inlet")] + "    all: {on: [x-, x+, y-, y+], periodic: true}\n  scheme: steady\n"
+    patches = "  patches:\n    all: {on: [x-, x+, y-, y+], periodic: true}\n  scheme: steady\n"
+    periodic = without(with_section(ALONE, patches, "fluid", "patches"), "fluid", "bodies")
     assert str(problems(periodic)[0]).startswith(
         "case.yaml:9:11: a steady flow that is periodic in all directions has no velocity of its own"
     )

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from case_text import with_section
 from programs import fsci
 
 from fsci.builder.automatic_pairs import with_pairs
@@ -78,7 +79,7 @@ def test_it_turns(tmp_path):
 def test_the_program_finds_it(tmp_path):
     """`bodies: all` asks for pairs with rigid bodies of the flow, too, and `check` lists them."""
     path = tmp_path / "case.yaml"
-    path.write_text(RAM.replace(RAM[RAM.index("contact:") : RAM.index("coupling:")], "contact: {bodies: all}\n"))
+    path.write_text(with_section(RAM, "contact: {bodies: all}\n", "contact"))
     (found,) = with_pairs(load_case(path)).contact.pairs.values()
     path.write_text(RAM)
     (named,) = load_case(path).contact.pairs.values()

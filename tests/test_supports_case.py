@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from docs_pages import yaml_blocks
 from programs import fsci
 
 from fsci.case import CaseError, load_case
@@ -219,8 +220,7 @@ def test_message_about_the_mesh(case, old, new, message):
 
 def test_example_of_the_docs(tmp_path):
     """The first YAML text of the page on structures reaches the exact solution that it names."""
-    page = (ROOT / "docs" / "structures.md").read_text()
-    (tmp_path / "case.yaml").write_text(page.split("```yaml\n")[1].split("```")[0])
+    (tmp_path / "case.yaml").write_text(yaml_blocks(ROOT / "docs" / "structures.md")[0])
     assert run_case(load_case(tmp_path), tmp_path / "out") == FINISHED
 
 
