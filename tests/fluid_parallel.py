@@ -14,16 +14,21 @@ from solvers.fluid.probes import mass_balance
 
 
 def scene(dim, element, comm, box="channel"):
-    """A moving and a resting body in a channel, in a closed box, or in a periodic one that is open above."""
+    """A moving and a resting body in a channel, in a closed box, or in a periodic one that is open above.
+
+    In a "film" they come closer than a cell.
+    """
     inflow = field(*[lambda x, y, *zt: 4 * y * (1 - y), 0, 0][:dim])
     swirl = field(*[lambda x, y, *zt: y * y - 1 / 3, lambda x, y, *zt: 0.1 * x * x, 0][:dim])
     sides = ("y-", "y+", "z-", "z+")[: 2 * dim - 2]
+    channel = [
+        Patch("in", ("x-",), "velocity", inflow),
+        Patch("out", ("x+",), "outflow"),
+        Patch("sides", sides, "slip"),
+    ]
     patches = {
-        "channel": [
-            Patch("in", ("x-",), "velocity", inflow),
-            Patch("out", ("x+",), "outflow"),
-            Patch("sides", sides, "slip"),
-        ],
+        "channel": channel,
+        "film": channel,
         "closed": [Patch("box", ("x-", "x+", *sides), "velocity", swirl)],
         "periodic": [
             Patch("ends", ("x-", "x+"), "periodic"),
@@ -35,7 +40,7 @@ def scene(dim, element, comm, box="channel"):
     v = np.array([0.7, 0.2, -0.1])[:dim]
     bodies = [
         body("disc", *disc, motion=lambda x, t: (x + t * v, 0 * x + v)),
-        body("brick", *block([1.1, 0.3, 0.3][:dim], [1.3, 0.63, 0.71][:dim])),
+        body("brick", *block([0.7 if box == "film" else 1.1, 0.3, 0.3][:dim], [1.3, 0.63, 0.71][:dim])),
     ]
     cells = [21, 13] if dim == 2 else [12, 7, 7]
     return make_fluid(

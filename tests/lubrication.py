@@ -7,7 +7,7 @@ import numpy as np
 from solvers.fluid.field import Fluid
 from solvers.fluid.grid import Grid
 from solvers.fluid.patches import Patch
-from tests.fluid_setup import body, circle, field, loop, make_fluid, solve_steady, sphere
+from tests.fluid_setup import body, circle, field, loop, make_fluid, solve_steady, sphere, step
 
 
 def cylinder_drag(gap: float) -> float:
@@ -66,6 +66,31 @@ def drag_ratio(dim: int, gap: float, h: float, element: str, **options) -> float
     force = approaching(dim, gap, h, element, **options).force()["body"].sum(axis=0)[-1]
     exact = cylinder_drag(gap) if dim == 2 else 6.0 * np.pi * sphere_drag(gap)
     return float(force * 2 ** (dim - 1) / exact)
+
+
+def closing_ratios(h: float, steps: int, dt: float, **settings) -> list[tuple[float, float]]:
+    """(gap in cells, computed over exact drag) of a cylinder whose gap is h exp(-t), h at the start, step by step."""
+    points, facets = circle([0.0, 1.0], 1.0, 2000), loop(2000)
+
+    def motion(x, t):
+        gap = h * np.exp(-t)
+        return x + np.array([0.0, gap]), 0.0 * x - np.array([0.0, gap])
+
+    patches = [
+        Patch("symmetry", ("x-",), "slip"),
+        Patch("free", ("x+", "y+"), "traction", field(0, 0)),
+        Patch("wall", ("y-",), "no_slip"),
+    ]
+    grid = Grid((stretched(h, 1.0, 8.0, 1.15), stretched(h, 4 * h, 8.0, 1.15)))
+    settings = {"element": "q2q1", "scheme": "bdf2", "convection": False, "rho": 1e-3} | settings
+    fluid = make_fluid(grid, patches, [body("body", points, facets, motion=motion)], dt=dt, **settings)
+    ratios = []
+    for number in range(steps):
+        step(fluid, number * dt, dt)
+        gap = h * np.exp(-(number + 1) * dt)
+        force = 2.0 * fluid.force()["body"].sum(axis=0)[1]
+        ratios.append((gap / h, float(force / (gap * cylinder_drag(gap)))))
+    return ratios
 
 
 def settling_ratio(start: float, end: float, h: float, element: str, points: int = 3) -> float:

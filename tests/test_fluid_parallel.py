@@ -23,6 +23,7 @@ PROGRAM = Path(__file__).parent / "fluid_parallel.py"
         (2, "q2q1", "closed"),
         (2, "q1q1", "closed"),
         (2, "q2q1", "periodic"),
+        (2, "q2q1", "film"),
         (3, "q1q1", "channel"),
     ],
 )
@@ -42,7 +43,13 @@ def test_processes_agree(tmp_path, dim, element, box):
 
 @pytest.mark.parametrize(
     ("dim", "element", "box"),
-    [(2, "q1q1", "channel"), (2, "q2q1", "channel"), (2, "q2q1", "periodic"), (3, "q1q1", "channel")],
+    [
+        (2, "q1q1", "channel"),
+        (2, "q2q1", "channel"),
+        (2, "q2q1", "periodic"),
+        (2, "q2q1", "film"),
+        (3, "q1q1", "channel"),
+    ],
 )
 def test_resumed_run_is_the_same_bit_for_bit(dim, element, box):
     dt, fluid = 0.03, scene(dim, element, MPI.COMM_SELF, box)
@@ -61,6 +68,7 @@ def test_resumed_run_is_the_same_bit_for_bit(dim, element, box):
         assert np.array_equal(other.flow, fluid.flow)
         for name, force in fluid.force().items():
             assert np.array_equal(other.force()[name], force)
+    assert (fluid.cut.film is not None) == (box == "film")
 
 
 def test_a_step_that_is_taken_back_leaves_no_trace():

@@ -36,8 +36,11 @@ class Balances:
         self.system = system
         u = system.unknowns.parts(system.flow)[0]
         v = system.unknowns.parts(ufl.TestFunction(system.unknowns.space))[0]
-        inertia, strain = forms.inertia(system.terms, u), forms.eps(u)
-        self._inner = self._over_fluid(ufl.dot(inertia, v) + 2.0 * system.terms.mu * ufl.inner(strain, forms.eps(v)))
+        strain = 2.0 * system.terms.mu * ufl.inner(forms.eps(u), forms.eps(v))
+        everywhere, in_film = (
+            ufl.dot(forms.inertia(flow, u), v) + strain for flow in (system.terms, forms.creeping(system.terms))
+        )
+        self._inner = self._over_fluid(everywhere, in_film)
 
     def __call__(self, held: NDArray[np.bool_]) -> tuple[Array, float]:
         """(force [N] of the fluid on all bodies together, shape (dim,); power [W] that the method takes) (collective).
@@ -60,20 +63,22 @@ class Balances:
         rows[: len(owned)] += owned
         return rows
 
-    def _over_fluid(self, integrand) -> list[fem.Integral]:
-        """Its integral over uncut cells, and over the fluid's part of cut cells."""
+    def _over_fluid(self, integrand, in_film) -> list[fem.Integral]:
+        """Its integral over uncut cells, over the fluid's part of cut cells, and that of another one in films."""
         system, domain, weights = self.system, self.system.grid.domain, self.system.weights
         parts = [fem.Integral(domain, integrand * fem.measure(domain, "dx", 2 * system.unknowns.degree + 1))]
         if system.with_bodies:
             dx_cut = fem.measure(domain, "dx", weights.degree)
-            parts.append(fem.Integral(domain, weights.fluid * integrand * dx_cut))
+            parts += [fem.Integral(domain, weights.fluid * some * dx_cut) for some in (integrand, in_film)]
         return parts
 
     def _inner_rows(self) -> Array:
-        """int (rho (u_t + u . grad u) - f) . v + 2 mu eps(u) : eps(v) at local dofs, the ghosts' share still there."""
+        """int (rho (u_t + u . grad u) - f) . v + 2 mu eps(u) : eps(v) at local dofs, the ghosts' share still there.
+
+        Without convection in films, as in the equations.
+        """
         system = self.system
-        assert system.cut is not None
         rows = np.zeros(system.unknowns.local)
-        for part, cells in zip(self._inner, (system.cut.uncut, system.cut.cut), strict=False):
-            fem.assemble_vector(part.on(cell=cells[cells < system.grid.owned]), rows)
+        for part, cells in zip(self._inner, system.cells, strict=False):
+            fem.assemble_vector(part.on(cell=cells), rows)
         return rows

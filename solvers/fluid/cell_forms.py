@@ -15,7 +15,7 @@ from solvers.fluid.weights import Weights
 
 @dataclass(frozen=True)
 class CellForms:
-    """Residuals and tangents over uncut cells and, with bodies, over cut ones; the ghost penalty with bodies."""
+    """Residuals and tangents over uncut cells and, with bodies, cut ones and films; the ghost penalty with bodies."""
 
     residuals: tuple[fem.Integral, ...]
     tangents: tuple[fem.Integral, ...]
@@ -23,9 +23,9 @@ class CellForms:
     ghost_history: fem.Integral | None  #: what the ghost penalty takes from the times behind, if anything
 
     def integrals(self) -> list[fem.Integral]:
-        """What is to be compiled."""
+        """What is to be compiled; forms of films are when there is one."""
         ghost = [form for form in (self.ghost_penalty, self.ghost_history) if form is not None]
-        return [*self.residuals, *self.tangents, *ghost]
+        return [*self.residuals[:2], *self.tangents[:2], *ghost]
 
 
 def cell_forms(
@@ -47,6 +47,7 @@ def cell_forms(
         dx_cut, dS = fem.measure(domain, "dx", weights.degree), fem.measure(domain, "dS", 2 * degree)
         on_interface = forms.interface(flow, weights, u, p, v, q)
         residuals.append(weights.fluid * everywhere * dx_cut + on_interface * dx_cut)
+        residuals.append(weights.fluid * forms.film(flow, u, p, v, q) * dx_cut + on_interface * dx_cut)
         ghost = forms.ghost_penalty(flow, penalties, scales, du, dp, v, q) * dS
         ghost_penalty, remembered = fem.Integral(domain, ufl.lhs(ghost)), ufl.rhs(ghost)
         ghost_history = None if remembered.empty() else fem.Integral(domain, remembered)

@@ -10,6 +10,7 @@ from scipy import ndimage
 
 from solvers import kernels
 from solvers.api import Array
+from solvers.fluid.film import Films, walls_of
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.pieces import FLUSH, Pieces, put_where_fluid_is
 from solvers.fluid.surface import Motion
@@ -35,6 +36,7 @@ class Cut:
     fluid: Array  #: int_fluid L_q dx / (w_q |K|) on cut cells, shape (cut, points)
     fraction: Array  #: share of fluid in each local cell
     pieces: Pieces
+    film: Array | None  #: factor of the ghost penalty, by cells of the box, below 1 in films; None: there are none
     facets: NDArray[np.int64]
     motion: Motion
 
@@ -49,10 +51,11 @@ class Cutter:
 
     Within a step no cell leaves the ghost penalty that once was under it: iterates that go to and fro across a cell's
     face would otherwise solve two systems in turn and never settle. Surfaces that have not moved are not cut again.
+    Films, if they are looked for, are those of its first cut.
     """
 
-    def __init__(self, grid: DistributedGrid, points: Array):
-        self.grid, self.points = grid, points
+    def __init__(self, grid: DistributedGrid, points: Array, films: Films | None = None):
+        self.grid, self.points, self.films = grid, points, films
         own = np.zeros(grid.grid.size, dtype=bool)
         own[grid.numbers] = True
         self._own = grid.grid.as_box(own)
@@ -60,10 +63,12 @@ class Cutter:
         sizes = grid.grid.cell_sizes()
         self._slivers = NOTHING * sizes.prod(axis=1) / sizes.max(axis=1)  # areas of surface that do not count
         self._first: _First | None = None
+        self._of_step: Cut | None = None
 
     def begin_step(self) -> None:
         """Forget where the surfaces have been."""
         self._special[:] = False
+        self._of_step = None
 
     def __call__(
         self, facets: NDArray[np.int64], motion: Motion, layers: int, wet: NDArray[np.bool_] | None = None
@@ -79,8 +84,10 @@ class Cutter:
             if (same := first.where(facets, motion, layers)) is not None:
                 self._first = same
                 self._special[:] = same.special
+                self._of_step = self._of_step or same.cut
                 return same.cut
         cut = self._cut(facets, motion, layers, wet)
+        self._of_step = self._of_step or cut
         self._first = _First(cut, layers, self._special.copy()) if begins else None
         return cut
 
@@ -125,6 +132,7 @@ class Cutter:
             fluid=fluid,
             fraction=1.0 - moments.fraction[grid.numbers],
             pieces=pieces,
+            film=self._film(motion, facets, moments, piece_normal, np.where(touched & in_use[cells], cells, -1), solid),
             facets=facets,
             motion=motion,
         )
@@ -154,9 +162,18 @@ class Cutter:
             np.empty((0, points)),
             np.ones(len(everything)),
             pieces,
+            None,
             facets,
             motion,
         )
+
+    def _film(self, motion: Motion, facets, moments, normal, cells, solid) -> Array | None:
+        """Factor of the stabilisation in cells of the box; `cells` of the pieces, negative where none counts."""
+        if self._of_step is not None or self.films is None:
+            return None if self._of_step is None else self._of_step.film
+        at = np.flatnonzero(cells >= 0)
+        corners, lengths = facets[moments.piece_facet[at]], moments.piece_mass[at].sum(axis=2)
+        return self.films.factor(self.grid.grid, walls_of(cells[at], corners, motion.x, lengths, normal[at]), solid)
 
     def _reach(self, special: NDArray[np.bool_], layers: int) -> NDArray[np.bool_]:
         """One layer more than the strip has, none around bodies at rest."""

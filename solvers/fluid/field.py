@@ -19,6 +19,7 @@ from solvers.fluid.balances import Balances
 from solvers.fluid.coupling_entries import InterfaceEntries, interface_entries
 from solvers.fluid.cut import Cut, Cutter
 from solvers.fluid.fast_bodies import FastBodies
+from solvers.fluid.film import films_of
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.history import History
 from solvers.fluid.immersed import ImmersedBody
@@ -73,7 +74,8 @@ class Fluid:
             # incomplete factors of dense blocks are two times as fast
             blocked=method != "direct" and self.unknowns.block_size > 1,
         )
-        self.cutter = Cutter(self.grid, self.system.weights.points)
+        films = films_of(patches, self.dim, settings.penalties) if settings.films else None
+        self.cutter = Cutter(self.grid, self.system.weights.points, films)
         self.history = History(settings.time, self.unknowns.local)
         self.current = Step(0.0, 0.0, STEADY)  #: the step that is computed now or was last
         self.started = False  #: a step was accepted, so that there are forces

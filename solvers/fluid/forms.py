@@ -9,7 +9,7 @@ Sources: Massing, Schott, Wall, Comput. Methods Appl. Mech. Engrg. 328 (2018) 26
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import ufl
@@ -61,6 +61,7 @@ class Flow:
     steady: bool
     degree: int  #: of the velocity
     mesh: Any
+    film: Expr = 1.0  #: factor of the ghost penalty, by cells
 
     @property
     def sizes(self) -> list[Expr]:
@@ -115,20 +116,51 @@ def residual_based(flow: Flow, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     bounds tau by the shortest edge; for first degree it is zero.
     Source of tau by direction: Blasco, Comput. Methods Appl. Mech. Engrg. 197 (2008) 3712-3723.
     """
-    metric = [4.0 / h**2 for h in flow.sizes]
-    trace, square = sum(metric), sum(g**2 for g in metric)
-    directions = [len(metric) * g**2 for g in metric] if flow.degree == 1 else [square] * len(metric)
-    viscous = (36.0 if flow.degree == 1 else 144.0) * flow.mu**2
-    common = 0.0 if flow.steady else 4.0 * flow.rho**2 * flow.alpha**2
     test = grad(q)
     if flow.convection:
-        common += flow.rho**2 * sum(g * flow.a[i] ** 2 for i, g in enumerate(metric))
         test += flow.rho * dot(grad(v), flow.a)
+    return _tested(flow, u, p, test) + grad_div(flow, u, v)
+
+
+def grad_div(flow: Flow, u: Expr, v: Expr) -> Expr:
+    """Integrand of the grad-div term among them, (tau_C div u, div v)."""
+    metric, common, viscous = _rates(flow)
+    return sqrt(common + viscous * sum(g**2 for g in metric)) / sum(metric) * div(u) * div(v)
+
+
+def film(flow: Flow, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+    """Integrand in cut cells with a film, where viscosity rules: `bulk` and `grad_div` of a flow without convection.
+
+    Second-order velocities are parabolas across the film that go on in the rest of the cell, (h / g)^2 times as large.
+    The rule for cut cells is exact for the squares of such velocities, but not for cubes of them.
+    """
+    stokes = creeping(flow)
+    return bulk(stokes, u, p, v, q) + grad_div(stokes, u, v)
+
+
+def creeping(flow: Flow) -> Flow:
+    """The flow without convection."""
+    return replace(flow, convection=False)
+
+
+def _tested(flow: Flow, u: Expr, p: Expr, test: Expr) -> Expr:
+    """test . T R with the residual R of the momentum equation."""
+    metric, common, viscous = _rates(flow)
+    square = sum(g**2 for g in metric)
+    directions = [len(metric) * g**2 for g in metric] if flow.degree == 1 else [square] * len(metric)
     strong = inertia(flow, u) + grad(p)
     if flow.degree > 1:
         strong -= flow.mu * div(grad(u))
-    by_direction = sum(test[i] * strong[i] / sqrt(common + viscous * g) for i, g in enumerate(directions))
-    return by_direction + sqrt(common + viscous * square) / trace * div(u) * div(v)
+    return sum(test[i] * strong[i] / sqrt(common + viscous * g) for i, g in enumerate(directions))
+
+
+def _rates(flow: Flow) -> tuple[list[Expr], Expr, Expr]:
+    """Diagonal of G [1/m^2], 4 rho^2 alpha^2 + rho^2 a . G a, and the factor of G : G in tau_M^-2."""
+    metric = [4.0 / h**2 for h in flow.sizes]
+    common = 0.0 if flow.steady else 4.0 * flow.rho**2 * flow.alpha**2
+    if flow.convection:
+        common += flow.rho**2 * sum(g * flow.a[i] ** 2 for i, g in enumerate(metric))
+    return metric, common, (36.0 if flow.degree == 1 else 144.0) * flow.mu**2
 
 
 def interface(flow: Flow, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
@@ -148,7 +180,7 @@ def interface(flow: Flow, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> E
 
 
 def ghost_penalty(flow: Flow, factors: Penalties, scales: GhostScales, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
-    """Integrand over faces of gamma_p h^3 / (rho phi) [d_n p] [d_n q] and
+    """Integrand over faces of, times the lesser f of their cells, gamma_p h^3 / (rho phi) [d_n p] [d_n q] and
 
     sum_j h^(2j-1) (c_j (gamma_v mu + gamma_b rho phi_b) [d_n^j u] + m_j gamma_t rho h^2 [d_n^j u_t]) [d_n^j v],
     c_1 = m_1 = 1, u_t = alpha u - gamma_m history.
@@ -170,7 +202,7 @@ def ghost_penalty(flow: Flow, factors: Penalties, scales: GhostScales, u: Expr, 
         c, m = (1.0, 1.0) if order == 1 else (factors.ghost_second, factors.ghost_mass_second)
         change = flow.alpha * _jump(u, n, order) - remembered * _jump(flow.history, n, order)
         terms += h ** (2 * order - 1) * dot(c * factor * _jump(u, n, order) + m * mass * change, _jump(v, n, order))
-    return terms
+    return terms if flow.film == 1.0 else ufl.min_value(flow.film("+"), flow.film("-")) * terms
 
 
 def _jump(field: Expr, n: Expr, order: int) -> Expr:

@@ -17,6 +17,7 @@ from solvers.api import Array
 from solvers.fluid import forms
 from solvers.fluid.cell_forms import cell_forms
 from solvers.fluid.cut import Cut
+from solvers.fluid.film import film_cells
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.interface import InterfaceTerms
 from solvers.fluid.matrix import Pattern, choose_pattern, create_matrix, fits, pattern_of
@@ -54,6 +55,11 @@ class FlowSettings:
     def steady(self) -> bool:
         return self.time.steady
 
+    @property
+    def films(self) -> bool:
+        """Films are looked for: one first-order cell across could not bend as they do."""
+        return self.degree > 1
+
 
 class FlowSystem:
     """Assembles the flow at the function `flow` (velocity and pressure) for the step, scales and cut taken last."""
@@ -73,7 +79,8 @@ class FlowSystem:
         domain, space = grid.domain, unknowns.space
         self.flow, self._history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
         self._alpha, self._newton = fem.constant(domain, 0.0), fem.constant(domain, 1.0)
-        self._phi, self._carried, self._known = (fem.function(fem.cellwise_space(domain)) for _ in range(3))
+        self._phi, self._carried, self._known, self._film = (fem.function(fem.cellwise_space(domain)) for _ in range(4))
+        self._film.x.array[:] = 1.0
         self.weights = Weights(grid, settings.degree)
         self.terms = self._terms()
         scales = forms.GhostScales(self._phi, self._carried, self._known)
@@ -117,6 +124,7 @@ class FlowSystem:
             steady=settings.steady,
             degree=settings.degree,
             mesh=domain.mesh.ufl_domain(),
+            film=self._film if self.with_bodies and settings.films else 1.0,
         )
 
     # ------------------------------------------------------------------------------------------------- a new step
@@ -158,9 +166,12 @@ class FlowSystem:
         active = np.zeros(len(grid.numbers), dtype=bool)
         active[cut.active] = True
         self.active_dofs = self.dofs_of(cut.active)
-        cells = [some[some < grid.owned] for some in (cut.uncut, cut.cut)]
+        #: owned cells of each of the forms: uncut, cut, and those in films if there are any
+        self.cells = [some[some < grid.owned] for some in (cut.uncut, cut.cut)]
+        if self.settings.films and (films := film_cells(grid, cut.cut, cut.film)) is not None:
+            self.cells = [self.cells[0], np.setdiff1d(self.cells[1], films, assume_unique=True), films]
         self._residuals, self._tangents = (
-            [form.on(cell=some) for form, some in zip(integrals, cells, strict=False)]
+            [form.on(cell=some) for form, some in zip(integrals, self.cells, strict=False)]
             for integrals in (self._forms.residuals, self._forms.tangents)
         )
         self._outer.set_cut(cut, active)
@@ -227,8 +238,9 @@ class FlowSystem:
             self._interface = InterfaceTerms(
                 self.grid, self.unknowns, self.weights, cut, self.settings.viscosity, penalty
             )
-        if not self._same_faces(cut):
-            self._penalised = cut.ghost_faces
+        film = np.ones(len(self.grid.numbers)) if cut.film is None else cut.film[self.grid.numbers]
+        if not self._same_faces(cut, film):
+            self._penalised, self._film.x.array[:] = cut.ghost_faces, film
             self._ghost.zeroEntries()
             if self.with_bodies:
                 self._assemble_ghost_penalty(cut.ghost_faces)
@@ -242,9 +254,10 @@ class FlowSystem:
             self._remembered[:] = 0.0
             fem.assemble_vector(self._forms.ghost_history.on(interior_facet=faces), self._remembered)
 
-    def _same_faces(self, cut: Cut) -> bool:
-        """The ghost penalty is assembled for these faces already, on every process (collective)."""
+    def _same_faces(self, cut: Cut, film: Array) -> bool:
+        """The ghost penalty is assembled for these faces and films already, on every process (collective)."""
         same = self._penalised is not None and np.array_equal(self._penalised, cut.ghost_faces)
+        same = same and np.array_equal(self._film.x.array, film)
         return self.grid.comm.allreduce(same, op=MPI.LAND)
 
     def pressure_sizes(self) -> Array:

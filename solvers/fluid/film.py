@@ -1,0 +1,156 @@
+"""Films between walls that are closer than a cell: how far the stabilisation steps back there.
+
+A film of height g between two walls lets g^3 / (12 mu) dp/dx through. The stabilisation of a cell of size h > g acts
+over h instead of g. Its shares of what the film does, where pressure and height change along one cell, are
+
+    PSPG             12 mu tau_M / g^2 < (h / g)^2 / 4      lets fluid through
+    ghost, pressure  12 gamma_p (h / g)^3                   lets fluid through
+    ghost, velocity  3/5 gamma_v (h / g)^3                  resists: the parabola goes on to h behind the walls
+
+The second one is gamma_p h^3 / mu [d_n p]^2 on a face of height h with [d_n p] = h p'' = p', over g^3 / (12 mu) p'^2
+times h. The third one is gamma_v mu h [d_n u]^2 with [d_n u] = u / h, u = 4 U y/g (1 - y/g) up to y = h, over
+mu int u_y^2 dy = 16/3 mu U^2 / g times h. The ghost penalty is multiplied by eps min(1, (g/h)^3 / (12 gamma_p)), which
+leaves shares below eps. The PSPG term is left out: second-order velocities with first-order pressures do without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from solvers.api import Array
+from solvers.fluid.forms import TRACE, Penalties
+from solvers.fluid.grid import DistributedGrid, Grid
+from solvers.fluid.patches import Patch
+from solvers.fluid.pieces import FLUSH
+
+#: eps: share of what a film does that the ghost penalty may add; drags are the same to 3 % from 1e-2 to 1e-6.
+SHARE = 1e-2
+#: Sine of half the angle between the ways that a wall can face.
+OCTANT = np.sin(np.pi / 8)
+#: Walls of a film are parallel up to 60 degrees.
+OPPOSITE = -0.5
+
+
+@dataclass(frozen=True)
+class Walls:
+    """Pieces of surface as planes, sorted by cell."""
+
+    cell: NDArray[np.int64]  #: number in the box
+    x: Array  #: middle [m], shape (n, dim)
+    n: Array  #: unit normal out of the fluid, shape (n, dim)
+
+
+@dataclass(frozen=True)
+class Films:
+    """Which faces of the box are walls, and what the factor of the ghost penalty is made of."""
+
+    faces: Sequence[tuple[int, int]]  #: axis and side (0, 1)
+    pressure: float  #: gamma_p
+    least: float  #: g / h below which the factor does not fall any more
+
+    def factor(self, grid: Grid, walls: Walls, solid: NDArray[np.bool_]) -> Array | None:
+        """f of each cell of the box, 1 where walls are not closer than a cell; None if that is so everywhere.
+
+        Solid cells around those of a film take part: they share nodes, and so the parabola goes on in them.
+        """
+        index = np.unravel_index(walls.cell, grid.shape, order="F")
+        sizes = np.stack([np.diff(edge)[i] for edge, i in zip(grid.edges, index, strict=True)], axis=1)
+        across = 1.0 / np.linalg.norm(walls.n / sizes, axis=1)
+        gap = np.minimum(self._to_faces(grid, walls), _to_walls(grid, walls, across))
+        near = gap < (1.0 - FLUSH) * across  # rounding does not make a film of a gap of one cell
+        if not near.any():
+            return None
+        ratio = np.maximum(gap[near] / sizes[near].max(axis=1), self.least)
+        factor = np.ones(grid.size)
+        np.minimum.at(factor, walls.cell[near], SHARE * np.minimum(1.0, ratio**3 / (12.0 * self.pressure)))
+        around = ndimage.minimum_filter(grid.as_box(factor), 3).ravel(order="F")
+        return np.where(solid, around, factor)
+
+    def _to_faces(self, grid: Grid, walls: Walls) -> Array:
+        """Distance [m] through the fluid to faces of the box, along the normal."""
+        gap = np.full(len(walls.cell), np.inf)
+        for axis, side in self.faces:
+            slope = walls.n[:, axis] if side == 0 else -walls.n[:, axis]
+            height = np.abs(walls.x[:, axis] - grid.edges[axis][-side])
+            facing = slope > -OPPOSITE
+            gap[facing] = np.minimum(gap[facing], height[facing] / slope[facing])
+        return gap
+
+
+def films_of(patches: Sequence[Patch], dim: int, penalties: Penalties) -> Films:
+    """Films in a flow with second-order velocities.
+
+    The factor falls as long as Nitsche's method is coercive without the ghost penalty: in a film u_y is linear,
+    u_y^2 <= 4/g int u_y^2 dy at a wall, hence 4/g < gamma C_T / h.
+    """
+    walls = {face for patch in patches if patch.record.prescribed in ("all", "normal") for face in patch.faces}
+    faces = sorted(("xyz".index(face[0]), int(face[1] == "+")) for face in walls)
+    return Films(faces, penalties.ghost_pressure, 4.0 / (penalties.nitsche * TRACE[dim, 2]))
+
+
+def walls_of(cell: NDArray[np.int64], corners: NDArray[np.int64], x: Array, lengths: Array, normal: Array) -> Walls:
+    """Connected pieces in one cell that face the same way, in the plane one of eight, as one.
+
+    corners: vertices of the facets that they are of, shape (pieces, dim), with positions x; lengths: int lambda_v ds
+    over each piece [m^(dim-1)], of the same shape; normal: unit normals out of the fluid.
+    """
+    count, dim = corners.shape
+    corner = np.unique(cell[:, None] * len(x) + corners, return_inverse=True)[1].ravel()  # in each cell its own
+    links = coo_array((np.ones(corner.size), (np.repeat(np.arange(count), dim), count + corner)), [2 * corner.size] * 2)
+    part = connected_components(links, directed=False)[1][:count]
+    facing = (np.where(np.abs(normal) > OCTANT, np.sign(normal), 0.0) + 1.0) @ 3.0 ** np.arange(dim)
+    _, first, group = np.unique(3**dim * part + facing.astype(np.int64), return_index=True, return_inverse=True)
+    area = lengths.sum(axis=1)
+
+    def total(values: Array) -> Array:
+        return np.stack([np.bincount(group, column) for column in values.T], axis=1)
+
+    n, middle = total(area[:, None] * normal), total(np.einsum("pv,pvi->pi", lengths, x[corners]))
+    middle, n = middle / total(area[:, None]), n / np.linalg.norm(n, axis=1, keepdims=True)
+    order = np.argsort(cell[first], kind="stable")
+    return Walls(cell[first][order], middle[order], n[order])
+
+
+def _to_walls(grid: Grid, walls: Walls, reach: Array) -> Array:
+    """Distance [m] through the fluid, along the normal, to the closest wall opposite in the cells around.
+
+    None farther than `reach`. Infinite where there is none. What is behind the wall itself is on the other side of a
+    body, not of a film.
+    """
+    index = np.stack(np.unravel_index(walls.cell, grid.shape, order="F"))
+    shape = np.array(grid.shape)[:, None]
+    gap, closest = np.full((2, len(walls.cell)), np.inf)
+    for offset in product((-1, 0, 1), repeat=grid.dim):
+        there = index + np.array(offset)[:, None]
+        inside = np.flatnonzero(((there >= 0) & (there < shape)).all(axis=0))
+        number = np.ravel_multi_index(tuple(there[:, inside]), grid.shape, order="F")
+        first, last = (np.searchsorted(walls.cell, number, side=side) for side in ("left", "right"))
+        for k in range((last - first).max(initial=0)):
+            some = first + k < last
+            a, b = inside[some], first[some] + k
+            opposing = np.einsum("ai,ai->a", walls.n[a], walls.n[b])
+            a, b, opposing = (v[opposing < OPPOSITE] for v in (a, b, opposing))
+            away = walls.x[a] - walls.x[b]
+            distance = np.einsum("ai,ai->a", away, walls.n[b]) / opposing
+            aside = away - distance[:, None] * walls.n[a]
+            far = distance**2 + (aside**2).sum(axis=1)
+            better = (distance > 0.0) & (distance < reach[a]) & (far < closest[a])
+            gap[a[better]], closest[a[better]] = distance[better], far[better]
+    return gap
+
+
+def film_cells(grid: DistributedGrid, cells: NDArray[np.int32], factor: Array | None) -> NDArray[np.int32] | None:
+    """Those of some local cells that this process owns and that are in films; None if nobody has any (collective)."""
+    if not grid.comm.allreduce(factor is not None, op=MPI.LOR):
+        return None
+    owned = cells[cells < grid.owned]
+    return owned[:0] if factor is None else owned[factor[grid.numbers[owned]] < 1.0]
