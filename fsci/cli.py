@@ -119,12 +119,15 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument("--plot", metavar="FOLDER", type=Path, help="draw error against time, unknowns and memory")
 
     stress = command(_stress, "run random hard cases, each against its twin, and count wrong results")
-    stress.add_argument("draws", metavar="N", type=_count, nargs="?", default=20, help="number of random cases (default: 20)")
+    stress.add_argument("draws", metavar="N", type=_count, nargs="?", default=20, help="number of cases (default: 20)")
     stress.add_argument("--seed", metavar="S", type=_count, default=0, help="seed of the first case (default: 0)")
     stress.add_argument("-o", "--out", metavar="FILE", type=Path, help="write all results as JSON")
     stress.add_argument("--keep", metavar="FOLDER", type=Path, help="keep the cases with wrong results")
     stress.add_argument(
-        "--steps", metavar="STEPS", type=_count, help="instead of random cases: number of steps of one case, to see whether results drift"
+        "--steps",
+        metavar="STEPS",
+        type=_count,
+        help="instead: number of steps of one case, to see whether results drift",
     )
 
     schema = command(_schema, "print the JSON schema of case files, for editors")
