@@ -27,8 +27,8 @@ structure = Structure([block], contact=contact)
 
 for _ in march(structure, steps=4):
     force = structure.residual_force.reshape(-1, 2)[block.points[1, : block.owned] < -0.999, 1].sum()
-    slave = contact.multipliers.node
-    x, p = contact.x[slave, 0], contact.z[:, 1]
+    slave = contact.nodes.of_surface[0]
+    x, p = contact.x[slave, 0], contact.z[slave, 1]
     b = np.sqrt(4.0 * force * R * (1.0 - nu**2) / (np.pi * E))
     hertz = 2.0 * force / (np.pi * b)
     print(f"force {force:.6f}: largest pressure {p.max():.5f}, Hertz {hertz:.5f}")
@@ -40,5 +40,7 @@ if sys.argv[1:]:
     plt.plot(fine, hertz * np.sqrt(1.0 - (fine / b) ** 2), "k-", label="Hertz")
     plt.plot(x[order], p[order], "o", label="computed")
     plt.xlim(-2.0 * b, 2.0 * b)
+    plt.xlabel("x [m]")
+    plt.ylabel("p [Pa]")
     plt.legend()
     plt.savefig(sys.argv[1])

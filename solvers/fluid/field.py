@@ -62,9 +62,10 @@ class Fluid:
         self.unknowns = Unknowns(self.grid, settings.degree, periodic_axes(patches))
         self.size = self.unknowns.owned  #: unknowns that this process owns
         self.boundary = Boundary(self.grid, self.unknowns, patches)
-        degree, steady = settings.degree, settings.steady
+        self.steady, self.scheme = settings.steady, settings.time  #: each step a flow at rest; how it takes rates
+        self.linear_tolerance = solver.linear_tolerance
         wanted = solver.linear if isinstance(solver.linear, str) else "auto"
-        method = linear.choose_flow(wanted, self.dim, self.dofs(), degree=degree, steady=steady)
+        method = linear.choose_flow(wanted, self.dim, self.dofs(), degree=settings.degree, steady=self.steady)
         self.system = FlowSystem(
             self.grid,
             settings,
@@ -100,19 +101,6 @@ class Fluid:
     def dofs(self) -> int:
         """Unknowns on all processes, inactive ones included."""
         return self.unknowns.size()
-
-    @property
-    def steady(self) -> bool:
-        """Each step is a flow at rest of its own."""
-        return self.settings.steady
-
-    @property
-    def scheme(self) -> TimeScheme:
-        return self.settings.time
-
-    @property
-    def linear_tolerance(self) -> float:
-        return self.solver.linear_tolerance
 
     @property
     def flow(self) -> Array:
