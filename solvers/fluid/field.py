@@ -30,7 +30,7 @@ from solvers.fluid.reach import require_known, require_within_period, strip_laye
 from solvers.fluid.space import Unknowns, set_velocity
 from solvers.fluid.surface import Motion, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
-from solvers.fluid.time_scheme import STEADY, Step, TimeScheme
+from solvers.fluid.time_scheme import STEADY, Step
 from solvers.largest import position_of_largest
 from solvers.newton import converge
 from solvers.rounding import rounding_error
