@@ -8,15 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from solvers.api import Array
 
 if TYPE_CHECKING:
-    from solvers.fluid.covered_faces import CoveredFaces
     from solvers.fluid.forms import Flow
 
 Expr = Any
+
+
+class WetPart(Protocol):
+    """Faces of cells that bodies cover in part, on one face of the box, with points on the rest of them."""
+
+    def along_normal(self, values: Array) -> Array:
+        """Vectors of some lengths along the outward normal."""
+        ...
+
+    def outflow(self, mu: float, mass_flux: Array) -> Array:
+        """d/du of the outflow's form."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -32,9 +43,9 @@ class PatchKind:
     depends_on_flow: bool = False  #: the form has u, and is linear in it
     #: Where bodies cover part of a cell's face the same is integrated over points of the wet part, with numbers:
     #: (faces, values at the points) -> t [Pa], shape (cells, points, dim); not for forms with u
-    stress: Callable[[CoveredFaces, Array], Array] | None = None
+    stress: Callable[[WetPart, Array], Array] | None = None
     #: (faces, mu, rho a) -> d<-t, v>/du; a: velocity of the step before; for forms with u
-    slope: Callable[[CoveredFaces, float, Array], Array] | None = None
+    slope: Callable[[WetPart, float, Array], Array] | None = None
 
 
 def _traction(flow: Flow, u: Expr, t: Expr, n: Expr, v: Expr) -> Expr:

@@ -88,7 +88,8 @@ class FlowSystem:
         self._forms = cell_forms(unknowns, self.terms, self.flow, settings.penalties, on_cut=on_cut)
         self._outer = OuterFaces(grid, boundary, unknowns, self.terms, self.flow)
         fem.compile_integrals([*self._forms.integrals(), *self._outer.integrals()], "the flow")
-        #: forms over the cells and outer faces of the cut
+        #: owned cells of the cut, uncut ones and cut ones, and forms over these and the outer faces
+        self.cells: list[NDArray[np.int32]] = []
         self._residuals: list = []
         self._outer_residuals: list = []
         self._tangents: list = []
