@@ -94,8 +94,9 @@ test-debian13:
 lint: setup
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
-	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
+	@if $(BIN)/python -c 'import numpy; raise SystemExit(numpy.__version__ >= "2")'; then echo $(BIN)/mypy && $(BIN)/mypy; \
+	else echo "lint: types are checked on Debian 12; those that numpy 2 and newer petsc4py declare differ"; fi
 
 bench: setup
 	$(BIN)/fsci bench all
