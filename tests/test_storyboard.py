@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fsci.plot.picture import look_at, plot_run
-from fsci.plot.render_flow import load_meshes, load_state
+from fsci.plot.render_flow import connect, load_meshes, load_state
 from fsci.plot.storyboard import arrange, choose, plane_state
 from fsci.run.output import FieldWriter
 from solvers.api import Snapshot
@@ -137,3 +137,11 @@ def test_contact_pressure_beside_a_rigid_body_in_the_plane(tmp_path):
     fields = FieldWriter(tmp_path / "fields")
     fields.write(1, 0.1, [flow, body, stop])
     assert "final_contact_pressure.png" in {path.name for path in plot_run(tmp_path)}
+
+
+def test_specks_of_streamlines_are_left_out():
+    long, speck = np.array([[0.0, 0], [1, 0], [2, 1]]), np.array([[0.0, 0], [0.01, 0], [0, 0.01]])
+    lines = connect([long, speck], 0.1)
+    assert lines.shape == (2, 2, 3)
+    assert np.array_equal(lines[:, :, :2], [long[:2], long[1:]])
+    assert len(connect([speck], 0.1)) == 0

@@ -15,6 +15,7 @@ from fsci.plot.render import ISOMETRIC, Array, Body, field_values, import_pyvist
 STREAMLINES = "velocity"  #: the field that is drawn with streamlines, besides its components
 SPACING = 0.035  #: distance of streamlines in the plane, as part of the edge of a square as large as the box
 RESOLUTION = 400  #: points along the diagonal at which the plane flow is sampled for them
+SHORTEST = 8  #: streamlines in the plane that extend over fewer of these points are left out
 SEEDS = 5  #: streamlines in space start from so many points along each edge of the middle cross-section,
 BODY_SEEDS = 9  #: and from so many along each edge of a rectangle
 AROUND = 1.2  #: that is so many times as large as a body
@@ -109,8 +110,13 @@ def _plane_streamlines(mesh: Any) -> Array:
         return NO_LINES
     density = (high - low) / (SPACING * np.sqrt(np.prod(high - low))) / 30.0  # streamplot's unit: 30 lines across
     drawn = Figure().add_subplot().streamplot(x, y, u, v, density=tuple(density))
-    lines = [np.stack([line[:-1], line[1:]], axis=1) for line in drawn.lines.get_segments()]
-    return np.pad(np.concatenate(lines), ((0, 0), (0, 0), (0, 1)))
+    return connect(drawn.lines.get_segments(), SHORTEST * step)
+
+
+def connect(lines: Sequence[Array], least: float) -> Array:
+    """Segments of polylines in the plane that extend over at least this length, shape (n, 2, 3)."""
+    found = [np.stack([line[:-1], line[1:]], axis=1) for line in lines if np.ptp(line, axis=0).max() >= least]
+    return np.pad(np.concatenate(found), ((0, 0), (0, 0), (0, 1))) if found else NO_LINES
 
 
 def segments(lines: Any) -> Array:
