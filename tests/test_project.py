@@ -11,6 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 BIN = Path(sys.executable).parent
+TUTORIALS = sorted(path.stem for path in ROOT.glob("docs/tutorial_*.md"))
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md"))]
 
 
@@ -65,9 +66,10 @@ def test_error_shown_in_the_quickstart(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", ["quickstart", "running", "flow"])
+@pytest.mark.parametrize("page", ["quickstart", "running", "flow", "howto", *TUTORIALS])
 def test_commands_of_the_docs_run(page, tmp_path):
     shutil.copytree(ROOT / "cases", tmp_path / "cases")
+    shutil.copytree(ROOT / "docs" / "tutorials", tmp_path / "docs" / "tutorials")
     lines = [line for line in commands(ROOT / "docs" / f"{page}.md") if not line.startswith("make")]
     assert lines
     environment = {**os.environ, "PATH": f"{BIN}:{os.environ['PATH']}"}
