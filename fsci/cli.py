@@ -169,6 +169,7 @@ def _new(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace) -> int:
     from fsci.case import CaseError, load_case
     from fsci.check.check import summary
+    from fsci.check.cost import in_words
     from fsci.check.meshes import check_meshes
 
     try:
@@ -179,6 +180,8 @@ def _check(options: argparse.Namespace) -> int:
     except CaseError as error:
         return _fail(str(error))
     print(f"{case.path}\n{summary(case, found.meshes, found.pairs)}")
+    if cost := in_words(case, found.meshes):
+        print(f"  estimate: {cost}")
     for kind, lines in (("note", found.notes), ("warning", [*case.warnings, *found.warnings])):
         for line in lines:
             print(f"{kind}: {line}", file=sys.stderr)

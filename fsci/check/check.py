@@ -22,7 +22,7 @@ def summary(case: Case, meshes: Mapping[str, BodyMesh] = {}, pairs: Mapping[str,
     `meshes`: of elastic bodies, by name, as far as they were read; `pairs`: also those that the case does not name.
     """
     time = case.time
-    steps = ceil((time.end - time.start) / time.step - 1e-9)
+    steps = number_of_steps(case)
     rows = [
         ("title", case.title),
         ("time", f"{time.start:g} to {time.end:g} {case.units.time}, {_count(steps, 'step')} of {time.step:g}"),
@@ -49,22 +49,34 @@ def _structure(case: Case, structure: Structure, meshes: Mapping[str, BodyMesh])
         rho_inf = structure.dynamics.rho_inf
         motion = "generalised-alpha" + ("" if rho_inf is None else f", rho_inf {rho_inf:g}")
     yield "structure", motion + (f", plane {structure.plane}" if case.dimension != 3 else "")
-    total, known = 0, True
     for name, body in structure.bodies.items():
         text = f"{_name(body.mesh)}, {body.material.law}"
         if isinstance(body.mesh, Shape):
-            cells, nodes = body.mesh.counts
-            total += nodes * body.mesh.dimension
-            text += f", {_count(cells, 'cell')} (order {body.mesh.order} {body.mesh.cell})"
+            text += f", {_count(body.mesh.counts[0], 'cell')} (order {body.mesh.order} {body.mesh.cell})"
         elif name in meshes:
             mesh = meshes[name]
-            total += mesh.points.size
             text += f", {_count(len(mesh.cells), 'cell')} ({mesh.cell_type})"
-        else:
-            known = False
         yield f"body {name}", text
-    if known:
-        yield "dofs", f"{total:,}"
+    dofs = structure_dofs(structure, meshes)
+    if dofs is not None:
+        yield "dofs", f"{dofs:,}"
+
+
+def structure_dofs(structure: Structure, meshes: Mapping[str, BodyMesh]) -> int | None:
+    """Unknowns of all elastic bodies; None if a mesh is not known."""
+    total = 0
+    for name, body in structure.bodies.items():
+        if isinstance(body.mesh, Shape):
+            total += body.mesh.counts[1] * body.mesh.dimension
+        elif name in meshes:
+            total += meshes[name].points.size
+        else:
+            return None
+    return total
+
+
+def number_of_steps(case: Case) -> int:
+    return ceil((case.time.end - case.time.start) / case.time.step - 1e-9)
 
 
 def _fluid(fluid: Fluid) -> Iterator[Row]:

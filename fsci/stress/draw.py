@@ -79,5 +79,5 @@ def draw(seed: int) -> Draw:
     elif twin == "parallel":
         processes = chance.choice([2, 2, 3, 4])
     else:
-        kill_after, delay = chance.randint(1, 4), chance.random()
+        kill_after, delay = chance.randint(2, 4), chance.random()
     return Draw(seed, scene, twin, frame, processes, kill_after, delay)
