@@ -329,6 +329,11 @@ def test_a_tube_folds():
     assert np.nanmin(contact.mean_gap()) > -1e-12
     radii = np.hypot(*contact.x[contact.multipliers.node[active], :2].T)
     assert len(np.unique(radii.round(9))) == len(active) // 16
+    (mortar,) = contact.interface.mortars
+    tree, x = mortar._search.tree, contact.x[mortar.masters.nodes]
+    wanted = by_force(tree, x, mortar._edge)
+    assert len(wanted) > 100
+    assert set(map(tuple, tree.pairs(x, mortar._edge).tolist())) == set(map(tuple, wanted.tolist()))
 
 
 MISTAKES = {
