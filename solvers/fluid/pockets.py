@@ -51,13 +51,13 @@ def _label(grid: DistributedGrid, own: NDArray[np.int32]) -> tuple[NDArray[np.in
 
     Of the cells of a part, the first is that with the smallest number, the last axis running fastest.
     """
-    low, shape, places = grid.window
+    low, shape, indices = grid.window
     window = np.zeros(int(np.prod(shape)), dtype=bool)
-    window[places[own]] = True
+    window[indices[own]] = True
     found, count = ndimage.label(window.reshape(shape), np.ones((3,) * grid.dim)) if len(own) else (window, 0)
     found = found.ravel()
     labels = np.zeros(len(grid.numbers), dtype=np.int64)
-    labels[own] = found[places[own]]
+    labels[own] = found[indices[own]]
     first = np.zeros(count + 1, dtype=np.int64)
     first[found[::-1]] = np.arange(len(found))[::-1]  # the last one assigned stays
     index = np.stack(np.unravel_index(first[1:], shape)) + low[:, None] if count else np.zeros((grid.dim, 0), dtype=int)

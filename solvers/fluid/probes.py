@@ -31,12 +31,12 @@ AXES = ("x", "y", "z")
 def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> Probe:
     """velocity [m/s] or pressure [Pa] at a point of the box; nan while a body covers it.
 
-    Raises PointInBody if one does at the time t (of bodies whose motion is known). Collective.
+    Raises PointInBody if one does at the time t (of bodies whose motion is given). Collective.
     """
     x = np.asarray(point, dtype=float)
-    known = [body for body in fluid.bodies if body.motion is not None]
-    motions = [body.motion(t) for body in known if body.motion is not None]
-    require_outside(x, [body.surface for body in known], motions)
+    given = [body for body in fluid.bodies if body.motion is not None]
+    motions = [body.motion(t) for body in given if body.motion is not None]
+    require_outside(x, [body.surface for body in given], motions)
     unknowns = fluid.unknowns
     nodes, degree = (unknowns.velocity, unknowns.degree) if quantity == "velocity" else (unknowns.pressure, 1)
     dofs, weights = interpolation(fluid, nodes, degree, x)

@@ -46,10 +46,10 @@ def _corners(fluid: Fluid, degree: int) -> np.ndarray:
     """Number of each corner of the cells, x fastest, in the lattice of nodes of this degree."""
     counts = fluid.unknowns.lattice_shape(degree)
     lattice = np.arange(int(np.prod(counts))).reshape(counts, order="F")
-    places = [
+    indices = [
         degree * np.arange(n + 1) % count for n, count in zip(fluid.grid.grid.shape, counts, strict=True)
     ]  # fmt: skip
-    return lattice[np.ix_(*places)].ravel(order="F")
+    return lattice[np.ix_(*indices)].ravel(order="F")
 
 
 def _bodies(fluid: Fluid) -> list[Snapshot]:

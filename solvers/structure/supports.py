@@ -91,8 +91,8 @@ class Oblique:
         """P u [m], shape (k, dim)."""
         targets = np.zeros(self.basis.shape[:2])
         for share in self.shares:
-            known = np.einsum("md,md->m", share.along, targets[share.nodes])
-            targets[share.nodes, share.slots] = (evaluate(share.value, share.points, t) - known) / share.sizes
+            already = np.einsum("md,md->m", share.along, targets[share.nodes])
+            targets[share.nodes, share.slots] = (evaluate(share.value, share.points, t) - already) / share.sizes
         return np.einsum("kij,ki->kj", self.basis, targets)
 
 
