@@ -118,3 +118,17 @@ def test_settling_of_an_elastic_cylinder(tmp_path):
     gap = history["cylinder.y"] - 1.0
     start, end = np.interp([-np.log(0.5), -np.log(0.2)], -np.log(gap), history["time"])
     assert end - start == pytest.approx(2.3303295, rel=0.02)
+
+
+@pytest.mark.slow
+def test_settling_of_an_elastic_cylinder_below_a_cell(tmp_path):
+    """From half a cell to 0.2 cells in 5.69648742 s, within 2 %, with three Newton iterations per step."""
+    text = SETTLING.replace("step: 0.1, end: 3", "step: 0.2, end: 7").replace("[0, 1.6]", "[0, 1.06]")
+    (tmp_path / "case.yaml").write_text(text.replace("cells: [128, 2]", "cells: [256, 2]"))
+    run = fsci("run", tmp_path / "case.yaml", "-o", tmp_path / "out", timeout=400)
+    assert run.returncode == 0, run.stdout[-2000:]
+    history = read_history(tmp_path / "out" / "history.csv")
+    gap = history["cylinder.y"] - 1.0
+    start, end = np.interp([-np.log(0.05), -np.log(0.02)], -np.log(gap), history["time"])
+    assert end - start == pytest.approx(5.69648742, rel=0.02)
+    assert history["iterations"][4:].max() <= 3
