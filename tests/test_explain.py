@@ -13,6 +13,7 @@ from small_cases import PLATE
 from fsci.case import load_case
 from fsci.explain import advice
 from fsci.explain.residuals import course, curve
+from fsci.report.report import read_summary, report
 
 #: steps that have a solution until half the time is over, and one whose load turns elements inside out
 HEAVY = PLATE.replace('"1e-6*t"', '"where(t > 0.5, -50, 0.01*t)"').replace("time: {", "time: {retry: {halvings: 1}, ")
@@ -40,6 +41,12 @@ def test_a_failed_step(failed):
     assert any(line.startswith("nearest node   ") and "of plate, in its cell " in line for line in lines)
     assert len([line for line in lines if line.startswith("try ")]) >= 1
     assert lines[-1] == f"to compute the step alone: fsci explain {failed} --replay FOLDER"
+
+
+def test_the_report_explains_it(failed):
+    text = report(failed, read_summary(failed), [])
+    assert "<h2>Why it failed</h2>" in text
+    assert "failed step    4, from time 0.5 with dt 0.1" in text
 
 
 def test_the_failed_step_alone(failed, tmp_path):

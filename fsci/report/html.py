@@ -81,6 +81,11 @@ def pictures(files: Iterable[Path]) -> str:
     return f'<div class="pictures">{"".join(figures)}</div>' if figures else ""
 
 
+def preformatted(text: str) -> str:
+    """A text with its lines and spaces as they are."""
+    return f"<pre>{escape(text)}</pre>" if text else ""
+
+
 def folded(title: str, text: str) -> str:
     """A long text that opens when asked for."""
-    return f"<details><summary>{escape(title)}</summary><pre>{escape(text)}</pre></details>" if text else ""
+    return f"<details><summary>{escape(title)}</summary>{preformatted(text)}</details>" if text else ""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fsci.report.html import bars, folded, heading, page, paragraph, pictures, section, table
+from fsci.report.html import bars, folded, heading, page, paragraph, pictures, preformatted, section, table
 from fsci.run.output import write_text
 
 NAME = "report.html"
@@ -46,6 +46,7 @@ def report(out: Path, summary: Mapping[str, Any], drawn: Sequence[Path]) -> str:
             heading(str(summary["title"])),
             paragraph(status, "status ok" if status == "finished" else "status bad"),
             paragraph(str(summary["message"])),
+            section("Why it failed", _failure(out, summary)),
             section("Run", _run(summary)),
             section("Verification", _verification(summary)),
             section("Pictures", pictures(file for file in drawn if file not in curves)),
@@ -70,6 +71,15 @@ def _run(summary: Mapping[str, Any]) -> str:
         ("versions", ", ".join(f"{name} {version}" for name, version in summary["versions"].items())),
     ]
     return table(("", ""), rows)
+
+
+def _failure(out: Path, summary: Mapping[str, Any]) -> str:
+    """What `fsci explain` says of a failed run."""
+    if summary["status"] != "failed":
+        return ""
+    from fsci.explain.explain import explain
+
+    return preformatted(explain(out))
 
 
 def _verification(summary: Mapping[str, Any]) -> str:
