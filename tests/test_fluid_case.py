@@ -37,7 +37,7 @@ verify:
 ALONE = without(without(CASE, "probes"), "verify")
 RESTING = without(ALONE, "fluid", "bodies", "cylinder", "motion")
 GRID = "cells: [40, 10]"
-KINDS = "'velocity', 'no_slip', 'slip', 'symmetry', 'traction', 'pressure', 'outflow' or 'periodic'"
+KINDS = "'velocity', 'no_slip', 'slip', 'symmetry', 'slip_length', 'traction', 'pressure', 'outflow' or 'periodic'"
 FACES = "'x-', 'x+', 'y-', 'y+', 'z-' or 'z+'"
 
 #: what is replaced, by what, the message with line and column, the text that stands there
@@ -105,6 +105,7 @@ MISTAKES = [
     ("on: x-", "on: [x-, z-]", "8:22: a box in 2D has no face 'z-'", "z-"),
     (", outflow: true", "", f"9:13: a patch needs one of {KINDS}", "{on"),
     ("outflow: true", "outflow: true, slip: true", f"9:31: give only one of {KINDS}", "true"),
+    ("outflow: true", "slip_length: 0", "9:35: 'slip_length' must be greater than 0, not 0", "0"),
     ("[y-, y+]", "y-", "7:3: no patch is on the face 'y+' of the box", "patches"),
     ('["4*y*(1 - y)", 0]', "[1, 0, 0]", "8:31: 'velocity' must have 2 entries in 2D, not 3", "[1"),
     ("on: x-", "on: x-, where: y - t", "8:28: 'where' must not depend on t", "y - t"),

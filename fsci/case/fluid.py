@@ -45,6 +45,11 @@ class Patch(Section):
     velocity: Vector | None = setting(None, "prescribed velocity", unit="m/s")
     no_slip: Switch = setting(False, "true: a wall at rest that the flow sticks to")
     slip: Switch = setting(False, "true: nothing flows through, and there is no shear stress")
+    slip_length: Positive | None = setting(
+        None,
+        "nothing flows through, and the shear stress is viscosity / slip_length times the velocity along",
+        unit="m",
+    )
     symmetry: Switch = setting(False, "true: a plane of symmetry, the same as slip")
     traction: Vector | None = setting(None, "prescribed force per area", unit="Pa")
     pressure: Formula | None = setting(

@@ -77,6 +77,12 @@ class CoveredFaces:
             block[:, :, i, :, i] -= mass
         return block
 
+    def friction(self, factor: Array) -> Array:
+        """d/du of <factor u, v> over the wet part, same shape; factor [Pa s/m] at the points, shape (cells, points)."""
+        shapes, _ = fem.tabulate_lagrange(self.grid.domain, self.unknowns.degree, self.reference)
+        mass = np.einsum("cq,qa,qb->cab", self.weights * factor, shapes, shapes)
+        return np.einsum("cab,ik->caibk", mass, np.eye(self.grid.dim))
+
 
 def covered_faces(
     grid: DistributedGrid,

@@ -121,7 +121,9 @@ class OuterFaces:
         for index, part in self._on_cut.covered:
             slope = self.terms[index].kind.slope
             if slope is not None:
-                yield self.unknowns.cell_velocity[part.cells], slope(part, mu, rho * part.velocity(a))
+                given = self.terms[index].value
+                values = None if given is None else part.velocity(given.x.array)
+                yield self.unknowns.cell_velocity[part.cells], slope(part, mu, rho * part.velocity(a), values)
 
 
 class CannotBeCovered(ValueError):

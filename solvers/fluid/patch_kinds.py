@@ -29,6 +29,10 @@ class WetPart(Protocol):
         """d/du of the outflow's form."""
         ...
 
+    def friction(self, factor: Array) -> Array:
+        """d/du of <factor u, v>, with factors [Pa s/m] at the points."""
+        ...
+
 
 @dataclass(frozen=True)
 class PatchKind:
@@ -44,8 +48,8 @@ class PatchKind:
     #: Where bodies cover part of a cell's face the same is integrated over points of the wet part, with numbers:
     #: (faces, values at the points) -> t [Pa], shape (cells, points, dim); not for forms with u
     stress: Callable[[WetPart, Array], Array] | None = None
-    #: (faces, mu, rho a) -> d<-t, v>/du; a: velocity of the step before; for forms with u
-    slope: Callable[[WetPart, float, Array], Array] | None = None
+    #: (faces, mu, rho a, values at the points) -> d<-t, v>/du; a: velocity of the step before; for forms with u
+    slope: Callable[[WetPart, float, Array, Array | None], Array] | None = None
 
 
 def _traction(flow: Flow, u: Expr, t: Expr, n: Expr, v: Expr) -> Expr:
@@ -56,6 +60,16 @@ def _traction(flow: Flow, u: Expr, t: Expr, n: Expr, v: Expr) -> Expr:
 def _pressure(flow: Flow, u: Expr, p: Expr, n: Expr, v: Expr) -> Expr:
     """<p, n . v> with the given pressure [Pa]: n . sigma n = -p."""
     return p * _dot(n, v)
+
+
+def _slip_length(flow: Flow, u: Expr, b: Expr, n: Expr, v: Expr) -> Expr:
+    """<mu/b u, v>: the shear stress is -mu/b times the velocity along the wall; that through it is held at zero."""
+    return flow.mu / b * _dot(u, v)
+
+
+def _slip_slope(faces: WetPart, mu: float, mass_flux: Array, b: Array | None) -> Array:
+    assert b is not None
+    return faces.friction(mu / b[:, :, 0])
 
 
 def _outflow(flow: Flow, u: Expr, value: Expr, n: Expr, v: Expr) -> Expr:
@@ -84,6 +98,7 @@ PATCH_KINDS: Mapping[str, PatchKind] = {
     "no_slip": PatchKind("all"),
     "slip": PatchKind("normal"),
     "symmetry": PatchKind("normal"),
+    "slip_length": PatchKind("normal", value="number", form=_slip_length, depends_on_flow=True, slope=_slip_slope),
     "traction": PatchKind(value="vector", open=True, form=_traction, stress=lambda faces, t: t),
     "pressure": PatchKind(
         "tangential", value="number", open=True, form=_pressure,
@@ -91,7 +106,7 @@ PATCH_KINDS: Mapping[str, PatchKind] = {
     ),
     "outflow": PatchKind(
         open=True, form=_outflow, depends_on_flow=True,
-        slope=lambda faces, mu, mass_flux: faces.outflow(mu, mass_flux),
+        slope=lambda faces, mu, mass_flux, values: faces.outflow(mu, mass_flux),
     ),
     "periodic": PatchKind(periodic=True),
 }  # fmt: skip
