@@ -30,7 +30,7 @@ MISTAKES = {
     "symmetry": (
         "displacement: [0, 0]",
         "symmetry: true",
-        "case.yaml:9:11: symmetry needs a plane, and this surface is curved",
+        "case.yaml:9:11: a plane of symmetry must be plane, but this surface is curved",
     ),
 }
 
