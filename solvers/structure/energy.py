@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from solvers.api import State
 
+#: Energy from nothing, relative to the most that the bodies ever had, that is said to the user.
+GAIN = 0.1
+
 
 class EnergyBalance:
     """kinetic + internal + damping + friction = initial energy + work of loads and supports, but for time steps [J]."""
 
     def __init__(self) -> None:
         self.kinetic = self.internal = self.work = self.damping = self.friction = self.initial = 0.0
+        self.largest = 0.0  #: kinetic and internal energy together
+        self.warned = False
 
     def start(self, kinetic: float, internal: float, friction: float) -> None:
         """The energies at the start [J]."""
@@ -21,6 +26,17 @@ class EnergyBalance:
         self.work += work
         self.damping += damping
         self.kinetic, self.internal, self.friction = kinetic, internal, friction
+
+    def warning(self) -> str:
+        """Words for the user the first time that bodies in motion have more energy than they can; else nothing."""
+        before, self.largest = self.largest, max(self.largest, self.kinetic + self.internal)
+        if self.warned or self.kinetic == 0.0 or before == 0.0 or self.error <= GAIN * before:
+            return ""
+        self.warned = True
+        return (
+            f"the bodies have gained energy from nothing, {self.error / before:.0%} of the most that they had: "
+            "the step does not resolve the impact; take a smaller 'step'"
+        )
 
     @property
     def error(self) -> float:

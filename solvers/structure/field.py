@@ -153,7 +153,8 @@ class Structure:
         self.begin_step(t, dt)
         info = self.solve()
         self.end_step()
-        return info
+        warning = "" if self.constraint is None else self.energy.warning()
+        return replace(info, notes=(*info.notes, warning)) if warning else info
 
     def begin_step(self, t: float, dt: float) -> None:
         """Remember the state at t and predict the one at t + dt."""
