@@ -1,4 +1,4 @@
-"""Patch tests of contact: a homogeneous state passes through meshes that do not match. And Hertz.
+"""Patch tests of contact: a homogeneous state passes through meshes that do not match.
 
 The states are finite (5 % shortening), so that every nonlinearity takes part; they are exact for any mesh of
 which the facets of the interface are integrated exactly, i.e. triangles, parallelograms and lines.
@@ -22,11 +22,8 @@ from contact_setup import (
 from mortar_surfaces import rotation
 from structure_setup import CELL_TYPES, constant, distort, vector
 
-from fsci import shapes
 from solvers.contact.surface import Surface
 from solvers.structure.body import Support, Traction
-from solvers.structure.elastic_constants import lame
-from solvers.structure.materials import StVenantKirchhoff
 
 STRETCH = 0.95
 MIXED = [
@@ -240,54 +237,3 @@ def test_only_contact_carries_the_load(cell_type, overlap):
     lift = overlap * np.eye(dim)[-1] * F[-1]
     for body, u, more in ((bodies[0], u_lower, 0.0), (bodies[1], u_upper, lift)):
         assert np.abs(u - ((F - 1) * body.points[:dim].T + more)).max() < 1e-8 * 0.05
-
-
-# --------------------------------------------------------------------------------------------------------------- Hertz
-
-RADIUS, E, NU = 8.0, 200.0, 0.3
-
-
-def half_cylinder(cells, order, cell):
-    """The right half of a part of height 4 of the cylinder that stands on the origin, finer towards it."""
-    unit = shapes.rectangle([1, 1], [cells, cells], order=order, cell=cell)
-    s, t = 4.0 * (np.exp(4.5 * unit.points.T) - 1.0) / (np.exp(4.5) - 1.0)
-    low = RADIUS - np.sqrt(RADIUS**2 - s**2)
-    return replace(unit, points=np.column_stack([s, low + (1.0 - low / 4.0) * t]))
-
-
-def hertz(cells, order, cell, facets):
-    """(largest pressure over Hertz', contact half width over facet, contact, info); the plane has so many facets."""
-    mu, lmbda = lame(E, NU)
-    supports = [Support("left", (constant(0), None)), Support("top", (constant(0), lambda x, t: -0.01 * t + 0 * x[0]))]
-    mesh = half_cylinder(cells, order, cell)
-    body = make_body("cylinder", mesh, StVenantKirchhoff(mu, lmbda), supports=supports)
-    x, i = np.linspace(6, -1, facets + 1), np.arange(facets)
-    plane = Surface("plane", np.column_stack([x, 0 * x]), np.column_stack([i, i + 1]), "line", None)
-    structure, contact = make_contact([body], [(("cylinder", "bottom"), plane)])
-    info = solve_step(structure)
-    force = 2.0 * contact.resultant(0)[1]
-    half_width = 2.0 * np.sqrt(force * RADIUS * (1 - NU**2) / (np.pi * E))
-    nodes = np.sort(contact.nodes.points[contact.nodes.of_surface[0], 0])
-    widest = np.diff(nodes[nodes < half_width]).max()
-    return pressures(contact).max() / (2 * force / (np.pi * half_width)), half_width / widest, contact, info
-
-
-@pytest.mark.parametrize(("cells", "order", "cell"), [(40, 1, "quad"), (40, 1, "tri"), (20, 2, "quad"), (20, 2, "tri")])
-def test_hertz(cells, order, cell):
-    peak, resolution, _, info = hertz(cells, order, cell, facets=80)
-    assert resolution >= 8
-    assert peak == pytest.approx(1, abs=0.02)
-    assert info.iterations <= 8, info.residuals
-
-
-def test_hertz_converges():
-    """The slack of the coarse mesh at the edge of contact goes away."""
-    errors = [abs(hertz(cells, 1, "quad", facets=80)[0] - 1) for cells in (6, 16, 40)]
-    assert errors[0] > 1.2 * errors[1] > 1.2**2 * errors[2], errors
-
-
-def test_hertz_on_a_plane_of_one_facet():
-    """The first iterate is bent so much that facets have no answer from the far ends; they must come back."""
-    peak, _, contact, _ = hertz(40, 1, "quad", facets=1)
-    assert contact.active_set.active.sum() == 16
-    assert peak == pytest.approx(1, abs=0.02)
