@@ -29,7 +29,9 @@ def middle_apart(comm, parts, dim, cells, ghost_mode):
 def main(out):
     comm, create_mesh = MPI.COMM_WORLD, dolfinx.mesh.create_mesh
     if comm.size > 1:
-        dolfinx.mesh.create_mesh = lambda *arguments: create_mesh(*arguments, partitioner=middle_apart)
+        dolfinx.mesh.create_mesh = lambda *arguments, **named: create_mesh(
+            *arguments, **(named | {"partitioner": middle_apart})
+        )
     supports = [Support("bottom", vector(0, 0, 0))]
     load = [Pressure("top", constant(0.1))]
     material = NeoHooke(1.0, 1.0, 1.0)

@@ -22,7 +22,8 @@ TRAPEZOIDAL = GeneralisedAlpha.from_rho_inf(1.0)
 
 
 def dense(matrix):
-    return matrix.convert("dense").getDenseArray()
+    converted = matrix.convert("dense")
+    return converted.getDenseArray().copy()
 
 
 def at_planes(body, *planes):

@@ -10,6 +10,12 @@ from fsci.run.monitor import Monitor, duration
 from solvers.api import StepFailed, StepInfo
 
 
+@pytest.fixture(autouse=True)
+def able(monkeypatch):
+    """The terminal moves its cursor, whatever the tests themselves run in."""
+    monkeypatch.setenv("TERM", "xterm")
+
+
 class Terminal(io.StringIO):
     """A stream that claims to be a terminal."""
 

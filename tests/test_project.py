@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -15,7 +16,13 @@ TUTORIALS = sorted(path.stem for path in ROOT.glob("docs/tutorial_*.md"))
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md"))]
 
 
-@pytest.mark.parametrize("tool", ["ruff check", "ruff format --check", "mypy", "lint-imports"])
+#: newer ones declare types that differ
+TYPES_OF_DEBIAN_12 = pytest.mark.skipif(np.__version__ >= "2", reason="types are checked against those of numpy 1")
+
+
+@pytest.mark.parametrize(
+    "tool", ["ruff check", "ruff format --check", pytest.param("mypy", marks=TYPES_OF_DEBIAN_12), "lint-imports"]
+)
 def test_tools_are_content(tool):
     program, *arguments = tool.split()
     done = subprocess.run([BIN / program, *arguments], cwd=ROOT, capture_output=True, text=True)
