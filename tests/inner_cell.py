@@ -18,10 +18,14 @@ from solvers.structure.probes import at_point, of_bodies, on_surface
 from solvers.structure.snapshot import snapshots
 
 
-def middle_apart(comm, parts, dim, cells, ghost_mode):
-    """Owners of the cells, all given by process 0, each followed by the process that has it as a ghost."""
+def middle_apart(comm, parts, dim_or_types, cells, ghost_mode=None):
+    """Owners of the cells, all given by process 0, each followed by the process that has it as a ghost.
+
+    cells: their nodes; newer versions of DOLFINx give one list of nodes for each type of cell.
+    """
     middle, neighbours = 13, (4, 10, 12, 14, 16, 22)
-    owners = [[1, 0] if c == middle else [0, 1] if c in neighbours else [0] for c in range(cells.num_nodes)]
+    number = cells.num_nodes if ghost_mode is not None else len(cells[0]) // 8
+    owners = [[1, 0] if c == middle else [0, 1] if c in neighbours else [0] for c in range(number)]
     offsets, flat = np.cumsum([0, *map(len, owners)]), np.concatenate([[], *owners])
     return dolfinx.cpp.graph.AdjacencyList_int32(flat.astype(np.int32), offsets.astype(np.int32))
 

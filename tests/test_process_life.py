@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from mpi4py import MPI
 from petsc4py import PETSc
 from programs import ENVIRONMENT, PARALLEL, fsci
 from small_cases import PLATE
@@ -54,8 +55,15 @@ def test_full_disk_of_one_process_is_said_without_a_traceback(tmp_path):
     assert "Traceback" not in errors
 
 
-@pytest.mark.parametrize("processes", [1, 2])
-def test_signal_within_a_solve(tmp_path, processes):
+#: its mpirun kills processes before they can write
+OPEN_MPI_5 = pytest.mark.skipif("Open MPI v5" in MPI.Get_library_version(), reason="SIGTERM of mpirun leaves 0.25 s")
+
+
+@pytest.mark.parametrize(
+    ("processes", "number"),
+    [(1, signal.SIGTERM), pytest.param(2, signal.SIGTERM, marks=OPEN_MPI_5), (2, signal.SIGUSR1)],
+)
+def test_signal_within_a_solve(tmp_path, processes, number):
     """Within 5 s there is a checkpoint of the last good step; the run goes on from it as if nothing had been."""
     out = tmp_path / "out"
     process = disturbed("sleep", tmp_path, rank=-1, processes=processes)
@@ -64,7 +72,7 @@ def test_signal_within_a_solve(tmp_path, processes):
         assert process.poll() is None, process.communicate()
     time.sleep(0.3)
     begin = time.monotonic()
-    process.send_signal(signal.SIGTERM)
+    process.send_signal(number)
     _, errors = process.communicate(timeout=60)
     assert time.monotonic() - begin < 5.0
     assert "Traceback" not in errors

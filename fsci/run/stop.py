@@ -1,4 +1,4 @@
-"""Ending a run on SIGTERM or SIGINT: after its step if that is soon, else at once with the last good state."""
+"""Ending a run on SIGTERM, SIGINT or SIGUSR1: after its step if that is soon, else at once with the last good state."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-SIGNALS = (signal.SIGTERM, signal.SIGINT)
+#: Open MPI 5 passes SIGUSR1 on and waits; after SIGTERM it kills its processes 0.25 s later.
+SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
 
 #: Time [s] that a step has to come to its end after a signal. `mpirun` kills its processes a second or more after it
 #: has passed a signal on.
