@@ -184,8 +184,6 @@ class Fluid:
             prescribed = self.boundary.dofs[self.boundary.dofs < self.unknowns.owned]
             self.held[prescribed] = True
             self.held |= ~self.system.active_dofs[: self.unknowns.owned]
-            if self.system.ghost is not None:
-                self.held |= self.system.ghost.outside
             self._hold_pressure(known_by_bodies=with_solid and not self.settings.steady)
 
     def _layers(self, motion: Motion) -> int:
@@ -226,7 +224,6 @@ class Fluid:
         """Accept the step. Between surfaces that touch now the velocity of this step is zero."""
         if self._coupled:
             self._note_fast_bodies()
-        self.system.settle()
         found = self.system.active_dofs | self.system.dofs_of(self.cut.contact_cells)
         self.history.end_step(self.current.dt, self.velocity(), found)
         self.started = True
