@@ -11,8 +11,8 @@ from typing import Any
 #: Open MPI 5 passes SIGUSR1 on and waits; after SIGTERM it kills its processes 0.25 s later.
 SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGUSR1)
 
-#: Time [s] that a step has to come to its end after a signal. `mpirun` kills its processes a second or more after it
-#: has passed a signal on.
+#: Time [s] that a step has to come to its end after a signal. The `mpirun` of Open MPI 4 kills its processes a second
+#: or more after it has passed SIGTERM on.
 GRACE = 0.3
 
 
