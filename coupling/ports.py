@@ -18,7 +18,7 @@ from solvers.api import Array, Stateful, StepInfo
 from solvers.fluid.coupling_entries import InterfaceEntries
 from solvers.fluid.krylov import Ladder
 from solvers.fluid.surface import Motion
-from solvers.fluid.time_scheme import Step, TimeScheme
+from solvers.fluid.time_scheme import FlowStep, FlowTimeScheme
 from solvers.newton import System
 from solvers.rows import RowTransformation, TakenRows
 from solvers.timing import Timer
@@ -163,11 +163,11 @@ class Flow(Part, Protocol):
     notes: list[str]  #: what the user should know of this step
 
     @property
-    def scheme(self) -> TimeScheme:
+    def scheme(self) -> FlowTimeScheme:
         """How it takes derivatives in time."""
         ...
 
-    current: Step  #: the step that it computes, with the rule for derivatives in time
+    current: FlowStep  #: the step that it computes, with the rule for derivatives in time
 
     def predict(self) -> None:
         """A first guess for the end of the step."""

@@ -28,7 +28,7 @@ from solvers.fluid.grid import uniform
 from solvers.fluid.patch_kinds import PatchKind
 from solvers.fluid.patches import Patch
 from solvers.fluid.surface import ImmersedSurface
-from solvers.fluid.time_scheme import Difference, TimeScheme
+from solvers.fluid.time_scheme import Difference, FlowTimeScheme
 from solvers.march import march
 from solvers.mesh import Mesh
 from solvers.solver_settings import SolverSettings
@@ -187,7 +187,7 @@ def test_time_scheme_of_a_flow():
     dt, speeds = 0.1, [0.0, 0.0, 0.0]
     fluid = make_fluid(
         uniform([0, 0], [1, 1], [3, 3]), [Patch("ends", ("x-", "x+"), "periodic"), SIDES],
-        dt=dt, scheme=TimeScheme(bdf3, times=3), body_force=field(lambda x, y, t: t**2, 0.0),
+        dt=dt, scheme=FlowTimeScheme(bdf3, times=3), body_force=field(lambda x, y, t: t**2, 0.0),
     )  # fmt: skip
     for number in range(5):
         step(fluid, number * dt, dt)

@@ -9,7 +9,7 @@ from solvers.fluid.grid import uniform
 from solvers.fluid.history import Past
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.surface import ImmersedSurface, Motion
-from solvers.fluid.time_scheme import Step
+from solvers.fluid.time_scheme import FlowStep
 
 VELOCITY, DT = field(2.0, 0.0), 0.01
 
@@ -101,7 +101,7 @@ def test_first_guess_goes_on_as_in_the_last_step():
     fluid.history.past = [Past(values[1], ~missing), Past(values[0], ~missing)]
     fluid.history.steps = (DT, DT)
     fluid.flow[:] = values[1]
-    fluid.current = Step(0.5 * DT, 0.5 * DT, fluid.history.difference(0.5 * DT))
+    fluid.current = FlowStep(0.5 * DT, 0.5 * DT, fluid.history.difference(0.5 * DT))
     fluid.predict()
     guess = fluid.flow[x[inside]]
     assert guess[0] == 5.0

@@ -14,7 +14,7 @@ from solvers import linear
 from solvers.fluid import krylov
 from solvers.fluid.grid import Grid, uniform
 from solvers.fluid.krylov import Ladder, rungs
-from solvers.fluid.multigrid import Lattice, coarsen, finest, interpolation
+from solvers.fluid.multigrid import LevelGrid, coarsen, finest, interpolation
 from solvers.linear import LinearSolveFailed
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
@@ -22,7 +22,7 @@ from solvers.solver_settings import SolverSettings
 
 def test_short_cells_are_joined_first():
     """Cells of 4 x 1: two across become one, then two more, then both ways; planes of coarse lattices are fine ones."""
-    lattice = Lattice((np.linspace(0, 16, 5), np.linspace(0, 16, 17)), ())
+    lattice = LevelGrid((np.linspace(0, 16, 5), np.linspace(0, 16, 17)), ())
     shapes = []
     while not lattice.smallest:
         coarse = lattice.coarser()

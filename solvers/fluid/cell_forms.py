@@ -20,7 +20,7 @@ class CellForms:
     residuals: tuple[fem.Integral, ...]
     tangents: tuple[fem.Integral, ...]
     ghost_penalty: fem.Integral | None
-    ghost_history: fem.Integral | None  #: what the ghost penalty takes from the times behind, if anything
+    ghost_history: fem.Integral | None  #: the share of the history in the ghost penalty, if any
 
     def integrals(self) -> list[fem.Integral]:
         """What is to be compiled; forms of films are when there is one."""
@@ -30,7 +30,7 @@ class CellForms:
 
 def cell_forms(
     unknowns: Unknowns,
-    flow: forms.Flow,
+    flow: forms.Coefficients,
     function: Any,
     penalties: forms.Penalties,
     *,
@@ -49,8 +49,8 @@ def cell_forms(
         residuals.append(weights.fluid * everywhere * dx_cut + on_interface * dx_cut)
         residuals.append(weights.fluid * forms.film(flow, u, p, v, q) * dx_cut + on_interface * dx_cut)
         ghost = forms.ghost_penalty(flow, penalties, scales, du, dp, v, q) * dS
-        ghost_penalty, remembered = fem.Integral(domain, ufl.lhs(ghost)), ufl.rhs(ghost)
-        ghost_history = None if remembered.empty() else fem.Integral(domain, remembered)
+        ghost_penalty, history = fem.Integral(domain, ufl.lhs(ghost)), ufl.rhs(ghost)
+        ghost_history = None if history.empty() else fem.Integral(domain, history)
     tangents = [ufl.derivative(form, function, trial) for form in residuals]
     return CellForms(
         tuple(fem.Integral(domain, form) for form in residuals),

@@ -30,7 +30,7 @@ from solvers.fluid.reach import require_known, require_within_period, strip_laye
 from solvers.fluid.space import Unknowns, set_velocity
 from solvers.fluid.surface import Motion, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
-from solvers.fluid.time_scheme import STEADY, Step
+from solvers.fluid.time_scheme import STEADY, FlowStep
 from solvers.largest import position_of_largest
 from solvers.newton import converge
 from solvers.rounding import rounding_error
@@ -78,7 +78,7 @@ class Fluid:
         films = films_of(patches, self.dim, settings.penalties) if settings.films else None
         self.cutter = Cutter(self.grid, self.system.weights.points, films)
         self.history = History(settings.time, self.unknowns.local)
-        self.current = Step(0.0, 0.0, STEADY)  #: the step that is computed now or was last
+        self.current = FlowStep(0.0, 0.0, STEADY)  #: the step that is computed now or was last
         self.started = False  #: a step was accepted, so that there are forces
         self._smallest = min(float(np.diff(edge).min()) for edge in grid.edges)
         self.motions: list[Motion] = []
@@ -121,7 +121,7 @@ class Fluid:
         if self.settings.initial_velocity is not None:
             set_velocity(self.flow, self.unknowns.velocity, self.settings.initial_velocity, t)
         self.history.start(self.velocity())
-        self.current = Step(t, dt, self.history.difference(dt))
+        self.current = FlowStep(t, dt, self.history.difference(dt))
         if not self._coupled:
             self.move({})
 
@@ -142,7 +142,7 @@ class Fluid:
     def begin_step(self, t: float, dt: float) -> None:
         """Remember the state at t; boundary, loads and moving bodies at t + dt."""
         difference, last = self.history.difference(dt), self.history.past[0].velocity
-        self.current = Step(t + dt, dt, difference)
+        self.current = FlowStep(t + dt, dt, difference)
         self.cutter.begin_step()
         self.system.begin_step(self.current, self.history.rate(difference), self.history.missing(difference), last)
         self.flow[self.boundary.dofs] = self.boundary.velocity(t + dt)
@@ -377,7 +377,7 @@ class Fluid:
         self.history.restore(self.unknowns, state)
         self.flow[:] = self.history.past[0].velocity
         self.flow[:] += self.unknowns.from_nodes(state["pressure"].values, self.unknowns.pressure)
-        self.current = Step(state["time"], 0.0, STEADY)
+        self.current = FlowStep(state["time"], 0.0, STEADY)
         self.ladder.rung = state["linear_solver"]
         self.system.restore_pattern(state["pattern"].values)
         self.cutter.begin_step()

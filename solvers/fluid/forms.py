@@ -2,7 +2,7 @@
 
 sigma(u, p) = 2 mu eps(u) - p I, n outward normal of the fluid, g velocity of the interface, h edge length of the cell.
 The time derivative is alpha u - history, alpha = 0 if the flow is steady; `a` is the velocity that scales
-the stabilisation, known before the iterate.
+the stabilisation, from before the iterate.
 Sources: Massing, Schott, Wall, Comput. Methods Appl. Mech. Engrg. 328 (2018) 262-300; Schott, Wall, ibid. 276 (2014)
 233-265; Burman, Fernandez, ibid. 279 (2014) 497-514; Tezduyar, Osawa, ibid. 190 (2000) 411-430 (tau).
 """
@@ -47,7 +47,7 @@ def choose_penalties(element: str, *, elastic: bool) -> Penalties:
 
 
 @dataclass(frozen=True)
-class Flow:
+class Coefficients:
     """What the terms share: functions, numbers and what the case leaves out."""
 
     rho: Expr  #: density [kg/m^3]
@@ -79,19 +79,19 @@ class GhostScales:
     """
 
     phi: Expr  #: nu + |a| h + alpha h^2 [m^2/s]
-    carried: Expr  #: phi_b [m^2/s]
-    known: Expr  #: 1 where the history is known, else 0
+    convective: Expr  #: phi_b [m^2/s]
+    has_history: Expr  #: 1 in cells of which all nodes had a velocity before, else 0
 
 
 def eps(u: Expr) -> Expr:
     return sym(grad(u))
 
 
-def sigma(flow: Flow, u: Expr, p: Expr) -> Expr:
+def sigma(flow: Coefficients, u: Expr, p: Expr) -> Expr:
     return 2.0 * flow.mu * eps(u) - p * ufl.Identity(len(u))
 
 
-def inertia(flow: Flow, u: Expr) -> Expr:
+def inertia(flow: Coefficients, u: Expr) -> Expr:
     """rho (u_t + u . grad u) - f."""
     terms = -flow.force
     if not flow.steady:
@@ -101,12 +101,12 @@ def inertia(flow: Flow, u: Expr) -> Expr:
     return terms
 
 
-def bulk(flow: Flow, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+def bulk(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     """Integrand of rho (u_t + u . grad u, v) + (2 mu eps(u), eps(v)) - (p, div v) + (q, div u) - (f, v)."""
     return dot(inertia(flow, u), v) + inner(2.0 * flow.mu * eps(u), eps(v)) - p * div(v) + q * div(u)
 
 
-def residual_based(flow: Flow, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+def residual_based(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     """Integrand of the SUPG, PSPG and grad-div terms, (rho a . grad v + grad q, T R) + (tau_C div u, div v).
 
     tau_M = (4 rho^2 alpha^2 + rho^2 a . G a + 36 mu^2 G : G)^(-1/2), 144 for second degree, tau_C = 1 / (tau_M tr G),
@@ -122,13 +122,13 @@ def residual_based(flow: Flow, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     return _tested(flow, u, p, test) + grad_div(flow, u, v)
 
 
-def grad_div(flow: Flow, u: Expr, v: Expr) -> Expr:
+def grad_div(flow: Coefficients, u: Expr, v: Expr) -> Expr:
     """Integrand of the grad-div term among them, (tau_C div u, div v)."""
     metric, common, viscous = _rates(flow)
     return sqrt(common + viscous * sum(g**2 for g in metric)) / sum(metric) * div(u) * div(v)
 
 
-def film(flow: Flow, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+def film(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     """Integrand in cut cells with a film, where viscosity rules: `bulk` and `grad_div` of a flow without convection.
 
     Second-order velocities are parabolas across the film that go on in the rest of the cell, (h / g)^2 times as large.
@@ -138,12 +138,12 @@ def film(flow: Flow, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     return bulk(stokes, u, p, v, q) + grad_div(stokes, u, v)
 
 
-def creeping(flow: Flow) -> Flow:
+def creeping(flow: Coefficients) -> Coefficients:
     """The flow without convection."""
     return replace(flow, convection=False)
 
 
-def _tested(flow: Flow, u: Expr, p: Expr, test: Expr) -> Expr:
+def _tested(flow: Coefficients, u: Expr, p: Expr, test: Expr) -> Expr:
     """test . T R with the residual R of the momentum equation."""
     metric, common, viscous = _rates(flow)
     square = sum(g**2 for g in metric)
@@ -154,7 +154,7 @@ def _tested(flow: Flow, u: Expr, p: Expr, test: Expr) -> Expr:
     return sum(test[i] * strong[i] / sqrt(common + viscous * g) for i, g in enumerate(directions))
 
 
-def _rates(flow: Flow) -> tuple[list[Expr], Expr, Expr]:
+def _rates(flow: Coefficients) -> tuple[list[Expr], Expr, Expr]:
     """Diagonal of G [1/m^2], 4 rho^2 alpha^2 + rho^2 a . G a, and the factor of G : G in tau_M^-2."""
     metric = [4.0 / h**2 for h in flow.sizes]
     common = 0.0 if flow.steady else 4.0 * flow.rho**2 * flow.alpha**2
@@ -163,30 +163,32 @@ def _rates(flow: Flow) -> tuple[list[Expr], Expr, Expr]:
     return metric, common, (36.0 if flow.degree == 1 else 144.0) * flow.mu**2
 
 
-def interface(flow: Flow, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+def interface(flow: Coefficients, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     """Integrand over cut cells of Nitsche's method on an interface at rest, by its weights.
 
     -<sigma(u, p) n, v> - <u, 2 mu eps(v) n + q n> + <P u, v>,  P = s I + s_n n n^T
 
     The same terms tested with -v, and with the interface velocity g in the place of u, are in `Interface`.
     """
-    carried = outer(u, weights.n)
+    u_n = outer(u, weights.n)
     return (
         -dot(dot(sigma(flow, u, p), weights.n), v)
-        - inner(2.0 * flow.mu * eps(v), carried)
-        - q * tr(carried)
+        - inner(2.0 * flow.mu * eps(v), u_n)
+        - q * tr(u_n)
         + dot(dot(weights.penalty, u), v)
     )
 
 
-def ghost_penalty(flow: Flow, factors: Penalties, scales: GhostScales, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+def ghost_penalty(
+    flow: Coefficients, factors: Penalties, scales: GhostScales, u: Expr, p: Expr, v: Expr, q: Expr
+) -> Expr:
     """Integrand over faces of, times the lesser f of their cells, gamma_p h^3 / (rho phi) [d_n p] [d_n q] and
 
     sum_j h^(2j-1) (c_j (gamma_v mu + gamma_b rho phi_b) [d_n^j u] + m_j gamma_t rho h^2 [d_n^j u_t]) [d_n^j v],
     c_1 = m_1 = 1, u_t = alpha u - gamma_m history.
 
     So the share of the mass is one of the acceleration, as in a mass matrix. Were it one of alpha u (gamma_m = 0), as
-    it is where no history is known, it would take a power from the flow that grows as steps get smaller.
+    it is in cells without history, it would take a power from the flow that grows as steps get smaller.
     Source of mass matrices with it: Sticko, Kreiss, J. Sci. Comput. 80 (2019), doi:10.1007/s10915-019-01004-2.
     """
     n = ufl.FacetNormal(flow.mesh)
@@ -195,12 +197,12 @@ def ghost_penalty(flow: Flow, factors: Penalties, scales: GhostScales, u: Expr, 
     if not flow.steady:
         mass = factors.ghost_mass * flow.rho * h**2
     if flow.convection:
-        factor += factors.ghost_convection * flow.rho * avg(scales.carried)
-    remembered = factors.ghost_memory * scales.known("+") * scales.known("-")
+        factor += factors.ghost_convection * flow.rho * avg(scales.convective)
+    memory = factors.ghost_memory * scales.has_history("+") * scales.has_history("-")
     terms = factors.ghost_pressure * h**3 / (flow.rho * avg(scales.phi)) * _jump(p, n, 1) * _jump(q, n, 1)
     for order in range(1, flow.degree + 1):
         c, m = (1.0, 1.0) if order == 1 else (factors.ghost_second, factors.ghost_mass_second)
-        change = flow.alpha * _jump(u, n, order) - remembered * _jump(flow.history, n, order)
+        change = flow.alpha * _jump(u, n, order) - memory * _jump(flow.history, n, order)
         terms += h ** (2 * order - 1) * dot(c * factor * _jump(u, n, order) + m * mass * change, _jump(v, n, order))
     return terms if flow.film == 1.0 else ufl.min_value(flow.film("+"), flow.film("-")) * terms
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from solvers.api import Array, State
 from solvers.distributed import Nodal
 from solvers.fluid.space import Unknowns
-from solvers.fluid.time_scheme import Difference, TimeScheme
+from solvers.fluid.time_scheme import Difference, FlowTimeScheme
 
 Mask = NDArray[np.bool_]
 
@@ -26,7 +26,7 @@ class Past:
 class History:
     """Velocities and lengths of the accepted steps, the last one first: as many as the time scheme needs."""
 
-    def __init__(self, scheme: TimeScheme, size: int):
+    def __init__(self, scheme: FlowTimeScheme, size: int):
         self.scheme = scheme
         self.past = [Past(np.zeros(size), np.ones(size, dtype=bool)) for _ in range(max(1, scheme.times))]
         self.steps: tuple[float, ...] = ()  #: lengths [s]

@@ -30,7 +30,7 @@ THINNER = 0.6
 
 
 @dataclass(frozen=True)
-class Lattice:
+class LevelGrid:
     """Planes [m] per direction; along a periodic axis the last plane is the first."""
 
     planes: tuple[Array, ...]
@@ -40,7 +40,7 @@ class Lattice:
     def shape(self) -> tuple[int, ...]:
         return tuple(len(some) - (axis in self.periodic) for axis, some in enumerate(self.planes))
 
-    def coarser(self) -> Lattice:
+    def coarser(self) -> LevelGrid:
         """Neighbouring cells are joined where they are smallest.
 
         A pair becomes one cell if that is no wider than H, the same for all directions: stretched cells are joined
@@ -48,7 +48,7 @@ class Lattice:
         """
         width = 2.0 * min(float(np.diff(some).min()) for some in self.planes)
         while True:
-            found = Lattice(tuple(_join(some, width * (1.0 + 1e-6)) for some in self.planes), self.periodic)
+            found = LevelGrid(tuple(_join(some, width * (1.0 + 1e-6)) for some in self.planes), self.periodic)
             if found.smallest or np.prod(found.shape) <= THINNER * np.prod(self.shape):
                 return found
             width *= 2.0
@@ -71,7 +71,7 @@ def _join(planes: Array, width: float) -> Array:
 class Component:
     """Owned nodes of one velocity component, or of the pressure, on one level."""
 
-    lattice: Lattice
+    lattice: LevelGrid
     nodes: Indices  #: their planes, shape (owned, dim)
     dofs: Indices  #: their global unknowns
 
@@ -104,13 +104,13 @@ def finest(unknowns: Unknowns) -> Level:
             np.interp(np.arange(degree * (len(edge) - 1) + 1) / degree, np.arange(len(edge)), edge)
             for edge in unknowns.grid.grid.edges
         )
-        lattice = Lattice(planes, unknowns.periodic)
+        lattice = LevelGrid(planes, unknowns.periodic)
         index = np.stack(np.unravel_index(nodes.numbers[: nodes.owned], lattice.shape, order="F"), axis=1)
         found += [Component(lattice, index, unknowns.global_dofs[dofs]) for dofs in nodes.dofs[: nodes.owned].T]
     return Level(found, int(unknowns.index_map.local_range[0]) * unknowns.block_size, unknowns.owned)
 
 
-def coarsen(comm: MPI.Comm, fine: Level, lattices: Sequence[Lattice]) -> Level:
+def coarsen(comm: MPI.Comm, fine: Level, lattices: Sequence[LevelGrid]) -> Level:
     """A level on coarser lattices; a node belongs to the process that has it on the finer one (collective).
 
     Unknowns of one place are neighbours, places in the order of the lattice.

@@ -43,7 +43,9 @@ class OnCut:
 class OuterFaces:
     """All terms of the patches on one grid."""
 
-    def __init__(self, grid: DistributedGrid, boundary: Boundary, unknowns: Unknowns, flow: forms.Flow, function: Any):
+    def __init__(
+        self, grid: DistributedGrid, boundary: Boundary, unknowns: Unknowns, flow: forms.Coefficients, function: Any
+    ):
         """flow: what the forms share; function: velocity and pressure."""
         self.grid, self.boundary, self.unknowns = grid, boundary, unknowns
         ds, test = fem.measure(grid.domain, "ds", 2 * unknowns.degree + 1), ufl.TestFunction(unknowns.space)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 from solvers.api import Array
 
 if TYPE_CHECKING:
-    from solvers.fluid.forms import Flow
+    from solvers.fluid.forms import Coefficients
 
 Expr = Any
 
@@ -43,7 +43,7 @@ class PatchKind:
     open: bool = False  #: the flow through it is free: it determines the level of the pressure
     periodic: bool = False
     #: (flow, u, value, n, v) -> integrand of -<t, v>; a number comes as such
-    form: Callable[[Flow, Expr, Expr, Expr, Expr], Expr] | None = None
+    form: Callable[[Coefficients, Expr, Expr, Expr, Expr], Expr] | None = None
     depends_on_flow: bool = False  #: the form has u, and is linear in it
     #: Where bodies cover part of a cell's face the same is integrated over points of the wet part, with numbers:
     #: (faces, values at the points) -> t [Pa], shape (cells, points, dim); not for forms with u
@@ -52,17 +52,17 @@ class PatchKind:
     slope: Callable[[WetPart, float, Array, Array | None], Array] | None = None
 
 
-def _traction(flow: Flow, u: Expr, t: Expr, n: Expr, v: Expr) -> Expr:
+def _traction(flow: Coefficients, u: Expr, t: Expr, n: Expr, v: Expr) -> Expr:
     """-<t, v> with the given traction [Pa]."""
     return -_dot(t, v)
 
 
-def _pressure(flow: Flow, u: Expr, p: Expr, n: Expr, v: Expr) -> Expr:
+def _pressure(flow: Coefficients, u: Expr, p: Expr, n: Expr, v: Expr) -> Expr:
     """<p, n . v> with the given pressure [Pa]: n . sigma n = -p."""
     return p * _dot(n, v)
 
 
-def _slip_length(flow: Flow, u: Expr, b: Expr, n: Expr, v: Expr) -> Expr:
+def _slip_length(flow: Coefficients, u: Expr, b: Expr, n: Expr, v: Expr) -> Expr:
     """<mu/b u, v>: the shear stress is -mu/b times the velocity along the wall; that through it is held at zero."""
     return flow.mu / b * _dot(u, v)
 
@@ -72,7 +72,7 @@ def _slip_slope(faces: WetPart, mu: float, mass_flux: Array, b: Array | None) ->
     return faces.friction(mu / b[:, :, 0])
 
 
-def _outflow(flow: Flow, u: Expr, value: Expr, n: Expr, v: Expr) -> Expr:
+def _outflow(flow: Coefficients, u: Expr, value: Expr, n: Expr, v: Expr) -> Expr:
     """What a parallel flow leaves unharmed, mu d_n u - p n = 0, and no energy comes back.
 
     -<mu (grad u)^T n, v> - rho/2 <min(0, u . n) u, v>. Source: Braack, Mucha, J. Comput. Math. 32 (2014) 507-521.

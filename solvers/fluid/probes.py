@@ -18,7 +18,7 @@ from solvers.fluid.balances import leak
 from solvers.fluid.covered_faces import CoveredFaces, covered_faces
 from solvers.fluid.field import Fluid
 from solvers.fluid.inside import INSIDE, require_outside, winding
-from solvers.fluid.space import Nodes
+from solvers.fluid.space import FlowNodes
 
 Probe = Callable[[], dict[str, float]]
 
@@ -51,7 +51,7 @@ def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> P
     return probe
 
 
-def interpolation(fluid: Fluid, nodes: Nodes, degree: int, x: Array) -> tuple[np.ndarray, Array]:
+def interpolation(fluid: Fluid, nodes: FlowNodes, degree: int, x: Array) -> tuple[np.ndarray, Array]:
     """(dofs of shape (n, components), shape functions (n,)) at a point, of the nodes that this process owns."""
     number, weight, stride = np.zeros(1, dtype=np.int64), np.ones(1), 1
     counts = fluid.unknowns.lattice_shape(degree)

@@ -20,7 +20,7 @@ Dofs = NDArray[np.int32]
 
 
 @dataclass(frozen=True)
-class Nodes:
+class FlowNodes:
     """Where one quantity lives; local nodes, owned ones first."""
 
     dofs: Dofs  #: local dofs, shape (nodes, components)
@@ -84,10 +84,10 @@ class Unknowns:
             stride *= count
         return LatticeNodes(dofs, points, number, at_start, at_end)
 
-    def _nodes(self, nodes: LatticeNodes) -> Nodes:
+    def _nodes(self, nodes: LatticeNodes) -> FlowNodes:
         keep = np.unique(nodes.dofs[:, 0], return_index=True)[1] if self.periodic else slice(None)
         dofs = nodes.dofs[keep]
-        return Nodes(dofs, nodes.points[keep], nodes.numbers[keep], int(np.count_nonzero(dofs[:, 0] < self.owned)))
+        return FlowNodes(dofs, nodes.points[keep], nodes.numbers[keep], int(np.count_nonzero(dofs[:, 0] < self.owned)))
 
     def size(self) -> int:
         """Dofs on all processes."""
@@ -103,18 +103,18 @@ class Unknowns:
 
     # ---------------------------------------------------------------------------------------------- to save values
 
-    def to_nodes(self, values: Array, nodes: Nodes) -> Nodal:
+    def to_nodes(self, values: Array, nodes: FlowNodes) -> Nodal:
         """Values at local dofs as those of owned nodes."""
         return Nodal(values[nodes.dofs[: nodes.owned]].astype(float), nodes.numbers[: nodes.owned])
 
-    def from_nodes(self, values: Array, nodes: Nodes) -> Array:
+    def from_nodes(self, values: Array, nodes: FlowNodes) -> Array:
         """Values at local dofs from those of owned nodes, zero elsewhere (collective)."""
         owned = np.zeros(self.local)
         owned[nodes.dofs[: nodes.owned]] = values
         return fem.share_owned(self.space, owned)
 
 
-def set_velocity(values: Array, nodes: Nodes, components: Sequence[Value], t: float) -> None:
+def set_velocity(values: Array, nodes: FlowNodes, components: Sequence[Value], t: float) -> None:
     """Set components of a vector at the nodes to given values; `values`: local dofs, changed in place."""
     points = np.zeros((3, len(nodes.points)))
     points[: nodes.points.shape[1]] = nodes.points.T

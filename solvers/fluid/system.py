@@ -25,7 +25,7 @@ from solvers.fluid.outer_faces import OuterFaces
 from solvers.fluid.patches import Boundary
 from solvers.fluid.pieces import Pieces
 from solvers.fluid.space import Unknowns, set_velocity
-from solvers.fluid.time_scheme import SCHEMES, Step, TimeScheme
+from solvers.fluid.time_scheme import SCHEMES, FlowStep, FlowTimeScheme
 from solvers.fluid.weights import Weights
 from solvers.values import Value
 
@@ -38,7 +38,7 @@ class FlowSettings:
     viscosity: float  #: [Pa s]
     element: Literal["q1q1", "q2q1"] = "q1q1"
     convection: bool = True  #: False: Stokes
-    scheme: str | TimeScheme = "bdf2"  #: one of `SCHEMES`, or another
+    scheme: str | FlowTimeScheme = "bdf2"  #: one of `SCHEMES`, or another
     body_force: Sequence[Value] | None = None  #: [N/m^3]
     initial_velocity: Sequence[Value] | None = None  #: [m/s]
     penalties: forms.Penalties = forms.Penalties()
@@ -48,7 +48,7 @@ class FlowSettings:
         return 1 if self.element == "q1q1" else 2
 
     @property
-    def time(self) -> TimeScheme:
+    def time(self) -> FlowTimeScheme:
         return SCHEMES[self.scheme] if isinstance(self.scheme, str) else self.scheme
 
     @property
@@ -79,11 +79,13 @@ class FlowSystem:
         domain, space = grid.domain, unknowns.space
         self.flow, self._history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
         self._alpha, self._newton = fem.constant(domain, 0.0), fem.constant(domain, 1.0)
-        self._phi, self._carried, self._known, self._film = (fem.function(fem.cellwise_space(domain)) for _ in range(4))
+        self._phi, self._convective, self._has_history, self._film = (
+            fem.function(fem.cellwise_space(domain)) for _ in range(4)
+        )
         self._film.x.array[:] = 1.0
         self.weights = Weights(grid, settings.degree)
         self.terms = self._terms()
-        scales = forms.GhostScales(self._phi, self._carried, self._known)
+        scales = forms.GhostScales(self._phi, self._convective, self._has_history)
         on_cut = (self.weights, scales) if with_bodies else None
         self._forms = cell_forms(unknowns, self.terms, self.flow, settings.penalties, on_cut=on_cut)
         self._outer = OuterFaces(grid, boundary, unknowns, self.terms, self.flow)
@@ -96,8 +98,8 @@ class FlowSystem:
         self.speed = np.zeros(len(grid.numbers))  #: largest one of a cell's scales [m/s]
         self.fastest = 0.0
         self.active_dofs = np.zeros(unknowns.local, dtype=bool)
-        #: the ghost penalty's share of the residual is a matrix times the flow, less what the history has of it
-        self._remembered = np.zeros(unknowns.local)
+        #: the ghost penalty's share of the residual is a matrix times the flow, less that of the history
+        self._ghost_history = np.zeros(unknowns.local)
         self._out = np.zeros(unknowns.local)
         self._matrix: PETSc.Mat | None = None
         self._ghost: PETSc.Mat | None = None
@@ -107,13 +109,13 @@ class FlowSystem:
         self._interface: InterfaceTerms | None = None
         self._current = False  #: weights, interface and ghost penalty are those of cut and scales
 
-    def _terms(self) -> forms.Flow:
+    def _terms(self) -> forms.Coefficients:
         settings, domain = self.settings, self.grid.domain
         a, history, force = (self.unknowns.parts(f)[0] for f in (self._scale_velocity, self._history, self._force))
         rho, mu = fem.constant(domain, settings.density), fem.constant(domain, settings.viscosity)
         if settings.body_force is None:
             force = ufl.as_vector([fem.constant(domain, 0.0)] * self.grid.dim)
-        return forms.Flow(
+        return forms.Coefficients(
             rho=rho,
             mu=mu,
             alpha=self._alpha,
@@ -130,7 +132,7 @@ class FlowSystem:
 
     # ------------------------------------------------------------------------------------------------- a new step
 
-    def begin_step(self, step: Step, rate: Array, missing: NDArray[np.bool_], velocity: Array) -> None:
+    def begin_step(self, step: FlowStep, rate: Array, missing: NDArray[np.bool_], velocity: Array) -> None:
         """Loads at the end of a step; all arrays at local dofs (collective).
 
         u_t = alpha u - rate [m/s^2]; missing: where no step has found what the rate asks for; velocity [m/s]: for the
@@ -138,7 +140,7 @@ class FlowSystem:
         """
         self._alpha.value = step.difference.alpha
         self._history.x.array[:] = rate
-        self._known.x.array[:] = ~missing[self.unknowns.cell_velocity].any(axis=(1, 2))
+        self._has_history.x.array[:] = ~missing[self.unknowns.cell_velocity].any(axis=(1, 2))
         if self.settings.body_force is not None:
             set_velocity(self._force.x.array, self.unknowns.velocity, self.settings.body_force, step.t)
         self._outer.begin_step(step.t)
@@ -155,9 +157,9 @@ class FlowSystem:
         dofs = unknowns.cell_blocks if unknowns.block_size == 1 else unknowns.cell_blocks * unknowns.block_size
         self.speed = by_dof[dofs].max(axis=1) if settings.convection else np.zeros(len(h))
         self.fastest = float(self.grid.comm.allreduce(self.speed.max(initial=0.0), op=MPI.MAX))
-        carried = self.speed * h
-        phi = settings.viscosity / settings.density + carried + float(self._alpha.value) * h**2
-        self._phi.x.array[:], self._carried.x.array[:] = phi, carried**2 / phi
+        convective = self.speed * h
+        phi = settings.viscosity / settings.density + convective + float(self._alpha.value) * h**2
+        self._phi.x.array[:], self._convective.x.array[:] = phi, convective**2 / phi
 
     def set_cut(self, cut: Cut) -> None:
         """Take a cut; cells, faces and the matrix follow."""
@@ -252,8 +254,8 @@ class FlowSystem:
         assert self._forms.ghost_penalty is not None
         fem.assemble_matrix(self._ghost, self._forms.ghost_penalty.on(interior_facet=faces))
         if self._forms.ghost_history is not None:
-            self._remembered[:] = 0.0
-            fem.assemble_vector(self._forms.ghost_history.on(interior_facet=faces), self._remembered)
+            self._ghost_history[:] = 0.0
+            fem.assemble_vector(self._forms.ghost_history.on(interior_facet=faces), self._ghost_history)
 
     def _same_faces(self, cut: Cut, film: Array) -> bool:
         """The ghost penalty is assembled for these faces and films already, on every process (collective)."""
@@ -297,7 +299,7 @@ class FlowSystem:
         self._follow()
         assert self._ghost is not None
         assert self.cut is not None
-        np.negative(self._remembered, out=self._out)
+        np.negative(self._ghost_history, out=self._out)
         for form in [*self._residuals, *self._outer_residuals]:
             fem.assemble_vector(form, self._out)
         if self.with_bodies:

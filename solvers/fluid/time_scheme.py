@@ -1,6 +1,6 @@
 """Backward differentiation formulas for the time derivative of the velocity.
 
-A scheme says from the lengths of the steps how much of which velocity counts. Another one is another `TimeScheme`.
+A scheme says from the lengths of the steps how much of which velocity counts. Another one is another `FlowTimeScheme`.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Step(step.Step):
+class FlowStep(step.Step):
     """A step of the flow, with its rule for derivatives in time."""
 
     difference: Difference
 
 
 @dataclass(frozen=True)
-class TimeScheme:
+class FlowTimeScheme:
     """difference(dt, before): the rule of a step of length dt [s], from the lengths of those before, the last first."""
 
     difference: Callable[[float, Sequence[float]], Difference]
@@ -62,8 +62,8 @@ def _bdf2_started(dt: float, before: Sequence[float]) -> Difference:
 
 
 #: By their names in `FlowSettings`.
-SCHEMES: Mapping[str, TimeScheme] = {
-    "steady": TimeScheme(lambda dt, before: STEADY, times=0, steady=True),
-    "backward_euler": TimeScheme(lambda dt, before: backward_euler(dt), times=1),
-    "bdf2": TimeScheme(_bdf2_started, times=2),
+SCHEMES: Mapping[str, FlowTimeScheme] = {
+    "steady": FlowTimeScheme(lambda dt, before: STEADY, times=0, steady=True),
+    "backward_euler": FlowTimeScheme(lambda dt, before: backward_euler(dt), times=1),
+    "bdf2": FlowTimeScheme(_bdf2_started, times=2),
 }
