@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fsci.plot.picture import look_at, plot_run
-from fsci.plot.render_flow import connect, load_meshes, load_state
+from fsci.plot.render import import_pyvista
+from fsci.plot.render_flow import connect, load_meshes, load_state, slice_plane
 from fsci.plot.storyboard import arrange, choose, plane_state
 from fsci.run.output import FieldWriter
 from solvers.api import Snapshot
@@ -145,3 +146,14 @@ def test_specks_of_streamlines_are_left_out():
     assert lines.shape == (2, 2, 3)
     assert np.array_equal(lines[:, :, :2], [long[:2], long[1:]])
     assert len(connect([speck], 0.1)) == 0
+
+
+def test_where_a_box_is_cut():
+    """In the middle if a body is there, else in the side that a part of a symmetric body lies in, or through bodies."""
+    box = import_pyvista().ImageData(dimensions=(5, 5, 9))  # 4 x 4 x 8
+    sphere = import_pyvista().Sphere(radius=0.5, center=(1.0, 1.0, 4.0))
+    half = sphere.clip("y", origin=(1.0, 1.0, 4.0), invert=False).translate((0, -1, 0))
+    assert slice_plane(box, []) == ("y", pytest.approx([2, 2, 4]))
+    assert slice_plane(box, [sphere]) == ("y", pytest.approx([2, 1, 4]))
+    assert slice_plane(box, [half]) == ("y", pytest.approx([2, 0, 4], abs=1e-5))
+    assert slice_plane(box, [half.translate((0, 1.8, 0))]) == ("y", pytest.approx([2, 2, 4]))

@@ -40,7 +40,10 @@ def load_state(files: Sequence[Path], field: str) -> list[Body]:
         return parts
     if field_values(flow.point_data, field) is not None:
         parts = [replace(part, values=None) for part in parts]
-    return ([plane_flow(flow, field)] if is_flat(flow) else _spatial_flow(flow, field, meshes[1:])) + parts
+    if is_flat(flow):
+        return [plane_flow(flow, field), *parts]
+    # The edges of elements would hide how the flow goes round a body.
+    return _spatial_flow(flow, field, meshes[1:]) + [replace(part, edges=NO_LINES) for part in parts]
 
 
 def load_meshes(files: Sequence[Path]) -> list[Body]:
@@ -133,10 +136,11 @@ def segments(lines: Any) -> Array:
 
 
 def _spatial_flow(mesh: Any, field: str, bodies: Sequence[Any]) -> list[Body]:
-    """A translucent slice along the middle of the box, the edges of the box, and tubes along streamlines."""
+    """A translucent slice through the bodies, the edges of the box, and tubes along streamlines."""
     parts = []
     moving = field.partition(".")[0] == STREAMLINES
-    middle = mesh.slice(normal=lengthwise(mesh))
+    normal, origin = slice_plane(mesh, bodies)
+    middle = mesh.slice(normal=normal, origin=origin)
     if middle.n_points:
         values = field_values(middle.point_data, field)
         parts.append(Body(middle, NO_LINES, NO_LINES, values, lit=False, opacity=VEIL if moving else PANE))
@@ -153,6 +157,24 @@ def lengthwise(mesh: Any) -> str:
     """The normal, x or y, of the upright plane through the middle that is longer; y if both are as long."""
     length = np.array(mesh.bounds[1::2]) - np.array(mesh.bounds[::2])
     return "x" if length[0] < (1 - 1e-9) * length[1] else "y"
+
+
+def slice_plane(mesh: Any, bodies: Sequence[Any]) -> tuple[str, Array]:
+    """(normal, point) of a lengthwise plane through a box, shape (3,): in its middle, if that cuts a body.
+
+    Else it is the side of the box where bodies end, as parts of symmetric bodies do, or their middle.
+    """
+    normal = lengthwise(mesh)
+    axis = "xyz".index(normal)
+    low, high = mesh.bounds[2 * axis : 2 * axis + 2]
+    origin = np.array(mesh.center)
+    ends = np.array([body.bounds[2 * axis : 2 * axis + 2] for body in bodies]).reshape(-1, 2)
+    if len(ends) and not np.any((ends[:, 0] < origin[axis]) & (origin[axis] < ends[:, 1])):
+        first, last, inside = ends[:, 0].min(), ends[:, 1].max(), 1e-6 * (high - low)
+        at_low, at_high = first <= low + inside, last >= high - inside
+        # A plane in the side itself cuts no cell.
+        origin[axis] = (first + last) / 2 if at_low == at_high else low + inside if at_low else high - inside
+    return normal, origin
 
 
 def _tubes(mesh: Any, bodies: Sequence[Any]) -> Any:
@@ -172,6 +194,7 @@ def _tubes(mesh: Any, bodies: Sequence[Any]) -> Any:
         integration_direction="both",
         max_step_length=0.2,
         max_steps=5000,
+        max_length=mesh.length,  # a closed streamline would go round for ever
     )
     return lines.tube(radius=TUBES * mesh.length) if lines.n_points else lines
 

@@ -11,13 +11,13 @@ import numpy as np
 
 from fsci.plot.curves import DOTS, STYLE, label
 from fsci.plot.render import Array, Body, Pixels, View, import_pyvista, render
-from fsci.plot.render_flow import NO_LINES, fill_lines, is_flat, lengthwise, load_state, plane_flow, segments
+from fsci.plot.render_flow import NO_LINES, fill_lines, is_flat, load_state, plane_flow, segments, slice_plane
 from fsci.plot.scene import draw_colour_bar, field_label
 
 PANELS = 6  #: at most
 WIDTH = 9.0  #: of the picture, inches
 SHAPE = 1.4  #: width over height that the panels together come close to
-BESIDE, BELOW, BAR, TITLE, GAP = 0.75, 0.6, 1.2, 0.45, 0.3  #: inches left of, below, right of, above, between panels
+BESIDE, BELOW, BAR, TITLE, GAP = 0.75, 0.6, 1.2, 0.45, 0.45  #: inches left of, below, right of, above, between panels
 HEAD = 0.32  #: inches for the time above each panel
 CROP = {True: 0.3, False: 1.0}  #: percent of the points in the plane, on a slice, with values above the colour bar
 
@@ -104,14 +104,15 @@ def plane_state(files: Sequence[Path]) -> tuple[list[Body], Axes, str]:
     if is_flat(meshes[0]):
         flow, *bodies = load_state(files, "velocity")
         return [flow, *(replace(body, edges=NO_LINES) for body in bodies)], ("x", "y"), ""
-    normal = lengthwise(meshes[0])
-    place = f"{normal} = {meshes[0].center['xyz'.index(normal)]:.3g}"
-    return list(cut(meshes)), ("y" if normal == "x" else "x", "z"), place
+    normal, origin = slice_plane(meshes[0], meshes[1:])
+    axis = "xyz".index(normal)
+    digit = 1e-4 * float(np.ptp(meshes[0].bounds[2 * axis : 2 * axis + 2]))
+    place = f"{normal} = {digit * round(origin[axis] / digit):.3g}"
+    return list(cut(meshes, normal, origin)), ("y" if normal == "x" else "x", "z"), place
 
 
-def cut(meshes: Sequence[Any]) -> Iterator[Body]:
-    """What the lengthwise plane through the middle of a box in space cuts, seen from the front."""
-    normal, origin = lengthwise(meshes[0]), meshes[0].center
+def cut(meshes: Sequence[Any], normal: str, origin: Array) -> Iterator[Body]:
+    """What an upright plane cuts of a box in space and of the bodies in it, seen from the front."""
     order = [1, 2, 0] if normal == "x" else [0, 2, 1]
     for mesh in meshes:
         section = mesh.slice(normal=normal, origin=origin)
