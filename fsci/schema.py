@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -32,13 +33,17 @@ COMMON = ("order", "cell", "rotate", "translate")
 
 def json_schema() -> str:
     """JSON schema of the case format."""
-    schema = Case.model_json_schema()
-    return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}, indent=2)
+    return json.dumps({"$schema": "https://json-schema.org/draft/2020-12/schema", **_schema()}, indent=2)
+
+
+def _schema() -> dict[str, Any]:
+    """The schema of all models; the name of a section is that of its model without `Section`."""
+    return json.loads(re.sub(r"(\w)Section\b", r"\1", json.dumps(Case.model_json_schema())))
 
 
 def reference_markdown() -> str:
     """The input reference: one chapter for each section."""
-    schema = Case.model_json_schema()
+    schema = _schema()
     models = schema.pop("$defs")
     functions = ", ".join(f"`{name}`" for name in FUNCTIONS)
     chapters = [INTRODUCTION.replace("{functions}", functions), _chapter("case.yaml", "Case", schema, models)]

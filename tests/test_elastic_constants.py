@@ -5,7 +5,7 @@ import pytest
 import ufl
 
 from fsci.builder.named import named
-from fsci.case.material import LAWS, Elastic, MooneyRivlin
+from fsci.case.material import LAWS, ElasticSection, MooneyRivlinSection
 from solvers.structure import elastic_constants as constants
 from solvers.structure import materials
 from solvers.structure.materials import parameters
@@ -27,11 +27,11 @@ def test_constants_from_one_another():
     "given", [{"E": E, "nu": NU}, {"lambda": LAMBDA, "mu": MU}, {"mu": MU, "nu": NU}], ids=lambda g: "_".join(g)
 )
 def test_two_constants_give_the_others(given):
-    assert Elastic(law="neo_hooke", **given).lame == pytest.approx((MU, LAMBDA), rel=1e-14)
+    assert ElasticSection(law="neo_hooke", **given).lame == pytest.approx((MU, LAMBDA), rel=1e-14)
 
 
 def test_constants_may_vary_in_space():
-    mu, lmbda = Elastic(law="neo_hooke", E="210*(1 + x)", nu=NU).lame
+    mu, lmbda = ElasticSection(law="neo_hooke", E="210*(1 + x)", nu=NU).lame
     x = np.array([[0.0, 1.0], [0.0, 0.0]])
     assert mu(x, 0.0) == pytest.approx([MU, 2 * MU])
     assert lmbda(x, 0.0) == pytest.approx([LAMBDA, 2 * LAMBDA])
@@ -41,9 +41,9 @@ def test_constants_may_vary_in_space():
 def test_constants_are_those_of_the_law(law):
     """Energy of a small strain e against mu e:e + lambda/2 (tr e)^2, for the constants that the case says it has."""
     if law == "mooney_rivlin":
-        settings = MooneyRivlin(law=law, c10=20.0, c01=10.0, bulk=120.0)
+        settings = MooneyRivlinSection(law=law, c10=20.0, c01=10.0, bulk=120.0)
     else:
-        settings = Elastic(law=law, E=E, nu=NU)
+        settings = ElasticSection(law=law, E=E, nu=NU)
     material = named(materials, law)(*settings.parameters, 0.0)
     mu, lmbda = settings.lame
     for strain in (np.diag([1.0, 0.0, 0.0]), np.diag([1.0, 1.0, 1.0]), np.array([[0, 1, 0], [1, 0, 0], [0, 0, 0.0]])):

@@ -8,7 +8,7 @@ import pytest
 from case_text import with_section, without
 
 from fsci.case import CaseError, load_case
-from fsci.case.grid import Grid
+from fsci.case.grid import GridSection
 from fsci.check.check import summary
 
 CASE = """\
@@ -317,7 +317,7 @@ def test_a_steady_flow_without_a_velocity_of_its_own():
 def test_edges_of_a_graded_grid():
     """Equal cells, and cells that grow by the same factor from the first to the last."""
     stretches = [{"to": 1, "cells": 2}, {"to": 3, "cells": 3, "ratio": 4}, {"to": 4, "cells": 1, "ratio": 7}]
-    grid = Grid.model_validate({"from": [0, -1], "to": [4, 1], "cells": [None, 4], "x": stretches})
+    grid = GridSection.model_validate({"from": [0, -1], "to": [4, 1], "cells": [None, 4], "x": stretches})
     x, y = grid.planes
     assert grid.shape == (6, 4)
     assert np.allclose(y, [-1, -0.5, 0, 0.5, 1], atol=0)

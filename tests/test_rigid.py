@@ -10,7 +10,7 @@ from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.march import march
 from solvers.newton import Tolerance
 from solvers.rigid import motion
-from solvers.rigid.body import RigidBody, Spring
+from solvers.rigid.body import PointSpring, RigidBody
 from solvers.rigid.contact import Obstacle, RigidContact, RigidPair
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.inertia import Inertia, inertia_of_surface
@@ -118,7 +118,7 @@ def test_a_symmetric_top_precesses_as_the_exact_one():
 def test_a_mass_on_a_spring_swings_with_second_order(rho_inf):
     errors = []
     for steps in (50, 100):
-        spring = Spring((0.5, 0.5), (12.0, 75.0))
+        spring = PointSpring((0.5, 0.5), (12.0, 75.0))
         bodies = field(square(springs=[spring], initial_velocity=(0.2, 0.0)), rho_inf=rho_inf)
         for _ in march(bodies, 2.0, steps):
             pass
@@ -129,7 +129,7 @@ def test_a_mass_on_a_spring_swings_with_second_order(rho_inf):
 
 def test_a_pendulum_on_stiff_springs_finds_its_rest():
     """Springs at two points hold weight and moment: statics of a beam on two supports."""
-    springs = [Spring((0.0, 0.0), 1e4, damping=0.05), Spring((1.0, 0.0), 1e4, damping=0.05)]
+    springs = [PointSpring((0.0, 0.0), 1e4, damping=0.05), PointSpring((1.0, 0.0), 1e4, damping=0.05)]
     bodies = field(square(springs=springs, gravity=(0.0, -10.0)), rho_inf=0.0)
     for _ in march(bodies, 4.0, 80):
         pass
@@ -162,7 +162,7 @@ def test_tangent_and_jacobian_against_finite_differences(make):
     """At a state that solves nothing, with springs, dampers and forces on the vertices."""
     rng = np.random.default_rng(3)
     dim = make().dim
-    spring = Spring(tuple(rng.uniform(size=dim)), 5.0, damping=0.3)
+    spring = PointSpring(tuple(rng.uniform(size=dim)), 5.0, damping=0.3)
     bodies = field(make(springs=[spring], initial_spin=(0.3, -0.2, 0.4)[: 3 if dim == 3 else 0]), rho_inf=0.6)
     bodies.initialise(0.0, 0.1)
     bodies.step(0.0, 0.1)
@@ -194,7 +194,7 @@ def test_tangent_and_jacobian_against_finite_differences(make):
 
 def test_state_is_complete():
     """A restored state goes on bit for bit."""
-    make = lambda: field(cube(initial_spin=(0.3, 1.0, 0.1), springs=[Spring((1.0, 1.0, 1.0), 3.0)]))  # noqa: E731
+    make = lambda: field(cube(initial_spin=(0.3, 1.0, 0.1), springs=[PointSpring((1.0, 1.0, 1.0), 3.0)]))  # noqa: E731
     one, two = make(), make()
     for bodies in (one, two):
         bodies.initialise(0.0, 0.1)

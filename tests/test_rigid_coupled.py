@@ -16,7 +16,7 @@ from solvers.fluid.system import FlowSettings
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.march import march
 from solvers.newton import Tolerance
-from solvers.rigid.body import RigidBody, Spring
+from solvers.rigid.body import PointSpring, RigidBody
 from solvers.rigid.contact import Obstacle, RigidContact, RigidPair
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.inertia import inertia_of_surface
@@ -51,7 +51,7 @@ def test_both_schemes_agree():
     """A disc that falls and turns on an eccentric spring."""
     found = {}
     for name, make in SCHEMES.items():
-        spring = Spring((0.6, 0.55), 3.0, damping=0.1)
+        spring = PointSpring((0.6, 0.55), 3.0, damping=0.1)
         coupled = swimming(patches=OPEN, gravity=(0.3, -1.0), springs=[spring], initial_spin=(0.0, 0.0, 1.0))
         for _ in march(make(coupled), 0.1, 5):
             assert coupled.balance.force < 1e-7
@@ -65,7 +65,7 @@ def test_blocks_against_finite_differences(monkeypatch):
     """With the cut held: velocity and force of the surface follow the unknowns, its place does not."""
     from solvers.fluid import coupling_entries
 
-    coupled = swimming(gravity=(0.3, -1.0), springs=[Spring((0.6, 0.55), 3.0)], initial_spin=(0.0, 0.0, 1.0))
+    coupled = swimming(gravity=(0.3, -1.0), springs=[PointSpring((0.6, 0.55), 3.0)], initial_spin=(0.0, 0.0, 1.0))
     scheme = Monolithic(coupled)
     scheme.initialise(0.0, 0.02)
     scheme.step(0.0, 0.02)
@@ -124,7 +124,7 @@ def test_the_frequency_on_a_spring_has_the_added_mass(name):
     """
     a, b, k, n = 0.4, 0.8, 10.0, 48
     added = np.pi * a**2 * (b**2 + a**2) / (b**2 - a**2)
-    body = disc(a, (0.0, 0.0), n, springs=[Spring((0.0, 0.0), k)], gravity=(1e-3, 0.0))
+    body = disc(a, (0.0, 0.0), n, springs=[PointSpring((0.0, 0.0), k)], gravity=(1e-3, 0.0))
     points = np.concatenate([1.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1.0]]), disc(b, (0, 0), n).points[::-1]])
     facets = np.concatenate([loop(4), 4 + loop(n)])
     omega = np.sqrt(k / (body.inertia.mass + added))

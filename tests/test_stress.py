@@ -12,7 +12,7 @@ from fsci.stress.draw import SCENES, Draw, draw
 from fsci.stress.frame import Frame
 from fsci.stress.judge import distance, ended_badly, other_bits, out_of_balance, without_a_word
 from fsci.stress.program import NEVER_ENDED, Ended
-from fsci.stress.scenes import Scene
+from fsci.stress.scenes import StressScene
 
 FRAME = Frame(angle=30, shift=(3, -2), length=1e-3, mass=100.0, time=10.0)
 QUANTITIES = {"c": "centre", "f": "force", "u": "displacement", "e": "energy"}
@@ -57,7 +57,7 @@ def test_draws_are_the_same_every_time():
         assert again.scene.parameters == one.scene.parameters
 
 
-SCENE = Scene("beam", {}, lambda frame: {}, {"tip": {"quantity": "displacement"}}, must_warn=("lock",))
+SCENE = StressScene("beam", {}, lambda frame: {}, {"tip": {"quantity": "displacement"}}, must_warn=("lock",))
 DRAW = Draw(0, SCENE, "shifted", Frame())
 HISTORY = {"time": np.array([1.0, 2.0]), "wall": np.ones(2), "tip.x": np.array([1.0, 2.0]), "tip.y": np.zeros(2)}
 GOOD = Ended(0, "warning: cells lock", HISTORY, {})

@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
+from fsci.case.verify import Check
 from fsci.run.verify import evaluate
 
 
-@dataclass(frozen=True)
-class Check:
-    value: str
-    statistic: str
-    reference: float
-    relative: float | None = None
-    absolute: float | None = None
-    start: float | None = None
-    regression: bool = False
+def check(value: str, statistic: str, reference: float, *, start: float | None = None, **tolerance: float) -> Check:
+    return Check(**{"value": value, "statistic": statistic, "reference": reference, "from": start, **tolerance})
 
 
 def sine(samples: int, periods: float, *, frequency: float = 1.1, phase: float = 0.3) -> dict[str, np.ndarray]:
@@ -32,9 +25,9 @@ def sine(samples: int, periods: float, *, frequency: float = 1.1, phase: float =
 def test_sine_at_forty_samples_per_period(phase):
     history = sine(40, 5.3, phase=phase)
     checks = [
-        Check("A.y", "mean", -0.06, absolute=1e-4 * 0.065),
-        Check("A.y", "amplitude", 0.065, relative=1e-4),
-        Check("A.y", "frequency", 1.1, relative=1e-5),
+        check("A.y", "mean", -0.06, absolute=1e-4 * 0.065),
+        check("A.y", "amplitude", 0.065, relative=1e-4),
+        check("A.y", "frequency", 1.1, relative=1e-5),
     ]
     results = evaluate(history, checks)
     assert [result["ok"] for result in results] == [True, True, True], results
@@ -44,16 +37,16 @@ def test_sine_at_forty_samples_per_period(phase):
 def test_parabola_is_refined_exactly_on_uneven_steps():
     time = np.array([0.0, 0.3, 0.4, 1.1, 1.3])
     history = {"time": time, "u": 2 - (time - 0.5) ** 2}
-    (result,) = evaluate(history, [Check("u", "amplitude", (2 - (2 - 0.8**2)) / 2, absolute=1e-14)])
+    (result,) = evaluate(history, [check("u", "amplitude", (2 - (2 - 0.8**2)) / 2, absolute=1e-14)])
     assert result["ok"], result
 
 
 def test_final_min_max_are_samples():
     history = {"time": np.array([1.0, 2.0, 3.0, 4.0]), "u": np.array([0.0, 3.0, 2.9, -1.0])}
     checks = [
-        Check("u", "final", -1, absolute=0),
-        Check("u", "min", -1, absolute=0),
-        Check("u", "max", 3, absolute=0),
+        check("u", "final", -1, absolute=0),
+        check("u", "min", -1, absolute=0),
+        check("u", "max", 3, absolute=0),
     ]
     assert all(result["ok"] for result in evaluate(history, checks))
 
@@ -64,25 +57,25 @@ def test_window_leaves_the_transient_out():
     history = {"time": time, "u": np.sin(2 * math.pi * time) + transient}
     whole, late = evaluate(
         history,
-        [Check("u", "amplitude", 1, relative=1e-3), Check("u", "amplitude", 1, relative=1e-3, start=5.0)],
+        [check("u", "amplitude", 1, relative=1e-3), check("u", "amplitude", 1, relative=1e-3, start=5.0)],
     )
     assert not whole["ok"]
     assert late["ok"]
     assert late["name"] == "u amplitude from 5"
-    (first,) = evaluate({"time": time, "u": time}, [Check("u", "min", 0.3, absolute=1e-12, start=0.1 + 0.2)])
+    (first,) = evaluate({"time": time, "u": time}, [check("u", "min", 0.3, absolute=1e-12, start=0.1 + 0.2)])
     assert first["ok"], "the sample at the start of the window counts in spite of rounding"
 
 
 def test_ripple_is_no_period():
     time = np.arange(1, 2001) * 0.0025
     history = {"time": time, "u": np.sin(2 * math.pi * time) + 0.03 * np.sin(2 * math.pi * 40 * time)}
-    (result,) = evaluate(history, [Check("u", "frequency", 1.0, relative=0.01)])
+    (result,) = evaluate(history, [check("u", "frequency", 1.0, relative=0.01)])
     assert result["ok"], result
 
 
 @pytest.mark.parametrize("periods", [0.4, 0.9])
 def test_frequency_needs_a_whole_period(periods):
-    (result,) = evaluate(sine(40, periods, phase=0.3), [Check("A.y", "frequency", 1.1, relative=0.5)])
+    (result,) = evaluate(sine(40, periods, phase=0.3), [check("A.y", "frequency", 1.1, relative=0.5)])
     assert not result["ok"]
     assert math.isnan(result["value"])
     assert "period" in result["message"]
@@ -91,7 +84,7 @@ def test_frequency_needs_a_whole_period(periods):
 def test_constant_has_no_frequency():
     history = {"time": np.arange(9.0), "u": np.ones(9)}
     frequency, amplitude = evaluate(
-        history, [Check("u", "frequency", 0, absolute=1), Check("u", "amplitude", 0, absolute=0)]
+        history, [check("u", "frequency", 0, absolute=1), check("u", "amplitude", 0, absolute=0)]
     )
     assert not frequency["ok"]
     assert amplitude["ok"]
@@ -102,9 +95,9 @@ def test_what_is_missing_is_not_ok_and_says_so():
     column, late, broken = evaluate(
         history,
         [
-            Check("v", "final", 0, absolute=1),
-            Check("u", "final", 0, absolute=1, start=3.0),
-            Check("u", "max", 1, absolute=1),
+            check("v", "final", 0, absolute=1),
+            check("u", "final", 0, absolute=1, start=3.0),
+            check("u", "max", 1, absolute=1),
         ],
     )
     assert [column["ok"], late["ok"], broken["ok"]] == [False] * 3
@@ -114,5 +107,5 @@ def test_what_is_missing_is_not_ok_and_says_so():
 
 
 def test_an_empty_history_gives_no_value():
-    (result,) = evaluate({}, [Check("u", "final", 0, absolute=1)])
+    (result,) = evaluate({}, [check("u", "final", 0, absolute=1)])
     assert not result["ok"]

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from fsci.builder.facing import Face, face, faces, meeting
 from fsci.case import Case, CaseError
-from fsci.case.contact import Pair, Side
+from fsci.case.contact import PairSection, Side
 from fsci.case.material import Material
-from fsci.case.supports import Support
+from fsci.case.supports import SupportSection
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body
 from solvers.mesh import Mesh
 from solvers.structure.elastic_constants import young
@@ -65,7 +65,7 @@ def with_pairs(case: Case, comm: MPI.Comm = MPI.COMM_SELF) -> Case:
     return case.model_copy(update={"contact": case.contact.model_copy(update={"pairs": pairs, "bodies": None})})
 
 
-def find_pairs(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Pair]:
+def find_pairs(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, PairSection]:
     """Pairs by name: those that the case names, then those of the bodies with these meshes, and of rigid ones."""
     assert case.contact is not None
     found = dict(case.contact.pairs)
@@ -86,7 +86,7 @@ def find_pairs(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Pair]:
     return found
 
 
-def _pair(case: Case, bodies: tuple[Candidate, Candidate], pair: tuple[Face, Face]) -> tuple[str, Pair]:
+def _pair(case: Case, bodies: tuple[Candidate, Candidate], pair: tuple[Face, Face]) -> tuple[str, PairSection]:
     assert case.contact is not None
     sides = list(zip(bodies, pair, strict=True))
     if not _is_slave(sides[0], sides[1]):
@@ -97,7 +97,7 @@ def _pair(case: Case, bodies: tuple[Candidate, Candidate], pair: tuple[Face, Fac
         words += [*body.side.values(), *([] if body.rigid else [surface.name])]
         found.append(Side(**body.side, on=None if body.rigid else (surface.name,)))
     name = "_".join("".join(c if c.isalnum() or c in "_-" else "_" for c in word) for word in words)
-    return name, Pair(slave=found[0], master=found[1], friction=case.contact.friction)
+    return name, PairSection(slave=found[0], master=found[1], friction=case.contact.friction)
 
 
 def _is_slave(first: tuple[Candidate, Face], second: tuple[Candidate, Face]) -> bool:
@@ -138,7 +138,7 @@ def _extent(mesh: Mesh) -> float:
     return float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
 
 
-def _holds(support: Support, face: Face) -> bool:
+def _holds(support: SupportSection, face: Face) -> bool:
     """It prescribes the displacement across this surface."""
     if face.name not in (support.on or ()):
         return False

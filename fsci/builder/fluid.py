@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fsci.builder.columns import Numbers, columns
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
-from fsci.case.fluid import Fluid as Section
+from fsci.case.fluid import FluidSection
 from fsci.case.probes import Reference
 from fsci.case.rigid_motion import rigid_motion
 from fsci.meshes.of_case import read_rigid_body, require_inside_period
@@ -52,7 +52,7 @@ def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Immer
         raise case.error(("fluid", "patches"), f"no patch is on part of the box's boundary: {faces}") from None
 
 
-def _flow(settings: Section, *, elastic: bool) -> FlowSettings:
+def _flow(settings: FluidSection, *, elastic: bool) -> FlowSettings:
     return FlowSettings(
         density=settings.density,
         viscosity=settings.viscosity,
@@ -65,7 +65,7 @@ def _flow(settings: Section, *, elastic: bool) -> FlowSettings:
     )
 
 
-def _body_force(settings: Section) -> tuple[Value, ...] | None:
+def _body_force(settings: FluidSection) -> tuple[Value, ...] | None:
     """Body force and density times gravity together [N/m^3]."""
     force, gravity, density = settings.body_force, settings.gravity, settings.density
     if gravity is None:
@@ -77,7 +77,7 @@ def _body_force(settings: Section) -> tuple[Value, ...] | None:
     return tuple(component(axis) for axis in range(len(gravity)))
 
 
-def _patches(settings: Section) -> list[Patch]:
+def _patches(settings: FluidSection) -> list[Patch]:
     return [Patch(name, patch.on, patch.kind, patch.value, patch.where) for name, patch in settings.patches.items()]
 
 

@@ -6,16 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from fsci.case.structure import Body as Section
-from fsci.case.supports import Spring as SpringSection
-from fsci.case.supports import Support as SupportSection
+from fsci.case.structure import BodySection
+from fsci.case.supports import SpringSection, SupportSection
 from fsci.meshes.locations import Locations
 from solvers.structure.body import Spring, Support, Symmetry
 from solvers.structure.loads import LineForce, PointForce, Pressure, Traction
 from solvers.structure.supports import Roller
 
 
-def build_loads(body: Section, locations: Locations) -> dict[str, tuple[Any, ...]]:
+def build_loads(body: BodySection, locations: Locations) -> dict[str, tuple[Any, ...]]:
     """Supports, springs and loads as `Body` takes them."""
 
     def each(section: str, build: Any) -> tuple[Any, ...]:

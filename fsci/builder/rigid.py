@@ -14,7 +14,7 @@ from fsci.case.free_body import HELD
 from fsci.meshes.of_case import require_inside_period
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.rigid import probes
-from solvers.rigid.body import RigidBody, Spring
+from solvers.rigid.body import PointSpring, RigidBody
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.inertia import inertia_of_surface
 from solvers.timing import Timer
@@ -40,7 +40,7 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> RigidBody:
         facets,
         inertia_of_surface(points, facets, settings.density),
         gravity=settings.gravity,
-        springs=[Spring(spring.at, spring.stiffness, spring.damping) for spring in settings.springs],
+        springs=[PointSpring(spring.at, spring.stiffness, spring.damping) for spring in settings.springs],
         held={way: _not_at_all for word in settings.held for way in HELD[word]},
         initial_velocity=settings.initial_velocity or (),
         initial_spin=(0.0, 0.0, *spin) if len(spin) == 1 else spin,

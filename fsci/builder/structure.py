@@ -13,7 +13,7 @@ from fsci.builder.named import named
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.probes import Probe
-from fsci.case.structure import Body as BodySettings
+from fsci.case.structure import BodySection
 from fsci.case.values import value_of
 from fsci.meshes.locations import Locations, find_locations
 from fsci.meshes.of_case import VECTORS, read_body
@@ -101,7 +101,7 @@ def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Loca
     return meshes, locations
 
 
-def _material(body: BodySettings, plane: str) -> Material:
+def _material(body: BodySection, plane: str) -> Material:
     settings = body.material
     density = 0.0 if settings.density is None else value_of(settings.density)
     mu, lmbda = settings.lame

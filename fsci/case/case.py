@@ -8,19 +8,19 @@ from typing import Any
 
 from pydantic import PrivateAttr
 
-from fsci.case.contact import Contact
+from fsci.case.contact import ContactSection
 from fsci.case.coupling import Coupling
 from fsci.case.curve import Curve, CurveName
 from fsci.case.document import Document, override
 from fsci.case.errors import CaseError, Place
-from fsci.case.fluid import Fluid
+from fsci.case.fluid import FluidSection
 from fsci.case.free_body import Free
 from fsci.case.output import Output
 from fsci.case.probes import Probe
 from fsci.case.section import Section, setting
 from fsci.case.shapes import Shape
 from fsci.case.solver import Solver
-from fsci.case.structure import Body, Structure
+from fsci.case.structure import BodySection, StructureSection
 from fsci.case.time import Time
 from fsci.case.units import Units
 from fsci.case.values import Name, Text
@@ -34,10 +34,10 @@ class Case(Section):
     units: Units = setting(Units, "units of all numbers")
     time: Time = setting(..., "time interval and steps")
     curves: dict[CurveName, Curve] = setting(dict, "functions that expressions may call, by name")
-    structure: Structure | None = setting(None, "elastic bodies")
-    fluid: Fluid | None = setting(None, "incompressible flow")
+    structure: StructureSection | None = setting(None, "elastic bodies")
+    fluid: FluidSection | None = setting(None, "incompressible flow")
     coupling: Coupling | None = setting(None, "how fluid and structure are solved together")
-    contact: Contact | None = setting(None, "surfaces that may touch")
+    contact: ContactSection | None = setting(None, "surfaces that may touch")
     probes: dict[Name, Probe] = setting(dict, "quantities that every step records, by name")
     output: Output = setting(Output, "which files are written, and how often")
     verify: tuple[Check, ...] = setting(tuple, "results that the run must reach")
@@ -62,7 +62,7 @@ class Case(Section):
         return self._warnings
 
     @property
-    def elastic_bodies(self) -> dict[str, Body]:
+    def elastic_bodies(self) -> dict[str, BodySection]:
         """The bodies of the structure; none without one."""
         return {} if self.structure is None else self.structure.bodies
 

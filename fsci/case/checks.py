@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from fsci.case.case import Case
-from fsci.case.contact import Contact, Side
+from fsci.case.contact import ContactSection, Side
 from fsci.case.coupling_checks import coupling_mistakes
 from fsci.case.errors import did_you_mean
 from fsci.case.fluid_checks import fluid_mistakes
@@ -14,7 +14,7 @@ from fsci.case.material import has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, mesh_mistakes, surfaces_mistakes
 from fsci.case.probe_checks import probe_mistakes, verify_mistakes
 from fsci.case.shapes import Shape
-from fsci.case.structure import NO_MIXED_SIMPLICES, Body, Structure
+from fsci.case.structure import NO_MIXED_SIMPLICES, BodySection, StructureSection
 from fsci.case.yaml_text import Keys
 
 VECTORS = ("gravity", "body_force", "initial_displacement", "initial_velocity")
@@ -47,7 +47,7 @@ def _sections(case: Case) -> Iterator[Mistake]:
         yield ("contact",), "'contact' needs the section 'structure'"
 
 
-def _structure(case: Case, structure: Structure) -> Iterator[Mistake]:
+def _structure(case: Case, structure: StructureSection) -> Iterator[Mistake]:
     yield from _plane(case, structure)
     for name, body in structure.bodies.items():
         keys: Keys = ("structure", "bodies", name)
@@ -60,7 +60,7 @@ def _structure(case: Case, structure: Structure) -> Iterator[Mistake]:
         yield from _needs(structure, body, keys)
 
 
-def _plane(case: Case, structure: Structure) -> Iterator[Mistake]:
+def _plane(case: Case, structure: StructureSection) -> Iterator[Mistake]:
     if case.dimension == 3 and "plane" in structure.model_fields_set:
         yield ("structure", "plane"), "'plane' is for 2D, but the mesh is 3D"
     elif structure.plane == "stress":
@@ -70,7 +70,7 @@ def _plane(case: Case, structure: Structure) -> Iterator[Mistake]:
                 yield keys, f"plane stress needs the law 'st_venant_kirchhoff', not '{body.material.law}'"
 
 
-def _element(case: Case, structure: Structure, body: Body, keys: Keys) -> Iterator[Mistake]:
+def _element(case: Case, structure: StructureSection, body: BodySection, keys: Keys) -> Iterator[Mistake]:
     if body.element != "mixed":
         return
     if case.dimension == 2 and structure.plane == "stress":
@@ -79,7 +79,7 @@ def _element(case: Case, structure: Structure, body: Body, keys: Keys) -> Iterat
         yield (*keys, "element"), NO_MIXED_SIMPLICES
 
 
-def _surfaces(body: Body, keys: Keys) -> Iterator[Mistake]:
+def _surfaces(body: BodySection, keys: Keys) -> Iterator[Mistake]:
     for kind in ("supports", "springs", "tractions", "pressures"):
         for i, item in enumerate(getattr(body, kind)):
             yield from surfaces_mistakes(body.mesh, item.on or (), (*keys, kind, i, "on"))
@@ -90,14 +90,14 @@ def _surfaces(body: Body, keys: Keys) -> Iterator[Mistake]:
                 yield (*keys, kind, i, "on"), f"a built-in shape has no {word} with names{hint}"
 
 
-def _vectors(case: Case, body: Body, keys: Keys) -> Iterator[Mistake]:
+def _vectors(case: Case, body: BodySection, keys: Keys) -> Iterator[Mistake]:
     for name in VECTORS:
         yield from length_mistakes(getattr(body, name), case.dimension, (*keys, name))
     for place, vector in load_vectors(body):
         yield from length_mistakes(vector, case.dimension, (*keys, *place))
 
 
-def load_vectors(body: Body) -> Iterator[tuple[Keys, tuple[Any, ...]]]:
+def load_vectors(body: BodySection) -> Iterator[tuple[Keys, tuple[Any, ...]]]:
     """Path from a body and value of all vectors of its supports, springs and loads."""
     for kind in ("supports", "springs", "tractions", "line_forces", "point_forces"):
         for i, item in enumerate(getattr(body, kind)):
@@ -107,7 +107,7 @@ def load_vectors(body: Body) -> Iterator[tuple[Keys, tuple[Any, ...]]]:
                     yield (kind, i, name), vector
 
 
-def _needs(structure: Structure, body: Body, keys: Keys) -> Iterator[Mistake]:
+def _needs(structure: StructureSection, body: BodySection, keys: Keys) -> Iterator[Mistake]:
     dynamic = structure.dynamics is not None
     reason = "gravity" if body.gravity else "dynamics" if dynamic else ""
     if reason and body.material.density is None:
@@ -118,7 +118,7 @@ def _needs(structure: Structure, body: Body, keys: Keys) -> Iterator[Mistake]:
         yield (*keys, "initial_velocity"), "'initial_velocity' needs 'dynamics' in 'structure'"
 
 
-def _contact(case: Case, contact: Contact) -> Iterator[Mistake]:
+def _contact(case: Case, contact: ContactSection) -> Iterator[Mistake]:
     if not contact.pairs and contact.bodies is None:
         missing: Keys = ("contact", "pairs") if "pairs" in contact.model_fields_set else ("contact",)
         yield missing, "'contact' needs 'pairs', or 'bodies: all' to have them found"
@@ -151,7 +151,7 @@ def _contact(case: Case, contact: Contact) -> Iterator[Mistake]:
             yield ("contact", "pairs", name, "master"), message
 
 
-def _side(case: Case, contact: Contact, side: Side, keys: Keys) -> Iterator[Mistake]:
+def _side(case: Case, contact: ContactSection, side: Side, keys: Keys) -> Iterator[Mistake]:
     bodies = case.elastic_bodies
     if side.body is None:
         rigid = [*contact.obstacles, *([] if case.fluid is None else case.fluid.bodies)]

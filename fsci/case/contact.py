@@ -47,7 +47,7 @@ class Friction(Section):
         return self
 
 
-class Pair(Section):
+class PairSection(Section):
     """Two surfaces that may touch, or one that may touch itself; the slave should be the finer or softer one."""
 
     slave: Side | None = setting(None, "surface that carries the contact pressure; of a body")
@@ -85,7 +85,7 @@ class Pair(Section):
         return ("slave", self.slave), ("master", self.master)
 
     @model_validator(mode="after")
-    def _both_sides(self) -> Pair:
+    def _both_sides(self) -> PairSection:
         if self.itself is not None and (self.slave or self.master) is not None:
             raise fault("give either 'slave' and 'master', or 'self'", "self")
         if self.itself is None and (self.slave is None or self.master is None):
@@ -100,7 +100,7 @@ class Pair(Section):
         return self
 
 
-class Obstacle(Section):
+class ObstacleSection(Section):
     """A rigid surface, at rest or moved as a whole."""
 
     mesh: Mesh = setting(..., "mesh file or built-in shape that has the surface")
@@ -108,10 +108,10 @@ class Obstacle(Section):
     motion: Vector | None = setting(None, "displacement; default: at rest", unit="m")
 
 
-class Contact(Section):
+class ContactSection(Section):
     """Contact by dual mortar multipliers."""
 
-    pairs: dict[Name, Pair] = setting(dict, "pairs of surfaces by name")
+    pairs: dict[Name, PairSection] = setting(dict, "pairs of surfaces by name")
     bodies: Literal["all"] | tuple[Name, ...] | None = setting(
         None, "all, or names of bodies: the program finds the pairs among their surfaces, and with all that is rigid"
     )
@@ -119,5 +119,5 @@ class Contact(Section):
     reach: Positive | None = setting(
         None, "distance up to which surfaces are a pair at the start; default: the extent of the smaller body", unit="m"
     )
-    obstacles: dict[Name, Obstacle] = setting(dict, "rigid surfaces by name")
+    obstacles: dict[Name, ObstacleSection] = setting(dict, "rigid surfaces by name")
     c_n: Positive = setting(1.0, "factor of the complementarity parameter; the result does not depend on it", unit="1")

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Count, CountOrZero, Entries, Name, NotNegative, NumberVector, Positive, Surfaces
+from fsci.case.values import Count, CountOrZero, EntryCount, Name, NotNegative, NumberVector, Positive, Surfaces
 
 PARTITIONED = ("accelerator", "relaxation", "reuse", "tolerance", "tolerance_absolute", "max_iterations")
 
@@ -23,7 +23,7 @@ class Coupling(Section):
         "surfaces that the fluid touches, by body; default: all but what lies in other bodies or, without contact, "
         "on the boundary of the box at the start",
     )
-    dry_side: dict[Name, Annotated[tuple[NumberVector, ...], Entries(1, None)]] = setting(
+    dry_side: dict[Name, Annotated[tuple[NumberVector, ...], EntryCount(1, None)]] = setting(
         dict,
         "2D: corners of a way around the box, from one end of the wetted surface of a body to its other end; between "
         "both there is no fluid, wherever the surface moves: for walls and membranes with fluid on one side",

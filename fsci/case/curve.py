@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, PrivateAttr, ValidationInfo, model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Entries, Name, Number, Switch, Text
+from fsci.case.values import EntryCount, Name, Number, Switch, Text
 from fsci.expression import RESERVED
 
 Array = NDArray[np.float64]
-Point = Annotated[tuple[Number, ...], Entries(2, 2)]
+Point = Annotated[tuple[Number, ...], EntryCount(2, 2)]
 
 
 class Curve(Section):
@@ -25,7 +25,7 @@ class Curve(Section):
     Before the first point and after the last one it keeps their values.
     """
 
-    table: Annotated[tuple[Point, ...], Entries(2, None)] | None = setting(
+    table: Annotated[tuple[Point, ...], EntryCount(2, None)] | None = setting(
         None, "points [t, value], one after the other"
     )
     csv: Text | None = setting(

@@ -8,11 +8,11 @@ from pydantic import model_validator
 
 from fsci.case.errors import listed
 from fsci.case.free_body import Free, RigidDynamics
-from fsci.case.grid import Grid
+from fsci.case.grid import GridSection
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import (
-    Entries,
+    EntryCount,
     Formula,
     Name,
     Number,
@@ -33,10 +33,10 @@ Face = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
 KINDS = tuple(PATCH_KINDS)
 
 
-class Patch(Section):
+class PatchSection(Section):
     """Part of the boundary of the box, with one condition."""
 
-    on: Annotated[tuple[Face, ...], Entries(1, None), OneOrMany()] = setting(
+    on: Annotated[tuple[Face, ...], EntryCount(1, None), OneOrMany()] = setting(
         ..., "face of the box, or list of faces: x- is the one where x is smallest"
     )
     where: SpaceFormula | None = setting(
@@ -63,7 +63,7 @@ class Patch(Section):
     )
 
     @model_validator(mode="after")
-    def _one_kind(self) -> Patch:
+    def _one_kind(self) -> PatchSection:
         given = [kind for kind in KINDS if getattr(self, kind) not in (None, False)]
         words = listed(KINDS)
         if not given:
@@ -103,7 +103,7 @@ class Turn(Section):
     """A rotation that changes with time."""
 
     centre: NumberVector = setting(..., "point that stays where it is", unit="m")
-    axis: Annotated[tuple[Number, ...], Entries(3, 3)] | None = setting(
+    axis: Annotated[tuple[Number, ...], EntryCount(3, 3)] | None = setting(
         None, "direction of the axis (3D only)", unit="1"
     )
     angle: TimeFormula | None = setting(None, "angle, counterclockwise seen against the axis", unit="degrees")
@@ -142,7 +142,7 @@ def _one_of(section: Section, first: str, second: str) -> None:
         raise fault(f"give either '{first}' or '{second}', not both", second)
 
 
-class RigidBody(Section):
+class RigidBodySection(Section):
     """A rigid body in the flow: at rest, moved as given, or free."""
 
     mesh: Mesh = setting(..., "mesh file or built-in shape; only its surface counts, as fine as it is meshed")
@@ -153,13 +153,13 @@ class RigidBody(Section):
     free: Free | None = setting(None, "instead of a motion: the flow and other forces move it")
 
     @model_validator(mode="after")
-    def _one_kind(self) -> RigidBody:
+    def _one_kind(self) -> RigidBodySection:
         if self.motion is not None and self.free is not None:
             raise fault("give either 'motion' or 'free', not both", "free")
         return self
 
 
-class Fluid(Section):
+class FluidSection(Section):
     """Incompressible flow in a box around bodies that cut its grid."""
 
     density: Positive = setting(..., "mass per volume", unit="kg/m^3")
@@ -171,11 +171,11 @@ class Fluid(Section):
         "bdf2", "time integration; steady: each time step is the steady flow under the conditions of its time"
     )
     element: Literal["q1q1", "q2q1"] = setting("q1q1", "velocity and pressure of first order, or velocity of second")
-    grid: Grid = setting(..., "box and cells")
-    patches: dict[Name, Patch] = setting(
+    grid: GridSection = setting(..., "box and cells")
+    patches: dict[Name, PatchSection] = setting(
         ..., "conditions on the boundary of the box by name; where patches meet, the one named last decides"
     )
-    bodies: dict[Name, RigidBody] = setting(dict, "rigid bodies by name")
+    bodies: dict[Name, RigidBodySection] = setting(dict, "rigid bodies by name")
     dynamics: RigidDynamics = setting(RigidDynamics, "time integration of free bodies")
     gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
     body_force: Vector | None = setting(None, "force per volume", unit="N/m^3")

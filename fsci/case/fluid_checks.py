@@ -8,13 +8,13 @@ import numpy as np
 
 from fsci.case.case import Case
 from fsci.case.errors import listed
-from fsci.case.fluid import FACES, Fluid, RigidBody
+from fsci.case.fluid import FACES, FluidSection, RigidBodySection
 from fsci.case.free_body import PLANE, Free
 from fsci.case.mesh_checks import Mistake, axis_mistakes, length_mistakes, mesh_mistakes, surface_mistakes
 from fsci.case.yaml_text import Keys
 
 
-def fluid_mistakes(case: Case, fluid: Fluid) -> Iterator[Mistake]:
+def fluid_mistakes(case: Case, fluid: FluidSection) -> Iterator[Mistake]:
     """All of them."""
     dimension = fluid.grid.dimension
     for name in ("gravity", "body_force", "initial_velocity"):
@@ -32,7 +32,7 @@ def fluid_mistakes(case: Case, fluid: Fluid) -> Iterator[Mistake]:
             yield from _free(case, fluid, body.free, (*keys, "free"))
 
 
-def _patches(fluid: Fluid) -> Iterator[Mistake]:
+def _patches(fluid: FluidSection) -> Iterator[Mistake]:
     dimension = fluid.grid.dimension
     faces = FACES[: 2 * dimension]
     for name, patch in fluid.patches.items():
@@ -53,7 +53,7 @@ def _patches(fluid: Fluid) -> Iterator[Mistake]:
         yield ("fluid", "patches"), f"no patch is on the {verb} {listed(bare, 'and')} of the box"
 
 
-def uncovered(fluid: Fluid) -> list[str]:
+def uncovered(fluid: FluidSection) -> list[str]:
     """Faces of the box of which a part, the middle of some cell's face, is on no patch though the face is on one."""
     planes, found = fluid.grid.planes, []
     for face in FACES[: 2 * fluid.grid.dimension]:
@@ -69,7 +69,7 @@ def uncovered(fluid: Fluid) -> list[str]:
     return found
 
 
-def _periods(fluid: Fluid, name: str) -> Iterator[Mistake]:
+def _periods(fluid: FluidSection, name: str) -> Iterator[Mistake]:
     """Nothing else is on the faces of a period."""
     for i, face in enumerate(fluid.patches[name].on):
         for other, patch in fluid.patches.items():
@@ -77,7 +77,7 @@ def _periods(fluid: Fluid, name: str) -> Iterator[Mistake]:
                 yield ("fluid", "patches", name, "on", i), f"the face '{face}' is periodic by the patch '{other}'"
 
 
-def _free(case: Case, fluid: Fluid, free: Free, keys: Keys) -> Iterator[Mistake]:
+def _free(case: Case, fluid: FluidSection, free: Free, keys: Keys) -> Iterator[Mistake]:
     dimension = fluid.grid.dimension
     if case.coupling is None:
         yield keys, "a free body needs the section 'coupling'; 'coupling: {}' for its defaults"
@@ -98,7 +98,7 @@ def _free(case: Case, fluid: Fluid, free: Free, keys: Keys) -> Iterator[Mistake]
         yield (*keys, "initial_spin"), f"'initial_spin' has {spins} in {dimension}D, not {len(free.initial_spin)}"
 
 
-def _motion(fluid: Fluid, body: RigidBody, keys: Keys) -> Iterator[Mistake]:
+def _motion(fluid: FluidSection, body: RigidBodySection, keys: Keys) -> Iterator[Mistake]:
     if body.motion is None:
         return
     dimension, keys = fluid.grid.dimension, (*keys, "motion")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from fsci.case.section import Section, setting
-from fsci.case.values import Entries, NotNegative, Number, NumberVector, Positive, Share, Vector
+from fsci.case.values import EntryCount, NotNegative, Number, NumberVector, Positive, Share, Vector
 
 #: Ways that can be held, and which of the six they are.
 HELD = {
@@ -19,11 +19,11 @@ HELD = {
 }
 
 
-class PointSpring(Section):
+class PointSpringSection(Section):
     """Between a point of the body and the place where that is at the start."""
 
     at: NumberVector = setting(..., "the point", unit="m")
-    stiffness: Annotated[tuple[NotNegative, ...], Entries(2, 3)] = setting(
+    stiffness: Annotated[tuple[NotNegative, ...], EntryCount(2, 3)] = setting(
         ..., "along each axis; in 2D per depth", unit="N/m"
     )
     damping: NotNegative = setting(0.0, "force by velocity over force by displacement", unit="s")
@@ -34,12 +34,12 @@ class Free(Section):
 
     density: Positive = setting(..., "mass per volume", unit="kg/m^3")
     gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
-    springs: tuple[PointSpring, ...] = setting(tuple, "springs and dampers at points")
+    springs: tuple[PointSpringSection, ...] = setting(tuple, "springs and dampers at points")
     held: tuple[Literal["x", "y", "z", "rotation", "rotation_x", "rotation_y", "rotation_z"], ...] = setting(
         tuple, "degrees of freedom that do not move"
     )
     initial_velocity: NumberVector | None = setting(None, "velocity of the centre at the start", unit="m/s")
-    initial_spin: Annotated[tuple[Number, ...], Entries(1, 3)] | None = setting(
+    initial_spin: Annotated[tuple[Number, ...], EntryCount(1, 3)] | None = setting(
         None, "angular velocity at the start: one number in 2D, three in 3D", unit="rad/s"
     )
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Count, Entries, Number, NumberVector, Positive
+from fsci.case.values import Count, EntryCount, Number, NumberVector, Positive
 
 MOST_CELLS = 100_000  #: along one direction
 MOST_GROWTH = 1e6  #: of cells within a stretch
@@ -29,10 +29,10 @@ class Stretch(Section):
         return self
 
 
-Stretches = Annotated[tuple[Stretch, ...], Entries(1, None)]
+Stretches = Annotated[tuple[Stretch, ...], EntryCount(1, None)]
 
 
-class Grid(Section):
+class GridSection(Section):
     """A box of axis-aligned cells. Each direction has a number of equal `cells`, or a list of stretches `x`, `y`, `z`.
 
     In a stretch of n cells each is ratio^(1/(n - 1)) times as long as the one before.
@@ -40,7 +40,7 @@ class Grid(Section):
 
     start: NumberVector = setting(..., "lowest corner of the box", unit="m", name="from")
     to: NumberVector = setting(..., "highest corner of the box", unit="m")
-    cells: Annotated[tuple[Count | None, ...], Entries(2, 3)] | None = setting(
+    cells: Annotated[tuple[Count | None, ...], EntryCount(2, 3)] | None = setting(
         None, "number of equal cells along x, y (and z); null for a direction with stretches"
     )
     x: Stretches | None = setting(None, "stretches along x")
@@ -57,7 +57,7 @@ class Grid(Section):
         return (self.x, self.y, self.z)[: self.dimension]
 
     @model_validator(mode="after")
-    def _consistent(self) -> Grid:
+    def _consistent(self) -> GridSection:
         dim = self.dimension
         if len(self.to) != dim:
             raise fault(f"must have {dim} entries like 'from', not {len(self.to)}", "to")

@@ -3,32 +3,32 @@
 from __future__ import annotations
 
 from fsci.case.section import Section, setting
-from fsci.case.supports import AT, Placed
+from fsci.case.supports import AT, Located
 from fsci.case.values import Formula, NumberVector, Surfaces, Vector
 
 
-class Traction(Section):
+class TractionSection(Section):
     """A dead load: it keeps its direction and acts on the reference area."""
 
     on: Surfaces = setting(..., "name of a surface, or list of names")
     value: Vector = setting(..., "force per reference area", unit="Pa")
 
 
-class Pressure(Section):
+class PressureSection(Section):
     """A follower load: it stays normal to the deformed surface."""
 
     on: Surfaces = setting(..., "name of a surface, or list of names")
     value: Formula = setting(..., "pressure; a positive one pushes against the surface", unit="Pa")
 
 
-class LineForce(Section):
+class LineForceSection(Section):
     """A dead load along lines of a mesh in space."""
 
     on: Surfaces = setting(..., "name of a line of a mesh file, or list of names")
     value: Vector = setting(..., "force per reference length", unit="N/m")
 
 
-class PointForce(Placed):
+class PointForceSection(Located):
     """A dead load at points. Near them the deformation of a solid grows without bound as cells get smaller."""
 
     on: Surfaces | None = setting(

@@ -21,7 +21,7 @@ def _values(*settings: Expression | None) -> list[Value]:
     return [value_of(setting) for setting in settings if setting is not None]
 
 
-class Elastic(Section):
+class ElasticSection(Section):
     """A hyperelastic law with two constants: exactly E and nu, or lambda and mu, or mu and nu.
 
     - st_venant_kirchhoff: W = lambda/2 (tr E)^2 + mu E:E with the Green-Lagrange strain E; for small strains.
@@ -37,7 +37,7 @@ class Elastic(Section):
     density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
 
     @model_validator(mode="after")
-    def _two_constants(self) -> Elastic:
+    def _two_constants(self) -> ElasticSection:
         settings = {"E": self.E, "nu": self.nu, "lambda": self.lmbda, "mu": self.mu}
         given = [name for name, value in settings.items() if value is not None]
         if set(given) not in PAIRS:
@@ -68,7 +68,7 @@ class Elastic(Section):
         return self.lame
 
 
-class MooneyRivlin(Section):
+class MooneyRivlinSection(Section):
     """W = c10 (J^(-2/3) I1 - 3) + c01 (J^(-4/3) I2 - 3) + bulk/2 (J - 1)^2; the shear modulus is 2 (c10 + c01)."""
 
     law: Literal["mooney_rivlin"] = setting(..., "stored energy")
@@ -78,7 +78,7 @@ class MooneyRivlin(Section):
     density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
 
     @model_validator(mode="after")
-    def _stiff(self) -> MooneyRivlin:
+    def _stiff(self) -> MooneyRivlinSection:
         c10, c01 = self.c10.constant, self.c01.constant
         if c10 is not None and c01 is not None and c10 + c01 <= 0:
             raise fault(f"the sum of c10 and c01 must be greater than 0, not {c10 + c01:g}", "c10")
@@ -97,10 +97,10 @@ class MooneyRivlin(Section):
         return value_of(self.c10), value_of(self.c01), value_of(self.bulk)
 
 
-def has_mass(material: Elastic | MooneyRivlin) -> bool:
+def has_mass(material: ElasticSection | MooneyRivlinSection) -> bool:
     """It has a density, and not 0 everywhere."""
     return material.density is not None and material.density.constant != 0.0
 
 
 LAWS = ("st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke", "mooney_rivlin")
-Material = Annotated[Elastic | MooneyRivlin, Field(discriminator="law"), chosen("law", LAWS)]
+Material = Annotated[ElasticSection | MooneyRivlinSection, Field(discriminator="law"), chosen("law", LAWS)]

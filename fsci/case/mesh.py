@@ -7,11 +7,11 @@ from typing import Annotated, Any, get_args
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from fsci.case.section import fault, setting
-from fsci.case.shapes import Placed, Shape
+from fsci.case.shapes import PlacedMesh, Shape
 from fsci.case.values import Name, Number, Order, Text, chosen, spoken
 
 
-class FileMesh(Placed):
+class FileMesh(PlacedMesh):
     """A mesh from a file: gmsh's .geo or .msh with physical names, or any format that meshio reads.
 
     All cells are of one type: triangles or tetrahedra of first or second order, quadrilaterals or hexahedra of first or

@@ -9,7 +9,7 @@ from fsci.case.material import Material
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import flow_doubts
 from fsci.case.shapes import Shape
-from fsci.case.structure import Body
+from fsci.case.structure import BodySection
 from fsci.case.yaml_text import Keys
 from solvers.structure.elastic_constants import poisson, young
 
@@ -35,7 +35,7 @@ def doubts(case: Case) -> Iterator[tuple[Keys, str]]:
         yield from flow_doubts(case, case.fluid)
 
 
-def _locking(body: Body, keys: Keys) -> Iterator[tuple[Keys, str]]:
+def _locking(body: BodySection, keys: Keys) -> Iterator[tuple[Keys, str]]:
     constants = _constants(body.material)
     if constants is None or body.element == "mixed" or body.mesh.order > 1 or _order_from_file(body.mesh):
         return

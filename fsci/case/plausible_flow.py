@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.case.case import Case
-from fsci.case.fluid import Fluid, Movement, Patch
+from fsci.case.fluid import FluidSection, Movement, PatchSection
 from fsci.case.rigid_motion import rigid_motion
 from fsci.case.shapes import Shape
 from fsci.case.yaml_text import Keys
@@ -20,7 +20,7 @@ CELLS_ACROSS_AT_REST, CELLS_ACROSS_IF_MOVING = 2.0, 4.0
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
 
 
-def flow_doubts(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
+def flow_doubts(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
     """Paths of settings with a warning about each."""
     density = fluid.density * case.units.density
     if not DENSITIES[0] <= density <= DENSITIES[1]:
@@ -40,7 +40,7 @@ def flow_doubts(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
             yield ("fluid", "patches", name), message
 
 
-def _fast_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
+def _fast_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
     """Bodies that cross too many cells in a step; how fast those are that turn only the mesh tells."""
     for name, body in fluid.bodies.items():
         if body.motion is not None and body.motion.rotation is None:
@@ -48,7 +48,7 @@ def _fast_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
                 yield ("fluid", "bodies", name, "motion"), doubt
 
 
-def fast_body(case: Case, fluid: Fluid, motion: Movement, points: NDArray[np.float64]) -> str | None:
+def fast_body(case: Case, fluid: FluidSection, motion: Movement, points: NDArray[np.float64]) -> str | None:
     """The warning if points [m] of a body, shape (n, dim), cross too many cells in a step, or None."""
     smallest = np.array([float(np.diff(edges).min()) for edges in fluid.grid.planes])
     time = case.time
@@ -65,7 +65,7 @@ def fast_body(case: Case, fluid: Fluid, motion: Movement, points: NDArray[np.flo
     )
 
 
-def _thin_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
+def _thin_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
     """Built-in shapes through which fluid passes; of files only the mesh tells."""
     rigid = fluid.bodies.items()
     moving = {("fluid", "bodies", name): (body.mesh, bool(body.motion or body.free)) for name, body in rigid}
@@ -78,7 +78,7 @@ def _thin_bodies(case: Case, fluid: Fluid) -> Iterator[tuple[Keys, str]]:
             yield (section, kind, name, "mesh"), doubt
 
 
-def thin_body(fluid: Fluid, extent: float, *, moves: bool) -> str | None:
+def thin_body(fluid: FluidSection, extent: float, *, moves: bool) -> str | None:
     """Whether fluid passes through a body of this thickness [m], because both of its sides share unknowns."""
     smallest = min(float(np.diff(edges).min()) for edges in fluid.grid.planes)
     least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
@@ -90,13 +90,13 @@ def thin_body(fluid: Fluid, extent: float, *, moves: bool) -> str | None:
     return f"{size}: {why}; refine the grid"
 
 
-def _driven(fluid: Fluid) -> bool:
+def _driven(fluid: FluidSection) -> bool:
     loads = (fluid.gravity, fluid.body_force, fluid.initial_velocity)
     moved = any(body.motion or body.free for body in fluid.bodies.values())
     return any(loads) or moved or any(p.velocity or p.traction or p.pressure for p in fluid.patches.values())
 
 
-def _cells_per_step(case: Case, fluid: Fluid, patch: Patch) -> float:
+def _cells_per_step(case: Case, fluid: FluidSection, patch: PatchSection) -> float:
     """Largest |u_i| dt / h_i of the velocity prescribed on a patch, over its nodes and some times of the run."""
     if patch.velocity is None:
         return 0.0

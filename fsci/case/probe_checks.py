@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from fsci.case.case import Case
 from fsci.case.errors import did_you_mean, listed
-from fsci.case.fluid import Fluid
+from fsci.case.fluid import FluidSection
 from fsci.case.material import has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, surface_mistakes
 from fsci.case.probes import RESERVED, Probe, Reference
-from fsci.case.structure import Structure
+from fsci.case.structure import StructureSection
 from fsci.case.verify import (
     BODY_COLUMN,
     CONTACT_COLUMNS,
@@ -71,7 +71,7 @@ def _of_none(case: Case, name: str, probe: Probe) -> Iterator[Mistake]:
         yield ("probes", name, "quantity"), f"quantity '{probe.quantity}' needs the section '{needed}'"
 
 
-def _of_structure(structure: Structure, name: str, probe: Probe) -> Iterator[Mistake]:
+def _of_structure(structure: StructureSection, name: str, probe: Probe) -> Iterator[Mistake]:
     keys, bodies = ("probes", name), structure.bodies
     if probe.minus is not None:
         yield (*keys, "minus"), "'minus' is for points of the fluid"
@@ -91,7 +91,7 @@ def _of_structure(structure: Structure, name: str, probe: Probe) -> Iterator[Mis
         yield (*keys, "quantity"), f"quantity '{probe.quantity}' needs the 'density' of the material"
 
 
-def _of_fluid(case: Case, fluid: Fluid, name: str, probe: Probe) -> Iterator[Mistake]:
+def _of_fluid(case: Case, fluid: FluidSection, name: str, probe: Probe) -> Iterator[Mistake]:
     keys, grid = ("probes", name), fluid.grid
     bodies = [*fluid.bodies, *(case.elastic_bodies if case.coupling is not None else ())]
     if "body" not in probe.measured.needs:

@@ -6,11 +6,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, model_validator
 
-from fsci.case.loads import LineForce, PointForce, Pressure, Traction
+from fsci.case.loads import LineForceSection, PointForceSection, PressureSection, TractionSection
 from fsci.case.material import Material
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
-from fsci.case.supports import Spring, Support
+from fsci.case.supports import SpringSection, SupportSection
 from fsci.case.values import (
     Name,
     NotNegative,
@@ -24,14 +24,14 @@ from fsci.case.values import (
 ALPHAS = ("alpha_m", "alpha_f", "beta", "gamma")
 
 
-class Damping(Section):
+class DampingSection(Section):
     """Rayleigh damping: C = mass M + stiffness K, with the stiffness K of the undeformed body."""
 
     mass: NotNegative = setting(0.0, "factor of the mass matrix", unit="1/s")
     stiffness: NotNegative = setting(0.0, "factor of the stiffness matrix", unit="s")
 
 
-class Dynamics(Section):
+class DynamicsSection(Section):
     """Generalised-alpha time integration, by rho_inf or by its four parameters."""
 
     rho_inf: Share | None = setting(
@@ -44,7 +44,7 @@ class Dynamics(Section):
     predictor: Literal["constant_displacement", "constant_velocity"] = setting(
         "constant_displacement", "first guess of a step"
     )
-    damping: Damping = setting(Damping, "Rayleigh damping")
+    damping: DampingSection = setting(DampingSection, "Rayleigh damping")
 
     @model_validator(mode="before")
     @classmethod
@@ -67,7 +67,7 @@ NO_MIXED_SIMPLICES = (
 )
 
 
-class Body(Section):
+class BodySection(Section):
     """One elastic body."""
 
     mesh: Mesh = setting(..., "mesh file or built-in shape")
@@ -81,14 +81,14 @@ class Body(Section):
     kinematics: Literal["finite", "linear"] = setting(
         "finite", "linear: small displacements, Hooke's law with the constants of the material at small strain"
     )
-    supports: tuple[Support, ...] = setting(tuple, "where the body is held")
-    springs: tuple[Spring, ...] = setting(tuple, "where it is held elastically")
+    supports: tuple[SupportSection, ...] = setting(tuple, "where the body is held")
+    springs: tuple[SpringSection, ...] = setting(tuple, "where it is held elastically")
     gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
     body_force: Vector | None = setting(None, "force per reference volume", unit="N/m^3")
-    tractions: tuple[Traction, ...] = setting(tuple, "dead loads on surfaces")
-    pressures: tuple[Pressure, ...] = setting(tuple, "follower loads on surfaces")
-    line_forces: tuple[LineForce, ...] = setting(tuple, "dead loads along lines, 3D only")
-    point_forces: tuple[PointForce, ...] = setting(tuple, "dead loads at points")
+    tractions: tuple[TractionSection, ...] = setting(tuple, "dead loads on surfaces")
+    pressures: tuple[PressureSection, ...] = setting(tuple, "follower loads on surfaces")
+    line_forces: tuple[LineForceSection, ...] = setting(tuple, "dead loads along lines, 3D only")
+    point_forces: tuple[PointForceSection, ...] = setting(tuple, "dead loads at points")
     initial_displacement: Vector | None = setting(None, "displacement at the start", unit="m")
     initial_velocity: Vector | None = setting(None, "velocity at the start", unit="m/s")
 
@@ -105,13 +105,13 @@ def _some(value: Any) -> Any:
     return value
 
 
-class Structure(Section):
+class StructureSection(Section):
     """Elastic bodies of finite deformation."""
 
     plane: Literal["strain", "stress"] = setting(
         "strain", "2D only: plane strain or plane stress (st_venant_kirchhoff)"
     )
-    dynamics: Annotated[Dynamics | None, BeforeValidator(_not_empty)] = setting(
+    dynamics: Annotated[DynamicsSection | None, BeforeValidator(_not_empty)] = setting(
         None, "time integration; absent: static, without inertia"
     )
-    bodies: Annotated[dict[Name, Body], BeforeValidator(_some)] = setting(..., "the bodies by name")
+    bodies: Annotated[dict[Name, BodySection], BeforeValidator(_some)] = setting(..., "the bodies by name")

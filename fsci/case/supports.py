@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import Discriminator, Tag, model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Entries, Formula, NotNegativeFormula, NumberVector, Surfaces, Switch
+from fsci.case.values import EntryCount, Formula, NotNegativeFormula, NumberVector, Surfaces, Switch
 
 AT = "instead of names: position of one node, exact to a millionth of the body's size"
 DIRECTION = "only along this direction, of any length; it does not turn with the body"
@@ -15,13 +15,13 @@ NORMAL = "true: only normal to the surface as it is without deformation, node by
 
 #: One expression, or one for each component; null leaves a component free.
 Displacement = Annotated[
-    Annotated[tuple[Formula | None, ...], Entries(2, 3), Tag("by components")]
+    Annotated[tuple[Formula | None, ...], EntryCount(2, 3), Tag("by components")]
     | Annotated[Formula, Tag("along a direction")],
     Discriminator(lambda value: "by components" if isinstance(value, list | tuple) else "along a direction"),
 ]
 
 
-class Placed(Section):
+class Located(Section):
     """What acts at a named part of the mesh, or at a node."""
 
     @model_validator(mode="after")
@@ -41,7 +41,7 @@ class Placed(Section):
         return self
 
 
-class Support(Placed):
+class SupportSection(Located):
     """Where the displacement is prescribed: all components, or only one along a direction, the others being free.
 
     At a node with several supports all of them hold; of those that contradict each other the last one counts.
@@ -59,7 +59,7 @@ class Support(Placed):
     symmetry: Switch = setting(False, "true: a plane of symmetry, nothing moves across it")
 
     @model_validator(mode="after")
-    def _one_kind(self) -> Support:
+    def _one_kind(self) -> SupportSection:
         along = "direction" if self.direction is not None else "normal" if self.normal else ""
         if self.symmetry:
             for name, given in (("displacement", self.displacement is not None), (along, along), ("at", self.at)):
@@ -77,7 +77,7 @@ class Support(Placed):
         return self
 
 
-class Spring(Placed):
+class SpringSection(Located):
     """An elastic foundation: it pulls the body back to where it is without deformation."""
 
     on: Surfaces | None = setting(None, "name of a surface, or of points of a mesh file, or list of names")

@@ -149,7 +149,7 @@ PoissonFormula = Annotated[
 
 
 @dataclass(frozen=True)
-class Entries:
+class EntryCount:
     """A list of so many entries."""
 
     fewest: int
@@ -184,9 +184,9 @@ class OneOrMany:
         return {"anyOf": [many["items"], many]}
 
 
-Vector = Annotated[tuple[Formula, ...], Entries(2, 3)]
-TimeVector = Annotated[tuple[TimeFormula, ...], Entries(2, 3)]
-NumberVector = Annotated[tuple[Number, ...], Entries(2, 3)]
+Vector = Annotated[tuple[Formula, ...], EntryCount(2, 3)]
+TimeVector = Annotated[tuple[TimeFormula, ...], EntryCount(2, 3)]
+NumberVector = Annotated[tuple[Number, ...], EntryCount(2, 3)]
 
 
 def _text(value: Any) -> str:
@@ -214,7 +214,7 @@ def _switch(value: Any) -> bool:
 Text = Annotated[str, BeforeValidator(_text)]
 Name = Annotated[str, BeforeValidator(_name)]
 Switch = Annotated[bool, BeforeValidator(_switch)]
-Surfaces = Annotated[tuple[Text, ...], Entries(1, None), OneOrMany()]
+Surfaces = Annotated[tuple[Text, ...], EntryCount(1, None), OneOrMany()]
 
 
 def chosen(key: str, names: Sequence[str]) -> BeforeValidator:

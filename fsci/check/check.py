@@ -6,17 +6,17 @@ from collections.abc import Iterator, Mapping
 from math import ceil
 
 from fsci.case import Case
-from fsci.case.contact import Pair
-from fsci.case.fluid import Fluid
+from fsci.case.contact import PairSection
+from fsci.case.fluid import FluidSection
 from fsci.case.mesh import Mesh
 from fsci.case.shapes import Shape
-from fsci.case.structure import Structure
+from fsci.case.structure import StructureSection
 from solvers.mesh import Mesh as BodyMesh
 
 Row = tuple[str, str]
 
 
-def summary(case: Case, meshes: Mapping[str, BodyMesh] = {}, pairs: Mapping[str, Pair] = {}) -> str:
+def summary(case: Case, meshes: Mapping[str, BodyMesh] = {}, pairs: Mapping[str, PairSection] = {}) -> str:
     """A few lines: steps, fields and bodies with their size where it is known, pairs of contact, probes, checks.
 
     `meshes`: of elastic bodies, by name, as far as they were read; `pairs`: also those that the case does not name.
@@ -43,7 +43,7 @@ def summary(case: Case, meshes: Mapping[str, BodyMesh] = {}, pairs: Mapping[str,
     return "\n".join(f"  {word:<{width}}  {text}" for word, text in rows if text)
 
 
-def _structure(case: Case, structure: Structure, meshes: Mapping[str, BodyMesh]) -> Iterator[Row]:
+def _structure(case: Case, structure: StructureSection, meshes: Mapping[str, BodyMesh]) -> Iterator[Row]:
     motion = "static"
     if structure.dynamics is not None:
         rho_inf = structure.dynamics.rho_inf
@@ -62,7 +62,7 @@ def _structure(case: Case, structure: Structure, meshes: Mapping[str, BodyMesh])
         yield "dofs", f"{dofs:,}"
 
 
-def structure_dofs(structure: Structure, meshes: Mapping[str, BodyMesh]) -> int | None:
+def structure_dofs(structure: StructureSection, meshes: Mapping[str, BodyMesh]) -> int | None:
     """Unknowns of all elastic bodies; None if a mesh is not known."""
     total = 0
     for name, body in structure.bodies.items():
@@ -79,7 +79,7 @@ def number_of_steps(case: Case) -> int:
     return ceil((case.time.end - case.time.start) / case.time.step - 1e-9)
 
 
-def _fluid(fluid: Fluid) -> Iterator[Row]:
+def _fluid(fluid: FluidSection) -> Iterator[Row]:
     flow = "Navier-Stokes" if fluid.flow == "navier_stokes" else "Stokes"
     yield "fluid", f"{flow}, {fluid.scheme.replace('_', ' ')}, {fluid.element}"
     cells = " x ".join(f"{count:,}" for count in fluid.grid.shape)
@@ -93,7 +93,7 @@ def _fluid(fluid: Fluid) -> Iterator[Row]:
     yield "dofs", f"{fluid.dofs:,} with those inside of bodies"
 
 
-def _sides(pair: Pair) -> str:
+def _sides(pair: PairSection) -> str:
     sides = [side.obstacle or f"{side.body}.{' + '.join(side.on or ())}" for _, side in pair.sides]
     friction = pair.friction
     law = ", tied" if pair.tied else ""

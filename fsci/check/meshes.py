@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fsci.builder.skin import find_skin
 from fsci.case import Case, CaseError
-from fsci.case.contact import Pair
+from fsci.case.contact import PairSection
 from fsci.case.errors import Problem
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import fast_body, thin_body
@@ -41,7 +41,7 @@ class Findings:
     warnings: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     meshes: dict[str, Mesh] = field(default_factory=dict)  #: of elastic bodies that were read
-    pairs: dict[str, Pair] = field(default_factory=dict)  #: of contact, also those that the case does not name
+    pairs: dict[str, PairSection] = field(default_factory=dict)  #: of contact, also those that the case does not name
 
     def attempt(self, read: Callable[[], T]) -> T | None:
         """The result, or None after a mistake, which is kept."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fsci.plot.render import Body, Pixels
+from fsci.plot.render import DrawnBody, Pixels
 from fsci.plot.render_flow import load_state
 from fsci.plot.scene import animate, compose
 
@@ -21,7 +21,7 @@ def plot_movie(
     """Animates all bodies, coloured by a field, as a GIF; `moments`: (time, file) of each body at each time."""
     shown = moments[:: -(-len(moments) // FRAMES)]
 
-    def states() -> Iterator[tuple[float, list[Body]]]:
+    def states() -> Iterator[tuple[float, list[DrawnBody]]]:
         for moment in shown:
             yield moment[0][0], load_state([file for _, file in moment], field)
 

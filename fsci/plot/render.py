@@ -27,7 +27,7 @@ ROUND: Any = {"smooth_shading": True, "split_sharp_edges": True, "feature_angle"
 
 
 @dataclass(frozen=True)
-class Body:
+class DrawnBody:
     """What is drawn of one body."""
 
     surface: Any  #: pyvista surface, curved cells subdivided, with the point data
@@ -64,7 +64,7 @@ def import_pyvista() -> Any:
     return pyvista
 
 
-def load_body(mesh: Any, field: str) -> Body:
+def load_body(mesh: Any, field: str) -> DrawnBody:
     """An elastic body from its mesh or VTU file.
 
     `field` is what colours it: a point field (a vector's magnitude) or a component, name.x.
@@ -78,7 +78,7 @@ def load_body(mesh: Any, field: str) -> Body:
     faces = pyvista.wrap(outer.GetOutput())
     surface = faces.extract_surface(nonlinear_subdivision=SUBDIVISION, algorithm="dataset_surface")
     edges, shared = face_edges(faces)
-    return Body(surface, edges, edges[~shared], field_values(surface.point_data, field))
+    return DrawnBody(surface, edges, edges[~shared], field_values(surface.point_data, field))
 
 
 def field_values(data: Any, field: str) -> Array | None:
@@ -137,7 +137,7 @@ def frame(axes: Array, low: Array, high: Array, *, aspect: float) -> View:
 
 
 def render(
-    bodies: list[Body], view: View, *, size: tuple[int, int], limits: tuple[float, float], colours: str
+    bodies: list[DrawnBody], view: View, *, size: tuple[int, int], limits: tuple[float, float], colours: str
 ) -> Pixels:
     """The picture of the bodies without any text; `size` is (width, height)."""
     pyvista = import_pyvista()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.plot.render import ISOMETRIC, Array, Body, field_values, import_pyvista, load_body
+from fsci.plot.render import ISOMETRIC, Array, DrawnBody, field_values, import_pyvista, load_body
 
 STREAMLINES = "velocity"  #: the field that is drawn with streamlines, besides its components
 SPACING = 0.035  #: distance of streamlines in the plane, as part of the edge of a square as large as the box
@@ -31,7 +31,7 @@ def is_flow(path: Path) -> bool:
     return "fluid_fraction" in import_pyvista().read(path).cell_data
 
 
-def load_state(files: Sequence[Path], field: str) -> list[Body]:
+def load_state(files: Sequence[Path], field: str) -> list[DrawnBody]:
     """What is drawn of the VTU files of one time, flow first; bodies in a flow that has the field are grey."""
     meshes = [import_pyvista().read(path) for path in files]
     flow = meshes[0] if "fluid_fraction" in meshes[0].cell_data else None
@@ -46,7 +46,7 @@ def load_state(files: Sequence[Path], field: str) -> list[Body]:
     return _spatial_flow(flow, field, meshes[1:]) + [replace(part, edges=NO_LINES) for part in parts]
 
 
-def load_meshes(files: Sequence[Path]) -> list[Body]:
+def load_meshes(files: Sequence[Path]) -> list[DrawnBody]:
     """The bodies with the edges of their elements, the cells of a flow: all of a plane one, the back faces of a box."""
     pyvista = import_pyvista()
     parts = []
@@ -58,10 +58,10 @@ def load_meshes(files: Sequence[Path]) -> list[Body]:
         faces = mesh.extract_surface(algorithm="dataset_surface")
         box = mesh.outline()
         if not is_flat(mesh):
-            parts.append(Body(box, segments(box), NO_LINES, None))
+            parts.append(DrawnBody(box, segments(box), NO_LINES, None))
             faces = faces.extract_cells(_on_back(faces)).extract_surface(algorithm="dataset_surface")
         edges = segments(faces.extract_all_edges())
-        parts.append(Body(box, edges, NO_LINES, None, line_colour="gray"))
+        parts.append(DrawnBody(box, edges, NO_LINES, None, line_colour="gray"))
     return parts
 
 
@@ -73,12 +73,12 @@ def _on_back(faces: Any) -> NDArray[np.int64]:
     return np.flatnonzero(np.any(np.abs(centres - back) < margin, axis=1))
 
 
-def _load_body(mesh: Any, field: str) -> list[Body]:
+def _load_body(mesh: Any, field: str) -> list[DrawnBody]:
     """The surface of a rigid body, or an elastic body."""
     if set(np.unique(mesh.celltypes)) == {LINE}:
         return [fill_lines(mesh.points, mesh.cells.reshape(-1, 3)[:, 1:])]
     if set(np.unique(mesh.celltypes)) == {TRIANGLE} and not is_flat(mesh):
-        return [Body(mesh.extract_surface(algorithm="dataset_surface"), NO_LINES, NO_LINES, None)]
+        return [DrawnBody(mesh.extract_surface(algorithm="dataset_surface"), NO_LINES, NO_LINES, None)]
     return [load_body(mesh, field)]
 
 
@@ -88,11 +88,11 @@ def is_flat(mesh: Any) -> bool:
     return bool(high[2] - low[2] <= 1e-9 * (high - low).max())
 
 
-def plane_flow(mesh: Any, field: str) -> Body:
+def plane_flow(mesh: Any, field: str) -> DrawnBody:
     """A flow in the plane (x, y), with streamlines if its velocity is asked for."""
     surface = mesh.extract_surface(algorithm="dataset_surface")
     lines = _plane_streamlines(mesh) if field.partition(".")[0] == STREAMLINES else NO_LINES
-    return Body(surface, lines, NO_LINES, field_values(surface.point_data, field), line_colour="white")
+    return DrawnBody(surface, lines, NO_LINES, field_values(surface.point_data, field), line_colour="white")
 
 
 def _plane_streamlines(mesh: Any) -> Array:
@@ -135,7 +135,7 @@ def segments(lines: Any) -> Array:
     return np.asarray(lines.points, dtype=np.float64)[np.concatenate(found)]
 
 
-def _spatial_flow(mesh: Any, field: str, bodies: Sequence[Any]) -> list[Body]:
+def _spatial_flow(mesh: Any, field: str, bodies: Sequence[Any]) -> list[DrawnBody]:
     """A translucent slice through the bodies, the edges of the box, and tubes along streamlines."""
     parts = []
     moving = field.partition(".")[0] == STREAMLINES
@@ -143,13 +143,13 @@ def _spatial_flow(mesh: Any, field: str, bodies: Sequence[Any]) -> list[Body]:
     middle = mesh.slice(normal=normal, origin=origin)
     if middle.n_points:
         values = field_values(middle.point_data, field)
-        parts.append(Body(middle, NO_LINES, NO_LINES, values, lit=False, opacity=VEIL if moving else PANE))
+        parts.append(DrawnBody(middle, NO_LINES, NO_LINES, values, lit=False, opacity=VEIL if moving else PANE))
     box = mesh.outline()
-    parts.append(Body(box, segments(box), NO_LINES, None))
+    parts.append(DrawnBody(box, segments(box), NO_LINES, None))
     if moving and np.any(mesh.point_data[STREAMLINES]):
         tubes = _tubes(mesh, bodies)
         if tubes.n_points:
-            parts.append(Body(tubes, NO_LINES, NO_LINES, field_values(tubes.point_data, field)))
+            parts.append(DrawnBody(tubes, NO_LINES, NO_LINES, field_values(tubes.point_data, field)))
     return parts
 
 
@@ -218,7 +218,7 @@ def _lattice(centre: Array, axes: Array, extent: Array, count: int = SEEDS) -> A
     return centre + np.stack([x.ravel() for x in np.meshgrid(*steps, indexing="ij")], axis=1) @ axes.T
 
 
-def fill_lines(points: Any, ends: NDArray[np.int64]) -> Body:
+def fill_lines(points: Any, ends: NDArray[np.int64]) -> DrawnBody:
     """The inside of closed lines in a plane, with its outline; `ends` are the points of each segment, shape (n, 2)."""
     from vtkmodules.vtkFiltersCore import vtkStripper
     from vtkmodules.vtkFiltersGeneral import vtkContourTriangulator
@@ -230,4 +230,4 @@ def fill_lines(points: Any, ends: NDArray[np.int64]) -> Body:
     filled = vtkContourTriangulator()
     filled.SetInputConnection(loops.GetOutputPort())
     filled.Update()
-    return Body(pyvista.wrap(filled.GetOutput()), NO_LINES, np.asarray(points, dtype=np.float64)[ends], None)
+    return DrawnBody(pyvista.wrap(filled.GetOutput()), NO_LINES, np.asarray(points, dtype=np.float64)[ends], None)

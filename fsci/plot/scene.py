@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fsci.plot.curves import SIZE, STYLE, label
-from fsci.plot.render import ISOMETRIC, Array, Body, Pixels, View, axes_of_view, frame, render
+from fsci.plot.render import ISOMETRIC, Array, DrawnBody, Pixels, View, axes_of_view, frame, render
 
 Rectangle = tuple[float, float, float, float]  #: left, bottom, width, height in parts of the figure
 
@@ -41,7 +41,7 @@ class Scene:
 
 
 def compose(
-    states: Iterable[list[Body]],
+    states: Iterable[list[DrawnBody]],
     field: str | None,
     title: str,
     units: Mapping[str, str],
@@ -116,7 +116,7 @@ def long_layout(slope: float, below: float) -> tuple[tuple[float, float], tuple[
     )
 
 
-def draw(scene: Scene, bodies: list[Body], time: float, *, dots: int) -> Any:
+def draw(scene: Scene, bodies: list[DrawnBody], time: float, *, dots: int) -> Any:
     """The figure of one state, at `dots` pixels per inch."""
     figure, image, title = lay_out(scene, dots)
     image.set_data(render_into(scene, bodies, dots))
@@ -124,7 +124,7 @@ def draw(scene: Scene, bodies: list[Body], time: float, *, dots: int) -> Any:
     return figure
 
 
-def animate(scene: Scene, states: Iterable[tuple[float, list[Body]]], *, dots: int) -> Iterator[Pixels]:
+def animate(scene: Scene, states: Iterable[tuple[float, list[DrawnBody]]], *, dots: int) -> Iterator[Pixels]:
     """The pictures of many states (time, bodies), shape (height, width, 3); what stays is drawn only once."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -192,7 +192,7 @@ def draw_colour_bar(
         colour_bar.ax.yaxis.get_offset_text().set_horizontalalignment("left")
 
 
-def render_into(scene: Scene, bodies: list[Body], dots: int) -> Pixels:
+def render_into(scene: Scene, bodies: list[DrawnBody], dots: int) -> Pixels:
     """The bodies at the size of the picture."""
     _, _, width, height = scene.layout[0]
     size = (round(scene.size[0] * width * dots), round(scene.size[1] * height * dots))
@@ -204,7 +204,7 @@ def headline(scene: Scene, time: float) -> str:
     return f"{scene.title}, t = {time:.5g} {scene.units['time']}"
 
 
-def field_label(field: str, bodies: list[Body], units: Mapping[str, str]) -> str:
+def field_label(field: str, bodies: list[DrawnBody], units: Mapping[str, str]) -> str:
     """What the colours are: |displacement| [m], displacement x [m], stress_xx [Pa]."""
     for body in bodies:
         data = body.surface.point_data

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fsci.plot.curves import DOTS, STYLE, label
-from fsci.plot.render import Array, Body, Pixels, View, import_pyvista, render
+from fsci.plot.render import Array, DrawnBody, Pixels, View, import_pyvista, render
 from fsci.plot.render_flow import NO_LINES, fill_lines, is_flat, load_state, plane_flow, segments, slice_plane
 from fsci.plot.scene import draw_colour_bar, field_label
 
@@ -97,7 +97,7 @@ def arrange(count: int, width: float, height: float) -> tuple[int, int]:
     return columns, -(-count // columns)
 
 
-def plane_state(files: Sequence[Path]) -> tuple[list[Body], Axes, str]:
+def plane_state(files: Sequence[Path]) -> tuple[list[DrawnBody], Axes, str]:
     """The flow, coloured by velocity, and grey bodies in the plane (x, y, 0); its coordinates; where it is in space."""
     pyvista = import_pyvista()
     meshes = [pyvista.read(path) for path in files]
@@ -111,7 +111,7 @@ def plane_state(files: Sequence[Path]) -> tuple[list[Body], Axes, str]:
     return list(cut(meshes, normal, origin)), ("y" if normal == "x" else "x", "z"), place
 
 
-def cut(meshes: Sequence[Any], normal: str, origin: Array) -> Iterator[Body]:
+def cut(meshes: Sequence[Any], normal: str, origin: Array) -> Iterator[DrawnBody]:
     """What an upright plane cuts of a box in space and of the bodies in it, seen from the front."""
     order = [1, 2, 0] if normal == "x" else [0, 2, 1]
     for mesh in meshes:
@@ -123,7 +123,7 @@ def cut(meshes: Sequence[Any], normal: str, origin: Array) -> Iterator[Body]:
         elif section.n_lines:
             yield fill_lines(section.points, section.lines.reshape(-1, 3)[:, 1:])
         elif section.n_points:
-            yield Body(section, NO_LINES, boundary(section), None)
+            yield DrawnBody(section, NO_LINES, boundary(section), None)
 
 
 def boundary(section: Any) -> Array:
@@ -135,7 +135,7 @@ def boundary(section: Any) -> Array:
     )
 
 
-def snapshot(bodies: list[Body], low: Array, high: Array, limits: tuple[float, float], width: float) -> Pixels:
+def snapshot(bodies: list[DrawnBody], low: Array, high: Array, limits: tuple[float, float], width: float) -> Pixels:
     """The plane from `low` to `high`, at the given width in inches."""
     half = (high - low) / 2
     view = View(np.array([*(low + half), 0.0]), np.array([1.0, 0, 0]), np.array([0.0, 1, 0]), *half)

@@ -4,31 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.case.verify import Check
+
 Array = NDArray[np.float64]
-
-
-class Check(Protocol):
-    """One entry of `verify:`; exactly one of `relative` and `absolute` is given."""
-
-    @property
-    def value(self) -> str: ...  #: history column
-    @property
-    def statistic(self) -> str: ...  #: final, min, max, mean, amplitude or frequency
-    @property
-    def start(self) -> float | None: ...  #: only times from here on count
-    @property
-    def reference(self) -> float: ...
-    @property
-    def relative(self) -> float | None: ...
-    @property
-    def absolute(self) -> float | None: ...
-    @property
-    def regression(self) -> bool: ...  #: the reference is a result of an earlier version
 
 
 def evaluate(history: Mapping[str, Array], checks: Sequence[Check]) -> list[dict[str, Any]]:

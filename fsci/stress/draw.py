@@ -9,9 +9,9 @@ from typing import Any, Literal
 
 from fsci.stress import flow_scenes, scenes
 from fsci.stress.frame import Frame
-from fsci.stress.scenes import Scene
+from fsci.stress.scenes import StressScene
 
-SCENES: dict[str, Callable[[random.Random], Scene]] = {
+SCENES: dict[str, Callable[[random.Random], StressScene]] = {
     "beam": scenes.beam,
     "press": scenes.press,
     "drop": scenes.drop,
@@ -30,7 +30,7 @@ class Draw:
     """What one number makes."""
 
     seed: int
-    scene: Scene
+    scene: StressScene
     twin: Twin
     frame: Frame  #: of the twin
     processes: int = 1  #: of the twin

@@ -6,7 +6,7 @@ import random
 from typing import Any
 
 from fsci.stress.frame import ACCELERATION, DENSITY, LENGTH, SPEED, VISCOSITY, Frame
-from fsci.stress.scenes import Case, Scene, solid, spread, timing
+from fsci.stress.scenes import Case, StressScene, solid, spread, timing
 
 #: Cells per unit of length. Where bodies begin is drawn in cells: flush, almost flush, anywhere.
 CELLS = 10
@@ -50,7 +50,7 @@ def common(chance: random.Random) -> dict[str, Any]:
     }
 
 
-def moved(chance: random.Random) -> Scene:
+def moved(chance: random.Random) -> StressScene:
     """A rigid body moved through a flow: thin, slanted, by up to 5 cells in a step, out of the box."""
     p = common(chance) | {
         "thickness": chance.choice([1e-3, 0.3, 1.5, 2.5, 4.0, 5.0, 5.0]),
@@ -81,10 +81,10 @@ def moved(chance: random.Random) -> Scene:
     if p["cells per step"] > 2.0:
         warn.append("cells in a time step")
     probes = {"force": {"quantity": "force", "body": "body"}, "energy": {"quantity": "kinetic_energy"}, "out": OUT}
-    return Scene("moved", p, case, probes, must_warn=tuple(warn))
+    return StressScene("moved", p, case, probes, must_warn=tuple(warn))
 
 
-def gate(chance: random.Random) -> Scene:
+def gate(chance: random.Random) -> StressScene:
     """A gate closes a basin and opens it again: a pocket without an outlet comes and goes."""
     p = common(chance) | {"past the floor": chance.choice([-1e-3, 0.0, 1e-3, 0.3])}
     steps = 8
@@ -99,10 +99,10 @@ def gate(chance: random.Random) -> Scene:
             "fluid": {**flow(frame, p, speed=1.0, inlet=0.0), "bodies": {"gate": {"mesh": mesh, "motion": motion}}},
         }
 
-    return Scene("gate", p, case, {"force": {"quantity": "force", "body": "gate"}, "out": OUT})
+    return StressScene("gate", p, case, {"force": {"quantity": "force", "body": "gate"}, "out": OUT})
 
 
-def post(chance: random.Random) -> Scene:
+def post(chance: random.Random) -> StressScene:
     """An elastic post in a flow: density ratio, stiffness, Reynolds number, both schemes of coupling."""
     p = common(chance) | {
         "solid density": spread(chance, 1e-3, 1e3),
@@ -131,10 +131,10 @@ def post(chance: random.Random) -> Scene:
         }
 
     tip = {"quantity": "displacement", "on": "top"}
-    return Scene("post", p, case, {"force": {"quantity": "force"}, "out": OUT, "tip": tip})
+    return StressScene("post", p, case, {"force": {"quantity": "force"}, "out": OUT, "tip": tip})
 
 
-def fall(chance: random.Random) -> Scene:
+def fall(chance: random.Random) -> StressScene:
     """An elastic block falls to the floor of a basin: fluid, structure and contact together, at any speed."""
     p = common(chance) | {
         "solid density": spread(chance, 1.1, 1e3),
@@ -166,4 +166,4 @@ def fall(chance: random.Random) -> Scene:
         }
 
     probes = {"force": {"quantity": "force"}, "out": OUT, "centre": {"quantity": "centre"}}
-    return Scene("fall", p, case, probes)
+    return StressScene("fall", p, case, probes)

@@ -17,7 +17,7 @@ Case = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Scene:
+class StressScene:
     """One draw of a scene."""
 
     name: str
@@ -46,7 +46,7 @@ def solid(frame: Frame, E: float, nu: float, density: float, law: str = "neo_hoo
 SOLVER: Case = {"newton": {"residual": 1e-10, "max_iterations": 25}}
 
 
-def beam(chance: random.Random) -> Scene:
+def beam(chance: random.Random) -> StressScene:
     """An elastic beam, held at one end, that is pulled sideways: stiffness, nearly incompressible, long cells."""
     p: dict[str, Any] = {
         "E": spread(chance, 1e1, 1e9),
@@ -80,10 +80,10 @@ def beam(chance: random.Random) -> Scene:
 
     warn = ("lock",) if p["order"] == 1 and p["element"] == "displacement" and p["nu"] > 0.49 else ()
     probes = {"tip": {"quantity": "displacement", "on": "right"}, "energy": {"quantity": "energy"}}
-    return Scene("beam", p, case, probes, any_angle=True, must_warn=warn)
+    return StressScene("beam", p, case, probes, any_angle=True, must_warn=warn)
 
 
-def press(chance: random.Random) -> Scene:
+def press(chance: random.Random) -> StressScene:
     """A block pressed onto another one: facets of very different size, stiffness ratio, small gaps, friction."""
     coarse = chance.choice([2, 3, 4])
     p: dict[str, Any] = {
@@ -134,10 +134,10 @@ def press(chance: random.Random) -> Scene:
         "bottom": {"quantity": "reaction", "body": "base", "on": "bottom"},
         "energy": {"quantity": "energy"},
     }
-    return Scene("press", p, case, probes, any_angle=True)
+    return StressScene("press", p, case, probes, any_angle=True)
 
 
-def drop(chance: random.Random) -> Scene:
+def drop(chance: random.Random) -> StressScene:
     """A block thrown onto a floor: contact at speed, one step that would pass the floor, friction."""
     p: dict[str, Any] = {
         "E": spread(chance, 1e2, 1e9),
@@ -180,4 +180,4 @@ def drop(chance: random.Random) -> Scene:
         }
 
     probes = {name: {"quantity": name} for name in ("momentum", "centre", "energy")}
-    return Scene("drop", p, case, probes, any_angle=True)
+    return StressScene("drop", p, case, probes, any_angle=True)

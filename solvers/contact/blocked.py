@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.contact.directions import free_normals
-from solvers.contact.interface import Interface
+from solvers.contact.interface import ContactInterface
 from solvers.contact.terms import find_normals
 
 
-def find_blocked(interface: Interface, x: Array) -> NDArray[np.bool_]:
+def find_blocked(interface: ContactInterface, x: Array) -> NDArray[np.bool_]:
     """Which they are with all nodes at x [m], shape (C,): judged once, at the start of a run."""
     multipliers, held = interface.multipliers, interface.nodes.held
     node, slaves = multipliers.node, multipliers.areas > 0.0

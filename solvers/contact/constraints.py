@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.contact.blocked import find_blocked
 from solvers.contact.coverage import Coverage
-from solvers.contact.interface import Interface
+from solvers.contact.interface import ContactInterface
 from solvers.contact.merge import Merging, with_mean_normals
 from solvers.contact.redistribute import Redistribution
 from solvers.contact.terms import Terms
@@ -31,7 +31,7 @@ class Constrained:
 class Constraints:
     """Coverage, merging and redistribution; decisions of a step stay, see there."""
 
-    def __init__(self, interface: Interface):
+    def __init__(self, interface: ContactInterface):
         self._interface = interface
         multipliers = interface.multipliers
         facets = [patch.multipliers[patch.facets] for patch in multipliers.patches]

@@ -15,10 +15,10 @@ from solvers.contact.constraints import Constraints
 from solvers.contact.directions import answered, free_normals
 from solvers.contact.distance import distances
 from solvers.contact.friction_work import FrictionWork
-from solvers.contact.interface import Interface, describe_interface
+from solvers.contact.interface import ContactInterface, describe_interface
 from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
 from solvers.contact.law.tied import Tied
-from solvers.contact.linearise import Part, linearise
+from solvers.contact.linearise import ActiveMultipliers, linearise
 from solvers.contact.pair import Pair
 from solvers.contact.redistribute import redistributed
 from solvers.contact.share import Shares
@@ -53,7 +53,7 @@ class Contact:
     ):
         self.comm, self.c_n = comm, c_n
         self.names = tuple(names) or tuple(f"pair{i}" for i in range(len(pairs)))
-        self.interface: Interface = describe_interface(pairs)
+        self.interface: ContactInterface = describe_interface(pairs)
         self.pairs, self.nodes = self.interface.pairs, self.interface.nodes
         self.multipliers = self.interface.multipliers
         self.size, self.dim = self.nodes.points.shape
@@ -87,7 +87,7 @@ class Contact:
         self.touched_at = np.full(len(self.pairs), np.inf)  #: when each pair first touched [s], as probes have noted it
         self.terms: Terms | None = None
         self._D, self._covers = np.zeros(count), np.zeros(count, dtype=bool)  # at the latest evaluation
-        self._condensation: tuple[list[Part], Linearised, Condensed] | None = None  # the latest
+        self._condensation: tuple[list[ActiveMultipliers], Linearised, Condensed] | None = None  # the latest
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -258,13 +258,13 @@ class Contact:
             total += float(np.sum(missed**2))
         return float(np.sqrt(total))
 
-    def in_contact(self) -> list[Part]:
+    def in_contact(self) -> list[ActiveMultipliers]:
         """Multipliers in contact, law by law."""
         parts = [(law, which[self.active_set.active[which]]) for law, which in self.interface.laws]
         status = self.active_set.status
-        return [Part(law, which, self._point(which), status[which]) for law, which in parts if len(which)]
+        return [ActiveMultipliers(law, which, self._point(which), status[which]) for law, which in parts if len(which)]
 
-    def linearised(self, parts: Sequence[Part], weight: float) -> Linearised:
+    def linearised(self, parts: Sequence[ActiveMultipliers], weight: float) -> Linearised:
         """What multipliers in contact add to a Newton step."""
         assert self.terms is not None
         count, n, dgap = len(self.z), self.dim * self.size, self._redistributed(self.terms.dgap)

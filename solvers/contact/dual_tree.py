@@ -29,7 +29,7 @@ Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Level:
+class TreeLevel:
     """Nodes of one depth: the two children of each in the next finer level, the same twice if there is only one."""
 
     children: Indices  #: shape (n, 2)
@@ -146,9 +146,9 @@ def neighbours(corners: Indices, dim: int) -> Indices:
     return np.stack([owner[:-1][same], owner[1:][same]], axis=1)
 
 
-def _join(count: int, edges: Indices, middles: Array) -> list[Level]:
+def _join(count: int, edges: Indices, middles: Array) -> list[TreeLevel]:
     """Levels from the facets to the root: neighbours become one node, the nearest first."""
-    levels: list[Level] = []
+    levels: list[TreeLevel] = []
     weights: Array = np.ones(count)
     while count > 1:
         cost = np.linalg.norm(middles[edges[:, 0]] - middles[edges[:, 1]], axis=1)
@@ -163,7 +163,7 @@ def _join(count: int, edges: Indices, middles: Array) -> list[Level]:
             children = list(zip(rest[::2], rest[1::2], strict=False))
             rest = rest[len(rest) // 2 * 2 :]
         children += [(a, a) for a in rest]
-        level = Level(np.array(children, dtype=np.int64))
+        level = TreeLevel(np.array(children, dtype=np.int64))
         for place, both in enumerate(children):
             parent[list(both)] = place
         total = np.asarray(np.bincount(parent, weights, len(children)), dtype=float)

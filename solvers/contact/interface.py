@@ -13,10 +13,10 @@ from solvers.api import Array
 from solvers.contact.law.law import Law
 from solvers.contact.mortar import FacetSearch, Mortar, join_masters
 from solvers.contact.pair import Pair
-from solvers.contact.patch import Multipliers, Patch, number_multipliers
+from solvers.contact.patch import Multipliers, SlavePatch, number_multipliers
 from solvers.contact.search import Search
 from solvers.contact.self_search import SelfSearch
-from solvers.contact.surface import Nodes, Surface, longest_edge, number_nodes
+from solvers.contact.surface import ContactNodes, Surface, longest_edge, number_nodes
 from solvers.sparse import Sparse, sparse
 
 #: T with N~ = N T over all nodes, and its inverse
@@ -24,12 +24,12 @@ Basis = tuple[Sparse, Sparse]
 
 
 @dataclass(frozen=True)
-class Interface:
+class ContactInterface:
     """All pairs together."""
 
     pairs: tuple[Pair, ...]
     surfaces: tuple[Surface, ...]  #: each once
-    nodes: Nodes
+    nodes: ContactNodes
     multipliers: Multipliers
     laws: tuple[tuple[Law, NDArray[np.int64]], ...]  #: each with its multipliers
     spans: NDArray[np.str_]  #: directions that each multiplier may have by its law: normal, surface, space
@@ -50,7 +50,7 @@ class Interface:
                 x[numbers] = surface.unmoved
         return x
 
-    def law_of(self, patch: Patch) -> Law:
+    def law_of(self, patch: SlavePatch) -> Law:
         """Of a patch: all its multipliers have the same."""
         return next(law for law, which in self.laws if np.isin(patch.multipliers, which).all())
 
@@ -80,7 +80,7 @@ class Interface:
         return patch.multipliers[places], slave.facets.ravel()[first]
 
 
-def describe_interface(pairs: Sequence[Pair]) -> Interface:
+def describe_interface(pairs: Sequence[Pair]) -> ContactInterface:
     """Number nodes and multipliers, and bring together what belongs to one slave surface."""
     surfaces = _distinct([surface for pair in pairs for surface in (pair.slave, pair.master)])
     slaves = _distinct([pair.slave for pair in pairs])
@@ -92,7 +92,7 @@ def describe_interface(pairs: Sequence[Pair]) -> Interface:
     mortars: list[Mortar] = []
     for k, slave in enumerate(slaves):
         mortars += _mortars_of(slave, k, pairs, numbers, multipliers)
-    return Interface(
+    return ContactInterface(
         pairs=tuple(pairs),
         surfaces=tuple(surfaces),
         nodes=nodes,

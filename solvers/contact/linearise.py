@@ -12,13 +12,13 @@ from solvers.api import Array
 from solvers.contact.blocks import block_diagonal, components, expand
 from solvers.contact.condense import Linearised
 from solvers.contact.directions import find_directions
-from solvers.contact.interface import Interface
+from solvers.contact.interface import ContactInterface
 from solvers.contact.law.law import Law, Point, Slopes, Statuses
 from solvers.sparse import Sparse, nothing, stack
 
 
 @dataclass(frozen=True)
-class Part:
+class ActiveMultipliers:
     """Multipliers of one law that are in contact."""
 
     law: Law
@@ -28,9 +28,9 @@ class Part:
 
 
 def linearise(
-    interface: Interface,
+    interface: ContactInterface,
     spans: NDArray[np.str_],
-    parts: Sequence[Part],
+    parts: Sequence[ActiveMultipliers],
     slopes: Slopes,
     force: Sparse,
     dforce: Sparse,
@@ -65,7 +65,9 @@ def linearise(
     )
 
 
-def _law_rows(parts: Sequence[Part], slopes: Slopes, weight: float, columns: int) -> tuple[Sparse, Sparse, Array]:
+def _law_rows(
+    parts: Sequence[ActiveMultipliers], slopes: Slopes, weight: float, columns: int
+) -> tuple[Sparse, Sparse, Array]:
     """(by z, by u, residual) of all multipliers in contact, law by law."""
     by_z, by_u, residual = [], [], []
     for part in parts:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
 from solvers.contact.blocks import expand
-from solvers.contact.patch import Patch
+from solvers.contact.patch import SlavePatch
 from solvers.contact.search import OPPOSED
 from solvers.contact.surface import Surface
 from solvers.kernels import MortarResult, mortar
@@ -90,7 +90,7 @@ class Mortar:
 
     def __init__(
         self,
-        patch: Patch,
+        patch: SlavePatch,
         facets: NDArray[np.int64],
         edge: float,
         masters: Masters,

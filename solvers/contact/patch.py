@@ -12,13 +12,13 @@ from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
 from solvers.contact.law.law import Law
 from solvers.contact.pieces import cut_at_edges
-from solvers.contact.surface import Nodes, Surface, facet_areas
+from solvers.contact.surface import ContactNodes, Surface, facet_areas
 from solvers.kernels import basis_transformation, nodal_normals
 from solvers.sparse import Sparse, sparse
 
 
 @dataclass(frozen=True)
-class Patch:
+class SlavePatch:
     """Connected slave surfaces; a node on a sharp edge has several places (see `cut_at_edges`)."""
 
     nodes: NDArray[np.int64]  #: of each place, among all nodes, shape (n,)
@@ -55,7 +55,7 @@ class Multipliers:
 
     node: NDArray[np.int64]  #: of each multiplier, shape (C,)
     areas: Array  #: reference area around the node in the patch [m^(dim-1)], zero if there is none, shape (C,)
-    patches: tuple[Patch, ...]
+    patches: tuple[SlavePatch, ...]
     patch_of_surface: tuple[int, ...]  #: patch of each slave surface
     facets_of_surface: tuple[NDArray[np.int64], ...]  #: of each slave surface, in numbers of its patch
 
@@ -66,7 +66,7 @@ class Multipliers:
 
 
 def number_multipliers(
-    slaves: Sequence[Surface], numbers: Sequence[NDArray[np.int64]], nodes: Nodes, laws: Sequence[Law]
+    slaves: Sequence[Surface], numbers: Sequence[NDArray[np.int64]], nodes: ContactNodes, laws: Sequence[Law]
 ) -> Multipliers:
     """Join slave surfaces of one law that have common nodes to patches, and number the multipliers.
 
@@ -74,7 +74,7 @@ def number_multipliers(
     """
     node = list(range(len(nodes.points)))
     areas = [0.0] * len(node)
-    patches: list[Patch] = []
+    patches: list[SlavePatch] = []
     of_surface = [0] * len(slaves)
     facets_of_surface = [np.empty((0, 0), dtype=np.int64)] * len(slaves)
     for group in _join(slaves, numbers, laws):
@@ -97,7 +97,7 @@ def number_multipliers(
         for i, own in zip(group, number, strict=True):
             of_surface[i], facets_of_surface[i] = len(patches), pieces.facets[own]
         mine = pieces.nodes, multipliers, pieces.facets, facet_type, share
-        patches.append(Patch(*mine, None if mask.all() else mask))
+        patches.append(SlavePatch(*mine, None if mask.all() else mask))
     return Multipliers(np.array(node), np.array(areas), tuple(patches), tuple(of_surface), tuple(facets_of_surface))
 
 
@@ -126,7 +126,7 @@ def _facets(
     return every[first[order]], np.split(place[number.ravel()], ends), owner[first[order]]
 
 
-def _mask(surfaces: Sequence[Surface], numbers: Sequence[NDArray[np.int64]], nodes: Nodes) -> Array:
+def _mask(surfaces: Sequence[Surface], numbers: Sequence[NDArray[np.int64]], nodes: ContactNodes) -> Array:
     mask = np.ones(nodes.points.shape)
     for surface, own in zip(surfaces, numbers, strict=True):
         if surface.symmetric is not None:

@@ -38,7 +38,7 @@ class Surface:
 
 
 @dataclass(frozen=True)
-class Nodes:
+class ContactNodes:
     """All nodes of all surfaces, each deformable node once."""
 
     points: Array  #: reference positions [m], shape (N, dim)
@@ -61,7 +61,7 @@ class Nodes:
         return np.einsum("nii->n", self.held) > self.dim - 0.5
 
 
-def number_nodes(surfaces: Sequence[Surface]) -> Nodes:
+def number_nodes(surfaces: Sequence[Surface]) -> ContactNodes:
     """Number the nodes of the surfaces together: nodes with the same dofs are the same node."""
     points, dofs, held, numbers = [], [], [], []
     known: dict[int, int] = {}
@@ -86,7 +86,7 @@ def number_nodes(surfaces: Sequence[Surface]) -> Nodes:
         dofs.append(own[new])
         held.append(np.zeros((len(new), dim, dim)) if fixed is None else fixed[new])
         numbers.append(number)
-    return Nodes(np.concatenate(points), np.concatenate(dofs), np.concatenate(held), tuple(numbers))
+    return ContactNodes(np.concatenate(points), np.concatenate(dofs), np.concatenate(held), tuple(numbers))
 
 
 def facet_areas(points: Array, facets: NDArray[np.int64], facet_type: str) -> Array:

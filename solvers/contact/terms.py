@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.contact.blocks import add_up, components
 from solvers.contact.mortar import Mortar, MortarTerms
-from solvers.contact.patch import Multipliers, Patch
+from solvers.contact.patch import Multipliers, SlavePatch
 from solvers.contact.share import Shares
 from solvers.sparse import Sparse
 
@@ -24,7 +24,7 @@ class Normals:
     slopes: Sparse  #: derivatives with respect to all nodes, shape (dim * C, dim * N)
     of_patch: tuple[tuple[Array, Sparse], ...]  #: the same by patch, in its own numbers
 
-    def at(self, multipliers: Multipliers, patch: Patch) -> tuple[Array, Sparse]:
+    def at(self, multipliers: Multipliers, patch: SlavePatch) -> tuple[Array, Sparse]:
         """Those of a patch."""
         return self.of_patch[next(k for k, other in enumerate(multipliers.patches) if other is patch)]
 

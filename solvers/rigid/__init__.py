@@ -5,7 +5,7 @@ from solvers.lazy import lazy_names
 __getattr__, __all__ = lazy_names(
     __name__,
     {
-        "body": ["RigidBody", "Spring"],
+        "body": ["PointSpring", "RigidBody"],
         "field": ["RigidBodies"],
         "inertia": ["Inertia", "inertia_of_surface"],
     },

@@ -18,7 +18,7 @@ WAYS = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
 
 
 @dataclass(frozen=True)
-class Spring:
+class PointSpring:
     """From a point of the body to the place where that point is at the start: -k d along each axis."""
 
     at: Sequence[float]  #: [m], shape (dim,)
@@ -35,7 +35,7 @@ class RigidBody:
     facets: NDArray[np.int64]  #: segments or triangles, the solid on their left or below, shape (m, dim)
     inertia: Inertia
     gravity: Sequence[Value] | None = None  #: [m/s^2], by components
-    springs: Sequence[Spring] = ()
+    springs: Sequence[PointSpring] = ()
     held: Mapping[str, Callable[[float], float]] = field(default_factory=dict)  #: by `WAYS`
     initial_velocity: Sequence[float] = ()  #: of the centre [m/s], shape (dim,)
     initial_spin: Sequence[float] = ()  #: [rad/s], shape (3,)
@@ -92,7 +92,7 @@ class RigidBody:
         return tangent
 
     def _spring_force(
-        self, spring: Spring, shift: Array, R: Array, velocity: Array, spin: Array
+        self, spring: PointSpring, shift: Array, R: Array, velocity: Array, spin: Array
     ) -> tuple[Array, Array, Array]:
         """(arm [m], force [N], stiffness by axis [N/m]) of a spring, each of shape (3,)."""
         at = np.array([spring.at], dtype=float)

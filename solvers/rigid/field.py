@@ -16,7 +16,7 @@ from solvers.newton import Tolerance, converge
 from solvers.rigid import motion
 from solvers.rigid.body import RigidBody, in_space
 from solvers.rigid.contact import RigidContact
-from solvers.rigid.motion import Instant
+from solvers.rigid.motion import RigidInstant
 from solvers.rigid.rotation import vector_rate
 from solvers.rounding import rounding_error
 from solvers.rows import RowTransformation, TakenRows
@@ -57,7 +57,7 @@ class RigidBodies:
         self.unknowns = len(bodies) * len(self.ways)  #: of all processes
         self.size = self.unknowns if comm.rank == 0 else 0
         self.surfaces = {body.name: body.points for body in bodies}
-        self.now = [Instant.at_rest() for _ in bodies]
+        self.now = [RigidInstant.at_rest() for _ in bodies]
         self.old = list(self.now)
         self.on_surface = np.zeros((len(bodies), 6))  #: force and moment by the flow [N, N m], now
         self.on_surface_old = np.zeros((len(bodies), 6))
@@ -84,14 +84,14 @@ class RigidBodies:
             v = np.zeros(6)
             v[: len(body.initial_velocity)] = body.initial_velocity
             v[3 : 3 + len(body.initial_spin)] = body.initial_spin
-            start = Instant.at_rest()
+            start = RigidInstant.at_rest()
             load = body.own_load(t, start.shift, start.R, v[:3], v[3:])
             rate, ways, h = load.copy(), body.held_ways, 1e-3 * dt
             x = [body.held_at(t + k * h) for k in range(4)]
             v[ways] = (-3.0 * x[0] + 4.0 * x[1] - x[2]) / (2.0 * h)
             course = (2.0 * x[0] - 5.0 * x[1] + 4.0 * x[2] - x[3]) / h**2
             rate[ways] = np.diag(motion.mass(body, start.R))[ways] * course
-            self.now[index] = Instant(start.shift, start.R, v, rate, load)
+            self.now[index] = RigidInstant(start.shift, start.R, v, rate, load)
         self.old = list(self.now)
 
     def step(self, t: float, dt: float) -> StepInfo:
@@ -164,7 +164,7 @@ class RigidBodies:
             v[3:] = now.R.T @ v[3:]
             self.now[index] = replace(now, v=v, p=p)
 
-    def _velocity(self, instants: Sequence[Instant]) -> Array:
+    def _velocity(self, instants: Sequence[RigidInstant]) -> Array:
         """Velocities of the centres [m/s] and spins in space [rad/s], of all unknowns."""
         return self._of_ways(np.array([np.concatenate([now.v[:3], motion.spin(now)]) for now in instants]))
 
@@ -393,5 +393,7 @@ class RigidBodies:
         return {"bodies": parts, "on_surface": self.on_surface.copy()}
 
     def restore(self, state: State) -> None:
-        self.now = [Instant(**{k: a.copy() for k, a in state["bodies"][body.name].items()}) for body in self.bodies]
+        self.now = [
+            RigidInstant(**{k: a.copy() for k, a in state["bodies"][body.name].items()}) for body in self.bodies
+        ]
         self.on_surface = state["on_surface"].copy()

@@ -26,7 +26,7 @@ from solvers.rigid.rotation import rotation, skew, vector_rate
 
 
 @dataclass(frozen=True)
-class Instant:
+class RigidInstant:
     """One body at one time."""
 
     shift: Array  #: displacement [m] of the centre since the start of the run, shape (3,)
@@ -36,7 +36,7 @@ class Instant:
     load: Array  #: force and moment about the centre in space, without contact, shape (6,)
 
     @classmethod
-    def at_rest(cls) -> Instant:
+    def at_rest(cls) -> RigidInstant:
         return cls(np.zeros(3), np.eye(3), np.zeros(6), np.zeros(6), np.zeros(6))
 
     def arrays(self) -> dict[str, Array]:
@@ -44,7 +44,7 @@ class Instant:
         return {part.name: getattr(self, part.name).copy() for part in fields(self)}
 
 
-def spin(now: Instant) -> Array:
+def spin(now: RigidInstant) -> Array:
     """[rad/s] in space."""
     return now.R @ now.v[3:]
 
@@ -61,18 +61,18 @@ def mass(body: RigidBody, R: Array) -> Array:
     return found
 
 
-def kinetic_energy(body: RigidBody, now: Instant) -> float:
+def kinetic_energy(body: RigidBody, now: RigidInstant) -> float:
     """[J]"""
     return 0.5 * float(body.inertia.mass * now.v[:3] @ now.v[:3] + now.v[3:] @ body.inertia.tensor @ now.v[3:])
 
 
-def acceleration(body: RigidBody, now: Instant) -> Array:
+def acceleration(body: RigidBody, now: RigidInstant) -> Array:
     """a [m/s^2], and A [rad/s^2] in the body, shape (6,)."""
     J, W = body.inertia.tensor, now.v[3:]
     return np.concatenate([now.p[:3] / body.inertia.mass, np.linalg.solve(J, now.R.T @ now.p[3:] - np.cross(W, J @ W))])
 
 
-def moved(body: RigidBody, scheme: GeneralisedAlpha, old: Instant, u: Array, t: float, dt: float) -> Instant:
+def moved(body: RigidBody, scheme: GeneralisedAlpha, old: RigidInstant, u: Array, t: float, dt: float) -> RigidInstant:
     """The body after a step to t by u, shape (6,), under its own loads."""
     R = rotation(u[3:]) @ old.R
     shift = old.shift + u[:3]
@@ -80,10 +80,10 @@ def moved(body: RigidBody, scheme: GeneralisedAlpha, old: Instant, u: Array, t: 
     v = scheme.velocity(in_body, old.v, acceleration(body, old), dt)
     change = momentum(body, R, v) - momentum(body, old.R, old.v)
     p = change / (scheme.gamma * dt) - (1.0 - scheme.gamma) / scheme.gamma * old.p
-    return Instant(shift, R, v, p, body.own_load(t, shift, R, v[:3], R @ v[3:]))
+    return RigidInstant(shift, R, v, p, body.own_load(t, shift, R, v[:3], R @ v[3:]))
 
 
-def velocity_rate(scheme: GeneralisedAlpha, old: Instant, now: Instant, theta: Array, dt: float) -> Array:
+def velocity_rate(scheme: GeneralisedAlpha, old: RigidInstant, now: RigidInstant, theta: Array, dt: float) -> Array:
     """Derivative of (v, spin in space) by dc and a further rotation w in space, shape (6, 6)."""
     rate = scheme.gamma / (scheme.beta * dt)
     by_w = rate * now.R @ old.R.T @ vector_rate(theta) - skew(spin(now))
@@ -91,7 +91,7 @@ def velocity_rate(scheme: GeneralisedAlpha, old: Instant, now: Instant, theta: A
 
 
 def inertia_tangent(
-    body: RigidBody, scheme: GeneralisedAlpha, old: Instant, now: Instant, theta: Array, dt: float
+    body: RigidBody, scheme: GeneralisedAlpha, old: RigidInstant, now: RigidInstant, theta: Array, dt: float
 ) -> Array:
     """Derivative of (1 - alpha_m) p by dc and a further rotation w in space, shape (6, 6)."""
     share, rate = (1.0 - scheme.alpha_m) / (scheme.gamma * dt), scheme.gamma / (scheme.beta * dt)

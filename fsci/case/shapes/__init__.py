@@ -1,9 +1,9 @@
 """Built-in meshes in the case file: every shape there is."""
 
-from fsci.case.shapes.built_in import Placed
+from fsci.case.shapes.built_in import PlacedMesh
 from fsci.case.shapes.plane import PlaneShape
 from fsci.case.shapes.solid import SolidShape
 
 Shape = PlaneShape | SolidShape
 
-__all__ = ["Placed", "Shape"]
+__all__ = ["PlacedMesh", "Shape"]

@@ -6,13 +6,13 @@ from math import prod
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Count, Entries, Number, NumberVector, OneOrMany, Order
+from fsci.case.values import Count, EntryCount, Number, NumberVector, OneOrMany, Order
 
 
 class Rotation(Section):
     """A rotation about an axis through the origin; in 2D about the origin."""
 
-    axis: Annotated[tuple[Number, ...], Entries(3, 3)] | None = setting(
+    axis: Annotated[tuple[Number, ...], EntryCount(3, 3)] | None = setting(
         None, "direction of the axis (3D only)", unit="1"
     )
     angle: Number = setting(..., "angle, counterclockwise seen against the axis", unit="degrees")
@@ -20,8 +20,8 @@ class Rotation(Section):
 
 #: One rotation or a list of them.
 Rotations = Annotated[tuple[Rotation, ...], OneOrMany()]
-Cells2 = Annotated[tuple[Count, ...], Entries(2, 2)]
-Cells3 = Annotated[tuple[Count, ...], Entries(3, 3)]
+Cells2 = Annotated[tuple[Count, ...], EntryCount(2, 2)]
+Cells3 = Annotated[tuple[Count, ...], EntryCount(3, 3)]
 
 
 Counts = tuple[int, int]  #: cells, nodes
@@ -43,14 +43,14 @@ def product(*parts: Counts) -> Counts:
     return prod(cells for cells, _ in parts), prod(nodes for _, nodes in parts)
 
 
-class Placed(Section):
+class PlacedMesh(Section):
     """A mesh that is rotated, then moved."""
 
     rotate: Rotations = setting(tuple, "rotation or list of rotations, the first one first")
     translate: NumberVector | None = setting(None, "displacement after the rotations", unit="m")
 
 
-class BuiltIn(Placed):
+class BuiltIn(PlacedMesh):
     """A built-in mesh."""
 
     dimension: ClassVar[int]
@@ -94,7 +94,7 @@ class BuiltIn(Placed):
         return max(edges) / min(edges)
 
 
-class Plane(BuiltIn):
+class PlaneBuiltIn(BuiltIn):
     """A built-in mesh in 2D."""
 
     dimension = 2
@@ -102,7 +102,7 @@ class Plane(BuiltIn):
     cell: Literal["quad", "tri"] = setting("quad", "type of the cells; a tri is half a quad")
 
 
-class Solid(BuiltIn):
+class SolidBuiltIn(BuiltIn):
     """A built-in mesh in 3D."""
 
     dimension = 3

@@ -11,24 +11,24 @@ from fsci.case.section import fault, setting
 from fsci.case.shapes.built_in import (
     Cells2,
     Counts,
-    Plane,
+    PlaneBuiltIn,
     across_disc,
     along,
     product,
     require_around,
     require_wall,
 )
-from fsci.case.values import Entries, Number, Positive
+from fsci.case.values import EntryCount, Number, Positive
 
 
-class Rectangle(Plane):
+class Rectangle(PlaneBuiltIn):
     """Rectangle with the surfaces left, right, bottom, top."""
 
     sides = ("left", "right", "bottom", "top")
     shape: Literal["rectangle"] = setting(..., "kind of shape")
-    size: Annotated[tuple[Positive, ...], Entries(2, 2)] = setting(..., "extent along x and y", unit="m")
+    size: Annotated[tuple[Positive, ...], EntryCount(2, 2)] = setting(..., "extent along x and y", unit="m")
     cells: Cells2 = setting(..., "number of cells along x and y")
-    origin: Annotated[tuple[Number, ...], Entries(2, 2)] = setting((0.0, 0.0), "lower left corner", unit="m")
+    origin: Annotated[tuple[Number, ...], EntryCount(2, 2)] = setting((0.0, 0.0), "lower left corner", unit="m")
 
     @property
     def lattice(self) -> Counts:
@@ -44,7 +44,7 @@ class Rectangle(Plane):
         return min(self.size)
 
 
-class Disc(Plane):
+class Disc(PlaneBuiltIn):
     """Disc about the origin, a square core in a round shell, with the surface outer."""
 
     sides = ("outer",)
@@ -71,7 +71,7 @@ class Disc(Plane):
         return 2 * self.radius
 
 
-class Ring(Plane):
+class Ring(PlaneBuiltIn):
     """Ring about the origin or a part of it, with the surfaces inner, outer and, unless closed, start, end."""
 
     sides = ("inner", "outer")

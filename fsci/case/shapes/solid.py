@@ -12,24 +12,24 @@ from fsci.case.shapes.built_in import (
     Cells2,
     Cells3,
     Counts,
-    Solid,
+    SolidBuiltIn,
     across_disc,
     along,
     product,
     require_around,
     require_wall,
 )
-from fsci.case.values import Entries, Number, Positive
+from fsci.case.values import EntryCount, Number, Positive
 
 
-class Box(Solid):
+class Box(SolidBuiltIn):
     """Box with the surfaces left, right (x), front, back (y), bottom, top (z)."""
 
     sides = ("left", "right", "front", "back", "bottom", "top")
     shape: Literal["box"] = setting(..., "kind of shape")
-    size: Annotated[tuple[Positive, ...], Entries(3, 3)] = setting(..., "extent along x, y and z", unit="m")
+    size: Annotated[tuple[Positive, ...], EntryCount(3, 3)] = setting(..., "extent along x, y and z", unit="m")
     cells: Cells3 = setting(..., "number of cells along x, y and z")
-    origin: Annotated[tuple[Number, ...], Entries(3, 3)] = setting((0.0, 0.0, 0.0), "lower corner", unit="m")
+    origin: Annotated[tuple[Number, ...], EntryCount(3, 3)] = setting((0.0, 0.0, 0.0), "lower corner", unit="m")
 
     @property
     def lattice(self) -> Counts:
@@ -45,7 +45,7 @@ class Box(Solid):
         return min(self.size)
 
 
-class Beam(Solid):
+class Beam(SolidBuiltIn):
     """Box along the x axis, from x = 0, with the surfaces left, right (x), front, back (y), bottom, top (z)."""
 
     sides = ("left", "right", "front", "back", "bottom", "top")
@@ -69,7 +69,7 @@ class Beam(Solid):
         return min(self.extents)
 
 
-class Cylinder(Solid):
+class Cylinder(SolidBuiltIn):
     """Cylinder about the z axis, from z = 0, with the surfaces outer, bottom, top."""
 
     sides = ("outer", "bottom", "top")
@@ -98,7 +98,7 @@ class Cylinder(Solid):
         return min(2 * self.radius, self.height)
 
 
-class Tube(Solid):
+class Tube(SolidBuiltIn):
     """Tube (or annulus) about the z axis, from z = 0, with the surfaces inner, outer, bottom, top."""
 
     sides = ("inner", "outer", "bottom", "top")
@@ -128,7 +128,7 @@ class Tube(Solid):
         return min(self.outer_radius - self.inner_radius, self.height)
 
 
-class SolidTorus(Solid):
+class SolidTorus(SolidBuiltIn):
     """Torus about the y axis, with the surface outer."""
 
     sides = ("outer",)
@@ -162,7 +162,7 @@ class SolidTorus(Solid):
         return 2 * self.minor_radius
 
 
-class HollowTorus(Solid):
+class HollowTorus(SolidBuiltIn):
     """Torus about the y axis with a wall, with the surfaces inner, outer."""
 
     sides = ("inner", "outer")
@@ -202,7 +202,7 @@ class HollowTorus(Solid):
         return self.outer_radius - self.inner_radius
 
 
-class HollowSphere(Solid):
+class HollowSphere(SolidBuiltIn):
     """Spherical shell about the origin (a cubed sphere), with the surfaces inner, outer."""
 
     sides = ("inner", "outer")
@@ -230,7 +230,7 @@ class HollowSphere(Solid):
         return self.outer_radius - self.inner_radius
 
 
-class Sphere(Solid):
+class Sphere(SolidBuiltIn):
     """Ball about the origin, a cubic core in a round shell, with the surface outer."""
 
     sides = ("outer",)
