@@ -134,7 +134,7 @@ def distributed(own: Sparse, sizes, comm) -> PETSc.Mat:
 def from_entries(
     comm: MPI.Comm, owned: tuple[int, int], rows: NDArray[np.int64], columns: NDArray[np.int64], data: Array
 ) -> PETSc.Mat:
-    """A matrix with `owned` rows and columns from entries of any process; equal places add up. Collective."""
+    """A matrix with `owned` rows and columns from entries of any process, which add up. Collective."""
     end = comm.scan(owned[0])  # type: ignore[attr-defined]
     start = end - owned[0]
     if comm.size > 1:

@@ -161,7 +161,7 @@ def sparse(csr, shape: tuple[int, int]) -> Sparse:
 
 
 def sparse_from_entries(rows: NDArray, columns: NDArray, data: Array, shape: tuple[int, int]) -> Sparse:
-    """Entries of equal places add up; the columns of each row are in order."""
+    """Entries of one row and column add up; the columns of each row are in order."""
     rows, columns = (np.ascontiguousarray(part, dtype=np.int32) for part in (rows, columns))
     out, indices, indptr = _empty(shape[0], len(data))
     compiled.coo_tocsr(*shape, len(data), rows, columns, np.ascontiguousarray(data), indptr, indices, out)

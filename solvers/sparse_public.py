@@ -68,7 +68,7 @@ def csr_sort_indices(rows: int, p, j, x) -> None:
 
 
 def csr_sum_duplicates(rows: int, columns: int, p, j, x) -> None:
-    """Adds up entries of equal places, whose columns are in order."""
+    """Adds up entries of one row and column, whose columns are in order."""
     found = _matrix(rows, columns, p.copy(), j.copy(), x.copy())
     found.sum_duplicates()
     _put(found, p, j, x)
@@ -80,7 +80,7 @@ def csr_todense(rows: int, columns: int, p, j, x, out: Array) -> None:
 
 
 def coo_tocsr(rows: int, columns: int, count: int, row, column, x, indptr, indices, data) -> None:
-    """Rows of entries that are in any order; those of equal places stay apart."""
+    """Rows of entries that are in any order; those of one row and column stay apart."""
     order = np.argsort(row, kind="stable")
     indptr[:] = np.searchsorted(row[order], np.arange(rows + 1))
     indices[:], data[:] = column[order], x[order]

@@ -1,4 +1,4 @@
-"""Values that a user gives: numbers, or functions of place and time."""
+"""Values that a user gives: numbers, or functions of position and time."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def evaluate_components(values: Sequence[Value], x: Array, t: float) -> Array:
 
 
 def combine(function: Callable[..., Any], *values: Value) -> Value:
-    """function(*values): a number if all of them are, else a function of place and time."""
+    """function(*values): a number if all of them are, else a function of position and time."""
     if not any(callable(value) for value in values):
         return float(function(*values))
 

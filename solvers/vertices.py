@@ -13,7 +13,7 @@ from solvers.sparse import sparse_from_entries
 
 @dataclass(frozen=True)
 class Entries:
-    """Entries of a sparse matrix; several of one place add up. A vertex has the dofs number * dim + axis."""
+    """Entries of a sparse matrix; several of one row and column add up. A vertex has the dofs number * dim + axis."""
 
     rows: NDArray[np.int64]
     columns: NDArray[np.int64]
@@ -48,7 +48,7 @@ class VertexJacobian:
         return self.times(entries.transposed).transposed
 
     def _summed(self, entries: Entries) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-        """(rows, columns, values); several entries of a place are added before each becomes k."""
+        """(rows, columns, values); several entries of one row and column are added before each becomes k."""
         rows, columns, values = entries.rows, entries.columns, entries.values
         if self.columns.shape[1] == 1 or not len(rows):
             return rows, columns, values

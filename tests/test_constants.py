@@ -10,8 +10,8 @@ from fsci import shapes
 from fsci.builder import facing
 from fsci.case import load_case
 from solvers.cell_types import CELL_TYPES
-from solvers.contact import dual_tree, mortar, pieces, self_search, share
-from solvers.contact.pieces import cut_at_edges
+from solvers.contact import dual_tree, mortar, self_search, share, sharp_edges
+from solvers.contact.sharp_edges import split_nodes
 from solvers.fluid.surface import ImmersedSurface
 from solvers.mesh_topology import cut_out
 from solvers.structure import dynamics
@@ -28,16 +28,16 @@ def set_opposed(monkeypatch, value):
 def test_angle_of_sharp_edges(monkeypatch, angle):
     """Square bodies and fine round ones are the same with any angle; coarse round ones need a large one."""
     found = []
-    for value in (angle, pieces.SHARP):
-        monkeypatch.setattr(pieces, "SHARP", value)
-        places = []
+    for value in (angle, sharp_edges.SHARP):
+        monkeypatch.setattr(sharp_edges, "SHARP", value)
+        split = []
         for mesh, names in (
             (shapes.box([1, 1, 1], [2, 2, 2]), ["left", "right", "bottom", "top", "front", "back"]),
             (shapes.ring(0.8, 1.0, [48, 3], 350, 5), ["inner", "outer", "start", "end"]),
         ):
             points, facets, _ = cut_out(mesh, names)
-            places.append(cut_at_edges(points, facets, CELL_TYPES[CELL_TYPES[mesh.cell_type].facet].name).nodes)
-        found.append(places)
+            split.append(split_nodes(points, facets, CELL_TYPES[CELL_TYPES[mesh.cell_type].facet].name).nodes)
+        found.append(split)
     assert all(np.array_equal(a, b) for a, b in zip(*found, strict=True))
 
 

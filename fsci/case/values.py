@@ -48,7 +48,7 @@ def spoken(value: Any) -> str:
 
 
 def value_of(expression: Expression) -> Value:
-    """A number where the expression is one, else the expression itself: a function of place and time."""
+    """A number where the expression is one, else the expression itself: a function of position and time."""
     return expression if expression.constant is None else float(expression.constant)
 
 

@@ -64,20 +64,20 @@ class ContactInterface:
 
     def multipliers_of(self, slave: Surface) -> NDArray[np.int64]:
         """Multipliers of a slave surface, in the order of its nodes; several where it has a sharp edge."""
-        return self._places(slave)[0]
+        return self._numbers(slave)[0]
 
     def at_nodes(self, slave: Surface, values: Array, join: np.ufunc) -> Array:
         """Values at the nodes of a slave surface from those (C,) of all multipliers, shape (n,)."""
-        which, node = self._places(slave)
+        which, node = self._numbers(slave)
         found = np.full(len(slave.points), np.nan)
         join.at(found, node, values[which])
         return found
 
-    def _places(self, slave: Surface) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _numbers(self, slave: Surface) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """(multipliers of a slave surface, the nodes of the surface that they belong to)."""
         patch = self.multipliers.patches[self.patch_of[id(slave)]]
-        places, first = np.unique(self.facets_of[id(slave)], return_index=True)
-        return patch.multipliers[places], slave.facets.ravel()[first]
+        split, first = np.unique(self.facets_of[id(slave)], return_index=True)
+        return patch.multipliers[split], slave.facets.ravel()[first]
 
 
 def describe_interface(pairs: Sequence[Pair]) -> ContactInterface:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
 from solvers.contact.law.law import Law
-from solvers.contact.pieces import cut_at_edges
+from solvers.contact.sharp_edges import split_nodes
 from solvers.contact.surface import ContactNodes, Surface, facet_areas
 from solvers.kernels import basis_transformation, nodal_normals
 from solvers.sparse import Sparse, sparse
@@ -19,11 +19,11 @@ from solvers.sparse import Sparse, sparse
 
 @dataclass(frozen=True)
 class SlavePatch:
-    """Connected slave surfaces; a node on a sharp edge has several places (see `cut_at_edges`)."""
+    """Connected slave surfaces; nodes on sharp edges are split (see `split_nodes`)."""
 
-    nodes: NDArray[np.int64]  #: of each place, among all nodes, shape (n,)
+    nodes: NDArray[np.int64]  #: of each split node, among all nodes, shape (n,)
     multipliers: NDArray[np.int64]  #: among all multipliers, shape (n,)
-    facets: NDArray[np.int64]  #: of all its surfaces, in numbers of the places
+    facets: NDArray[np.int64]  #: of all its surfaces, in numbers of the split nodes
     facet_type: str
     areas: Array  #: reference area around each node [m^(dim-1)], shape (n,)
     mask: Array | None  #: 0 for components that a plane of symmetry forbids, 1 for others, shape (n, dim)
@@ -48,9 +48,9 @@ class SlavePatch:
 
 @dataclass(frozen=True)
 class Multipliers:
-    """All multipliers: one for each place of a slave patch.
+    """All multipliers: one for each split node of a slave patch.
 
-    The first N belong to the N nodes (most of which have none in use), the others to nodes with several places.
+    The first N belong to the N nodes (most of which have none in use), the others to nodes that were split.
     """
 
     node: NDArray[np.int64]  #: of each multiplier, shape (C,)
@@ -81,11 +81,11 @@ def number_multipliers(
         facets, number, owner = _facets([slaves[i] for i in group], [numbers[i] for i in group])
         facet_type = slaves[group[0]].facet_type
         # what is tied may go any way: there a sharp edge matters only between surfaces that a case names apart
-        pieces = cut_at_edges(nodes.points, facets, facet_type, owner if laws[group[0]].span == "space" else None)
-        share = np.zeros(len(pieces.nodes))
-        np.add.at(share, pieces.facets, facet_areas(nodes.points, facets, facet_type)[:, None] / facets.shape[1])
-        multipliers = np.empty(len(pieces.nodes), dtype=np.int64)
-        for k, (at, area) in enumerate(zip(pieces.nodes.tolist(), share.tolist(), strict=True)):
+        split = split_nodes(nodes.points, facets, facet_type, owner if laws[group[0]].span == "space" else None)
+        share = np.zeros(len(split.nodes))
+        np.add.at(share, split.facets, facet_areas(nodes.points, facets, facet_type)[:, None] / facets.shape[1])
+        multipliers = np.empty(len(split.nodes), dtype=np.int64)
+        for k, (at, area) in enumerate(zip(split.nodes.tolist(), share.tolist(), strict=True)):
             if areas[at] > 0.0:
                 multipliers[k] = len(node)
                 node.append(at)
@@ -93,10 +93,10 @@ def number_multipliers(
             else:
                 multipliers[k] = at
                 areas[at] = area
-        mask = _mask([slaves[i] for i in group], [numbers[i] for i in group], nodes)[pieces.nodes]
+        mask = _mask([slaves[i] for i in group], [numbers[i] for i in group], nodes)[split.nodes]
         for i, own in zip(group, number, strict=True):
-            of_surface[i], facets_of_surface[i] = len(patches), pieces.facets[own]
-        mine = pieces.nodes, multipliers, pieces.facets, facet_type, share
+            of_surface[i], facets_of_surface[i] = len(patches), split.facets[own]
+        mine = split.nodes, multipliers, split.facets, facet_type, share
         patches.append(SlavePatch(*mine, None if mask.all() else mask))
     return Multipliers(np.array(node), np.array(areas), tuple(patches), tuple(of_surface), tuple(facets_of_surface))
 

@@ -113,9 +113,9 @@ def finest(unknowns: Unknowns) -> Level:
 def coarsen(comm: MPI.Comm, fine: Level, lattices: Sequence[LevelGrid]) -> Level:
     """A level on coarser lattices; a node belongs to the process that has it on the finer one (collective).
 
-    Unknowns of one place are neighbours, places in the order of the lattice.
+    Unknowns at one point are neighbours, points in the order of the lattice.
     """
-    kept, places = [], []
+    kept, points = [], []
     for component, lattice in zip(fine.components, lattices, strict=True):
         nodes, own = np.empty_like(component.nodes), np.ones(len(component.nodes), dtype=bool)
         for axis, (some, every) in enumerate(zip(lattice.planes, component.lattice.planes, strict=True)):
@@ -123,8 +123,8 @@ def coarsen(comm: MPI.Comm, fine: Level, lattices: Sequence[LevelGrid]) -> Level
             nodes[:, axis] = np.searchsorted(some, place)
             own &= some[nodes[:, axis]] == place
         kept.append(nodes[own])
-        places.append(np.stack([some[i] for some, i in zip(lattice.planes, nodes[own].T, strict=True)], axis=1))
-    every = np.concatenate(places)
+        points.append(np.stack([some[i] for some, i in zip(lattice.planes, nodes[own].T, strict=True)], axis=1))
+    every = np.concatenate(points)
     number = np.empty(len(every), dtype=np.int64)
     number[np.lexsort(every.T)] = np.arange(len(every))
     start = comm.exscan(len(every)) or 0  # type: ignore[attr-defined]

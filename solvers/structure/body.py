@@ -29,7 +29,7 @@ class Body:
     """Mass, internal forces, loads and tangent of one body at the displacement `u`.
 
     `mesh` is that of the whole body; only process 0 needs it, others may pass None. Vectors have one entry per
-    dimension, each a number or a function of place and time.
+    dimension, each a number or a function of position and time.
     """
 
     def __init__(

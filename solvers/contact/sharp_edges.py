@@ -1,7 +1,7 @@
-"""Surfaces cut at their sharp edges: a node on one has a place on each side, and no normal is a mean across it.
+"""Surfaces cut at their sharp edges: a node on one is split, one on each side, and no normal is a mean across it.
 
 Around a node, facets belong together if a way from one to the other crosses no sharp edge. So an edge may also end
-within a surface: its last node has one place.
+within a surface: its last node is not split.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Pieces:
-    """Places (node, side of an edge), in the order of the nodes."""
+class SplitNodes:
+    """Nodes, those on sharp edges once for each side, in the order of the nodes."""
 
-    nodes: Indices  #: of each place, shape (n,)
-    facets: Indices  #: in numbers of the places, shape (k, nodes per facet)
+    nodes: Indices  #: the node that each is or was split from, shape (n,)
+    facets: Indices  #: in numbers of the split nodes, shape (k, nodes per facet)
 
 
-def cut_at_edges(points: Array, facets: Indices, facet_type: str, among: Indices | None = None) -> Pieces:
+def split_nodes(points: Array, facets: Indices, facet_type: str, among: Indices | None = None) -> SplitNodes:
     """Facets (k, nodes per facet) of nodes at reference positions points [m], shape (n, dim).
 
     among: numbers of the facets, between equal ones of which no edge counts as sharp, shape (k,).
@@ -42,8 +42,8 @@ def cut_at_edges(points: Array, facets: Indices, facet_type: str, among: Indices
     if among is not None:
         smooth |= among[of_facet[i]] == among[of_facet[j]]
     part = connected_parts(i[smooth], j[smooth], k * n)
-    places, number = np.unique(np.stack([ends, part], axis=1), axis=0, return_inverse=True)
-    return Pieces(places[:, 0], number.reshape(k, n).astype(np.int64))
+    split, number = np.unique(np.stack([ends, part], axis=1), axis=0, return_inverse=True)
+    return SplitNodes(split[:, 0], number.reshape(k, n).astype(np.int64))
 
 
 def _corner_normals(points: Array, facets: Indices, facet_type: str) -> Array:

@@ -13,7 +13,7 @@ from solvers.contact.contact import Contact
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.tied import Tied
 from solvers.contact.pair import Pair
-from solvers.contact.pieces import cut_at_edges
+from solvers.contact.sharp_edges import split_nodes
 from solvers.contact.surface import Surface
 from solvers.mesh_topology import cut_out
 from solvers.structure.body import Support, Traction
@@ -38,7 +38,7 @@ def test_a_box_has_one_place_for_each_face(cell_type):
     dim = 2 if cell_type in ("quad", "triangle6", "quad9") else 3
     mesh = brick(cell_type, 3, [1.0] * dim, [0.0] * dim, 0.0)
     points, facets, facet_type = surface(mesh, *sides(dim))
-    found = cut_at_edges(points, facets, facet_type)
+    found = split_nodes(points, facets, facet_type)
     on_faces = (np.minimum(np.abs(points), np.abs(1.0 - points)) < 1e-12).sum(axis=1)
     assert np.array_equal(np.bincount(found.nodes), on_faces)
     assert np.array_equal(found.nodes[found.facets], facets)
@@ -52,7 +52,7 @@ def test_what_is_round_stays_whole():
         (shapes.sphere(1.0, [3, 1]), ["outer"]),
     ):
         points, facets, facet_type = surface(mesh, *names)
-        assert len(cut_at_edges(points, facets, facet_type).nodes) == len(points)
+        assert len(split_nodes(points, facets, facet_type).nodes) == len(points)
 
 
 def test_an_edge_may_end_within_a_surface():
@@ -61,7 +61,7 @@ def test_an_edge_may_end_within_a_surface():
     height = np.where(y < 2, 3.0 * np.abs(x - 2.0), 0.0)
     node = np.arange(25).reshape(5, 5)
     quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)
-    found = cut_at_edges(np.stack([x, y, height], axis=-1).reshape(-1, 3), quads, "quad")
+    found = split_nodes(np.stack([x, y, height], axis=-1).reshape(-1, 3), quads, "quad")
     several = np.flatnonzero(np.bincount(found.nodes) > 1)
     assert set(several) >= {node[2, 0]}
     assert node[2, 4] not in several
