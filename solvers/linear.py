@@ -109,15 +109,20 @@ def _multigrid(comm) -> PETSc.PC:
     return preconditioner
 
 
-def choose_flow(
-    method: Method, dim: int, dofs: int, *, degree: int = 1, steady: bool = True
-) -> Literal["direct", "multigrid", "ilu"]:
-    """The method for a flow of this size, by the degree of its velocity."""
-    if method != "auto":
-        return "multigrid" if method == "iterative" else method
-    if dofs <= FLOW_DIRECT_LIMIT[dim]:
-        return "direct"
-    return "multigrid" if steady or dofs > FLOW_INCOMPLETE_LIMIT[degree] else "ilu"
+#: A solver of flows.
+Rung = Literal["multigrid", "ilu", "fill", "direct"]
+
+
+def choose_flow(method: Method, dim: int, dofs: int, *, degree: int, steady: bool) -> tuple[Rung, ...]:
+    """Solvers for a flow of this size from the usual one to the last resort, by the degree of its velocity.
+
+    More fill takes minutes for velocities of second degree.
+    """
+    if method == "direct" or (method == "auto" and dofs <= FLOW_DIRECT_LIMIT[dim]):
+        return ("direct",)
+    if method == "ilu" or (method == "auto" and not steady and dofs <= FLOW_INCOMPLETE_LIMIT[degree]):
+        return ("ilu", "multigrid", "direct")
+    return ("multigrid", "direct") if degree > 1 else ("multigrid", "fill", "direct")
 
 
 #: Unknowns of a flow above which the iterative solver is taken. Measured: in 3D it is 4 times faster at 8,000 already.

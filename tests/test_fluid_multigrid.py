@@ -13,7 +13,7 @@ from fsci.run.run import FAILED, run_case
 from solvers import linear
 from solvers.fluid import krylov
 from solvers.fluid.grid import Grid, uniform
-from solvers.fluid.krylov import Ladder, rungs
+from solvers.fluid.krylov import Ladder
 from solvers.fluid.multigrid import LevelGrid, coarsen, finest, interpolation
 from solvers.linear import LinearSolveFailed
 from solvers.newton import Tolerance
@@ -109,7 +109,7 @@ def test_second_degree_on_stretched_cells():
 
 def test_what_stalls_is_followed_by_what_does_not(monkeypatch):
     said = []
-    ladder = Ladder(MPI.COMM_SELF, rungs("multigrid", 1), 1000, said.append)
+    ladder = Ladder(MPI.COMM_SELF, ("multigrid", "fill", "direct"), 1000, said.append)
     stalled = LinearSolveFailed("the linear solver stalled after 200 iterations (PETSc reason -3)")
     ladder.climb(stalled)
     assert ladder.here == "fill"
@@ -125,23 +125,24 @@ def test_what_stalls_is_followed_by_what_does_not(monkeypatch):
 
 def test_method_is_chosen_by_size():
     """Incomplete factors where they are cheaper: in time steps of small flows."""
-    assert linear.choose_flow("auto", 3, 20_000, degree=1, steady=False) == "ilu"
-    assert linear.choose_flow("auto", 3, 200_000, degree=1, steady=False) == "multigrid"
-    assert linear.choose_flow("auto", 3, 20_000, degree=1, steady=True) == "multigrid"
-    assert linear.choose_flow("iterative", 3, 10, degree=1, steady=False) == "multigrid"
-    assert rungs("ilu", 1)[1] == "multigrid"
+    assert linear.choose_flow("auto", 3, 20_000, degree=1, steady=False) == ("ilu", "multigrid", "direct")
+    assert linear.choose_flow("auto", 3, 200_000, degree=1, steady=False) == ("multigrid", "fill", "direct")
+    assert linear.choose_flow("auto", 3, 20_000, degree=2, steady=True) == ("multigrid", "direct")
+    assert linear.choose_flow("auto", 2, 20_000, degree=2, steady=True) == ("direct",)
+    assert linear.choose_flow("iterative", 3, 10, degree=1, steady=False) == ("multigrid", "fill", "direct")
+    assert linear.choose_flow("direct", 3, 10**6, degree=1, steady=False) == ("direct",)
 
 
 def test_the_direct_solver_needs_memory(monkeypatch):
     monkeypatch.setattr(krylov, "free_memory", lambda comm: 1e9)
-    ladder = Ladder(MPI.COMM_SELF, rungs("multigrid", 2), 10**6, print)
+    ladder = Ladder(MPI.COMM_SELF, ("multigrid", "direct"), 10**6, print)
     with pytest.raises(LinearSolveFailed, match=r"would need about 110 GB of the 1 GB .* 'solver.linear.tolerance'"):
         ladder.climb(LinearSolveFailed("the linear solver stalled"))
     assert ladder.here == "multigrid"
 
 
 def test_a_singular_system_stays_singular():
-    ladder = Ladder(MPI.COMM_SELF, rungs("multigrid", 1), 1000, print)
+    ladder = Ladder(MPI.COMM_SELF, ("multigrid", "fill", "direct"), 1000, print)
     with pytest.raises(LinearSolveFailed, match="singular"):
         ladder.climb(LinearSolveFailed("the linear system is singular", singular=True))
     assert ladder.here == "multigrid"

@@ -23,7 +23,7 @@ from solvers.fluid.film import films_of
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.history import History
 from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.krylov import FlowSolver, Ladder, rungs
+from solvers.fluid.krylov import FlowSolver, Ladder
 from solvers.fluid.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.pressure_level import Hold, hold_pressure, keep_levels, spread_excess
 from solvers.fluid.reach import require_known, require_within_period, strip_layers
@@ -65,7 +65,7 @@ class Fluid:
         self.steady, self.scheme = settings.steady, settings.time  #: each step a flow at rest; how it takes rates
         self.linear_tolerance = solver.linear_tolerance
         wanted = solver.linear if isinstance(solver.linear, str) else "auto"
-        method = linear.choose_flow(wanted, self.dim, self.dofs(), degree=settings.degree, steady=self.steady)
+        rungs = linear.choose_flow(wanted, self.dim, self.dofs(), degree=settings.degree, steady=self.steady)
         self.system = FlowSystem(
             self.grid,
             settings,
@@ -73,7 +73,7 @@ class Fluid:
             self.unknowns,
             with_bodies=bool(self.bodies),
             # incomplete factors of dense blocks are two times as fast
-            blocked=method != "direct" and self.unknowns.block_size > 1,
+            blocked=rungs[0] != "direct" and self.unknowns.block_size > 1,
         )
         films = films_of(patches, self.dim, settings.penalties) if settings.films else None
         self.cutter = Cutter(self.grid, self.system.weights.points, films)
@@ -85,7 +85,7 @@ class Fluid:
         self._wet = wetness([body.surface for body in self.bodies])
         self._fast_bodies = FastBodies(grid)
         self.notes: list[str] = []  #: what the user should know of this step
-        self.ladder = Ladder(comm, rungs(method, settings.degree), self.dofs(), self.notes.append)
+        self.ladder = Ladder(comm, rungs, self.dofs(), self.notes.append)
         self.linear_solver = FlowSolver(self.unknowns, self.ladder, solver.linear_tolerance, steady=settings.steady)
         self.linear_iterations = 0  #: of the last linear system
         self.rounding: Array | None = None  #: rounding error of `residual_rows`, as far as this step knows

@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from mpi4py import MPI
@@ -18,10 +17,8 @@ from solvers.fluid.multigrid import Multigrid
 from solvers.fluid.space import Unknowns
 from solvers.lagged import Lagged, LaggedFactors
 
-Rung = Literal["multigrid", "ilu", "fill", "direct"]
-
 #: What the messages call it.
-WORDS: dict[Rung, str] = {
+WORDS: dict[linear.Rung, str] = {
     "multigrid": "multigrid",
     "ilu": "incomplete factors",
     "fill": "incomplete factors with more fill and overlap",
@@ -31,24 +28,15 @@ WORDS: dict[Rung, str] = {
 FACTORS = 1_100.0
 
 
-def rungs(method: Literal["direct", "multigrid", "ilu"], degree: int) -> tuple[Rung, ...]:
-    """Solvers from the usual one to the last resort. More fill takes minutes for velocities of second degree."""
-    if method == "ilu":
-        return ("ilu", "multigrid", "direct")
-    if method == "direct":
-        return ("direct",)
-    return ("multigrid", "direct") if degree > 1 else ("multigrid", "fill", "direct")
-
-
 class Ladder:
     """Which of several solvers is in use, and the next one if it fails. Its `rung` is part of the state."""
 
-    def __init__(self, comm: MPI.Comm, rungs: Sequence[Rung], dofs: int, say: Callable[[str], None]):
+    def __init__(self, comm: MPI.Comm, rungs: Sequence[linear.Rung], dofs: int, say: Callable[[str], None]):
         self.comm, self.rungs, self._dofs, self._say = comm, rungs, dofs, say
         self.rung = 0
 
     @property
-    def here(self) -> Rung:
+    def here(self) -> linear.Rung:
         return self.rungs[self.rung]
 
     def climb(self, failure: linear.LinearSolveFailed) -> None:

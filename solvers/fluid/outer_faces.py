@@ -33,11 +33,12 @@ class Term:
 
 
 @dataclass(frozen=True)
-class OnCut:
+class OuterOnCut:
     """The outer faces as bodies leave them."""
 
-    free: tuple[NDArray[np.int32], ...]  #: by term: local faces with fluid that no body covers
-    covered: tuple[tuple[int, CoveredFaces], ...]  #: (which term, faces that bodies cover in part)
+    residuals: tuple[Any, ...] = ()  #: forms over faces with fluid that no body covers
+    tangents: tuple[Any, ...] = ()  #: their derivatives by the flow
+    covered: tuple[tuple[Term, CoveredFaces], ...] = ()  #: faces that bodies cover in part
 
 
 class OuterFaces:
@@ -65,7 +66,6 @@ class OuterFaces:
         ]
         for kind in dict.fromkeys(patch.record for _, patch in with_form if not patch.record.value):
             self.terms.append(term(kind, tuple(n for n, patch in with_form if patch.record == kind), None))
-        self._on_cut = OnCut((), ())
 
     def integrals(self) -> list[fem.Integral]:
         """What is to be compiled."""
@@ -80,52 +80,42 @@ class OuterFaces:
                 assert value is not None
                 set_velocity(term.value.x.array, nodes, value, t)
 
-    def set_cut(self, cut: Cut, active: NDArray[np.bool_]) -> None:
-        """Take a cut; active: which local cells have unknowns."""
-        free, covered, points = [], [], 2 * self.unknowns.degree + 1
+    def on_cut(self, cut: Cut, active: NDArray[np.bool_]) -> OuterOnCut:
+        """The faces on a cut; active: which local cells have unknowns."""
+        residuals, tangents, covered, points = [], [], [], 2 * self.unknowns.degree + 1
         by_patch = self.boundary.facets, self.boundary.cells
-        for index, term in enumerate(self.terms):
+        for term in self.terms:
             facets, cells = (np.concatenate([parts[n] for n in term.patches]) for parts in by_patch)
             uncovered, parts = covered_faces(self.grid, self.unknowns, cut, points, facets, cells)
-            free.append(np.sort(facets[active[cells] & uncovered]))
+            free = np.sort(facets[active[cells] & uncovered])
+            residuals.append(term.residual.on(exterior_facet=free))
+            if term.tangent is not None:
+                tangents.append(term.tangent.on(exterior_facet=free))
             with_fluid = [part.only(active) for part in parts]
-            covered += [(index, part) for part in with_fluid if len(part.cells)]
-        for term in (self.terms[index] for index, _ in covered):
+            covered += [(term, part) for part in with_fluid if len(part.cells)]
+        for term, _ in covered:
             if (term.kind.slope if term.kind.depends_on_flow else term.kind.stress) is None:
                 raise CannotBeCovered([self.boundary.patches[n] for n in term.patches])
-        self._on_cut = OnCut(tuple(free), tuple(covered))
+        return OuterOnCut(tuple(residuals), tuple(tangents), tuple(covered))
 
-    def residuals(self) -> list:
-        """Forms over faces that no body covers."""
-        parts = zip(self.terms, self._on_cut.free, strict=True)
-        return [term.residual.on(exterior_facet=faces) for term, faces in parts]
-
-    def tangents(self) -> list:
-        """Their derivatives by the flow."""
-        parts = zip(self.terms, self._on_cut.free, strict=True)
-        return [term.tangent.on(exterior_facet=faces) for term, faces in parts if term.tangent is not None]
-
-    def add_covered(self, out: Array, flow: Array, mu: float, rho: float, a: Array) -> None:
+    def add_covered(self, on_cut: OuterOnCut, out: Array, flow: Array, mu: float, rho: float, a: Array) -> None:
         """Add the same over the wet part of the others to local dofs; for rho, a see `slopes`."""
-        for index, part in self._on_cut.covered:
-            term = self.terms[index]
+        for term, part in on_cut.covered:
             if term.kind.stress is not None and term.value is not None:
                 dofs, load = part.load(term.kind.stress(part, part.velocity(term.value.x.array)))
                 np.subtract.at(out, dofs, load)
-        for dofs, block in self.slopes(mu, rho, a):
+        for dofs, block in self.slopes(on_cut, mu, rho, a):
             np.add.at(out, dofs, np.einsum("caibk,cbk->cai", block, flow[dofs]))
 
-    def slopes(self, mu: float, rho: float, a: Array) -> Iterator[tuple[NDArray[np.int32], Array]]:
+    def slopes(self, on_cut: OuterOnCut, mu: float, rho: float, a: Array) -> Iterator[tuple[NDArray[np.int32], Array]]:
         """(local dofs, derivatives) of terms with u there.
 
         mu [Pa s]; rho [kg/m^3], zero without convection; a [m/s]: velocity of the step before, at local dofs.
         """
-        for index, part in self._on_cut.covered:
-            slope = self.terms[index].kind.slope
-            if slope is not None:
-                given = self.terms[index].value
-                values = None if given is None else part.velocity(given.x.array)
-                yield self.unknowns.cell_velocity[part.cells], slope(part, mu, rho * part.velocity(a), values)
+        for term, part in on_cut.covered:
+            if term.kind.slope is not None:
+                values = None if term.value is None else part.velocity(term.value.x.array)
+                yield self.unknowns.cell_velocity[part.cells], term.kind.slope(part, mu, rho * part.velocity(a), values)
 
 
 class CannotBeCovered(ValueError):

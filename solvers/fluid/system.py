@@ -21,7 +21,7 @@ from solvers.fluid.film import film_cells
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.interface import InterfaceTerms
 from solvers.fluid.matrix import Pattern, choose_pattern, create_matrix, fits, pattern_of
-from solvers.fluid.outer_faces import OuterFaces
+from solvers.fluid.outer_faces import OuterFaces, OuterOnCut
 from solvers.fluid.patches import Boundary
 from solvers.fluid.pieces import Pieces
 from solvers.fluid.space import Unknowns, set_velocity
@@ -93,8 +93,8 @@ class FlowSystem:
         #: owned cells of the cut, uncut ones and cut ones, and forms over these and the outer faces
         self.cells: list[NDArray[np.int32]] = []
         self._residuals: list = []
-        self._outer_residuals: list = []
         self._tangents: list = []
+        self._outer_on_cut = OuterOnCut()
         self.speed = np.zeros(len(grid.numbers))  #: largest one of a cell's scales [m/s]
         self.fastest = 0.0
         self.active_dofs = np.zeros(unknowns.local, dtype=bool)
@@ -177,9 +177,8 @@ class FlowSystem:
             [form.on(cell=some) for form, some in zip(integrals, self.cells, strict=False)]
             for integrals in (self._forms.residuals, self._forms.tangents)
         )
-        self._outer.set_cut(cut, active)
-        self._outer_residuals = self._outer.residuals()
-        self._tangents += self._outer.tangents()
+        self._outer_on_cut = self._outer.on_cut(cut, active)
+        self._tangents += self._outer_on_cut.tangents
         if not fits(self.unknowns, self._pattern, cut):
             self._allocate(choose_pattern(self.unknowns, cut))
 
@@ -300,7 +299,7 @@ class FlowSystem:
         assert self._ghost is not None
         assert self.cut is not None
         np.negative(self._ghost_history, out=self._out)
-        for form in [*self._residuals, *self._outer_residuals]:
+        for form in [*self._residuals, *self._outer_on_cut.residuals]:
             fem.assemble_vector(form, self._out)
         if self.with_bodies:
             self._out += self.interface.velocity_terms(self.cut.motion.v)
@@ -325,7 +324,7 @@ class FlowSystem:
         self._ghost.copy(matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         for form in self._tangents:
             fem.assemble_matrix(matrix, form)
-        for dofs, blocks in self._outer.slopes(*self._outer_scales()):
+        for dofs, blocks in self._outer.slopes(self._outer_on_cut, *self._outer_scales()):
             for at, block in zip(dofs.reshape(len(dofs), -1).astype(PETSc.IntType), blocks, strict=True):
                 matrix.setValuesLocal(at, at, block.reshape(len(at), -1), PETSc.InsertMode.ADD_VALUES)
         self._newton.value = 1.0
@@ -344,13 +343,13 @@ class FlowSystem:
     def outer_rows(self) -> Array:
         """Rows of tractions and outflow alone at local dofs, the ghosts' share still there."""
         out = np.zeros(self.unknowns.local)
-        for form in self._outer_residuals:
+        for form in self._outer_on_cut.residuals:
             fem.assemble_vector(form, out)
         self._add_covered(out)
         return out
 
     def _add_covered(self, out: Array) -> None:
-        self._outer.add_covered(out, self.flow.x.array, *self._outer_scales())
+        self._outer.add_covered(self._outer_on_cut, out, self.flow.x.array, *self._outer_scales())
 
     def _outer_scales(self) -> tuple[float, float, Array]:
         settings = self.settings
