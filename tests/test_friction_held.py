@@ -80,7 +80,7 @@ def test_a_corner(dim):
     assert solve_step(structure).iterations <= 8
     z, n = contact.z, contact.terms.normals
     along = np.linalg.norm(z - np.einsum("nd,nd->n", z, n)[:, None] * n, axis=1)
-    several = ~contact.multipliers.alone
+    several = ~contact.multipliers.only_one
     assert several.sum() >= dim
     assert along[several & contact.active_set.active].max() < 1e-9
     assert along[~several].max() > 0.1

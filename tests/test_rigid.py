@@ -136,7 +136,7 @@ def test_a_pendulum_on_stiff_springs_finds_its_rest():
     assert bodies.displacement()[:, 1] == pytest.approx(-30.0 / 2e4, rel=1e-6)
 
 
-def test_held_ways_follow_their_functions():
+def test_held_components_follow_their_functions():
     """A square that is led in x and turned: its corners are where kinematics says, whatever acts on it."""
     body = square(held={"x": lambda t: 0.1 * t, "rotation_z": lambda t: 0.5 * t**2}, gravity=(7.0, -10.0))
     bodies = field(body)

@@ -12,10 +12,10 @@ from solvers.contact.terms import find_normals
 
 
 def find_blocked(interface: ContactInterface, x: Array) -> NDArray[np.bool_]:
-    """Which they are with all nodes at x [m], shape (C,): judged once, at the start of a run."""
+    """Which they are with all nodes at x [m], shape (C,): decided once, at the start of a run."""
     multipliers, held = interface.multipliers, interface.nodes.held
     node, slaves = multipliers.node, multipliers.areas > 0.0
-    if not held[node[slaves]].any() and multipliers.alone.all():
+    if not held[node[slaves]].any() and multipliers.only_one.all():
         return np.zeros(len(node), dtype=bool)
     normals = find_normals(multipliers, x).values
     own = np.arange(len(node))  # as if every multiplier had its node for itself

@@ -48,9 +48,9 @@ class Constraints:
         self.coverage.begin_step()
         self._merging.begin_step()
 
-    def judge(self, terms: Terms) -> Constrained:
+    def choose(self, terms: Terms) -> Constrained:
         """By the mortar integrals of an iterate."""
-        able = self.coverage.judge(terms.D) & ~self._blocked
+        able = self.coverage.choose(terms.D) & ~self._blocked
         into = self._merging.into(terms, able)
         merged = into != np.arange(len(into))
         if merged.any():

@@ -12,7 +12,7 @@ from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.condense import Condensed, Linearised, condense, recover
 from solvers.contact.constraints import Constraints
-from solvers.contact.directions import answered, free_normals
+from solvers.contact.directions import admissible, free_normals
 from solvers.contact.distance import distances
 from solvers.contact.friction_work import FrictionWork
 from solvers.contact.interface import ContactInterface, describe_interface
@@ -176,7 +176,7 @@ class Contact:
     def _drop_dependent(self, status: Statuses) -> None:
         """Of several multipliers at a node whose normals depend on each other the later ones are not in contact."""
         assert self.terms is not None
-        several = np.flatnonzero((status != OPEN) & ~self.multipliers.alone & (self._spans == "normal"))
+        several = np.flatnonzero((status != OPEN) & ~self.multipliers.only_one & (self._spans == "normal"))
         if len(several) == 0:
             return
         left = free_normals(self.terms.normals[several], self.multipliers.node[several], self.nodes.held)
@@ -211,9 +211,9 @@ class Contact:
             return None
         pieces += self._ties.pieces if self.comm.rank == 0 else []
         terms = total_terms(pieces, normals, self._shares, (len(self.pairs), len(self.z), self.size))
-        judged = self._constraints.judge(terms)
-        terms, self._covers, self._shared = judged.terms, judged.covers, judged.shared
-        self._spans, self.merged = judged.spans, judged.merged
+        constrained = self._constraints.choose(terms)
+        terms, self._covers, self._shared = constrained.terms, constrained.covers, constrained.shared
+        self._spans, self.merged = constrained.spans, constrained.merged
         if self._sliding.mortars:
             used = [(mortar, found.used) for mortar, found in pieces]
             self._slip = self._sliding.evaluate(self.x, normals, used, self._redistributed)
@@ -254,7 +254,7 @@ class Contact:
             if part.law.span != "normal":
                 held, spans = self.nodes.held[self.multipliers.node[part.which]], self._spans[part.which]
                 less = held.any(axis=(1, 2)) | (spans == "normal")  # not all directions of its law
-                missed[less] = answered(missed[less], part.point.normals[less], held[less], spans[less])
+                missed[less] = admissible(missed[less], part.point.normals[less], held[less], spans[less])
             total += float(np.sum(missed**2))
         return float(np.sqrt(total))
 

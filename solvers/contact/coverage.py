@@ -13,7 +13,7 @@ LEAST_COVERED, LEAST_KEPT = 0.02, 0.01
 
 
 class Coverage:
-    """Judges coverage in every evaluation of a step.
+    """Decides on coverage in every evaluation of a step.
 
     After KEEP_AFTER evaluations a multiplier that had a constraint keeps it as long as the lower limit is met, so that
     the set of constraints cannot alternate. Facet pairs are kept in the same way.
@@ -32,7 +32,7 @@ class Coverage:
         """Whether the covered areas D [m^(dim-1)] are more than slivers, shape (C,)."""
         return D > least * self._areas
 
-    def judge(self, D: Array) -> NDArray[np.bool_]:
+    def choose(self, D: Array) -> NDArray[np.bool_]:
         """Those of an iterate that can have a constraint, shape (C,)."""
         found = self.enough(D) | (self._seen & self.enough(D, LEAST_KEPT))
         self._evaluations += 1

@@ -106,11 +106,11 @@ def find_directions(
     )
 
 
-def answered(missed: Array, normals: Array, held: Array, spans: NDArray[np.str_]) -> Array:
+def admissible(missed: Array, normals: Array, held: Array, spans: NDArray[np.str_]) -> Array:
     """What multipliers miss of their laws, in the directions that they have, shape (m, dim).
 
     In others nothing is asked for: there a support carries what comes, or the node has multipliers of other surfaces.
-    held: of the node of each multiplier, shape (m, dim, dim); spans: as below.
+    held: of the node of each multiplier, shape (m, dim, dim); spans: as above.
     """
     found = missed - np.einsum("nij,nj->ni", held, missed)
     holds = np.rint(np.einsum("nii->n", held)).astype(int)

@@ -56,7 +56,7 @@ class DualTree:
         return unit_normals(x[self.facets[:, self._simplices]])
 
     def pairs(self, x: Array, inflation: float, x_previous: Array | None = None) -> Indices:
-        """Facets i < j whose ways from x_previous to x come closer than `inflation` [m], or little more, shape (p, 2).
+        """Facets i < j whose paths from x_previous to x come closer than `inflation` [m], or little more, shape (p, 2).
 
         Only those without a common node that are opposed to each other.
         """
@@ -82,10 +82,10 @@ class DualTree:
 
     def _slabs(self, x: Array, x_previous: Array | None, radius: float) -> tuple[Array, Array]:
         """Least and largest extent of the facets along some directions, shapes (k, directions)."""
-        ways = [x[self.facets] @ self._directions.T]
+        ends = [x[self.facets] @ self._directions.T]
         if x_previous is not None:
-            ways.append(x_previous[self.facets] @ self._directions.T)
-        extents = np.concatenate(ways, axis=1)
+            ends.append(x_previous[self.facets] @ self._directions.T)
+        extents = np.concatenate(ends, axis=1)
         return extents.min(axis=1) - radius, extents.max(axis=1) + radius
 
     def _descend(self, masks: Sequence[NDArray], lows: Sequence[Array], highs: Sequence[Array]) -> Indices:

@@ -56,7 +56,7 @@ class ContactInterface:
 
     def spans_among(self, constrained: NDArray[np.bool_]) -> NDArray[np.str_]:
         """Directions of multipliers where those given (C,) have constraints: of several at a node each its normal."""
-        if self.multipliers.alone.all():
+        if self.multipliers.only_one.all():
             return self.spans
         node = self.multipliers.node
         several = np.bincount(node[constrained], minlength=len(node))[node] > 1

@@ -28,11 +28,11 @@ SAME = np.sqrt(0.5)
 
 
 class Merging:
-    """Judges in every evaluation of a step; after KEEP_AFTER of them what is merged stays so, as with coverage."""
+    """Decides in every evaluation of a step; after KEEP_AFTER of them what is merged stays so, as with coverage."""
 
     def __init__(self, multipliers: Multipliers):
         self._node = multipliers.node
-        self._several = ~multipliers.alone
+        self._several = ~multipliers.only_one
         self._any = bool(self._several.any())
         self._kept = np.empty((0, 2), dtype=np.int64)  # merged pairs
         self._evaluations = 0  # of this step

@@ -60,8 +60,8 @@ class Multipliers:
     facets_of_surface: tuple[NDArray[np.int64], ...]  #: of each slave surface, in numbers of its patch
 
     @property
-    def alone(self) -> NDArray[np.bool_]:
-        """Multipliers that share their node with no other one, shape (C,)."""
+    def only_one(self) -> NDArray[np.bool_]:
+        """The only multipliers of their nodes, shape (C,)."""
         return np.bincount(self.node[self.areas > 0.0], minlength=len(self.node))[self.node] <= 1
 
 

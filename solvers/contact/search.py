@@ -49,8 +49,8 @@ class Search:
         previous positions also every pair that comes so close while the nodes go straight from there to here.
         ValueError if shapes do not fit, StepFailed if a position is not finite.
         """
-        way_s, way_m = _way(xs, xs_previous), _way(xm, xm_previous)
-        if not all(np.isfinite(x).all() for x in way_s + way_m):
+        path_s, path_m = _path(xs, xs_previous), _path(xm, xm_previous)
+        if not all(np.isfinite(x).all() for x in path_s + path_m):
             raise StepFailed("contact", "surface positions are not finite")
         radii = np.ascontiguousarray(np.broadcast_to(np.asarray(inflation, float), len(self._slave_facets)))
         if self._trees is None:
@@ -58,21 +58,21 @@ class Search:
             self._trees = kdop_tree(self._slave_facets), kdop_tree(self._master_facets)
         slave, master = self._trees
 
-        low_s, high_s = slave.box(*way_s)
-        low_m, high_m = master.box(*way_m)
+        low_s, high_s = slave.box(*path_s)
+        low_m, high_m = master.box(*path_m)
         if np.any(low_s - radii.max() > high_m) or np.any(low_m > high_s + radii.max()):
             return np.empty((0, 2), np.int32)
-        _update(slave, way_s, radii)
-        _update(master, way_m, np.zeros(len(self._master_facets)))
+        _update(slave, path_s, radii)
+        _update(master, path_m, np.zeros(len(self._master_facets)))
         return slave.candidates(master)[0]
 
 
-def _way(x: Array, x_previous: Array | None) -> list[Array]:
+def _path(x: Array, x_previous: Array | None) -> list[Array]:
     return [np.ascontiguousarray(y, float) for y in (x, x_previous) if y is not None]
 
 
-def _update(tree: Tree, way: list[Array], radii: Array) -> None:
-    x, *previous = way
+def _update(tree: Tree, path: list[Array], radii: Array) -> None:
+    x, *previous = path
     tree.refit(x, radii, *previous)
     if tree.quality() > REBUILD_ABOVE:
         tree.build(x, radii, *previous)

@@ -184,7 +184,7 @@ class Fluid:
             prescribed = self.boundary.dofs[self.boundary.dofs < self.unknowns.owned]
             self.held[prescribed] = True
             self.held |= ~self.system.active_dofs[: self.unknowns.owned]
-            self._hold_pressure(known_by_bodies=with_solid and not self.settings.steady)
+            self._hold_pressure(set_by_solids=with_solid and not self.settings.steady)
 
     def _layers(self, motion: Motion) -> int:
         """Cells behind the surface that the next two steps may uncover."""
@@ -193,9 +193,9 @@ class Fluid:
         times = self.settings.time.times
         return strip_layers(self.grid, motion, times * self.current.dt, self._smallest)
 
-    def _hold_pressure(self, *, known_by_bodies: bool) -> None:
+    def _hold_pressure(self, *, set_by_solids: bool) -> None:
         elastic = np.concatenate([np.full(b.surface.vertices, b.deforms) for b in self.bodies] + [[]]) > 0.0
-        self._holds = hold_pressure(self.system, elastic, known_by_bodies=known_by_bodies)
+        self._holds = hold_pressure(self.system, elastic, set_by_solids=set_by_solids)
         for hold in self._holds:
             self.held[hold.dofs] = True
             if not hold.keeps_level:
@@ -203,7 +203,7 @@ class Fluid:
 
     @property
     def level_unknown(self) -> bool:
-        """A body that another field moves could know the pressure that is held."""
+        """An elastic body could determine the pressure that is held."""
         return any(hold.elastic for hold in self._holds)
 
     def solve(self) -> StepInfo:
@@ -339,8 +339,8 @@ class Fluid:
 
     def vertices_of(self, names: Sequence[str]) -> NDArray[np.int64]:
         """Numbers among all vertices of those of some bodies, in the order of the names."""
-        place = self._vertices()
-        return np.concatenate([np.arange(place[name].start, place[name].stop, dtype=np.int64) for name in names])
+        part = self._vertices()
+        return np.concatenate([np.arange(part[name].start, part[name].stop, dtype=np.int64) for name in names])
 
     def force(self) -> dict[str, Array]:
         """Force [N] (per depth in 2D) of the fluid on the vertices of each body, shape (n, dim) (collective)."""

@@ -23,16 +23,16 @@ class Hold:
     inside: Mask  #: owned pressure dofs of the pocket
     shares: Array  #: of its fluid, at owned dofs; their sum on all processes is one
     keeps_level: bool  #: the pressure stays what it was when the pocket closed; else zero at the node
-    known: Array  #: shares of where there was a pressure before, at owned dofs; their sum is one or zero
+    shares_before: Array  #: the same of where there was a pressure before; their sum is one or zero
     level: float  #: the mean pressure there [Pa]
     elastic: bool  #: a surface that another field moves bounds the pocket
 
 
-def hold_pressure(system: FlowSystem, elastic: Mask, *, known_by_bodies: bool) -> list[Hold]:
+def hold_pressure(system: FlowSystem, elastic: Mask, *, set_by_solids: bool) -> list[Hold]:
     """One node of each pocket where nothing says how high the pressure is (collective).
 
-    `elastic`: vertices that another field moves; `known_by_bodies`: the pressure at them follows from the room that
-    they leave. The level is zero if all of the box is closed, else that of the time when the pocket closed.
+    `elastic`: vertices that another field moves; `set_by_solids`: the pressure at them follows from the volume
+    that they leave. The level is zero if all of the box is closed, else that of the time when the pocket closed.
     """
     closed = system.boundary.closed()
     if not (closed or system.with_bodies):
@@ -40,7 +40,7 @@ def hold_pressure(system: FlowSystem, elastic: Mask, *, known_by_bodies: bool) -
     assert system.cut is not None
     open_cells, periodic = system.boundary.open_cells(), system.unknowns.periodic
     pockets = find_pockets(system.grid, system.cut, open_cells, elastic, periodic)
-    pockets = [pocket for pocket in pockets if not (pocket.elastic and known_by_bodies)]
+    pockets = [pocket for pocket in pockets if not (pocket.elastic and set_by_solids)]
     sizes = system.pressure_sizes() if pockets else np.empty(0)
     return [_hold(system, pocket, sizes, keep_level=not (closed and pocket.largest)) for pocket in pockets]
 
@@ -58,9 +58,11 @@ def _hold(system: FlowSystem, pocket: Pocket, sizes: Array, *, keep_level: bool)
     smallest = [comm.allreduce(int(choice.min(initial=last)), op=MPI.MIN) for choice in choices]
     best = next((number for number in smallest if number < last), last)
     before = system.flow.x.array[: unknowns.owned]
-    shares, known = (_shares(comm, np.where(part, sizes, 0.0)) for part in (inside, inside & (before != 0.0)))
+    shares, shares_before = (_shares(comm, np.where(part, sizes, 0.0)) for part in (inside, inside & (before != 0.0)))
     at = dofs[nodes.numbers[: nodes.owned] == best].astype(np.int64)
-    return Hold(at, inside, shares, keep_level, known, comm.allreduce(float(known @ before)), pocket.elastic)
+    return Hold(
+        at, inside, shares, keep_level, shares_before, comm.allreduce(float(shares_before @ before)), pocket.elastic
+    )
 
 
 def _shares(comm: MPI.Comm, sizes: Array) -> Array:
@@ -74,8 +76,8 @@ def keep_levels(comm: MPI.Comm, holds: list[Hold], flow: Array) -> None:
     One node has held it meanwhile. Which one must not matter: the flow turned around would have another level.
     """
     for hold in holds:
-        if hold.keeps_level and comm.allreduce(float(hold.known.sum())) > 0.0:
-            flow[hold.inside] += hold.level - comm.allreduce(float(hold.known @ flow))
+        if hold.keeps_level and comm.allreduce(float(hold.shares_before.sum())) > 0.0:
+            flow[hold.inside] += hold.level - comm.allreduce(float(hold.shares_before @ flow))
 
 
 def spread_excess(comm: MPI.Comm, holds: list[Hold], rows: Array) -> None:

@@ -13,13 +13,13 @@ from solvers.rigid.inertia import Inertia
 from solvers.rigid.rotation import skew
 from solvers.values import Value, evaluate
 
-#: The ways a body can move: displacements of its centre and rotations about the axes through it.
-WAYS = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
+#: Components of motion: displacements of its centre and rotations about the axes through it.
+COMPONENTS = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
 
 
 @dataclass(frozen=True)
 class PointSpring:
-    """From a point of the body to the place where that point is at the start: -k d along each axis."""
+    """From a point of the body to where that point is at the start: -k d along each axis."""
 
     at: Sequence[float]  #: [m], shape (dim,)
     stiffness: float | Sequence[float]  #: [N/m], of all directions or by axis; in 2D per depth
@@ -28,7 +28,7 @@ class PointSpring:
 
 @dataclass(frozen=True)
 class RigidBody:
-    """A rigid body with 6 unknowns, in 2D with 3. `held` ways follow functions of time [m, rad], 0 for none."""
+    """A rigid body with 6 unknowns, in 2D with 3. `held` components follow functions of time [m, rad], 0 for none."""
 
     name: str
     points: Array  #: vertices of its surface [m], shape (n, dim)
@@ -36,7 +36,7 @@ class RigidBody:
     inertia: Inertia
     gravity: Sequence[Value] | None = None  #: [m/s^2], by components
     springs: Sequence[PointSpring] = ()
-    held: Mapping[str, Callable[[float], float]] = field(default_factory=dict)  #: by `WAYS`
+    held: Mapping[str, Callable[[float], float]] = field(default_factory=dict)  #: by `COMPONENTS`
     initial_velocity: Sequence[float] = ()  #: of the centre [m/s], shape (dim,)
     initial_spin: Sequence[float] = ()  #: [rad/s], shape (3,)
 
@@ -50,16 +50,16 @@ class RigidBody:
         return float(np.linalg.norm(self.points - self.inertia.centre, axis=1).max())
 
     @property
-    def held_ways(self) -> NDArray[np.int64]:
-        """Numbers of the ways that are held."""
-        return np.array([i for i, way in enumerate(WAYS) if way in self.held], dtype=np.int64)
+    def held_components(self) -> NDArray[np.int64]:
+        """Numbers of the components that are held."""
+        return np.array([i for i, name in enumerate(COMPONENTS) if name in self.held], dtype=np.int64)
 
     def held_at(self, t: float) -> Array:
-        """Where the held ways are at the time t."""
-        return np.array([self.held[WAYS[i]](t) for i in self.held_ways])
+        """Held components at the time t."""
+        return np.array([self.held[COMPONENTS[i]](t) for i in self.held_components])
 
     def arms(self, R: Array, points: Array) -> Array:
-        """From the centre to points of the reference place [m], shape (n, dim), turned by R, shape (n, 3)."""
+        """From the centre to points of the reference configuration [m], shape (n, dim), turned by R, shape (n, 3)."""
         return in_space(points - self.inertia.centre) @ R.T
 
     def own_load(self, t: float, shift: Array, R: Array, velocity: Array, spin: Array) -> Array:

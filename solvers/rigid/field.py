@@ -34,8 +34,8 @@ HALF_TURN = np.pi
 class RigidBodies:
     """A `Solid`: all bodies are whole on every process; the first one owns the unknowns.
 
-    The unknowns of a body are increments of its place in a step: displacement of the centre [m] and a further rotation
-    about the axes of space [rad]. `held` ways are given, all others follow from the balance of forces and moments.
+    The unknowns of a body are increments of its position in a step: displacement of the centre [m] and a rotation about
+    the axes of space [rad]. `held` components are given, others follow from the balance of forces and moments.
     """
 
     name = "rigid bodies"
@@ -53,8 +53,8 @@ class RigidBodies:
         self.bodies, self.scheme, self.tolerance = list(bodies), scheme, tolerance
         self.comm, self.timer, self.contact = comm, timer or Timer(), contact
         self.dim, self.extents = bodies[0].dim, np.array([body.extent for body in bodies])
-        self.ways = UNKNOWNS[self.dim]
-        self.unknowns = len(bodies) * len(self.ways)  #: of all processes
+        self.components = UNKNOWNS[self.dim]
+        self.unknowns = len(bodies) * len(self.components)  #: of all processes
         self.size = self.unknowns if comm.rank == 0 else 0
         self.surfaces = {body.name: body.points for body in bodies}
         self.now = [RigidInstant.at_rest() for _ in bodies]
@@ -63,12 +63,12 @@ class RigidBodies:
         self.on_surface_old = np.zeros((len(bodies), 6))
         self._forces = [np.zeros((len(body.points), self.dim)) for body in bodies]  #: on the vertices [N]
         self._u, self._last = np.zeros((len(bodies), 6)), np.zeros((len(bodies), 6))
-        self._held_u = np.zeros((len(bodies), 6))  #: increments of the held ways in this step
+        self._held_u = np.zeros((len(bodies), 6))  #: increments of the held components in this step
         self.current = Step(0.0, 0.0)  #: the step that is computed now or was last
         free = np.ones((len(bodies), 6), dtype=bool)
         for index, body in enumerate(bodies):
-            free[index, body.held_ways] = False
-        self._free = free[:, self.ways].ravel()
+            free[index, body.held_components] = False
+        self._free = free[:, self.components].ravel()
         self._balance = np.zeros(self.unknowns)
         self._noise: Array | None = None  #: rounding errors of the balance, as far as this step knows
 
@@ -86,11 +86,11 @@ class RigidBodies:
             v[3 : 3 + len(body.initial_spin)] = body.initial_spin
             start = RigidInstant.at_rest()
             load = body.own_load(t, start.shift, start.R, v[:3], v[3:])
-            rate, ways, h = load.copy(), body.held_ways, 1e-3 * dt
+            rate, held, h = load.copy(), body.held_components, 1e-3 * dt
             x = [body.held_at(t + k * h) for k in range(4)]
-            v[ways] = (-3.0 * x[0] + 4.0 * x[1] - x[2]) / (2.0 * h)
+            v[held] = (-3.0 * x[0] + 4.0 * x[1] - x[2]) / (2.0 * h)
             course = (2.0 * x[0] - 5.0 * x[1] + 4.0 * x[2] - x[3]) / h**2
-            rate[ways] = np.diag(motion.mass(body, start.R))[ways] * course
+            rate[held] = np.diag(motion.mass(body, start.R))[held] * course
             self.now[index] = RigidInstant(start.shift, start.R, v, rate, load)
         self.old = list(self.now)
 
@@ -103,18 +103,18 @@ class RigidBodies:
         return info
 
     def begin_step(self, t: float, dt: float) -> None:
-        """Remember the state at t; held ways are where they will be at t + dt."""
+        """Remember the state at t; held components are those of t + dt."""
         self.old, self.on_surface_old = list(self.now), self.on_surface.copy()
         self.current, self._noise = Step(t + dt, dt), None
         self._u[:] = self._held_u[:] = 0.0
         for u, body in zip(self._held_u, self.bodies, strict=True):
-            u[body.held_ways] = body.held_at(t + dt) - body.held_at(t)
+            u[body.held_components] = body.held_at(t + dt) - body.held_at(t)
         self._place(self._held_u)
 
     def predict(self, t: float) -> None:
-        """Free ways go on with their velocity."""
-        u, way = self._held_u.copy(), self.current.dt * self._velocity(self.old)
-        u[:, self.ways] += np.where(self._free, way, 0.0).reshape(len(u), -1)
+        """Free components go on with their velocity."""
+        u, path = self._held_u.copy(), self.current.dt * self._velocity(self.old)
+        u[:, self.components] += np.where(self._free, path, 0.0).reshape(len(u), -1)
         self._place(u)
 
     def _place(self, u: Array) -> None:
@@ -144,29 +144,29 @@ class RigidBodies:
         if self.contact is None or not self.contact.active.any():
             return
         mass = np.zeros((self.unknowns, self.unknowns))
-        n = len(self.ways)
+        n = len(self.components)
         for index, (body, now) in enumerate(zip(self.bodies, self.now, strict=True)):
             rows = slice(index * n, (index + 1) * n)
-            mass[rows, rows] = motion.mass(body, now.R)[np.ix_(self.ways, self.ways)]
+            mass[rows, rows] = motion.mass(body, now.R)[np.ix_(self.components, self.components)]
         before, weight = self._velocity(self.old), self.force_weight
         force, force_before = (
-            self._of_ways(np.array([one.load for one in some]) + by_flow)
+            self._by_component(np.array([one.load for one in some]) + by_flow)
             for some, by_flow in ((self.now, self.on_surface), (self.old, self.on_surface_old))
         )
         pushed = np.linalg.solve(mass, weight * force + (1.0 - weight) * force_before)
         without = np.where(self._free, before + self.current.dt * pushed, self._velocity(self.now))
         velocity, rate = self.contact.after_impact(mass, before, without, force)
-        rate = np.where(self._free, rate, self._of_ways(np.array([now.p for now in self.now])))
+        rate = np.where(self._free, rate, self._by_component(np.array([now.p for now in self.now])))
         for index, now in enumerate(self.now):
             rows = slice(index * n, (index + 1) * n)
             v, p = np.zeros(6), now.p.copy()
-            v[self.ways], p[self.ways] = velocity[rows], rate[rows]
+            v[self.components], p[self.components] = velocity[rows], rate[rows]
             v[3:] = now.R.T @ v[3:]
             self.now[index] = replace(now, v=v, p=p)
 
     def _velocity(self, instants: Sequence[RigidInstant]) -> Array:
         """Velocities of the centres [m/s] and spins in space [rad/s], of all unknowns."""
-        return self._of_ways(np.array([np.concatenate([now.v[:3], motion.spin(now)]) for now in instants]))
+        return self._by_component(np.array([np.concatenate([now.v[:3], motion.spin(now)]) for now in instants]))
 
     # ---------------------------------------------------------------------------------------------- the surface
 
@@ -184,12 +184,12 @@ class RigidBodies:
         """A vertex moves by dc + w x r: k = 2 entries in 2D, 4 in 3D."""
         columns, values = [], []
         axes = np.arange(self.dim)
-        turns = np.arange(self.dim, len(self.ways))
+        turns = np.arange(self.dim, len(self.components))
         for index, (body, now) in enumerate(zip(self.bodies, self.now, strict=True)):
             r = body.arms(now.R, body.points)
             swept = np.cross(np.eye(3)[None, :, :], r[:, None, :])  # (n, axis of rotation, component)
-            by_turn = swept[:, self.ways[turns] - 3, : self.dim].transpose(0, 2, 1)
-            first, n = index * len(self.ways), len(r)
+            by_turn = swept[:, self.components[turns] - 3, : self.dim].transpose(0, 2, 1)
+            first, n = index * len(self.components), len(r)
             columns.append(
                 np.concatenate(
                     [
@@ -218,12 +218,12 @@ class RigidBodies:
     def reduced(self, force: Array) -> Array:
         """Forces [N] and moments [N m] of forces on the vertices, of all unknowns."""
         parts = np.split(force, np.cumsum([len(body.points) for body in self.bodies])[:-1])
-        return self._of_ways(self._resultants(parts))
+        return self._by_component(self._resultants(parts))
 
     def taken(self) -> Array:
-        """What momentum, own loads and contact leave open [N, N m]; for held ways what was handed over."""
+        """What momentum, own loads and contact leave open [N, N m]; for held components what was handed over."""
         weight = self.force_weight
-        handed_over = self._of_ways(weight * self.on_surface + (1.0 - weight) * self.on_surface_old)
+        handed_over = self._by_component(weight * self.on_surface + (1.0 - weight) * self.on_surface_old)
         return np.where(self._free, self._balance, handed_over)
 
     def taken_at_start(self) -> Array:
@@ -231,10 +231,10 @@ class RigidBodies:
 
     def moved(self) -> Array:
         """Increments of the last step [m, rad]."""
-        return self._of_ways(self._u)
+        return self._by_component(self._u)
 
-    def _of_ways(self, values: Array) -> Array:
-        return values[:, self.ways].ravel()
+    def _by_component(self, values: Array) -> Array:
+        return values[:, self.components].ravel()
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
@@ -243,31 +243,31 @@ class RigidBodies:
         m, f = self.scheme.alpha_m, self.scheme.alpha_f
         parts = zip(self.now, self.old, strict=True)
         rows = [(1 - m) * now.p + m * old.p - (1 - f) * now.load - f * old.load for now, old in parts]
-        balance = self._of_ways(np.array(rows))
+        balance = self._by_component(np.array(rows))
         return balance if self.contact is None else balance - self.contact.force
 
     def residual(self) -> float:
         """Norm [N] of the balance; moments count over the size of the body."""
         weight = self.force_weight
-        mean = self._of_ways(weight * self.on_surface + (1.0 - weight) * self.on_surface_old)
+        mean = self._by_component(weight * self.on_surface + (1.0 - weight) * self.on_surface_old)
         if self.contact is not None:
             self.contact.z[:] = 0.0
         self._balance = np.where(self._free, self._own_balance() - mean, 0.0)
         if self.contact is None:
             return self._norm(self._balance)
         arms = [body.arms(now.R, body.points) for body, now in zip(self.bodies, self.now, strict=True)]
-        self.contact.measure(self._positions(), arms, self.ways, self.current.t)
+        self.contact.measure(self._positions(), arms, self.components, self.current.t)
         self.contact.G[:, ~self._free] = 0.0
         self.contact.press(self._system(), -self._balance)
         return self._norm(self._balance - self.contact.force)
 
     def _norm(self, rows: Array) -> float:
-        arms = np.where(self.ways < 3, 1.0, self.extents[:, None]).ravel()
+        arms = np.where(self.components < 3, 1.0, self.extents[:, None]).ravel()
         return float(np.linalg.norm(rows / arms))
 
     def tangent(self) -> Array:
         """d(balance)/d(unknowns), dense; what forces on the vertices turn with the body is in it."""
-        found, n, weight = np.zeros((self.unknowns, self.unknowns)), len(self.ways), self.force_weight
+        found, n, weight = np.zeros((self.unknowns, self.unknowns)), len(self.components), self.force_weight
         parts = zip(self.bodies, self.old, self.now, self._u, self._forces, strict=True)
         for index, (body, old, now, u, force) in enumerate(parts):
             own = motion.inertia_tangent(body, self.scheme, old, now, u[3:], self.current.dt)
@@ -277,7 +277,7 @@ class RigidBodies:
             turned = arms.T @ in_space(force)  # sum of [f] [r] = r f^T - (f . r) 1
             own[3:, 3:] -= weight * (turned - np.trace(turned) * np.eye(3))
             rows = slice(index * n, (index + 1) * n)
-            found[rows, rows] = own[np.ix_(self.ways, self.ways)]
+            found[rows, rows] = own[np.ix_(self.components, self.components)]
         return found
 
     def linearise(self) -> PETSc.Mat:
@@ -315,7 +315,7 @@ class RigidBodies:
 
     def _add(self, increment: Array) -> float:
         added = np.zeros_like(self._u)
-        added[:, self.ways] = np.where(self._free, increment, 0.0).reshape(len(added), -1)
+        added[:, self.components] = np.where(self._free, increment, 0.0).reshape(len(added), -1)
         for part, u in zip(added, self._u, strict=True):
             part[3:] = vector_rate(u[3:]) @ part[3:]
         self._last = added
@@ -339,7 +339,7 @@ class RigidBodies:
         """Positions are known to eps times displacement and size [m], rotations to eps."""
         sizes = np.ones((len(self.bodies), 6))
         sizes[:, :3] = np.array([[np.abs(now.shift).max()] for now in self.now]) + self.extents[:, None]
-        return self._of_ways(sizes)[: self.size]
+        return self._by_component(sizes)[: self.size]
 
     def add_rounding(self, error: Array) -> None:
         """Rounding errors that the flow brings into the balance, after `linearise`, of the owned unknowns."""

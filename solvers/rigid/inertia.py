@@ -12,7 +12,7 @@ from solvers.api import Array
 
 @dataclass(frozen=True)
 class Inertia:
-    """Of a body at its reference place."""
+    """Of a body in its reference configuration."""
 
     mass: float  #: [kg]
     centre: Array  #: centre of mass [m], shape (dim,)
