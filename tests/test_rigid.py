@@ -168,7 +168,7 @@ def test_tangent_and_jacobian_against_finite_differences(make):
     bodies.step(0.0, 0.1)
     bodies.begin_step(0.1, 0.1)
     start = np.zeros((1, 6))
-    start[:, bodies.ways] = 0.3 * rng.standard_normal(len(bodies.ways))
+    start[:, bodies.components] = 0.3 * rng.standard_normal(len(bodies.components))
     bodies._place(start)
     force = rng.standard_normal((len(bodies.bodies[0].points), dim))
 

@@ -28,7 +28,6 @@ class Directions:
     basis: Sparse  #: P, shape (dim * m, K)
     felt: Sparse  #: Q, orthonormal, shape (dim * N, K)
     turning: Sparse  #: Z = turning @ (derivatives of the normals), shape (dim * m, dim * m)
-    of_multiplier: NDArray[np.int64]  #: multiplier that each zeta belongs to, shape (K,)
 
 
 def free_normals(normals: Array, node: NDArray[np.int64], held: Array) -> Array:
@@ -102,7 +101,6 @@ def find_directions(
         basis=columns(P, np.arange(m), dim * m),
         felt=columns(Q, node, dim * len(held)),
         turning=block_diagonal(turn),
-        of_multiplier=np.nonzero(used)[0],
     )
 
 

@@ -62,19 +62,15 @@ class ContactInterface:
         several = np.bincount(node[constrained], minlength=len(node))[node] > 1
         return np.where(several & (self.spans == "surface"), "normal", self.spans)
 
-    def multipliers_of(self, slave: Surface) -> NDArray[np.int64]:
-        """Multipliers of a slave surface, in the order of its nodes; several where it has a sharp edge."""
-        return self._numbers(slave)[0]
-
     def at_nodes(self, slave: Surface, values: Array, join: np.ufunc) -> Array:
         """Values at the nodes of a slave surface from those (C,) of all multipliers, shape (n,)."""
-        which, node = self._numbers(slave)
+        which, node = self.multipliers_of(slave)
         found = np.full(len(slave.points), np.nan)
         join.at(found, node, values[which])
         return found
 
-    def _numbers(self, slave: Surface) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(multipliers of a slave surface, the nodes of the surface that they belong to)."""
+    def multipliers_of(self, slave: Surface) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(multipliers of a slave surface, the nodes of the surface that they belong to), in the order of the nodes."""
         patch = self.multipliers.patches[self.patch_of[id(slave)]]
         split, first = np.unique(self.facets_of[id(slave)], return_index=True)
         return patch.multipliers[split], slave.facets.ravel()[first]

@@ -51,11 +51,6 @@ class ContactNodes:
         return self.points.shape[1]
 
     @property
-    def deformable(self) -> NDArray[np.bool_]:
-        """Shape (N,)."""
-        return self.dofs[:, 0] >= 0
-
-    @property
     def fixed(self) -> NDArray[np.bool_]:
         """Held in all directions, shape (N,)."""
         return np.einsum("nii->n", self.held) > self.dim - 0.5

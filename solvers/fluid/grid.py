@@ -79,13 +79,6 @@ class DistributedGrid:
         return self.grid.dim
 
     @cached_property
-    def local_of(self) -> NDArray[np.int32]:
-        """Local number of each box cell, -1 where this process does not hold it."""
-        found = np.full(self.grid.size, -1, dtype=np.int32)
-        found[self.numbers] = np.arange(len(self.numbers), dtype=np.int32)
-        return found
-
-    @cached_property
     def interior_faces(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """(local faces, their two local cells) of all faces between two local cells."""
         return fem.interior_facets(self.domain)
