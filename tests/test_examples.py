@@ -29,6 +29,9 @@ def test_all_are_tested_and_shown():
     assert names == {*library, "post_process"}
     pages = [(EXAMPLES.parent / name).read_text() for name in ("library.md", "howto.md")]
     assert all(f"examples/{name}.py" in pages[name not in library] for name in names)
+    assert all(f"pictures/{name}_example.png" in pages[0] for name in library)
+    drawn = (EXAMPLES.parent / "draw_examples.py").read_text()
+    assert set(re.findall(r"^def (\w+)\(found", drawn, re.MULTILINE)) == library
 
 
 def test_two_blocks():
