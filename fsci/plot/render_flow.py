@@ -17,9 +17,9 @@ SPACING = 0.035  #: distance of streamlines in the plane, as part of the edge of
 RESOLUTION = 400  #: points along the diagonal at which the plane flow is sampled for them
 SHORTEST = 8  #: streamlines in the plane that extend over fewer of these points are left out
 SEEDS = 5  #: streamlines in space start from so many points along each edge of the middle cross-section,
-BODY_SEEDS = 9  #: and from so many along each edge of a rectangle
+BODY_SEEDS = 6  #: and from so many along each edge of a rectangle
 AROUND = 1.2  #: that is so many times as large as a body
-VEIL, PANE = 0.4, 0.8  #: opacity of the slice through a flow in space, with stream tubes and without
+VEIL, PANE = 0.3, 0.8  #: opacity of the slice through a flow in space, with stream tubes and without
 TUBES = 0.0025  #: their radius, as part of the box's diagonal
 LINE, TRIANGLE = 3, 5  #: VTK's numbers of cell types
 
