@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -84,6 +84,11 @@ def body(name: str, points, facets, *, motion=None, velocity=0.0, wet=None) -> I
         slip = np.zeros_like(points) + velocity
         return ImmersedBody(surface, lambda t: Motion(points, slip), rests=True)
     return ImmersedBody(surface, lambda t: Motion(*motion(points, t)))
+
+
+def with_slip(immersed: ImmersedBody, length: float) -> ImmersedBody:
+    """The body with a slip length [m]."""
+    return replace(immersed, surface=replace(immersed.surface, slip_length=length))
 
 
 def loop(count: int) -> np.ndarray:

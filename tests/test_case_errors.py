@@ -56,6 +56,12 @@ MISTAKES = [
         "17:3: 'my energy' must be a name of letters, digits, '_' and '-' that begins with a letter, not 'my energy'",
         "my energy",
     ),
+    (
+        "      gravity",
+        "      slip_length: 0.1\n      gravity",
+        "12:20: 'slip_length' is of the flow around the body: it needs the section 'fluid'",
+        "0.1",
+    ),
     # types
     ("{step: 0.1, end: 1}", "3", "3:7: 'time' must be a section of settings, not 3", "3"),
     (" {step: 0.1, end: 1}", "", "3:1: 'time' is empty: give it a value", "time"),

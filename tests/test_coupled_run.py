@@ -237,3 +237,17 @@ def test_no_matrix_is_kept_from_step_to_step(tmp_path, monkeypatch):
         created, destroyed = (int(number) for number in line.split()[1:3])
         kept.append(created - destroyed)
     assert kept[0] == kept[1]
+
+
+def test_post_with_a_slip_length(tmp_path):
+    """Both schemes find the same, in as few Newton iterations as with a flow that sticks, and less drag."""
+    found = {}
+    for length, scheme in ((0, "monolithic"), (0.1, "monolithic"), (0.1, "iqn")):
+        folder = tmp_path / f"{scheme}{length}"
+        text = with_scheme(scheme).replace("post:\n", f"post:\n      slip_length: {length}\n", 1)
+        found[scheme, length] = run(text, folder, ("time.end", "0.06"))
+    sticks, slips, partitioned = found.values()
+    for name, bound in (("tip.x", 1e-7), ("force.x", 1e-5)):
+        assert slips[name] == pytest.approx(partitioned[name], abs=bound * np.abs(slips[name]).max())
+    assert slips["force.x"][-1] < 0.99 * sticks["force.x"][-1]
+    assert slips["iterations"].max() <= sticks["iterations"].max() + 1

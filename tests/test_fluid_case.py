@@ -137,6 +137,7 @@ MISTAKES = [
         "14:11: 'disc' has no surface 'inner' (available: outer)",
         "inner",
     ),
+    ("      motion", "      slip_length: -1\n      motion", "14:20: 'slip_length' must be at least 0, not -1", "-1"),
     ('[0, "0.1*sin(t)"]', "[x, 0]", "14:31: entry 1 of 'displacement' must not depend on x", "x"),
     ('[0, "0.1*sin(t)"]', "[t, 0, 0]", "14:30: 'displacement' must have 2 entries in 2D, not 3", "[t"),
     ("angle: 90*t}", "}", "14:59: a rotation needs 'angle' or 'angular_velocity'", "{centre"),

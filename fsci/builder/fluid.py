@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,7 @@ def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Immer
     assert case.fluid is not None
     settings, linear = case.fluid, case.solver.linear
     solver = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
+    bodies = [_with_slip(case, body) for body in bodies]
     elastic = any(body.deforms for body in bodies)
     grid, flow, patches = Grid(settings.grid.planes), _flow(settings, elastic=elastic), _patches(settings)
     try:
@@ -82,6 +84,14 @@ def _patches(settings: FluidSection) -> list[Patch]:
 
 
 # ---------------------------------------------------------------------------------------------------------- bodies
+
+
+def _with_slip(case: Case, body: ImmersedBody) -> ImmersedBody:
+    assert case.fluid is not None
+    name = body.surface.name
+    settings = case.fluid.bodies.get(name) or case.elastic_bodies.get(name)
+    length = 0.0 if settings is None else settings.slip_length
+    return replace(body, surface=replace(body.surface, slip_length=length)) if length else body
 
 
 def read_surface(case: Case, name: str, comm: MPI.Comm) -> tuple[Array, NDArray[np.int64]]:

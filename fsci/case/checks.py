@@ -57,7 +57,7 @@ def _structure(case: Case, structure: StructureSection) -> Iterator[Mistake]:
         yield from _element(case, structure, body, keys)
         yield from _surfaces(body, keys)
         yield from _vectors(case, body, keys)
-        yield from _needs(structure, body, keys)
+        yield from _needs(case, structure, body, keys)
 
 
 def _plane(case: Case, structure: StructureSection) -> Iterator[Mistake]:
@@ -107,13 +107,15 @@ def load_vectors(body: BodySection) -> Iterator[tuple[Keys, tuple[Any, ...]]]:
                     yield (kind, i, name), vector
 
 
-def _needs(structure: StructureSection, body: BodySection, keys: Keys) -> Iterator[Mistake]:
+def _needs(case: Case, structure: StructureSection, body: BodySection, keys: Keys) -> Iterator[Mistake]:
     dynamic = structure.dynamics is not None
     reason = "gravity" if body.gravity else "dynamics" if dynamic else ""
     if reason and body.material.density is None:
         yield (*keys, "material"), f"missing setting 'density' in 'material': {reason} needs it"
     elif reason and not has_mass(body.material):
         yield (*keys, "material", "density"), f"'density' must be greater than 0: {reason} needs it"
+    if body.slip_length and case.fluid is None:
+        yield (*keys, "slip_length"), "'slip_length' is of the flow around the body: it needs the section 'fluid'"
     if body.initial_velocity and not dynamic:
         yield (*keys, "initial_velocity"), "'initial_velocity' needs 'dynamics' in 'structure'"
 

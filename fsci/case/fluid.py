@@ -15,6 +15,7 @@ from fsci.case.values import (
     EntryCount,
     Formula,
     Name,
+    NotNegative,
     Number,
     NumberVector,
     OneOrMany,
@@ -151,6 +152,9 @@ class RigidBodySection(Section):
     )
     motion: Movement | None = setting(None, "motion from the place of the mesh; default: at rest")
     free: Free | None = setting(None, "instead of a motion: the flow and other forces move it")
+    slip_length: NotNegative = setting(
+        0.0, "the flow slips along it with this times the slope of its velocity; 0: it sticks", unit="m"
+    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> RigidBodySection:

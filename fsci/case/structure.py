@@ -89,6 +89,9 @@ class BodySection(Section):
     pressures: tuple[PressureSection, ...] = setting(tuple, "follower loads on surfaces")
     line_forces: tuple[LineForceSection, ...] = setting(tuple, "dead loads along lines, 3D only")
     point_forces: tuple[PointForceSection, ...] = setting(tuple, "dead loads at points")
+    slip_length: NotNegative = setting(
+        0.0, "the flow around it slips along it with this times the slope of its velocity; 0: it sticks", unit="m"
+    )
     initial_displacement: Vector | None = setting(None, "displacement at the start", unit="m")
     initial_velocity: Vector | None = setting(None, "velocity at the start", unit="m/s")
 

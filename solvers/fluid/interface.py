@@ -6,12 +6,14 @@ the velocity g instead of u, and the same terms tested with the surface's motion
     C[(v, q), b i] = <2 mu eps(v) n + q n, N_b e_i> - <P v, N_b e_i>       fluid rows:  r += C g
     f_b i = -<sigma(u, p) n - P (u - g), N_b e_i> = (C^T S (u, p) - M g)_bi,   S = -1 for u, +1 for p
 
+C and M have what `slip` adds along surfaces that the flow does not stick to.
 Both come from the same moments of the same pieces, so that the sum of all forces vanishes to round-off.
 Source: Massing, Schott, Wall, Comput. Methods Appl. Mech. Engrg. 328 (2018) 262-300, section 3.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +22,7 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.slip import PieceIntegrals, Slip, slip_terms
 from solvers.fluid.space import Unknowns
 from solvers.fluid.weights import Weights
 
@@ -30,7 +33,17 @@ CouplingBlocks = tuple[Array, Array]
 class InterfaceTerms:
     """The operators of one cut, over the pieces in cells that this process owns."""
 
-    def __init__(self, grid: DistributedGrid, unknowns: Unknowns, rule: Weights, cut: Cut, mu: float, penalty: Array):
+    def __init__(
+        self,
+        grid: DistributedGrid,
+        unknowns: Unknowns,
+        rule: Weights,
+        cut: Cut,
+        mu: float,
+        penalty: Array,
+        slip_length: Array | None = None,
+    ):
+        """penalty: P by pieces [Pa s/m]; slip_length: by facets [m], None where the flow sticks to all of them."""
         pieces = cut.pieces
         mine = cut.cut[pieces.cell] < grid.owned
         cells = cut.cut[pieces.cell[mine]]
@@ -40,6 +53,7 @@ class InterfaceTerms:
         self.corners = cut.facets[pieces.facet[mine]]
         self.x = cut.motion.x[self.corners]
         self.sizes = grid.sizes[cells]
+        self.cells = cells  #: local cell of each piece, sorted
         self.u, self.p = unknowns.cell_velocity[cells], unknowns.cell_pressure[cells]
         phi, gradient = rule.velocity_table
         psi, psi_gradient = rule.pressure_table
@@ -51,6 +65,11 @@ class InterfaceTerms:
         self.normal_slope = np.einsum("pavj,pj->pav", self.grad, self.n)
         slope = np.tensordot(moments.sum(axis=2), psi_gradient, (1, 0))
         self.pressure_slope = slope / self.sizes[:, None, :]
+        self.slip: Slip | None = None
+        if slip_length is not None:
+            at = PieceIntegrals(self.n, moments.sum(axis=2), self.phi, self.grad, self.mass_of_pieces, self.sizes)
+            length = slip_length[pieces.facet[mine]]
+            self.slip = slip_terms(at, rule.velocity_table, mu, self.penalty, length)
 
     def velocity_terms(self, g: Array) -> Array:
         """C g at local dofs, the ghosts' share still there; g [m/s] of shape (vertices, dim)."""
@@ -58,6 +77,8 @@ class InterfaceTerms:
         against = np.einsum("pav,pvi->pai", mu * self.normal_slope, g)
         against += mu * np.einsum("pavj,pvj->pa", self.grad, g)[:, :, None] * n[:, None, :]
         against -= np.einsum("pij,paj->pai", self.penalty, self.phi @ g)
+        if self.slip is not None:
+            against += np.einsum("pakvi,pvi->pak", self.slip.coupling, g)
         leak = np.einsum("pav,pv->pa", self.psi, np.einsum("pvi,pi->pv", g, n))
         size = self._unknowns.local
         total: Array = np.bincount(self.u.ravel(), against.ravel(), size).astype(float)
@@ -71,9 +92,28 @@ class InterfaceTerms:
         force += np.einsum("pav,pa->pv", self.psi, p)[:, :, None] * n[:, None, :]
         slip = np.einsum("pav,pai->pvi", self.phi, u) - np.einsum("pvw,pwi->pvi", self.mass_of_pieces, g[self.corners])
         force += np.einsum("pij,pvj->pvi", self.penalty, slip)
+        if self.slip is not None:
+            force -= np.einsum("pakvi,pak->pvi", self.slip.coupling, u)
+            force -= np.einsum("pviwj,pwj->pvi", self.slip.mass, g[self.corners])
         total = np.zeros((self.vertices, n.shape[1]))
         np.add.at(total, self.corners, force)
         return total
+
+    def slip_rows(self, flow: Array) -> Array:
+        """What slip adds to the rows of a flow, all at local dofs, the ghosts' share still there."""
+        size = self._unknowns.local
+        if self.slip is None:
+            return np.zeros(size)
+        rows = np.einsum("pakbl,pbl->pak", self.slip.flow, flow[self.u])
+        return np.bincount(self.u.ravel(), rows.ravel(), size).astype(float)
+
+    def slip_blocks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
+        """Their derivatives: (local dofs, block) of each cell."""
+        if self.slip is None or not len(self.u):
+            return
+        size, (_, first) = self.u[0].size, np.unique(self.cells, return_index=True)
+        blocks = np.add.reduceat(self.slip.flow, first, axis=0).reshape(-1, size, size)
+        yield from zip(self.u[first].reshape(-1, size).astype(np.int32), blocks, strict=True)
 
     @cached_property
     def coupling_blocks(self) -> CouplingBlocks:
@@ -83,12 +123,15 @@ class InterfaceTerms:
         block -= np.einsum("pki,pav->pakvi", self.penalty, self.phi)
         for axis in range(self.dim):
             block[:, :, axis, :, axis] += mu * self.normal_slope
+        if self.slip is not None:
+            block += self.slip.coupling
         return block, np.einsum("pav,pi->pavi", self.psi, n)
 
     @cached_property
     def mass_blocks(self) -> Array:
         """M = -df/dg [kg/s] by pieces, shape (pieces, vertices, dim, vertices, dim)."""
-        return np.einsum("pij,pvw->pviwj", self.penalty, self.mass_of_pieces)
+        mass: Array = np.einsum("pij,pvw->pviwj", self.penalty, self.mass_of_pieces)
+        return mass if self.slip is None else mass + self.slip.mass
 
     @cached_property
     def pattern(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

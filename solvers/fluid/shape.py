@@ -32,6 +32,8 @@ def shape_derivatives(interface: InterfaceTerms, flow: Array) -> tuple[CouplingB
     rows_u = np.einsum("pav,pkj->pakvj", at.phi, penalised)
     rows_u -= mu * np.einsum("pav,pkj->pakvj", at.normal_slope, grad_u)
     rows_u -= mu * np.einsum("pavj,pk->pakvj", at.grad @ grad_u[:, None], n)
+    if at.slip is not None:
+        rows_u -= np.einsum("pakvi,pij->pakvj", at.slip.coupling, grad_u)
     rows_p = -np.einsum("pav,pj->pavj", at.psi, np.einsum("pi,pij->pj", n, grad_u))
 
     field = n[:, :, None] * grad_p[:, None, :] + penalised
@@ -40,6 +42,8 @@ def shape_derivatives(interface: InterfaceTerms, flow: Array) -> tuple[CouplingB
     load = np.einsum("pbv,pij->pbivj", at.mass_of_pieces, field) + np.einsum(
         "pb,pivj->pbivj", at.psi.sum(axis=1), turned
     )
+    if at.slip is not None:
+        load += np.einsum("pbivl,plj->pbivj", at.slip.mass, grad_u)
     return (rows_u, rows_p), load
 
 

@@ -20,6 +20,7 @@ class ImmersedSurface:
     vertices: int
     wet: NDArray[np.bool_] | None = None  #: facets that the fluid touches; the others only close the solid; None: all
     may_part: NDArray[np.bool_] | None = None  #: facets in contact: those on the boundary of the box may leave it
+    slip_length: float = 0.0  #: shear stress = mu / slip_length times the velocity along it [m]; 0: the flow sticks
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,13 @@ def wetness(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_]:
     """Which facets of all surfaces the fluid touches."""
     parts = [np.ones(len(s.facets), dtype=bool) if s.wet is None else s.wet for s in surfaces]
     return np.concatenate([*parts, np.empty(0, dtype=bool)])
+
+
+def slip_lengths(surfaces: Sequence[ImmersedSurface]) -> Array | None:
+    """Of the facets of all surfaces [m]; None if the flow sticks to all of them."""
+    if not any(surface.slip_length for surface in surfaces):
+        return None
+    return np.concatenate([np.full(len(surface.facets), surface.slip_length) for surface in surfaces])
 
 
 def offsets(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.int64]:

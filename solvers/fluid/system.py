@@ -106,6 +106,7 @@ class FlowSystem:
         self._pattern: Pattern | None = None
         self._penalised: NDArray[np.int32] | None = None  #: faces that the ghost penalty is assembled for
         self.cut: Cut | None = None
+        self.slip_length: Array | None = None  #: of the facets of all surfaces [m]; None: the flow sticks to them
         self._interface: InterfaceTerms | None = None
         self._current = False  #: weights, interface and ghost penalty are those of cut and scales
 
@@ -238,7 +239,7 @@ class FlowSystem:
             penalty = self._interface_penalties(cut.pieces, cut)
             self.weights.set(cut, penalty)
             self._interface = InterfaceTerms(
-                self.grid, self.unknowns, self.weights, cut, self.settings.viscosity, penalty
+                self.grid, self.unknowns, self.weights, cut, self.settings.viscosity, penalty, self.slip_length
             )
         film = np.ones(len(self.grid.numbers)) if cut.film is None else cut.film[self.grid.numbers]
         if not self._same_faces(cut, film):
@@ -303,6 +304,7 @@ class FlowSystem:
             fem.assemble_vector(form, self._out)
         if self.with_bodies:
             self._out += self.interface.velocity_terms(self.cut.motion.v)
+            self._out += self.interface.slip_rows(self.flow.x.array)
         self._add_covered(self._out)
         fem.add_ghosts(self.unknowns.space, self._out)
         owned = self.unknowns.owned
@@ -327,6 +329,8 @@ class FlowSystem:
         for dofs, blocks in self._outer.slopes(self._outer_on_cut, *self._outer_scales()):
             for at, block in zip(dofs.reshape(len(dofs), -1).astype(PETSc.IntType), blocks, strict=True):
                 matrix.setValuesLocal(at, at, block.reshape(len(at), -1), PETSc.InsertMode.ADD_VALUES)
+        for dofs, block in self.interface.slip_blocks() if self.with_bodies else ():
+            matrix.setValuesLocal(dofs, dofs, block, PETSc.InsertMode.ADD_VALUES)
         self._newton.value = 1.0
         matrix.assemble()
         start = matrix.getOwnershipRange()[0]
