@@ -45,6 +45,10 @@ Maker: TypeAlias = Callable[[Any, "Task"], PETSc.KSP]
 #: process. Nested dissection: by bandwidth a slender body is 1.5 times faster, but a square one 5 times slower.
 SMALL_PLANE = 4_000
 
+#: Size of a pivot that PETSc takes for zero. Its own 2e-14 is one of numbers of size 1: in units where stiffness is
+#: 1e-21, regular matrices were refused. Bodies without supports are found by how far they fly (`flown_off`).
+ZERO_PIVOT = 1e-300
+
 
 @dataclass(frozen=True)
 class Task:
@@ -64,6 +68,7 @@ def direct_solver(comm, task: Task) -> PETSc.KSP:
     preconditioner.setType(PETSc.PC.Type.CHOLESKY if task.symmetric else PETSc.PC.Type.LU)
     if task.dim == 2 and task.dofs < SMALL_PLANE and comm.size == 1:
         preconditioner.setFactorOrdering("nd")
+        preconditioner.setFactorPivot(ZERO_PIVOT)
     else:
         preconditioner.setFactorSolverType("mumps")
     return ksp
@@ -166,8 +171,15 @@ def incomplete_solver(comm, task: Task) -> PETSc.KSP:
 SOLVERS: Mapping[str, Maker] = {"direct": direct_solver, "iterative": elastic_solver, "ilu": incomplete_solver}
 
 
-def _schwarz_solver(comm, prefix: str, tolerance: float, **more: str | int) -> PETSc.KSP:
-    settings = {"pc_type": "asm", "pc_asm_overlap": 1, "sub_pc_type": "ilu", "sub_pc_factor_levels": 0, **more}
+def _schwarz_solver(comm, prefix: str, tolerance: float, **more: str | float) -> PETSc.KSP:
+    settings = {
+        "pc_type": "asm",
+        "pc_asm_overlap": 1,
+        "sub_pc_type": "ilu",
+        "sub_pc_factor_levels": 0,
+        "sub_pc_factor_zeropivot": ZERO_PIVOT,
+        **more,
+    }
     options = PETSc.Options(prefix)
     for name, value in settings.items():
         options[name] = value
@@ -199,6 +211,7 @@ def coupled_solver(comm, structure, flow, *, tolerance: float, fill: bool = Fals
         "fieldsplit_flow_pc_asm_overlap": 2 if fill else 1,
         "fieldsplit_flow_sub_pc_type": "ilu",
         "fieldsplit_flow_sub_pc_factor_levels": 1 if fill else 0,
+        "fieldsplit_flow_sub_pc_factor_zeropivot": ZERO_PIVOT,
     }.items():
         options[name] = value
     ksp = PETSc.KSP().create(comm)

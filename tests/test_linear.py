@@ -57,6 +57,24 @@ def test_iterative_equals_direct(mesh):
     assert iterations(iterative) < LIMIT
 
 
+@pytest.mark.parametrize("unit", [1e-24, 1e12])
+@pytest.mark.parametrize("method", ["direct", "ilu"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_units_of_stiffness(dim, method, unit):
+    """The same displacement: no matrix is singular because its numbers are small."""
+    shape, cells = (shapes.rectangle, (8, 2)) if dim == 2 else (shapes.box, (8, 2, 2))
+    mesh, found = shape((4, 1, 1)[:dim], cells), []
+    for scale in (1.0, unit):
+        settings = SolverSettings(Tolerance(residual=1e-9), linear=method, linear_tolerance=1e-12)
+        material, load = NeoHooke(400.0 * scale, 600.0 * scale), vector(*[0.0] * (dim - 1), -4.0 * scale)
+        supports, tractions = [held(dim=dim)], [Traction("right", load)]
+        structure = make_structure(mesh, material, settings=settings, supports=supports, tractions=tractions)
+        load_step(structure)
+        found.append(structure.now.u.copy())
+    assert np.abs(found[0]).max() > 0.1
+    assert found[1] == pytest.approx(found[0], abs=1e-8 * np.abs(found[0]).max())
+
+
 def test_unsymmetric_system():
     """A follower pressure."""
     loads = {"pressures": [Pressure("top", constant(3.0))]}

@@ -125,6 +125,12 @@ def test_a_block_that_begins_on_the_floor_and_leaves_it():
     assert (one.scene, one.parameters["height"], one.verdict) == ("fall", 0.0, "right")
 
 
+def test_a_beam_in_units_in_which_its_stiffness_is_tiny():
+    """1e-21: no pivot is zero because of its units."""
+    one = run.judge(215)
+    assert (one.scene, one.twin, one.verdict) == ("beam", "units times 1000, 1e-12, 1e+06", "right")
+
+
 @pytest.mark.slow
 def test_an_impact_that_the_step_does_not_resolve_is_told():
     """The block leaves with twice its energy."""

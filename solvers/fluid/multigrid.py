@@ -20,6 +20,7 @@ from scipy import sparse
 from solvers.api import Array
 from solvers.fluid.decoupled import decoupled
 from solvers.fluid.space import Unknowns
+from solvers.linear import ZERO_PIVOT
 
 Indices = NDArray[np.int64]
 
@@ -218,6 +219,7 @@ class Multigrid:
         """Incomplete factors by process, with a layer of its neighbours: without that it takes twice as long."""
         prefix = "flow_second_" if self._second else "flow_first_"
         PETSc.Options(prefix)["sub_pc_type"] = "ilu"
+        PETSc.Options(prefix)["sub_pc_factor_zeropivot"] = ZERO_PIVOT
         smoother.setOptionsPrefix(prefix)
         if self._second:
             # one step alone would diverge on stretched cells; in the given order it takes 20 iterations instead of 13
