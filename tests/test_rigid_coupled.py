@@ -74,7 +74,7 @@ def test_blocks_against_finite_differences(monkeypatch):
     fluid, bodies, interface = coupled.flow, coupled.solid, coupled.interface
     rng = np.random.default_rng(0)
     start = np.zeros((1, 6))
-    start[:, bodies.ways] = 1e-3 * rng.standard_normal(3)
+    start[:, bodies.components] = 1e-3 * rng.standard_normal(3)
     bodies.place(start)
     fluid.move(interface.move(interface.displacement()))
     free = np.flatnonzero(~fluid.held)
