@@ -24,23 +24,24 @@ def test_cylinder_second_order(gap):
     assert drag_ratio(2, gap, H, "q2q1") == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.mark.parametrize(("h", "cells"), [(0.1, (0.5, 0.2, 0.1)), (0.05, (0.4, 0.2, 0.1, 0.05))])
+@pytest.mark.parametrize(("h", "cells"), [(0.1, (0.5, 0.2, 0.1)), (0.05, (0.4, 0.2, 0.1))])
 def test_cylinder_second_order_below_a_cell(h, cells):
-    """Within 3 % down to a tenth of a cell."""
-    assert [drag_ratio(2, gap * h, h, "q2q1") for gap in cells] == pytest.approx([1.0] * len(cells), abs=0.03)
+    """Within 1.5 % down to a tenth of a cell."""
+    assert [drag_ratio(2, gap * h, h, "q2q1") for gap in cells] == pytest.approx([1.0] * len(cells), abs=0.015)
 
 
-def test_film_below_the_width_of_a_cell():
-    """Known and documented: where the pressure falls off within a cell, the drag is too large."""
-    assert drag_ratio(2, 0.005, 0.1, "q2q1") == pytest.approx(1.068, abs=0.01)
+@pytest.mark.parametrize(("h", "ratio"), [(0.1, 1.039), (0.05, 0.970)])
+def test_film_of_a_twentieth_of_a_cell(h, ratio):
+    """Known and documented: where the pressure falls off within a cell the drag is too large; else fluid passes."""
+    assert drag_ratio(2, 0.05 * h, h, "q2q1") == pytest.approx(ratio, abs=0.01)
 
 
 @pytest.mark.parametrize(("h", "dt"), [(0.1, 0.1), (0.05, 0.3)])
 def test_cylinder_that_closes_a_gap(h, dt):
-    """A moving body, from a gap of a cell to a tenth of one: within 3 % in every step."""
+    """A moving body, from a gap of a cell to a tenth of one: within 1.5 % in every step."""
     ratios = np.array(closing_ratios(h, round(2.4 / dt), dt))
     assert ratios[-1, 0] < 0.1
-    assert ratios[:, 1] == pytest.approx(1.0, abs=0.03)
+    assert ratios[:, 1] == pytest.approx(1.0, abs=0.015)
 
 
 @pytest.mark.parametrize(("gap", "ratio"), [(0.5, 1.003), (0.2, 1.023), (0.1, 1.078), (0.05, 1.372), (0.01, 0.643)])
@@ -67,9 +68,9 @@ def test_sphere_second_order(gap):
 @pytest.mark.slow
 @pytest.mark.parametrize("gap", [0.05, 0.02, 0.01])
 def test_sphere_second_order_below_a_cell(gap):
-    """Within 3 % down to a tenth of a cell."""
+    """Within 2 % down to a tenth of a cell."""
     ratio = drag_ratio(3, gap, 0.1, "q2q1", growth=1.6, fine=0.6, size=5.0)
-    assert ratio == pytest.approx(1.0, abs=0.03)
+    assert ratio == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(("element", "ratio", "bar"), [("q2q1", 1.0, 0.02), ("q1q1", 1.048, 0.01)])

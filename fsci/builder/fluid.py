@@ -19,7 +19,6 @@ from fsci.case.rigid_motion import rigid_motion
 from fsci.meshes.of_case import read_rigid_body, require_inside_period
 from solvers.fluid import probes
 from solvers.fluid.field import Fluid
-from solvers.fluid.forms import choose_penalties
 from solvers.fluid.grid import Grid
 from solvers.fluid.immersed import ImmersedBody, rigid_body
 from solvers.fluid.inside import PointInBody
@@ -45,8 +44,7 @@ def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Immer
     settings, linear = case.fluid, case.solver.linear
     solver = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
     bodies = [_with_slip(case, body) for body in bodies]
-    elastic = any(body.deforms for body in bodies)
-    grid, flow, patches = Grid(settings.grid.planes), _flow(settings, elastic=elastic), _patches(settings)
+    grid, flow, patches = Grid(settings.grid.planes), _flow(settings), _patches(settings)
     try:
         return Fluid(grid, flow, patches, bodies, solver, timer=timer, comm=comm)
     except UncoveredFaces as error:
@@ -54,7 +52,7 @@ def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Immer
         raise case.error(("fluid", "patches"), f"no patch is on part of the box's boundary: {faces}") from None
 
 
-def _flow(settings: FluidSection, *, elastic: bool) -> FlowSettings:
+def _flow(settings: FluidSection) -> FlowSettings:
     return FlowSettings(
         density=settings.density,
         viscosity=settings.viscosity,
@@ -63,7 +61,6 @@ def _flow(settings: FluidSection, *, elastic: bool) -> FlowSettings:
         scheme=settings.scheme,
         body_force=_body_force(settings),
         initial_velocity=settings.initial_velocity,
-        penalties=choose_penalties(settings.element, elastic=elastic),
     )
 
 

@@ -20,6 +20,9 @@ from solvers.tessellation import unit_normals
 #: Share of a cell (of its face) below which fluid (surface) in it is rounding error of the geometry.
 NOTHING = 1e-10
 
+#: Layers around the cells of a process, besides those of the strip, that it cuts too: roots are found there.
+MARGIN = 4
+
 Cells = NDArray[np.int32]
 
 
@@ -33,10 +36,13 @@ class Cut:
     ghost_faces: NDArray[np.int32]  #: faces between active cells, one of them cut or of the strip
     contact_cells: Cells  #: solid cells where surfaces touch each other or the box's boundary
     reach: NDArray[np.bool_]  #: local cells that the surfaces may soon cut or uncover
+    alive: NDArray[np.bool_]  #: active cells of the box, near those that this process holds
+    share: Array  #: share of fluid in these cells of the box, zero elsewhere and in the strip
+    depth: int  #: cells from the strip's farthest cell to a cut one
     fluid: Array  #: int_fluid L_q dx / (w_q |K|) on cut cells, shape (cut, points)
     fraction: Array  #: share of fluid in each local cell
     pieces: Pieces
-    film: Array | None  #: factor of the ghost penalty, by cells of the box, below 1 in films; None: there are none
+    film: Array | None  #: factor of the penalty, by cells of the box, below 1 in films; None: there are none
     facets: NDArray[np.int64]
     motion: Motion
 
@@ -60,6 +66,7 @@ class Cutter:
         own[grid.numbers] = True
         self._own = grid.grid.as_box(own)
         self._special = np.zeros(grid.grid.size, dtype=bool)
+        self._depth = 0
         sizes = grid.grid.cell_sizes()
         self._slivers = NOTHING * sizes.prod(axis=1) / sizes.max(axis=1)  # areas of surface that do not count
         self._first: _First | None = None
@@ -69,6 +76,7 @@ class Cutter:
         """Forget where the surfaces have been."""
         self._special[:] = False
         self._of_step = None
+        self._depth = 0
 
     def __call__(
         self, facets: NDArray[np.int64], motion: Motion, layers: int, wet: NDArray[np.bool_] | None = None
@@ -93,7 +101,8 @@ class Cutter:
 
     def _cut(self, facets: NDArray[np.int64], motion: Motion, layers: int, wet: NDArray[np.bool_] | None) -> Cut:
         grid, box = self.grid, self.grid.grid
-        wanted = _grow(self._own, layers + 2)
+        self._depth = max(self._depth, layers)
+        wanted = _grow(self._own, self._depth + MARGIN)
         moments = kernels.moments(box.edges, self.points, motion.x, facets, wanted.ravel(order="F"))
         normal = -unit_normals(motion.x[facets])
         off = self._off_boundary(motion.x[facets])
@@ -109,7 +118,8 @@ class Cutter:
         self._special |= is_cut | strip
         touching = solid & (self._facing(moments, counts, normal) | self._covered(motion.x[facets[~off]]))
         local_cut, local_strip = is_cut[grid.numbers], strip[grid.numbers]
-        active = ~solid[grid.numbers] | local_strip
+        alive = (~solid | strip) & np.isfinite(moments.fraction)
+        active = alive[grid.numbers]
         faces, sides = grid.interior_faces
         special = self._special[grid.numbers][sides].any(axis=1) & active[sides].all(axis=1)
         cut = np.flatnonzero(local_cut).astype(np.int32)
@@ -129,6 +139,9 @@ class Cutter:
             ghost_faces=faces[special],
             contact_cells=np.flatnonzero(touching[grid.numbers]).astype(np.int32),
             reach=self._reach(box.as_box(self._special), layers),
+            alive=alive,
+            share=np.where(alive & ~strip, np.clip(1.0 - moments.fraction, 0.0, 1.0), 0.0),
+            depth=self._depth,
             fluid=fluid,
             fraction=1.0 - moments.fraction[grid.numbers],
             pieces=pieces,
@@ -159,6 +172,9 @@ class Cutter:
             none,
             none,
             np.zeros(len(everything), dtype=bool),
+            np.ones(self.grid.grid.size, dtype=bool),
+            np.ones(self.grid.grid.size),
+            0,
             np.empty((0, points)),
             np.ones(len(everything)),
             pieces,
@@ -197,7 +213,7 @@ class Cutter:
         """Box cells around facets on the box's boundary: fluid enters them if the facets leave it."""
         box = self.grid.grid
         marked = np.zeros(box.size, dtype=bool)
-        marked[cells_between(box, corners.min(axis=1), corners.max(axis=1))] = True
+        marked[_cells_between(box, corners.min(axis=1), corners.max(axis=1))] = True
         return marked
 
     def _fluid_weights(self, moments, cut: Cells) -> Array:
@@ -230,7 +246,7 @@ class _First:
         return self if np.array_equal(cut.motion.v, motion.v) else replace(self, cut=replace(cut, motion=motion))
 
 
-def cells_between(box: Grid, low: Array, high: Array) -> NDArray[np.int64]:
+def _cells_between(box: Grid, low: Array, high: Array) -> NDArray[np.int64]:
     """Numbers of the cells that boxes between two corners [m] overlap, shape (boxes, dim) each; some several times."""
     first, last = (
         [

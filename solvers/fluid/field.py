@@ -76,7 +76,7 @@ class Fluid:
             blocked=rungs[0] != "direct" and self.unknowns.block_size > 1,
         )
         self.system.slip_length = slip_lengths([body.surface for body in self.bodies])
-        films = films_of(patches, self.dim, settings.penalties) if settings.films else None
+        films = films_of(patches, settings.penalties) if settings.films else None
         self.cutter = Cutter(self.grid, self.system.weights.points, films)
         self.history = History(settings.time, self.unknowns.local)
         self.current = FlowStep(0.0, 0.0, STEADY)  #: the step that is computed now or was last
@@ -185,6 +185,8 @@ class Fluid:
             prescribed = self.boundary.dofs[self.boundary.dofs < self.unknowns.owned]
             self.held[prescribed] = True
             self.held |= ~self.system.active_dofs[: self.unknowns.owned]
+            if self.system.ghost is not None:
+                self.held |= self.system.ghost.outside
             self._hold_pressure(set_by_solids=with_solid and not self.settings.steady)
 
     def _layers(self, motion: Motion) -> int:
@@ -225,6 +227,7 @@ class Fluid:
         """Accept the step. Between surfaces that touch now the velocity of this step is zero."""
         if self._coupled:
             self._note_fast_bodies()
+        self.system.settle()
         found = self.system.active_dofs | self.system.dofs_of(self.cut.contact_cells)
         self.history.end_step(self.current.dt, self.velocity(), found)
         self.started = True

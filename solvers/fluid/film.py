@@ -3,14 +3,15 @@
 A film of height g between two walls lets g^3 / (12 mu) dp/dx through. The stabilisation of a cell of size h > g acts
 over h instead of g. Its shares of what the film does, where pressure and height change along one cell, are
 
-    PSPG             12 mu tau_M / g^2 < (h / g)^2 / 4      lets fluid through
-    ghost, pressure  12 gamma_p (h / g)^3                   lets fluid through
-    ghost, velocity  3/5 gamma_v (h / g)^3                  resists: the parabola goes on to h behind the walls
+    PSPG                 12 mu tau_M / g^2 < (h / g)^2 / 4    lets fluid through
+    extension, pressure  12 gamma (h / g)^3                   lets fluid through
+    extension, velocity  3 gamma (h / g)^3                    resists: the parabola goes on to h behind the walls
+    grad-div             tau_C / mu, about 8 in the plane     resists where the pressure falls off within a few cells
 
-The second one is gamma_p h^3 / mu [d_n p]^2 on a face of height h with [d_n p] = h p'' = p', over g^3 / (12 mu) p'^2
-times h. The third one is gamma_v mu h [d_n u]^2 with [d_n u] = u / h, u = 4 U y/g (1 - y/g) up to y = h, over
-mu int u_y^2 dy = 16/3 mu U^2 / g times h. The ghost penalty is multiplied by eps min(1, (g/h)^3 / (12 gamma_p)), which
-leaves shares below eps. The PSPG term is left out: second-order velocities with first-order pressures do without it.
+The second one is gamma h^2 / mu (c p)^2 at a node with c p = h^2 p'' = h p', over g^3 / (12 mu) p'^2 times h. The third
+one is gamma mu (c u)^2 with c u = u = 4 U y/g (1 - y/g) at y = h, over mu int u_y^2 dy = 16/3 mu U^2 / g times h.
+The penalty on the distance to the extension is multiplied by eps min(1, (g/h)^3 / (12 gamma)), which leaves shares
+below eps. PSPG and grad-div terms are left out: second-order velocities with first-order pressures do without them.
 """
 
 from __future__ import annotations
@@ -27,13 +28,15 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from solvers.api import Array
-from solvers.fluid.forms import TRACE, Penalties
+from solvers.fluid.forms import Penalties
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.patches import Patch
 from solvers.fluid.pieces import FLUSH
 
-#: eps: share of what a film does that the ghost penalty may add; drags are the same to 3 % from 1e-2 to 1e-6.
-SHARE = 1e-2
+#: eps: share of what a film does that the penalty may add; drags are the same to 1 % from 3e-3 to 1e-6.
+SHARE = 3e-3
+#: g / h below which the factor does not fall any more: nodes that fluid hardly reaches have rounding errors over it.
+LEAST = 0.1
 #: Sine of half the angle between the ways that a wall can face.
 OCTANT = np.sin(np.pi / 8)
 #: Walls of a film are parallel up to 60 degrees.
@@ -51,11 +54,10 @@ class Walls:
 
 @dataclass(frozen=True)
 class Films:
-    """Which faces of the box are walls, and what the factor of the ghost penalty is made of."""
+    """Which faces of the box are walls, and what the factor of the penalty is made of."""
 
     faces: Sequence[tuple[int, int]]  #: axis and side (0, 1)
-    pressure: float  #: gamma_p
-    least: float  #: g / h below which the factor does not fall any more
+    penalty: float  #: gamma
 
     def factor(self, grid: Grid, walls: Walls, solid: NDArray[np.bool_]) -> Array | None:
         """f of each cell of the box, 1 where walls are not closer than a cell; None if that is so everywhere.
@@ -69,9 +71,9 @@ class Films:
         near = gap < (1.0 - FLUSH) * across  # rounding does not make a film of a gap of one cell
         if not near.any():
             return None
-        ratio = np.maximum(gap[near] / sizes[near].max(axis=1), self.least)
+        ratio = np.maximum(gap[near] / sizes[near].max(axis=1), LEAST)
         factor = np.ones(grid.size)
-        np.minimum.at(factor, walls.cell[near], SHARE * np.minimum(1.0, ratio**3 / (12.0 * self.pressure)))
+        np.minimum.at(factor, walls.cell[near], SHARE * np.minimum(1.0, ratio**3 / (12.0 * self.penalty)))
         around = ndimage.minimum_filter(grid.as_box(factor), 3).ravel(order="F")
         return np.where(solid, around, factor)
 
@@ -86,15 +88,11 @@ class Films:
         return gap
 
 
-def films_of(patches: Sequence[Patch], dim: int, penalties: Penalties) -> Films:
-    """Films in a flow with second-order velocities.
-
-    The factor falls as long as Nitsche's method is coercive without the ghost penalty: in a film u_y is linear,
-    u_y^2 <= 4/g int u_y^2 dy at a wall, hence 4/g < gamma C_T / h.
-    """
+def films_of(patches: Sequence[Patch], penalties: Penalties) -> Films:
+    """Films in a flow with second-order velocities."""
     walls = {face for patch in patches if patch.record.prescribed in ("all", "normal") for face in patch.faces}
     faces = sorted(("xyz".index(face[0]), int(face[1] == "+")) for face in walls)
-    return Films(faces, penalties.ghost_pressure, 4.0 / (penalties.nitsche * TRACE[dim, 2]))
+    return Films(faces, penalties.extension)
 
 
 def walls_of(cell: NDArray[np.int64], corners: NDArray[np.int64], x: Array, lengths: Array, normal: Array) -> Walls:

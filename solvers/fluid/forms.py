@@ -32,18 +32,8 @@ class Penalties:
     ghost_mass: float = 3e-3
     ghost_convection: float = 0.01
     ghost_pressure: float = 0.05
-    ghost_second: float = 0.05  #: second derivatives, relative to first ones
-    ghost_mass_second: float = 0.05  #: the same of the mass
     ghost_memory: float = 0.9  #: share of the history per step; with 1, kinks in fluid at rest would not decay
-
-
-#: Of q2q1 around elastic bodies: with less, slivers that these uncover keep Newton's method from converging.
-ELASTIC = Penalties(ghost_mass=2e-2, ghost_mass_second=1.0)
-
-
-def choose_penalties(element: str, *, elastic: bool) -> Penalties:
-    """Those of a flow around bodies of which some deform."""
-    return ELASTIC if elastic and element == "q2q1" else Penalties()
+    extension: float = 0.1  #: of the distance of poorly cut nodes to their extension; results do not depend on it
 
 
 @dataclass(frozen=True)
@@ -61,7 +51,6 @@ class Coefficients:
     steady: bool
     degree: int  #: of the velocity
     mesh: Any
-    film: Expr = 1.0  #: factor of the ghost penalty, by cells
 
     @property
     def sizes(self) -> list[Expr]:
@@ -119,23 +108,18 @@ def residual_based(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Ex
     test = grad(q)
     if flow.convection:
         test += flow.rho * dot(grad(v), flow.a)
-    return _tested(flow, u, p, test) + grad_div(flow, u, v)
-
-
-def grad_div(flow: Coefficients, u: Expr, v: Expr) -> Expr:
-    """Integrand of the grad-div term among them, (tau_C div u, div v)."""
     metric, common, viscous = _rates(flow)
-    return sqrt(common + viscous * sum(g**2 for g in metric)) / sum(metric) * div(u) * div(v)
+    grad_div = sqrt(common + viscous * sum(g**2 for g in metric)) / sum(metric) * div(u) * div(v)
+    return _tested(flow, u, p, test) + grad_div
 
 
 def film(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
-    """Integrand in cut cells with a film, where viscosity rules: `bulk` and `grad_div` of a flow without convection.
+    """Integrand in cut cells with a film, where viscosity rules: `bulk` of a flow without convection.
 
     Second-order velocities are parabolas across the film that go on in the rest of the cell, (h / g)^2 times as large.
     The rule for cut cells is exact for the squares of such velocities, but not for cubes of them.
     """
-    stokes = creeping(flow)
-    return bulk(stokes, u, p, v, q) + grad_div(stokes, u, v)
+    return bulk(creeping(flow), u, p, v, q)
 
 
 def creeping(flow: Coefficients) -> Coefficients:
@@ -182,10 +166,9 @@ def interface(flow: Coefficients, weights: Any, u: Expr, p: Expr, v: Expr, q: Ex
 def ghost_penalty(
     flow: Coefficients, factors: Penalties, scales: GhostScales, u: Expr, p: Expr, v: Expr, q: Expr
 ) -> Expr:
-    """Integrand over faces of, times the lesser f of their cells, gamma_p h^3 / (rho phi) [d_n p] [d_n q] and
+    """Integrand over faces, of first degree, of gamma_p h^3 / (rho phi) [d_n p] [d_n q] and
 
-    sum_j h^(2j-1) (c_j (gamma_v mu + gamma_b rho phi_b) [d_n^j u] + m_j gamma_t rho h^2 [d_n^j u_t]) [d_n^j v],
-    c_1 = m_1 = 1, u_t = alpha u - gamma_m history.
+    h ((gamma_v mu + gamma_b rho phi_b) [d_n u] + gamma_t rho h^2 [d_n u_t]) [d_n v],  u_t = alpha u - gamma_m history.
 
     So the share of the mass is one of the acceleration, as in a mass matrix. Were it one of alpha u (gamma_m = 0), as
     it is in cells without history, it would take a power from the flow that grows as steps get smaller.
@@ -199,20 +182,11 @@ def ghost_penalty(
     if flow.convection:
         factor += factors.ghost_convection * flow.rho * avg(scales.convective)
     memory = factors.ghost_memory * scales.has_history("+") * scales.has_history("-")
-    terms = factors.ghost_pressure * h**3 / (flow.rho * avg(scales.phi)) * _jump(p, n, 1) * _jump(q, n, 1)
-    for order in range(1, flow.degree + 1):
-        c, m = (1.0, 1.0) if order == 1 else (factors.ghost_second, factors.ghost_mass_second)
-        change = flow.alpha * _jump(u, n, order) - memory * _jump(flow.history, n, order)
-        terms += h ** (2 * order - 1) * dot(c * factor * _jump(u, n, order) + m * mass * change, _jump(v, n, order))
-    return terms if flow.film == 1.0 else ufl.min_value(flow.film("+"), flow.film("-")) * terms
+    change = flow.alpha * _jump(u, n) - memory * _jump(flow.history, n)
+    terms = factors.ghost_pressure * h**3 / (flow.rho * avg(scales.phi)) * _jump(p, n) * _jump(q, n)
+    return terms + h * dot(factor * _jump(u, n) + mass * change, _jump(v, n))
 
 
-def _jump(field: Expr, n: Expr, order: int) -> Expr:
-    """Jump of the order-th normal derivative across a face, counted along the normal of its '+' side."""
-    derivative = field
-    for _ in range(order):
-        derivative = grad(derivative)
-    jumped = derivative("+") - derivative("-")
-    for _ in range(order):
-        jumped = dot(jumped, n("+"))
-    return jumped
+def _jump(field: Expr, n: Expr) -> Expr:
+    """Jump of the normal derivative across a face, counted along the normal of its '+' side."""
+    return dot(grad(field)("+") - grad(field)("-"), n("+"))

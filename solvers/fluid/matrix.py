@@ -22,23 +22,26 @@ class Pattern:
     cells: NDArray[np.bool_]  #: per local cell
     faces: NDArray[np.bool_]  #: per local face with two cells, in the order of `interior_faces`
     reach: NDArray[np.bool_]  #: per local cell: all its faces with cells of the pattern belong to it
+    by_faces: bool  #: couplings across faces are wanted
 
     def covers(self, cut: Cut, faces: NDArray[np.int32]) -> bool:
         """A cut needs no more than this."""
-        return bool(self.cells[cut.active].all() and self.faces[np.searchsorted(faces, cut.ghost_faces)].all())
+        wanted = self.faces[np.searchsorted(faces, cut.ghost_faces)] if self.by_faces else np.True_
+        return bool(self.cells[cut.active].all() and wanted.all())
 
 
-def choose_pattern(unknowns: Unknowns, cut: Cut) -> Pattern:
+def choose_pattern(unknowns: Unknowns, cut: Cut, *, by_faces: bool) -> Pattern:
     """A sparsity pattern for a cut and for those that its bodies may make in the next steps."""
     cells = cut.reach.copy()
     cells[cut.active] = True
-    return pattern_of(unknowns, cells, cut.reach)
+    return pattern_of(unknowns, cells, cut.reach, by_faces=by_faces)
 
 
-def pattern_of(unknowns: Unknowns, cells: NDArray[np.bool_], reach: NDArray[np.bool_]) -> Pattern:
+def pattern_of(unknowns: Unknowns, cells: NDArray[np.bool_], reach: NDArray[np.bool_], *, by_faces: bool) -> Pattern:
     """Some local cells, and the faces between them of those in reach of a body."""
     _, sides = unknowns.grid.interior_faces
-    return Pattern(cells, reach[sides].any(axis=1) & cells[sides].all(axis=1), reach)
+    faces = reach[sides].any(axis=1) & cells[sides].all(axis=1) & by_faces
+    return Pattern(cells, faces, reach, by_faces)
 
 
 def fits(unknowns: Unknowns, pattern: Pattern | None, cut: Cut) -> bool:
@@ -47,13 +50,15 @@ def fits(unknowns: Unknowns, pattern: Pattern | None, cut: Cut) -> bool:
     return unknowns.grid.comm.allreduce(pattern is not None and pattern.covers(cut, faces), op=MPI.LAND)
 
 
-def create_matrix(unknowns: Unknowns, pattern: Pattern, *, blocked: bool) -> PETSc.Mat:
-    """An empty matrix with the entries of a pattern; blocked: in dense blocks of each node (collective)."""
+def create_matrix(
+    unknowns: Unknowns, pattern: Pattern, more: NDArray[np.int64] | None = None, *, blocked: bool
+) -> PETSc.Mat:
+    """An empty matrix with the entries of a pattern and `more` in owned rows; blocked: in dense blocks (collective)."""
     size = unknowns.block_size
     index_map = unknowns.index_map
     owned, local = int(index_map.size_local), int(index_map.size_local + index_map.num_ghosts)
     neighbours = _neighbours(unknowns, pattern, local)
-    total = np.maximum(fem.sum_ghosts(unknowns.space, neighbours.astype(float)), 1.0).astype(np.int64)
+    total = np.maximum(fem.sum_ghosts(unknowns.space, neighbours.astype(float)), 1.0)[:owned].astype(np.int64)
     comm = unknowns.grid.comm
     rows_global = int(index_map.size_global) * size
     matrix = PETSc.Mat().create(comm)
@@ -65,10 +70,13 @@ def create_matrix(unknowns: Unknowns, pattern: Pattern, *, blocked: bool) -> PET
     numbers = np.concatenate([np.arange(start, start + owned), ghosts]).astype(PETSc.IntType)
     mapping = PETSc.LGMap().create(numbers, bsize=size, comm=comm)
     matrix.setLGMap(mapping, mapping)
-    inside = np.minimum(total[:owned], owned).astype(PETSc.IntType)
-    outside = np.minimum(total[:owned], int(index_map.size_global) - owned).astype(PETSc.IntType)
-    if not blocked:
-        inside, outside = (np.repeat(count * size, size) for count in (inside, outside))
+    if blocked:
+        total += 0 if more is None else more.reshape(owned, size).max(axis=1)
+    else:
+        total = np.repeat(total * size, size) + (0 if more is None else more)
+    unit = 1 if blocked else size
+    inside = np.minimum(total, owned * unit).astype(PETSc.IntType)
+    outside = np.minimum(total, (int(index_map.size_global) - owned) * unit).astype(PETSc.IntType)
     matrix.setPreallocationNNZ((inside, outside) if comm.size > 1 else inside)
     matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)
     matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)

@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from solvers import fem
 from solvers.api import Array
 from solvers.fluid.pockets import Pocket, find_pockets
 from solvers.fluid.system import FlowSystem
@@ -41,8 +42,22 @@ def hold_pressure(system: FlowSystem, elastic: Mask, *, set_by_solids: bool) -> 
     open_cells, periodic = system.boundary.open_cells(), system.unknowns.periodic
     pockets = find_pockets(system.grid, system.cut, open_cells, elastic, periodic)
     pockets = [pocket for pocket in pockets if not (pocket.elastic and set_by_solids)]
-    sizes = system.pressure_sizes() if pockets else np.empty(0)
+    sizes = _pressure_sizes(system) if pockets else np.empty(0)
     return [_hold(system, pocket, sizes, keep_level=not (closed and pocket.largest)) for pocket in pockets]
+
+
+def _pressure_sizes(system: FlowSystem) -> Array:
+    """int q dx over the fluid of each owned dof's pressure function [m^dim] (collective)."""
+    assert system.cut is not None
+    grid, cut, unknowns, weights = system.grid, system.cut, system.unknowns, system.weights
+    volume, (psi, _) = grid.sizes.prod(axis=1), weights.pressure_table
+    uncut, mine = cut.uncut[cut.uncut < grid.owned], cut.cut < grid.owned
+    cells = np.concatenate([uncut, cut.cut[mine]])
+    fluid = np.concatenate([np.ones((len(uncut), len(weights.rule))), cut.fluid[mine][:, weights.order]])
+    parts = volume[cells, None] * ((fluid * weights.rule) @ psi)
+    size = np.bincount(unknowns.cell_pressure[cells].ravel(), parts.ravel(), unknowns.local).astype(float)
+    fem.add_ghosts(unknowns.space, size)
+    return size[: unknowns.owned]
 
 
 def _hold(system: FlowSystem, pocket: Pocket, sizes: Array, *, keep_level: bool) -> Hold:

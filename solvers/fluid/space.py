@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import ufl
@@ -26,6 +27,7 @@ class FlowNodes:
     dofs: Dofs  #: local dofs, shape (nodes, components)
     points: Array  #: positions [m], shape (nodes, dim)
     numbers: NDArray[np.int64]  #: number in the box's lattice, the same for every distribution
+    sizes: Array  #: edge lengths [m] of the cells around each, their mean, shape (nodes, dim)
     owned: int
 
 
@@ -58,7 +60,7 @@ class Unknowns:
         #: velocity dofs of each local cell, shape (cells, functions, dim), and pressure dofs, (cells, functions)
         self.cell_velocity: Dofs = np.stack(by_component[: self.dim], axis=2)
         self.cell_pressure: Dofs = by_component[self.dim]
-        self.velocity, self.pressure = (self._nodes(some) for some in nodes)
+        self.velocity, self.pressure = (self._nodes(some, d) for some, d in zip(nodes, (degree, 1), strict=True))
         self.velocity_mask = np.zeros(self.local, dtype=bool)  #: which local dofs are velocities
         self.velocity_mask[self.velocity.dofs] = True
 
@@ -84,10 +86,30 @@ class Unknowns:
             stride *= count
         return LatticeNodes(dofs, points, number, at_start, at_end)
 
-    def _nodes(self, nodes: LatticeNodes) -> FlowNodes:
+    def _nodes(self, nodes: LatticeNodes, degree: int) -> FlowNodes:
         keep = np.unique(nodes.dofs[:, 0], return_index=True)[1] if self.periodic else slice(None)
-        dofs = nodes.dofs[keep]
-        return FlowNodes(dofs, nodes.points[keep], nodes.numbers[keep], int(np.count_nonzero(dofs[:, 0] < self.owned)))
+        dofs, points = nodes.dofs[keep], nodes.points[keep]
+        owned = int(np.count_nonzero(dofs[:, 0] < self.owned))
+        return FlowNodes(dofs, points, nodes.numbers[keep], self._sizes(points, degree), owned)
+
+    def _sizes(self, points: Array, degree: int) -> Array:
+        """Edge lengths [m] of the cells around nodes, their mean, shape (nodes, dim)."""
+        sizes = np.empty(points.shape)
+        for axis, edge in enumerate(self.grid.grid.edges):
+            lattice = np.interp(np.arange(degree * (len(edge) - 1) + 1) / degree, np.arange(len(edge)), edge)
+            index, h = np.searchsorted(0.5 * (lattice[1:] + lattice[:-1]), points[:, axis]), np.diff(edge)
+            before, after = -(-index // degree) - 1, index // degree
+            sizes[:, axis] = 0.5 * (h[np.maximum(before, 0)] + h[np.minimum(after, len(h) - 1)])
+        return sizes
+
+    @cached_property
+    def at_pressure(self) -> NDArray[np.int64]:
+        """Where the nodes of the pressure are among those of the velocity."""
+        index = np.unravel_index(self.pressure.numbers, self.lattice_shape(1), order="F")
+        fine = [self.degree * i for i in index]
+        numbers = np.ravel_multi_index(fine, self.lattice_shape(self.degree), order="F")
+        order = np.argsort(self.velocity.numbers)
+        return order[np.searchsorted(self.velocity.numbers, numbers, sorter=order)]
 
     def size(self) -> int:
         """Dofs on all processes."""

@@ -18,6 +18,8 @@ from solvers.fluid import forms
 from solvers.fluid.cell_forms import cell_forms
 from solvers.fluid.cut import Cut
 from solvers.fluid.film import film_cells
+from solvers.fluid.ghost import Scales
+from solvers.fluid.ghost_choice import choose_ghost_penalty
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.interface import InterfaceTerms
 from solvers.fluid.matrix import Pattern, choose_pattern, create_matrix, fits, pattern_of
@@ -79,17 +81,13 @@ class FlowSystem:
         domain, space = grid.domain, unknowns.space
         self.flow, self._history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
         self._alpha, self._newton = fem.constant(domain, 0.0), fem.constant(domain, 1.0)
-        self._phi, self._convective, self._has_history, self._film = (
-            fem.function(fem.cellwise_space(domain)) for _ in range(4)
-        )
-        self._film.x.array[:] = 1.0
         self.weights = Weights(grid, settings.degree)
         self.terms = self._terms()
-        scales = forms.GhostScales(self._phi, self._convective, self._has_history)
-        on_cut = (self.weights, scales) if with_bodies else None
-        self._forms = cell_forms(unknowns, self.terms, self.flow, settings.penalties, on_cut=on_cut)
+        self.ghost = choose_ghost_penalty(unknowns, self.terms, settings.penalties) if with_bodies else None
+        self._forms = cell_forms(unknowns, self.terms, self.flow, self.weights if with_bodies else None)
         self._outer = OuterFaces(grid, boundary, unknowns, self.terms, self.flow)
-        fem.compile_integrals([*self._forms.integrals(), *self._outer.integrals()], "the flow")
+        ghost = [] if self.ghost is None else self.ghost.integrals
+        fem.compile_integrals([*self._forms.integrals(), *self._outer.integrals(), *ghost], "the flow")
         #: owned cells of the cut, uncut ones and cut ones, and forms over these and the outer faces
         self.cells: list[NDArray[np.int32]] = []
         self._residuals: list = []
@@ -104,7 +102,6 @@ class FlowSystem:
         self._matrix: PETSc.Mat | None = None
         self._ghost: PETSc.Mat | None = None
         self._pattern: Pattern | None = None
-        self._penalised: NDArray[np.int32] | None = None  #: faces that the ghost penalty is assembled for
         self.cut: Cut | None = None
         self.slip_length: Array | None = None  #: of the facets of all surfaces [m]; None: the flow sticks to them
         self._interface: InterfaceTerms | None = None
@@ -128,7 +125,6 @@ class FlowSystem:
             steady=settings.steady,
             degree=settings.degree,
             mesh=domain.mesh.ufl_domain(),
-            film=self._film if self.with_bodies and settings.films else 1.0,
         )
 
     # ------------------------------------------------------------------------------------------------- a new step
@@ -141,7 +137,8 @@ class FlowSystem:
         """
         self._alpha.value = step.difference.alpha
         self._history.x.array[:] = rate
-        self._has_history.x.array[:] = ~missing[self.unknowns.cell_velocity].any(axis=(1, 2))
+        if self.ghost is not None:
+            self.ghost.begin_step(missing)
         if self.settings.body_force is not None:
             set_velocity(self._force.x.array, self.unknowns.velocity, self.settings.body_force, step.t)
         self._outer.begin_step(step.t)
@@ -150,17 +147,16 @@ class FlowSystem:
     def set_scales(self, velocity: Array) -> None:
         """Take local velocity dofs [m/s] that scale stabilisation and penalties from now on (collective)."""
         settings, unknowns = self.settings, self.unknowns
-        self._scale_velocity.x.array[:], self._penalised, self._current = velocity, None, False
-        h = self.grid.sizes.min(axis=1)
+        self._scale_velocity.x.array[:], self._current = velocity, False
         speed = np.linalg.norm(velocity[unknowns.velocity.dofs], axis=1)
         by_dof = np.zeros(unknowns.local)
         by_dof[unknowns.velocity.dofs[:, 0]] = speed
         dofs = unknowns.cell_blocks if unknowns.block_size == 1 else unknowns.cell_blocks * unknowns.block_size
-        self.speed = by_dof[dofs].max(axis=1) if settings.convection else np.zeros(len(h))
+        self.speed = by_dof[dofs].max(axis=1) * settings.convection
         self.fastest = float(self.grid.comm.allreduce(self.speed.max(initial=0.0), op=MPI.MAX))
-        convective = self.speed * h
-        phi = settings.viscosity / settings.density + convective + float(self._alpha.value) * h**2
-        self._phi.x.array[:], self._convective.x.array[:] = phi, convective**2 / phi
+        if self.ghost is not None:
+            numbers = settings.viscosity, settings.density, float(self._alpha.value)
+            self.ghost.set_scales(Scales(*numbers, self.speed, speed * settings.convection))
 
     def set_cut(self, cut: Cut) -> None:
         """Take a cut; cells, faces and the matrix follow."""
@@ -170,6 +166,10 @@ class FlowSystem:
         active = np.zeros(len(grid.numbers), dtype=bool)
         active[cut.active] = True
         self.active_dofs = self.dofs_of(cut.active)
+        other_room = False
+        if self.ghost is not None:
+            other_room = self.ghost.set_cut(cut, self.boundary.dofs)
+            self.active_dofs &= ~self.ghost.lost
         #: owned cells of each of the forms: uncut, cut, and those in films if there are any
         self.cells = [some[some < grid.owned] for some in (cut.uncut, cut.cut)]
         if self.settings.films and (films := film_cells(grid, cut.cut, cut.film)) is not None:
@@ -181,7 +181,10 @@ class FlowSystem:
         self._outer_on_cut = self._outer.on_cut(cut, active)
         self._tangents += self._outer_on_cut.tangents
         if not fits(self.unknowns, self._pattern, cut):
-            self._allocate(choose_pattern(self.unknowns, cut))
+            self._allocate(choose_pattern(self.unknowns, cut, by_faces=self._by_faces))
+        elif other_room:
+            assert self._pattern is not None
+            self._allocate(self._pattern)
 
     def dofs_of(self, cells: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Which local dofs belong to some local cells or, on other processes, to theirs (collective)."""
@@ -199,21 +202,25 @@ class FlowSystem:
         """Make the matrix of a saved state: the rounding of a direct solver depends on its pattern (collective)."""
         both = np.zeros((2, len(self.grid.numbers)))
         both[:, : self.grid.owned] = state.T
-        cells, reach = (fem.share_owned(self._phi.function_space, column) > 0.5 for column in both)
-        self._allocate(pattern_of(self.unknowns, cells, reach))
+        cells, reach = (fem.share_owned(fem.cellwise_space(self.grid.domain), column) > 0.5 for column in both)
+        self._allocate(pattern_of(self.unknowns, cells, reach, by_faces=self._by_faces))
+
+    @property
+    def _by_faces(self) -> bool:
+        return self.ghost is not None and self.ghost.by_faces
 
     def _allocate(self, pattern: Pattern) -> None:
         self._pattern, self._matrix = pattern, self._fill_pattern(pattern)
-        self._ghost, self._penalised = self._matrix.duplicate(copy=False), None
+        self._ghost = None
 
     def _fill_pattern(self, pattern: Pattern) -> PETSc.Mat:
         """A matrix that has all entries of a pattern, with values that do not matter."""
-        matrix = create_matrix(self.unknowns, pattern, blocked=self._blocked)
+        more = None if self.ghost is None else self.ghost.room()
+        matrix = create_matrix(self.unknowns, pattern, more, blocked=self._blocked)
         cells = np.flatnonzero(pattern.cells[: self.grid.owned]).astype(np.int32)
         fem.assemble_matrix(matrix, self._forms.tangents[0].on(cell=cells))
-        if self._forms.ghost_penalty is not None:
-            faces = self.grid.interior_faces[0][pattern.faces]
-            fem.assemble_matrix(matrix, self._forms.ghost_penalty.on(interior_facet=faces))
+        if self.ghost is not None:
+            self.ghost.fill(matrix, pattern)
         diagonal = matrix.createVecLeft()
         diagonal.set(1.0)
         matrix.setDiagonal(diagonal, addv=PETSc.InsertMode.ADD_VALUES)
@@ -233,7 +240,6 @@ class FlowSystem:
         if self._current:
             return
         assert self.cut is not None
-        assert self._ghost is not None
         cut = self.cut
         if self.with_bodies:
             penalty = self._interface_penalties(cut.pieces, cut)
@@ -241,40 +247,27 @@ class FlowSystem:
             self._interface = InterfaceTerms(
                 self.grid, self.unknowns, self.weights, cut, self.settings.viscosity, penalty, self.slip_length
             )
-        film = np.ones(len(self.grid.numbers)) if cut.film is None else cut.film[self.grid.numbers]
-        if not self._same_faces(cut, film):
-            self._penalised, self._film.x.array[:] = cut.ghost_faces, film
-            self._ghost.zeroEntries()
-            if self.with_bodies:
-                self._assemble_ghost_penalty(cut.ghost_faces)
-            self._ghost.assemble()
+        self._assemble_ghost_penalty()
         self._current = True
 
-    def _assemble_ghost_penalty(self, faces: NDArray[np.int32]) -> None:
-        assert self._forms.ghost_penalty is not None
-        fem.assemble_matrix(self._ghost, self._forms.ghost_penalty.on(interior_facet=faces))
-        if self._forms.ghost_history is not None:
-            self._ghost_history[:] = 0.0
-            fem.assemble_vector(self._forms.ghost_history.on(interior_facet=faces), self._ghost_history)
+    def _assemble_ghost_penalty(self) -> None:
+        assert self._matrix is not None
+        stale = self._ghost is None or (self.ghost is not None and self.ghost.stale)
+        if not self.grid.comm.allreduce(stale, op=MPI.LOR):
+            return
+        if self._ghost is None:
+            self._ghost = self._matrix.duplicate(copy=False)
+        self._ghost.zeroEntries()
+        if self.ghost is not None:
+            self.ghost.assemble(self._ghost, self._ghost_history)
+        self._ghost.assemble()
 
-    def _same_faces(self, cut: Cut, film: Array) -> bool:
-        """The ghost penalty is assembled for these faces and films already, on every process (collective)."""
-        same = self._penalised is not None and np.array_equal(self._penalised, cut.ghost_faces)
-        same = same and np.array_equal(self._film.x.array, film)
-        return self.grid.comm.allreduce(same, op=MPI.LAND)
-
-    def pressure_sizes(self) -> Array:
-        """int q dx over the fluid of each owned dof's pressure function [m^dim] (collective)."""
-        assert self.cut is not None
-        cut, unknowns, weights = self.cut, self.unknowns, self.weights
-        volume, (psi, _) = self.grid.sizes.prod(axis=1), weights.pressure_table
-        uncut, mine = cut.uncut[cut.uncut < self.grid.owned], cut.cut < self.grid.owned
-        cells = np.concatenate([uncut, cut.cut[mine]])
-        fluid = np.concatenate([np.ones((len(uncut), len(weights.rule))), cut.fluid[mine][:, weights.order]])
-        parts = volume[cells, None] * ((fluid * weights.rule) @ psi)
-        size = np.bincount(unknowns.cell_pressure[cells].ravel(), parts.ravel(), unknowns.local).astype(float)
-        fem.add_ghosts(unknowns.space, size)
-        return size[: unknowns.owned]
+    def settle(self) -> None:
+        """Give nodes that no fluid reaches their values (collective)."""
+        if self.ghost is not None:
+            owned = self.unknowns.owned
+            self.flow.x.array[:owned] = self.ghost.settle(self.flow.x.array[:owned])
+            self.flow.x.scatter_forward()
 
     def _interface_penalties(self, pieces: Pieces, cut: Cut) -> Array:
         """P = s I + s_n n n^T of pieces [Pa s/m], shape (pieces, dim, dim).

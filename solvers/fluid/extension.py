@@ -1,0 +1,209 @@
+"""Nodes that fluid hardly reaches take the polynomial of a well-cut cell nearby: which nodes do, and by which weights.
+
+A node is as well cut as the best of its cells: k = max |K in fluid| / |K|, relative to the best cell nearby. It is free
+where k >= WELL; where less, it depends on a root, a cell that is better cut. Its extension is
+
+    E u(x_i) = sum_b N_b(x_i) u_b,     N_b: shape functions of the root, continued outside of it.
+
+Of all well-cut cells nearby the root is the one whose polynomial amplifies least at the node, sum_b |N_b(x_i)| -> min.
+Sources: Badia, Neiva, Verdugo, arXiv:2106.13728 (the penalty on the distance to the extension does not lock, its limit
+is the aggregated finite element method); Burman, Hansbo, Larson, arXiv:2205.01340.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from solvers.api import Array
+from solvers.fluid.grid import Grid
+
+#: Shares of fluid, relative to the best cell nearby: from WELL on a cell is a root and its nodes are free, up to LITTLE
+#: the penalty on the distance to the extension has its full weight.
+WELL, LITTLE = 0.6, 0.2
+
+#: Layers of cells around those of a node that are near.
+NEAR = 2
+
+#: A parabola goes on for FAR cells in one direction and while it amplifies by sum_b |N_b| <= LARGEST, so that rounding
+#: stays rounding: a cell away that is 17 in one direction, 289 in two, 4913 in three. Then a straight line does.
+FAR, LARGEST = 2.0, 350.0
+
+#: Nodes that are looked at together, to bound the memory.
+CHUNK = 4096
+
+Numbers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Dependent:
+    """Nodes with an extension, as places among the nodes that were asked for, sorted."""
+
+    nodes: Numbers
+    rows: sparse.csr_matrix  #: E, shape (dependent nodes, nodes of the lattice)
+    weight: Array  #: of the distance to the extension: 1 for small shares of fluid, falling to 0 where a node is free
+    dry: NDArray[np.bool_]  #: nodes that no fluid reaches: they are what the extension says
+    lost: Numbers  #: nodes of active cells with no fluid nearby
+
+
+class Extension:
+    """The extension of one lattice of nodes. Within a step nodes keep their roots, so that Newton's method settles."""
+
+    def __init__(self, grid: Grid, degree: int, shape: tuple[int, ...], numbers: Numbers):
+        """`numbers`: the nodes to look at, in the lattice of this degree and shape, x fastest."""
+        self.grid, self.degree, self.shape = grid, degree, shape
+        self._index = np.stack(np.unravel_index(numbers, shape, order="F"), axis=1)
+        self._strides = np.cumprod([1, *shape[:-1]])
+        #: place of each node of the lattice among those to look at, -1: none
+        self._place = np.full(int(np.prod(self.shape)), -1, dtype=np.int64)
+        self._place[numbers] = np.arange(len(numbers))
+        self._lattice = [
+            np.interp(np.arange(degree * (len(edge) - 1) + 1) / degree, np.arange(len(edge)), edge)
+            for edge in grid.edges
+        ]
+        #: row of E that each node to look at has in this step, -1: none yet
+        self._row_of, self._rows = np.full(len(numbers), -1), sparse.csr_matrix((0, int(np.prod(shape))))
+
+    def begin_step(self) -> None:
+        """Forget the roots."""
+        self._row_of[:], self._rows = -1, self._rows[:0]
+
+    def __call__(self, share: Array, active: NDArray[np.bool_], reach: int) -> Dependent:
+        """Dependent nodes of active box cells with these shares of fluid; roots are at most `reach` cells away."""
+        nodes = self._nodes_of(np.flatnonzero(active & (share < WELL)))
+        kept, best = (self._largest(nodes, share, layers) for layers in (0, NEAR))
+        poor = (kept < WELL * best) | (kept == 0.0)
+        nodes = nodes[poor]
+        relative = np.divide(kept, best, out=np.zeros(len(kept)), where=best > 0.0)[poor]
+        self._find_roots(nodes[self._row_of[nodes] < 0], share, reach)
+        known = self._row_of[nodes] >= 0
+        rows = self._rows[self._row_of[nodes[known]]]
+        return Dependent(nodes[known], rows, _weight(relative[known]), relative[known] == 0.0, nodes[~known])
+
+    def _nodes_of(self, cells: Numbers) -> Numbers:
+        """The nodes of box cells, sorted, each once."""
+        index = np.unravel_index(cells, self.grid.shape, order="F")
+        steps = np.arange(self.degree + 1)
+        axes = [
+            (self.degree * i[:, None] + steps) % n * stride
+            for i, n, stride in zip(index, self.shape, self._strides, strict=True)
+        ]
+        places = self._place[np.unique(reduce(_outer_sum, axes))]
+        return np.sort(places[places >= 0])
+
+    def _cells_around(self, nodes: Numbers, layers: int) -> tuple[Numbers, NDArray[np.bool_]]:
+        """(box cells, whether they exist) of nodes and some layers around them, shape (nodes, cells)."""
+        axes = [self._window(axis, nodes, layers) for axis in range(self.grid.dim)]
+        strides = np.cumprod([1, *self.grid.shape[:-1]])
+        cells = reduce(_outer_sum, (index * stride for (index, _), stride in zip(axes, strides, strict=True)))
+        return cells, reduce(_outer_and, (exists for _, exists in axes))
+
+    def _window(self, axis: int, nodes: Numbers, layers: int) -> tuple[Numbers, NDArray[np.bool_]]:
+        """(indices, whether they exist) of cells in one direction, shape (nodes, 2 layers + 2)."""
+        m, n = self._index[nodes, axis, None], self.grid.shape[axis]
+        index = m // self.degree + np.arange(-layers - 1, layers + 1)
+        exists = (index >= 0) & (index < n) & (index >= -(-m // self.degree) - 1 - layers)
+        return np.clip(index, 0, n - 1), exists
+
+    def _largest(self, nodes: Numbers, share: Array, layers: int) -> Array:
+        """Largest share of fluid in the cells of nodes and some layers around them."""
+        found = []
+        for part in _chunks(nodes):
+            cells, inside = self._cells_around(part, layers)
+            found.append(np.where(inside, share[cells], 0.0).max(axis=1, initial=0.0))
+        return np.concatenate(found)
+
+    def _find_roots(self, nodes: Numbers, share: Array, reach: int) -> None:
+        """Add rows of E for nodes that have none, as far as there is a root."""
+        for layers in dict.fromkeys([min(NEAR, reach), reach]):
+            parts = [self._search(part, share, layers) for part in _chunks(nodes)]
+            found = np.concatenate([part for part, _ in parts])
+            self._row_of[found] = self._rows.shape[0] + np.arange(len(found))
+            self._rows = sparse.vstack([self._rows, *(rows for _, rows in parts)], format="csr")
+            nodes = nodes[self._row_of[nodes] < 0]
+
+    def _search(self, nodes: Numbers, share: Array, layers: int) -> tuple[Numbers, sparse.csr_matrix]:
+        """(nodes with a root, their rows); of roots that amplify equally the mean."""
+        cost = reduce(_outer_product, (self._amplification(axis, nodes, layers) for axis in range(self.grid.dim)))
+        cells, inside = self._cells_around(nodes, layers)
+        fluid = np.where(inside, share[cells], 0.0)
+        best = fluid.max(axis=1, initial=0.0)[:, None]
+        cost = np.where((fluid >= WELL * best) & (fluid > 0.0), cost, np.inf)
+        least = cost.min(axis=1, initial=np.inf)[:, None]
+        at, chosen = np.nonzero((cost <= (1.0 + 1e-9) * least) & np.isfinite(cost))
+        columns, weights = self._entries(nodes[at], layers, chosen, cost[at, chosen] > LARGEST)
+        weights = weights / np.bincount(at, minlength=len(nodes))[at, None]
+        found = np.unique(at)
+        rows = np.broadcast_to(np.searchsorted(found, at)[:, None], columns.shape)
+        kept = np.abs(weights) > 0.0
+        entries = (weights[kept], (rows[kept], columns[kept]))
+        return nodes[found], sparse.csr_matrix(entries, shape=(len(found), int(np.prod(self.shape))))
+
+    def _coordinates(self, axis: int, nodes: Numbers, layers: int) -> Array:
+        """Where nodes lie in the cells of `_window`: from 0 to 1 inside, shape (nodes, cells)."""
+        index, _ = self._window(axis, nodes, layers)
+        edge, m = self.grid.edges[axis], self._index[nodes, axis, None]
+        outside = (self._lattice[axis][m] - edge[index]) / (edge[index + 1] - edge[index])
+        local = m - self.degree * index
+        within = (local >= 0) & (local <= self.degree)
+        return np.where(within, local / self.degree, outside)
+
+    def _amplification(self, axis: int, nodes: Numbers, layers: int) -> Array:
+        """Sum of the absolute 1D shape functions, of a parabola however far it is, shape (nodes, cells)."""
+        s = self._coordinates(axis, nodes, layers)
+        return np.abs(_lagrange(s, self.degree)).sum(axis=2)
+
+    def _entries(self, nodes: Numbers, layers: int, chosen: Numbers, steep: NDArray[np.bool_]) -> tuple[Numbers, Array]:
+        """(lattice nodes, weights) of chosen cells of the windows, shape (chosen, functions)."""
+        width = 2 * layers + 2
+        columns, weights = np.zeros((len(nodes), 1), dtype=np.int64), np.ones((len(nodes), 1))
+        for axis in range(self.grid.dim):
+            # the window's cells are numbered with the first direction slowest, see _outer_sum
+            place = (chosen // width ** (self.grid.dim - 1 - axis) % width)[:, None]
+            index, _ = self._window(axis, nodes, layers)
+            first = self.degree * np.take_along_axis(index, place, axis=1)
+            lattice = (first + np.arange(self.degree + 1)) % self.shape[axis] * self._strides[axis]
+            s = np.take_along_axis(self._coordinates(axis, nodes, layers), place, axis=1)[:, 0]
+            columns, weights = _outer_sum(columns, lattice), _outer_product(weights, _continued(s, self.degree, steep))
+        return columns, weights
+
+
+def _continued(s: Array, degree: int, steep: NDArray[np.bool_]) -> Array:
+    """1D shape functions at s, outside of the cell those of a line where steep or far, shape (places, functions)."""
+    outside = np.maximum(-s, s - 1.0)
+    straight = (outside > FAR) | steep & (outside > 0.0)
+    line = np.stack([1.0 - s, *[0.0 * s] * (degree - 1), s], axis=1)
+    return np.where(straight[:, None], line, _lagrange(s, degree))
+
+
+def _lagrange(s: Array, degree: int) -> Array:
+    """1D shape functions at s, one more axis."""
+    if degree == 1:
+        return np.stack([1.0 - s, s], axis=-1)
+    return np.stack([(2.0 * s - 1.0) * (s - 1.0), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)], axis=-1)
+
+
+def _weight(relative: Array) -> Array:
+    """Smooth from 1 at LITTLE to 0 at WELL."""
+    s = np.clip((WELL - relative) / (WELL - LITTLE), 0.0, 1.0)
+    return s * s * (3.0 - 2.0 * s)
+
+
+def _chunks(nodes: Numbers) -> list[Numbers]:
+    return np.array_split(nodes, len(nodes) // CHUNK + 1)
+
+
+def _outer_sum(a, b):
+    return (a[:, :, None] + b[:, None, :]).reshape(len(a), a.shape[1] * b.shape[1])
+
+
+def _outer_product(a, b):
+    return (a[:, :, None] * b[:, None, :]).reshape(len(a), a.shape[1] * b.shape[1])
+
+
+def _outer_and(a, b):
+    return (a[:, :, None] & b[:, None, :]).reshape(len(a), a.shape[1] * b.shape[1])

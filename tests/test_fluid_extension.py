@@ -1,0 +1,125 @@
+"""Nodes of q2q1 that fluid hardly reaches: they continue polynomials exactly, lose nothing, and no constant matters."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from fluid_setup import block, body, circle, field, loop, make_fluid, step, turned, wall
+
+from fsci.bench import fluid as bench
+from solvers.fluid.extension import WELL, Extension
+from solvers.fluid.forms import Penalties
+from solvers.fluid.grid import Grid, uniform
+from solvers.fluid.system import FlowSettings
+
+
+def around_a_disc(scheme="steady", **settings):
+    """A flow on cells of different sizes, cut by a disc that moves and by a turned block; after its first cut."""
+    x = np.concatenate([np.linspace(0, 0.3, 7), [0.34, 0.4, 0.47, 0.55], np.linspace(0.6, 1, 6)])
+    v = np.array([0.5, 0.2])
+    disc = body("disc", circle((0.31, 0.42), 0.17, 40), loop(40), motion=lambda x, t: (x + t * v, 0 * x + v))
+    points, facets = block([0.66, 0.6], [0.81, 0.83])
+    fluid = make_fluid(
+        Grid((x, np.linspace(0, 1, 15))), [wall(field(0, 0))], [disc, body("block", turned(points, 0.3), facets)],
+        element="q2q1", scheme=scheme, dt=0.02, **settings,
+    )  # fmt: skip
+    fluid.begin_step(0.0, 0.02)
+    fluid.residual()
+    return fluid
+
+
+def at_nodes(fluid, polynomial):
+    """A polynomial of (x, y) at all nodes of velocity and pressure, as owned dofs."""
+    values = np.zeros(fluid.unknowns.owned)
+    for nodes in (fluid.unknowns.velocity, fluid.unknowns.pressure):
+        values[nodes.dofs] = polynomial(*nodes.points.T)[:, None]
+    return values
+
+
+def penalty(fluid, values):
+    """The penalty's matrix times owned values."""
+    matrix = fluid.system._ghost
+    x, y = matrix.createVecs()
+    x.array[:] = values
+    matrix.mult(x, y)
+    return y.array.copy()
+
+
+@pytest.mark.parametrize("scheme", ["steady", "bdf2"])
+def test_polynomials_have_no_distance_to_their_extension(scheme):
+    """On cells of different sizes, too: those of second degree of the velocity, of first degree of the pressure."""
+    fluid = around_a_disc(scheme)
+    velocity, pressure = fluid.unknowns.velocity.dofs, fluid.unknowns.pressure.dofs
+    assert fluid.system.ghost._dependent.sum() > 20
+    rough = np.abs(penalty(fluid, at_nodes(fluid, lambda x, y: np.sin(40 * x * y))))
+    linear = penalty(fluid, at_nodes(fluid, lambda x, y: 1 + 2 * x - 3 * y + x * y))
+    quadratic = penalty(fluid, at_nodes(fluid, lambda x, y: x * x - 2 * y * y + x * x * y))
+    assert np.abs(linear[velocity]).max() < 1e-11 * rough[velocity].max()
+    assert np.abs(linear[pressure]).max() < 1e-11 * rough[pressure].max()
+    assert np.abs(quadratic[velocity]).max() < 1e-11 * rough[velocity].max()
+    assert np.abs(quadratic[pressure]).max() > 1e-4 * rough[pressure].max()
+
+
+def test_rounding_is_not_amplified_far_from_the_fluid():
+    """Behind a corner of the fluid in space a parabola would be 117,649 times as large: a line goes on, 729 times."""
+    grid, share = uniform([0, 0, 0], [1, 1, 1], [8, 8, 8]), np.zeros((8, 8, 8))
+    share[:4, :4, :4] = 1.0
+    found = Extension(grid, 2, (17,) * 3, np.arange(17**3))(share.ravel(), np.ones(8**3, dtype=bool), 4)
+    assert np.abs(found.rows).sum(axis=1).max() < 730.0
+    x, y, z = np.unravel_index(np.arange(17**3), (17,) * 3, order="F")
+    line = 1.0 + x - 2.0 * y + 3.0 * z
+    np.testing.assert_allclose(found.rows @ line, line[found.nodes], rtol=1e-11)
+
+
+def test_penalty_loses_no_force_and_no_volume():
+    """A constant has no distance: the sum of all equations is that without the penalty."""
+    fluid = around_a_disc("bdf2")
+    rows = penalty(fluid, np.random.default_rng(2).normal(size=fluid.unknowns.owned))
+    for dofs in (*fluid.unknowns.velocity.dofs.T, fluid.unknowns.pressure.dofs[:, 0]):
+        assert abs(rows[dofs].sum()) < 1e-12 * np.abs(rows[dofs]).sum()
+        assert np.abs(rows[dofs]).max() > 0.0
+
+
+def test_nodes_of_well_cut_cells_are_free():
+    """And those of no other cell are; where no fluid is, the velocity is what the extension says."""
+    fluid = around_a_disc("bdf2")
+    cut, unknowns, ghost = fluid.cut, fluid.unknowns, fluid.system.ghost
+    share = cut.share[fluid.grid.numbers]
+    largest = np.zeros(unknowns.local)
+    for cells in (cut.uncut, cut.cut, cut.strip):
+        np.maximum.at(largest, unknowns.cell_velocity[cells], share[cells, None, None])
+    dofs = unknowns.velocity.dofs
+    asked = fluid.system.active_dofs[dofs] & ~np.isin(dofs, fluid.boundary.dofs)
+    assert np.array_equal((ghost._dependent | ghost.outside)[dofs][asked], (largest[dofs] < WELL)[asked])
+    assert np.array_equal(ghost.outside[dofs][asked], (largest[dofs] == 0.0)[asked])
+    assert ghost.outside.sum() > 20
+
+
+def test_velocity_behind_the_surface_goes_on_as_a_polynomial():
+    """After a step the strip has the velocity that the next ones ask for: here one of first degree."""
+    velocity = field(lambda x, y, t: 1 + 2 * y, lambda x, y, t: 0.5 * x)
+    shape = circle((0.31, 0.42), 0.17, 40)
+
+    def motion(points, t):
+        now = points + t * np.array([0.5, 0.2])
+        return now, np.stack([c(now.T, t) for c in velocity], axis=1)
+
+    fluid = make_fluid(
+        uniform([0, 0], [1, 1], [12, 14]), [wall(velocity)], [body("disc", shape, loop(40), motion=motion)],
+        element="q2q1", dt=0.02, convection=False, initial_velocity=velocity,
+    )  # fmt: skip
+    step(fluid, 0.0, 0.02)
+    outside, nodes = fluid.system.ghost.outside, fluid.unknowns.velocity
+    exact = np.stack([c(nodes.points.T, 0.0) for c in velocity], axis=1)
+    assert outside[nodes.dofs].sum() > 20
+    assert np.abs(fluid.flow[nodes.dofs] - exact)[outside[nodes.dofs]].max() < 1e-10
+
+
+def test_no_constant_matters(monkeypatch):
+    """The drag of 2D-1 moves by less than 0.05 % while the penalty grows by five orders of magnitude."""
+    drags = []
+    for factor in (0.1, 1.0, 1e4):
+        settings = partial(FlowSettings, penalties=Penalties(extension=factor))
+        monkeypatch.setattr(bench, "FlowSettings", settings)
+        drags.append(bench.steady("q2q1", 10)["c_D error [%]"])
+    assert np.ptp(drags) < 0.05
