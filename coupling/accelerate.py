@@ -118,11 +118,11 @@ class QuasiNewton:
         if not columns:
             return d + self.first * (found - d)
         V, W = np.stack(columns, axis=1), np.stack([c for step in self._steps for c in step[1]], axis=1)
-        kept = self._independent(V)
+        kept = self.independent(V)
         a = np.linalg.lstsq(V[:, kept], -residual, rcond=None)[0]
         return (mapped + W[:, kept] @ a).reshape(d.shape)
 
-    def _independent(self, V: Array) -> list[int]:
+    def independent(self, V: Array) -> list[int]:
         """Columns that do not depend on newer ones, by modified Gram-Schmidt."""
         basis: list[Array] = []
         kept = []

@@ -45,7 +45,7 @@ class Monolithic:
         self._linear_iterations = 0  #: of this step
         #: rounding errors of the residuals of solid and flow [N], as far as this step knows
         self._noise: Array | None = None
-        self._found, self._largest = np.zeros(2), np.zeros(2)  #: residuals of solid and flow: now, largest of the step
+        self._found, self.largest = np.zeros(2), np.zeros(2)  #: residuals of solid and flow: now, largest of the step
         self._prepared: Blocks | None = None  #: the matrix at the present iterate, if it is there already
 
     # ------------------------------------------------------------------------------------------------- steps
@@ -57,7 +57,7 @@ class Monolithic:
     def step(self, t: float, dt: float) -> StepInfo:
         coupled = self.coupled
         coupled.begin_step(t, dt)
-        self._largest, self._linear_iterations = np.zeros(2), 0
+        self.largest, self._linear_iterations = np.zeros(2), 0
         self._noise = self._prepared = None
         self._krylov.begin_step()
         self._direct.begin_step()
@@ -81,17 +81,17 @@ class Monolithic:
         of_flow = flow.residual()
         solid.load(self.coupled.force())
         found = np.array([solid.residual(), of_flow])
-        self._largest = np.maximum(self._largest, found)
+        self.largest = np.maximum(self.largest, found)
         self._found = found
         above = found > (np.zeros(2) if self._noise is None else self._noise)
-        relative = np.divide(found, self._largest, out=np.zeros(2), where=above)
+        relative = np.divide(found, self.largest, out=np.zeros(2), where=above)
         self._farther = solid if relative[0] > relative[1] else flow
-        return float(relative.max() * self._largest.sum())
+        return float(relative.max() * self.largest.sum())
 
     def advance(self) -> float:
         """One Newton step; the larger of both parts' relative increments."""
         solid, flow = self.coupled.solid, self.coupled.flow
-        blocks, self._prepared = self._prepared or self._blocks(), None
+        blocks, self._prepared = self._prepared or self.blocks(), None
         b, x = blocks.create_vectors()
         own = solid.size
         b.array[:own], b.array[own:] = solid.right_side(), flow.right_side()
@@ -130,11 +130,11 @@ class Monolithic:
             flow.set_up_multigrid(krylov.getPC().getFieldSplitSubKSP()[1].getPC(), blocks.flow)
         return krylov
 
-    def _blocks(self) -> Blocks:
+    def blocks(self) -> Blocks:
         solid, flow = self.coupled.solid, self.coupled.flow
         K, A = solid.linearise(), flow.linearise()
         with flow.timer("coupling"):
-            into_flow, into_solid, mass = self._coupling_blocks()
+            into_flow, into_solid, mass = self.coupling_blocks()
             PETSc.garbage_cleanup(K.comm)  # the K of earlier iterates, on a communicator that no solver has
             K = K.copy()
             K.axpy(1.0, mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
@@ -145,7 +145,7 @@ class Monolithic:
             self._noise = np.array([solid.round_off(), flow.round_off()])
             return Blocks(K, into_solid, into_flow, A)
 
-    def _coupling_blocks(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
+    def coupling_blocks(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
         """alpha C B, -w B^T C^T S and w alpha B^T M B ; rows of held dofs of the flow are empty."""
         flow, solid = self.coupled.flow, self.coupled.solid
         entries, B, w = flow.interface_entries(self.coupled.interface.surfaces), solid.jacobian(), solid.force_weight
@@ -170,7 +170,7 @@ class Monolithic:
     def round_off(self) -> float:
         """No residual is too large if those of both parts are rounding errors; other ones are left out already."""
         if self._noise is None:
-            self._prepared = self._blocks()
+            self._prepared = self.blocks()
         assert self._noise is not None
         return math.inf if (self._found <= self._noise).all() else 0.0
 

@@ -127,7 +127,7 @@ def press_blocks(
     structure, contact = make_contact(bodies, [tuple(near if slave == "upper" else near[::-1])])
     structure.initialise(0.0, 1.0)
     if load:
-        bodies[0]._dead_load += uncovered_load(bodies[0], load, masters_edge)
+        bodies[0].dead_load += uncovered_load(bodies[0], load, masters_edge)
     return structure, contact, solve_step(structure, first=False)
 
 

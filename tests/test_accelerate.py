@@ -75,7 +75,7 @@ def test_quasi_newton_reuses_earlier_steps_until_told_to_forget():
 def test_dependent_columns_are_dropped():
     accelerator = QuasiNewton()
     V = np.array([[1.0, 1.0, 0.0], [0.0, 1e-9, 1.0], [0.0, 0.0, 0.0]])
-    assert accelerator._independent(V) == [0, 2]
+    assert accelerator.independent(V) == [0, 2]
 
 
 @pytest.mark.parametrize("make", [Aitken, QuasiNewton])

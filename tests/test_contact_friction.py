@@ -48,7 +48,7 @@ def two_blocks(cell_type, law, *, held=False):
 def put_at_the_edge(contact, law, distance):
     """Tangential multipliers with |q| = s (1 + distance) or s (1 - distance), in turns."""
     every = np.arange(len(contact.z))
-    point = contact._point(every)
+    point = contact.point(every)
     normal = np.einsum("nd,nd->n", contact.z, point.normals)[:, None] * point.normals
     q = trial_traction(point)
     side = 1.0 + distance * np.where(every % 2, 1.0, -1.0)
@@ -83,7 +83,7 @@ def test_linearisation_is_the_derivative_of_the_residual(cell_type, law, edge, h
     dz = 1e3 * rng.uniform(-1, 1, (len(L.active), contact.dim))
     tangents = np.eye(contact.dim) - np.einsum("ni,nj->nij", *[contact.terms.normals[L.active]] * 2)
     normals = contact.terms.normals[L.active].copy()
-    frozen = contact._point(L.active)  # the factor of the gap is a parameter, and with it the D in it
+    frozen = contact.point(L.active)  # the factor of the gap is a parameter, and with it the D in it
 
     def residual(step):
         structure.now.u[:] = u + step * du
@@ -91,7 +91,7 @@ def test_linearisation_is_the_derivative_of_the_residual(cell_type, law, edge, h
         contact.z[L.active] += step * dz
         structure.residual()
         assert np.array_equal(contact.active_set.status[L.active], status)
-        point = contact._point(L.active)
+        point = contact.point(L.active)
         point = replace(point, c_n=frozen.c_n * point.D / frozen.D)
         missed = law.residual(point, status, 1.0) / point.D[:, None]  # the rows at fixed factor D
         missed -= np.einsum("nd,nd->n", missed, point.normals)[:, None] * point.normals
@@ -127,9 +127,9 @@ def test_a_common_rigid_motion_is_no_slip(cell_type):
     for moved in (x, x @ turn.T + 0.7):
         contact.begin_step()
         contact.evaluate(moved - contact.nodes.points, 1.0)
-        contact._x_old = contact.x.copy()
-        seen = contact._slip.defined & (contact.terms.D > 0)
-        slips.append(contact._slip.values[seen])
+        contact.x_old = contact.x.copy()
+        seen = contact.slip.defined & (contact.terms.D > 0)
+        slips.append(contact.slip.values[seen])
         contact.x = contact.nodes.points.copy()
     assert np.abs(slips[0]).max() > 1e-3
     assert slips[1] == pytest.approx(slips[0] @ turn.T, abs=1e-12)

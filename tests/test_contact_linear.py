@@ -36,7 +36,7 @@ def test_static_contact():
     assert np.abs(ilu[0].now.u - direct[0].now.u).max() < 1e-6 * size
     force = direct[1].resultant(0)
     assert np.abs(ilu[1].resultant(0) - force).max() < 1e-6 * np.abs(force).max()
-    used = ilu[0]._constrained_ksp
+    used = ilu[0].constrained_solver
     assert used.getPC().getType() == "asm"
     assert 0 < used.getIterationNumber() < 100
 

@@ -144,6 +144,6 @@ def test_a_pair_that_never_meets_costs_nothing(monkeypatch):
     monkeypatch.setattr(solvers.contact.mortar, "mortar", forbidden)
     monkeypatch.setattr(solvers.contact.patch, "nodal_normals", forbidden)
     monkeypatch.setattr(contact, "condense", forbidden)
-    monkeypatch.setattr(solvers.contact.search, "_update", forbidden)
+    monkeypatch.setattr(solvers.contact.search, "update", forbidden)
     assert max(steps(structure, 3, 0.1)) <= 1
     assert not contact.near

@@ -130,7 +130,7 @@ def prepare(make, seed=5):
     structure.initialise(0.0, 0.1)
     structure.begin_step(0.0, 0.1)
     structure.now.u[:] = rng.uniform(-0.01, 0.01, structure.layout.size)
-    structure.now.u = structure.held.free_part(structure.now.u) + structure._target
+    structure.now.u = structure.held.free_part(structure.now.u) + structure.target
     structure.residual()
     pressure = rng.uniform(25.0, 35.0, len(contact.z))
     contact.z[:] = pressure[:, None] * contact.terms.normals
@@ -189,14 +189,14 @@ def test_condensed_step_is_that_of_the_saddle_point_system(name):
     held = structure.held.dofs
     matrix[held] = 0.0
     matrix[held, held] = 1.0
-    right[held] = (structure._target - structure.now.u)[held]
+    right[held] = (structure.target - structure.now.u)[held]
     # rows and columns of equal size, so that the dense solution is accurate
     columns = 1.0 / np.abs(matrix).max(axis=0)
     rows = 1.0 / np.abs(matrix * columns).max(axis=1)
     solution = columns * np.linalg.solve(rows[:, None] * matrix * columns, rows * right)
 
     structure.advance()
-    compare(structure._increment, solution[:size], 1e-10)
+    compare(structure.increment, solution[:size], 1e-10)
     z = L.basis @ solution[size:] + L.turning @ L.place @ solution[:size]
     compare(contact.z[L.active].ravel(), z, 1e-10)
 

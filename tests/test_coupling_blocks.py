@@ -19,7 +19,7 @@ def disturbed():
     scheme = Monolithic(coupled)
     scheme.step(0.0, 0.02)
     coupled.begin_step(0.02, 0.02)
-    scheme._largest = np.zeros(2)
+    scheme.largest = np.zeros(2)
     rng = np.random.default_rng(0)
     structure, fluid = coupled.solid.structure, coupled.flow
     structure.now.u += structure.held.free_part(1e-3 * rng.standard_normal(structure.layout.size))
@@ -99,7 +99,7 @@ def difference(a, b) -> float:
 def test_blocks_against_finite_differences(disturbed, without_shape, seed: int):
     rows(disturbed)
     du, dw = direction(disturbed, seed)
-    found = by_matrix(disturbed, disturbed._blocks().assembled(), du, dw)
+    found = by_matrix(disturbed, disturbed.blocks().assembled(), du, dw)
     for part, exact in zip(found, by_differences(disturbed, du, dw), strict=True):
         assert difference(part, exact) < 1e-6
 
@@ -115,9 +115,9 @@ def test_every_coupling_block_counts(disturbed, without_shape, number: int, name
         dw = 0.0 * dw
     part = 1 if name == "into_fluid" else 0
     exact = by_differences(disturbed, du, dw)[part]
-    found = by_matrix(disturbed, disturbed._blocks().assembled(), du, dw)[part]
+    found = by_matrix(disturbed, disturbed.blocks().assembled(), du, dw)[part]
     assert difference(found, exact) < 1e-6
-    block = disturbed._coupling_blocks()[number]
+    block = disturbed.coupling_blocks()[number]
     x, y = block.createVecs()
     x.array[:] = dw if name == "into_structure" else du
     block.mult(x, y)

@@ -58,8 +58,8 @@ def hold_tangential(fluid, numbers):
     for number in numbers:
         for axis in range(1, fluid.dim):
             dofs = fem.facet_dofs(fluid.unknowns.space, axis, np.sort(boundary.facets[number]))
-            boundary._imposed[dofs] = sides
-    boundary.dofs = np.flatnonzero(boundary._imposed >= 0)
+            boundary.imposed[dofs] = sides
+    boundary.dofs = np.flatnonzero(boundary.imposed >= 0)
     fluid.move({})
 
 

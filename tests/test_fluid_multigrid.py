@@ -40,7 +40,7 @@ def test_interpolation_of_linear_fields_is_exact(element):
         Grid(edges), [wall(field(1, 0))], solver=SolverSettings(linear="iterative"), scheme="steady",
         convection=False, element=element,
     )  # fmt: skip
-    levels = [finest(fluid.unknowns), *fluid.linear_solver.multigrid._levels[1:]]
+    levels = [finest(fluid.unknowns), *fluid.linear_solver.multigrid.levels[1:]]
     lattices = [levels[-1].components[-1].lattice.coarser()] * 3
     levels.append(coarsen(MPI.COMM_SELF, levels[-1], lattices))
     for fine, coarse in itertools.pairwise(levels):

@@ -122,7 +122,7 @@ def test_patch_that_slides(lower, upper, slave):
         structure.begin_step(t - 1.0, 1.0)
         F, motion = np.eye(dim) + at(t)[0], at(t)[1]
         bodies[0].external_force(t)  # evaluates the loads of this time, once
-        bodies[0]._dead_load += uncovered(bodies[0], nominal_stress(F)[:, -1], FIRST + np.linalg.solve(F, motion)[:-1])
+        bodies[0].dead_load += uncovered(bodies[0], nominal_stress(F)[:, -1], FIRST + np.linalg.solve(F, motion)[:-1])
         info = structure.solve()
         structure.end_step()
         assert info.iterations <= 8, info.residuals

@@ -33,7 +33,7 @@ def cantilever(mesh, method, **loads):
 
 
 def iterations(structure):
-    return structure._ksp.getIterationNumber()
+    return structure.linear_solver.getIterationNumber()
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_iterative_equals_direct(mesh):
     direct, iterative = (cantilever(mesh, method) for method in ("direct", "iterative"))
     steps = [load_step(structure).iterations for structure in (direct, iterative)]
     assert steps[0] == steps[1]
-    assert direct._ksp.getPC().getType() != iterative._ksp.getPC().getType() == "gamg"
+    assert direct.linear_solver.getPC().getType() != iterative.linear_solver.getPC().getType() == "gamg"
     size = np.abs(direct.now.u).max()
     assert size > 0.3
     assert np.abs(iterative.now.u - direct.now.u).max() < 1e-6 * size
@@ -111,11 +111,11 @@ def test_rigid_modes_are_needed():
     structure.initialise(0.0, 1.0)
     structure.begin_step(0.0, 1.0)
     structure.residual()
-    matrix, x = structure.tangent(), structure.layout.vector()
-    structure._b.array[:] = -structure.residual_force
-    matrix.zeroRowsColumns(structure.held.dofs.astype(PETSc.IntType), 1.0, x, structure._b)
+    matrix, x, b = structure.tangent(), structure.layout.vector(), structure.layout.vector()
+    b.array[:] = -structure.residual_force
+    matrix.zeroRowsColumns(structure.held.dofs.astype(PETSc.IntType), 1.0, x, b)
     matrix.setNearNullSpace(PETSc.NullSpace().create(vectors=translations(structure)))
-    linear.solve(structure._ksp, matrix, structure._b, x)
+    linear.solve(structure.linear_solver, matrix, b, x)
     assert iterations(structure) > 1.5 * with_rotations
 
 
@@ -162,7 +162,7 @@ def test_turned_body():
     quarter = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
     structure.now.u[:] = (x @ quarter.T - x).ravel()
     structure.residual()
-    structure._target = structure.held.part(structure.now.u)
+    structure.target = structure.held.part(structure.now.u)
     structure.advance()
     assert iterations(structure) <= first + 5
 

@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 from programs import PARALLEL
 
-from solvers.fluid.cut import _cells_between
+from solvers.fluid.cut import cells_between
 from solvers.fluid.grid import DistributedGrid, Grid, uniform
 from solvers.fluid.pockets import find_pockets
 
@@ -88,7 +88,7 @@ def test_cells_between_corners(dim):
             for e, x, y in zip(box.edges, a, b, strict=True)
         ]
         expected |= {int(np.ravel_multi_index(cell, box.shape, order="F")) for cell in itertools.product(*rows)}
-    assert set(_cells_between(box, low, high).tolist()) == expected
+    assert set(cells_between(box, low, high).tolist()) == expected
 
 
 if __name__ == "__main__":

@@ -169,15 +169,15 @@ def test_tangent_and_jacobian_against_finite_differences(make):
     bodies.begin_step(0.1, 0.1)
     start = np.zeros((1, 6))
     start[:, bodies.components] = 0.3 * rng.standard_normal(len(bodies.components))
-    bodies._place(start)
+    bodies.place(start)
     force = rng.standard_normal((len(bodies.bodies[0].points), dim))
 
     def rows(increment):
-        bodies._place(start)
-        bodies._add(increment)
+        bodies.place(start)
+        bodies.update(increment)
         bodies.load(force)
         bodies.residual()
-        return bodies._balance.copy(), bodies.displacement().ravel()
+        return bodies.balance.copy(), bodies.displacement().ravel()
 
     rows(np.zeros(bodies.unknowns))
     tangent, jacobian = bodies.tangent(), bodies.jacobian()

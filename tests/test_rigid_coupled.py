@@ -70,25 +70,25 @@ def test_blocks_against_finite_differences(monkeypatch):
     scheme.initialise(0.0, 0.02)
     scheme.step(0.0, 0.02)
     coupled.begin_step(0.02, 0.02)
-    scheme._largest = np.zeros(2)
+    scheme.largest = np.zeros(2)
     fluid, bodies, interface = coupled.flow, coupled.solid, coupled.interface
     rng = np.random.default_rng(0)
     start = np.zeros((1, 6))
     start[:, bodies.components] = 1e-3 * rng.standard_normal(3)
-    bodies._place(start)
+    bodies.place(start)
     fluid.move(interface.move(interface.displacement()))
     free = np.flatnonzero(~fluid.held)
     fluid.flow[free] += 0.1 * rng.standard_normal(len(free))
     scheme.residual()
 
     def rows(increment):
-        bodies._place(start)
-        bodies._add(increment)
+        bodies.place(start)
+        bodies.update(increment)
         fluid.cut.motion.v[:] = interface.velocity(interface.displacement())
         fluid.residual()
         bodies.load(coupled.force())
         bodies.residual()
-        return np.concatenate([bodies._balance, fluid.residual_rows])
+        return np.concatenate([bodies.balance, fluid.residual_rows])
 
     rows(np.zeros(3))
     with_shape = coupling_entries.shape_derivatives
@@ -98,7 +98,7 @@ def test_blocks_against_finite_differences(monkeypatch):
         return (0.0 * velocity, 0.0 * pressure), 0.0 * load
 
     monkeypatch.setattr(coupling_entries, "shape_derivatives", without)
-    matrix = scheme._blocks().assembled()
+    matrix = scheme.blocks().assembled()
     flow, h = fluid.flow.copy(), 1e-6
     du, dw = rng.standard_normal(3), np.where(fluid.held, 0.0, rng.standard_normal(fluid.size))
     x, y = matrix.createVecs()

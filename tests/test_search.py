@@ -172,7 +172,7 @@ def test_surfaces_that_never_meet_touch_no_tree(monkeypatch):
         raise AssertionError("tree touched")
 
     with monkeypatch.context() as patch:
-        patch.setattr(search_module, "_update", forbidden)
+        patch.setattr(search_module, "update", forbidden)
         for inflation in (0.0, 1.0, np.full(100, 4.7)):
             found = search.pairs(xs, xm, inflation, xs + 0.01, xm)
             assert found.shape == (0, 2)
@@ -206,8 +206,8 @@ def test_earlier_calls_leave_no_trace():
         found = search.pairs(now, xm, 0.005 * step, before)
         assert len(found) > 0
         np.testing.assert_array_equal(found, Search(slave, master).pairs(now, xm, 0.005 * step, before))
-        assert search._trees is not None
-        assert max(tree.quality() for tree in search._trees) <= REBUILD_ABOVE
+        assert search.trees is not None
+        assert max(tree.quality() for tree in search.trees) <= REBUILD_ABOVE
 
 
 def test_quality_tells_when_to_rebuild():

@@ -67,7 +67,7 @@ def tube(n):
 
 
 def by_force(tree, x, inflation):
-    low, high = tree._slabs(x, None, 0.5 * inflation)
+    low, high = tree.slabs(x, None, 0.5 * inflation)
     found = [
         np.stack([np.full(len(j), i), j], axis=1)
         for i in range(len(low))
@@ -330,10 +330,10 @@ def test_a_tube_folds():
     radii = np.hypot(*contact.x[contact.multipliers.node[active], :2].T)
     assert len(np.unique(radii.round(9))) == len(active) // 16
     (mortar,) = contact.interface.mortars
-    tree, x = mortar._search.tree, contact.x[mortar.masters.nodes]
-    wanted = by_force(tree, x, mortar._edge)
+    tree, x = mortar.search.tree, contact.x[mortar.masters.nodes]
+    wanted = by_force(tree, x, mortar.edge)
     assert len(wanted) > 100
-    assert set(map(tuple, tree.pairs(x, mortar._edge).tolist())) == set(map(tuple, wanted.tolist()))
+    assert set(map(tuple, tree.pairs(x, mortar.edge).tolist())) == set(map(tuple, wanted.tolist()))
 
 
 MISTAKES = {

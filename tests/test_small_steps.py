@@ -32,7 +32,7 @@ def steps(tmp_path, monkeypatch):
     for name in names:
         original = getattr(ffcx.codegeneration.jit, name)
         monkeypatch.setattr(ffcx.codegeneration.jit, name, lambda *a, f=original, **k: (asked.append(a), f(*a, **k))[1])
-    one_step = fsci.run.run.Run._step
+    one_step = fsci.run.run.Run.take_step
 
     def timed(run):
         begin = time.process_time()
@@ -41,7 +41,7 @@ def steps(tmp_path, monkeypatch):
         if run.clock.step == 1:
             asked.clear()
 
-    monkeypatch.setattr(fsci.run.run.Run, "_step", timed)
+    monkeypatch.setattr(fsci.run.run.Run, "take_step", timed)
 
     def run(end):
         (tmp_path / "case.yaml").write_text(CASE)

@@ -154,8 +154,8 @@ def test_linear_systems_with_held_directions(rows_only):
     projection = np.stack([structure.held.part(e) for e in np.eye(n)])
     missing = structure.missing_displacement()
     assert np.abs(missing).max() > 0.05
-    assert not structure.held.reached(structure.now.u, structure._target, 1.0)
-    assert structure.held.reached(structure.now.u + missing, structure._target, 1.0)
+    assert not structure.held.reached(structure.now.u, structure.target, 1.0)
+    assert structure.held.reached(structure.now.u + missing, structure.target, 1.0)
     held = np.linalg.svd(projection)[2][: round(np.trace(projection))]
     size = len(held)
     assert size == 3 + 3  # two of them at the corner

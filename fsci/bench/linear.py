@@ -45,7 +45,7 @@ def measure(name: str, mesh: Mesh) -> Row:
             seconds = perf_counter() - begin - (structure.timer.seconds["assembly"] - assembly)
             row[f"{method} {when} [s]"] = seconds
             structure.residual()
-    row["iterations"] = structure._ksp.getIterationNumber()
+    row["iterations"] = structure.linear_solver.getIterationNumber()
     return row
 
 

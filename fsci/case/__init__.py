@@ -3,5 +3,3 @@
 from fsci.case.case import Case
 from fsci.case.errors import CaseError
 from fsci.case.load import load_case
-
-__all__ = ["Case", "CaseError", "load_case"]

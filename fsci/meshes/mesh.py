@@ -18,8 +18,6 @@ from solvers.cell_types import CELL_TYPES
 from solvers.mesh import Mesh
 from solvers.mesh_topology import find_facets
 
-__all__ = ["MeshError", "build_mesh", "extract_region", "place", "require_region", "require_surface"]
-
 
 def build_mesh(settings: Any, folder: Path) -> Mesh:
     """The mesh of a case's `mesh:` section; file names count from `folder`. Raises MeshError."""

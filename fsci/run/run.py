@@ -203,7 +203,7 @@ class Run:
             if self._asked_to_stop():
                 return self._end("stopped", f"stopped at time {self.clock.time:g}; continue with fsci resume")
             try:
-                self._step()
+                self.take_step()
             except StepFailed as failure:
                 return self._fail(failure)
             if every and self.clock.step % every == 0:
@@ -211,7 +211,7 @@ class Run:
                     self._write_checkpoint()
         return self._end("finished", "")
 
-    def _step(self) -> None:
+    def take_step(self) -> None:
         """One accepted step. Raises StepFailed if halving does not help."""
         before, clock = self.record.wall(), self.clock
         while True:
@@ -366,6 +366,3 @@ class Run:
             self.monitor.say(f"time: {shares(self.record.wall(), self.record.timer.seconds)}")
         self.monitor.finish(message, ok=status == "finished" and not missed)
         return {"finished": FAILED if missed else FINISHED, "stopped": STOPPED, "failed": FAILED}[status]
-
-
-__all__ = ["BAD_CASE", "FAILED", "FINISHED", "STOPPED", "CaseError", "Run", "resume_run", "run_case"]

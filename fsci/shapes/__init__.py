@@ -4,18 +4,3 @@ from fsci.shapes.plane import disc, rectangle, ring
 from fsci.shapes.solid import beam, box, cylinder, hollow_sphere, hollow_torus, solid_torus, sphere, tube
 
 annulus = tube
-
-__all__ = [
-    "annulus",
-    "beam",
-    "box",
-    "cylinder",
-    "disc",
-    "hollow_sphere",
-    "hollow_torus",
-    "rectangle",
-    "ring",
-    "solid_torus",
-    "sphere",
-    "tube",
-]

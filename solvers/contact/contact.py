@@ -60,7 +60,7 @@ class Contact:
         count = len(self.multipliers.node)
         self.z = np.zeros((count, self.dim))
         self.x = self.nodes.points.copy()
-        self._x_old = self.x.copy()
+        self.x_old = self.x.copy()
         self.active_set = ActiveSet(count)
         self._spans = self.interface.spans  # at the latest evaluation
         self._keep_overlap = keep_overlap
@@ -80,7 +80,7 @@ class Contact:
         self._ties = Ties(tied, self.multipliers, self.nodes.points, self.interface.unmoved())
         sliding = [mortar for mortar, law in laws if law.slips]
         self._sliding = Sliding(sliding, self.multipliers, self._shares, (self.size, self.dim))
-        self._slip: Slip | None = None  # at the latest evaluation
+        self.slip: Slip | None = None  # at the latest evaluation
         self._weight = 1.0  # of the new contact force in the balance
         self.work = FrictionWork((count, self.dim))
         self.time = np.nan  #: of the latest evaluation [s]
@@ -96,7 +96,7 @@ class Contact:
         at_node, areas = stiffness.mean(axis=1)[self.multipliers.node], self.multipliers.areas
         self._stiffness = np.divide(at_node, areas, out=np.zeros_like(areas), where=areas > 0.0)
         self.x = self.positions(u, t)
-        self._x_old = self.x.copy()
+        self.x_old = self.x.copy()
         self._constraints.start(self.x)
 
     def positions(self, u: Array, t: float) -> Array:
@@ -109,7 +109,7 @@ class Contact:
 
     def begin_step(self) -> None:
         """Facets may have moved from here on."""
-        self._x_old = self.x.copy()
+        self.x_old = self.x.copy()
         if self._keep_overlap:
             self._kept = np.minimum(0.0, self._mean_gap)
         self._constraints.begin_step()
@@ -118,12 +118,12 @@ class Contact:
         for mortar in self._mortars:
             mortar.begin_step(self.active_set.active)
         self._sliding.begin_step(self.x)
-        self._slip = None
+        self.slip = None
 
     def end_step(self, weight: float) -> None:
         """Accept the step; weight: of the new contact force in the balance."""
         self.work.end_step(weight, *self._force_and_slip())
-        self._slip = None
+        self.slip = None
 
     @property
     def friction_work(self) -> float:
@@ -132,10 +132,10 @@ class Contact:
 
     def _force_and_slip(self) -> tuple[Array, Array]:
         """Along the surface: force [N] of the multipliers in contact, and their slip in this step [m]."""
-        if self.terms is None or self._slip is None:
+        if self.terms is None or self.slip is None:
             return np.zeros_like(self.z), np.zeros_like(self.z)
         tangent = along(self.terms.normals) * self.active_set.active[:, None, None]
-        slip = np.einsum("nij,nj->ni", tangent, self._slip.values)
+        slip = np.einsum("nij,nj->ni", tangent, self.slip.values)
         return self._D[:, None] * np.einsum("nij,nj->ni", tangent, self.z), slip
 
     def evaluate(self, u: Array, t: float) -> None:
@@ -150,15 +150,15 @@ class Contact:
             self._D = self._redistributed(self.terms.D)
             np.divide(self._gap, self._D, out=self._mean_gap, where=self._D > 0.0)
             for law, which in self.interface.laws:
-                status[which] = law.status(self._point(which))
+                status[which] = law.status(self.point(which))
             self._drop_dependent(status)
         self.active_set.choose(status)
         self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
 
-    def _point(self, which: NDArray[np.int64]) -> Point:
+    def point(self, which: NDArray[np.int64]) -> Point:
         """What a law is told of its multipliers."""
         assert self.terms is not None
-        stiffness, slip = self._stiffness[which], self._slip
+        stiffness, slip = self._stiffness[which], self.slip
         return Point(
             z=self.z[which],
             normals=self.terms.normals[which],
@@ -190,7 +190,7 @@ class Contact:
 
     def _evaluate_mortars(self) -> Terms | None:
         """Terms of all pairs, each process doing its share of the slave facets; None if no facets are near."""
-        near = [mortar.near(self.x, self._x_old) for mortar in self._mortars]
+        near = [mortar.near(self.x, self.x_old) for mortar in self._mortars]
         if not self._ties.pieces and all(len(facet_pairs) == 0 for facet_pairs, _ in near):
             return None
         normals = find_normals(self.multipliers, self.x)
@@ -216,10 +216,10 @@ class Contact:
         self._spans, self.merged = constrained.spans, constrained.merged
         if self._sliding.mortars:
             used = [(mortar, found.used) for mortar, found in pieces]
-            self._slip = self._sliding.evaluate(self.x, normals, used, self._redistributed)
+            self.slip = self._sliding.evaluate(self.x, normals, used, self._redistributed)
         if self._ties.pieces:
             tied = self._ties.slip(self.x, self._shared)
-            self._slip = tied if self._slip is None or not self._sliding.mortars else self._slip.plus(tied)
+            self.slip = tied if self.slip is None or not self._sliding.mortars else self.slip.plus(tied)
         return terms
 
     # ------------------------------------------------------------------------------------- what the balance needs
@@ -262,13 +262,13 @@ class Contact:
         """Multipliers in contact, law by law."""
         parts = [(law, which[self.active_set.active[which]]) for law, which in self.interface.laws]
         status = self.active_set.status
-        return [ActiveMultipliers(law, which, self._point(which), status[which]) for law, which in parts if len(which)]
+        return [ActiveMultipliers(law, which, self.point(which), status[which]) for law, which in parts if len(which)]
 
     def linearised(self, parts: Sequence[ActiveMultipliers], weight: float) -> Linearised:
         """What multipliers in contact add to a Newton step."""
         assert self.terms is not None
         count, n, dgap = len(self.z), self.dim * self.size, self._redistributed(self.terms.dgap)
-        slip = nothing((self.dim * count, n)) if self._slip is None else self._slip.slopes
+        slip = nothing((self.dim * count, n)) if self.slip is None else self.slip.slopes
         slopes = Slopes(gap=dgap, normals=self.terms.dnormals, slip=slip)
         force = self._force_matrix()
         if self._shared is not None:

@@ -61,7 +61,7 @@ class DualTree:
         Only those without a common node that are opposed to each other.
         """
         normals = self.normals(x)
-        low, high = self._slabs(x, x_previous, 0.5 * inflation)
+        low, high = self.slabs(x, x_previous, 0.5 * inflation)
         bits = 1 << np.arange(len(self._samples), dtype=np.uint64)
         within = (normals @ self._samples.T > CONE).all(axis=1)
         masks = [np.where(within, bits, np.uint64(0)).sum(axis=1, dtype=np.uint64)]
@@ -80,7 +80,7 @@ class DualTree:
         products = np.einsum("pad,pbd->pab", normals[pairs[:, 0]], normals[pairs[:, 1]])
         return apart & (products < OPPOSED).any(axis=(1, 2))
 
-    def _slabs(self, x: Array, x_previous: Array | None, radius: float) -> tuple[Array, Array]:
+    def slabs(self, x: Array, x_previous: Array | None, radius: float) -> tuple[Array, Array]:
         """Least and largest extent of the facets along some directions, shapes (k, directions)."""
         ends = [x[self.facets] @ self._directions.T]
         if x_previous is not None:

@@ -98,10 +98,10 @@ class Mortar:
         search: FacetSearch,
     ):
         self.patch, self.masters, self.integration = patch, masters, integration
-        self._search = search
+        self.search = search
         self._types = CELL_TYPES[patch.facet_type].kernel, CELL_TYPES[masters.facet_type].kernel
         self.facets = np.ascontiguousarray(facets, dtype=np.int64)
-        self._edge = edge
+        self.edge = edge
         self._evaluations = 0
         self._kept = np.empty(0, dtype=np.int64)
 
@@ -109,7 +109,7 @@ class Mortar:
         """Facet pairs are chosen anew; active: multipliers in contact, shape (C,)."""
         self._evaluations = 0
         self._kept = np.empty(0, dtype=np.int64)
-        self._search.begin_step(active[self.patch.multipliers][self.facets].sum(axis=1))
+        self.search.begin_step(active[self.patch.multipliers][self.facets].sum(axis=1))
 
     def _codes(self, facet_pairs: NDArray[np.int32]) -> NDArray[np.int64]:
         """One number for each facet pair, in the same order."""
@@ -129,7 +129,7 @@ class Mortar:
         """Facet pairs that may meet, and the largest motion [m] of a node in this step; x of all nodes."""
         slave, master = self.patch.nodes, self.masters.nodes
         motion = max(float(np.abs(x[nodes] - x_previous[nodes]).max(initial=0.0)) for nodes in (slave, master))
-        found = self._search.pairs(x[slave], x[master], self._edge + motion, x_previous[slave], x_previous[master])
+        found = self.search.pairs(x[slave], x[master], self.edge + motion, x_previous[slave], x_previous[master])
         codes = self._codes(found)
         if len(self._kept) == 0 or np.isin(self._kept, codes).all():
             return found, motion
@@ -183,7 +183,7 @@ class Mortar:
         return MortarTerms(result.D, M, np.zeros(ns), *none, result.area, used), W, M
 
     def _reach(self, motion: float) -> dict[str, float]:
-        return {"reach": self._edge + motion, "near": NEAR * self._edge + motion, "facing": OPPOSED}
+        return {"reach": self.edge + motion, "near": NEAR * self.edge + motion, "facing": OPPOSED}
 
     @staticmethod
     def _total(direct, by_normals, dnormals: Sparse, rows: int, columns: int) -> Sparse:
@@ -195,7 +195,7 @@ class Mortar:
     def begin(self, x: Array, normals: Array, facet_pairs: NDArray[np.int32]) -> tuple[Array, Sparse, Sparse]:
         """(D, W, M) at the beginning of a step. Facets count from farther away than for contact: they may come."""
         slave, master = self.patch.nodes, self.masters.nodes
-        result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(self._edge))
+        result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(self.edge))
         W = sparse(result.W, (len(slave), len(slave))) @ self.patch.basis()[1]
         return result.D, W, sparse(result.M, (len(slave), len(master)))
 

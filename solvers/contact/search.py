@@ -30,7 +30,7 @@ class Search:
     def __init__(self, slave_facets: Facets, master_facets: Facets):
         self._slave_facets = np.ascontiguousarray(slave_facets, dtype=np.int64)
         self._master_facets = np.ascontiguousarray(master_facets, dtype=np.int64)
-        self._trees: tuple[Tree, Tree] | None = None
+        self.trees: tuple[Tree, Tree] | None = None
 
     def begin_step(self, pressed: NDArray[np.int64]) -> None:
         """Nothing to choose: one side is the slave, the other one the master."""
@@ -53,17 +53,17 @@ class Search:
         if not all(np.isfinite(x).all() for x in path_s + path_m):
             raise StepFailed("contact", "surface positions are not finite")
         radii = np.ascontiguousarray(np.broadcast_to(np.asarray(inflation, float), len(self._slave_facets)))
-        if self._trees is None:
+        if self.trees is None:
             kdop_tree = KdopTree2 if np.shape(xs)[1] == 2 else KdopTree3
-            self._trees = kdop_tree(self._slave_facets), kdop_tree(self._master_facets)
-        slave, master = self._trees
+            self.trees = kdop_tree(self._slave_facets), kdop_tree(self._master_facets)
+        slave, master = self.trees
 
         low_s, high_s = slave.box(*path_s)
         low_m, high_m = master.box(*path_m)
         if np.any(low_s - radii.max() > high_m) or np.any(low_m > high_s + radii.max()):
             return np.empty((0, 2), np.int32)
-        _update(slave, path_s, radii)
-        _update(master, path_m, np.zeros(len(self._master_facets)))
+        update(slave, path_s, radii)
+        update(master, path_m, np.zeros(len(self._master_facets)))
         return slave.candidates(master)[0]
 
 
@@ -71,7 +71,7 @@ def _path(x: Array, x_previous: Array | None) -> list[Array]:
     return [np.ascontiguousarray(y, float) for y in (x, x_previous) if y is not None]
 
 
-def _update(tree: Tree, path: list[Array], radii: Array) -> None:
+def update(tree: Tree, path: list[Array], radii: Array) -> None:
     x, *previous = path
     tree.refit(x, radii, *previous)
     if tree.quality() > REBUILD_ABOVE:

@@ -31,9 +31,9 @@ class Shares:
         """The facet pairs that this process integrates; all pairs of a slave facet stay together."""
         if self.comm.size == 1 or len(facet_pairs) == 0:
             return facet_pairs
-        return np.ascontiguousarray(facet_pairs[self._owners(pair, facet_pairs, facets) == self.comm.rank])
+        return np.ascontiguousarray(facet_pairs[self.owners(pair, facet_pairs, facets) == self.comm.rank])
 
-    def _owners(self, pair: int, facet_pairs: NDArray[np.int32], facets: int) -> NDArray[np.int64]:
+    def owners(self, pair: int, facet_pairs: NDArray[np.int32], facets: int) -> NDArray[np.int64]:
         met = self._met.get(pair, np.ones(facets, dtype=bool))
         cost = np.cumsum(np.where(met[facet_pairs[:, 0]], OVERLAP_COST, 1.0))
         owner = np.minimum((cost / cost[-1] * self.comm.size).astype(int), self.comm.size - 1)
@@ -51,7 +51,7 @@ class Shares:
             return np.zeros((2, 1))
         overlaps = np.isin(_codes(facet_pairs), _codes(used))
         cost = np.where(overlaps, OVERLAP_COST, 1.0)
-        owners = facet_pairs[:, 0].astype(np.int64) * size // facets, self._owners(pair, facet_pairs, facets)
+        owners = facet_pairs[:, 0].astype(np.int64) * size // facets, self.owners(pair, facet_pairs, facets)
         return np.stack([np.bincount(owner, cost, size) for owner in owners])
 
     def note(self, work: NDArray[np.float64]) -> None:

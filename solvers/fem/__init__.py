@@ -4,7 +4,7 @@ A node is a point of the mesh file, numbered as there on every process; a dof bl
 Elements are isoparametric, so that the nodes of the mesh and of the displacement are the same points.
 """
 
-import mpi4py.MPI  # noqa: F401  (DOLFINx from PyPI finds its MPI only after this)
+import mpi4py.MPI  # DOLFINx from PyPI finds its MPI only after this
 
 from solvers.fem.compiling import listening
 from solvers.fem.domain import (
@@ -58,62 +58,3 @@ from solvers.fem.spaces import (
     tabulate_lagrange,
     vector_space,
 )
-
-__all__ = [
-    "COMPILE_OPTIONS",
-    "Domain",
-    "Entities",
-    "Integral",
-    "accumulate",
-    "add_ghosts",
-    "assemble_matrix",
-    "assemble_scalar",
-    "assemble_vector",
-    "average_at_nodes",
-    "block_points",
-    "boundary_facets",
-    "cell_blocks",
-    "cell_midpoints",
-    "cell_quadrature",
-    "cellwise_space",
-    "compile_expression",
-    "compile_form",
-    "compile_forms",
-    "compile_integrals",
-    "component_cell_dofs",
-    "component_dofs",
-    "constant",
-    "create_matrix",
-    "distribute",
-    "evaluate_cells",
-    "exterior_facets",
-    "facet_dofs",
-    "facet_midpoints",
-    "facet_quadrature",
-    "flow_space",
-    "function",
-    "identify_blocks",
-    "input_cells",
-    "input_nodes",
-    "interior_facets",
-    "listening",
-    "locate_point",
-    "mean_cell_size",
-    "measure",
-    "node_of_block",
-    "owned_cells",
-    "pressure_space",
-    "quadrature_points",
-    "quadrature_space",
-    "reference_nodes",
-    "scalar_space",
-    "share_owned",
-    "sum_ghosts",
-    "surface_blocks",
-    "surface_measure",
-    "tabulate",
-    "tabulate_lagrange",
-    "vector_space",
-    "volume_measure",
-    "vtk_from_basix",
-]

@@ -213,7 +213,7 @@ class Cutter:
         """Box cells around facets on the box's boundary: fluid enters them if the facets leave it."""
         box = self.grid.grid
         marked = np.zeros(box.size, dtype=bool)
-        marked[_cells_between(box, corners.min(axis=1), corners.max(axis=1))] = True
+        marked[cells_between(box, corners.min(axis=1), corners.max(axis=1))] = True
         return marked
 
     def _fluid_weights(self, moments, cut: Cells) -> Array:
@@ -246,7 +246,7 @@ class _First:
         return self if np.array_equal(cut.motion.v, motion.v) else replace(self, cut=replace(cut, motion=motion))
 
 
-def _cells_between(box: Grid, low: Array, high: Array) -> NDArray[np.int64]:
+def cells_between(box: Grid, low: Array, high: Array) -> NDArray[np.int64]:
     """Numbers of the cells that boxes between two corners [m] overlap, shape (boxes, dim) each; some several times."""
     first, last = (
         [

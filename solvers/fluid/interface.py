@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
-from solvers.fluid.slip import PieceIntegrals, Slip, slip_terms
+from solvers.fluid.slip import PieceIntegrals, SlipTerms, slip_terms
 from solvers.fluid.space import Unknowns
 from solvers.fluid.weights import Weights
 
@@ -65,7 +65,7 @@ class InterfaceTerms:
         self.normal_slope = np.einsum("pavj,pj->pav", self.grad, self.n)
         slope = np.tensordot(moments.sum(axis=2), psi_gradient, (1, 0))
         self.pressure_slope = slope / self.sizes[:, None, :]
-        self.slip: Slip | None = None
+        self.slip: SlipTerms | None = None
         if slip_length is not None:
             at = PieceIntegrals(self.n, moments.sum(axis=2), self.phi, self.grad, self.mass_of_pieces, self.sizes)
             length = slip_length[pieces.facet[mine]]

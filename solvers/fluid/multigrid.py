@@ -176,16 +176,16 @@ class Multigrid:
 
     def __init__(self, comm: MPI.Comm, unknowns: Unknowns):
         self.comm, self._second = comm, unknowns.degree > 1
-        self._levels = [finest(unknowns)]
+        self.levels = [finest(unknowns)]
         self._interpolations: list[PETSc.Mat] = []
-        while comm.allreduce(self._levels[-1].owned) > COARSEST:
-            lattices = [component.lattice for component in self._levels[-1].components]
+        while comm.allreduce(self.levels[-1].owned) > COARSEST:
+            lattices = [component.lattice for component in self.levels[-1].components]
             if lattices[-1].smallest:
                 break
             finer_velocity = lattices[0].shape != lattices[-1].shape
             next_one = lattices[-1] if finer_velocity else lattices[-1].coarser()
-            self._levels.append(coarsen(comm, self._levels[-1], [next_one] * len(lattices)))
-            self._interpolations.append(interpolation(comm, *self._levels[-2:]))
+            self.levels.append(coarsen(comm, self.levels[-1], [next_one] * len(lattices)))
+            self._interpolations.append(interpolation(comm, *self.levels[-2:]))
 
     def set_up(self, preconditioner: PETSc.PC, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> None:
         """Make a preconditioner one V-cycle for a matrix; it stays what it is when the matrix changes (collective).
@@ -207,7 +207,7 @@ class Multigrid:
                 smoother.getPC().setType(PETSc.PC.Type.LU)
                 smoother.getPC().setFactorSolverType("mumps")
             else:
-                self._smooth(smoother, matrices[count - 1 - level], self._levels[count - 1 - level])
+                self._smooth(smoother, matrices[count - 1 - level], self.levels[count - 1 - level])
         preconditioner.setUp()
         for level in range(count):
             smoother = preconditioner.getMGSmoother(level)

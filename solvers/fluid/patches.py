@@ -77,14 +77,14 @@ class Boundary:
         last = np.any([grid.on_face(midpoints, f"{axis}+") for axis in "xyz"[: grid.dim]], axis=0)
         #: of these, those that count as the section of a flow: of a period only its end
         self.at_end = [last[patch_of == n] | (not patch.record.periodic) for n, patch in enumerate(patches)]
-        self._imposed = np.full(unknowns.local, -1)
+        self.imposed = np.full(unknowns.local, -1)
         for number, patch in enumerate(patches):
             for component in self._held(grid, patch, midpoints[patch_of == number]):
                 on_patch, axes = component
                 dofs = fem.facet_dofs(unknowns.space, axes, np.sort(self.facets[number][on_patch]))
-                self._imposed[dofs] = number
+                self.imposed[dofs] = number
         #: local dofs with a prescribed velocity
-        self.dofs: NDArray[np.int64] = np.flatnonzero(self._imposed >= 0)
+        self.dofs: NDArray[np.int64] = np.flatnonzero(self.imposed >= 0)
         self._place = np.full((unknowns.local, 2), -1)
         for axis in range(unknowns.dim):
             dofs = unknowns.velocity.dofs[:, axis]
@@ -120,7 +120,7 @@ class Boundary:
     def velocity(self, t: float) -> Array:
         """Prescribed velocities [m/s] of `dofs` at a time."""
         values = np.zeros(len(self.dofs))
-        owner = self._imposed[self.dofs]
+        owner = self.imposed[self.dofs]
         node, axis = self._place[self.dofs].T
         for number, patch in enumerate(self.patches):
             if patch.record.value != "velocity":

@@ -23,7 +23,7 @@ AT_ONCE = 256
 
 
 @dataclass(frozen=True)
-class Slip:
+class SlipTerms:
     """What slip adds, by pieces of surface; zero where the flow sticks."""
 
     flow: Array  #: d(rows)/du, (pieces, functions, dim, functions, dim)
@@ -43,7 +43,7 @@ class PieceIntegrals:
     sizes: Array  #: edge lengths of the cell [m], (pieces, dim)
 
 
-def slip_terms(at: PieceIntegrals, table: tuple[Array, Array], mu: float, penalty: Array, length: Array) -> Slip:
+def slip_terms(at: PieceIntegrals, table: tuple[Array, Array], mu: float, penalty: Array, length: Array) -> SlipTerms:
     """For slip lengths [m] of pieces, inf: no shear stress.
 
     table: values (points, functions) and reference gradients (points, functions, dim) at the points of L_q; mu [Pa s];
@@ -64,7 +64,7 @@ def slip_terms(at: PieceIntegrals, table: tuple[Array, Array], mu: float, penalt
     slips = np.flatnonzero(kappa > 0.0)
     for some in np.split(slips, range(AT_ONCE, len(slips), AT_ONCE)):
         flow[some] = _squares(n[some], at.area[some] * -kappa[some, None], at.sizes[some], table, mu, s[some])
-    return Slip(flow, -factor * coupling, -factor * s[:, None, None, None, None] * mass)
+    return SlipTerms(flow, -factor * coupling, -factor * s[:, None, None, None, None] * mass)
 
 
 def _squares(n: Array, weight: Array, sizes: Array, table: tuple[Array, Array], mu: float, s: Array) -> Array:

@@ -11,15 +11,3 @@ from ._kernels import (
     nodal_normals,
     nodal_tangents,
 )
-
-__all__ = [
-    "KdopTree2",
-    "KdopTree3",
-    "Moments",
-    "MortarResult",
-    "basis_transformation",
-    "moments",
-    "mortar",
-    "nodal_normals",
-    "nodal_tangents",
-]

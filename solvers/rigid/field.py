@@ -69,7 +69,7 @@ class RigidBodies:
         for index, body in enumerate(bodies):
             free[index, body.held_components] = False
         self._free = free[:, self.components].ravel()
-        self._balance = np.zeros(self.unknowns)
+        self.balance = np.zeros(self.unknowns)
         self._noise: Array | None = None  #: rounding errors of the balance, as far as this step knows
 
     # ------------------------------------------------------------------------------------------------- steps
@@ -109,15 +109,15 @@ class RigidBodies:
         self._u[:] = self._held_u[:] = 0.0
         for u, body in zip(self._held_u, self.bodies, strict=True):
             u[body.held_components] = body.held_at(t + dt) - body.held_at(t)
-        self._place(self._held_u)
+        self.place(self._held_u)
 
     def predict(self, t: float) -> None:
         """Free components go on with their velocity."""
         u, path = self._held_u.copy(), self.current.dt * self._velocity(self.old)
         u[:, self.components] += np.where(self._free, path, 0.0).reshape(len(u), -1)
-        self._place(u)
+        self.place(u)
 
-    def _place(self, u: Array) -> None:
+    def place(self, u: Array) -> None:
         """Go to the increments u since the start of the step, shape (bodies, 6)."""
         self._u = u
         self.now = [
@@ -140,7 +140,7 @@ class RigidBodies:
 
     def end_step(self) -> None:
         """Accept the step; an impact takes velocity away."""
-        self._balance = self._own_balance()
+        self.balance = self._own_balance()
         if self.contact is None or not self.contact.active.any():
             return
         mass = np.zeros((self.unknowns, self.unknowns))
@@ -224,7 +224,7 @@ class RigidBodies:
         """What momentum, own loads and contact leave open [N, N m]; for held components what was handed over."""
         weight = self.force_weight
         handed_over = self._by_component(weight * self.on_surface + (1.0 - weight) * self.on_surface_old)
-        return np.where(self._free, self._balance, handed_over)
+        return np.where(self._free, self.balance, handed_over)
 
     def taken_at_start(self) -> Array:
         return np.zeros(self.unknowns)
@@ -252,14 +252,14 @@ class RigidBodies:
         mean = self._by_component(weight * self.on_surface + (1.0 - weight) * self.on_surface_old)
         if self.contact is not None:
             self.contact.z[:] = 0.0
-        self._balance = np.where(self._free, self._own_balance() - mean, 0.0)
+        self.balance = np.where(self._free, self._own_balance() - mean, 0.0)
         if self.contact is None:
-            return self._norm(self._balance)
+            return self._norm(self.balance)
         arms = [body.arms(now.R, body.points) for body, now in zip(self.bodies, self.now, strict=True)]
         self.contact.measure(self._positions(), arms, self.components, self.current.t)
         self.contact.G[:, ~self._free] = 0.0
-        self.contact.press(self._system(), -self._balance)
-        return self._norm(self._balance - self.contact.force)
+        self.contact.press(self._system(), -self.balance)
+        return self._norm(self.balance - self.contact.force)
 
     def _norm(self, rows: Array) -> float:
         arms = np.where(self.components < 3, 1.0, self.extents[:, None]).ravel()
@@ -293,7 +293,7 @@ class RigidBodies:
 
     def advance(self) -> float:
         """One Newton step; the size of the increment over that of the step."""
-        right = -self._balance
+        right = -self.balance
         if self.contact is not None:
             right += self.contact.force
         return self._add(np.linalg.solve(self._system(), right))
@@ -307,7 +307,7 @@ class RigidBodies:
 
     def right_side(self) -> Array:
         """Minus the balance, without the contact force."""
-        return -self._balance[: self.size]
+        return -self.balance[: self.size]
 
     def update(self, increment: Array) -> float:
         """Add increments of the owned unknowns; their size relative to the step."""
@@ -319,7 +319,7 @@ class RigidBodies:
         for part, u in zip(added, self._u, strict=True):
             part[3:] = vector_rate(u[3:]) @ part[3:]
         self._last = added
-        self._place(self._u + added)
+        self.place(self._u + added)
         size = np.linalg.norm(self._scaled(self._u))
         return float(np.linalg.norm(self._scaled(added)) / size) if size > 0.0 else 0.0
 
@@ -329,7 +329,7 @@ class RigidBodies:
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""
-        self._place(self._u - fraction * self._last)
+        self.place(self._u - fraction * self._last)
 
     def settled(self) -> bool:
         """The residual says all: it vanishes only where gaps and pressures fit."""
@@ -355,7 +355,7 @@ class RigidBodies:
 
     def worst(self) -> tuple[float, ...] | None:
         """Centre [m] of the body with the largest residual."""
-        norms = np.abs(np.nan_to_num(self._balance, nan=np.inf)).reshape(len(self.bodies), -1).max(axis=1)
+        norms = np.abs(np.nan_to_num(self.balance, nan=np.inf)).reshape(len(self.bodies), -1).max(axis=1)
         index = int(np.argmax(norms))
         return tuple((self.bodies[index].inertia.centre + self.now[index].shift[: self.dim]).tolist())
 

@@ -79,7 +79,7 @@ class Body:
             self._dead.add_lines(line)
         for point in point_forces:
             self._dead.add_points(point)
-        self._dead_load = np.zeros(self.size)
+        self.dead_load = np.zeros(self.size)
         self._loads_at: float | None = None  #: time that the loads are evaluated for
         self._gravity = gravity
         self._moved: PETSc.Mat | None = None  # mass that is elsewhere than the density says [kg]
@@ -158,7 +158,7 @@ class Body:
         changed = self._dead.update(t) or self._loads_at is None
         if self.domain.comm.allreduce(changed, op=MPI.LOR):
             self._force.x.array[:] = self._dead.force
-            self._dead_load = self._summed() + self._moved_weight(t)
+            self.dead_load = self._summed() + self._moved_weight(t)
         for pressure in self.pressures:
             pressure.set_time(t)
         self._loads_at = t
@@ -188,11 +188,11 @@ class Body:
         """Loads at a time and the present displacement [N], shape (size,) (collective)."""
         self._evaluate_loads(t)
         if not self.pressures:
-            return self._dead_load.copy()
+            return self.dead_load.copy()
         self._force.x.array[:] = 0.0
         for pressure in self.pressures:
             pressure.add_force(self._shape, self._force.x.array)
-        return self._dead_load + self._summed()
+        return self.dead_load + self._summed()
 
     @property
     def _shape(self) -> Array:

@@ -58,8 +58,8 @@ class Structure:
         self.current = Step(0.0, 0.0)  #: the step that is computed now or was last
         self.energy = EnergyBalance()
         self.residual_force = np.zeros(self.layout.size)  #: left-hand side of the balance, supports included [N]
-        self._target = np.zeros(self.layout.size)
-        self._increment = np.zeros(self.layout.size)
+        self.target = np.zeros(self.layout.size)
+        self.increment = np.zeros(self.layout.size)
         self.rounding: Array | None = None  #: rounding error of `residual_force` [N], as far as this step knows
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is there already
         self._tangents = [body.create_tangent() for body in bodies]
@@ -69,10 +69,10 @@ class Structure:
         method = settings.linear
         self._method = linear.choose(method, self.dim, self.dofs()) if isinstance(method, str) else method
         # the tangent of a follower pressure has an unsymmetric boundary term
-        self._ksp = self._linear_solver(symmetric=not any(body.pressures for body in self.bodies))
-        self._constrained_ksp = None if contact is None else self._linear_solver(symmetric=False)
+        self.linear_solver = self._create_solver(symmetric=not any(body.pressures for body in self.bodies))
+        self.constrained_solver = None if contact is None else self._create_solver(symmetric=False)
 
-    def _linear_solver(self, *, symmetric: bool) -> PETSc.KSP:
+    def _create_solver(self, *, symmetric: bool) -> PETSc.KSP:
         make = linear.SOLVERS[self._method] if isinstance(self._method, str) else self._method
         return make(self.comm, linear.Task(self.dim, self.dofs(), symmetric, self.settings.linear_tolerance))
 
@@ -165,7 +165,7 @@ class Structure:
         self.rounding = self._tangent = None  # not part of the saved state: a resumed run must start alike
         if self.constraint is not None:
             self.constraint.begin_step()
-        self._target = self.held.displacement(t + dt)
+        self.target = self.held.displacement(t + dt)
         self.now.u += self.time.guess(self, dt)
 
     def load(self, force: Array) -> None:
@@ -275,7 +275,9 @@ class Structure:
             attach_rigid_modes(matrix, self.bodies, self.now.u)
         try:
             with self.timer("solve"):
-                linear.solve(self._ksp if change is None else self._constrained_ksp, matrix, self._b, self._x)
+                linear.solve(
+                    self.linear_solver if change is None else self.constrained_solver, matrix, self._b, self._x
+                )
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         if taken is not None:
@@ -299,7 +301,7 @@ class Structure:
 
     def missing_displacement(self) -> Array:
         """What the supports still ask of owned dofs [m], zero at free ones."""
-        return self._target - self.held.part(self.now.u)
+        return self.target - self.held.part(self.now.u)
 
     def right_side(self) -> Array:
         """What an increment has to make up for [N], without the new contact force where contact may be."""
@@ -324,19 +326,19 @@ class Structure:
 
     def update(self, increment: Array) -> float:
         """Add an increment of the owned dofs; returns |du| / |u|."""
-        self._increment = increment.copy()
-        self.now.u += self._increment
-        self.now.u = self.held.free_part(self.now.u) + self._target
+        self.increment = increment.copy()
+        self.now.u += self.increment
+        self.now.u = self.held.free_part(self.now.u) + self.target
         size = self.norm(self.now.u)
-        return self.norm(self._increment) / size if size > 0.0 else 0.0
+        return self.norm(self.increment) / size if size > 0.0 else 0.0
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""
-        self.now.u -= fraction * self._increment
+        self.now.u -= fraction * self.increment
 
     def settled(self) -> bool:
         """True once the prescribed displacements are reached and the active set stays as it is."""
-        reached = self.held.reached(self.now.u, self._target, self._extent)
+        reached = self.held.reached(self.now.u, self.target, self._extent)
         reached = reached and (self.constraint is None or self.constraint.settled)
         return self.comm.allreduce(reached, op=MPI.LAND)
 

@@ -5,5 +5,3 @@ from fsci.case.shapes.plane import PlaneShape
 from fsci.case.shapes.solid import SolidShape
 
 Shape = PlaneShape | SolidShape
-
-__all__ = ["PlacedMesh", "Shape"]

@@ -6,17 +6,3 @@ from solvers.structure.materials.material import Material, Tensor, in_space, par
 from solvers.structure.materials.mooney_rivlin import MooneyRivlin
 from solvers.structure.materials.neo_hooke import NeoHooke
 from solvers.structure.materials.st_venant_kirchhoff import PlaneStressStVenantKirchhoff, StVenantKirchhoff
-
-__all__ = [
-    "CoupNeoHooke",
-    "LinearElastic",
-    "Material",
-    "MooneyRivlin",
-    "NeoHooke",
-    "PlaneStressLinearElastic",
-    "PlaneStressStVenantKirchhoff",
-    "StVenantKirchhoff",
-    "Tensor",
-    "in_space",
-    "parameters",
-]
