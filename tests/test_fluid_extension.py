@@ -50,7 +50,7 @@ def test_polynomials_have_no_distance_to_their_extension(scheme):
     """On cells of different sizes, too: those of second degree of the velocity, of first degree of the pressure."""
     fluid = around_a_disc(scheme)
     velocity, pressure = fluid.unknowns.velocity.dofs, fluid.unknowns.pressure.dofs
-    assert fluid.system.ghost._dependent.sum() > 20
+    assert fluid.system.ghost.dependent.sum() > 20
     rough = np.abs(penalty(fluid, at_nodes(fluid, lambda x, y: np.sin(40 * x * y))))
     linear = penalty(fluid, at_nodes(fluid, lambda x, y: 1 + 2 * x - 3 * y + x * y))
     quadratic = penalty(fluid, at_nodes(fluid, lambda x, y: x * x - 2 * y * y + x * x * y))
@@ -90,7 +90,7 @@ def test_nodes_of_well_cut_cells_are_free():
         np.maximum.at(largest, unknowns.cell_velocity[cells], share[cells, None, None])
     dofs = unknowns.velocity.dofs
     asked = fluid.system.active_dofs[dofs] & ~np.isin(dofs, fluid.boundary.dofs)
-    assert np.array_equal((ghost._dependent | ghost.outside)[dofs][asked], (largest[dofs] < WELL)[asked])
+    assert np.array_equal((ghost.dependent | ghost.outside)[dofs][asked], (largest[dofs] < WELL)[asked])
     assert np.array_equal(ghost.outside[dofs][asked], (largest[dofs] == 0.0)[asked])
     assert ghost.outside.sum() > 20
 

@@ -41,7 +41,7 @@ class ExtensionPenalty:
         self._entries: tuple[Numbers, Numbers] = (np.empty(0, dtype=np.int64),) * 2
         self._scales, self._weight = np.zeros((2, unknowns.owned))
         #: owned dofs that no fluid reaches, and those with a distance to their extension
-        self.outside, self._dependent = np.zeros((2, unknowns.owned), dtype=bool)
+        self.outside, self.dependent = np.zeros((2, unknowns.owned), dtype=bool)
         self.lost = np.zeros(unknowns.local, dtype=bool)
         none = (self._entries[0], self._entries[0], np.empty(0))
         self._distance, self._extend = self._matrix(none), self._matrix(none)
@@ -68,7 +68,7 @@ class ExtensionPenalty:
 
     def set_cut(self, cut: Cut, prescribed: NDArray[np.int64]) -> bool:
         unknowns, before, self.stale = self.unknowns, self._entries, True
-        self.outside[:], self._dependent[:], self.lost[:], self._weight[:] = False, False, False, 0.0
+        self.outside[:], self.dependent[:], self.lost[:], self._weight[:] = False, False, False, 0.0
         free = np.ones(unknowns.local, dtype=bool)
         free[prescribed] = False
         parts = [self._find(cut, free, *lattice) for lattice in self._lattices]
@@ -76,7 +76,7 @@ class ExtensionPenalty:
         self.lost[:] = fem.share_owned(unknowns.space, self.lost.astype(float)) > 0.5
         rows, columns, data = (np.concatenate(some) for some in zip(*parts, strict=True))
         outside = self.outside[rows - unknowns.global_dofs[0]] if len(rows) else np.zeros(0, dtype=bool)
-        own = unknowns.global_dofs[: unknowns.owned][self._dependent]
+        own = unknowns.global_dofs[: unknowns.owned][self.dependent]
         self._distance.destroy()
         self._extend.destroy()
         self._extend = self._matrix((rows[outside], columns[outside], data[outside]))
@@ -106,7 +106,7 @@ class ExtensionPenalty:
             self.outside[dofs] = dry
         else:
             self.lost[dofs] = dry
-        self._dependent[dofs] = free[dofs] & ~found.dry[:, None]
+        self.dependent[dofs] = free[dofs] & ~found.dry[:, None]
         self._weight[dofs] = found.weight[:, None]
         self.lost[nodes.dofs[found.lost]] = True
         kept, columns = (free & ~self.lost)[dofs[entries.row]], directory(entries.col.astype(np.int64))
