@@ -1,0 +1,88 @@
+"""Stokes flow around a cut disc by ngsxfem; a script of its Python. Prints a row as JSON.
+
+python ngsxfem_stokes.py ORDER CELLS: velocity of order 1 or 2, pressure of order 1, triangles of a square's halves.
+After share/ngsxfem/stokescutfem.py; the matrix has the couplings of ghost penalties on the faces that have some only.
+"""
+
+import json
+import sys
+from math import sqrt
+from time import process_time
+
+import ngsolve as ng
+import xfem
+from ngsolve.meshes import MakeStructured2DMesh
+from xfem.lsetcurv import LevelSetMeshAdaptation
+
+CENTRE, RADIUS = (0.51, 0.48), 0.21
+
+
+def solve(order: int, cells: int) -> dict[str, float]:
+    """Errors (roots of mean squares in the fluid) relative to the largest value, and seconds of the processor."""
+    begin = process_time()
+    mesh = MakeStructured2DMesh(quads=False, nx=cells, ny=cells)
+    exact = ng.CF((20 * ng.x * ng.y**3, 5 * ng.x**4 - 5 * ng.y**4))
+    distance = RADIUS - ng.sqrt((ng.x - CENTRE[0]) ** 2 + (ng.y - CENTRE[1]) ** 2)  # negative in the fluid
+
+    adaptation = LevelSetMeshAdaptation(mesh, order=order, threshold=10.5, discontinuous_qn=True)
+    deformation = adaptation.CalcDeformation(distance)
+    level = adaptation.lset_p1
+    info = xfem.CutInfo(mesh, level)
+    wet, cut = info.GetElementsOfType(xfem.HASNEG), info.GetElementsOfType(xfem.IF)
+    faces = xfem.GetFacetsWithNeighborTypes(mesh, a=wet, b=cut)
+
+    V, Q = ng.VectorH1(mesh, order=order, dirichlet=".*"), ng.H1(mesh, order=1)
+    V = ng.Compress(V, xfem.GetDofsOfElements(V, wet))
+    Q = ng.Compress(Q, xfem.GetDofsOfElements(Q, wet))
+    W = ng.FESpace([V, Q], dgjumps=True)
+    (u, p), (v, q) = W.TnT()
+    normal = ng.Grad(level) / ng.Norm(ng.Grad(level))
+    h = ng.specialcf.mesh_size
+    dx = xfem.dCut(level, xfem.NEG, definedonelements=wet, deformation=deformation)
+    ds = xfem.dCut(level, xfem.IF, definedonelements=cut, deformation=deformation)
+    dw = xfem.dFacetPatch(definedonelements=faces, deformation=deformation)
+
+    def traction(u, p):
+        return (ng.Grad(u) + ng.Grad(u).trans) * normal - p * normal
+
+    def strain(u):
+        return 0.5 * (ng.Grad(u) + ng.Grad(u).trans)
+
+    a = xfem.RestrictedBilinearForm(W, element_restriction=wet, facet_restriction=faces, check_unused=False)
+    f = ng.LinearForm(W)
+    a += (2 * ng.InnerProduct(strain(u), strain(v)) - ng.div(u) * q - ng.div(v) * p) * dx
+    a += (-traction(u, p) * v - traction(v, q) * u + 20 * order**2 / h * u * v) * ds
+    f += (-traction(v, q) * exact + 20 * order**2 / h * exact * v) * ds
+    if order == 1:  # Brezzi and Pitkaranta
+        a += -0.05 * h**2 * ng.grad(p) * ng.grad(q) * dx
+    a += 0.05 / h**2 * (u - u.Other()) * (v - v.Other()) * dw
+    a += -0.05 * (p - p.Other()) * (q - q.Other()) * dw
+    a.Assemble()
+    f.Assemble()
+
+    found = ng.GridFunction(W)
+    velocity, pressure = found.components
+    free = W.FreeDofs()
+    free.Clear(V.ndof)  # the level of the pressure, which nothing determines
+    velocity.Set(exact, definedon=mesh.Boundaries(".*"))
+    f.vec.data -= a.mat * found.vec
+    found.vec.data += a.mat.Inverse(free, inverse="pardiso") * f.vec
+    seconds = process_time() - begin
+
+    fine = dx.order(2 * order + 2)
+    area = ng.Integrate(ng.CF(1.0) * fine, mesh)
+    exact_p = 60 * ng.x**2 * ng.y - 20 * ng.y**3
+    level_p = ng.Integrate((pressure - exact_p) * fine, mesh) / area
+    off_u = ng.Integrate(ng.InnerProduct(velocity - exact, velocity - exact) * fine, mesh) / area
+    off_p = ng.Integrate((pressure - exact_p - level_p) ** 2 * fine, mesh) / area
+    return {
+        "dofs": W.ndof,
+        "time [s]": seconds,
+        "velocity [%]": 100 * sqrt(off_u) / 20,
+        "pressure [%]": 100 * sqrt(off_p) / 60,
+    }
+
+
+if __name__ == "__main__":
+    ng.SetNumThreads(1)
+    print(json.dumps(solve(int(sys.argv[1]), int(sys.argv[2]))))

@@ -1,0 +1,68 @@
+"""Other programs beside ours: what they are given, what is read from them, what is said if they are missing."""
+
+import numpy as np
+import pytest
+
+from fsci.bench import hertz
+from fsci.bench.peers import hertz_files, install, rows, stokes
+from fsci.bench.peers.__main__ import main
+
+
+def test_our_stokes_flow_has_the_exact_solution():
+    coarse, fine = (stokes.solve("q1q1", cells) for cells in (10, 20))
+    assert fine["velocity [%]"] < 0.3 * coarse["velocity [%]"] < 0.3
+    assert fine["pressure [%]"] < 0.5 * coarse["pressure [%]"]
+
+
+def test_the_pressure_of_hertz_has_no_error():
+    radius, force = 1.0, 4.0 * hertz.E / (3.0 * (1.0 - hertz.NU**2) * hertz.RADIUS)
+    distance = np.linspace(0.0, 3.0, 50)
+    pressure = 1.5 * force / np.pi * np.sqrt(np.maximum(0.0, 1.0 - (distance / radius) ** 2))
+    found = {"dofs": 1, "newton": 1, "time [s]": 1.0, "force": force, "distance": distance, "pressure": pressure}
+    assert rows.pressure_errors(found)["peak [%]"] == pytest.approx(0.0, abs=1e-10)
+    assert rows.pressure_errors(found)["pressure [%]"] == pytest.approx(0.0, abs=1e-10)
+    assert rows.pressure_errors({**found, "pressure": 1.1 * pressure})["pressure [%]"] == pytest.approx(10.0)
+
+
+def test_files_of_the_ball(tmp_path):
+    """Faces of the slave surface have their nodes on it; both files have all nodes and cells."""
+    ball, below, points, cells, sets = hertz_files.both(2, 3)
+    hertz_files.write_calculix(tmp_path / "ball.inp", 2, 3)
+    text = (tmp_path / "ball.inp").read_text()
+    slave = text.split("NAME=SLAVE\n")[1].split("*")[0].split()
+    corners = {number: corners for corners, number in hertz_files.FACES.items()}
+    for cell, face in zip(slave[::2], slave[1::2], strict=True):
+        assert set(cells[int(cell.rstrip(",")) - 1][list(corners[int(face[1])])]) <= set(sets["bottom"])
+    assert len(slave) // 2 == len(ball.surfaces["bottom"])
+    hertz_files.write_kratos(tmp_path / "ball.mdpa", 2, 3)
+    text = (tmp_path / "ball.mdpa").read_text()
+    assert len(text.split("Begin Nodes\n")[1].split("End")[0].splitlines()) == len(points)
+    assert text.split("Begin SubModelPart bottom")[1].count("\n") > len(sets["bottom"]) + len(ball.surfaces["bottom"])
+    assert below.points[:, 2].max() == 0.0
+
+
+def test_pressure_in_a_result_of_calculix(tmp_path):
+    (tmp_path / "a.frd").write_text(
+        " -1         1 1.00000E+00 2.00000E+00 3.00000E+00\n"
+        " -4  CONTACT     6    1\n -5  COPEN       1    4    1    1\n"
+        " -1         7 0.00000E+00 0.00000E+00 0.00000E+00 6.50000E+00 0.00000E+00 0.00000E+00\n -3\n"
+        " -4  OTHER       6    1\n -1         7 1.00000E+00 1.00000E+00 1.00000E+00 1.00000E+00\n -3\n"
+    )
+    assert rows.contact_pressure(tmp_path / "a.frd") == {7: 6.5}
+
+
+def test_what_is_missing(tmp_path, monkeypatch, capsys):
+    assert main([]) == main([str(tmp_path), "sotkes"]) == 2
+    assert capsys.readouterr().err.startswith("usage: python -m fsci.bench.peers FOLDER [stokes|cylinder|hertz ..]")
+    monkeypatch.setattr(install.shutil, "which", lambda name: None)
+    monkeypatch.setattr(rows, "python_of", lambda name, folder: folder)
+    assert main([str(tmp_path), "hertz"]) == 1
+    assert capsys.readouterr().out.splitlines()[-1] == "there is no ccx: apt-get install calculix-ccx"
+
+
+def test_a_program_that_fails_is_shown(tmp_path, monkeypatch):
+    with pytest.raises(rows.PeerFailed, match="No such file"):
+        rows.run_program(tmp_path, "ls", "nothing")
+    monkeypatch.setattr(rows, "PATIENCE", 0.1)
+    with pytest.raises(rows.PeerFailed, match=r"sleep took more than 0\.1 s"):
+        rows.run_program(tmp_path, "sleep", "5")
