@@ -1,0 +1,175 @@
+"""Do the tests notice a wrong operator? python tests/mutate.py [--count N] [--seed S] [--group NAME]
+
+Replaces one random operator at a time (+ - * / < >) in forms, mortar and time schemes, runs the tests of that part, and
+prints the mutants that pass all of them. Works in place, on a clean checkout; every file is put back.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import random
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+SWAPPED = {"+": "-", "-": "+", "*": "/", "/": "*", "<": ">", ">": "<"}
+
+#: part -> (its sources, their tests, the fast ones first)
+GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "flow": (
+        ("solvers/fluid/forms.py", "solvers/fluid/patch_kinds.py"),
+        (
+            "fluid_patch", "fluid_tangent", "fluid_ghost", "fluid_covered_faces", "fluid_slip", "fluid_stretched",
+            "fluid_film", "fluid_time", "fluid_reactions", "constants",
+        ),
+    ),
+    "structure": (
+        ("solvers/structure/forms.py", *(f"solvers/structure/materials/{name}.py" for name in (
+            "material", "neo_hooke", "coup_neo_hooke", "mooney_rivlin", "st_venant_kirchhoff", "linear_elastic",
+        ))),
+        (
+            "structure_tangent", "structure_patch", "mixed_element", "elastic_constants", "linear_kinematics", "additions",
+            "structure_probes",
+        ),
+    ),
+    "time": (
+        (
+            "solvers/generalised_alpha.py", "solvers/structure/dynamics.py", "solvers/fluid/time_scheme.py",
+            "solvers/fluid/history.py", "solvers/rigid/motion.py",
+        ),
+        (
+            "additions", "rigid", "structure_time", "fluid_history", "fluid_time", "massless", "contact_motion",
+            "contact_linear", "structure_springs",
+        ),
+    ),
+    "mortar": (
+        tuple(f"solvers/contact/{name}.py" for name in (
+            "mortar", "slip", "terms", "linearise", "condense", "directions", "merge", "law/coulomb", "law/friction",
+            "law/frictionless", "law/law", "law/tied",
+        )),
+        ("contact_system", "contact_patch", "contact_friction", "friction_held", "contact_held", "contact_several",
+         "sharp_edges", "tying", "search", "friction_patch", "constants", "self_contact"),
+    ),
+    "kernels": (
+        tuple(f"solvers/kernels/{name}.hpp" for name in (
+            "facet_assembly", "integrals", "dual_basis", "normals", "facet_derivatives", "plane_frame", "clipping",
+        )),
+        ("mortar_kernel", "mortar_derivatives", "contact_system"),
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One operator of a file in another one's place."""
+
+    path: Path
+    at: int  #: characters before the operator
+    operator: str
+
+    @property
+    def text(self) -> str:
+        """The whole file."""
+        text = self.path.read_text()
+        return text[: self.at] + SWAPPED[self.operator] + text[self.at + 1 :]
+
+    def __str__(self) -> str:
+        before = self.path.read_text()[: self.at]
+        number = before.count("\n")
+        line, new = self.path.read_text().splitlines()[number], self.text.splitlines()[number]
+        return f"{self.path.relative_to(ROOT)}:{number + 1}\n    {line.strip()}\n -> {new.strip()}"
+
+
+def mutants(path: Path) -> Iterator[Mutant]:
+    """Of all operators in a file."""
+    text = path.read_text()
+    found = _of_python(text) if path.suffix == ".py" else _of_kernel(text)
+    return (Mutant(path, at, text[at]) for at in found)
+
+
+def _of_python(text: str) -> Iterator[int]:
+    lines = text.encode().splitlines(keepends=True)
+    starts = [sum(map(len, lines[:n])) for n in range(len(lines))]
+    for node in ast.walk(ast.parse(text)):
+        match node:
+            case ast.BinOp(left, _, right) | ast.Compare(left, _, [right]):
+                assert left.end_lineno is not None
+                assert left.end_col_offset is not None
+                begin = starts[left.end_lineno - 1] + left.end_col_offset
+                between = text[begin : starts[right.lineno - 1] + right.col_offset]
+                operator = between.strip(" ()\n")
+                if operator in SWAPPED:
+                    yield begin + between.index(operator)
+            case ast.UnaryOp(ast.USub(), ast.Name() | ast.Call() | ast.Attribute() | ast.Subscript()):
+                yield starts[node.lineno - 1] + node.col_offset
+
+
+def _of_kernel(text: str) -> Iterator[int]:
+    start = 0
+    for line in text.splitlines(keepends=True):
+        code = line.split("//")[0]
+        if not code.lstrip().startswith(("#", "template", "static_assert", "for")):
+            yield from (start + found.start() + 1 for found in re.finditer(r" [-+*/<>] ", code))
+        start += len(line)
+
+
+def survives(mutant: Mutant, tests: tuple[str, ...]) -> bool:
+    """All tests pass with it."""
+    original = mutant.path.read_text()
+    try:
+        mutant.path.write_text(mutant.text)
+        if mutant.path.suffix == ".hpp" and not build():
+            return False
+        files = [f"tests/test_{name}.py" for name in tests]
+        run = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", "not slow", *files]
+        try:
+            return subprocess.run(run, cwd=ROOT, capture_output=True, timeout=900).returncode == 0
+        except subprocess.TimeoutExpired:
+            return False
+    finally:
+        mutant.path.write_text(original)
+
+
+def build() -> bool:
+    """Compile the kernels and put them where they are imported from."""
+    from solvers.kernels import _kernels
+
+    (folder,) = (ROOT / "build").iterdir()
+    done = subprocess.run(["cmake", "--build", str(folder)], capture_output=True)
+    if done.returncode == 0:
+        installed = Path(_kernels.__file__)
+        installed.unlink()
+        shutil.copy(folder / installed.name, installed)
+    return done.returncode == 0
+
+
+def main() -> int:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--count", type=int, default=50)
+    options.add_argument("--seed", type=int, default=0)
+    options.add_argument("--group", choices=GROUPS, action="append")
+    given = options.parse_args()
+    if subprocess.run(["git", "diff", "--quiet"], cwd=ROOT).returncode:
+        return print("there are changes that are not committed") or 2
+    chance, left = random.Random(given.seed), []
+    groups = given.group or list(GROUPS)
+    for number in range(given.count):
+        sources, tests = GROUPS[groups[number % len(groups)]]
+        mutant = chance.choice([one for name in sources for one in mutants(ROOT / name)])
+        passed = survives(mutant, tests)
+        left += [mutant] * passed
+        print(f"{number + 1:3d} {'SURVIVES' if passed else 'caught  '} {mutant}", flush=True)
+    if any(name == "kernels" for name in groups):
+        build()
+    print(f"{len(left)} of {given.count} survive")
+    return 1 if left else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
