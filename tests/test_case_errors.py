@@ -3,6 +3,7 @@
 import pickle
 
 import pytest
+from case_mistakes import assert_located, first_lines, load, refused
 
 from fsci.case import CaseError, load_case
 
@@ -280,17 +281,8 @@ MISTAKES = [
 ]
 
 
-def problems(text, overrides=()):
-    with open("case.yaml", "w", encoding="utf-8") as file:
-        file.write(text)
-    with pytest.raises(CaseError) as caught:
-        load_case("case.yaml", overrides)
-    return caught.value
-
-
 @pytest.fixture(autouse=True)
-def _folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def _folder(tmp_path, in_new_folder):
     (tmp_path / "there.msh").touch()
 
 
@@ -300,29 +292,25 @@ def test_message(old, new, message, at, tmp_path):
     text = CASE.replace(old, new, 1)
     if "velocity" in message:
         text = text.replace("quantity: displacement", "quantity: velocity").replace("reference: -0.1", "reference: 1")
-    found = problems(text).problems
-    expected = "case.yaml:" + message.replace("{folder}", str(tmp_path))
-    assert expected in [str(problem).split("\n")[0] for problem in found]
-    place = next(p.place for p in found if str(p).startswith(expected))
-    assert text.split("\n")[place.line - 1][place.column - 1 :].startswith(at)
+    error, message = refused(text), message.replace("{folder}", str(tmp_path))
+    assert f"case.yaml:{message}" in first_lines(error)
+    assert_located(text, error, message, at)
 
 
 def test_the_case_without_mistakes_loads():
-    with open("case.yaml", "w", encoding="utf-8") as file:
-        file.write(CASE)
-    assert load_case("case.yaml").warnings == ()
+    assert load(CASE).warnings == ()
 
 
 def test_no_message_is_the_validators_own():
     text = CASE.replace("0.1", "[]").replace("[4, 2]", "{}").replace("1000", "[1]").replace("beam:", "beam: 3\n    b:")
-    message = str(problems(text))
+    message = str(refused(text))
     for word in ("pydantic", "value_error", "Input should", "Field required", "validation error", "dict", "NoneType"):
         assert word not in message
 
 
 def test_all_mistakes_at_once_in_the_order_of_lines():
     text = CASE.replace("max_iterations", "max_iteration").replace("step: 0.1", "step: 0").replace("law:", "lw:")
-    assert str(problems(text)) == (
+    assert str(refused(text)) == (
         "case.yaml:3:14: 'step' must be greater than 0, not 0\n"
         "  time: {step: 0, end: 1}\n"
         "               ^\n"
@@ -338,12 +326,12 @@ def test_all_mistakes_at_once_in_the_order_of_lines():
 
 def test_the_column_inside_a_text_is_not_guessed_where_it_cannot_be_seen():
     folded = CASE.replace('"1e3*min(t, 1)"', '"1e3*\n          mim(t, 1)"')
-    assert str(problems(folded)).startswith("case.yaml:14:34: entry 2 of 'value': unknown function 'mim'")
+    assert str(refused(folded)).startswith("case.yaml:14:34: entry 2 of 'value': unknown function 'mim'")
 
 
 def test_several_bodies_need_names_in_probes():
     twins = CASE.replace("    beam:\n", "    other: &other\n").replace("probes:", "    beam: {<<: *other}\nprobes:")
-    assert str(problems(twins)).split("\n")[0] == (
+    assert str(refused(twins)).split("\n")[0] == (
         "case.yaml:17:8: missing setting 'body' in 'tip': there are several bodies (other, beam)"
     )
 
@@ -352,7 +340,7 @@ def test_bodies_of_different_dimensions():
     rubber = "material: {law: neo_hooke, E: 1, nu: 0, density: 1}"
     box = f"    box: {{mesh: {{shape: box, size: [1, 1, 1], cells: [1, 1, 1]}}, {rubber}}}"
     text = CASE.replace("probes:", f"{box}\nprobes:").replace("{quantity: disp", "{body: beam, quantity: disp")
-    assert str(problems(text)).split("\n")[0] == "case.yaml:15:25: this shape is 3D, but another body is 2D"
+    assert str(refused(text)).split("\n")[0] == "case.yaml:15:25: this shape is 3D, but another body is 2D"
 
 
 @pytest.mark.parametrize(
@@ -376,11 +364,11 @@ def test_bodies_of_different_dimensions():
 )  # fmt: skip
 def test_override(override, message):
     name, _, value = override.partition("=")
-    assert str(problems(CASE, [(name, value)])) == f"--set {override}: {message}"
+    assert str(refused(CASE, overrides=((name, value),))) == f"--set {override}: {message}"
 
 
 def test_mistakes_in_file_and_override_together():
-    text = str(problems(CASE.replace("step: 0.1", "step: 0"), [("time.end", "x")]))
+    text = str(refused(CASE.replace("step: 0.1", "step: 0"), overrides=(("time.end", "x"),)))
     assert text.startswith(
         "--set time.end=x: 'end' must not depend on x (it is a fixed number)\ncase.yaml:3:14: 'step'"
     )
@@ -396,5 +384,5 @@ def test_files_that_cannot_be_read(tmp_path):
 
 
 def test_an_error_survives_sending_it_to_another_process():
-    error = problems(CASE.replace("step: 0.1", "step: 0"))
+    error = refused(CASE.replace("step: 0.1", "step: 0"))
     assert str(pickle.loads(pickle.dumps(error))) == str(error)

@@ -15,9 +15,7 @@ from fsci.cli import execute
 ROOT = Path(__file__).parent.parent
 
 
-@pytest.fixture(autouse=True)
-def _folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("in_new_folder")
 
 
 @pytest.fixture

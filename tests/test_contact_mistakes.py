@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from case_mistakes import assert_located, first_lines, refused
 from contact_cases import COLLISION, PLATE
 
 from fsci.case import CaseError, load_case
@@ -112,20 +113,14 @@ MISTAKES = [
 ]  # fmt: skip
 
 
+@pytest.mark.usefixtures("in_new_folder")
 @pytest.mark.parametrize(("old", "new", "message", "at"), MISTAKES, ids=[m[2] for m in MISTAKES])
-def test_message(old, new, message, at, tmp_path):
-    path = tmp_path / "case.yaml"
+def test_message(old, new, message, at):
     assert PLATE.count(old) >= 1
     text = PLATE.replace(old, new, 1)
-    path.write_text(text)
-    with pytest.raises(CaseError) as caught:
-        load_case(path)
-    lines = [str(problem).split("\n")[0] for problem in caught.value.problems]
-    found = [i for i, line in enumerate(lines) if line == f"{path}:{message}"]
-    assert found, lines
-    assert len(lines) == 1, lines
-    place = caught.value.problems[found[0]].place
-    assert text.split("\n")[place.line - 1][place.column - 1 :].startswith(at)
+    error = refused(text)
+    assert first_lines(error) == [f"case.yaml:{message}"]
+    assert_located(text, error, message, at)
 
 
 def test_the_case_without_mistakes_loads(tmp_path):

@@ -1,10 +1,10 @@
 """The section `coupling` of a case: each mistake with its message and the text it points at."""
 
 import pytest
+from case_mistakes import assert_located, load, refused
 from case_text import section
 from coupled_case import POST
 
-from fsci.case import CaseError, load_case
 from fsci.check.check import summary
 
 COUPLING = "coupling: {scheme: monolithic}"
@@ -76,28 +76,14 @@ MISTAKES = [
 ]
 
 
-def load(text: str):
-    with open("case.yaml", "w", encoding="utf-8") as file:
-        file.write(text)
-    return load_case("case.yaml")
-
-
-@pytest.fixture(autouse=True)
-def _folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("in_new_folder")
 
 
 @pytest.mark.parametrize(("old", "new", "message", "at"), MISTAKES, ids=[m[2] for m in MISTAKES])
 def test_message(old, new, message, at):
     assert POST.count(old) == 1
     text = POST.replace(old, new)
-    with pytest.raises(CaseError) as caught:
-        load(text)
-    said = {str(problem).split("\n")[0]: problem.place for problem in caught.value.problems}
-    found = [line for line in said if line.startswith(f"case.yaml:{message}")]
-    assert len(found) == 1, list(said)
-    place = said[found[0]]
-    assert text.split("\n")[place.line - 1][place.column - 1 :].startswith(at)
+    assert_located(text, refused(text), message, at)
 
 
 def test_the_case_without_mistakes_loads():

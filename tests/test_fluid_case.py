@@ -5,9 +5,9 @@ import sys
 
 import numpy as np
 import pytest
+from case_mistakes import assert_located, load, refused
 from case_text import with_section, without
 
-from fsci.case import CaseError, load_case
 from fsci.case.grid import GridSection
 from fsci.check.check import summary
 
@@ -230,39 +230,18 @@ MISTAKES = [
 ]
 
 
-def problems(text):
-    with open("case.yaml", "w", encoding="utf-8") as file:
-        file.write(text)
-    with pytest.raises(CaseError) as caught:
-        load_case("case.yaml")
-    return caught.value.problems
-
-
-def load(text):
-    with open("case.yaml", "w", encoding="utf-8") as file:
-        file.write(text)
-    return load_case("case.yaml")
-
-
-@pytest.fixture(autouse=True)
-def _folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("in_new_folder")
 
 
 @pytest.mark.parametrize(("old", "new", "message", "at"), MISTAKES, ids=[m[2] for m in MISTAKES])
 def test_message(old, new, message, at):
     assert CASE.count(old) >= 1
     text = CASE.replace(old, new, 1)
-    found = problems(text)
-    expected = "case.yaml:" + message
-    said = [str(problem).split("\n")[0] for problem in found]
-    assert any(line.startswith(expected) for line in said), said
-    place = next(p.place for p in found if str(p).startswith(expected))
-    assert text.split("\n")[place.line - 1][place.column - 1 :].startswith(at)
+    assert_located(text, refused(text), message, at)
 
 
 def test_a_case_without_any_field():
-    assert str(problems("title: a\ntime: {step: 1, end: 2}\n")[0]).startswith(
+    assert str(refused("title: a\ntime: {step: 1, end: 2}\n").problems[0]).startswith(
         "case.yaml:1:1: a case needs a section 'structure' or 'fluid'"
     )
 
@@ -310,7 +289,7 @@ def test_a_flow_that_nothing_drives():
 def test_a_steady_flow_without_a_velocity_of_its_own():
     patches = "  patches:\n    all: {on: [x-, x+, y-, y+], periodic: true}\n  scheme: steady\n"
     periodic = without(with_section(ALONE, patches, "fluid", "patches"), "fluid", "bodies")
-    assert str(problems(periodic)[0]).startswith(
+    assert str(refused(periodic).problems[0]).startswith(
         "case.yaml:9:11: a steady flow that is periodic in all directions has no velocity of its own"
     )
 
