@@ -24,7 +24,7 @@ def kinked_flow(dt, **factors):
 def energy(dt, **factors):
     """u^T G u of one kinked velocity around a disc, for an ordinary flow of speed 1."""
     fluid = kinked_flow(dt, **factors)
-    ghost = fluid.system._ghost
+    ghost = fluid.system.ghost_matrix
     u, out = ghost.createVecs()
     u.array[:] = fluid.velocity()[: fluid.unknowns.owned]
     ghost.mult(u, out)
@@ -80,7 +80,7 @@ def test_share_of_the_mass_where_no_velocity_was_known():
 
 def ghost_rows(fluid):
     """The ghost penalty's matrix times the flow, at the rows that `momentum` has."""
-    u, out = fluid.system._ghost.createVecs()
+    u, out = fluid.system.ghost_matrix.createVecs()
     u.array[:] = fluid.flow[: fluid.unknowns.owned]
-    fluid.system._ghost.mult(u, out)
+    fluid.system.ghost_matrix.mult(u, out)
     return np.where(fluid.held, 0.0, out.array)[fluid.unknowns.velocity_mask[: fluid.unknowns.owned]]

@@ -47,7 +47,7 @@ def momentum_rate(fluid):
     rule = fluid_rule(fluid)
     u, du, _ = values(fluid, rule)
     keep = fluid.flow.copy()
-    fluid.flow[:] = fluid.system._history.x.array
+    fluid.flow[:] = fluid.system.history.x.array
     history = values(fluid, rule)[0]
     fluid.flow[:] = keep
     rate = difference.alpha * u - history

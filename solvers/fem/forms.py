@@ -49,18 +49,18 @@ class Integral:
 
     def __init__(self, domain: Domain, form: ufl.Form):
         self._domain, self._form = domain, form
-        self._compiled: Any = None
+        self.compiled: Any = None
 
     def compile(self, what: str = "a form") -> None:
         """Compile it if it is not yet (collective); `what` it is, for messages."""
-        if self._compiled is None:
+        if self.compiled is None:
             with compiling(what):
-                self._compiled = calls.Compiled(self._domain.mesh, self._form, COMPILE_OPTIONS)
+                self.compiled = calls.Compiled(self._domain.mesh, self._form, COMPILE_OPTIONS)
 
     def on(self, **entities: NDArray[np.int32]) -> Any:
         """The form over sorted local entities; measures must carry the subdomain number 1."""
         self.compile()
-        return self._compiled.on(entities)
+        return self.compiled.on(entities)
 
 
 def compile_integrals(integrals: Sequence[Integral], owner: str) -> None:

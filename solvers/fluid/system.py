@@ -79,15 +79,15 @@ class FlowSystem:
         self.with_bodies, self._blocked = with_bodies, blocked
         self.grid, self.settings, self.boundary, self.unknowns = grid, settings, boundary, unknowns
         domain, space = grid.domain, unknowns.space
-        self.flow, self._history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
+        self.flow, self.history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
         self._alpha, self._newton = fem.constant(domain, 0.0), fem.constant(domain, 1.0)
         self.weights = Weights(grid, settings.degree)
         self.terms = self._terms()
         self.ghost = choose_ghost_penalty(unknowns, self.terms, settings.penalties) if with_bodies else None
-        self._forms = cell_forms(unknowns, self.terms, self.flow, self.weights if with_bodies else None)
+        self.forms = cell_forms(unknowns, self.terms, self.flow, self.weights if with_bodies else None)
         self._outer = OuterFaces(grid, boundary, unknowns, self.terms, self.flow)
         ghost = [] if self.ghost is None else self.ghost.integrals
-        fem.compile_integrals([*self._forms.integrals(), *self._outer.integrals(), *ghost], "the flow")
+        fem.compile_integrals([*self.forms.integrals(), *self._outer.integrals(), *ghost], "the flow")
         #: owned cells of the cut, uncut ones and cut ones, and forms over these and the outer faces
         self.cells: list[NDArray[np.int32]] = []
         self._residuals: list = []
@@ -100,7 +100,7 @@ class FlowSystem:
         self._ghost_history = np.zeros(unknowns.local)
         self._out = np.zeros(unknowns.local)
         self._matrix: PETSc.Mat | None = None
-        self._ghost: PETSc.Mat | None = None
+        self.ghost_matrix: PETSc.Mat | None = None
         self._pattern: Pattern | None = None
         self.cut: Cut | None = None
         self.slip_length: Array | None = None  #: of the facets of all surfaces [m]; None: the flow sticks to them
@@ -109,7 +109,7 @@ class FlowSystem:
 
     def _terms(self) -> forms.Coefficients:
         settings, domain = self.settings, self.grid.domain
-        a, history, force = (self.unknowns.parts(f)[0] for f in (self._scale_velocity, self._history, self._force))
+        a, history, force = (self.unknowns.parts(f)[0] for f in (self._scale_velocity, self.history, self._force))
         rho, mu = fem.constant(domain, settings.density), fem.constant(domain, settings.viscosity)
         if settings.body_force is None:
             force = ufl.as_vector([fem.constant(domain, 0.0)] * self.grid.dim)
@@ -136,7 +136,7 @@ class FlowSystem:
         scales.
         """
         self._alpha.value = step.difference.alpha
-        self._history.x.array[:] = rate
+        self.history.x.array[:] = rate
         if self.ghost is not None:
             self.ghost.begin_step(missing)
         if self.settings.body_force is not None:
@@ -176,7 +176,7 @@ class FlowSystem:
             self.cells = [self.cells[0], np.setdiff1d(self.cells[1], films, assume_unique=True), films]
         self._residuals, self._tangents = (
             [form.on(cell=some) for form, some in zip(integrals, self.cells, strict=False)]
-            for integrals in (self._forms.residuals, self._forms.tangents)
+            for integrals in (self.forms.residuals, self.forms.tangents)
         )
         self._outer_on_cut = self._outer.on_cut(cut, active)
         self._tangents += self._outer_on_cut.tangents
@@ -211,14 +211,14 @@ class FlowSystem:
 
     def _allocate(self, pattern: Pattern) -> None:
         self._pattern, self._matrix = pattern, self._fill_pattern(pattern)
-        self._ghost = None
+        self.ghost_matrix = None
 
     def _fill_pattern(self, pattern: Pattern) -> PETSc.Mat:
         """A matrix that has all entries of a pattern, with values that do not matter."""
         more = None if self.ghost is None else self.ghost.room()
         matrix = create_matrix(self.unknowns, pattern, more, blocked=self._blocked)
         cells = np.flatnonzero(pattern.cells[: self.grid.owned]).astype(np.int32)
-        fem.assemble_matrix(matrix, self._forms.tangents[0].on(cell=cells))
+        fem.assemble_matrix(matrix, self.forms.tangents[0].on(cell=cells))
         if self.ghost is not None:
             self.ghost.fill(matrix, pattern)
         diagonal = matrix.createVecLeft()
@@ -252,15 +252,15 @@ class FlowSystem:
 
     def _assemble_ghost_penalty(self) -> None:
         assert self._matrix is not None
-        stale = self._ghost is None or (self.ghost is not None and self.ghost.stale)
+        stale = self.ghost_matrix is None or (self.ghost is not None and self.ghost.stale)
         if not self.grid.comm.allreduce(stale, op=MPI.LOR):
             return
-        if self._ghost is None:
-            self._ghost = self._matrix.duplicate(copy=False)
-        self._ghost.zeroEntries()
+        if self.ghost_matrix is None:
+            self.ghost_matrix = self._matrix.duplicate(copy=False)
+        self.ghost_matrix.zeroEntries()
         if self.ghost is not None:
-            self.ghost.assemble(self._ghost, self._ghost_history)
-        self._ghost.assemble()
+            self.ghost.assemble(self.ghost_matrix, self._ghost_history)
+        self.ghost_matrix.assemble()
 
     def settle(self) -> None:
         """Give nodes that no fluid reaches their values (collective)."""
@@ -290,7 +290,7 @@ class FlowSystem:
     def residual(self) -> Array:
         """Left-hand side of the equations at owned dofs: forces [N] of velocity rows, volume rates of pressure rows."""
         self._follow()
-        assert self._ghost is not None
+        assert self.ghost_matrix is not None
         assert self.cut is not None
         np.negative(self._ghost_history, out=self._out)
         for form in [*self._residuals, *self._outer_on_cut.residuals]:
@@ -301,9 +301,9 @@ class FlowSystem:
         self._add_covered(self._out)
         fem.add_ghosts(self.unknowns.space, self._out)
         owned = self.unknowns.owned
-        flow, through = self._ghost.createVecs()
+        flow, through = self.ghost_matrix.createVecs()
         flow.array[:] = self.flow.x.array[:owned]
-        self._ghost.mult(flow, through)
+        self.ghost_matrix.mult(flow, through)
         return self._out[:owned] + through.array
 
     def tangent(self, identity: Array, *, picard: bool) -> PETSc.Mat:
@@ -313,10 +313,10 @@ class FlowSystem:
         """
         self._follow()
         assert self._matrix is not None
-        assert self._ghost is not None
+        assert self.ghost_matrix is not None
         self._newton.value = 0.0 if picard else 1.0
         matrix = self._matrix
-        self._ghost.copy(matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self.ghost_matrix.copy(matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         for form in self._tangents:
             fem.assemble_matrix(matrix, form)
         for dofs, blocks in self._outer.slopes(self._outer_on_cut, *self._outer_scales()):
