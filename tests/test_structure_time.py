@@ -163,3 +163,14 @@ def test_moving_support_does_not_ring():
     for velocity, acceleration in seen:
         assert velocity.reshape(-1, 2) == pytest.approx(np.tile([2.0, 0.0], (4, 1)), abs=1e-7)
         assert np.abs(acceleration).max() < 1e-4
+
+
+def test_accelerated_support_at_the_start():
+    """Velocity and acceleration of a support that moves by 0.3 t + 0.7 t^2 + 0.2 t^3."""
+    cubic = Support("left", (lambda x, t: 0.0 * x[0] + 0.3 * t + 0.7 * t**2 + 0.2 * t**3, constant(0.0)))
+    time = Dynamics(GeneralisedAlpha.from_rho_inf(1.0))
+    structure = make_structure(block("quad", 2), NeoHooke(30.0, 50.0, 2.0), time=time, supports=[cubic])
+    structure.initialise(0.0, 0.1)
+    held = structure.held.dofs
+    assert structure.now.v[held].reshape(-1, 2) == pytest.approx(np.tile([0.3, 0.0], (3, 1)), abs=1e-7)
+    assert structure.now.a[held].reshape(-1, 2) == pytest.approx(np.tile([1.4, 0.0], (3, 1)), abs=1e-6)
