@@ -26,7 +26,7 @@ from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.krylov import FlowSolver, Ladder
 from solvers.fluid.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.pressure_level import Hold, hold_pressure, keep_levels, spread_excess
-from solvers.fluid.reach import require_known, require_within_period, strip_layers
+from solvers.fluid.reach import require_history, require_within_period, strip_layers
 from solvers.fluid.space import Unknowns, set_velocity
 from solvers.fluid.surface import Motion, offsets, slip_lengths, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
@@ -178,7 +178,7 @@ class Fluid:
             cut = self.cutter(facets, motion, self._layers(motion), self._wet)
         with self.timer("weights"):
             self.system.set_cut(cut)
-            require_known(self.unknowns, cut, self.history.missing(self.current.difference))
+            require_history(self.unknowns, cut, self.history.missing(self.current.difference))
             require_within_period(self.unknowns, cut)
             self.flow[~self.system.active_dofs] = 0.0
             self.held = np.zeros(self.unknowns.owned, dtype=bool)

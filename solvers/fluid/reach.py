@@ -22,7 +22,7 @@ def strip_layers(grid: DistributedGrid, motion: Motion, time: float, smallest: f
     return math.ceil(min(max(1.0, layers), max(grid.grid.shape)))  # no more than there are
 
 
-def require_known(unknowns: Unknowns, cut: Cut, missing: NDArray[np.bool_]) -> None:
+def require_history(unknowns: Unknowns, cut: Cut, missing: NDArray[np.bool_]) -> None:
     """Raise StepFailed where the flow needs a velocity at a time behind that no step has found (collective).
 
     missing: local dofs without one.
