@@ -41,13 +41,13 @@ Numbers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Dependent:
-    """Nodes with an extension, as places among the nodes that were asked for, sorted."""
+    """Nodes with an extension, as kept among the nodes that were asked for, sorted."""
 
     nodes: Numbers
     rows: sparse.csr_matrix  #: E, shape (dependent nodes, nodes of the lattice)
     weight: Array  #: of the distance to the extension: 1 for small shares of fluid, falling to 0 where a node is free
     dry: NDArray[np.bool_]  #: nodes that no fluid reaches: they are what the extension says
-    lost: Numbers  #: nodes of active cells with no fluid nearby
+    undetermined: Numbers  #: nodes of active cells with no fluid nearby
 
 
 class Extension:
@@ -92,8 +92,8 @@ class Extension:
             (self.degree * i[:, None] + steps) % n * stride
             for i, n, stride in zip(index, self.shape, self._strides, strict=True)
         ]
-        places = self._place[np.unique(reduce(_outer_sum, axes))]
-        return np.sort(places[places >= 0])
+        kept = self._place[np.unique(reduce(_outer_sum, axes))]
+        return np.sort(kept[kept >= 0])
 
     def _cells_around(self, nodes: Numbers, layers: int) -> tuple[Numbers, NDArray[np.bool_]]:
         """(box cells, whether they exist) of nodes and some layers around them, shape (nodes, cells)."""
@@ -173,7 +173,7 @@ class Extension:
 
 
 def _continued(s: Array, degree: int, steep: NDArray[np.bool_]) -> Array:
-    """1D shape functions at s, outside of the cell those of a line where steep or far, shape (places, functions)."""
+    """1D shape functions at s, outside of the cell those of a line where steep or far, shape (kept, functions)."""
     outside = np.maximum(-s, s - 1.0)
     straight = (outside > FAR) | steep & (outside > 0.0)
     line = np.stack([1.0 - s, *[0.0 * s] * (degree - 1), s], axis=1)

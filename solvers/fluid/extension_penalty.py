@@ -42,7 +42,7 @@ class ExtensionPenalty:
         self._scales, self._weight = np.zeros((2, unknowns.owned))
         #: owned dofs that no fluid reaches, and those with a distance to their extension
         self.outside, self.dependent = np.zeros((2, unknowns.owned), dtype=bool)
-        self.lost = np.zeros(unknowns.local, dtype=bool)
+        self.undetermined = np.zeros(unknowns.local, dtype=bool)
         none = (self._entries[0], self._entries[0], np.empty(0))
         self._distance, self._extend = self._matrix(none), self._matrix(none)
         self.stale = True
@@ -68,12 +68,12 @@ class ExtensionPenalty:
 
     def set_cut(self, cut: Cut, prescribed: NDArray[np.int64]) -> bool:
         unknowns, before, self.stale = self.unknowns, self._entries, True
-        self.outside[:], self.dependent[:], self.lost[:], self._weight[:] = False, False, False, 0.0
+        self.outside[:], self.dependent[:], self.undetermined[:], self._weight[:] = False, False, False, 0.0
         free = np.ones(unknowns.local, dtype=bool)
         free[prescribed] = False
         parts = [self._find(cut, free, *lattice) for lattice in self._lattices]
         self._weight *= self._film(cut)[: unknowns.owned]
-        self.lost[:] = fem.share_owned(unknowns.space, self.lost.astype(float)) > 0.5
+        self.undetermined[:] = fem.share_owned(unknowns.space, self.undetermined.astype(float)) > 0.5
         rows, columns, data = (np.concatenate(some) for some in zip(*parts, strict=True))
         outside = self.outside[rows - unknowns.global_dofs[0]] if len(rows) else np.zeros(0, dtype=bool)
         own = unknowns.global_dofs[: unknowns.owned][self.dependent]
@@ -105,11 +105,11 @@ class ExtensionPenalty:
         if nodes is self.unknowns.velocity:
             self.outside[dofs] = dry
         else:
-            self.lost[dofs] = dry
+            self.undetermined[dofs] = dry
         self.dependent[dofs] = free[dofs] & ~found.dry[:, None]
         self._weight[dofs] = found.weight[:, None]
-        self.lost[nodes.dofs[found.lost]] = True
-        kept, columns = (free & ~self.lost)[dofs[entries.row]], directory(entries.col.astype(np.int64))
+        self.undetermined[nodes.dofs[found.undetermined]] = True
+        kept, columns = (free & ~self.undetermined)[dofs[entries.row]], directory(entries.col.astype(np.int64))
         rows = self.unknowns.global_dofs[dofs[entries.row]]
         return rows[kept], columns[kept], np.broadcast_to(entries.data[:, None], kept.shape)[kept]
 
@@ -134,7 +134,7 @@ class ExtensionPenalty:
         product.destroy()
         return rows
 
-    def room(self) -> NDArray[np.int64]:
+    def extra_entries(self) -> NDArray[np.int64]:
         return np.diff(self._product()[0]).astype(np.int64)
 
     def fill(self, matrix: PETSc.Mat, pattern: Pattern) -> None:

@@ -25,7 +25,7 @@ class FacePenalty:
         self.unknowns, self._grid = unknowns, unknowns.grid
         domain = self._grid.domain
         self.outside = np.zeros(unknowns.owned, dtype=bool)
-        self.lost = np.zeros(unknowns.local, dtype=bool)
+        self.undetermined = np.zeros(unknowns.local, dtype=bool)
         self._phi, self._convective, self._has_history = (fem.function(fem.cellwise_space(domain)) for _ in range(3))
         test, trial = ufl.TestFunction(unknowns.space), ufl.TrialFunction(unknowns.space)
         dS = fem.measure(domain, "dS", 2 * unknowns.degree)
@@ -55,7 +55,7 @@ class FacePenalty:
         self._faces = cut.ghost_faces
         return False
 
-    def room(self) -> NDArray[np.int64] | None:
+    def extra_entries(self) -> NDArray[np.int64] | None:
         return None
 
     def fill(self, matrix: PETSc.Mat, pattern: Pattern) -> None:

@@ -51,7 +51,7 @@ class GhostPenalty(Protocol):
         ...
 
     @property
-    def lost(self) -> NDArray[np.bool_]:
+    def undetermined(self) -> NDArray[np.bool_]:
         """Local dofs of active cells that nothing determines."""
         ...
 
@@ -62,7 +62,7 @@ class GhostPenalty(Protocol):
     def set_scales(self, scales: Scales) -> None: ...
 
     def set_cut(self, cut: Cut, prescribed: NDArray[np.int64]) -> bool:
-        """Take a cut; True if `room` has changed. `prescribed`: local dofs with given values (collective)."""
+        """Take a cut; True if `extra_entries` has changed. `prescribed`: local dofs with given values (collective)."""
         ...
 
     @property
@@ -70,7 +70,7 @@ class GhostPenalty(Protocol):
         """Cut or scales are others than those of the last `assemble`."""
         ...
 
-    def room(self) -> NDArray[np.int64] | None:
+    def extra_entries(self) -> NDArray[np.int64] | None:
         """Entries in each owned row besides those of the pattern (collective)."""
         ...
 

@@ -166,10 +166,10 @@ class FlowSystem:
         active = np.zeros(len(grid.numbers), dtype=bool)
         active[cut.active] = True
         self.active_dofs = self.dofs_of(cut.active)
-        other_room = False
+        pattern_changed = False
         if self.ghost is not None:
-            other_room = self.ghost.set_cut(cut, self.boundary.dofs)
-            self.active_dofs &= ~self.ghost.lost
+            pattern_changed = self.ghost.set_cut(cut, self.boundary.dofs)
+            self.active_dofs &= ~self.ghost.undetermined
         #: owned cells of each of the forms: uncut, cut, and those in films if there are any
         self.cells = [some[some < grid.owned] for some in (cut.uncut, cut.cut)]
         if self.settings.films and (films := film_cells(grid, cut.cut, cut.film)) is not None:
@@ -182,7 +182,7 @@ class FlowSystem:
         self._tangents += self._outer_on_cut.tangents
         if not fits(self.unknowns, self._pattern, cut):
             self._allocate(choose_pattern(self.unknowns, cut, by_faces=self._by_faces))
-        elif other_room:
+        elif pattern_changed:
             assert self._pattern is not None
             self._allocate(self._pattern)
 
@@ -215,7 +215,7 @@ class FlowSystem:
 
     def _fill_pattern(self, pattern: Pattern) -> PETSc.Mat:
         """A matrix that has all entries of a pattern, with values that do not matter."""
-        more = None if self.ghost is None else self.ghost.room()
+        more = None if self.ghost is None else self.ghost.extra_entries()
         matrix = create_matrix(self.unknowns, pattern, more, blocked=self._blocked)
         cells = np.flatnonzero(pattern.cells[: self.grid.owned]).astype(np.int32)
         fem.assemble_matrix(matrix, self.forms.tangents[0].on(cell=cells))
