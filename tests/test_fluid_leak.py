@@ -36,16 +36,16 @@ def history_of(tmp_path, thickness, motion=""):
     return code, read_history(tmp_path / "out" / "history.csv")
 
 
-@pytest.mark.parametrize(("thickness", "motion", "rate"), [(0.25, "", 0.0), (0.4, MOVED, 0.05)])
-def test_a_thick_plate_is_tight(tmp_path, thickness, motion, rate):
+@pytest.mark.parametrize(("thickness", "motion", "rate"), [(0.25, "", 0.0), (0.02, "", 0.0), (0.4, MOVED, 0.05)])
+def test_a_plate_is_tight(tmp_path, thickness, motion, rate):
     code, history = history_of(tmp_path, thickness, motion)
     assert code == 0, "verify holds"
     assert np.allclose(history["flow"], rate, atol=1e-10)
 
 
 def test_what_passes_a_thin_plate_is_seen(tmp_path):
-    """Both faces of the plate see at least the flow that leaves the channel."""
-    code, history = history_of(tmp_path, 0.02)
+    """It hardly moves. Both of its faces see at least the flow that leaves the channel."""
+    code, history = history_of(tmp_path, 0.02, MOVED.replace("0.05", "1e-9"))
     assert code == 1, "verify is missed"
     assert history["flow"][-1] > 0.01
     assert np.all(history["fluid.leak"] > history["flow"])
@@ -54,9 +54,9 @@ def test_what_passes_a_thin_plate_is_seen(tmp_path):
 @pytest.mark.parametrize(
     ("thickness", "motion", "words"),
     [
-        (0.15, "", "the body is 0.15 thick, 1.5 of the smallest cells: where it has fluid on both sides, fluid passes"),
+        (0.15, "", None),
+        (0.3, MOVED, "the body is 0.3 thick, 3 of the smallest cells: where it has fluid on both sides, fluid passes"),
         (0.3, MOVED, "fluid passes through a body that moves with less than 4 cells across"),
-        (0.21, "", None),
         (0.41, MOVED, None),
     ],
 )

@@ -74,12 +74,15 @@ def _thin_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
     for (section, kind, name), (mesh, moves) in (moving | elastic).items():
         if not isinstance(mesh, Shape) or name in one_sided:
             continue
-        if doubt := thin_body(fluid, mesh.thickness, moves=moves):
+        if doubt := thin_body(case, fluid, mesh.thickness, moves=moves):
             yield (section, kind, name, "mesh"), doubt
 
 
-def thin_body(fluid: FluidSection, extent: float, *, moves: bool) -> str | None:
+def thin_body(case: Case, fluid: FluidSection, extent: float, *, moves: bool) -> str | None:
     """Whether fluid passes through a body of this thickness [m], because both of its sides share unknowns."""
+    rests = not case.elastic_bodies and not any(body.motion or body.free for body in fluid.bodies.values())
+    if rests and fluid.grid.dimension == 2 and not any(patch.periodic for patch in fluid.patches.values()):
+        return None  # each side has unknowns of its own
     smallest = min(float(np.diff(edges).min()) for edges in fluid.grid.planes)
     least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
     if extent >= least * smallest:

@@ -205,7 +205,7 @@ def _against_grid(case: Case, found: Findings, keys: Keys, mesh: Mesh, *, moves:
         found.warnings.append(f"{case.place(*keys)}: the body is outside of the fluid's box")
     if keys[-1] in (case.coupling.dry_side if case.coupling is not None else ()):
         return
-    if doubt := thin_body(case.fluid, thickness(mesh), moves=moves):
+    if doubt := thin_body(case, case.fluid, thickness(mesh), moves=moves):
         found.warnings.append(f"{case.place(*keys, 'mesh')}: {doubt}")
 
 

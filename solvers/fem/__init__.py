@@ -50,6 +50,7 @@ from solvers.fem.spaces import (
     function,
     identify_blocks,
     node_of_block,
+    node_steps,
     pressure_space,
     quadrature_points,
     quadrature_space,

@@ -136,6 +136,13 @@ def tabulate_lagrange(domain: Domain, degree: int, points: Array) -> tuple[Array
     return table[0], np.moveaxis(table[1:], 0, -1)
 
 
+def node_steps(domain: Domain, degree: int) -> NDArray[np.int64]:
+    """From the first corner of a cell to its nodes of degree 1 or 2 in their lattice, shape (functions, dim)."""
+    cell = getattr(basix.CellType, CELL_TYPES[domain.cell_type].shape.name)
+    element = basix.create_element(basix.ElementFamily.P, cell, degree, basix.LagrangeVariant.gll_warped)
+    return np.rint(degree * element.points).astype(np.int64)
+
+
 def facet_dofs(space: Any, component: int, facets: NDArray[np.int32]) -> NDArray[np.int32]:
     """Local dofs of one component of a `flow_space` on facets, on every process that knows them (collective)."""
     dim = space.mesh.topology.dim

@@ -132,5 +132,10 @@ def _covered(
     for k, i in enumerate(others):
         reference[:, i] = np.tile(np.repeat(points, len(points) ** k), len(points) ** (len(others) - 1 - k))
     areas = grid.sizes[cells[touched]][:, others].prod(axis=1)
-    weights = found.weights[row[number[touched]]] * areas[:, None]
+    wet = found.weights[row[number[touched]]]
+    if grid.sheets is not None:
+        for place, cell in enumerate(grid.original[cells[touched]].tolist()):
+            if cell in grid.sheets.shares:
+                wet[place] = grid.sheets.shares[cell].wet(axis, side, points)
+    weights = wet * areas[:, None]
     return CoveredFaces(grid, unknowns, cells[touched], axis, side, reference, weights), touched

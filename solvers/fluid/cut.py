@@ -12,13 +12,11 @@ from solvers import kernels
 from solvers.api import Array
 from solvers.fluid.film import Films, walls_of
 from solvers.fluid.grid import DistributedGrid, Grid
-from solvers.fluid.pieces import FLUSH, Pieces, put_where_fluid_is
+from solvers.fluid.pieces import FLUSH, NOTHING, Pieces, put_where_fluid_is
+from solvers.fluid.sheet_cells import on_sheets
 from solvers.fluid.surface import Motion
 from solvers.gauss import gauss
 from solvers.tessellation import unit_normals
-
-#: Share of a cell (of its face) below which fluid (surface) in it is rounding error of the geometry.
-NOTHING = 1e-10
 
 #: Layers around the cells of a process, besides those of the strip, that it cuts too: roots are found there.
 MARGIN = 4
@@ -105,9 +103,10 @@ class Cutter:
         wanted = _grow(self._own, self._depth + MARGIN)
         moments = kernels.moments(box.edges, self.points, motion.x, facets, wanted.ravel(order="F"))
         normal = -unit_normals(motion.x[facets])
-        off = self._off_boundary(motion.x[facets])
+        off = off_boundary(box, motion.x[facets])
         counts = off if wet is None else off & wet
-        overlap = moments.fraction > 1.0 + NOTHING
+        # on sheets, cells that are solid but for rounding belong to nobody
+        overlap = moments.fraction > (1.0 + NOTHING if grid.sheets is None else 1.0 - NOTHING)
         piece_normal = normal[moments.piece_facet]
         cells, piece_moments = put_where_fluid_is(box, self.points, moments, piece_normal, overlap)
         touched = counts[moments.piece_facet] & (cells >= 0)
@@ -132,7 +131,7 @@ class Cutter:
         pieces = Pieces(
             rows[mine], moments.piece_facet[mine], piece_moments[mine], moments.piece_mass[mine], piece_normal[mine]
         )
-        return Cut(
+        found = Cut(
             uncut=np.flatnonzero(active & ~local_cut & ~local_strip).astype(np.int32),
             cut=cut,
             strip=np.flatnonzero(local_strip).astype(np.int32),
@@ -149,15 +148,7 @@ class Cutter:
             facets=facets,
             motion=motion,
         )
-
-    def _off_boundary(self, corners: Array) -> NDArray[np.bool_]:
-        """Facets that do not lie on the boundary of the box; those that do are in dry contact with it."""
-        off = np.ones(len(corners), dtype=bool)
-        for axis, edge in enumerate(self.grid.grid.edges):
-            near = FLUSH * float(np.diff(edge).min())
-            for place in (edge[0], edge[-1]):
-                off &= (np.abs(corners[:, :, axis] - place) > near).any(axis=1)
-        return off
+        return found if grid.sheets is None else on_sheets(grid, self.points, found)
 
     def _whole(self, facets: NDArray[np.int64], motion: Motion) -> Cut:
         """No surface at all."""
@@ -244,6 +235,16 @@ class _First:
         ):
             return None
         return self if np.array_equal(cut.motion.v, motion.v) else replace(self, cut=replace(cut, motion=motion))
+
+
+def off_boundary(grid: Grid, corners: Array) -> NDArray[np.bool_]:
+    """Facets that do not lie on the boundary of the box; those that do are in dry contact with it."""
+    off = np.ones(len(corners), dtype=bool)
+    for axis, edge in enumerate(grid.edges):
+        near = FLUSH * float(np.diff(edge).min())
+        for place in (edge[0], edge[-1]):
+            off &= (np.abs(corners[:, :, axis] - place) > near).any(axis=1)
+    return off
 
 
 def cells_between(box: Grid, low: Array, high: Array) -> NDArray[np.int64]:

@@ -22,7 +22,7 @@ from solvers.fluid.fast_bodies import FastBodies
 from solvers.fluid.film import films_of
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.history import History
-from solvers.fluid.immersed import ImmersedBody
+from solvers.fluid.immersed import ImmersedBody, sheets_of
 from solvers.fluid.krylov import FlowSolver, Ladder
 from solvers.fluid.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.pressure_level import Hold, hold_pressure, keep_levels, spread_excess
@@ -58,13 +58,16 @@ class Fluid:
         comm: MPI.Comm = MPI.COMM_WORLD,
     ):
         self.comm, self.settings, self.solver, self.timer = comm, settings, solver, timer or Timer()
-        self.bodies, self.grid, self.dim = list(bodies), DistributedGrid(comm, grid), grid.dim
-        self.unknowns = Unknowns(self.grid, settings.degree, periodic_axes(patches))
+        self.bodies, self.dim, periodic = list(bodies), grid.dim, periodic_axes(patches)
+        sheets = None if periodic else sheets_of(grid, self.bodies)
+        self.grid = DistributedGrid(comm, grid, sheets)
+        self.unknowns = Unknowns(self.grid, settings.degree, periodic)
         self.size = self.unknowns.owned  #: unknowns that this process owns
         self.boundary = Boundary(self.grid, self.unknowns, patches)
         self.steady, self.scheme = settings.steady, settings.time  #: each step a flow at rest; how it takes rates
         self.linear_tolerance = solver.linear_tolerance
         wanted = solver.linear if isinstance(solver.linear, str) else "auto"
+        wanted = wanted if sheets is None else "direct"  # the others need the nodes of a lattice
         rungs = linear.choose_flow(wanted, self.dim, self.dofs(), degree=settings.degree, steady=self.steady)
         self.system = FlowSystem(
             self.grid,
@@ -370,7 +373,7 @@ class Fluid:
         """Everything a step starts from."""
         return self.history.save(self.unknowns) | {
             "pressure": self.unknowns.to_nodes(self.flow, self.unknowns.pressure),
-            "pattern": Nodal(self.system.pattern_state(), self.grid.numbers[: self.grid.owned]),
+            "pattern": Nodal(self.system.pattern_state(), self.grid.original[: self.grid.owned]),
             "time": self.current.t,
             "linear_solver": self.ladder.rung,
             "motion": {body.surface.name: {"x": m.x, "v": m.v} for body, m in self.moved()},

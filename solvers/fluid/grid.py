@@ -1,9 +1,7 @@
-"""The background grid: a box of axis-aligned cells, distributed, with its cells and faces in box numbering."""
+"""The background grid, distributed, with its cells and faces in the numbering of the box."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +10,10 @@ from numpy.typing import NDArray
 
 from solvers import fem
 from solvers.api import Array
-from solvers.mesh import Mesh
+from solvers.fluid.box import Grid, uniform
+from solvers.fluid.sheets import Sheets
+
+__all__ = ["FACES", "DistributedGrid", "Grid", "Indices", "uniform"]
 
 #: Names of the box faces: axis and side.
 FACES = ("x-", "x+", "y-", "y+", "z-", "z+")
@@ -20,56 +21,17 @@ FACES = ("x-", "x+", "y-", "y+", "z-", "z+")
 Indices = NDArray[np.int64]
 
 
-@dataclass(frozen=True)
-class Grid:
-    """Cells between the planes x = edges[0][i], y = edges[1][j], z = edges[2][k]; cell number i + nx (j + ny k)."""
-
-    edges: tuple[Array, ...]  #: increasing coordinates [m] of the grid planes, one array per direction
-
-    @property
-    def dim(self) -> int:
-        return len(self.edges)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Cells per direction."""
-        return tuple(len(edge) - 1 for edge in self.edges)
-
-    @property
-    def size(self) -> int:
-        """Number of cells."""
-        return int(np.prod(self.shape))
-
-    def mesh(self) -> Mesh:
-        """Nodes and cells of the whole box."""
-        lattice = np.meshgrid(*self.edges, indexing="ij")
-        points = np.stack([x.ravel(order="F") for x in lattice], axis=1)
-        strides = np.cumprod([1, *(n + 1 for n in self.shape)])[: self.dim]
-        first = sum(
-            index.ravel(order="F") * stride for index, stride in zip(np.indices(self.shape), strides, strict=True)
-        )
-        square = np.array([0, strides[0], strides[0] + strides[1], strides[1]])
-        corners = square if self.dim == 2 else np.concatenate([square, square + strides[2]])
-        return Mesh(points, first[:, None] + corners, "quad" if self.dim == 2 else "hexahedron")
-
-    def cell_sizes(self) -> Array:
-        """Edge lengths [m] of every cell, shape (size, dim)."""
-        steps = np.meshgrid(*(np.diff(edge) for edge in self.edges), indexing="ij")
-        return np.stack([h.ravel(order="F") for h in steps], axis=1)
-
-    def as_box(self, values: NDArray) -> NDArray:
-        """Values per cell as an array with one axis per direction (a view)."""
-        return values.reshape(self.shape, order="F")
-
-
 class DistributedGrid:
     """The part of the grid that this process holds: its cells, one layer of ghost cells, and their faces."""
 
-    def __init__(self, comm: MPI.Comm, grid: Grid):
-        self.comm, self.grid = comm, grid
-        self.domain = fem.distribute(comm, grid.mesh() if comm.rank == 0 else None)
-        #: box number of each local cell, ghosts last
-        self.numbers: Indices = fem.input_cells(self.domain)
+    def __init__(self, comm: MPI.Comm, grid: Grid, sheets: Sheets | None = None):
+        self.comm, self.grid, self.sheets = comm, grid, sheets
+        mesh = (grid if sheets is None else sheets).mesh() if comm.rank == 0 else None
+        self.domain = fem.distribute(comm, mesh)
+        #: number of each local cell in the mesh, ghosts last
+        self.original: Indices = fem.input_cells(self.domain)
+        #: number of the cell of the box in its place; only with `sheets` there are cells with the same
+        self.numbers: Indices = self.original if sheets is None else sheets.place(self.original)
         self.owned = fem.owned_cells(self.domain)
         self.sizes = grid.cell_sizes()[self.numbers]
         self._seams: dict[tuple[int, ...], tuple[Indices, Indices]] = {}
@@ -134,8 +96,3 @@ class DistributedGrid:
         edge = self.grid.edges[axis]
         plane = edge[0] if name[1] == "-" else edge[-1]
         return np.abs(midpoints[:, axis] - plane) < 1e-9 * (edge[-1] - edge[0])
-
-
-def uniform(low: Sequence[float], high: Sequence[float], cells: Sequence[int]) -> Grid:
-    """A grid of equal cells."""
-    return Grid(tuple(np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells, strict=True)))

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.fluid.surface import ImmersedSurface, Motion
+from solvers.fluid.cut import off_boundary
+from solvers.fluid.grid import Grid
+from solvers.fluid.sheets import Sheets, find_sheets
+from solvers.fluid.surface import ImmersedSurface, Motion, together
 
 
 @dataclass(frozen=True)
@@ -40,3 +43,12 @@ def rigid_body(
         return ImmersedBody(surface, lambda t: Motion(points, np.zeros_like(points)), rests=True)
     given = motion
     return ImmersedBody(surface, lambda t: Motion(*given(t)))
+
+
+def sheets_of(grid: Grid, bodies: Sequence[ImmersedBody]) -> Sheets | None:
+    """Sheets of the fluid around thin bodies at rest; None if there are none."""
+    if not bodies or not all(body.rests for body in bodies):
+        return None
+    motions = [body.motion(0.0) for body in bodies if body.motion is not None]
+    facets, motion = together([body.surface for body in bodies], motions, grid.dim)
+    return find_sheets(grid, facets, motion.x, off_boundary(grid, motion.x[facets]))

@@ -34,6 +34,8 @@ def choose_pattern(unknowns: Unknowns, cut: Cut, *, by_faces: bool) -> Pattern:
     """A sparsity pattern for a cut and for those that its bodies may make in the next steps."""
     cells = cut.reach.copy()
     cells[cut.active] = True
+    faces, sides = unknowns.grid.interior_faces
+    cells[sides[np.searchsorted(faces, cut.ghost_faces)]] = True
     return pattern_of(unknowns, cells, cut.reach, by_faces=by_faces)
 
 

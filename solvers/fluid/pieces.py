@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.fluid.grid import Grid
+from solvers.fluid.box import Grid
 
 #: Distance from a plane of the grid, in cells, up to which a piece lies in it.
 FLUSH = 1e-6
+#: Share of a cell (of its face) below which fluid (surface) in it is rounding error of the geometry.
+NOTHING = 1e-10
 
 
 @dataclass(frozen=True)

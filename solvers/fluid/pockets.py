@@ -12,6 +12,7 @@ from scipy import ndimage
 from solvers.connected import connected_parts
 from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.sheet_cells import connected_cells
 
 Mask = NDArray[np.bool_]
 
@@ -34,7 +35,10 @@ def find_pockets(
     are connected, because they share unknowns; those at the ends of `periodic` axes share them across the period.
     """
     own = cut.active[cut.active < grid.owned]
-    labels, count = _join(grid, *_label(grid, own), periodic)
+    if grid.sheets is not None:
+        labels, count = connected_cells(grid, own)
+    else:
+        labels, count = _join(grid, *_label(grid, own), periodic)
     at_elastic = elastic[cut.facets[cut.pieces.facet]].any(axis=1)
     marks = np.zeros((3, count + 1), dtype=np.int64)  # open cells, elastic pieces, cells of each part
     np.add.at(marks[0], labels[is_open], 1)

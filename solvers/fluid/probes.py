@@ -54,6 +54,8 @@ def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> P
 def interpolation(fluid: Fluid, nodes: FlowNodes, degree: int, x: Array) -> tuple[np.ndarray, Array]:
     """(dofs of shape (n, components), shape functions (n,)) at a point, of the nodes that this process owns."""
     number, weight, stride = np.zeros(1, dtype=np.int64), np.ones(1), 1
+    indices: list[int] = []
+    place: list[float] = []
     counts = fluid.unknowns.lattice_shape(degree)
     for edge, coordinate, count in zip(fluid.grid.grid.edges, x, counts, strict=True):
         cell = int(np.clip(np.searchsorted(edge, coordinate) - 1, 0, len(edge) - 2))
@@ -63,6 +65,12 @@ def interpolation(fluid: Fluid, nodes: FlowNodes, degree: int, x: Array) -> tupl
         number = np.add.outer(stride * steps, number).ravel()
         weight = np.multiply.outer(np.array(shape), weight).ravel()
         stride *= count
+        indices.append(cell)
+        place.append(s)
+    if (sheets := fluid.grid.sheets) is not None:
+        steps = np.indices((degree + 1,) * fluid.dim).reshape(fluid.dim, -1)[::-1].T  # the first direction fastest
+        box = int(np.ravel_multi_index(indices, fluid.grid.grid.shape, order="F"))
+        number = sheets.nodes(np.array([sheets.cell_at(box, np.array(place))]), degree, steps)[0]
     owned = nodes.numbers[: nodes.owned]
     order = np.argsort(owned)
     at = np.minimum(np.searchsorted(owned[order], number), max(len(owned) - 1, 0))

@@ -9,8 +9,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from solvers.api import StepFailed
-from solvers.fluid.cut import NOTHING, Cut
+from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.pieces import NOTHING
 from solvers.fluid.space import Unknowns
 from solvers.fluid.surface import Motion
 

@@ -29,10 +29,12 @@ def _flow(fluid: Fluid) -> Snapshot | None:
     share = np.zeros(len(grid.numbers))
     wet = np.concatenate([fluid.cut.uncut, fluid.cut.cut])
     share[wet] = np.maximum(fluid.cut.fraction[wet], np.finfo(float).tiny)
-    fraction = gather_nodal(fluid.comm, Nodal(share[: grid.owned, None], grid.numbers[: grid.owned]))
-    if velocity is None or pressure is None or fraction is None:
+    shares = gather_nodal(fluid.comm, Nodal(share[: grid.owned, None], grid.original[: grid.owned]))
+    if velocity is None or pressure is None or shares is None:
         return None
     mesh = grid.grid.mesh()
+    place = np.arange(len(shares)) if grid.sheets is None else grid.sheets.place(np.arange(len(shares)))
+    fraction = np.bincount(place, shares[:, 0])[:, None]
     active = fraction[:, 0] > 0.0
     nodes, cells = np.unique(mesh.cells[active], return_inverse=True)
     at_corners = [values[_corners(fluid, degree)] for values, degree in ((velocity, unknowns.degree), (pressure, 1))]

@@ -15,6 +15,7 @@ from solvers.api import Array
 from solvers.distributed import Nodal
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.periodic import LatticeNodes, join_ends
+from solvers.fluid.sheet_cells import join_sheets
 from solvers.values import Value, evaluate
 
 Dofs = NDArray[np.int32]
@@ -42,6 +43,8 @@ class Unknowns:
         self.grid, self.degree, self.dim, self.periodic = grid, degree, grid.dim, tuple(periodic)
         self.space = fem.flow_space(grid.domain, degree)
         nodes = [self._lattice_nodes(range(self.dim), degree), self._lattice_nodes([self.dim], 1)]
+        if grid.sheets is not None:
+            self.space, nodes = join_sheets(grid, self.space, degree, nodes)
         if self.periodic:
             self.space, nodes = join_ends(grid.comm, self.space, nodes)
         self.block_size = int(self.space.dofmap.index_map_bs)
@@ -87,7 +90,7 @@ class Unknowns:
         return LatticeNodes(dofs, points, number, at_start, at_end)
 
     def _nodes(self, nodes: LatticeNodes, degree: int) -> FlowNodes:
-        keep = np.unique(nodes.dofs[:, 0], return_index=True)[1] if self.periodic else slice(None)
+        keep = np.unique(nodes.dofs[:, 0], return_index=True)[1] if self.periodic or self.grid.sheets else slice(None)
         dofs, points = nodes.dofs[keep], nodes.points[keep]
         owned = int(np.count_nonzero(dofs[:, 0] < self.owned))
         return FlowNodes(dofs, points, nodes.numbers[keep], self._sizes(points, degree), owned)

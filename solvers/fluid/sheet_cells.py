@@ -1,0 +1,141 @@
+"""Cuts and unknowns on a grid with sheets: each new cell has its share of the fluid and of the surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers import fem
+from solvers.api import Array
+from solvers.connected import connected_parts
+from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.periodic import FAR, LatticeNodes
+from solvers.gauss import gauss
+
+Indices = NDArray[np.int64]
+
+
+def on_sheets(grid: DistributedGrid, points: Array, cut: Any) -> Any:
+    """A `Cut` of the box, in which the new cells are as those in their places, with what each has of the fluid."""
+    sheets, original = grid.sheets, grid.original
+    assert sheets is not None
+    box, local = sheets.grid.size, np.full(sheets.grid.size + len(sheets.cells), -1)
+    local[original] = np.arange(len(original))
+    for_faces, new = original >= box + sheets.singles, (original >= box) & (original < box + sheets.singles)
+    empty = for_faces | np.isin(original, sheets.left)
+    is_cut = np.zeros(len(original), dtype=bool)
+    is_cut[cut.cut] = True
+    row_of = np.full(box, -1)
+    row_of[grid.numbers[cut.cut]] = np.arange(len(cut.cut))
+    is_cut = (is_cut | new) & ~empty
+    cells = np.flatnonzero(is_cut).astype(np.int32)
+    rows = row_of[grid.numbers[cells]]
+    fluid = np.where(rows[:, None] < 0, 1.0, cut.fluid[rows])
+    fraction = np.where(empty, 0.0, cut.fraction)
+    weights = _tensor(gauss(len(points))[1])
+    place = np.full(len(original), -1)
+    place[cells] = np.arange(len(cells))
+    for number, share in sheets.shares.items():
+        if (cell := local[number]) >= 0 and (found := share.integrals(points)) is not None:
+            fluid[place[cell]], fraction[cell] = found / weights, share.fraction
+    piece_box, target = grid.numbers[cut.cut[cut.pieces.cell]], np.full(len(cut.pieces.cell), -1)
+    for piece, (number, facet) in enumerate(zip(piece_box.tolist(), cut.pieces.facet.tolist(), strict=True)):
+        cells_there = sheets.successors.get(number)
+        owner = number if cells_there is None else next((c for c in cells_there if sheets.shares[c].has(facet)), None)
+        target[piece] = -1 if owner is None or local[owner] < 0 else place[local[owner]]
+    kept = np.flatnonzero(target >= 0)
+    kept = kept[np.argsort(target[kept], kind="stable")]
+    pieces = cut.pieces
+    return replace(
+        cut,
+        uncut=cut.uncut[~(empty | new)[cut.uncut]],
+        cut=cells,
+        strip=cut.strip[original[cut.strip] < box],
+        ghost_faces=cut.ghost_faces[_passable(grid, cut.ghost_faces, empty, for_faces)],
+        contact_cells=cut.contact_cells[original[cut.contact_cells] < box],
+        fluid=fluid,
+        fraction=fraction,
+        pieces=replace(
+            pieces,
+            cell=target[kept],
+            facet=pieces.facet[kept],
+            moments=pieces.moments[kept],
+            mass=pieces.mass[kept],
+            normal=pieces.normal[kept],
+        ),
+    )
+
+
+def _passable(
+    grid: DistributedGrid, faces: NDArray[np.int32], empty: NDArray[np.bool_], for_faces: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Faces with fluid on both sides that belongs together."""
+    assert grid.sheets is not None
+    known, sides = grid.interior_faces
+    ends = sides[np.searchsorted(known, faces)]
+    pairs = np.sort(grid.numbers[ends], axis=1)
+    parted = np.array([pair in grid.sheets.parted for pair in map(tuple, pairs.tolist())], dtype=bool)
+    return for_faces[ends].all(axis=1) | ~(empty[ends].any(axis=1) | parted)
+
+
+def _tensor(weights: Array) -> Array:
+    return np.multiply.outer(weights, weights).ravel()
+
+
+def join_sheets(
+    grid: DistributedGrid, space: Any, degree: int, nodes: list[LatticeNodes]
+) -> tuple[Any, list[LatticeNodes]]:
+    """(the space in which nodes of the same number are one, velocity's and pressure's nodes with these numbers).
+
+    degree: of the velocity. Collective.
+    """
+    assert grid.sheets is not None
+    size, dim, comm = int(space.dofmap.index_map_bs), grid.dim, grid.comm
+    start, end = space.dofmap.index_map.local_range
+    columns = [(0, degree)] if size > 1 else [*((axis, degree) for axis in range(dim)), (dim, 1)]
+    number = np.zeros(end - start + int(space.dofmap.index_map.num_ghosts), dtype=np.int64)
+    for component, its_degree in columns:
+        blocks = fem.component_cell_dofs(space, component) // size
+        steps = fem.node_steps(grid.domain, its_degree)
+        number[blocks] = component * FAR + grid.sheets.nodes(grid.original, its_degree, steps)
+    new = np.unique(number[fem.cell_blocks(space)[grid.original >= grid.grid.size]])
+    shared = np.flatnonzero(np.isin(number, np.unique(np.concatenate(comm.allgather(new)))))
+    mine = shared[shared < end - start]
+    tables = comm.allgather((number[mine], start + mine))
+    owners = np.repeat(np.arange(comm.size, dtype=np.int32), [len(known) for known, _ in tables])
+    known, masters = (np.concatenate(column) for column in zip(*tables, strict=True))
+    known, first = np.unique(known, return_index=True)
+    twin = first[np.searchsorted(known, number[shared])]
+    space, local = fem.identify_blocks(space, shared.astype(np.int32), masters[twin], owners[twin])
+    joined = np.arange(len(number), dtype=np.int32)
+    joined[shared] = local
+
+    def renumbered(part: LatticeNodes) -> LatticeNodes:
+        blocks = part.dofs // size
+        return replace(part, dofs=size * joined[blocks] + part.dofs % size, numbers=number[blocks[:, 0]] % FAR)
+
+    return space, [renumbered(part) for part in nodes]
+
+
+def connected_cells(grid: DistributedGrid, cells: NDArray[np.int32]) -> tuple[Indices, int]:
+    """Parts of the cells of all processes that share corners: that of each local cell, from 1 on, and their number.
+
+    0 where none is. cells: of this process. Collective.
+    """
+    assert grid.sheets is not None
+    corners = grid.sheets.nodes(grid.original[cells], 1, fem.node_steps(grid.domain, 1))
+    gathered = grid.comm.allgather((grid.original[cells], corners))
+    everything, nodes = (np.concatenate(column) for column in zip(*gathered, strict=True))
+    ends = np.unique(nodes, return_inverse=True)[1].reshape(nodes.shape) + len(everything)
+    first = np.repeat(np.arange(len(everything)), nodes.shape[1])
+    part = connected_parts(first, ends.ravel(), len(everything) + int(ends.max(initial=0)) + 1)[: len(everything)]
+    order = np.full(len(everything), np.iinfo(np.int64).max)
+    np.minimum.at(order, part, everything)  # parts by their first cell, on any number of processes
+    known = np.unique(order[part])
+    labels = np.zeros(len(grid.original), dtype=np.int64)
+    before = sum(len(numbers) for numbers, _ in gathered[: grid.comm.rank])
+    labels[cells] = 1 + np.searchsorted(known, order[part[before : before + len(cells)]])
+    return labels, len(known)

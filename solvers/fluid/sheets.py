@@ -1,0 +1,288 @@
+"""Sheets of fluid: where a body is thinner than a cell, the fluid on each side of it has a cell of its own.
+
+A cell with two parts of fluid becomes two cells. Parts of neighbouring cells are linked if both are wet at the same
+place of the common face, and only linked parts share a node. So the nodes around a thin body come several times, once
+for each part of the fluid around the node, and each side knows of the other one as little as of one behind a thick
+body. Where the parts join within the cells around a node, at the tip of a body, there is one node.
+Source: the rule by which 4C's cut library gives nodes several sets of unknowns: Schott, Wall, Comput. Methods Appl.
+Mech. Engrg. 276 (2014) 233-265, section 3.
+
+The new cells are put behind those of the box; faces between them and their neighbours, which the ghost penalty needs,
+come as pairs of cells that are there for nothing else. All get their unknowns by the numbers of their nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from solvers import kernels
+from solvers.api import Array
+from solvers.connected import connected_parts
+from solvers.fluid.box import Grid
+from solvers.fluid.pieces import NOTHING
+from solvers.fluid.regions import SAME, WHOLE, Region, chords_of, lagrange, regions_in_cell
+from solvers.gauss import gauss
+from solvers.mesh import Mesh
+
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+#: From the first corner of a cell to each, in the order of `Grid.mesh`.
+SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
+CORNER_STEPS = {2: np.array(SQUARE), 3: np.array([[*xy, z] for z in (0, 1) for xy in SQUARE])}
+
+
+@dataclass(frozen=True)
+class FluidShare:
+    """What a cell of the mesh has of the fluid and the surface in its place, if that is not everything."""
+
+    regions: tuple[Region, ...]
+
+    @property
+    def fraction(self) -> float:
+        return sum(region.share for region in self.regions)
+
+    def integrals(self, points: Array) -> Array | None:
+        """int L_q over the fluid; None if it has all of the fluid after all."""
+        if any(region.facets is None for region in self.regions):
+            return None
+        total = np.zeros(len(points) ** 2)
+        for region in self.regions:
+            total += region.integrals(points)
+        return total
+
+    def has(self, facet: int) -> bool:
+        """The facet bounds it."""
+        return any(region.facets is None or facet in region.facets for region in self.regions)
+
+    def wet(self, axis: int, side: int, points: Array) -> Array:
+        """int L_q over the wet part of a face."""
+        nodes, weights = gauss(len(points) + 1)
+        total = np.zeros(len(points))
+        for face, a, b in (wet for region in self.regions for wet in region.faces):
+            if face == (axis, side):
+                total += (b - a) * weights @ lagrange(points, a + (b - a) * nodes)
+        return total
+
+
+@dataclass(frozen=True)
+class Sheets:
+    """Cells behind those of the box: first those with fluid, then pairs of cells with a face between them."""
+
+    grid: Grid
+    shares: dict[int, FluidShare]  #: of cells of the mesh, by their numbers in it
+    left: Indices  #: cells of the box from which all fluid has gone to new ones
+    parted: frozenset[tuple[int, int]]  #: neighbours in the box, the lower first, with no fluid on the face between
+    cells: Indices  #: number in the box of each new cell
+    pairs: int  #: how many pairs there are
+    #: which of the nodes at one place of the lattice of second degree the nodes of a cell are, 0 that of the box
+    copies: Indices
+
+    @property
+    def singles(self) -> int:
+        """New cells with fluid."""
+        return len(self.cells) - 2 * self.pairs
+
+    @cached_property
+    def successors(self) -> dict[int, list[int]]:
+        """Cells of the mesh with fluid in the place of one of the box that lost some."""
+        found: dict[int, list[int]] = {int(cell): [] for cell in self.left}
+        for cell in self.shares:
+            found.setdefault(int(self.place(np.array([cell]))[0]), []).append(cell)
+        return found
+
+    def cell_at(self, cell: int, x: Array) -> int:
+        """Cell of the mesh with the fluid at x, in the coordinates of a cell of the box."""
+        there = self.successors.get(cell) or [cell]
+        regions = ((c, region) for c in there if c in self.shares for region in self.shares[c].regions)
+        return next((c for c, region in regions if region.contains(x)), there[0])
+
+    def mesh(self) -> Mesh:
+        """The box and the new cells; of these only pairs are connected."""
+        box, dim = self.grid.mesh(), self.grid.dim
+        index = np.stack(np.unravel_index(self.cells, self.grid.shape, order="F"), axis=1)
+        units = [[cell] for cell in range(self.singles)]
+        units += [[cell, cell + 1] for cell in range(self.singles, len(self.cells), 2)]
+        points, cells, count = [], [], len(box.points)
+        for unit in units:
+            lattice = (index[unit][:, None, :] + CORNER_STEPS[dim]).reshape(-1, dim)
+            places, number = np.unique(lattice, axis=0, return_inverse=True)
+            points.append(np.stack([edge[i] for edge, i in zip(self.grid.edges, places.T, strict=True)], axis=1))
+            cells.append(count + number.reshape(len(unit), -1))
+            count += len(places)
+        return Mesh(np.concatenate([box.points, *points]), np.concatenate([box.cells, *cells]), box.cell_type)
+
+    def place(self, original: Indices) -> Indices:
+        """Number in the box of cells of the mesh."""
+        return np.concatenate([np.arange(self.grid.size), self.cells])[original]
+
+    def nodes(self, original: Indices, degree: int, steps: Indices) -> Indices:
+        """Numbers of the nodes of cells of the mesh, shape (cells, nodes): those of the lattice, then the others.
+
+        steps: from the first node of a cell to each in the lattice of this degree, shape (nodes, dim).
+        """
+        number, copy = self._lattice(self.place(original), degree, steps), np.zeros((len(original), len(steps)), int)
+        new = original >= self.grid.size
+        copy[new] = self.copies[original[new] - self.grid.size][:, _in_cell(steps, degree)]
+        size = self.lattice_size(degree)
+        further = size + np.searchsorted(self._further(degree), copy * size + number)
+        return np.where(copy > 0, further, number)
+
+    def lattice_size(self, degree: int) -> int:
+        """Nodes of the lattice of the box."""
+        return int(np.prod([degree * n + 1 for n in self.grid.shape]))
+
+    def _lattice(self, cells: Indices, degree: int, steps: Indices) -> Indices:
+        index = np.stack(np.unravel_index(cells, self.grid.shape, order="F"), axis=1)
+        counts = [degree * n + 1 for n in self.grid.shape]
+        return np.ravel_multi_index(tuple(np.moveaxis(degree * index[:, None, :] + steps, 2, 0)), counts, order="F")
+
+    def _further(self, degree: int) -> Indices:
+        """All nodes that the lattice does not have, as copy * size + number."""
+        steps = np.array(list(product(range(degree + 1), repeat=self.grid.dim)))
+        copy = self.copies[:, _in_cell(steps, degree)]
+        return np.unique((copy * self.lattice_size(degree) + self._lattice(self.cells, degree, steps))[copy > 0])
+
+
+def _in_cell(steps: Indices, degree: int) -> Indices:
+    """Numbers of nodes among those of a cell of second degree."""
+    return (steps * (2 // degree)) @ 3 ** np.arange(steps.shape[1])
+
+
+def find_sheets(grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_]) -> Sheets | None:
+    """Sheets of the fluid around surfaces with vertices at x [m]; None if its parts share all nodes.
+
+    bounds: facets that are not on the boundary of the box.
+    """
+    if grid.dim != 2 or not len(facets):
+        return None
+    moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
+    parts, special = _parts(grid, moments, facets, x, bounds)
+    links = _links(grid, parts)
+    copies = _copies(grid, parts, links, special)
+    moved = (copies > 0).any(axis=1)
+    solid = moments.cells[moments.fraction[moments.cells] > 1.0 - NOTHING]
+    if not (moved.any() or _separates(grid, solid, parts, links)):
+        return None
+    linked = np.zeros(len(parts), dtype=bool)
+    linked[[n for a, b, _ in links for n in (a, b)]] = True
+    new = np.flatnonzero(moved & linked)  # what is closed off within a cell counts as solid
+    by_cell: dict[int, list[int]] = {}
+    for number, part in enumerate(parts):
+        by_cell.setdefault(part.cell, []).append(number)
+    shares = {grid.size + k: FluidShare((parts[n],)) for k, n in enumerate(new)}
+    staying = {cell: [n for n in numbers if not moved[n]] for cell, numbers in by_cell.items()}
+    shares |= {
+        cell: FluidShare(tuple(parts[n] for n in kept))
+        for cell, kept in staying.items()
+        if kept and len(kept) < len(by_cell[cell])
+    }
+    passing = {(parts[a].cell, parts[b].cell) for a, b, _ in links if not moved[a] and not moved[b]}
+    touching = _neighbours(grid, [cell for cell, kept in staying.items() if kept])
+    at_faces = [(a, b) for a, b, _ in links if (moved[a] or moved[b]) and special[[parts[a].cell, parts[b].cell]].any()]
+    cells = np.concatenate([new, np.array(at_faces, dtype=np.int64).ravel()])
+    return Sheets(
+        grid,
+        shares,
+        np.array(sorted(cell for cell, kept in staying.items() if not kept), dtype=np.int64),
+        frozenset(touching - passing),
+        np.array([parts[n].cell for n in cells], dtype=np.int64),
+        len(at_faces),
+        copies[cells],
+    )
+
+
+def _separates(grid: Grid, cells: Indices, parts: Sequence[Region], links: Sequence[tuple[int, int, int]]) -> bool:
+    """Around one of some cells without fluid there are parts that are not linked with each other there."""
+    index = np.stack(np.unravel_index([part.cell for part in parts], grid.shape, order="F"), axis=1)
+    ends = np.array(links, dtype=np.int64).reshape(-1, 3)[:, :2]
+    for place in np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1):
+        near = (np.abs(index - place) <= 1).all(axis=1)
+        first, second = ends[near[ends].all(axis=1)].T
+        if len(np.unique(connected_parts(first, second, len(parts))[near])) > 1:
+            return True
+    return False
+
+
+def _parts(grid: Grid, moments, facets: Indices, x: Array, bounds: NDArray[np.bool_]) -> tuple[list[Region], Mask]:
+    """(parts of the fluid in all cells around surfaces, cells with surface or solid)."""
+    fluid = 1.0 - moments.fraction
+    touched = np.zeros(grid.size, dtype=bool)
+    touched[moments.cells] = True
+    special = touched | (fluid < 1.0 - SAME)
+    near = ndimage.binary_dilation(grid.as_box(special), np.ones((3,) * grid.dim, dtype=bool)).ravel(order="F")
+    whole = near & (fluid > NOTHING)
+    found = []
+    ends = np.searchsorted(moments.piece_cell, np.arange(len(moments.cells) + 1))
+    for row, cell in enumerate(moments.cells.tolist()):
+        numbers = moments.piece_facet[ends[row] : ends[row + 1]]
+        chords = chords_of(grid, cell, x, facets, numbers[bounds[numbers]].tolist())
+        if chords and whole[cell]:
+            found += regions_in_cell(cell, float(fluid[cell]), chords)
+            whole[cell] = False
+    found += [Region(int(cell), float(fluid[cell]), WHOLE) for cell in np.flatnonzero(whole)]
+    return sorted(found, key=lambda region: region.cell), special
+
+
+def _links(grid: Grid, parts: Sequence[Region]) -> list[tuple[int, int, int]]:
+    """(part, part of the next cell, axis) where both are wet at the same place of the face between them."""
+    at: dict[tuple[int, int, int], list[tuple[int, float, float]]] = {}
+    for number, part in enumerate(parts):
+        for (axis, side), a, b in part.faces:
+            at.setdefault((part.cell, axis, side), []).append((number, a, b))
+    found = []
+    for (cell, axis, side), below in at.items():
+        stride, count = int(np.prod(grid.shape[:axis])), grid.shape[axis]
+        if not side or cell // stride % count == count - 1:
+            continue
+        above = at.get((cell + stride, axis, 0), [])
+        for one, a, b in below:
+            found += [(one, other, axis) for other, c, d in above if min(b, d) - max(a, c) > SAME]
+    return sorted(set(found))
+
+
+def _copies(grid: Grid, parts: Sequence[Region], links: Sequence[tuple[int, int, int]], special: Mask) -> Indices:
+    """Which of the nodes at its place each node of a part's cell is, in the lattice of second degree.
+
+    Of the parts around a node those with the most fluid keep that of the box.
+    """
+    steps = np.array(list(product(range(3), repeat=grid.dim)))[:, ::-1]  # the first direction fastest
+    size = len(steps)
+    ends = np.array(links, dtype=np.int64).reshape(-1, 3)
+    first, second = [], []
+    for axis in range(grid.dim):
+        a, b, _ = ends[ends[:, 2] == axis].T
+        upper, lower = (np.flatnonzero(steps[:, axis] == at) for at in (2, 0))
+        first.append((a[:, None] * size + upper).ravel())
+        second.append((b[:, None] * size + lower).ravel())
+    group = connected_parts(np.concatenate(first), np.concatenate(second), len(parts) * size)
+    cells = np.array([part.cell for part in parts])
+    index = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1)
+    counts = [2 * n + 1 for n in grid.shape]
+    node = np.ravel_multi_index(tuple(np.moveaxis(2 * index[:, None] + steps, 2, 0)), counts, order="F").ravel()
+    fluid = np.bincount(group, np.repeat([part.share for part in parts], size), len(group))
+    groups = np.unique(group)
+    order = groups[np.lexsort((groups, -fluid[groups], node[groups]))]
+    starts = np.flatnonzero(np.diff(node[order], prepend=-1))
+    rank = np.zeros(len(group), dtype=np.int64)
+    rank[order] = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
+    around = np.zeros(int(np.prod(counts)), dtype=bool)  # all cells around these nodes are among the parts
+    places = np.stack(np.unravel_index(np.flatnonzero(special), grid.shape, order="F"), axis=1)
+    around[np.ravel_multi_index(tuple(np.moveaxis(2 * places[:, None] + steps, 2, 0)), counts, order="F")] = True
+    return np.where(around[node], rank[group], 0).reshape(-1, size)
+
+
+def _neighbours(grid: Grid, cells: Sequence[int]) -> set[tuple[int, int]]:
+    """Pairs of them with a common face, the lower first."""
+    index, known, found = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1), set(cells), set()
+    for axis, count in enumerate(grid.shape):
+        stride = int(np.prod(grid.shape[:axis]))
+        found |= {(c, c + stride) for c, i in zip(cells, index[:, axis], strict=True) if i + 1 < count}
+    return {pair for pair in found if pair[1] in known}

@@ -1,0 +1,162 @@
+"""Bodies of any thickness: the fluid on one side does not know of that on the other."""
+
+import numpy as np
+import pytest
+from fluid_setup import block, body, field, fluid_rule, make_fluid, solve_steady, step, turned, values
+from programs import fsci
+
+from fsci.run.history import read_history
+from solvers.distributed import gather, scatter
+from solvers.fluid.grid import uniform
+from solvers.fluid.patches import Patch
+from solvers.fluid.probes import at_point
+
+THICKNESS = [1e-3, 0.2, 1.0, 1.5, 3.0]  # in cells
+DRAWS = 20
+
+
+def channel(plate, element, pressures):
+    """A channel with slip walls, closed by a plate, with given pressures at its ends."""
+    patches = [
+        Patch("in", ("x-",), "traction", field(pressures[0], 0.0)),
+        Patch("out", ("x+",), "traction", field(-pressures[1], 0.0)),
+        Patch("w", ("y-", "y+"), "slip"),
+    ]
+    fluid = make_fluid(
+        uniform([0, 0], [3, 1], [30, 10]), patches, [body("plate", *plate)], element=element, scheme="steady",
+        convection=False,
+    )  # fmt: skip
+    solve_steady(fluid)
+    return fluid
+
+
+def sealed(thickness, element, draw, pressures=(2.0, 0.7)):
+    """A plate at a random place and angle: the flow, its largest velocity, what the force is off."""
+    rng = np.random.default_rng(draw)
+    h, angle = 0.1, rng.uniform(-0.6, 0.6)
+    middle = np.array([1.5, 0.5]) + rng.uniform(-0.1, 0.1, 2)
+    points, facets = block([-thickness * h / 2, -0.9], [thickness * h / 2, 0.9])
+    points = turned(points, angle) + middle
+    fluid = channel((points, facets), element, pressures)
+    length = 1.0 / np.cos(angle)
+    exact = (pressures[0] - pressures[1]) * length * np.array([np.cos(angle), np.sin(angle)])
+    speed = np.abs(fluid.flow[fluid.unknowns.velocity.dofs]).max()
+    return fluid, speed, fluid.force()["plate"].sum(axis=0) - exact
+
+
+@pytest.mark.parametrize("thickness", THICKNESS)
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_plate_that_seals_a_channel(element, thickness):
+    """Pressures on both sides are constant; nothing flows, and the plate carries their difference."""
+    for draw in range(DRAWS):
+        _, speed, off = sealed(thickness, element, draw)
+        assert speed < 1e-10, draw
+        assert np.abs(off).max() < 1e-8, draw
+
+
+@pytest.mark.parametrize("shift", [-1e-12, 0.0, 1e-12])
+@pytest.mark.parametrize("thickness", [0.2, 1.0, 2.0])
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_plate_in_a_plane_of_the_grid(element, thickness, shift):
+    """One of its sides, or both."""
+    for side in (1.5, 1.6, 1.7 - 0.1 * thickness):
+        fluid = channel(block([side + shift, -0.5], [side + shift + 0.1 * thickness, 1.5]), element, (1.0, 0.0))
+        assert np.abs(fluid.flow[fluid.unknowns.velocity.dofs]).max() < 1e-10
+        assert np.abs(fluid.force()["plate"].sum(axis=0) - [1.0, 0.0]).max() < 1e-8
+
+
+def test_probes_on_both_sides():
+    """Points in one cell, with a plate between them."""
+    fluid = channel(block([1.53, -0.5], [1.55, 1.5]), "q1q1", (2.0, 0.5))
+    for x, pressure in ((1.52, 2.0), (1.5299, 2.0), (1.5501, 0.5), (1.59, 0.5)):
+        assert abs(at_point(fluid, "pressure", (x, 0.47), 0.0)()[""] - pressure) < 1e-10
+
+
+def two_channels(thickness, middle):
+    """Flow on both sides of a plate along a channel, driven by a force, and the exact one; lengths in heights."""
+    h = 0.1
+    low, high = middle - thickness * h / 2, middle + thickness * h / 2
+    patches = [Patch("ends", ("x-", "x+"), "outflow"), Patch("w", ("y-", "y+"), "no_slip")]
+    fluid = make_fluid(
+        uniform([0, 0], [1, 1], [6, 10]), patches, [body("plate", *block([-0.5, low], [1.5, high]))],
+        element="q2q1", scheme="steady", convection=False, mu=0.3, body_force=field(2.0, 0.0),
+    )  # fmt: skip
+    solve_steady(fluid)
+    rule = fluid_rule(fluid)
+    u, _, p = values(fluid, rule)
+    wet = rule.weights.sum(axis=1) > 1e-9
+    rule_y, weights = rule.x[wet, :, 1], rule.weights[wet]
+    below = (rule_y * weights).sum(axis=1) / weights.sum(axis=1) < middle
+    exact = np.where(below[:, None], rule_y * (low - rule_y), (1.0 - rule_y) * (rule_y - high)) * 2.0 / (2.0 * 0.3)
+    off = np.abs(u[wet] - np.stack([exact, 0.0 * exact], axis=-1)).max()
+    drag = fluid.force()["plate"].sum(axis=0)[0]
+    return off, np.abs(p[wet]).max(), drag - (low + 1.0 - high) / 2.0 * 2.0
+
+
+@pytest.mark.parametrize("thickness", [1e-3, 0.2, 1.0, 1.5])
+def test_two_parabolas(thickness):
+    """Both flows are exact, also where the plate leaves the box; it carries half of the force."""
+    for middle in np.random.default_rng(5).uniform(0.3, 0.7, 8):
+        assert np.abs(two_channels(thickness, middle)).max() < 1e-8, middle
+
+
+def split():
+    """A channel with a plate in its middle, thinner than a cell, that begins within the box and ends behind it."""
+    plate, facets = block([0.62, 0.5], [2.5, 0.5 + 0.02])
+    inflow = field(lambda x, y, t: 6 * y * (1 - y) * np.minimum(1.0, 0.5 + t), 0.0)
+    patches = [
+        Patch("in", ("x-",), "velocity", inflow), Patch("out", ("x+",), "outflow"), Patch("w", ("y-", "y+"), "no_slip"),
+    ]  # fmt: skip
+    return make_fluid(
+        uniform([0, 0], [1.5, 1], [15, 10]), patches, [body("plate", turned(plate, 0.1, (0.6, 0.5)), facets)],
+        mu=0.05,
+    )  # fmt: skip
+
+
+def test_resumed():
+    """The state holds the unknowns of both sides: steps after it are the same bit for bit."""
+    fluid, again = (split() for _ in range(2))
+    for number in range(3):
+        step(fluid, 0.1 * number, 0.1)
+    again.restore(scatter(fluid.comm, gather(fluid.comm, fluid.save()), again.save()))
+    for one in (fluid, again):
+        step(one, 0.3, 0.1)
+    assert np.array_equal(fluid.flow, again.flow)
+    assert fluid.grid.sheets is not None
+
+
+CASE = """\
+time: {{step: 0.1, end: 0.3}}
+fluid:
+  density: 1
+  viscosity: 0.02
+  element: {element}
+  grid: {{from: [0, 0], to: [1.5, 1], cells: [15, 10]}}
+  patches:
+    inlet: {{on: x-, velocity: ["6*y*(1-y)", 0]}}
+    outlet: {{on: x+, outflow: true}}
+    walls: {{on: [y-, y+], no_slip: true}}
+  bodies:
+    plate: {{mesh: {{shape: rectangle, size: [1.2, 0.013], cells: [12, 1], origin: [0.618, 0.543]}}}}
+probes:
+  force: {{quantity: force, body: plate}}
+  above: {{quantity: pressure, at: [0.9, 0.57]}}
+  below: {{quantity: pressure, at: [0.9, 0.53]}}
+"""
+
+
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_two_processes(tmp_path, element):
+    """A plate in the middle of the flow, its tip within the box, its end behind the outlet; a run that goes on, too."""
+    (tmp_path / "case.yaml").write_text(CASE.format(element=element))
+    found = []
+    for processes in (1, 2):
+        out = tmp_path / str(processes)
+        done = fsci("run", tmp_path, "-o", out, processes=processes)
+        assert done.returncode == 0, done.stdout + done.stderr
+        done = fsci("resume", out, "--set", "time.end=0.5", processes=3 - processes)
+        assert done.returncode == 0, done.stdout + done.stderr
+        history = read_history(out / "history.csv")
+        assert len(history["above"]) == 5
+        found.append([history[name][-1] for name in ("force.x", "force.y", "above", "below", "fluid.mass")])
+    assert np.allclose(found[1], found[0], rtol=1e-8, atol=1e-10)
