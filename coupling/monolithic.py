@@ -112,9 +112,11 @@ class Monolithic:
         ladder = self.coupled.flow.ladder
         while ladder.here != "direct":
             try:
-                self._linear_iterations += self._krylov.solve(
-                    blocks.nested(), b, x, lambda matrix: self._krylov_solver(matrix, blocks)
-                )
+                matrix = blocks.nested()
+                iterations = self._krylov.solve_again(matrix, b, x)
+                if iterations is None:
+                    iterations = self._krylov.solve(self._krylov_solver(matrix, blocks), matrix, b, x)
+                self._linear_iterations += iterations
                 return
             except linear.LinearSolveFailed as failure:
                 ladder.climb(failure)

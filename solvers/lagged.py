@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from petsc4py import PETSc
 
@@ -27,24 +26,23 @@ class Lagged:
         """The next matrix is one of another step."""
         self.made, self._kept = 0, None
 
-    def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, make: Callable[[PETSc.Mat], PETSc.KSP]) -> int:
-        """Solve matrix x = b; how many iterations that took. Raises LinearSolveFailed.
+    def solve_again(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> int | None:
+        """Solve matrix x = b; how many iterations that took, or None: it takes a solver for this matrix."""
+        kept, self._kept = self._kept, None
+        if kept is None or self.made < self.fresh:
+            return None
+        ksp, made_of, first = kept
+        try:
+            linear.solve(ksp, matrix, b, x, made_of)
+        except linear.LinearSolveFailed:
+            return None
+        iterations = int(ksp.getIterationNumber())
+        if iterations <= self.patience * first:
+            self._kept = kept
+        return iterations
 
-        make: a solver for a matrix, whose preconditioner is made of that.
-        """
-        if self._kept is not None and self.made >= self.fresh:
-            ksp, made_of, first = self._kept
-            try:
-                linear.solve(ksp, matrix, b, x, made_of)
-            except linear.LinearSolveFailed:
-                pass
-            else:
-                iterations = int(ksp.getIterationNumber())
-                if iterations > self.patience * first:
-                    self._kept = None
-                return iterations
-        self._kept = None
-        ksp = make(matrix)
+    def solve(self, ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> int:
+        """The same with a solver for this matrix, which is kept. Raises LinearSolveFailed."""
         linear.solve(ksp, matrix, b, x)
         linear.keep_preconditioner(ksp)
         self.made += 1
@@ -70,8 +68,8 @@ class LaggedFactors:
 
     def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> int:
         """Solve matrix x = b; how many iterations that took. Raises LinearSolveFailed."""
-        return self._lagged.solve(matrix, b, x, self._factor)
-
-    def _factor(self, matrix: PETSc.Mat) -> PETSc.KSP:
+        iterations = self._lagged.solve_again(matrix, b, x)
+        if iterations is not None:
+            return iterations
         self._ksp.getPC().setReusePreconditioner(False)  # the order of elimination stays
-        return self._ksp
+        return self._lagged.solve(self._ksp, matrix, b, x)

@@ -88,7 +88,10 @@ class FlowSolver:
         """
         while self.ladder.here != "direct":
             try:
-                return self._krylov.solve(matrix, b, x, lambda matrix: self._create(matrix, held))
+                iterations = self._krylov.solve_again(matrix, b, x)
+                if iterations is not None:
+                    return iterations
+                return self._krylov.solve(self._create(matrix, held), matrix, b, x)
             except linear.LinearSolveFailed as failure:
                 self.ladder.climb(failure)
         return self._direct.solve(matrix, b, x)
