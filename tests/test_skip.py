@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections import Counter
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
@@ -16,6 +17,8 @@ from fsci.run.run import FINISHED, Run, run_case
 from solvers.contact.mortar import Mortar
 from solvers.contact.search import Search
 from solvers.fluid.system import FlowSystem
+from solvers.structure.body import Body
+from solvers.structure.field import Structure
 from solvers.timing import Timer
 
 DISC = """\
@@ -107,6 +110,54 @@ def test_no_tangent_where_only_a_residual_is_needed(tmp_path, monkeypatch):
     iterations = sum(iterations_of(written(tmp_path, FLOW + RESTING, 0.1), 3))
     assert calls["flow__tangent"] <= iterations
     assert calls["flow__residual"] <= iterations + 3
+
+
+def test_no_stiffness_where_only_a_residual_is_needed(tmp_path, monkeypatch):
+    """Of a structure, too: one stiffness for each Newton step, one residual more for each time step."""
+    calls = counted(monkeypatch, body__assemble_tangent=Body, structure__residual=Structure)
+    iterations = iterations_of(written(tmp_path, BEAM, 0.2), 4)
+    assert calls["body__assemble_tangent"] == sum(iterations)
+    assert calls["structure__residual"] == sum(iterations) + len(iterations)
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        (BEAM, {"assembly", "contact", "solve"}),
+        (FLOW, {"assembly", "cut", "weights", "solve"}),
+        (FLOW + POST, {"assembly", "contact", "cut", "weights", "coupling", "solve"}),
+    ],
+    ids=["beam", "flow", "post"],
+)
+def test_time_goes_to_parts_that_are_there(text, parts, tmp_path):
+    """What is timed; the time of parts that are absent is that of asking."""
+    timer, case = Timer(), written(tmp_path, text, 0.2)
+    simulation = build(case, MPI.COMM_WORLD, timer)
+    simulation.initialise(0.0, case.time.step)
+    simulation.scheme.step(0.0, case.time.step)
+    assert timer.seconds.keys() == parts
+    absent = {"contact"} if "contact" in parts else {"cut"}  # no pairs; no bodies
+    assert sum(timer.seconds[part] for part in absent) < 0.05 * sum(timer.seconds.values())
+
+
+def test_a_pair_that_never_meets_changes_nothing(tmp_path):
+    """The same Newton steps and motion as without it: only boxes are compared."""
+    found = []
+    for text in (FAR, BLOCK.replace("0.001", "5").split("contact:")[0]):
+        case = written(tmp_path, text, 0.05)
+        simulation = build(case, MPI.COMM_WORLD, Timer())
+        simulation.initialise(0.0, case.time.step)
+        iterations = [simulation.scheme.step(n * case.time.step, case.time.step).iterations for n in range(5)]
+        found.append((iterations, simulation.snapshots()[0].points))
+    assert found[0][0] == found[1][0]
+    assert np.abs(found[0][1] - found[1][1]).max() < 1e-12
+
+
+def test_probes_only_when_asked(tmp_path):
+    for text in (BEAM, FLOW + RESTING, FLOW + POST):
+        simulation = build(written(tmp_path, text, 0.2), MPI.COMM_WORLD, Timer())
+        simulation.initialise(0.0, 0.01)
+        assert simulation.probes() == {}
 
 
 def test_output_only_when_asked(tmp_path, monkeypatch):
