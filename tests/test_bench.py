@@ -3,12 +3,13 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 from programs import fsci
 
-from fsci.bench import linear, small
+from fsci.bench import hertz, linear, small, studies
 from fsci.bench.compare import compare
 from fsci.bench.families import FAMILIES
-from fsci.bench.family import front
+from fsci.bench.family import Study, front
 from fsci.bench.front_plot import plot_front
 from fsci.bench.table import show, text
 from fsci.shapes import box
@@ -79,6 +80,39 @@ def test_a_family_measures_each_option_and_resolution(tmp_path):
     assert rows[0]["front"] == "*"
     plot_front(rows, "two runs", tmp_path / "front.png")
     assert (tmp_path / "front.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_family_of_a_case_of_its_own():
+    """A bar hits a wall; the errors are those of momentum and depth."""
+    bar = FAMILIES["bar_impact"]
+    (row,) = replace(bar, options={"": {}}, resolutions=dict([*bar.resolutions.items()][:1])).run()
+    assert row["error [%]"] == max(row["momentum.x final [%]"], row["centre.x min [%]"]) < 6.0
+
+
+def test_a_study_has_its_front(tmp_path):
+    """Runs without a memory of their own have no panel for it."""
+    rows = [{"option": "a", "resolution": str(n), "unknowns": n, "time [s]": n, "error [%]": 1 / n} for n in (1.0, 2.0)]
+    found = Study("words", lambda: rows).run()
+    assert [row["front"] for row in found] == ["*", "*"]
+    plot_front(found, "two runs", tmp_path / "front.png")
+    assert (tmp_path / "front.png").stat().st_size > 0
+
+
+def test_second_order_ball():
+    """Nodes of a coarse mesh of second order lie on the ball as those of a finer one of first order do."""
+    coarse, fine = hertz.quarter_ball(2, 6, order=2), hertz.quarter_ball(2, 6)
+    assert len(coarse.points) > 6 * len(fine.points)
+    corners = coarse.points[np.unique(coarse.cells[:, :8])]
+    assert np.abs(np.sort(corners, axis=0) - np.sort(fine.points, axis=0)).max() < 1e-12
+
+
+def test_studies_measure_what_they_say(monkeypatch):
+    """Few cells: the drag in a film of 0.2 cells, and the flow around a sphere."""
+    monkeypatch.setattr(studies, "FILM_CELLS", (0.1,))
+    rows = studies.film()
+    assert [row["option"] for row in rows] == ["q1q1", "q2q1"]
+    assert rows[1]["error [%]"] < 3.0 < rows[0]["error [%]"]
+    assert studies.decay("q1q1", "bdf2", 6)["error [%]"] < 5.0
 
 
 def test_ratios_to_earlier_results():

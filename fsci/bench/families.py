@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from fsci.bench.family import Family
+from fsci.bench import hertz, studies
+from fsci.bench.family import Family, Study
+from fsci.bench.scenes import BAR, CANTILEVER
 
 
 def _grid_2d1(scale: float) -> dict[str, Any]:
@@ -28,9 +30,19 @@ def _steps(*steps: float) -> dict[str, dict[str, Any]]:
     return {f"{step:g} s": {"time.step": step} for step in steps}
 
 
-FLAG = "structure.bodies.flag.mesh"
+FLAG, BEAM, BAR_MESH = (f"structure.bodies.{name}.mesh" for name in ("flag", "beam", "bar"))
 
-FAMILIES = {
+FAMILIES: dict[str, Family | Study] = {
+    "cantilever": Family(
+        CANTILEVER,
+        "a beam bent by a force on its end, neo-Hookean, 3D",
+        {
+            "hex8": {},
+            "hex27": {f"{BEAM}.order": 2},
+            "tet10": {f"{BEAM}.order": 2, f"{BEAM}.cell": "tet"},
+        },
+        {f"{n} x {n // 10} x {n // 10}": {f"{BEAM}.cells": [n, n // 10, n // 10]} for n in (10, 20, 40)},
+    ),
     "csm1": Family(
         "csm1",
         "Turek-Hron CSM1, a flag under its weight",
@@ -78,4 +90,23 @@ FAMILIES = {
         {"bdf2": {"fluid.scheme": "bdf2"}, "backward_euler": {"fluid.scheme": "backward_euler"}},
         _steps(0.1, 0.05),
     ),
+    "bar_impact": Family(
+        BAR,
+        "an elastic bar hits a wall: exact momentum and depth",
+        {f"rho_inf {r:g}": {"structure.dynamics.rho_inf": r} for r in (1.0, 0.8, 0.0)},
+        {f"{n} cells": {f"{BAR_MESH}.cells": [n, 1], "time.step": 1.0 / n} for n in (10, 40, 160)},
+    ),
+    "two_tori": Family(
+        "two_tori",
+        "two tori collide: energy that is lost or gained",
+        {f"steps of {step:g}": {"time.step": step} for step in (0.1, 0.05)},
+        {
+            f"{n} x {n // 2}": {f"structure.bodies.{body}.mesh.cells": [n, n // 2, 1] for body in ("lower", "upper")}
+            for n in (20, 40)
+        },
+        values=("energy.total",),
+    ),
+    "hertz_front": Study("a ball pressed onto a plane: error of the pressure", hertz.measure),
+    "film": Study("a cylinder that approaches a wall, gap of 0.02 radii: error of the drag", studies.film),
+    "beltrami": Study("Ethier and Steinman's flow around a cut sphere: error of the velocity", studies.beltrami),
 }

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -26,7 +27,7 @@ class Family:
     A run has the settings of all, of its option and of its resolution.
     """
 
-    case: str  #: folder in `cases/`
+    case: str | Mapping[str, Any]  #: folder in `cases/`, or the content of a case
     words: str
     options: Mapping[str, Settings]  #: what is compared: elements, schemes
     resolutions: Mapping[str, Settings]  #: coarse to fine
@@ -35,19 +36,23 @@ class Family:
 
     def run(self) -> list[Row]:
         """A row for each option and resolution; those on the front have a star."""
-        with TemporaryDirectory() as folder:
-            rows = [
-                {"option": option, "resolution": resolution, **self._measure(Path(folder) / "out", [first, second])}
-                for (option, first), (resolution, second) in product(self.options.items(), self.resolutions.items())
-            ]
-        on_front = front([(float(row[TIME]), float(row[ERROR])) for row in rows])
-        return [{**row, FRONT: "*" if on else ""} for row, on in zip(rows, on_front, strict=True)]
+        with TemporaryDirectory() as name:
+            folder = Path(name)
+            case = folder if isinstance(self.case, Mapping) else CASES / self.case
+            if isinstance(self.case, Mapping):
+                (folder / "case.yaml").write_text(json.dumps(self.case))
+            return starred(
+                [
+                    {"option": option, "resolution": resolution, **self._measure(case, folder / "out", [first, second])}
+                    for (option, first), (resolution, second) in product(self.options.items(), self.resolutions.items())
+                ]
+            )
 
-    def _measure(self, out: Path, parts: Sequence[Settings]) -> Row:
+    def _measure(self, case: Path, out: Path, parts: Sequence[Settings]) -> Row:
         settings: dict[str, Any] = {"output.fields_every": 0, **(self.all or {})}
         for part in parts:
             settings |= part
-        summary, seconds = run_timed(CASES / self.case, out, settings)
+        summary, seconds = run_timed(case, out, settings)
         errors = {
             f"{check['name']} [%]": 100.0 * abs(check["value"] / check["reference"] - 1.0)
             for check in summary["verify"]
@@ -64,6 +69,24 @@ class Family:
 
     def _counts(self, name: str) -> bool:
         return not self.values or name.split()[0] in self.values
+
+
+@dataclass(frozen=True)
+class Study:
+    """Runs that are not made of a case: their rows have an option, a resolution, unknowns, a time and an error."""
+
+    words: str
+    measure: Callable[[], list[Row]]
+
+    def run(self) -> list[Row]:
+        """Those on the front have a star."""
+        return starred(self.measure())
+
+
+def starred(rows: list[Row]) -> list[Row]:
+    """Rows with a star on those of the front of time and error."""
+    on_front = front([(float(row[TIME]), float(row[ERROR])) for row in rows])
+    return [{**row, FRONT: "*" if on else ""} for row, on in zip(rows, on_front, strict=True)]
 
 
 def front(points: Sequence[tuple[float, float]]) -> list[bool]:

@@ -46,7 +46,7 @@ def _growing(length: float, h: float, ratio: float, largest: float) -> Array:
     while sum(steps) < length:
         h = min(h * ratio, largest)
         steps.append(h)
-    return np.cumsum(steps) * (length / sum(steps))
+    return np.cumsum(steps) * (length / sum(steps)) if steps else np.zeros(0)
 
 
 def polygon(centre: tuple[float, float], radius: float, count: int) -> Array:

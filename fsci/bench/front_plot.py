@@ -19,9 +19,11 @@ def plot_front(rows: Sequence[Row], title: str, path: Path) -> None:
     from fsci.plot.curves import COLOURS, DOTS, STYLE
 
     with plt.rc_context(STYLE):
-        figure, panels = plt.subplots(1, 3, figsize=(12.0, 4.2), sharey=True, layout="constrained")
+        costs = [cost for cost in (TIME, UNKNOWNS, MEMORY) if cost in rows[0]]
+        size = (4.0 * len(costs), 4.2)
+        figure, panels = plt.subplots(1, len(costs), figsize=size, sharey=True, layout="constrained")
         options = list(dict.fromkeys(str(row["option"]) for row in rows))
-        for panel, cost in zip(panels, (TIME, UNKNOWNS, MEMORY), strict=True):
+        for panel, cost in zip(panels, costs, strict=True):
             for number, option in enumerate(options):
                 points = [(float(row[cost]), float(row[ERROR])) for row in rows if row["option"] == option]
                 panel.loglog(*zip(*points, strict=True), "o-", color=COLOURS[number % len(COLOURS)], label=option)

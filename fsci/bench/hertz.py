@@ -16,6 +16,7 @@ from scipy.optimize import brentq
 
 from coupling.contact_surfaces import contact_surface
 from fsci import shapes
+from fsci.bench.family import ERROR, TIME, UNKNOWNS
 from fsci.bench.table import Row
 from solvers.contact.contact import Contact
 from solvers.contact.pair import Pair
@@ -74,20 +75,20 @@ def graded(cells: int, outer: int) -> Array:
     return np.concatenate([np.linspace(0.0, CORE, cells + 1), CORE + edge * np.cumsum(factor**powers)])
 
 
-def quarter_ball(per_radius: int, outer: int) -> Mesh:
+def quarter_ball(per_radius: int, outer: int, order: int = 1) -> Mesh:
     """Hexahedra, `per_radius` along the radius of contact; `outer` ones from there to the sides of the block."""
     cells = round(CORE * per_radius)
     across, up = graded(cells, outer), graded(max(2, cells), outer)
-    unit = shapes.box([1, 1, 1], [len(across) - 1, len(across) - 1, len(up) - 1])
-    index = np.rint(unit.points * (np.array([len(across)] * 2 + [len(up)]) - 1)).astype(int)
-    x, y, z = across[index[:, 0]], across[index[:, 1]], up[index[:, 2]]
+    unit = shapes.box([1, 1, 1], [len(across) - 1, len(across) - 1, len(up) - 1], order=order)
+    index = np.rint(order * unit.points * (np.array([len(across)] * 2 + [len(up)]) - 1)) / order
+    x, y, z = (np.interp(i, np.arange(len(to)), to) for i, to in zip(index.T, (across, across, up), strict=True))
     low = RADIUS - np.sqrt(RADIUS**2 - x**2 - y**2)
     return replace(unit, points=np.column_stack([x, y, low + (1.0 - low / BLOCK) * z]))
 
 
-def solve(per_radius: int, outer: int) -> Found:
+def solve(per_radius: int, outer: int, order: int = 1) -> Found:
     """Press the ball onto the plane in one step."""
-    structure, contact = build(quarter_ball(per_radius, outer))
+    structure, contact = build(quarter_ball(per_radius, outer, order))
     structure.initialise(0.0, 1.0)
     start, start_cpu = perf_counter(), process_time()
     structure.begin_step(0.0, 1.0)
@@ -141,4 +142,22 @@ def run() -> list[Row]:
                 "pressure error (L2)": found.pressure_error,
             }
         )
+    return rows
+
+
+def measure() -> list[Row]:
+    """First and second order: error of the pressure (L2) against time of the load step."""
+    runs = [
+        ("hex8", 1, 2, 6),
+        ("hex8", 1, 4, 9),
+        ("hex8", 1, 8, 14),
+        ("hex27", 2, 1, 3),
+        ("hex27", 2, 2, 6),
+        ("hex27", 2, 4, 9),
+    ]
+    rows: list[Row] = []
+    for cell, order, per_radius, outer in runs:
+        found = solve(per_radius, outer, order)
+        measured = {UNKNOWNS: found.structure.dofs(), TIME: found.cpu, ERROR: 100.0 * found.pressure_error}
+        rows.append({"option": cell, "resolution": f"{per_radius} cells per radius", **measured})
     return rows

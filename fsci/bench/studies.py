@@ -1,0 +1,130 @@
+"""Runs whose error is measured against a formula: films, and a flow in time around a cut sphere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import process_time
+
+import numpy as np
+from mpi4py import MPI
+
+from fsci import shapes
+from fsci.bench.family import ERROR, TIME, UNKNOWNS
+from fsci.bench.fluid import graded, polygon, zero
+from fsci.bench.table import Row
+from solvers.api import Array
+from solvers.fluid.field import Fluid
+from solvers.fluid.grid import Grid, uniform
+from solvers.fluid.immersed import rigid_body
+from solvers.fluid.patches import Patch
+from solvers.fluid.probes import interpolation
+from solvers.fluid.system import FlowSettings
+from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
+from solvers.tessellation import tessellate
+
+#: Gap between cylinder and wall, in radii
+GAP = 0.02
+FILM_CELLS = (0.2, 0.1, 0.05, 0.02, 0.01)
+
+
+def film() -> list[Row]:
+    """Half a cylinder of radius 1 moves towards a wall: cells of 10 to 0.5 gaps, of the film and below the cylinder."""
+    alpha = np.arccosh(1.0 + GAP)
+    exact = 4.0 * np.pi / (alpha - np.tanh(alpha))  # Jeffrey and Onishi (1981)
+    rows: list[Row] = []
+    for element in ("q1q1", "q2q1"):
+        for h in FILM_CELLS:
+            begin = process_time()
+            fluid = _approaching(element, h)
+            force = 2.0 * fluid.force()["cylinder"].sum(axis=0)[1]
+            found = {UNKNOWNS: fluid.dofs(), TIME: process_time() - begin, ERROR: 100.0 * abs(force / exact - 1.0)}
+            rows.append({"option": element, "resolution": f"gap of {GAP / h:g} cells", **found})
+    return rows
+
+
+def _approaching(element: str, h: float) -> Fluid:
+    x = graded(0.0, 8.0, (0.0, 1.0), h, 1.15, 1.0)
+    y = graded(0.0, 8.0, (0.0, max(4 * h, round((GAP + 0.3) / h) * h)), h, 1.15, 1.0)
+    points = polygon((0.0, 1.0 + GAP), 1.0, 2000)
+    count = np.arange(len(points))
+    down = np.zeros_like(points) - [0.0, 1.0]
+    body = rigid_body("cylinder", points, np.stack([count, np.roll(count, -1)], axis=1), lambda t: (points, down))
+    patches = [
+        Patch("symmetry", ("x-",), "slip"),
+        Patch("free", ("x+", "y+"), "traction", (zero, zero)),
+        Patch("wall", ("y-",), "no_slip"),
+    ]
+    flow = FlowSettings(1.0, 1.0, element=element, scheme="steady", convection=False)  # type: ignore[arg-type]
+    settings = SolverSettings(Tolerance(1e-8), linear="direct")
+    fluid = Fluid(Grid((x, y)), flow, patches, [body], settings, comm=MPI.COMM_SELF)
+    fluid.initialise(0.0, 1.0)
+    fluid.begin_step(0.0, 1.0)
+    fluid.solve()
+    return fluid
+
+
+# ------------------------------------------------------------------------------------------- Ethier and Steinman
+
+A, D = np.pi / 4, np.pi / 2  #: parameters of the flow in [-1, 1]^3; viscosity and density are 1
+END = 0.2
+
+
+def _component(i: int) -> Callable[[Array, float], Array]:
+    """u_i = -a (exp(a x_i) sin(a x_j + d x_k) + exp(a x_k) cos(a x_i + d x_j)) exp(-d^2 t), (i, j, k) in a cycle.
+
+    Source: C. R. Ethier, D. A. Steinman, Int. J. Numer. Meth. Fluids 19 (1994) 369-375.
+    """
+    j, k = (i + 1) % 3, (i + 2) % 3
+
+    def value(x: Array, t: float) -> Array:
+        first = np.exp(A * x[i]) * np.sin(A * x[j] + D * x[k])
+        second = np.exp(A * x[k]) * np.cos(A * x[i] + D * x[j])
+        return -A * (first + second) * np.exp(-(D**2) * t)
+
+    return value
+
+
+VELOCITY = tuple(_component(i) for i in range(3))
+
+
+def beltrami() -> list[Row]:
+    """A decaying flow whose velocity is given on the box and on a sphere in it; the step is 0.4 of a cell."""
+    rows: list[Row] = []
+    for element, scheme in (("q1q1", "backward_euler"), ("q1q1", "bdf2"), ("q2q1", "backward_euler"), ("q2q1", "bdf2")):
+        for cells in (4, 8) if element == "q2q1" else (8, 12, 16):
+            found = decay(element, scheme, cells)
+            rows.append({"option": f"{element}, {scheme}", "resolution": f"{cells}^3, {cells // 2} steps", **found})
+    return rows
+
+
+def decay(element: str, scheme: str, cells: int) -> Row:
+    """One run of it: unknowns, seconds of the processor, error of the velocity over its size."""
+    begin, steps = process_time(), cells // 2
+    facets, nodes = tessellate(mesh := shapes.sphere(0.453, [16, 1]))
+    points = mesh.points[nodes] + [0.03, -0.04, 0.01]
+    body = rigid_body(
+        "sphere", points, facets, lambda t: (points, np.stack([u(points.T, t) for u in VELOCITY], axis=1))
+    )
+    patch = Patch("box", ("x-", "x+", "y-", "y+", "z-", "z+"), "velocity", VELOCITY)
+    flow = FlowSettings(1.0, 1.0, element=element, scheme=scheme, initial_velocity=VELOCITY)  # type: ignore[arg-type]
+    settings = SolverSettings(Tolerance(1e-6))
+    fluid = Fluid(uniform([-1] * 3, [1] * 3, [cells] * 3), flow, [patch], [body], settings, comm=MPI.COMM_SELF)
+    dt = END / steps
+    fluid.initialise(0.0, dt)
+    for number in range(steps):
+        fluid.begin_step(number * dt, dt)
+        fluid.solve()
+        fluid.end_step()
+    seconds = process_time() - begin
+    side = np.linspace(-1.0, 1.0, 14)[1:-1]  # not at nodes, where errors are smaller
+    x = np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3)
+    x = x[np.linalg.norm(x - points.mean(axis=0), axis=1) > 0.47]
+    exact = np.stack([u(x.T, END) for u in VELOCITY], axis=1)
+    at = (interpolation(fluid, fluid.unknowns.velocity, fluid.unknowns.degree, place) for place in x)
+    off = np.array([weights @ fluid.flow[dofs] for dofs, weights in at]) - exact
+    return {
+        UNKNOWNS: fluid.dofs(),
+        TIME: seconds,
+        ERROR: 100.0 * float(np.sqrt((off**2).sum() / (exact**2).sum())),
+    }
