@@ -61,7 +61,7 @@ def test_first_steps(folder, tmp_path):
 
 @pytest.mark.parametrize(
     "name",
-    ["csm1", "csm2", "csm3", "cavity", "cook_membrane"]
+    ["csm1", "csm2", "csm3", "cavity", "cook_membrane", "sealed_plate"]
     + [
         pytest.param(name, marks=pytest.mark.slow)
         for name in (
