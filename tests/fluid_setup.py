@@ -86,9 +86,10 @@ def body(name: str, points, facets, *, motion=None, velocity=0.0, wet=None) -> I
     return ImmersedBody(surface, lambda t: Motion(*motion(points, t)))
 
 
-def with_slip(immersed: ImmersedBody, length: float) -> ImmersedBody:
-    """The body with a slip length [m]."""
-    return replace(immersed, surface=replace(immersed.surface, slip_length=length))
+def with_slip(immersed: ImmersedBody, length: float, transmissivity: float = 0.0) -> ImmersedBody:
+    """The body with a slip length [m] and a transmissivity [m^3]."""
+    surface = replace(immersed.surface, slip_length=length, transmissivity=transmissivity)
+    return replace(immersed, surface=surface)
 
 
 def loop(count: int) -> np.ndarray:

@@ -35,28 +35,37 @@ def stretched(h: float, fine: float, end: float, growth: float) -> np.ndarray:
     return np.array(planes)
 
 
-def film_force(dim: int, gap: float, *, slip: float = 0.0) -> float:
+def film_force(dim: int, gap: float, *, slip: float = 0.0, transmissivity: float = 0.0) -> float:
     """F / (mu V) of the film alone in the limit of small gaps, whose height is gap + r^2 / 2 (lubrication theory).
 
-    With the flux T p' / mu, T = g^3 / 12 + slip g^2 / 2 between two walls with a slip length, F = 2 int x^2 / T dx (2D)
-    and pi / 2 int r^3 / T dr (3D).
+    With the flux T p' / mu, T = g^3 / 12 + slip g^2 / 2 + transmissivity (slip: slip length of both walls), it is
+    F = 2 int x^2 / T dx in 2D and pi / 2 int r^3 / T dr in 3D.
     """
     # r = tan(s): a smooth integrand over a finite interval
-    places, weights = np.polynomial.legendre.leggauss(4000)
+    places, weights = np.polynomial.legendre.leggauss(400)
     s = np.pi / 4 * (places + 1.0)
     r, dr = np.tan(s), np.pi / 4 * weights / np.cos(s) ** 2
     g = gap + r**2 / 2
-    T = g**3 / 12.0 + slip * g**2 / 2.0
+    T = g**3 / 12.0 + slip * g**2 / 2.0 + transmissivity
     return float(dr @ (2.0 * r**2 / T if dim == 2 else np.pi / 2 * r**3 / T))
 
 
 def approaching(
-    dim: int, gap: float, h: float, element: str, *, size=8.0, growth=1.15, fine=1.0, slip: float = 0.0
+    dim: int,
+    gap: float,
+    h: float,
+    element: str,
+    *,
+    size=8.0,
+    growth=1.15,
+    fine=1.0,
+    slip: float = 0.0,
+    transmissivity=0.0,
 ) -> Fluid:
     """A body of radius 1 at rest for an instant, its surface moving down to the wall y = 0 (z = 0) with velocity 1.
 
     Half of the cylinder, a quarter of the sphere; free outer boundary. Cells of size h near the gap. slip: slip length
-    of both walls.
+    of both walls; transmissivity: of the body's surface.
     """
     sides = stretched(h, fine, size, growth)
     up = stretched(h, max(4 * h, round((gap + 0.3) / h) * h), size, growth)
@@ -72,7 +81,7 @@ def approaching(
         ]
     face = ("xyz"[dim - 1] + "-",)
     wall = Patch("wall", face, "slip_length", field(slip)) if slip else Patch("wall", face, "no_slip")
-    moving = with_slip(body("body", points, facets, velocity=down), slip)
+    moving = with_slip(body("body", points, facets, velocity=down), slip, transmissivity)
     grid = Grid((*[sides] * (dim - 1), up))
     fluid = make_fluid(grid, [*planes, wall], [moving], element=element, scheme="steady", convection=False)
     solve_steady(fluid)
@@ -91,6 +100,13 @@ def slip_ratio(dim: int, gap: float, h: float, element: str, slip: float, **opti
     force = approaching(dim, gap, h, element, slip=slip, **options).force()["body"].sum(axis=0)[-1]
     exact = cylinder_drag(gap) if dim == 2 else 6.0 * np.pi * sphere_drag(gap)
     return float(force * 2 ** (dim - 1) / (film_force(dim, gap, slip=slip) + exact - film_force(dim, gap)))
+
+
+def seepage_ratio(dim: int, gap: float, h: float, element: str, transmissivity: float, **options) -> float:
+    """Computed drag over that of the film with transmissivity alone."""
+    fluid = approaching(dim, gap, h, element, transmissivity=transmissivity, **options)
+    force = fluid.force()["body"].sum(axis=0)[-1] * 2 ** (dim - 1)
+    return float(force / film_force(dim, gap, transmissivity=transmissivity))
 
 
 def closing_ratios(h: float, steps: int, dt: float, **settings) -> list[tuple[float, float]]:

@@ -18,6 +18,12 @@ BOX_SURFACES = "(available: left, right, front, back, bottom, top)"
 
 #: what is replaced, by what, the message with line and column, the text that stands there
 MISTAKES = [
+    (
+        "  pairs:\n",
+        "  film: {roughness: 0.1}\n  pairs:\n",
+        "15:9: 'film' is of the fluid between surfaces: it needs the section 'fluid'",
+        "{rough",
+    ),
     ("body: block, on: top", "body: blok, on: top", "16:27: unknown body 'blok'; did you mean 'block'?", "blok"),
     (
         "body: block, on: top",
@@ -77,7 +83,7 @@ MISTAKES = [
     (
         "contact:\n",
         "contact:\n  gap: 1\n",
-        "10:3: unknown setting 'gap' (available: pairs, bodies, friction, reach, obstacles, c_n)",
+        "10:3: unknown setting 'gap' (available: pairs, bodies, friction, reach, obstacles, film, c_n)",
         "gap",
     ),
     (

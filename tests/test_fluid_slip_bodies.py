@@ -85,7 +85,7 @@ def test_no_shear_stress(element):
     assert fluid.force()["wall"].sum(axis=0) @ [np.cos(0.4), np.sin(0.4)] == pytest.approx(0.0, abs=1e-9)
 
 
-def moving(dim, element, length):
+def moving(dim, element, length, transmissivity=0.0):
     """A body that moves through the box, with a flow without any symmetry."""
     if dim == 2:
         points, facets = circle((0.47, 0.52), 0.2, 24), loop(24)
@@ -97,8 +97,9 @@ def moving(dim, element, length):
         Patch("open", ("x+",), "outflow"),
         Patch("rest", ("x-", "y-", "y+", "z-", "z+")[: 2 * dim - 1], "no_slip"),
     ]
+    mover = with_slip(mover, length, transmissivity)
     fluid = make_fluid(
-        uniform([0] * dim, [1] * dim, [5] * dim if dim == 2 else [3] * dim), patches, [with_slip(mover, length)],
+        uniform([0] * dim, [1] * dim, [5] * dim if dim == 2 else [3] * dim), patches, [mover],
         rho=1.2, mu=0.03, element=element, scheme="backward_euler", dt=0.05,
     )  # fmt: skip
     fluid.begin_step(0.0, 0.05)
@@ -106,7 +107,14 @@ def moving(dim, element, length):
     return fluid
 
 
-MOVING = [(2, "q1q1", 0.05), (2, "q2q1", 0.05), (3, "q1q1", 2.0), (2, "q1q1", np.inf)]
+MOVING = [
+    (2, "q1q1", 0.05),
+    (2, "q2q1", 0.05),
+    (3, "q1q1", 2.0),
+    (2, "q1q1", np.inf),
+    (2, "q2q1", 0.05, 1e-4),
+    (3, "q1q1", 0.0, 1e-3),
+]
 
 
 @pytest.mark.parametrize("case", MOVING)

@@ -43,7 +43,7 @@ def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Immer
     assert case.fluid is not None
     settings, linear = case.fluid, case.solver.linear
     solver = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
-    bodies = [_with_slip(case, body) for body in bodies]
+    bodies = [_with_layer(case, body) for body in bodies]
     grid, flow, patches = Grid(settings.grid.planes), _flow(settings), _patches(settings)
     try:
         return Fluid(grid, flow, patches, bodies, solver, timer=timer, comm=comm)
@@ -83,12 +83,18 @@ def _patches(settings: FluidSection) -> list[Patch]:
 # ---------------------------------------------------------------------------------------------------------- bodies
 
 
-def _with_slip(case: Case, body: ImmersedBody) -> ImmersedBody:
+def _with_layer(case: Case, body: ImmersedBody) -> ImmersedBody:
+    """The body with what the flow finds along its surface."""
     assert case.fluid is not None
-    name = body.surface.name
+    name, film = body.surface.name, 0.0 if case.contact is None else case.contact.film.value
     settings = case.fluid.bodies.get(name) or case.elastic_bodies.get(name)
-    length = 0.0 if settings is None else settings.slip_length
-    return replace(body, surface=replace(body.surface, slip_length=length)) if length else body
+    if settings is None:
+        return body
+    touches = film and name in case.bodies_in_contact
+    return replace(
+        body,
+        surface=replace(body.surface, slip_length=settings.slip_length, transmissivity=film if touches else 0.0),
+    )
 
 
 def read_surface(case: Case, name: str, comm: MPI.Comm) -> tuple[Array, NDArray[np.int64]]:

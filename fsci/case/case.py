@@ -67,6 +67,15 @@ class Case(Section):
         return {} if self.structure is None else self.structure.bodies
 
     @property
+    def bodies_in_contact(self) -> set[str]:
+        """Elastic bodies that may touch something."""
+        if self.contact is None:
+            return set()
+        named = self.elastic_bodies if self.contact.bodies == "all" else self.contact.bodies or ()
+        sides = [side for pair in self.contact.pairs.values() for _, side in pair.sides]
+        return {*named, *(side.body for side in sides if side.body is not None)}
+
+    @property
     def rigid(self) -> dict[str, Free] | None:
         """Rigid bodies that the flow moves; None without any."""
         return (self.fluid.free_bodies or None) if self.fluid is not None else None

@@ -124,6 +124,8 @@ def _contact(case: Case, contact: ContactSection) -> Iterator[Mistake]:
     if not contact.pairs and contact.bodies is None:
         missing: Keys = ("contact", "pairs") if "pairs" in contact.model_fields_set else ("contact",)
         yield missing, "'contact' needs 'pairs', or 'bodies: all' to have them found"
+    if contact.film.value and case.fluid is None:
+        yield ("contact", "film"), "'film' is of the fluid between surfaces: it needs the section 'fluid'"
     for setting in ("friction", "reach"):
         if setting in contact.model_fields_set and contact.bodies is None:
             yield ("contact", setting), f"'{setting}' is for the pairs that 'bodies' asks for"

@@ -108,6 +108,31 @@ class ObstacleSection(Section):
     motion: Vector | None = setting(None, "displacement; default: at rest", unit="m")
 
 
+class FilmSection(Section):
+    """How easily fluid passes between surfaces that touch or nearly do, by the one or the other number.
+
+    Bodies in contact have a rough or porous layer on all of their surface; between two of them fluid passes in both.
+    """
+
+    transmissivity: NotNegative | None = setting(
+        None, "flux in the layer per width, over pressure gradient / viscosity", unit="m^3"
+    )
+    roughness: NotNegative | None = setting(
+        None, "instead of it: height of a gap that lets as much through, transmissivity = roughness^3 / 12", unit="m"
+    )
+
+    @model_validator(mode="after")
+    def _one_of_them(self) -> FilmSection:
+        if self.transmissivity is not None and self.roughness is not None:
+            raise fault("give either 'transmissivity' or 'roughness', not both", "roughness")
+        return self
+
+    @property
+    def value(self) -> float:
+        """Transmissivity of a surface [m^3]."""
+        return (self.roughness or 0.0) ** 3 / 12.0 if self.transmissivity is None else self.transmissivity
+
+
 class ContactSection(Section):
     """Contact by dual mortar multipliers."""
 
@@ -120,4 +145,5 @@ class ContactSection(Section):
         None, "distance up to which surfaces are a pair at the start; default: the extent of the smaller body", unit="m"
     )
     obstacles: dict[Name, ObstacleSection] = setting(dict, "rigid surfaces by name")
+    film: FilmSection = setting(FilmSection, "layer on the surfaces, in which fluid passes; default: none")
     c_n: Positive = setting(1.0, "factor of the complementarity parameter; the result does not depend on it", unit="1")

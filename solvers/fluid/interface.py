@@ -13,15 +13,16 @@ Source: Massing, Schott, Wall, Comput. Methods Appl. Mech. Engrg. 328 (2018) 262
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.fluid.cell_blocks import CellBlocks, cell_blocks
 from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.seepage import release_terms, seepage_terms
 from solvers.fluid.slip import PieceIntegrals, SlipTerms, slip_terms
 from solvers.fluid.space import Unknowns
 from solvers.fluid.weights import Weights
@@ -42,8 +43,9 @@ class InterfaceTerms:
         mu: float,
         penalty: Array,
         slip_length: Array | None = None,
+        transmissivity: Array | None = None,
     ):
-        """penalty: P by pieces [Pa s/m]; slip_length: by facets [m], None where the flow sticks to all of them."""
+        """penalty: P by pieces [Pa s/m]; slip_length [m], transmissivity [m^3]: by facets, None where all are zero."""
         pieces = cut.pieces
         mine = cut.cut[pieces.cell] < grid.owned
         cells = cut.cut[pieces.cell[mine]]
@@ -53,7 +55,6 @@ class InterfaceTerms:
         self.corners = cut.facets[pieces.facet[mine]]
         self.x = cut.motion.x[self.corners]
         self.sizes = grid.sizes[cells]
-        self.cells = cells  #: local cell of each piece, sorted
         self.u, self.p = unknowns.cell_velocity[cells], unknowns.cell_pressure[cells]
         phi, gradient = rule.velocity_table
         psi, psi_gradient = rule.pressure_table
@@ -65,11 +66,19 @@ class InterfaceTerms:
         self.normal_slope = np.einsum("pavj,pj->pav", self.grad, self.n)
         slope = np.tensordot(moments.sum(axis=2), psi_gradient, (1, 0))
         self.pressure_slope = slope / self.sizes[:, None, :]
-        self.slip: SlipTerms | None = None
+        self.slip: SlipTerms | None = None  #: of slip and seepage together
+        self.cell_blocks: list[CellBlocks] = []  #: what both add to the rows of the flow
+        facet = pieces.facet[mine]
+        at = PieceIntegrals(self.n, moments.sum(axis=2), self.phi, self.grad, self.mass_of_pieces, self.sizes)
         if slip_length is not None:
-            at = PieceIntegrals(self.n, moments.sum(axis=2), self.phi, self.grad, self.mass_of_pieces, self.sizes)
-            length = slip_length[pieces.facet[mine]]
-            self.slip = slip_terms(at, rule.velocity_table, mu, self.penalty, length)
+            self.slip = slip_terms(at, rule.velocity_table, mu, self.penalty, slip_length[facet])
+        if transmissivity is not None:
+            mobility = transmissivity[facet] / mu
+            released = release_terms(at, rule.velocity_table, mu, self.penalty, mobility)
+            self.slip = released if self.slip is None else self.slip + released
+            self.cell_blocks = [cell_blocks(cells, self.p, seepage_terms(at, psi_gradient, mobility))]
+        if self.slip is not None:
+            self.cell_blocks.append(cell_blocks(cells, self.u, self.slip.flow))
 
     def velocity_terms(self, g: Array) -> Array:
         """C g at local dofs, the ghosts' share still there; g [m/s] of shape (vertices, dim)."""
@@ -98,22 +107,6 @@ class InterfaceTerms:
         total = np.zeros((self.vertices, n.shape[1]))
         np.add.at(total, self.corners, force)
         return total
-
-    def slip_rows(self, flow: Array) -> Array:
-        """What slip adds to the rows of a flow, all at local dofs, the ghosts' share still there."""
-        size = self._unknowns.local
-        if self.slip is None:
-            return np.zeros(size)
-        rows = np.einsum("pakbl,pbl->pak", self.slip.flow, flow[self.u])
-        return np.bincount(self.u.ravel(), rows.ravel(), size).astype(float)
-
-    def slip_blocks(self) -> Iterator[tuple[NDArray[np.int32], Array]]:
-        """Their derivatives: (local dofs, block) of each cell."""
-        if self.slip is None or not len(self.u):
-            return
-        size, (_, first) = self.u[0].size, np.unique(self.cells, return_index=True)
-        blocks = np.add.reduceat(self.slip.flow, first, axis=0).reshape(-1, size, size)
-        yield from zip(self.u[first].reshape(-1, size).astype(np.int32), blocks, strict=True)
 
     @cached_property
     def coupling_blocks(self) -> CouplingBlocks:

@@ -30,6 +30,9 @@ class SlipTerms:
     coupling: Array  #: d(rows)/dg, (pieces, functions, dim, vertices, dim)
     mass: Array  #: -d(force)/dg, (pieces, vertices, dim, vertices, dim)
 
+    def __add__(self, other: SlipTerms) -> SlipTerms:
+        return SlipTerms(self.flow + other.flow, self.coupling + other.coupling, self.mass + other.mass)
+
 
 @dataclass(frozen=True)
 class PieceIntegrals:
@@ -62,7 +65,7 @@ def slip_terms(at: PieceIntegrals, table: tuple[Array, Array], mu: float, penalt
     functions = table[0].shape[1]
     flow = np.zeros((len(n), functions, dim, functions, dim))
     slips = np.flatnonzero(kappa > 0.0)
-    for some in np.split(slips, range(AT_ONCE, len(slips), AT_ONCE)):
+    for some in (slips[first : first + AT_ONCE] for first in range(0, len(slips), AT_ONCE)):
         flow[some] = _squares(n[some], at.area[some] * -kappa[some, None], at.sizes[some], table, mu, s[some])
     return SlipTerms(flow, -factor * coupling, -factor * s[:, None, None, None, None] * mass)
 

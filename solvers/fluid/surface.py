@@ -21,6 +21,7 @@ class ImmersedSurface:
     wet: NDArray[np.bool_] | None = None  #: facets that the fluid touches; the others only close the solid; None: all
     may_part: NDArray[np.bool_] | None = None  #: facets in contact: those on the boundary of the box may leave it
     slip_length: float = 0.0  #: shear stress = mu / slip_length times the velocity along it [m]; 0: the flow sticks
+    transmissivity: float = 0.0  #: fluid passes along it in a thin layer, this / mu grad p [m^3]; 0: there is none
 
 
 @dataclass(frozen=True)
@@ -48,11 +49,11 @@ def wetness(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_]:
     return np.concatenate([*parts, np.empty(0, dtype=bool)])
 
 
-def slip_lengths(surfaces: Sequence[ImmersedSurface]) -> Array | None:
-    """Of the facets of all surfaces [m]; None if the flow sticks to all of them."""
-    if not any(surface.slip_length for surface in surfaces):
+def by_facets(surfaces: Sequence[ImmersedSurface], numbers: Sequence[float]) -> Array | None:
+    """Numbers of surfaces for all of their facets; None if all are zero."""
+    if not any(numbers):
         return None
-    return np.concatenate([np.full(len(surface.facets), surface.slip_length) for surface in surfaces])
+    return np.concatenate([np.full(len(s.facets), number) for s, number in zip(surfaces, numbers, strict=True)])
 
 
 def offsets(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.int64]:

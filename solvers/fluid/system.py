@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Literal
 
 import numpy as np
@@ -104,6 +105,7 @@ class FlowSystem:
         self._pattern: Pattern | None = None
         self.cut: Cut | None = None
         self.slip_length: Array | None = None  #: of the facets of all surfaces [m]; None: the flow sticks to them
+        self.transmissivity: Array | None = None  #: the same of a layer on them [m^3]; None: there is none
         self._interface: InterfaceTerms | None = None
         self._current = False  #: weights, interface and ghost penalty are those of cut and scales
 
@@ -245,7 +247,14 @@ class FlowSystem:
             penalty = self._interface_penalties(cut.pieces, cut)
             self.weights.set(cut, penalty)
             self._interface = InterfaceTerms(
-                self.grid, self.unknowns, self.weights, cut, self.settings.viscosity, penalty, self.slip_length
+                self.grid,
+                self.unknowns,
+                self.weights,
+                cut,
+                self.settings.viscosity,
+                penalty,
+                self.slip_length,
+                self.transmissivity,
             )
         self._assemble_ghost_penalty()
         self._current = True
@@ -297,7 +306,8 @@ class FlowSystem:
             fem.assemble_vector(form, self._out)
         if self.with_bodies:
             self._out += self.interface.velocity_terms(self.cut.motion.v)
-            self._out += self.interface.slip_rows(self.flow.x.array)
+            for terms in self.interface.cell_blocks:
+                self._out += terms.rows(self.flow.x.array)
         self._add_covered(self._out)
         fem.add_ghosts(self.unknowns.space, self._out)
         owned = self.unknowns.owned
@@ -322,7 +332,7 @@ class FlowSystem:
         for dofs, blocks in self._outer.slopes(self._outer_on_cut, *self._outer_scales()):
             for at, block in zip(dofs.reshape(len(dofs), -1).astype(PETSc.IntType), blocks, strict=True):
                 matrix.setValuesLocal(at, at, block.reshape(len(at), -1), PETSc.InsertMode.ADD_VALUES)
-        for dofs, block in self.interface.slip_blocks() if self.with_bodies else ():
+        for dofs, block in chain(*self.interface.cell_blocks) if self.with_bodies else ():
             matrix.setValuesLocal(dofs, dofs, block, PETSc.InsertMode.ADD_VALUES)
         self._newton.value = 1.0
         matrix.assemble()
