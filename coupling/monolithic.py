@@ -24,8 +24,8 @@ from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.lagged import Lagged, LaggedFactors
 from solvers.newton import Tolerance, converge
 from solvers.rounding import rounding_error
-from solvers.rows import Numbering, from_entries
-from solvers.vertices import Entries
+from solvers.rows import Numbering, distributed, from_entries
+from solvers.sparse import Sparse
 
 
 class Monolithic:
@@ -150,15 +150,20 @@ class Monolithic:
     def coupling_blocks(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
         """alpha C B, -w B^T C^T S and w alpha B^T M B ; rows of held dofs of the flow are empty."""
         flow, solid = self.coupled.flow, self.coupled.solid
-        entries, B, w = flow.interface_entries(self.coupled.interface.surfaces), solid.jacobian(), solid.force_weight
-        into_flow = self._matrix((flow.size, solid.size), B.times(entries.into_flow))
-        force_by_flow = B.transposed_times(entries.force_by_flow.scaled(-w))
-        force_by_motion = B.times(B.transposed_times(entries.force_by_motion.scaled(-w)))
-        into_solid = self._matrix((solid.size, flow.size), force_by_flow)
-        return into_flow, into_solid, self._matrix((solid.size, solid.size), force_by_motion)
+        entries, w = flow.interface_entries(self.coupled.interface.surfaces), solid.force_weight
+        B = solid.jacobian().transposed(self._numbering.first.getSize())
+        into_flow, force_by_motion = B @ entries.into_flow, B @ (B @ entries.force_by_motion).T
+        return (
+            self._matrix((flow.size, solid.size), into_flow.T),
+            self._matrix((solid.size, flow.size), (-w * (B @ entries.force_by_flow)).ordered()),
+            self._matrix((solid.size, solid.size), -w * force_by_motion.T),
+        )
 
-    def _matrix(self, owned: tuple[int, int], entries: Entries) -> PETSc.Mat:
-        return from_entries(self.comm, owned, entries.rows, entries.columns, entries.values)
+    def _matrix(self, owned: tuple[int, int], parts: Sparse) -> PETSc.Mat:
+        if self.comm.size == 1:
+            return distributed(parts, ((owned[0], None), (owned[1], None)), self.comm)
+        rows, columns = parts.row_numbers().astype(np.int64), parts.indices.astype(np.int64)
+        return from_entries(self.comm, owned, rows, columns, parts.data)
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""

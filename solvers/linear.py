@@ -172,16 +172,8 @@ SOLVERS: Mapping[str, Maker] = {"direct": direct_solver, "iterative": elastic_so
 
 
 def _schwarz_solver(comm, prefix: str, tolerance: float, **more: str | float) -> PETSc.KSP:
-    settings = {
-        "pc_type": "asm",
-        "pc_asm_overlap": 1,
-        "sub_pc_type": "ilu",
-        "sub_pc_factor_levels": 0,
-        "sub_pc_factor_zeropivot": ZERO_PIVOT,
-        **more,
-    }
     options = PETSc.Options(prefix)
-    for name, value in settings.items():
+    for name, value in _incomplete_factors(comm, **more).items():
         options[name] = value
     ksp = PETSc.KSP().create(comm)
     ksp.setOptionsPrefix(prefix)
@@ -193,6 +185,15 @@ def _schwarz_solver(comm, prefix: str, tolerance: float, **more: str | float) ->
     return ksp
 
 
+def _incomplete_factors(comm, **more: str | float) -> dict[str, str | float]:
+    """Options of overlapping subdomains; on one process without them, because the only one would copy the matrix."""
+    given: dict[str, str | float] = {"sub_pc_type": "ilu", "sub_pc_factor_levels": 0, **more}
+    given["sub_pc_factor_zeropivot"] = ZERO_PIVOT
+    if comm.size > 1:
+        return {"pc_type": "asm", "pc_asm_overlap": 1, **given}
+    return {name.removeprefix("sub_"): value for name, value in given.items() if name.startswith("sub_")}
+
+
 def coupled_solver(comm, structure, flow, *, tolerance: float, fill: bool = False) -> PETSc.KSP:
     """FGMRES for structure and flow together; `structure`, `flow`: their rows, as index sets.
 
@@ -200,6 +201,7 @@ def coupled_solver(comm, structure, flow, *, tolerance: float, fill: bool = Fals
     (`fill`: more of both), unless its part, the second one, is set up otherwise.
     Source: Gee, Kuttler, Wall, Int. J. Numer. Meth. Engng 85 (2011) 987-1016.
     """
+    more = {"pc_asm_overlap": 2, "sub_pc_factor_levels": 1} if fill else {}
     options = PETSc.Options("coupled_")
     for name, value in {
         "pc_fieldsplit_type": "multiplicative",
@@ -207,11 +209,7 @@ def coupled_solver(comm, structure, flow, *, tolerance: float, fill: bool = Fals
         "fieldsplit_structure_pc_type": "lu",
         "fieldsplit_structure_pc_factor_mat_solver_type": "mumps",
         "fieldsplit_flow_ksp_type": "preonly",
-        "fieldsplit_flow_pc_type": "asm",
-        "fieldsplit_flow_pc_asm_overlap": 2 if fill else 1,
-        "fieldsplit_flow_sub_pc_type": "ilu",
-        "fieldsplit_flow_sub_pc_factor_levels": 1 if fill else 0,
-        "fieldsplit_flow_sub_pc_factor_zeropivot": ZERO_PIVOT,
+        **{f"fieldsplit_flow_{name}": value for name, value in _incomplete_factors(comm, **more).items()},
     }.items():
         options[name] = value
     ksp = PETSc.KSP().create(comm)

@@ -1,12 +1,14 @@
 """Benchmarks: their tables and command line; the small ones run."""
 
 import json
+import time
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from programs import fsci
 
-from fsci.bench import hertz, linear, small, studies
+from fsci.bench import hertz, linear, profile, small, studies
 from fsci.bench.compare import compare
 from fsci.bench.families import FAMILIES
 from fsci.bench.family import Study, front
@@ -135,3 +137,16 @@ def test_linear_row():
     assert row["dofs"] == 192
     assert 0 < row["iterations"] < 60
     assert min(seconds for name, seconds in row.items() if name.endswith("[s]")) > 0
+
+
+def test_profile():
+    """The parts of a Newton step add up to all that it takes, and each part is found."""
+    begin = time.process_time()
+    found, least = profile.channel(8, 2)
+    seconds = time.process_time() - begin
+    parts = [*profile.PARTS, "Krylov", "rest"]
+    assert found["total"] == pytest.approx(sum(found[part] for part in parts))
+    assert all(found[part] > 0.0 for part in parts)
+    assert found["total"] * 1e-6 * found["unknowns"] * found["newton"] * 2 < seconds
+    assert 0.0 < least["Krylov"] < found["Krylov"]
+    assert found["krylov"] >= 1

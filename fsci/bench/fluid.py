@@ -170,7 +170,8 @@ def ring(count: int, around: int, radius: float, thickness: float, tilt: float) 
     return flat @ turn.T, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
-def channel(cells: int, steps: int, dt: float = 0.05) -> Row:
+def ring_in_channel(cells: int, timer: Timer) -> Fluid:
+    """A tilted ring that sinks through a channel."""
     points, facets = ring(64, 32, 0.5, 0.2, math.radians(65.0))
     speed = np.array([0.0, 0.0, -0.2])
 
@@ -184,9 +185,14 @@ def channel(cells: int, steps: int, dt: float = 0.05) -> Row:
     ]
     body = rigid_body("ring", points, facets, lambda t: (points + t * speed, 0.0 * points + speed))
     flow = FlowSettings(1.0, 0.01, scheme="backward_euler")
-    solver, timer = SolverSettings(Tolerance(1e-6), linear_tolerance=1e-5), Timer()
+    solver = SolverSettings(Tolerance(1e-6), linear_tolerance=1e-5)
     grid = uniform([-1.0] * 3, [1.0] * 3, [cells] * 3)
-    fluid = Fluid(grid, flow, patches, [body], solver, timer=timer, comm=MPI.COMM_SELF)
+    return Fluid(grid, flow, patches, [body], solver, timer=timer, comm=MPI.COMM_SELF)
+
+
+def channel(cells: int, steps: int, dt: float = 0.05) -> Row:
+    timer = Timer()
+    fluid = ring_in_channel(cells, timer)
     fluid.initialise(0.0, dt)
     timer.seconds.clear()
     begin, newton = perf_counter(), 0

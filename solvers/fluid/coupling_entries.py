@@ -1,4 +1,4 @@
-"""The blocks of a monolithic system that belong to the flow's side of the interface, entry by entry.
+"""The blocks of a monolithic system that belong to the flow's side of the interface.
 
 With the operators of `interface` and the derivatives of `shape`, for displacements d of the vertices of some bodies,
 whose velocity is g = alpha d - ..., rows r and force f of the flow change by
@@ -8,25 +8,29 @@ whose velocity is g = alpha d - ..., rows r and force f of the flow change by
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.fluid.interface import InterfaceTerms
+from solvers.fluid.interface import InterfaceTerms, MotionOperator
 from solvers.fluid.shape import shape_derivatives
 from solvers.fluid.space import Unknowns
-from solvers.vertices import Entries
+from solvers.overlap import OverlappingBlocks
+from solvers.sparse import Sparse
 
 
 @dataclass(frozen=True)
 class InterfaceEntries:
-    """Derivatives by motion and flow; each process has those of its cells."""
+    """Derivatives by motion and flow; each process has those of its cells. Rows: dofs of the vertices.
 
-    into_flow: Entries  #: dr/dd: global unknowns of the flow, dofs of the vertices; held rows are empty
-    force_by_flow: Entries  #: df/dw: dofs of the vertices, global unknowns of the flow
-    force_by_motion: Entries  #: df/dd: dofs of the vertices in both
+    Columns of the flow are its global unknowns.
+    """
+
+    into_flow: Sparse  #: dr/dd transposed; held rows of the flow are zero
+    force_by_flow: Sparse  #: df/dw
+    force_by_motion: Sparse  #: df/dd; columns: dofs of the vertices
 
 
 def interface_entries(
@@ -42,20 +46,52 @@ def interface_entries(
     flow, held: velocity and pressure at local dofs, and which of these have no rows. alpha [1/s]: dg/dd.
     """
     by_shape, load_by_shape = shape_derivatives(operator, flow)
-    C = operator.coupling_blocks
-    back = np.concatenate([-C[0].ravel(), C[1].ravel()])
-    into = np.concatenate([(alpha * c + s).ravel() for c, s in zip(C, by_shape, strict=True)])
-    load = (alpha * operator.mass_blocks - load_by_shape).ravel()
+    C = operator.coupling
+    sums = _Sums(operator, unknowns, vertices)
+    into = sums.with_flow(alpha * C + by_shape)
+    into.data[held[into.indices]] = 0.0
+    back = sums.with_flow(replace(-1.0 * C, psi=C.psi))
+    load = sums.with_surface(-alpha * operator.mass_blocks + load_by_shape)
+    if unknowns.grid.comm.size > 1:
+        into, back = (part.with_columns(unknowns.global_dofs, unknowns.size()) for part in (into, back))
+    return InterfaceEntries(into, back, load)
 
-    dim, numbers = operator.dim, unknowns.global_dofs
-    moved = np.full((operator.vertices, dim), -1)  #: dof among the given vertices
-    moved[vertices] = np.arange(len(vertices) * dim).reshape(-1, dim)
-    moved = moved.ravel()
-    rows, columns = operator.pattern
-    of_flow, of_surface, ours = numbers[rows], moved[columns], moved[columns] >= 0
-    kept = ours & ~held[rows]
-    into_flow = Entries(of_flow[kept], of_surface[kept], into[kept])
-    by_flow = Entries(of_surface[ours], of_flow[ours], back[ours])
-    rows, columns = (moved[dofs] for dofs in operator.surface_pattern)
-    ours = (rows >= 0) & (columns >= 0)
-    return InterfaceEntries(into_flow, by_flow, Entries(rows[ours], columns[ours], -load[ours]))
+
+class _Sums:
+    """Matrices from what the pieces have at some of the vertices; rows are these vertices' dofs."""
+
+    def __init__(self, operator: InterfaceTerms, unknowns: Unknowns, vertices: NDArray[np.int64]):
+        self._operator, self._dim, number = operator, operator.dim, np.full(operator.vertices, -1)
+        number[vertices] = np.arange(len(vertices))
+        corner = number[operator.corners]
+        self._ours = corner[:, 0] >= 0  # all vertices of a facet are of the same body
+        self._corner = corner[self._ours]
+        self._shape = (len(vertices), unknowns.local)
+        self._velocity = self._beside(operator.u)
+        self._pressure = self._beside(operator.p[:, :, None])
+
+    def _beside(self, dofs: NDArray[np.int32]) -> OverlappingBlocks:
+        """Functions of the cell of each piece, dofs (pieces, functions, components), beside its vertices."""
+        dofs, vertices = dofs[self._ours], self._corner.shape[1]
+        numbers = np.repeat(dofs, vertices, axis=1).reshape(-1, dofs.shape[2])
+        rows = np.repeat(self._corner[:, None], dofs.shape[1], axis=1).ravel()
+        return OverlappingBlocks(rows, numbers[:, 0], numbers, self._shape, self._shape[1])
+
+    def with_flow(self, coefficients: MotionOperator) -> Sparse:
+        """An operator and its transposed, columns: local dofs of the flow."""
+        at, dim, ours = self._operator, self._dim, self._ours
+        fields = at.fields[ours]
+        turned = np.swapaxes(coefficients.fields[ours], 2, 3).reshape(len(fields), fields.shape[3], dim * dim)
+        velocity = (fields @ turned[:, None]).reshape(-1, dim, dim)
+        if coefficients.blocks is not None:
+            velocity += coefficients.blocks[ours].transpose(0, 1, 3, 4, 2).reshape(-1, dim, dim)
+        pressure = (at.psi[ours][..., None] * coefficients.psi[ours][:, None, None]).reshape(-1, dim, 1)
+        return (self._velocity.matrix(velocity) + self._pressure.matrix(pressure)).ordered()
+
+    def with_surface(self, blocks: Array) -> Sparse:
+        """Blocks (pieces, vertices, vertices, dim, dim), columns: dofs of the vertices."""
+        dim, n, corner = self._dim, self._shape[0], self._corner
+        rows, columns = (np.repeat(corner, corner.shape[1], axis=1).ravel(), np.tile(corner, corner.shape[1]).ravel())
+        numbers = columns[:, None] * dim + np.arange(dim)
+        at = OverlappingBlocks(rows, columns, numbers, (n, n), n * dim)
+        return at.matrix(blocks[self._ours].reshape(-1, dim, dim))

@@ -13,10 +13,10 @@ Source: Massing, Schott, Wall, Comput. Methods Appl. Mech. Engrg. 328 (2018) 262
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.fluid.cell_blocks import CellBlocks, cell_blocks
@@ -27,8 +27,24 @@ from solvers.fluid.slip import PieceIntegrals, SlipTerms, slip_terms
 from solvers.fluid.space import Unknowns
 from solvers.fluid.weights import Weights
 
-#: By pieces: velocity rows (pieces, functions, dim, vertices, dim), pressure rows (pieces, functions, vertices, dim)
-CouplingBlocks = tuple[Array, Array]
+
+@dataclass(frozen=True)
+class MotionOperator:
+    """An operator from the surface's motion to the flow's rows, by pieces."""
+
+    fields: Array  #: of `InterfaceTerms.fields` in velocity rows (pieces, fields, component, component of the motion)
+    psi: Array  #: of psi in pressure rows (pieces, component of the motion)
+    blocks: Array | None = None  #: more in velocity rows (pieces, functions, dim, vertices, dim), with slip
+
+    def __rmul__(self, factor: float) -> MotionOperator:
+        return MotionOperator(
+            factor * self.fields, factor * self.psi, None if self.blocks is None else factor * self.blocks
+        )
+
+    def __add__(self, other: MotionOperator) -> MotionOperator:
+        """Both have blocks, or neither."""
+        blocks = None if self.blocks is None or other.blocks is None else self.blocks + other.blocks
+        return MotionOperator(self.fields + other.fields, self.psi + other.psi, blocks)
 
 
 class InterfaceTerms:
@@ -109,45 +125,24 @@ class InterfaceTerms:
         return total
 
     @cached_property
-    def coupling_blocks(self) -> CouplingBlocks:
-        """C by pieces."""
-        mu, n = self.mu, self.n
-        block = mu * np.einsum("pavi,pk->pakvi", self.grad, n)
-        block -= np.einsum("pki,pav->pakvi", self.penalty, self.phi)
-        for axis in range(self.dim):
-            block[:, :, axis, :, axis] += mu * self.normal_slope
-        if self.slip is not None:
-            block += self.slip.coupling
-        return block, np.einsum("pav,pi->pavi", self.psi, n)
+    def fields(self) -> Array:
+        """int phi_a N_b, int d_n phi_a N_b, int d_i phi_a N_b by pieces, shape (pieces, functions, vertices, 2 + dim).
+
+        Every operator between motion and velocity is these times coefficients of the piece.
+        """
+        return np.concatenate([self.phi[..., None], self.normal_slope[..., None], self.grad], axis=3)
+
+    @cached_property
+    def coupling(self) -> MotionOperator:
+        """C."""
+        dim, mu, n = self.dim, self.mu, self.n
+        by_gradient = mu * np.einsum("ij,pk->pikj", np.eye(dim), n)
+        by_slope = np.broadcast_to(mu * np.eye(dim), (len(n), 1, dim, dim))
+        fields = np.concatenate([-self.penalty[:, None], by_slope, by_gradient], axis=1)
+        return MotionOperator(fields, n, None if self.slip is None else self.slip.coupling)
 
     @cached_property
     def mass_blocks(self) -> Array:
-        """M = -df/dg [kg/s] by pieces, shape (pieces, vertices, dim, vertices, dim)."""
-        mass: Array = np.einsum("pij,pvw->pviwj", self.penalty, self.mass_of_pieces)
-        return mass if self.slip is None else mass + self.slip.mass
-
-    @cached_property
-    def pattern(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(local dofs, dofs of the vertices) of the entries of `CouplingBlocks`, those of the velocity first."""
-        columns, (on_velocity, on_pressure) = self._columns(), (block.shape for block in self.coupling_blocks)
-        rows = [
-            np.broadcast_to(self.u[..., None, None], on_velocity),
-            np.broadcast_to(self.p[..., None, None], on_pressure),
-        ]
-        vertices = [
-            np.broadcast_to(columns[:, None, None], on_velocity),
-            np.broadcast_to(columns[:, None], on_pressure),
-        ]
-        return np.concatenate([part.ravel() for part in rows]), np.concatenate([part.ravel() for part in vertices])
-
-    @cached_property
-    def surface_pattern(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(rows, columns) of the entries of `mass_blocks` among the dofs of the vertices."""
-        columns, shape = self._columns(), self.mass_blocks.shape
-        return (
-            np.broadcast_to(columns[..., None, None], shape).ravel(),
-            np.broadcast_to(columns[:, None, None], shape).ravel(),
-        )
-
-    def _columns(self) -> NDArray[np.int64]:
-        return self.dim * self.corners[:, :, None] + np.arange(self.dim)
+        """M = -df/dg [kg/s] by pieces, shape (pieces, vertices, vertices, dim, dim)."""
+        mass: Array = self.mass_of_pieces[:, :, :, None, None] * self.penalty[:, None, None]
+        return mass if self.slip is None else mass + np.swapaxes(self.slip.mass, 2, 3)

@@ -15,11 +15,11 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.api import Array
-from solvers.fluid.interface import CouplingBlocks, InterfaceTerms
+from solvers.fluid.interface import InterfaceTerms, MotionOperator
 
 
-def shape_derivatives(interface: InterfaceTerms, flow: Array) -> tuple[CouplingBlocks, Array]:
-    """(dr/dd, df/dd) by pieces, as `InterfaceTerms` has them; `flow` at local dofs."""
+def shape_derivatives(interface: InterfaceTerms, flow: Array) -> tuple[MotionOperator, Array]:
+    """(dr/dd, df/dd) by pieces, as `InterfaceTerms.coupling` and `mass_blocks`; `flow` at local dofs."""
     at, n, mu, P = interface, interface.n, interface.mu, interface.penalty
     u, p = flow[at.u], flow[at.p]
     area = at.psi.sum(axis=(1, 2))
@@ -29,22 +29,19 @@ def shape_derivatives(interface: InterfaceTerms, flow: Array) -> tuple[CouplingB
     grad_p = np.einsum("pa,paj,p->pj", p, at.pressure_slope, share)
 
     penalised = P @ grad_u
-    rows_u = np.einsum("pav,pkj->pakvj", at.phi, penalised)
-    rows_u -= mu * np.einsum("pav,pkj->pakvj", at.normal_slope, grad_u)
-    rows_u -= mu * np.einsum("pavj,pk->pakvj", at.grad @ grad_u[:, None], n)
-    if at.slip is not None:
-        rows_u -= np.einsum("pakvi,pij->pakvj", at.slip.coupling, grad_u)
-    rows_p = -np.einsum("pav,pj->pavj", at.psi, np.einsum("pi,pij->pj", n, grad_u))
+    by_gradient = -mu * np.einsum("pk,pij->pikj", n, grad_u)
+    into_velocity = np.concatenate([penalised[:, None], -mu * grad_u[:, None], by_gradient], axis=1)
+    more = None if at.slip is None else -np.einsum("pakvi,pij->pakvj", at.slip.coupling, grad_u)
+    into_flow = MotionOperator(into_velocity, -np.einsum("pi,pij->pj", n, grad_u), more)
 
     field = n[:, :, None] * grad_p[:, None, :] + penalised
     stress = pressure[:, None, None] * np.eye(at.dim) - mu * (grad_u + np.swapaxes(grad_u, 1, 2))
     turned = np.einsum("pil,plvj->pivj", stress, _normal_derivative(at.x, n))
-    load = np.einsum("pbv,pij->pbivj", at.mass_of_pieces, field) + np.einsum(
-        "pb,pivj->pbivj", at.psi.sum(axis=1), turned
-    )
+    load = at.mass_of_pieces[:, :, :, None, None] * field[:, None, None]
+    load += np.einsum("pb,pivj->pbvij", at.psi.sum(axis=1), turned)
     if at.slip is not None:
-        load += np.einsum("pbivl,plj->pbivj", at.slip.mass, grad_u)
-    return (rows_u, rows_p), load
+        load += np.einsum("pbivl,plj->pbvij", at.slip.mass, grad_u)
+    return into_flow, load
 
 
 def _normal_derivative(x: Array, n: Array) -> Array:
