@@ -178,6 +178,11 @@ class Multigrid:
         self.comm, self._second = comm, unknowns.degree > 1
         self.levels = [finest(unknowns)]
         self._interpolations: list[PETSc.Mat] = []
+        #: the finest matrix that a preconditioner was made for last, what it was converted to, and by levels the
+        #: interpolation and the coarse matrix: while that matrix is in use, its pattern stays
+        self._last: PETSc.Mat | None = None
+        self._converted: PETSc.Mat | None = None
+        self._kept: list[tuple[PETSc.Mat, PETSc.Mat]] = []
         while comm.allreduce(self.levels[-1].owned) > COARSEST:
             lattices = [component.lattice for component in self.levels[-1].components]
             if lattices[-1].smallest:
@@ -190,6 +195,7 @@ class Multigrid:
     def set_up(self, preconditioner: PETSc.PC, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> None:
         """Make a preconditioner one V-cycle for a matrix; it stays what it is when the matrix changes (collective).
 
+        It takes the place of the one before, whose matrices are overwritten.
         held: owned unknowns whose rows are those of the identity.
         """
         matrices, interpolations = self._galerkin(matrix, held)
@@ -236,15 +242,22 @@ class Multigrid:
     def _galerkin(self, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> tuple[list[PETSc.Mat], list[PETSc.Mat]]:
         """Matrices and interpolations, finest first (collective)."""
         matrices, interpolations, free = [matrix], [], (~held).astype(float)
-        product = matrix if "baij" not in matrix.getType() else matrix.convert(PETSc.Mat.Type.AIJ, PETSc.Mat())
-        for level in self._interpolations:
-            P = level.copy()
+        if self._last is None or self._last.handle != matrix.handle:
+            self._last, self._converted, self._kept = matrix, None, []
+        product = matrix
+        if "baij" in matrix.getType():
+            product = self._converted = matrix.convert(PETSc.Mat.Type.AIJ, self._converted or PETSc.Mat())
+        for number, level in enumerate(self._interpolations):
+            P, known = self._kept[number] if number < len(self._kept) else (level.copy(), None)
+            level.copy(P, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
             coarse, fine = P.createVecs()
             fine.array[:] = free
             P.diagonalScale(fine, None)
             P.multTranspose(fine, coarse)
             free = (coarse.array > 0.0).astype(float)
-            product = product.ptap(P)
+            product = product.ptap(P, result=known)
+            if known is None:
+                self._kept.append((P, product))
             coarse.array[:] = 1.0 - free  # coarse unknowns that correct nothing get rows of the identity
             product.setDiagonal(coarse, addv=PETSc.InsertMode.ADD_VALUES)
             product.assemble()
