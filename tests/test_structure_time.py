@@ -174,3 +174,22 @@ def test_accelerated_support_at_the_start():
     held = structure.held.dofs
     assert structure.now.v[held].reshape(-1, 2) == pytest.approx(np.tile([0.3, 0.0], (3, 1)), abs=1e-7)
     assert structure.now.a[held].reshape(-1, 2) == pytest.approx(np.tile([1.4, 0.0], (3, 1)), abs=1e-6)
+
+
+def test_acceleration_at_the_start():
+    """M a = f_ext - f_int(u) - C v of a body that starts stretched and moving, under gravity, with damping."""
+    structure = make_structure(
+        block("quad", 2),
+        NeoHooke(30.0, 50.0, 2.0),
+        time=Dynamics(GeneralisedAlpha.from_rho_inf(1.0), Damping(mass=0.7, stiffness=0.02)),
+        gravity=vector(0.0, -10.0),
+        initial_displacement=(lambda x, t: 0.1 * x[0] + 0.05 * x[1], lambda x, t: -0.02 * x[1]),
+        initial_velocity=(lambda x, t: 0.3 * x[1], lambda x, t: 0.2 * x[0] * x[1]),
+    )
+    structure.initialise(0.0, 0.1)
+    (body,), now = structure.bodies, structure.now
+    mass, damping = (matrix.convert("dense").getDenseArray() for matrix in (structure.mass, structure.damping))
+    weight = mass @ np.tile([0.0, -10.0], len(now.u) // 2)
+    parts = weight, -body.internal_force(), -damping @ now.v
+    assert min(np.abs(part).max() for part in parts) > 0.1
+    assert mass @ now.a == pytest.approx(sum(parts), abs=1e-10)
