@@ -193,6 +193,21 @@ def test_newton_with_damping_and_no_mass():
     assert info.residuals[-1] < 1e-9 * info.residuals[0]
 
 
+def test_motion_of_massless_surfaces():
+    """Their velocity is the difference of positions, exactly; they have no acceleration. Others follow Newmark."""
+    dt = 0.05
+    _, structure, _ = bar(10, dt, end=0.5)
+    structure.begin_step(0.5, dt)
+    structure.solve()
+    massless, moved = structure.massless, structure.now.u - structure.old.u
+    assert np.abs(moved[massless]).max() > 0.01 * dt * SIZE
+    assert np.array_equal(structure.now.v[massless], moved[massless] / dt)
+    assert not structure.now.a[massless].any()
+    others = np.setdiff1d(np.arange(len(moved)), massless)
+    mean = (structure.now.v + structure.old.v)[others] / 2.0
+    assert mean == pytest.approx(moved[others] / dt, abs=1e-12 * SIZE)
+
+
 # ------------------------------------------------------------------------------------------- two bars, non-matching
 
 
