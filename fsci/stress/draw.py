@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from fsci.stress import flow_scenes, scenes
+from fsci.stress import flow_scenes, scenes, space_scenes
 from fsci.stress.frame import Frame
 from fsci.stress.scenes import StressScene
 
@@ -20,6 +20,14 @@ SCENES: dict[str, Callable[[random.Random], StressScene]] = {
     "post": flow_scenes.post,
     "fall": flow_scenes.fall,
 }
+
+SPACE_SCENES: dict[str, Callable[[random.Random], StressScene]] = {
+    "press 3D": space_scenes.press,
+    "drop 3D": space_scenes.drop,
+    "moved 3D": space_scenes.moved,
+    "post 3D": space_scenes.post,
+}
+SPACE = 100_000  #: from this number on draws are in space
 
 Twin = Literal["rotated", "shifted", "rescaled", "parallel", "resumed"]
 TWINS: tuple[Twin, ...] = ("rotated", "shifted", "rescaled", "parallel", "resumed")
@@ -43,7 +51,7 @@ class Draw:
         f = self.frame
         return {
             "rotated": f"rotated by {f.angle:.5g} degrees",
-            "shifted": f"shifted by ({f.shift[0]:.3g}, {f.shift[1]:.3g})",
+            "shifted": f"shifted by ({', '.join(f'{s:.3g}' for s in f.shift[: self.scene.dim])})",
             "rescaled": f"units times {f.length:g}, {f.mass:g}, {f.time:g}",
             "parallel": f"{self.processes} processes",
             "resumed": f"killed after {self.kill_after} steps",
@@ -63,14 +71,14 @@ class Draw:
 def draw(seed: int) -> Draw:
     """The same for the same number, whatever was drawn before."""
     chance = random.Random(seed)
-    scene = SCENES[chance.choice(sorted(SCENES))](chance)
+    kinds = SPACE_SCENES if seed >= SPACE else SCENES
+    scene = kinds[chance.choice(sorted(kinds))](chance)
     twin = chance.choice(TWINS)
     frame, processes, kill_after, delay = Frame(), 1, 0, 0.0
     if twin == "rotated":
-        angle = chance.choice([90.0, 180.0, 270.0])
-        frame = Frame(angle=chance.uniform(0, 360) if scene.any_angle and chance.random() < 0.7 else angle)
+        frame = _turned(chance, scene)
     elif twin == "shifted":
-        frame = Frame(shift=(chance.uniform(-10, 10), chance.uniform(-10, 10)))
+        frame = Frame(shift=tuple(chance.uniform(-10, 10) for _ in range(scene.dim)))
     elif twin == "rescaled":
         frame = Frame(
             length=chance.choice([1e-6, 1e-3, 1e3]), mass=10.0 ** chance.randint(-12, 12),
@@ -81,3 +89,16 @@ def draw(seed: int) -> Draw:
     else:
         kill_after, delay = chance.randint(2, 4), chance.random()
     return Draw(seed, scene, twin, frame, processes, kill_after, delay)
+
+
+def _turned(chance: random.Random, scene: StressScene) -> Frame:
+    """By any angle, in space about any axis; with a grid by quarter turns, in space also about a diagonal of a cube."""
+    if scene.dim == 2:
+        angle = chance.choice([90.0, 180.0, 270.0])
+        return Frame(angle=chance.uniform(0, 360) if scene.any_angle and chance.random() < 0.7 else angle)
+    if scene.any_angle:
+        return Frame(angle=chance.uniform(0, 360), axis=tuple(chance.uniform(-1, 1) for _ in range(3)))
+    if chance.random() < 0.5:
+        return Frame(angle=chance.choice([120.0, 240.0]), axis=tuple(chance.choice([-1.0, 1.0]) for _ in range(3)))
+    axis = chance.choice([(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+    return Frame(angle=chance.choice([90.0, 180.0, 270.0]), axis=axis)

@@ -61,13 +61,14 @@ def _balances(draw: Draw, run: Ended) -> Iterator[tuple[str, float, float]]:
         flow = max(_largest(history, "out"), _swept(draw))
         yield "fluid.mass", _largest(history, "fluid.mass"), BALANCE * flow
     if "interface.momentum" in history:
-        force = max(_largest(history, "force.x"), _largest(history, "force.y"))
+        force = max(_largest(history, f"force.{i}") for i in "xyz")
         yield "interface.momentum", _largest(history, "interface.momentum"), BALANCE * force
-    if draw.scene.name == "press":
-        sums = [history[f"top.{i}"] + history[f"bottom.{i}"] for i in "xy"]
-        size = max(_largest(history, f"{name}.{i}") for name in ("top", "bottom") for i in "xy")
+    if draw.scene.name.startswith("press"):
+        axes = "xyz"[: draw.scene.dim]
+        sums = [history[f"top.{i}"] + history[f"bottom.{i}"] for i in axes]
+        size = max(_largest(history, f"{name}.{i}") for name in ("top", "bottom") for i in axes)
         yield "the sum of reactions", float(np.abs(sums).max()), BALANCE * size
-    if draw.scene.name == "drop" and "energy from nothing" not in run.words:
+    if draw.scene.name.startswith("drop") and "energy from nothing" not in run.words:
         had = float((history["energy.kinetic"] + history["energy.internal"]).max())
         yield "energy from nothing", float(history["structure.energy"].max()), GAIN * had
 
@@ -92,7 +93,8 @@ def other_bits(run: Ended, twin: Ended) -> str:
 def distance(draw: Draw, run: Ended, twin: Ended, frame: Frame) -> tuple[float, str]:
     """By how much of its largest value a probe differs, and which one; infinite if the runs end at other times."""
     quantities = {name: probe["quantity"] for name, probe in draw.scene.probes.items()}
-    ours, theirs = Frame().back(run.history, quantities), frame.back(twin.history, quantities)
+    dim = draw.scene.dim
+    ours, theirs = Frame().back(run.history, quantities, dim), frame.back(twin.history, quantities, dim)
     rows, others = _common(ours["time"], theirs["time"])
     if not rows or abs(ours["time"][rows[-1]] / ours["time"][-1] - 1) > 1e-9:
         return np.inf, "the last time"

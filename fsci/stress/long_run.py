@@ -15,9 +15,9 @@ import numpy as np
 from fsci.run.history import History, read_history
 from fsci.stress.program import ENVIRONMENT, command, steps_done, write
 
-#: A block in a basin, thrown up and pulled down again by a weight that changes: it lands and lifts off 50 times.
+#: A disc in a basin whose weight changes its sign every half second: it is pressed onto the floor, and lifted off.
 CASE: dict[str, Any] = {
-    "title": "A block that lands again and again",
+    "title": "A disc that lands again and again",
     "fluid": {
         "density": 1,
         "viscosity": 0.05,
@@ -28,10 +28,10 @@ CASE: dict[str, Any] = {
     "structure": {
         "dynamics": {"rho_inf": 0.5},
         "bodies": {
-            "block": {
-                "mesh": {"shape": "rectangle", "size": [0.62, 0.7], "cells": [2, 2], "origin": [0.21, 0.01]},
+            "disc": {
+                "mesh": {"shape": "disc", "radius": 0.3, "cells": [12, 2], "translate": [0.5, 0.31]},
                 "material": {"law": "neo_hooke", "E": 1000, "nu": 0.3, "density": 2},
-                "gravity": [0, "-4*sin(2*pi*t/2)"],
+                "gravity": [0, "-2 - 6*tanh(5*sin(2*pi*t))"],
             }
         },
     },
@@ -42,7 +42,7 @@ CASE: dict[str, Any] = {
                 "on": "top",
             }
         },
-        "pairs": {"floor": {"slave": {"body": "block", "on": "bottom"}, "master": {"obstacle": "floor"}}},
+        "pairs": {"floor": {"slave": {"body": "disc", "on": "outer"}, "master": {"obstacle": "floor"}}},
     },
     "coupling": {"scheme": "monolithic"},
     "probes": {"centre": {"quantity": "centre"}, "force": {"quantity": "force"}, "energy": {"quantity": "energy"}},

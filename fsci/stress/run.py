@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from fsci.stress.draw import SCENES, Draw, draw
+from fsci.stress.draw import SCENES, SPACE_SCENES, Draw, draw
 from fsci.stress.frame import Frame
 from fsci.stress.judge import (
     AGREEMENT,
@@ -98,7 +98,7 @@ def _judge(one: Draw, folder: Path) -> tuple[Verdict, str]:
 def _rounding_decides(one: Draw, first: Ended, folder: Path) -> bool:
     """Whether the results jump when only rounding is different."""
     for number, shift in enumerate(ROUNDING):
-        frame = Frame(shift=shift)
+        frame = Frame(shift=(*shift, shift[0] - shift[1]))
         other = run(folder / f"rounding{number}", one.case(frame))
         if other.code == 0 and AGREEMENT < distance(one, first, other, frame)[0] <= NEAR:
             return True
@@ -122,7 +122,7 @@ def _keep(folder: Path, to: Path) -> None:
 
 def table(outcomes: Sequence[Outcome]) -> str:
     """Counts by scene, and what refusals said."""
-    names = [name for name in (*SCENES, "mutant") if any(o.scene == name for o in outcomes)]
+    names = [name for name in (*SCENES, *SPACE_SCENES, "mutant") if any(o.scene == name for o in outcomes)]
     counts = Counter((o.scene, o.verdict) for o in outcomes)
     lines = [f"{'scene':10}{'draws':>8}" + "".join(f"{verdict:>10}" for verdict in VERDICTS)]
     for name in (*names, "all"):

@@ -25,6 +25,7 @@ class StressScene:
     case: Callable[[Frame], Case]
     probes: dict[str, dict[str, Any]]  #: their settings
     any_angle: bool = False  #: no grid: it may be turned by any angle
+    dim: int = 2
     must_warn: tuple[str, ...] = field(default=())  #: words that a run that ends well has to say
 
 
