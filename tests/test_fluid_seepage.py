@@ -6,6 +6,7 @@ from fluid_setup import BOX, block, body, make_fluid, turned, with_slip
 from lubrication import film_force, seepage_ratio
 from programs import fsci
 from test_coupled_run import MEETING, run
+from test_fsci_lubrication import SETTLING
 
 from fsci.case import CaseError, load_case
 from fsci.run.history import read_history
@@ -93,6 +94,39 @@ def test_bodies_that_meet(tmp_path):
         assert found[name] == pytest.approx(other[name], abs=1e-6)
     assert np.abs(found["force.x"] - without["force.x"]).max() > 1e-3 * np.abs(found["force.x"]).max()
     assert found["iterations"].max() <= without["iterations"].max() + 1
+
+
+#: The cylinder of `SETTLING` with a rough surface and a wall to touch; the film is 4.6 cells wide, or 2.3.
+ROUGH = (
+    SETTLING.replace("step: 0.1, end: 3", "step: 0.1, end: 7")
+    .replace("[0, 1.6]", "[0, 1.12]")
+    .replace("cells: [128, 2]", "cells: [256, 2]")
+    .replace(
+        "coupling:",
+        """contact:
+  film: {transmissivity: 1e-4}
+  obstacles:
+    wall: {mesh: {shape: rectangle, size: [2, 0.1], cells: [1, 1], origin: [-1, -0.1]}, on: top}
+  pairs:
+    wall: {slave: {body: cylinder, on: outer}, master: {obstacle: wall}}
+coupling:""",
+    )
+)
+COARSE = ROUGH.replace("to: 1, cells: 20", "to: 1, cells: 10").replace("{to: 0.9, cells: 9}", "{to: 0.8, cells: 4}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("text", [ROUGH, COARSE], ids=["h 0.1", "h 0.2"])
+def test_elastic_cylinder_settles_until_contact(text, tmp_path):
+    """The force 4 pi closes the film in the time of the film's theory, int F dg / 4 pi, to 5 %; the wall takes it."""
+    history = run(text, tmp_path)
+    time, gap, force = history["time"], history["cylinder.y"] - 1.0, history["contact.wall.y"]
+    start, end = np.interp([-0.1, -0.002], -gap, time)
+    places, weights = np.polynomial.legendre.leggauss(6)
+    films = np.array([film_force(2, 0.051 + 0.049 * place, transmissivity=1e-4) for place in places])
+    assert end - start == pytest.approx(0.049 * weights @ films / (4.0 * np.pi), rel=0.05)
+    assert force[-1] == pytest.approx(4.0 * np.pi, rel=1e-3)
+    assert history["iterations"].max() <= 5
 
 
 def test_two_processes(tmp_path):
