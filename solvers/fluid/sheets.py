@@ -34,6 +34,10 @@ from solvers.mesh import Mesh
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+THIN = 2  #: cells apart, at most, of the fluid on two sides that the ghost penalty or a node would join
+AROUND = 3  #: cells within which parts around the end of a body are linked
+OPPOSED = -0.7  #: product of unit normals below which two surfaces face opposite ways: corners below 45 degrees do
+
 #: From the first corner of a cell to each, in the order of `Grid.mesh`.
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
 CORNER_STEPS = {2: np.array(SQUARE), 3: np.array([[*xy, z] for z in (0, 1) for xy in SQUARE])}
@@ -157,7 +161,7 @@ def _in_cell(steps: Indices, degree: int) -> Indices:
 
 
 def find_sheets(grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_]) -> Sheets | None:
-    """Sheets of the fluid around surfaces with vertices at x [m]; None if its parts share all nodes.
+    """Sheets of the fluid around surfaces with vertices at x [m]; None if no body is thin.
 
     bounds: facets that are not on the boundary of the box.
     """
@@ -166,11 +170,12 @@ def find_sheets(grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_]
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
     parts, special = _parts(grid, moments, facets, x, bounds)
     links = _links(grid, parts)
+    cells = np.array([part.cell for part in parts])
+    facing = _facing(parts, x[facets])
+    if not _is_thin(grid, parts, links, facing, np.flatnonzero(_grown(grid, special, 1)[cells])):
+        return None
     copies = _copies(grid, parts, links, special)
     moved = (copies > 0).any(axis=1)
-    solid = moments.cells[moments.fraction[moments.cells] > 1.0 - NOTHING]
-    if not (moved.any() or _separates(grid, solid, parts, links)):
-        return None
     linked = np.zeros(len(parts), dtype=bool)
     linked[[n for a, b, _ in links for n in (a, b)]] = True
     new = np.flatnonzero(moved & linked)  # what is closed off within a cell counts as solid
@@ -199,16 +204,41 @@ def find_sheets(grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_]
     )
 
 
-def _separates(grid: Grid, cells: Indices, parts: Sequence[Region], links: Sequence[tuple[int, int, int]]) -> bool:
-    """Around one of some cells without fluid there are parts that are not linked with each other there."""
+def _is_thin(
+    grid: Grid, parts: Sequence[Region], links: Sequence[tuple[int, int, int]], facing: Array, close: Indices
+) -> bool:
+    """Somewhere two parts that face opposite ways, a few cells apart, are not linked nearby: a thin body is between.
+
+    Parts around a corner of a thick body do not face opposite ways or are linked around it. facing: mean normal of the
+    surface in each part, nan where there is none; close: parts at which to look.
+    """
     index = np.stack(np.unravel_index([part.cell for part in parts], grid.shape, order="F"), axis=1)
     ends = np.array(links, dtype=np.int64).reshape(-1, 3)[:, :2]
-    for place in np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1):
-        near = (np.abs(index - place) <= 1).all(axis=1)
-        first, second = ends[near[ends].all(axis=1)].T
-        if len(np.unique(connected_parts(first, second, len(parts))[near])) > 1:
+    linked = np.zeros(len(parts), dtype=bool)
+    linked[ends.ravel()] = True
+    number = np.full(len(parts), -1)
+    for part in close[linked[close]]:
+        apart = np.abs(index - index[part]).max(axis=1)
+        near = np.flatnonzero(apart <= AROUND)
+        number[near] = np.arange(len(near))
+        first, second = number[ends[(apart[ends] <= AROUND).all(axis=1)]].T
+        group = connected_parts(first, second, len(near))
+        opposed = ~(facing[near] @ facing[part] > OPPOSED)
+        if (group != group[number[part]])[linked[near] & opposed & (apart[near] <= THIN)].any():
             return True
     return False
+
+
+def _facing(parts: Sequence[Region], ends: Array) -> Array:
+    """Mean unit normal of the facets in each part, shape (parts, 2); nan without facets. ends: of facets, (n, 2, 2)."""
+    along = ends[:, 1] - ends[:, 0]
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
+    found = np.full((len(parts), 2), np.nan)
+    for number, part in enumerate(parts):
+        if part.facets:
+            mean = normals[list(part.facets)].sum(axis=0)
+            found[number] = mean / max(float(np.linalg.norm(mean)), SAME)
+    return found
 
 
 def _parts(grid: Grid, moments, facets: Indices, x: Array, bounds: NDArray[np.bool_]) -> tuple[list[Region], Mask]:
@@ -217,8 +247,7 @@ def _parts(grid: Grid, moments, facets: Indices, x: Array, bounds: NDArray[np.bo
     touched = np.zeros(grid.size, dtype=bool)
     touched[moments.cells] = True
     special = touched | (fluid < 1.0 - SAME)
-    near = ndimage.binary_dilation(grid.as_box(special), np.ones((3,) * grid.dim, dtype=bool)).ravel(order="F")
-    whole = near & (fluid > NOTHING)
+    whole = _grown(grid, special, AROUND) & (fluid > NOTHING)
     found = []
     ends = np.searchsorted(moments.piece_cell, np.arange(len(moments.cells) + 1))
     for row, cell in enumerate(moments.cells.tolist()):
@@ -229,6 +258,12 @@ def _parts(grid: Grid, moments, facets: Indices, x: Array, bounds: NDArray[np.bo
             whole[cell] = False
     found += [Region(int(cell), float(fluid[cell]), WHOLE) for cell in np.flatnonzero(whole)]
     return sorted(found, key=lambda region: region.cell), special
+
+
+def _grown(grid: Grid, cells: Mask, layers: int) -> Mask:
+    """These cells and so many layers around them."""
+    shape = np.ones((3,) * grid.dim, dtype=bool)
+    return ndimage.binary_dilation(grid.as_box(cells), shape, iterations=layers).ravel(order="F")
 
 
 def _links(grid: Grid, parts: Sequence[Region]) -> list[tuple[int, int, int]]:
