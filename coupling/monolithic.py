@@ -109,8 +109,8 @@ class Monolithic:
         return max(solid.update(x.array[:own]), flow.update(x.array[own:]))
 
     def _solve(self, blocks: Blocks, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        ladder = self.coupled.flow.ladder
-        while ladder.here != "direct":
+        sequence = self.coupled.flow.sequence
+        while sequence.current != "direct":
             try:
                 matrix = blocks.nested()
                 iterations = self._krylov.solve_again(matrix, b, x)
@@ -119,14 +119,14 @@ class Monolithic:
                 self._linear_iterations += iterations
                 return
             except linear.LinearSolveFailed as failure:
-                ladder.climb(failure)
+                sequence.advance(failure)
         self._direct.solve(blocks.assembled(), b, x)
 
     def _krylov_solver(self, matrix: PETSc.Mat, blocks: Blocks) -> PETSc.KSP:
         flow, parts = self.coupled.flow, (self._numbering.first, self._numbering.second)
-        rung, tolerance = flow.ladder.here, flow.linear_tolerance
-        krylov = linear.coupled_solver(self.comm, *parts, tolerance=tolerance, fill=rung == "fill")
-        if rung == "multigrid":
+        method, tolerance = flow.sequence.current, flow.linear_tolerance
+        krylov = linear.coupled_solver(self.comm, *parts, tolerance=tolerance, fill=method == "fill")
+        if method == "multigrid":
             krylov.setOperators(matrix)
             krylov.getPC().setUp()
             flow.set_up_multigrid(krylov.getPC().getFieldSplitSubKSP()[1].getPC(), blocks.flow)

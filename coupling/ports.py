@@ -16,7 +16,7 @@ from petsc4py import PETSc
 
 from solvers.api import Array, Stateful, StepInfo
 from solvers.fluid.coupling_entries import InterfaceEntries
-from solvers.fluid.krylov import Ladder
+from solvers.fluid.krylov import SolverSequence
 from solvers.fluid.surface import Motion
 from solvers.fluid.time_scheme import FlowStep, FlowTimeScheme
 from solvers.newton import System
@@ -189,7 +189,7 @@ class Flow(Part, Protocol):
         """Force [N] on all bodies by its momentum, shape (dim,), and power [W] that the method takes."""
         ...
 
-    ladder: Ladder  #: which linear solver is used, from fast to safe
+    sequence: SolverSequence  #: which linear solver is used, from fast to safe
 
     @property
     def linear_tolerance(self) -> float: ...

@@ -115,10 +115,10 @@ def _multigrid(comm) -> PETSc.PC:
 
 
 #: A solver of flows.
-Rung = Literal["multigrid", "ilu", "fill", "direct"]
+FlowMethod = Literal["multigrid", "ilu", "fill", "direct"]
 
 
-def choose_flow(method: Method, dim: int, dofs: int, *, degree: int, steady: bool) -> tuple[Rung, ...]:
+def choose_flow(method: Method, dim: int, dofs: int, *, degree: int, steady: bool) -> tuple[FlowMethod, ...]:
     """Solvers for a flow of this size from the usual one to the last resort, by the degree of its velocity.
 
     More fill takes minutes for velocities of second degree.

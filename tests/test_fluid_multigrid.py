@@ -13,7 +13,7 @@ from fsci.run.run import FAILED, run_case
 from solvers import linear
 from solvers.fluid import krylov
 from solvers.fluid.grid import Grid, uniform
-from solvers.fluid.krylov import Ladder
+from solvers.fluid.krylov import SolverSequence
 from solvers.fluid.multigrid import LevelGrid, coarsen, finest, interpolation
 from solvers.linear import LinearSolveFailed
 from solvers.newton import Tolerance
@@ -104,23 +104,23 @@ def test_second_degree_on_stretched_cells():
     assert iterations <= 30
 
 
-# ------------------------------------------------------------------------------------------------------- the ladder
+# ------------------------------------------------------------------------------------------------------- the sequence
 
 
 def test_what_stalls_is_followed_by_what_does_not(monkeypatch):
     said = []
-    ladder = Ladder(MPI.COMM_SELF, ("multigrid", "fill", "direct"), 1000, said.append)
+    sequence = SolverSequence(MPI.COMM_SELF, ("multigrid", "fill", "direct"), 1000, said.append)
     stalled = LinearSolveFailed("the linear solver stalled after 200 iterations (PETSc reason -3)")
-    ladder.climb(stalled)
-    assert ladder.here == "fill"
-    ladder.climb(stalled)
-    assert ladder.here == "direct"
+    sequence.advance(stalled)
+    assert sequence.current == "fill"
+    sequence.advance(stalled)
+    assert sequence.current == "direct"
     assert said[1] == (
         "the linear solver stalled after 200 iterations (PETSc reason -3) with incomplete factors with more fill and "
         "overlap: the direct solver from here on ('solver.linear.method' chooses)"
     )
     with pytest.raises(LinearSolveFailed, match="stalled"):
-        ladder.climb(stalled)
+        sequence.advance(stalled)
 
 
 def test_method_is_chosen_by_size():
@@ -135,17 +135,17 @@ def test_method_is_chosen_by_size():
 
 def test_the_direct_solver_needs_memory(monkeypatch):
     monkeypatch.setattr(krylov, "free_memory", lambda comm: 1e9)
-    ladder = Ladder(MPI.COMM_SELF, ("multigrid", "direct"), 10**6, print)
+    sequence = SolverSequence(MPI.COMM_SELF, ("multigrid", "direct"), 10**6, print)
     with pytest.raises(LinearSolveFailed, match=r"would need about 110 GB of the 1 GB .* 'solver.linear.tolerance'"):
-        ladder.climb(LinearSolveFailed("the linear solver stalled"))
-    assert ladder.here == "multigrid"
+        sequence.advance(LinearSolveFailed("the linear solver stalled"))
+    assert sequence.current == "multigrid"
 
 
 def test_a_singular_system_stays_singular():
-    ladder = Ladder(MPI.COMM_SELF, ("multigrid", "fill", "direct"), 1000, print)
+    sequence = SolverSequence(MPI.COMM_SELF, ("multigrid", "fill", "direct"), 1000, print)
     with pytest.raises(LinearSolveFailed, match="singular"):
-        ladder.climb(LinearSolveFailed("the linear system is singular", singular=True))
-    assert ladder.here == "multigrid"
+        sequence.advance(LinearSolveFailed("the linear system is singular", singular=True))
+    assert sequence.current == "multigrid"
 
 
 def test_a_stalled_solver_is_replaced_within_the_solve(monkeypatch):

@@ -23,7 +23,7 @@ from solvers.fluid.film import films_of
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.history import History
 from solvers.fluid.immersed import ImmersedBody, sheets_of
-from solvers.fluid.krylov import FlowSolver, Ladder
+from solvers.fluid.krylov import FlowSolver, SolverSequence
 from solvers.fluid.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.pressure_level import Hold, hold_pressure, keep_levels, spread_excess
 from solvers.fluid.reach import require_history, require_within_period, strip_layers
@@ -68,7 +68,7 @@ class Fluid:
         self.linear_tolerance = solver.linear_tolerance
         wanted = solver.linear if isinstance(solver.linear, str) else "auto"
         wanted = wanted if sheets is None else "direct"  # the others need the nodes of a lattice
-        rungs = linear.choose_flow(wanted, self.dim, self.dofs(), degree=settings.degree, steady=self.steady)
+        methods = linear.choose_flow(wanted, self.dim, self.dofs(), degree=settings.degree, steady=self.steady)
         self.system = FlowSystem(
             self.grid,
             settings,
@@ -76,7 +76,7 @@ class Fluid:
             self.unknowns,
             with_bodies=bool(self.bodies),
             # incomplete factors of dense blocks are two times as fast
-            blocked=rungs[0] != "direct" and self.unknowns.block_size > 1,
+            blocked=methods[0] != "direct" and self.unknowns.block_size > 1,
         )
         surfaces = [body.surface for body in self.bodies]
         self.system.slip_length = by_facets(surfaces, [surface.slip_length for surface in surfaces])
@@ -91,8 +91,8 @@ class Fluid:
         self._wet = wetness([body.surface for body in self.bodies])
         self._fast_bodies = FastBodies(grid)
         self.notes: list[str] = []  #: what the user should know of this step
-        self.ladder = Ladder(comm, rungs, self.dofs(), self.notes.append)
-        self.linear_solver = FlowSolver(self.unknowns, self.ladder, solver.linear_tolerance, steady=settings.steady)
+        self.sequence = SolverSequence(comm, methods, self.dofs(), self.notes.append)
+        self.linear_solver = FlowSolver(self.unknowns, self.sequence, solver.linear_tolerance, steady=settings.steady)
         self.linear_iterations = 0  #: of the last linear system
         self.rounding: Array | None = None  #: rounding error of `residual_rows`, as far as this step knows
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is there already
@@ -377,7 +377,7 @@ class Fluid:
             "pressure": self.unknowns.to_nodes(self.flow, self.unknowns.pressure),
             "pattern": Nodal(self.system.pattern_state(), self.grid.original[: self.grid.owned]),
             "time": self.current.t,
-            "linear_solver": self.ladder.rung,
+            "linear_solver": self.sequence.position,
             "motion": {body.surface.name: {"x": m.x, "v": m.v} for body, m in self.moved()},
         }
 
@@ -387,7 +387,7 @@ class Fluid:
         self.flow[:] = self.history.past[0].velocity
         self.flow[:] += self.unknowns.from_nodes(state["pressure"].values, self.unknowns.pressure)
         self.current = FlowStep(state["time"], 0.0, STEADY)
-        self.ladder.rung = state["linear_solver"]
+        self.sequence.position = state["linear_solver"]
         self.system.restore_pattern(state["pattern"].values)
         self.cutter.begin_step()
         kept = self.flow.copy()

@@ -18,7 +18,7 @@ from solvers.fluid.space import Unknowns
 from solvers.lagged import Lagged, LaggedFactors
 
 #: What the messages call it.
-WORDS: dict[linear.Rung, str] = {
+WORDS: dict[linear.FlowMethod, str] = {
     "multigrid": "multigrid",
     "ilu": "incomplete factors",
     "fill": "incomplete factors with more fill and overlap",
@@ -28,31 +28,31 @@ WORDS: dict[linear.Rung, str] = {
 FACTORS = 1_100.0
 
 
-class Ladder:
-    """Which of several solvers is in use, and the next one if it fails. Its `rung` is part of the state."""
+class SolverSequence:
+    """Which of several solvers is in use, and the next one if it fails. Its `position` is part of the state."""
 
-    def __init__(self, comm: MPI.Comm, rungs: Sequence[linear.Rung], dofs: int, say: Callable[[str], None]):
-        self.comm, self.rungs, self._dofs, self._say = comm, rungs, dofs, say
-        self.rung = 0
+    def __init__(self, comm: MPI.Comm, methods: Sequence[linear.FlowMethod], dofs: int, say: Callable[[str], None]):
+        self.comm, self.methods, self._dofs, self._say = comm, methods, dofs, say
+        self.position = 0
 
     @property
-    def here(self) -> linear.Rung:
-        return self.rungs[self.rung]
+    def current(self) -> linear.FlowMethod:
+        return self.methods[self.position]
 
-    def climb(self, failure: linear.LinearSolveFailed) -> None:
+    def advance(self, failure: linear.LinearSolveFailed) -> None:
         """Take the next solver from now on. Raises LinearSolveFailed if there is none (collective)."""
-        if failure.singular or self.rung == len(self.rungs) - 1:
+        if failure.singular or self.position == len(self.methods) - 1:
             raise failure
         need, there = FACTORS * self._dofs ** (4.0 / 3.0), free_memory(self.comm)
-        if self.rungs[self.rung + 1] == "direct" and need > there:
+        if self.methods[self.position + 1] == "direct" and need > there:
             raise linear.LinearSolveFailed(
-                f"{failure} with {WORDS[self.here]}, and the direct solver would need about {need / 1e9:.3g} GB of the "
-                f"{there / 1e9:.3g} GB that are free; take cells that grow less from one to the next, "
+                f"{failure} with {WORDS[self.current]}, and the direct solver would need about {need / 1e9:.3g} GB "
+                f"of the {there / 1e9:.3g} GB that are free; take cells that grow less from one to the next, "
                 f"'element: q1q1', or a larger 'solver.linear.tolerance'"
             ) from failure
-        before = WORDS[self.here]
-        self.rung += 1
-        self._say(f"{failure} with {before}: {WORDS[self.here]} from here on ('solver.linear.method' chooses)")
+        before = WORDS[self.current]
+        self.position += 1
+        self._say(f"{failure} with {before}: {WORDS[self.current]} from here on ('solver.linear.method' chooses)")
 
 
 def free_memory(comm: MPI.Comm) -> float:
@@ -61,20 +61,20 @@ def free_memory(comm: MPI.Comm) -> float:
 
 
 class FlowSolver:
-    """Solves with the solver that the ladder stands at, preconditioned with an earlier matrix of the step if possible.
+    """Solves with the present solver of the sequence, preconditioned with an earlier matrix of the step if possible.
 
-    Nothing but the rung of the ladder is kept from step to step, so that resumed runs are the same.
+    Nothing but the position of the sequence is kept from step to step, so that resumed runs are the same.
     """
 
-    def __init__(self, unknowns: Unknowns, ladder: Ladder, tolerance: float, *, steady: bool):
-        self.ladder, self._unknowns, self._tolerance = ladder, unknowns, tolerance
+    def __init__(self, unknowns: Unknowns, sequence: SolverSequence, tolerance: float, *, steady: bool):
+        self.sequence, self._unknowns, self._tolerance = sequence, unknowns, tolerance
         self._krylov = Lagged()
-        self._direct = LaggedFactors(ladder.comm, fresh=math.inf if steady else 1)
+        self._direct = LaggedFactors(sequence.comm, fresh=math.inf if steady else 1)
 
     @cached_property
     def multigrid(self) -> Multigrid:
         """The levels (collective)."""
-        return Multigrid(self.ladder.comm, self._unknowns)
+        return Multigrid(self.sequence.comm, self._unknowns)
 
     def begin_step(self) -> None:
         """The next matrix is one of another step."""
@@ -86,20 +86,20 @@ class FlowSolver:
 
         held: owned unknowns whose rows are those of the identity.
         """
-        while self.ladder.here != "direct":
+        while self.sequence.current != "direct":
             try:
                 iterations = self._krylov.solve_again(matrix, b, x)
                 if iterations is not None:
                     return iterations
                 return self._krylov.solve(self._create(matrix, held), matrix, b, x)
             except linear.LinearSolveFailed as failure:
-                self.ladder.climb(failure)
+                self.sequence.advance(failure)
         return self._direct.solve(matrix, b, x)
 
     def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> PETSc.KSP:
-        comm, rung = self.ladder.comm, self.ladder.here
-        if rung != "multigrid":
-            return linear.flow_solver(comm, tolerance=self._tolerance, fill=rung == "fill")
+        comm, method = self.sequence.comm, self.sequence.current
+        if method != "multigrid":
+            return linear.flow_solver(comm, tolerance=self._tolerance, fill=method == "fill")
         ksp = linear.flexible_solver(comm, tolerance=self._tolerance)
         ksp.setOperators(matrix)
         self.multigrid.set_up(ksp.getPC(), matrix, held)
