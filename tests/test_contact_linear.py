@@ -37,7 +37,7 @@ def test_static_contact():
     force = direct[1].resultant(0)
     assert np.abs(ilu[1].resultant(0) - force).max() < 1e-6 * np.abs(force).max()
     used = ilu[0].constrained_solver
-    assert used.getPC().getType() == "asm"
+    assert used.getPC().getType() == "ilu"
     assert 0 < used.getIterationNumber() < 100
 
 
