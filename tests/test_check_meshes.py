@@ -155,9 +155,10 @@ def test_completed_cells_are_mentioned(capsys):
 
 
 def test_bodies_against_the_grid():
-    thin = shapes.rectangle((1, 0.3), (3, 1))
-    write("plate.inp", thin)
-    plate = FLOW.replace("block.inp", "plate.inp")
+    write("short.inp", shapes.rectangle((1, 0.3), (3, 1)))
+    write("plate.inp", shapes.rectangle((2, 0.3), (6, 1)))
+    short, plate = (FLOW.replace("block.inp", f"{name}.inp") for name in ("short", "plate"))
+    assert "the body is 0.3 thick" in check_meshes(load(short)).warnings[0], "both sides share unknowns at its ends"
     assert not check_meshes(load(plate)).warnings, "it rests: it may be as thin as it likes"
     found = check_meshes(load(plate.replace("slip: true", "periodic: true")))
     assert len(found.warnings) == 1

@@ -17,6 +17,7 @@ from solvers.fluid.fast_bodies import MOST_CELLS
 MOST_CELLS_PER_STEP = 10.0  #: that a flow or a body may cross in a time step without being asked about it
 #: Cells across a body that both of its sides need to share no unknowns: with fewer, fluid passes through the body.
 CELLS_ACROSS_AT_REST, CELLS_ACROSS_IF_MOVING = 2.0, 4.0
+CELLS_ALONG = 6.0  #: of a thin body at rest in 2D, from which on each side has unknowns of its own
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
 
 
@@ -74,16 +75,18 @@ def _thin_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
     for (section, kind, name), (mesh, moves) in (moving | elastic).items():
         if not isinstance(mesh, Shape) or name in one_sided:
             continue
-        if doubt := thin_body(case, fluid, mesh.thickness, moves=moves):
+        length = max(mesh.extents) if fluid.grid.dimension == 2 else 0.0
+        if doubt := thin_body(case, fluid, mesh.thickness, length, moves=moves):
             yield (section, kind, name, "mesh"), doubt
 
 
-def thin_body(case: Case, fluid: FluidSection, extent: float, *, moves: bool) -> str | None:
+def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, moves: bool) -> str | None:
     """Whether fluid passes through a body of this thickness [m], because both of its sides share unknowns."""
-    rests = not case.elastic_bodies and not any(body.motion or body.free for body in fluid.bodies.values())
-    if rests and fluid.grid.dimension == 2 and not any(patch.periodic for patch in fluid.patches.values()):
-        return None  # each side has unknowns of its own
     smallest = min(float(np.diff(edges).min()) for edges in fluid.grid.planes)
+    rests = not case.elastic_bodies and not any(body.motion or body.free for body in fluid.bodies.values())
+    plane = fluid.grid.dimension == 2 and not any(patch.periodic for patch in fluid.patches.values())
+    if rests and plane and length >= CELLS_ALONG * smallest:
+        return None  # each side has unknowns of its own
     least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
     if extent >= least * smallest:
         return None

@@ -205,7 +205,8 @@ def _against_grid(case: Case, found: Findings, keys: Keys, mesh: Mesh, *, moves:
         found.warnings.append(f"{case.place(*keys)}: the body is outside of the fluid's box")
     if keys[-1] in (case.coupling.dry_side if case.coupling is not None else ()):
         return
-    if doubt := thin_body(case, case.fluid, thickness(mesh), moves=moves):
+    length = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    if doubt := thin_body(case, case.fluid, thickness(mesh), length, moves=moves):
         found.warnings.append(f"{case.place(*keys, 'mesh')}: {doubt}")
 
 

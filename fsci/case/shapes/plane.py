@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import radians
+from math import pi, radians
 from typing import Annotated, Literal
 
 from pydantic import model_validator
@@ -61,6 +61,10 @@ class Disc(PlaneBuiltIn):
     def lattice(self) -> Counts:
         n, order = self.cells, self.order
         return across_disc(n[0], n[1], order)
+
+    @property
+    def extents(self) -> tuple[float, ...]:
+        return 2 * pi * self.radius, self.radius
 
     @property
     def aspect(self) -> float:
