@@ -143,7 +143,7 @@ def test_the_twin_turned_the_wrong_way_is_noticed(tmp_path, monkeypatch):
     """A whole draw whose twin is turned, but brought back as if it were not."""
     seed = next(s for s in range(1000) if s % 5 != 4 and draw(s).twin == "rotated" and draw(s).scene.name == "beam")
     assert run.judge(seed).verdict == "right"
-    monkeypatch.setattr(Frame, "back", lambda frame, history, quantities: history)
+    monkeypatch.setattr(Frame, "back", lambda frame, history, quantities, dim: history)
     assert run.judge(seed).verdict == "wrong"
 
 
