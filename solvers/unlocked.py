@@ -13,12 +13,12 @@ from petsc4py import PETSc
 
 def solve(ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
     """Solve A x = b with the operators of `ksp`. Raises PETSc.Error as `ksp.solve` does."""
-    code = library().KSPSolve(*(ctypes.c_void_p(thing.handle) for thing in (ksp, b, x)))
+    code = petsc_library().KSPSolve(*(ctypes.c_void_p(thing.handle) for thing in (ksp, b, x)))
     if code:
         raise PETSc.Error(code)
 
 
 @cache
-def library() -> ctypes.CDLL:
+def petsc_library() -> ctypes.CDLL:
     """The library that petsc4py uses: what its module is linked to is found through it."""
     return ctypes.CDLL(PETSc.__file__)

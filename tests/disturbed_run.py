@@ -16,7 +16,7 @@ class Library:
     """PETSc, but for the second solve."""
 
     def __init__(self, what, rank):
-        self.what, self.rank, self.solves, self.real = what, rank, 0, unlocked.library()
+        self.what, self.rank, self.solves, self.real = what, rank, 0, unlocked.petsc_library()
 
     def KSPSolve(self, *handles):
         self.solves += 1
@@ -32,6 +32,6 @@ class Library:
 
 if __name__ == "__main__":
     library = Library(sys.argv[1], int(sys.argv[2]))
-    unlocked.library = lambda: library
+    unlocked.petsc_library = lambda: library
     sys.argv[1:] = sys.argv[3:]
     cli.main()

@@ -84,6 +84,15 @@ def beam(chance: random.Random) -> StressScene:
     return StressScene("beam", p, case, probes, any_angle=True, must_warn=warn)
 
 
+#: A block pressed onto a base: its pair, and what is compared.
+PRESSED = {"slave": {"body": "block", "on": "bottom"}, "master": {"body": "base", "on": "top"}}
+PRESS_PROBES = {
+    "top": {"quantity": "reaction", "body": "block", "on": "top"},
+    "bottom": {"quantity": "reaction", "body": "base", "on": "bottom"},
+    "energy": {"quantity": "energy"},
+}
+
+
 def press(chance: random.Random) -> StressScene:
     """A block pressed onto another one: facets of very different size, stiffness ratio, small gaps, friction."""
     coarse = chance.choice([2, 3, 4])
@@ -119,23 +128,10 @@ def press(chance: random.Random) -> StressScene:
                     },
                 }
             },
-            "contact": {
-                "pairs": {
-                    "p": {
-                        "slave": {"body": "block", "on": "bottom"},
-                        "master": {"body": "base", "on": "top"},
-                        **friction,
-                    }
-                }
-            },
+            "contact": {"pairs": {"p": {**PRESSED, **friction}}},
         }
 
-    probes = {
-        "top": {"quantity": "reaction", "body": "block", "on": "top"},
-        "bottom": {"quantity": "reaction", "body": "base", "on": "bottom"},
-        "energy": {"quantity": "energy"},
-    }
-    return StressScene("press", p, case, probes, any_angle=True)
+    return StressScene("press", p, case, PRESS_PROBES, any_angle=True)
 
 
 def drop(chance: random.Random) -> StressScene:

@@ -7,7 +7,7 @@ from typing import Any
 
 from fsci.stress.flow_scenes import OFFSETS, OUT, common
 from fsci.stress.frame import ACCELERATION, DENSITY, LENGTH, SPEED, VISCOSITY, Frame
-from fsci.stress.scenes import Case, StressScene, solid, spread, timing
+from fsci.stress.scenes import PRESS_PROBES, PRESSED, Case, StressScene, solid, spread, timing
 
 CELLS = 6  #: per unit of length
 
@@ -48,23 +48,10 @@ def press(chance: random.Random) -> StressScene:
                     },
                 }
             },
-            "contact": {
-                "pairs": {
-                    "p": {
-                        "slave": {"body": "block", "on": "bottom"},
-                        "master": {"body": "base", "on": "top"},
-                        **friction,
-                    }
-                }
-            },
+            "contact": {"pairs": {"p": {**PRESSED, **friction}}},
         }
 
-    probes = {
-        "top": {"quantity": "reaction", "body": "block", "on": "top"},
-        "bottom": {"quantity": "reaction", "body": "base", "on": "bottom"},
-        "energy": {"quantity": "energy"},
-    }
-    return StressScene("press 3D", p, case, probes, any_angle=True, dim=3)
+    return StressScene("press 3D", p, case, PRESS_PROBES, any_angle=True, dim=3)
 
 
 def drop(chance: random.Random) -> StressScene:

@@ -41,7 +41,7 @@ Numbers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Dependent:
-    """Nodes with an extension, as kept among the nodes that were asked for, sorted."""
+    """Nodes with an extension, by their positions among the nodes that were asked for, sorted."""
 
     nodes: Numbers
     rows: sparse.csr_matrix  #: E, shape (dependent nodes, nodes of the lattice)
@@ -75,10 +75,10 @@ class Extension:
     def __call__(self, share: Array, active: NDArray[np.bool_], reach: int) -> Dependent:
         """Dependent nodes of active box cells with these shares of fluid; roots are at most `reach` cells away."""
         nodes = self._nodes_of(np.flatnonzero(active & (share < WELL)))
-        kept, best = (self._largest(nodes, share, layers) for layers in (0, NEAR))
-        poor = (kept < WELL * best) | (kept == 0.0)
+        largest, best = (self._largest(nodes, share, layers) for layers in (0, NEAR))
+        poor = (largest < WELL * best) | (largest == 0.0)
         nodes = nodes[poor]
-        relative = np.divide(kept, best, out=np.zeros(len(kept)), where=best > 0.0)[poor]
+        relative = np.divide(largest, best, out=np.zeros(len(largest)), where=best > 0.0)[poor]
         self._find_roots(nodes[self._row_of[nodes] < 0], share, reach)
         known = self._row_of[nodes] >= 0
         rows = self._rows[self._row_of[nodes[known]]]
@@ -92,8 +92,8 @@ class Extension:
             (self.degree * i[:, None] + steps) % n * stride
             for i, n, stride in zip(index, self.shape, self._strides, strict=True)
         ]
-        kept = self._place[np.unique(reduce(_outer_sum, axes))]
-        return np.sort(kept[kept >= 0])
+        positions = self._place[np.unique(reduce(_outer_sum, axes))]
+        return np.sort(positions[positions >= 0])
 
     def _cells_around(self, nodes: Numbers, layers: int) -> tuple[Numbers, NDArray[np.bool_]]:
         """(box cells, whether they exist) of nodes and some layers around them, shape (nodes, cells)."""
@@ -173,7 +173,7 @@ class Extension:
 
 
 def _continued(s: Array, degree: int, steep: NDArray[np.bool_]) -> Array:
-    """1D shape functions at s, outside of the cell those of a line where steep or far, shape (kept, functions)."""
+    """1D shape functions at s, outside of the cell those of a line where steep or far, shape (points, functions)."""
     outside = np.maximum(-s, s - 1.0)
     straight = (outside > FAR) | steep & (outside > 0.0)
     line = np.stack([1.0 - s, *[0.0 * s] * (degree - 1), s], axis=1)
