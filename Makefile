@@ -84,8 +84,8 @@ test-slow: setup
 
 # What versions of DOLFINx, PETSc, MPI and numpy may break.
 test-versions: setup
-	$(BIN)/python -m pytest -n 2 -m "not slow" $(VERSION_TESTS:%=tests/test_%.py)
-	$(BIN)/python -m pytest -m slow tests/test_versions.py
+	$(BIN)/python -m pytest -n 2 -m "not slow" $(VERSION_TESTS:%=tests/*/test_%.py)
+	$(BIN)/python -m pytest -m slow tests/cases/test_versions.py
 
 # The same in a Debian 13 that is made for it, as root.
 test-debian13:

@@ -38,7 +38,7 @@ History = dict[str, Array]
 
 
 def main(results: Path) -> None:
-    sys.path.insert(0, str(DOCS.parent / "tests"))
+    sys.path[:0] = [str(DOCS.parent / "tests" / folder) for folder in ("setups", "fields")]
     static = {(name, refine): flag(results, name, refine) for name in STATIC_REFERENCE for refine in STATIC_MESHES}
     swings = {(refine, dt): flag(results, "csm3", refine, dt) for refine, dt in SWINGS}
     for name in STATIC_REFERENCE:

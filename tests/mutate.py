@@ -126,7 +126,7 @@ def survives(mutant: Mutant, tests: tuple[str, ...]) -> bool:
         mutant.path.write_text(mutant.text)
         if mutant.path.suffix == ".hpp" and not build():
             return False
-        files = [f"tests/test_{name}.py" for name in tests]
+        files = [str(path) for name in tests for path in ROOT.glob(f"tests/*/test_{name}.py")]
         run = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", "not slow", *files]
         try:
             return subprocess.run(run, cwd=ROOT, capture_output=True, timeout=900).returncode == 0

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "contributing.md").read_text()
 SOURCES = {
     path: path.read_text() for folder in ("coupling", "solvers", "fsci") for path in (ROOT / folder).rglob("*.py")

@@ -3,6 +3,7 @@
 import itertools
 import subprocess
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +15,7 @@ from solvers.fluid.cut import cells_between
 from solvers.fluid.grid import DistributedGrid, Grid, uniform
 from solvers.fluid.pockets import find_pockets
 
+SETUPS = Path(__file__).parents[1] / "setups"
 SHAPES = [((9, 8), ()), ((9, 8), (0,)), ((6, 5, 4), ()), ((6, 5, 4), (1, 2))]
 
 
@@ -69,8 +71,8 @@ def test_pockets_are_the_closed_parts():
 
 
 def test_pockets_on_three_processes():
-    command = ["mpirun", "-n", "3", sys.executable, __file__]
-    done = subprocess.run(command, env=PARALLEL, capture_output=True, text=True, timeout=100)
+    command, environment = ["mpirun", "-n", "3", sys.executable, __file__], {**PARALLEL, "PYTHONPATH": str(SETUPS)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100)
     assert done.returncode == 0, done.stderr
 
 

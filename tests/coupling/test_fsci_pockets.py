@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from coupling_setup import TIGHT, couple_one
 from fluid_setup import body, field, loop, make_fluid, step
 from mpi4py import MPI
 
@@ -17,7 +18,6 @@ from solvers.structure.body import Body, Symmetry
 from solvers.structure.dynamics import Dynamics
 from solvers.structure.elastic_constants import lame
 from solvers.structure.materials import StVenantKirchhoff
-from tests.coupling_setup import TIGHT, couple_one
 
 WEIGHT, DT = 3.0, 0.05
 

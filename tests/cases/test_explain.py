@@ -131,7 +131,7 @@ def test_what_to_try(tmp_path):
 
 def test_reasons_are_those_of_the_program():
     """Each key is part of a message in the sources: a message that is worded anew must be so here too."""
-    root = Path(__file__).parents[1]
+    root = Path(__file__).parents[2]
     sources = [path for folder in ("solvers", "coupling") for path in (root / folder).rglob("*.py")]
     text = "\n".join(path.read_text() for path in sources)
     assert [reason for reason in advice.REASONS if reason not in text] == []

@@ -19,7 +19,7 @@ from small_cases import PLATE
 from fsci.run.history import read_history
 from solvers import unlocked
 
-PROGRAM = Path(__file__).parent / "disturbed_run.py"
+PROGRAM = Path(__file__).parents[1] / "setups" / "disturbed_run.py"
 
 #: one linear solve a step
 CASE = f"""\

@@ -10,7 +10,7 @@ from run_fuzz import trouble
 
 from fsci.stress.mutants import CASES, mutant
 
-PROGRAM = Path(__file__).parent / "run_fuzz.py"
+PROGRAM = Path(__file__).parents[1] / "run_fuzz.py"
 
 
 @pytest.mark.parametrize("case", CASES, ids=["beam", "press", "flow", "post"])

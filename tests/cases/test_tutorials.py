@@ -9,7 +9,7 @@ from programs import fsci
 
 from fsci.run.history import read_history
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = Path(__file__).parents[2] / "docs"
 STAGES = ("solid", "contact", "flow", "coupled", "together")
 
 

@@ -4,7 +4,7 @@ import ast
 from collections import defaultdict
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 #: One class for each generation of DOLFINx; only one of the two is ever imported.
 VERSIONS = {"Compiled"}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from lubrication import closing_ratios, cylinder_drag, drag_ratio, settling_ratio, sphere_drag
 from programs import fsci
 
 from fsci.run.history import read_history
-from tests.lubrication import closing_ratios, cylinder_drag, drag_ratio, settling_ratio, sphere_drag
 
 H = 0.05
 

@@ -15,7 +15,7 @@ from fsci.meshes.mesh import MeshError, build_mesh, extract_region, place, requi
 from solvers.mesh import Mesh
 from solvers.mesh_topology import boundary_facets, surface_facets
 
-CSM3 = Path(__file__).parent.parent / "cases" / "csm3"
+CSM3 = Path(__file__).parents[2] / "cases" / "csm3"
 
 
 def build(folder, file, **settings):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from coupling_setup import BAR_MODES, TIGHT, bar_and_column
 
 from coupling.accelerate import Aitken, QuasiNewton, Relaxation
 from coupling.monolithic import Monolithic
 from coupling.partitioned import FixedPointTolerance, Partitioned
 from solvers.api import StepFailed
-from tests.coupling_setup import BAR_MODES, TIGHT, bar_and_column
 
 
 def swing(scheme, dt: float, steps: int):

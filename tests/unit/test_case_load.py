@@ -8,7 +8,7 @@ import pytest
 from fsci.case import load_case
 from fsci.check.check import summary
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 
 MINIMAL = """\
 time: {step: 1, end: 2}   # two load steps

@@ -129,7 +129,7 @@ def test_fewer_cells_than_processes(case, processes, tmp_path):
 
 
 def test_process_without_a_surface(tmp_path):
-    program, found = Path(__file__).parent / "inner_cell.py", []
+    program, found = Path(__file__).parents[1] / "setups" / "inner_cell.py", []
     for processes in (1, 2):
         out = tmp_path / f"{processes}.npz"
         command = ["mpirun", "-n", str(processes), sys.executable, program, out]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from fluid_setup import body, circle, loop, solve_steady
+from lubrication import drag_ratio
 from test_contact_start import end_of_a_pushed_bar
 from test_fluid_film import scene
 from test_self_contact import CLAPPING, closing_c, fold, run
@@ -19,7 +20,6 @@ from solvers.fluid.surface import ImmersedSurface
 from solvers.mesh_topology import cut_out
 from solvers.structure import dynamics
 from solvers.tessellation import tessellate
-from tests.lubrication import drag_ratio
 
 
 def set_opposed(monkeypatch, value):

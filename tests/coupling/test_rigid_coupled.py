@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fluid_setup import loop
 
 from coupling import couple_rigid
 from coupling.accelerate import QuasiNewton
@@ -21,7 +22,6 @@ from solvers.rigid.contact import Obstacle, RigidContact, RigidPair
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.inertia import inertia_of_surface
 from solvers.solver_settings import SolverSettings
-from tests.fluid_setup import loop
 
 TIGHT = SolverSettings(Tolerance(1e-10))
 WALLS = [Patch("walls", ("x-", "x+", "y-", "y+"), "no_slip")]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 FILES = sorted(path for folder in ("solvers", "coupling") for path in (ROOT / folder).rglob("*.py"))
 
 

@@ -14,7 +14,7 @@ from fsci.run.history import read_history
 from fsci.run.run import FINISHED, run_case
 from solvers.structure.elastic_constants import lame
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 #: A block with a named edge y = z = 0 and two named corners of x = 2.
 GEO = """\

@@ -12,7 +12,7 @@ import pytest
 from fsci.case import load_case
 from fsci.cli import execute
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 
 
 pytestmark = pytest.mark.usefixtures("in_new_folder")

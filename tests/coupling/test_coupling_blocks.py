@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from coupling_setup import post_in_flow
 
 from coupling.monolithic import Monolithic
 from solvers.fluid import coupling_entries
 from solvers.newton import Tolerance
-from tests.coupling_setup import post_in_flow
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from programs import PARALLEL
 
 from solvers.fluid.probes import mass_balance
 
-PROGRAM = Path(__file__).parent / "fluid_parallel.py"
+PROGRAM = Path(__file__).parents[1] / "setups" / "fluid_parallel.py"
 
 
 @pytest.mark.parametrize(

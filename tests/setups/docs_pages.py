@@ -11,7 +11,7 @@ from ruamel.yaml.error import YAMLError
 
 from fsci.schema import json_schema
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/*.md"))]
 SCHEMA = json.loads(json_schema())
 MODELS = SCHEMA["$defs"]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from coupling_setup import TIGHT, post_in_flow
 
 from coupling import accelerate
 from coupling.monolithic import Monolithic
 from coupling.partitioned import FixedPointTolerance, Partitioned
 from solvers.fluid.interface import InterfaceTerms
 from solvers.structure.field import Structure
-from tests.coupling_setup import TIGHT, post_in_flow
 
 SCHEMES = {
     "monolithic": lambda coupled: Monolithic(coupled, TIGHT),
