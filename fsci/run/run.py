@@ -124,11 +124,13 @@ class Run:
             return self._watched_loop()
 
     def _initialise(self, simulation: Simulation) -> None:
-        """The state at the first time. Raises CaseError if contact surfaces have no equilibrium."""
+        """The state at the first time. Raises CaseError if there is none: a smaller step would not help."""
         try:
             with self.record.timer("start"):
                 simulation.initialise(self.case.time.start, self.case.time.step)
         except StepFailed as failure:
+            if self.case.contact is None:
+                raise self.case.error(("structure",), str(failure)) from None
             raise self.case.error(("contact",), f"{_NO_START}: {failure}") from None
 
     def from_checkpoint(self, state: State) -> int:

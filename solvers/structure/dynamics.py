@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from solvers.api import Array
+from solvers.api import Array, StepFailed
 from solvers.blocks import block_diagonal
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.first_state import FirstState
@@ -84,6 +84,7 @@ class Dynamics:
         now.a[:] = held.free_part(now.a) + (2.0 * u[0] - 5.0 * u[1] + 4.0 * u[2] - u[3]) / h**2
 
     def _solve_acceleration(self, structure: Moving) -> None:
+        """M a_0 = f_ext - f_int - C v_0, prescribed where supports are. Raises StepFailed."""
         now, (x, b) = structure.now, structure.mass.createVecs()
         b.array[:] = now.external + now.constraint - now.internal - _damping_force(structure, now.v)
         x.array[:] = now.a
@@ -97,6 +98,10 @@ class Dynamics:
         ksp.getPC().setType(PETSc.PC.Type.JACOBI)
         ksp.setTolerances(rtol=1e-15, atol=0.0, max_it=1000)
         ksp.solve(b, x)
+        if (reason := ksp.getConvergedReason()) < 0:  # x would be zero, or where the iterations stopped
+            finite = np.isfinite(b.norm())
+            why = f"PETSc reason {reason}" if finite else "a force is not a number"
+            raise StepFailed("structure", f"there is no acceleration at the start ({why})")
         now.a[:] = x.array
 
     # ------------------------------------------------------------------------------------------------- steps

@@ -73,3 +73,24 @@ tractions: [{{on: right, value: [0, {load}]}}]}}"
         both = history({"a": one, "b": two}, processes)
         for name in ("at_a.x", "at_a.y", "at_b.x", "at_b.y"):
             assert both[name] == pytest.approx(alone[name], rel=1e-7), name
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_no_state_at_the_start(processes, tmp_path):
+    """A load that is infinite at t = 0 is an error at once, not a run that begins without it."""
+    falling = """\
+time: {step: 0.1, end: 1}
+structure:
+  dynamics: {rho_inf: 1}
+  bodies:
+    plate:
+      mesh: {shape: rectangle, size: [1, 1], cells: [2, 2]}
+      material: {law: neo_hooke, E: 1, nu: 0.3, density: 1}
+      body_force: [0, "1/t"]
+"""
+    (tmp_path / "case.yaml").write_text(falling)
+    run = fsci("run", tmp_path, "-o", tmp_path / "out", processes=processes, timeout=60)
+    assert run.returncode == 2, run.stdout + run.stderr
+    message = "case.yaml:2:1: structure: there is no acceleration at the start (a force is not a number)"
+    assert run.stderr.count(message) == 1
+    assert "Traceback" not in run.stderr

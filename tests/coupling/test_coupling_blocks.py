@@ -141,24 +141,17 @@ def test_every_newton_step_gains_much(E, rho_s, factor):
 
 
 def test_the_force_on_the_structure_is_the_reaction_of_the_fluid():
-    """All forces on the fluid's box: what the interface takes from the momentum rows is what the surface gets."""
+    """f = C' S w - M g, with the C by which motion enters the fluid's rows."""
     coupled = post_in_flow()
     coupled.initialise(0.0, 0.02)
     Monolithic(coupled).step(0.0, 0.02)
-    fluid, system = coupled.flow, coupled.flow.system
-    with_interface = system.residual()
-    owned = fluid.unknowns.owned
-    interface = system.interface
-    ones = np.zeros(fluid.unknowns.local)
-    for axis in range(2):
-        ones[:] = 0.0
-        ones[fluid.unknowns.velocity.dofs[:, axis]] = 1.0
-        # terms of the interface in the momentum rows, tested with a unit velocity: a force of -f on the fluid
-        on_fluid = -fluid.interface_entries(["post"]).force_by_flow @ ones
-        against = interface.force(fluid.flow, fluid.cut.motion.v)[:, axis].sum()
-        tested = interface.velocity_terms(fluid.cut.motion.v) @ ones
-        assert np.isfinite(on_fluid).all()
-        assert tested == pytest.approx(float(on_fluid @ fluid.cut.motion.v.ravel()), rel=1e-10, abs=1e-14)
-        assert np.isfinite(against)
+    fluid = coupled.flow
+    interface, velocity = fluid.system.interface, fluid.unknowns.velocity.dofs.ravel()
+    rng = np.random.default_rng(3)
+    w, g = rng.standard_normal(fluid.unknowns.local), rng.standard_normal(fluid.cut.motion.v.shape)
+    signed = w.copy()
+    signed[velocity] *= -1.0
+    work_on_motion = np.vdot(interface.force(w, np.zeros_like(g)), g)
+    assert work_on_motion == pytest.approx(interface.velocity_terms(g) @ signed, rel=1e-10)
     assert coupled.balance.force < 1e-8  # what Newton's method leaves
-    assert np.isfinite(with_interface[:owned]).all()
+    assert np.abs(interface.force(fluid.flow, fluid.cut.motion.v)).max() > 1e-3

@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 from fluid_setup import (
+    around_moving_body,
     block,
     body,
-    circle,
     field,
-    loop,
     make_fluid,
+    moving_body,
     nodal_errors,
     solve_steady,
-    sphere,
     turned,
     wall,
     with_slip,
@@ -88,19 +87,12 @@ def test_no_shear_stress(element):
 
 def moving(dim, element, length, transmissivity=0.0):
     """A body that moves through the box, with a flow without any symmetry."""
-    if dim == 2:
-        points, facets = circle((0.47, 0.52), 0.2, 24), loop(24)
-    else:
-        points, facets = sphere((0.47, 0.52, 0.5), 0.27, 1)
-    v = np.array([0.3, -0.2, 0.1])[:dim]
-    mover = body("mover", points, facets, motion=lambda x, t: (x + t * v, 0 * x + v + 0.3 * x[:, ::-1]))
     patches = [
         Patch("open", ("x+",), "outflow"),
         Patch("rest", ("x-", "y-", "y+", "z-", "z+")[: 2 * dim - 1], "no_slip"),
     ]
-    mover = with_slip(mover, length, transmissivity)
     fluid = make_fluid(
-        uniform([0] * dim, [1] * dim, [5] * dim if dim == 2 else [3] * dim), patches, [mover],
+        around_moving_body(dim), patches, [with_slip(moving_body(dim), length, transmissivity)],
         rho=1.2, mu=0.03, element=element, scheme="backward_euler", dt=0.05,
     )  # fmt: skip
     fluid.begin_step(0.0, 0.05)

@@ -4,9 +4,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from fluid_setup import body, circle, field, loop, make_fluid, sphere, step
+from fluid_setup import around_moving_body, field, make_fluid, moving_body, step
 
-from solvers.fluid.grid import uniform
 from solvers.fluid.patches import Patch
 
 
@@ -20,14 +19,8 @@ def channel(dim, element, scheme, convection):
         Patch("pulled", sides[:1], "traction", field(*[0.3, -0.2, 0.1][:dim])),
         Patch("slip", sides[1:], "slip"),
     ]
-    if dim == 2:
-        points, facets = circle((0.47, 0.52), 0.2, 24), loop(24)
-    else:
-        points, facets = sphere((0.47, 0.52, 0.5), 0.27, 1)
-    v = np.array([0.3, -0.2, 0.1])[:dim]
-    mover = body("mover", points, facets, motion=lambda x, t: (x + t * v, 0 * x + v + 0.3 * x[:, ::-1]))
     return make_fluid(
-        uniform([0] * dim, [1] * dim, [5] * dim if dim == 2 else [3] * dim), patches, [mover],
+        around_moving_body(dim), patches, [moving_body(dim)],
         rho=1.2, mu=0.03, element=element, scheme=scheme, convection=convection, dt=0.05,
         body_force=field(*[1, -2, 0.5][:dim]),
     )  # fmt: skip

@@ -5,6 +5,7 @@ import pytest
 from structure_setup import block, constant, make_structure, vector
 
 from fsci import shapes
+from solvers.api import StepFailed
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
@@ -193,3 +194,11 @@ def test_acceleration_at_the_start():
     parts = weight, -body.internal_force(), -damping @ now.v
     assert min(np.abs(part).max() for part in parts) > 0.1
     assert mass @ now.a == pytest.approx(sum(parts), abs=1e-10)
+
+
+def test_no_acceleration_at_the_start():
+    """A load that is not a number must not start a run with an acceleration of zero."""
+    time = Dynamics(GeneralisedAlpha.from_rho_inf(1.0))
+    structure = make_structure(block("quad", 2), NeoHooke(30.0, 50.0, 2.0), time=time, gravity=vector(0.0, np.nan))
+    with pytest.raises(StepFailed, match=r"no acceleration at the start \(a force is not a number\)"):
+        structure.initialise(0.0, 0.1)

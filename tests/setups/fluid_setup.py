@@ -11,7 +11,7 @@ from mpi4py import MPI
 from solvers import fem
 from solvers.fluid.cut import Cutter
 from solvers.fluid.field import Fluid
-from solvers.fluid.grid import Grid
+from solvers.fluid.grid import Grid, uniform
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.patches import Patch
 from solvers.fluid.surface import ImmersedSurface, Motion
@@ -145,6 +145,21 @@ def block(low, high) -> tuple[np.ndarray, np.ndarray]:
         return square, BLOCK_FACETS[2]
     both = [np.column_stack([square, np.full(4, float(z))]) for z in (low[2], high[2])]
     return np.concatenate(both), BLOCK_FACETS[3]
+
+
+def moving_body(dim: int) -> ImmersedBody:
+    """A disc or a ball in the unit box that moves and deforms; its velocity is not that of its positions."""
+    if dim == 2:
+        points, facets = circle((0.47, 0.52), 0.2, 24), loop(24)
+    else:
+        points, facets = sphere((0.47, 0.52, 0.5), 0.27, 1)
+    v = np.array([0.3, -0.2, 0.1])[:dim]
+    return body("mover", points, facets, motion=lambda x, t: (x + t * v, 0 * x + v + 0.3 * x[:, ::-1]))
+
+
+def around_moving_body(dim: int) -> Grid:
+    """The unit box in cells that the moving body cuts: 5 x 5, or 3 x 3 x 3."""
+    return uniform([0] * dim, [1] * dim, [5] * dim if dim == 2 else [3] * dim)
 
 
 def turned(points: np.ndarray, angle: float, about=None) -> np.ndarray:

@@ -8,9 +8,8 @@ import sys
 from time import process_time
 
 import ngsolve as ng
-import xfem
 from netgen.geom2d import SplineGeometry
-from xfem.lsetcurv import LevelSetMeshAdaptation
+from ngsxfem_cut import cut_flow
 
 LENGTH, HEIGHT, CENTRE, RADIUS, MEAN, VISCOSITY = 2.2, 0.41, (0.2, 0.2), 0.05, 0.2, 1e-3
 DRAG, LIFT, PRESSURE = 5.57953523384, 0.010618948146, 0.11752016697
@@ -29,30 +28,16 @@ def solve(size: float) -> dict[str, float]:
     """Errors of drag, lift and pressure difference, and seconds of the processor from the mesh on."""
     begin = process_time()
     mesh = channel(size)
-    distance = RADIUS - ng.sqrt((ng.x - CENTRE[0]) ** 2 + (ng.y - CENTRE[1]) ** 2)  # negative in the fluid
-    adaptation = LevelSetMeshAdaptation(mesh, order=2, threshold=10.5, discontinuous_qn=True)
-    deformation = adaptation.CalcDeformation(distance)
-    level = adaptation.lset_p1
-    info = xfem.CutInfo(mesh, level)
-    wet, cut = info.GetElementsOfType(xfem.HASNEG), info.GetElementsOfType(xfem.IF)
-    faces = xfem.GetFacetsWithNeighborTypes(mesh, a=wet, b=cut)
-
-    V, Q = ng.VectorH1(mesh, order=2, dirichlet="wall|inlet"), ng.H1(mesh, order=1)
-    V = ng.Compress(V, xfem.GetDofsOfElements(V, wet))
-    Q = ng.Compress(Q, xfem.GetDofsOfElements(Q, wet))
-    W = ng.FESpace([V, Q], dgjumps=True)
+    flow = cut_flow(mesh, CENTRE, RADIUS, 2, "wall|inlet")
+    W, dx, ds, dw, normal = flow.both, flow.dx, flow.ds, flow.dw, flow.normal
     (u, p), (v, q) = W.TnT()
-    normal = ng.Grad(level) / ng.Norm(ng.Grad(level))
     h = ng.specialcf.mesh_size
-    dx = xfem.dCut(level, xfem.NEG, definedonelements=wet, deformation=deformation)
-    ds = xfem.dCut(level, xfem.IF, definedonelements=cut, deformation=deformation)
-    dw = xfem.dFacetPatch(definedonelements=faces, deformation=deformation)
     penalty = 40 * VISCOSITY / h
 
     def traction(u, p):
         return VISCOSITY * ng.Grad(u) * normal - p * normal
 
-    a = xfem.RestrictedBilinearForm(W, element_restriction=wet, facet_restriction=faces, check_unused=False)
+    a = flow.form()
     a += (VISCOSITY * ng.InnerProduct(ng.Grad(u), ng.Grad(v)) - ng.div(u) * q - ng.div(v) * p) * dx
     a += (ng.Grad(u) * u) * v * dx
     a += (-traction(u, p) * v - traction(v, q) * u + penalty * u * v) * ds

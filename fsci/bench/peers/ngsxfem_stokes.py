@@ -1,7 +1,7 @@
 """Stokes flow around a cut disc by ngsxfem; a script of its Python. Prints a row as JSON.
 
 python ngsxfem_stokes.py ORDER CELLS: velocity of order 1 or 2, pressure of order 1, triangles of a square's halves.
-After share/ngsxfem/stokescutfem.py; the matrix has the couplings of ghost penalties on the faces that have some only.
+After share/ngsxfem/stokescutfem.py.
 """
 
 import json
@@ -10,9 +10,8 @@ from math import sqrt
 from time import process_time
 
 import ngsolve as ng
-import xfem
 from ngsolve.meshes import MakeStructured2DMesh
-from xfem.lsetcurv import LevelSetMeshAdaptation
+from ngsxfem_cut import cut_flow
 
 CENTRE, RADIUS = (0.51, 0.48), 0.21
 
@@ -22,25 +21,10 @@ def solve(order: int, cells: int) -> dict[str, float]:
     begin = process_time()
     mesh = MakeStructured2DMesh(quads=False, nx=cells, ny=cells)
     exact = ng.CF((20 * ng.x * ng.y**3, 5 * ng.x**4 - 5 * ng.y**4))
-    distance = RADIUS - ng.sqrt((ng.x - CENTRE[0]) ** 2 + (ng.y - CENTRE[1]) ** 2)  # negative in the fluid
-
-    adaptation = LevelSetMeshAdaptation(mesh, order=order, threshold=10.5, discontinuous_qn=True)
-    deformation = adaptation.CalcDeformation(distance)
-    level = adaptation.lset_p1
-    info = xfem.CutInfo(mesh, level)
-    wet, cut = info.GetElementsOfType(xfem.HASNEG), info.GetElementsOfType(xfem.IF)
-    faces = xfem.GetFacetsWithNeighborTypes(mesh, a=wet, b=cut)
-
-    V, Q = ng.VectorH1(mesh, order=order, dirichlet=".*"), ng.H1(mesh, order=1)
-    V = ng.Compress(V, xfem.GetDofsOfElements(V, wet))
-    Q = ng.Compress(Q, xfem.GetDofsOfElements(Q, wet))
-    W = ng.FESpace([V, Q], dgjumps=True)
+    flow = cut_flow(mesh, CENTRE, RADIUS, order, ".*")
+    V, W, dx, ds, dw, normal = flow.velocity, flow.both, flow.dx, flow.ds, flow.dw, flow.normal
     (u, p), (v, q) = W.TnT()
-    normal = ng.Grad(level) / ng.Norm(ng.Grad(level))
     h = ng.specialcf.mesh_size
-    dx = xfem.dCut(level, xfem.NEG, definedonelements=wet, deformation=deformation)
-    ds = xfem.dCut(level, xfem.IF, definedonelements=cut, deformation=deformation)
-    dw = xfem.dFacetPatch(definedonelements=faces, deformation=deformation)
 
     def traction(u, p):
         return (ng.Grad(u) + ng.Grad(u).trans) * normal - p * normal
@@ -48,7 +32,7 @@ def solve(order: int, cells: int) -> dict[str, float]:
     def strain(u):
         return 0.5 * (ng.Grad(u) + ng.Grad(u).trans)
 
-    a = xfem.RestrictedBilinearForm(W, element_restriction=wet, facet_restriction=faces, check_unused=False)
+    a = flow.form()
     f = ng.LinearForm(W)
     a += (2 * ng.InnerProduct(strain(u), strain(v)) - ng.div(u) * q - ng.div(v) * p) * dx
     a += (-traction(u, p) * v - traction(v, q) * u + 20 * order**2 / h * u * v) * ds
