@@ -21,7 +21,7 @@ def leak(system: FlowSystem) -> float:
     assert system.cut is not None
     at = system.interface
     u, g = system.flow.x.array[at.u], system.cut.motion.v[at.corners]
-    through = np.einsum("pav,pa->p", at.phi, np.einsum("pai,pi->pa", u, at.n))
+    through = np.einsum("pav,pa->p", at.fields[..., 0], np.einsum("pai,pi->pa", u, at.n))
     through -= np.einsum("pvw,pw->p", at.mass_of_pieces, np.einsum("pwi,pi->pw", g, at.n))
     return system.grid.comm.allreduce(float(np.abs(through).sum()))
 

@@ -8,7 +8,7 @@ from typing import Any
 import ufl
 
 from solvers import fem
-from solvers.fluid import forms
+from solvers.fluid import forms, nitsche
 from solvers.fluid.space import Unknowns
 from solvers.fluid.weights import Weights
 
@@ -34,7 +34,7 @@ def cell_forms(unknowns: Unknowns, flow: forms.Coefficients, function: Any, weig
     residuals = [everywhere * fem.measure(domain, "dx", 2 * degree + 1)]
     if weights is not None:
         dx_cut = fem.measure(domain, "dx", weights.degree)
-        on_interface = forms.interface(flow, weights, u, p, v, q)
+        on_interface = nitsche.own(flow, weights, u, p, v, q)
         residuals.append(weights.fluid * everywhere * dx_cut + on_interface * dx_cut)
         residuals.append(weights.fluid * forms.film(flow, u, p, v, q) * dx_cut + on_interface * dx_cut)
     tangents = [ufl.derivative(form, function, trial) for form in residuals]

@@ -83,8 +83,6 @@ class _Sums:
         fields = at.fields[ours]
         turned = np.swapaxes(coefficients.fields[ours], 2, 3).reshape(len(fields), fields.shape[3], dim * dim)
         velocity = (fields @ turned[:, None]).reshape(-1, dim, dim)
-        if coefficients.blocks is not None:
-            velocity += coefficients.blocks[ours].transpose(0, 1, 3, 4, 2).reshape(-1, dim, dim)
         pressure = (at.psi[ours][..., None] * coefficients.psi[ours][:, None, None]).reshape(-1, dim, 1)
         return (self._velocity.matrix(velocity) + self._pressure.matrix(pressure)).ordered()
 

@@ -1,6 +1,6 @@
-"""The equations of the flow on a cut grid: bulk, stabilisation, interface, ghost penalty.
+"""The equations of the flow on a cut grid: bulk, stabilisation, ghost penalty; those of surfaces are in `nitsche`.
 
-sigma(u, p) = 2 mu eps(u) - p I, n outward normal of the fluid, g velocity of the interface, h edge length of the cell.
+sigma(u, p) = 2 mu eps(u) - p I, h edge length of the cell.
 The time derivative is alpha u - history, alpha = 0 if the flow is steady; `a` is the velocity that scales
 the stabilisation, from before the iterate.
 Sources: Massing, Schott, Wall, Comput. Methods Appl. Mech. Engrg. 328 (2018) 262-300; Schott, Wall, ibid. 276 (2014)
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import ufl
-from ufl import avg, div, dot, grad, inner, outer, sqrt, sym, tr
+from ufl import avg, div, dot, grad, inner, sqrt, sym
 
 Expr = Any
 
@@ -147,22 +147,6 @@ def _rates(flow: Coefficients) -> tuple[list[Expr], Expr, Expr]:
     if flow.convection:
         common += flow.rho**2 * sum(g * flow.a[i] ** 2 for i, g in enumerate(metric))
     return metric, common, (36.0 if flow.degree == 1 else 144.0) * flow.mu**2
-
-
-def interface(flow: Coefficients, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
-    """Integrand over cut cells of Nitsche's method on an interface at rest, by its weights.
-
-    -<sigma(u, p) n, v> - <u, 2 mu eps(v) n + q n> + <P u, v>,  P = s I + s_n n n^T
-
-    The same terms tested with -v, and with the interface velocity g in the place of u, are in `Interface`.
-    """
-    u_n = outer(u, weights.n)
-    return (
-        -dot(dot(sigma(flow, u, p), weights.n), v)
-        - inner(2.0 * flow.mu * eps(v), u_n)
-        - q * tr(u_n)
-        + dot(dot(weights.penalty, u), v)
-    )
 
 
 def ghost_penalty(

@@ -1,29 +1,25 @@
 """What fluid and surface exchange: velocity of the surface into the fluid, force of the fluid on the surface.
 
-With N_b the shape functions of the surface's vertices and g = sum_b N_b g_b, Nitsche's terms of `forms.interface` for
-the velocity g instead of u, and the same terms tested with the surface's motion, are one matrix C and its transpose:
+With N_b the shape functions of the surface's vertices, g = sum_b N_b g_b and the terms of `nitsche`, whose stress is t,
 
-    C[(v, q), b i] = <2 mu eps(v) n + q n, N_b e_i> - <P v, N_b e_i>       fluid rows:  r += C g
-    f_b i = -<sigma(u, p) n - P (u - g), N_b e_i> = (C^T S (u, p) - M g)_bi,   S = -1 for u, +1 for p
+    C[(v, q), b i] = <t(v, 0) + q n, N_b e_i>                                    fluid rows:  r += C g
+    f_b i = -<t(u, g) - p n, N_b e_i> = (C^T S (u, p) - M g)_bi,   S = -1 for u, +1 for p,   M = <P N_b, N_c>.
 
-C and M have what `slip` adds along surfaces that the flow does not stick to.
 Both come from the same moments of the same pieces, so that the sum of all forces vanishes to round-off.
-Source: Massing, Schott, Wall, Comput. Methods Appl. Mech. Engrg. 328 (2018) 262-300, section 3.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from solvers.api import Array
+from solvers.fluid import nitsche
 from solvers.fluid.cell_blocks import CellBlocks, cell_blocks
 from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
-from solvers.fluid.seepage import release_terms, seepage_terms
-from solvers.fluid.slip import PieceIntegrals, SlipTerms, slip_terms
+from solvers.fluid.seepage import release, seepage_terms
 from solvers.fluid.space import Unknowns
 from solvers.fluid.weights import Weights
 
@@ -34,17 +30,16 @@ class MotionOperator:
 
     fields: Array  #: of `InterfaceTerms.fields` in velocity rows (pieces, fields, component, component of the motion)
     psi: Array  #: of psi in pressure rows (pieces, component of the motion)
-    blocks: Array | None = None  #: more in velocity rows (pieces, functions, dim, vertices, dim), with slip
 
     def __rmul__(self, factor: float) -> MotionOperator:
-        return MotionOperator(
-            factor * self.fields, factor * self.psi, None if self.blocks is None else factor * self.blocks
-        )
+        return MotionOperator(factor * self.fields, factor * self.psi)
 
     def __add__(self, other: MotionOperator) -> MotionOperator:
-        """Both have blocks, or neither."""
-        blocks = None if self.blocks is None or other.blocks is None else self.blocks + other.blocks
-        return MotionOperator(self.fields + other.fields, self.psi + other.psi, blocks)
+        return MotionOperator(self.fields + other.fields, self.psi + other.psi)
+
+    def of(self, by_motion: Array) -> MotionOperator:
+        """After a map of the motion, shape (pieces, dim, dim)."""
+        return MotionOperator(self.fields @ by_motion[:, None], np.einsum("pi,pij->pj", self.psi, by_motion))
 
 
 class InterfaceTerms:
@@ -64,85 +59,68 @@ class InterfaceTerms:
         """penalty: P by pieces [Pa s/m]; slip_length [m], transmissivity [m^3]: by facets, None where all are zero."""
         pieces = cut.pieces
         mine = cut.cut[pieces.cell] < grid.owned
-        cells = cut.cut[pieces.cell[mine]]
+        cells, facet = cut.cut[pieces.cell[mine]], pieces.facet[mine]
         self.mu, self.dim, self._unknowns, self.vertices = mu, grid.dim, unknowns, len(cut.motion.x)
         moments = pieces.moments[mine][:, rule.order]
         self.n, self.penalty, self.mass_of_pieces = pieces.normal[mine], penalty[mine], pieces.mass[mine]
-        self.corners = cut.facets[pieces.facet[mine]]
+        self.corners = cut.facets[facet]
         self.x = cut.motion.x[self.corners]
         self.sizes = grid.sizes[cells]
         self.u, self.p = unknowns.cell_velocity[cells], unknowns.cell_pressure[cells]
         phi, gradient = rule.velocity_table
         psi, psi_gradient = rule.pressure_table
-        #: int phi_a N_b, int grad phi_a N_b, int psi_a N_b, int d_n phi_a N_b and int grad psi_a over each piece
-        self.phi = np.tensordot(moments, phi, (1, 0)).transpose(0, 2, 1)
-        slope = np.tensordot(moments, gradient, (1, 0)).transpose(0, 2, 1, 3)
-        self.grad = slope / self.sizes[:, None, None, :]
+        table = np.concatenate([phi[:, :, None], gradient], axis=2)
+        #: int phi_a N_b, int grad phi_a N_b over each piece, shape (pieces, functions, vertices, 1 + dim)
+        self.fields = np.ascontiguousarray(np.tensordot(moments, table, (1, 0)).transpose(0, 2, 1, 3))
+        self.fields[..., 1:] /= self.sizes[:, None, None, :]
+        #: int psi_a N_b and int grad psi_a
         self.psi = np.tensordot(moments, psi, (1, 0)).transpose(0, 2, 1)
-        self.normal_slope = np.einsum("pavj,pj->pav", self.grad, self.n)
-        slope = np.tensordot(moments.sum(axis=2), psi_gradient, (1, 0))
-        self.pressure_slope = slope / self.sizes[:, None, :]
-        self.slip: SlipTerms | None = None  #: of slip and seepage together
-        self.cell_blocks: list[CellBlocks] = []  #: what both add to the rows of the flow
-        facet = pieces.facet[mine]
-        at = PieceIntegrals(self.n, moments.sum(axis=2), self.phi, self.grad, self.mass_of_pieces, self.sizes)
+        area = moments.sum(axis=2)
+        self.pressure_slope = np.tensordot(area, psi_gradient, (1, 0)) / self.sizes[:, None, :]
+        self.coupling = MotionOperator(nitsche.stress(mu, self.n, self.penalty), self.n)  #: C
+        self.cell_blocks: list[CellBlocks] = []  #: what surfaces that give way add to the rows of the flow
+        D, along = np.zeros_like(self.penalty), self.n[:, :, None] * self.n[:, None, :]
+        tangents = np.eye(self.dim) - along
         if slip_length is not None:
-            self.slip = slip_terms(at, rule.velocity_table, mu, self.penalty, slip_length[facet])
+            D += nitsche.compliance(slip_length[facet] / mu, tangents, self.penalty)
         if transmissivity is not None:
             mobility = transmissivity[facet] / mu
-            released = release_terms(at, rule.velocity_table, mu, self.penalty, mobility)
-            self.slip = released if self.slip is None else self.slip + released
-            self.cell_blocks = [cell_blocks(cells, self.p, seepage_terms(at, psi_gradient, mobility))]
-        if self.slip is not None:
-            self.cell_blocks.append(cell_blocks(cells, self.u, self.slip.flow))
+            D += nitsche.compliance(release(mobility, self.sizes), along, self.penalty)
+            seeping = seepage_terms(tangents, area, psi_gradient, mobility, self.sizes)
+            self.cell_blocks.append(cell_blocks(cells, self.p, seeping))
+        if slip_length is not None or transmissivity is not None:
+            own = nitsche.released(mu, self.n, self.penalty, D, area, rule.velocity_table, self.sizes)
+            self.cell_blocks.append(cell_blocks(cells, self.u, own))
+            R = np.eye(self.dim) - D @ self.penalty
+            self.coupling = MotionOperator(self.coupling.fields @ R[:, None], self.n)
+            self.penalty = self.penalty @ R
 
     def velocity_terms(self, g: Array) -> Array:
         """C g at local dofs, the ghosts' share still there; g [m/s] of shape (vertices, dim)."""
-        g, n, mu = g[self.corners], self.n, self.mu
-        against = np.einsum("pav,pvi->pai", mu * self.normal_slope, g)
-        against += mu * np.einsum("pavj,pvj->pa", self.grad, g)[:, :, None] * n[:, None, :]
-        against -= np.einsum("pij,paj->pai", self.penalty, self.phi @ g)
-        if self.slip is not None:
-            against += np.einsum("pakvi,pvi->pak", self.slip.coupling, g)
-        leak = np.einsum("pav,pv->pa", self.psi, np.einsum("pvi,pi->pv", g, n))
+        g, fields, K = g[self.corners], *self._flat()
+        against = fields @ (g @ np.swapaxes(K, 1, 2)).reshape(len(g), -1, self.dim)
+        leak = np.einsum("pav,pv->pa", self.psi, np.einsum("pvi,pi->pv", g, self.n))
         size = self._unknowns.local
         total: Array = np.bincount(self.u.ravel(), against.ravel(), size).astype(float)
         return total + np.bincount(self.p.ravel(), leak.ravel(), size)
 
     def force(self, flow: Array, g: Array) -> Array:
         """This process' share of the force [N] on the vertices, shape (vertices, dim); `flow` at local dofs."""
-        u, p, n, mu = flow[self.u], flow[self.p], self.n, self.mu
-        force = -mu * np.einsum("pav,pai->pvi", self.normal_slope, u)
-        force -= mu * np.einsum("pavi,pa->pvi", self.grad, np.einsum("paj,pj->pa", u, n))
-        force += np.einsum("pav,pa->pv", self.psi, p)[:, :, None] * n[:, None, :]
-        slip = np.einsum("pav,pai->pvi", self.phi, u) - np.einsum("pvw,pwi->pvi", self.mass_of_pieces, g[self.corners])
-        force += np.einsum("pij,pvj->pvi", self.penalty, slip)
-        if self.slip is not None:
-            force -= np.einsum("pakvi,pak->pvi", self.slip.coupling, u)
-            force -= np.einsum("pviwj,pwj->pvi", self.slip.mass, g[self.corners])
-        total = np.zeros((self.vertices, n.shape[1]))
+        u, p, g, fields, K = flow[self.u], flow[self.p], g[self.corners], *self._flat()
+        force = np.einsum("pav,pa->pv", self.psi, p)[:, :, None] * self.n[:, None, :]
+        force -= (np.swapaxes(fields, 1, 2) @ u).reshape(*g.shape[:2], -1) @ K
+        force -= self.mass_of_pieces @ g @ self.penalty
+        total = np.zeros((self.vertices, self.dim))
         np.add.at(total, self.corners, force)
         return total
 
-    @cached_property
-    def fields(self) -> Array:
-        """int phi_a N_b, int d_n phi_a N_b, int d_i phi_a N_b by pieces, shape (pieces, functions, vertices, 2 + dim).
+    def _flat(self) -> tuple[Array, Array]:
+        """`fields` (pieces, functions, vertices x fields) and coefficients (pieces, fields x component, motion)."""
+        pieces, functions = self.fields.shape[:2]
+        flat = self.fields.reshape(pieces, functions, -1)
+        return flat, self.coupling.fields.reshape(pieces, -1, self.dim)
 
-        Every operator between motion and velocity is these times coefficients of the piece.
-        """
-        return np.concatenate([self.phi[..., None], self.normal_slope[..., None], self.grad], axis=3)
-
-    @cached_property
-    def coupling(self) -> MotionOperator:
-        """C."""
-        dim, mu, n = self.dim, self.mu, self.n
-        by_gradient = mu * np.einsum("ij,pk->pikj", np.eye(dim), n)
-        by_slope = np.broadcast_to(mu * np.eye(dim), (len(n), 1, dim, dim))
-        fields = np.concatenate([-self.penalty[:, None], by_slope, by_gradient], axis=1)
-        return MotionOperator(fields, n, None if self.slip is None else self.slip.coupling)
-
-    @cached_property
+    @property
     def mass_blocks(self) -> Array:
         """M = -df/dg [kg/s] by pieces, shape (pieces, vertices, vertices, dim, dim)."""
-        mass: Array = self.mass_of_pieces[:, :, :, None, None] * self.penalty[:, None, None]
-        return mass if self.slip is None else mass + np.swapaxes(self.slip.mass, 2, 3)
+        return self.mass_of_pieces[:, :, :, None, None] * self.penalty[:, None, None]

@@ -20,28 +20,20 @@ from solvers.fluid.interface import InterfaceTerms, MotionOperator
 
 def shape_derivatives(interface: InterfaceTerms, flow: Array) -> tuple[MotionOperator, Array]:
     """(dr/dd, df/dd) by pieces, as `InterfaceTerms.coupling` and `mass_blocks`; `flow` at local dofs."""
-    at, n, mu, P = interface, interface.n, interface.mu, interface.penalty
+    at, n, mu = interface, interface.n, interface.mu
     u, p = flow[at.u], flow[at.p]
     area = at.psi.sum(axis=(1, 2))
     share = np.where(area > 0.0, 1.0 / np.where(area > 0.0, area, 1.0), 0.0)
-    grad_u = np.einsum("pai,paj,p->pij", u, at.grad.sum(axis=2), share, optimize=True)
+    grad_u = np.einsum("pai,paj,p->pij", u, at.fields[..., 1:].sum(axis=2), share, optimize=True)
     pressure = np.einsum("pa,pa,p->p", p, at.psi.sum(axis=2), share)
     grad_p = np.einsum("pa,paj,p->pj", p, at.pressure_slope, share)
 
-    penalised = P @ grad_u
-    by_gradient = -mu * np.einsum("pk,pij->pikj", n, grad_u)
-    into_velocity = np.concatenate([penalised[:, None], -mu * grad_u[:, None], by_gradient], axis=1)
-    more = None if at.slip is None else -np.einsum("pakvi,pij->pakvj", at.slip.coupling, grad_u)
-    into_flow = MotionOperator(into_velocity, -np.einsum("pi,pij->pj", n, grad_u), more)
-
-    field = n[:, :, None] * grad_p[:, None, :] + penalised
+    field = n[:, :, None] * grad_p[:, None, :] + at.penalty @ grad_u
     stress = pressure[:, None, None] * np.eye(at.dim) - mu * (grad_u + np.swapaxes(grad_u, 1, 2))
     turned = np.einsum("pil,plvj->pivj", stress, _normal_derivative(at.x, n))
     load = at.mass_of_pieces[:, :, :, None, None] * field[:, None, None]
     load += np.einsum("pb,pivj->pbvij", at.psi.sum(axis=1), turned)
-    if at.slip is not None:
-        load += np.einsum("pbivl,plj->pbvij", at.slip.mass, grad_u)
-    return into_flow, load
+    return at.coupling.of(-grad_u), load
 
 
 def _normal_derivative(x: Array, n: Array) -> Array:

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 from solvers import fem
 from solvers.api import Array
-from solvers.fluid import forms
+from solvers.fluid import forms, nitsche
 from solvers.fluid.cell_forms import cell_forms
 from solvers.fluid.cut import Cut
 from solvers.fluid.film import film_cells
@@ -283,20 +283,14 @@ class FlowSystem:
             self.flow.x.scatter_forward()
 
     def _interface_penalties(self, pieces: Pieces, cut: Cut) -> Array:
-        """P = s I + s_n n n^T of pieces [Pa s/m], shape (pieces, dim, dim).
-
-        s = gamma mu C_T / h + rho max(0, -g . n), s_n = rho (gamma_b |a| + gamma_t h alpha) with
-        h = (sum n_i^2 / h_i^2)^(-1/2), the length of a cell along the normal.
-        """
-        settings, factors, n = self.settings, self.settings.penalties, pieces.normal
-        cells = cut.cut[pieces.cell]
-        h, rho = 1.0 / np.linalg.norm(n / self.grid.sizes[cells], axis=1), settings.density
-        s = factors.nitsche * settings.viscosity * forms.TRACE[self.grid.dim, settings.degree] / h
-        if settings.convection:
-            g = cut.motion.v[cut.facets[pieces.facet]].mean(axis=1)
-            s = s + rho * np.maximum(0.0, -np.einsum("pi,pi->p", g, n))
-        normal = rho * (factors.convection * self.speed[cells] + factors.mass * h * float(self._alpha.value))
-        return s[:, None, None] * np.eye(self.grid.dim) + normal[:, None, None] * n[:, :, None] * n[:, None, :]
+        """P of pieces [Pa s/m], shape (pieces, dim, dim)."""
+        settings, cells = self.settings, cut.cut[pieces.cell]
+        g = cut.motion.v[cut.facets[pieces.facet]].mean(axis=1)
+        flow = settings.viscosity, settings.density, float(self._alpha.value)
+        speeds = self.speed[cells], g * settings.convection
+        return nitsche.penalties(
+            flow, settings.penalties, settings.degree, pieces.normal, self.grid.sizes[cells], *speeds
+        )
 
     # --------------------------------------------------------------------------------------- residual and tangent
 

@@ -101,6 +101,8 @@ def moving(dim, element, length, transmissivity=0.0):
 
 
 MOVING = [
+    (2, "q2q1", 0.0),
+    (3, "q1q1", 0.0),
     (2, "q1q1", 0.05),
     (2, "q2q1", 0.05),
     (3, "q1q1", 2.0),

@@ -1,0 +1,112 @@
+"""Nitsche's method on the surfaces of bodies: the one place that says how flow and surface act on each other.
+
+For a flow (u, p) and a surface with the velocity g, tested with (v, q) and a motion h of the surface,
+
+    N = -<2 mu eps(u) n - p n, v - h> - <u - g, 2 mu eps(v) n + q n> + <P (u - g), v - h>,   P = s I + s_n n n^T.
+
+With t(u, g) = 2 mu eps(u) n - P (u - g) that is
+
+    N = -<2 mu eps(u) n - p n, v> - <u, t(v, 0) + q n>      the flow's own block: `own`, for the form compiler
+        + <g, t(v, 0) + q n>                                C
+        + <t(u, g) - p n, h>                                less the force on the surface: C^T, the mass <P g, h>
+
+so that the coefficients of t, `stress`, and P give every operator of the surface (`interface.InterfaceTerms`).
+
+Surfaces that give way: where a law asks for u - g = -c t in the directions of a projector (slip along the surface,
+c = b / mu with the slip length b; seepage into it), one more term -<D t(u, g), t(v, -h)> with D = projector /
+(1 / c + s), s the penalty in these directions, brings that about exactly for every c from 0 (no slip) to infinity
+(no stress), and all blocks stay symmetric. It multiplies what the surface has by R = I - D P: t becomes R t in C, P
+becomes P R in the mass. The flow's own block gets `released`.
+Sources: Massing, Schott, Wall, Comput. Methods Appl. Mech. Engrg. 328 (2018) 262-300, section 3; Juntunen, Stenberg,
+Math. Comp. 78 (2009) 1353-1374.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from ufl import dot, inner, outer, tr
+
+from solvers.api import Array
+from solvers.fluid.forms import TRACE, Coefficients, Expr, Penalties, eps, sigma
+
+#: Pieces that are worked on at once: what is at their quadrature points is large in 3D.
+AT_ONCE = 256
+
+
+def own(flow: Coefficients, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
+    """Integrand over cut cells of the flow's own block, by its weights n and P."""
+    u_n = outer(u, weights.n)
+    return (
+        -dot(dot(sigma(flow, u, p), weights.n), v)
+        - inner(2.0 * flow.mu * eps(v), u_n)
+        - q * tr(u_n)
+        + dot(dot(weights.penalty, u), v)
+    )
+
+
+def penalties(
+    flow: tuple[float, float, float], factors: Penalties, degree: int, n: Array, sizes: Array, speed: Array, g: Array
+) -> Array:
+    """P = s I + s_n n n^T of pieces [Pa s/m], shape (pieces, dim, dim).
+
+    s = gamma mu C_T / h + rho max(0, -g . n), s_n = rho (gamma_b |a| + gamma_t h alpha) with
+    h = (sum n_i^2 / h_i^2)^(-1/2), the length of a cell along the normal.
+    flow: mu [Pa s], rho [kg/m^3], alpha [1/s]; n, edge lengths of the cells [m], g [m/s]: (pieces, dim);
+    speed: |a| [m/s], (pieces,).
+    """
+    (mu, rho, alpha), dim = flow, n.shape[1]
+    h = 1.0 / np.linalg.norm(n / sizes, axis=1)
+    s = factors.nitsche * mu * TRACE[dim, degree] / h + rho * np.maximum(0.0, -np.einsum("pi,pi->p", g, n))
+    normal = rho * (factors.convection * speed + factors.mass * h * alpha)
+    return s[:, None, None] * np.eye(dim) + normal[:, None, None] * n[:, :, None] * n[:, None, :]
+
+
+def stress(mu: float, n: Array, P: Array) -> Array:
+    """t of a velocity phi e_k: t_i = sum_f K[f, k, i] (phi, grad phi)_f, shape (pieces, 1 + dim, dim, dim)."""
+    identity = np.eye(n.shape[1])
+    slope = np.einsum("pj,ki->pjki", n, identity) + np.einsum("pk,ij->pjki", n, identity)
+    return np.concatenate([-P[:, None], mu * slope], axis=1)
+
+
+def compliance(c: Array, projector: Array, P: Array) -> Array:
+    """D [m/Pa s] where surfaces give way by c [m/Pa s] in the directions of projectors, shape (pieces, dim, dim)."""
+    s = np.einsum("pij,pij->p", P, projector) / np.einsum("pii->p", projector)
+    with np.errstate(divide="ignore"):
+        return (1.0 / (1.0 / c + s))[:, None, None] * projector
+
+
+def released(mu: float, n: Array, P: Array, D: Array, area: Array, table: tuple[Array, Array], sizes: Array) -> Array:
+    """-<D t(u), t(v)> by pieces, shape (pieces, functions, dim, functions, dim); zero where D is.
+
+    area: int L_q, (pieces, points); table: values (points, functions) and reference gradients (points, functions, dim)
+    at these points; sizes: edge lengths of the cells [m], (pieces, dim).
+    """
+    functions, dim = table[0].shape[1], n.shape[1]
+    block = np.zeros((len(n), functions, dim, functions, dim))
+    gives = np.flatnonzero(D.any(axis=(1, 2)))
+    for some in (gives[first : first + AT_ONCE] for first in range(0, len(gives), AT_ONCE)):
+        block[some] = _squares(mu, n[some], P[some], D[some], -area[some], table, sizes[some])
+    return block
+
+
+def _squares(mu: float, n: Array, P: Array, D: Array, weight: Array, table: tuple[Array, Array], sizes: Array) -> Array:
+    """int weight t(phi_b e_l) . D t(phi_a e_k), shape (pieces, a, k, b, l).
+
+    t(phi_a e_k) = S_a e_k + n_k g_a with S_a = mu d_n phi_a - s phi_a and g_a = mu grad phi_a - s_n phi_a n.
+    """
+    dim, phi, grad = n.shape[1], table[0], mu * table[1] / sizes[:, None, None, :]
+    s_total = np.einsum("pi,pij,pj->p", n, P, n)
+    s = (np.einsum("pii->p", P) - s_total) / (dim - 1)
+    S = np.einsum("pqai,pi->pqa", grad, n) - s[:, None, None] * phi
+    g = grad - ((s_total - s)[:, None] * n)[:, None, None, :] * phi[:, :, None]
+    pieces, points, functions = S.shape
+    Dg = (g.reshape(pieces, -1, dim) @ D).reshape(g.shape)
+    weighted = np.swapaxes(weight[:, :, None] * S, 1, 2)
+    mixed = (weighted @ Dg.reshape(pieces, points, -1)).reshape(pieces, functions, functions, dim)
+    both = sum(np.swapaxes(weight[:, :, None] * g[..., i], 1, 2) @ Dg[..., i] for i in range(dim))
+    block = np.einsum("pab,pkl->pakbl", weighted @ S, D) + np.einsum("pab,pk,pl->pakbl", both, n, n)
+    block += np.einsum("pabk,pl->pakbl", mixed, n)
+    block += np.einsum("pbal,pk->pakbl", mixed, n)
+    return block
