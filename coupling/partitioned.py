@@ -77,7 +77,10 @@ class Partitioned:
         return StepInfo(len(history), tuple(history), numbers, tuple(coupled.flow.notes))
 
     def _small(self, found: Array) -> float:
-        return max(self.tolerance.relative * _mean(found - self.coupled.interface.past[0]), self.tolerance.absolute)
+        """[m]; no less than a few roundings of the places: bodies that come to rest move by less in a step."""
+        interface = self.coupled.interface
+        moved, rounding = _mean(found - interface.past[0]), 4.0 * np.finfo(float).eps * _mean(interface.points + found)
+        return max(self.tolerance.relative * moved, self.tolerance.absolute, float(rounding))
 
     def save(self) -> State:
         return {**self.coupled.save(), "accelerator": self.accelerator.save()}
