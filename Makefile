@@ -45,7 +45,7 @@ VERSION_TESTS  := fem versions lagged linear moments_kernel mortar_kernel mortar
   contact_patch contact_system contact_run contact_friction coupling_bar coupling_blocks coupled_run
 INSTALL        := $(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation
 
-.PHONY: setup demo test test-slow test-versions test-debian13 lint bench docs clean FORCE
+.PHONY: setup demo test test-slow test-versions test-debian13 coverage lint bench docs clean FORCE
 
 setup: $(PROJECT_STAMP)
 
@@ -87,6 +87,13 @@ test-versions: setup
 	$(BIN)/python -m pytest -n 2 -m "not slow" $(VERSION_TESTS:%=tests/*/test_%.py)
 	$(BIN)/python -m pytest -m slow tests/cases/test_versions.py
 
+# Lines of solvers and coupling that the quick tests run, by file; it takes half as long again as the tests.
+coverage: setup
+	$(BIN)/coverage erase
+	$(BIN)/coverage run -m pytest -n 2 -m "not slow"
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage report
+
 # The same in a Debian 13 that is made for it, as root.
 test-debian13:
 	.ci/test-debian13
@@ -110,5 +117,5 @@ docs: $(DOCS_STAMP)
 
 # Back to a fresh clone, except for results/: they may have taken days.
 clean:
-	rm -rf .venv build docs/_build docs/reference .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv build docs/_build docs/reference .coverage .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find . -name __pycache__ -prune -exec rm -rf {} +

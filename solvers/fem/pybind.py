@@ -16,6 +16,10 @@ from solvers.api import Array
 
 Indices = NDArray[np.int32]
 
+# UFL sorts the constants of a form by their numbers as text, 10 before 9: where a digit is added the same form would be
+# another one, and would be compiled once more. From here on all numbers have seven digits.
+ufl.Constant(ufl.triangle, count=999_999)
+
 # ------------------------------------------------------------------------------------------------------------ elements
 
 

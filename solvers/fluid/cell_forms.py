@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import ufl
@@ -27,18 +27,29 @@ class CellForms:
 
 def cell_forms(unknowns: Unknowns, flow: forms.Coefficients, function: Any, weights: Weights | None) -> CellForms:
     """Forms at the function of velocity and pressure; weights: of the interface, if there is one."""
-    domain, degree = unknowns.grid.domain, unknowns.degree
+    domain = unknowns.grid.domain
     test, trial = ufl.TestFunction(unknowns.space), ufl.TrialFunction(unknowns.space)
-    (u, p), (v, q) = (unknowns.parts(f) for f in (function, test))
-    everywhere = forms.bulk(flow, u, p, v, q) + forms.residual_based(flow, u, p, v, q)
-    residuals = [everywhere * fem.measure(domain, "dx", 2 * degree + 1)]
-    if weights is not None:
-        dx_cut = fem.measure(domain, "dx", weights.degree)
-        on_interface = nitsche.own(flow, weights, u, p, v, q)
-        residuals.append(weights.fluid * everywhere * dx_cut + on_interface * dx_cut)
-        residuals.append(weights.fluid * forms.film(flow, u, p, v, q) * dx_cut + on_interface * dx_cut)
-    tangents = [ufl.derivative(form, function, trial) for form in residuals]
+    residuals = _residuals(unknowns, flow, function, test, weights)
+    # the body force has no derivative: flows with and without one share their compiled tangents
+    same_slope = _residuals(unknowns, replace(flow, force=forms.nothing(unknowns.grid.dim)), function, test, weights)
+    tangents = [ufl.derivative(form, function, trial) for form in same_slope]
     return CellForms(
         tuple(fem.Integral(domain, form) for form in residuals),
         tuple(fem.Integral(domain, form) for form in tangents),
     )
+
+
+def _residuals(
+    unknowns: Unknowns, flow: forms.Coefficients, function: Any, test: Any, weights: Weights | None
+) -> list[Any]:
+    """Over uncut cells and, with weights, over cut ones and films."""
+    domain, degree = unknowns.grid.domain, unknowns.degree
+    (u, p), (v, q) = (unknowns.parts(f) for f in (function, test))
+    everywhere = forms.bulk(flow, u, p, v, q) + forms.residual_based(flow, u, p, v, q)
+    uncut = everywhere * fem.measure(domain, "dx", 2 * degree + 1)
+    if weights is None:
+        return [uncut]
+    dx_cut = fem.measure(domain, "dx", weights.degree)
+    on_interface = nitsche.own(flow, weights, u, p, v, q)
+    film = forms.film(flow, u, p, v, q)
+    return [uncut, *(weights.fluid * bulk * dx_cut + on_interface * dx_cut for bulk in (everywhere, film))]

@@ -74,6 +74,11 @@ class GhostScales:
     film: Expr  #: factor of velocities of second degree, below 1 in films
 
 
+def nothing(dim: int) -> Expr:
+    """A vector field of zeros, which leaves no trace in a compiled form."""
+    return ufl.as_vector([0.0] * dim)
+
+
 def eps(u: Expr) -> Expr:
     return sym(grad(u))
 

@@ -8,7 +8,6 @@ from itertools import chain
 from typing import Literal
 
 import numpy as np
-import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -114,7 +113,7 @@ class FlowSystem:
         a, history, force = (self.unknowns.parts(f)[0] for f in (self._scale_velocity, self.history, self._force))
         rho, mu = fem.constant(domain, settings.density), fem.constant(domain, settings.viscosity)
         if settings.body_force is None:
-            force = ufl.as_vector([fem.constant(domain, 0.0)] * self.grid.dim)
+            force = forms.nothing(self.grid.dim)
         return forms.Coefficients(
             rho=rho,
             mu=mu,

@@ -49,32 +49,6 @@ def test_located(mistake, processes, tmp_path):
     assert "Traceback" not in run.stderr
 
 
-def test_several_bodies_of_different_cells(tmp_path):
-    """Two bodies in one case, quads and triangles, give what each gives alone; on two processes, too."""
-    from fsci.run.history import read_history
-
-    body = "{{mesh: {{shape: rectangle, size: [2, 1], cells: [4, 2], cell: {cell}, order: {order}}}, \
-material: {{law: neo_hooke, E: {E}, nu: 0.3}}, supports: [{{on: left, displacement: [0, 0]}}], \
-tractions: [{{on: right, value: [0, {load}]}}]}}"
-    one, two = body.format(cell="quad", order=2, E=100, load=-1), body.format(cell="tri", order=1, E=50, load="0.5*t")
-
-    def history(bodies, processes=1):
-        text = "time: {step: 0.5, end: 1}\nstructure:\n  bodies:\n"
-        text += "".join(f"    {name}: {settings}\n" for name, settings in bodies.items())
-        text += "probes:\n"
-        text += "".join(f"  at_{name}: {{body: {name}, quantity: displacement, at: [2, 1]}}\n" for name in bodies)
-        (tmp_path / "case.yaml").write_text(text)
-        run = fsci("run", tmp_path, "-o", tmp_path / "out", processes=processes, timeout=60)
-        assert run.returncode == 0, run.stdout + run.stderr
-        return read_history(tmp_path / "out" / "history.csv")
-
-    alone = {**history({"a": one}), **history({"b": two})}
-    for processes in (1, 2):
-        both = history({"a": one, "b": two}, processes)
-        for name in ("at_a.x", "at_a.y", "at_b.x", "at_b.y"):
-            assert both[name] == pytest.approx(alone[name], rel=1e-7), name
-
-
 @pytest.mark.parametrize("processes", [1, 2])
 def test_no_state_at_the_start(processes, tmp_path):
     """A load that is infinite at t = 0 is an error at once, not a run that begins without it."""

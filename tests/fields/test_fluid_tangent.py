@@ -4,8 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from fluid_setup import around_moving_body, field, make_fluid, moving_body, step
+from fluid_setup import around_moving_body, field, make_fluid, moving_body, step, wall
 
+from solvers.fluid import cell_forms
 from solvers.fluid.patches import Patch
 
 
@@ -89,3 +90,23 @@ def test_newton_converges_quadratically():
     r = np.array(info.residuals) / max(info.residuals)
     assert info.iterations <= 4
     assert all(b < 30 * a**2 or b < 1e-12 for a, b in pairwise(r[1:])), r
+
+
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_a_body_force_needs_no_other_tangent(element, monkeypatch):
+    """Forms of tangents are the same with and without one, so that they are compiled once; residuals differ."""
+    made = []
+    for body_force in (None, field(1, -2)):
+        fluid = make_fluid(
+            around_moving_body(2), [wall(field(1, 0))], [moving_body(2)], element=element, scheme="bdf2",
+            body_force=body_force,
+        )  # fmt: skip
+        with monkeypatch.context() as patch:
+            patch.setattr(cell_forms.fem, "Integral", lambda domain, form: form)
+            made.append(
+                cell_forms.cell_forms(fluid.unknowns, fluid.system.terms, fluid.system.flow, fluid.system.weights)
+            )
+    without, with_force = made
+    assert len(without.tangents) == 3
+    assert [form.signature() for form in without.tangents] == [form.signature() for form in with_force.tangents]
+    assert without.residuals[0].signature() != with_force.residuals[0].signature()

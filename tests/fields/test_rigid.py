@@ -11,7 +11,7 @@ from solvers.march import march
 from solvers.newton import Tolerance
 from solvers.rigid import motion
 from solvers.rigid.body import PointSpring, RigidBody
-from solvers.rigid.contact import Obstacle, RigidContact, RigidPair
+from solvers.rigid.contact import Obstacle, RigidContact, RigidPair, gaps
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.inertia import Inertia, inertia_of_surface
 from solvers.rigid.rotation import rotation, skew, vector_rate
@@ -253,3 +253,41 @@ def test_a_tilted_square_topples_onto_its_side():
     heights = np.sort((points + bodies.displacement())[:, 1])
     assert heights == pytest.approx([-1.0, -1.0, 0.0, 0.0], abs=1e-6)
     assert bodies.contact.force[1] == pytest.approx(30.0, rel=1e-6)
+
+
+def test_gaps_from_a_triangle():
+    """Over its inside, beside an edge and beside a corner, in front of it and behind."""
+    triangle = np.array([[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]]])
+    x = np.array([[0.5, 0.5, 0.3], [0.5, 0.5, -0.3], [1.0, -4.0, 3.0], [-3.0, -4.0, 12.0], [2.0, 2.0, 1.0]])
+    found = gaps(x, triangle)
+    assert found.gap == pytest.approx([0.3, -0.3, 3.0, 12.0, 1.0], abs=1e-14)
+    assert found.normal == pytest.approx(np.tile([0.0, 0.0, 1.0], (5, 1)), abs=1e-14)
+    steps = np.array([[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]], [[2, 0, 1.0], [2, 2, 1.0], [0, 2, 1.0]]])
+    nearer = np.array([[1.1, 1.2, 0.2], [1.2, 1.1, 0.9]])  # beside both insides: the nearest facet decides
+    assert gaps(nearer, steps).gap == pytest.approx([0.2, -0.1], abs=1e-14)
+
+
+def test_a_cube_falls_on_a_floor_in_space():
+    """On the triangles of a plate, its corners over their insides, edges and corners."""
+    plate = np.array([[-1.0, -1.0, -1.0], [2.0, -1.0, -1.0], [2.0, 2.0, -1.0], [-1.0, 2.0, -1.0]])
+    floor = Obstacle("floor", plate, np.array([[0, 1, 2], [0, 2, 3]]))
+    contact = RigidContact([RigidPair(0, 8, floor)], 6)
+    even = Inertia(2.0, np.array([0.5, 0.5, 0.5]), np.eye(3) / 3.0)
+    bodies = field(cube(even, gravity=(0.0, 0.0, -10.0)), contact=contact)
+    for t, _ in march(bodies, 1.0, 50):
+        assert bodies.displacement()[:, 2].min() > -1.0 - 1e-12
+        if t < 0.44:
+            assert bodies.now[0].shift[2] == pytest.approx(-5.0 * t**2, rel=1e-11)
+    assert bodies.displacement() == pytest.approx(np.tile([0.0, 0.0, -1.0], (8, 1)), abs=1e-11)
+    assert bodies.contact.force == pytest.approx([0.0, 0.0, 20.0, 0.0, 0.0, 0.0], rel=1e-9, abs=1e-9)
+
+
+def test_an_increment_can_be_taken_back():
+    bodies = field(cube(initial_spin=(0.3, 1.0, 0.1)))
+    bodies.initialise(0.0, 0.1)
+    bodies.begin_step(0.0, 0.1)
+    before = bodies.displacement()
+    bodies.update(np.array([0.1, 0.2, -0.3, 0.02, -0.01, 0.03]))
+    assert np.abs(bodies.displacement() - before).min() > 0.01
+    bodies.retreat(1.0)
+    assert bodies.displacement() == pytest.approx(before, abs=1e-14)

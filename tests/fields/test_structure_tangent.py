@@ -55,9 +55,12 @@ def tangent_error(structure):
     return np.linalg.norm(y.array - difference) / np.linalg.norm(difference)
 
 
-@pytest.mark.parametrize("cell_type", ["quad", "tetra", "hexahedron"])
-@pytest.mark.parametrize("law", MATERIALS)
+@pytest.mark.parametrize(
+    ("law", "cell_type"),
+    [*((law, cell) for law in MATERIALS for cell in ("quad", "tetra")), ("neo_hooke", "hexahedron")],
+)
 def test_material(law, cell_type):
+    """In the plane and in space; what a law says does not depend on the cells."""
     structure = make_structure(distort(block(cell_type, 2), 0.05), MATERIALS[law])
     assert tangent_error(structure) < 1e-6
 

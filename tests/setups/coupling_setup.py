@@ -12,6 +12,7 @@ from solvers.fluid.grid import Grid, uniform
 from solvers.fluid.patches import Patch
 from solvers.fluid.system import FlowSettings
 from solvers.generalised_alpha import GeneralisedAlpha
+from solvers.linear import Method
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body, Support, Symmetry
@@ -32,10 +33,11 @@ def couple_one(
     patches: list[Patch],
     *,
     wetted: tuple[str, ...],
+    linear: Method = "auto",
 ) -> Coupled:
     """One elastic body in a flow that touches some of its surfaces, solved more accurately than by default."""
-    structure = Structure([body], time, SolverSettings(TIGHT))
-    return couple(structure, grid, flow, patches, wetted={body.name: wetted}, solver=SolverSettings(TIGHT))
+    settings = SolverSettings(TIGHT, linear)
+    return couple(Structure([body], time, settings), grid, flow, patches, wetted={body.name: wetted}, solver=settings)
 
 
 #: rho_s L_s / (rho_f L) -> smallest k with k tan k = r
@@ -74,7 +76,14 @@ def bar_and_column(ratio: float, *, density: float | None = None, amplitude: flo
 
 
 def post_in_flow(
-    *, E: float = 100.0, rho_s: float = 2.0, scheme: str = "bdf2", mu: float = 0.05, rho_inf: float = 0.8
+    *,
+    E: float = 100.0,
+    rho_s: float = 2.0,
+    scheme: str = "bdf2",
+    mu: float = 0.05,
+    rho_inf: float = 0.8,
+    element: str = "q1q1",
+    linear: Method = "auto",
 ) -> Coupled:
     """A soft square post that stands on the bottom of a channel, in a flow that begins to move."""
     a, b = lame(E, 0.3)
@@ -86,11 +95,12 @@ def post_in_flow(
         Body("post", mesh, material, supports=supports, comm=MPI.COMM_SELF),
         Dynamics(GeneralisedAlpha.from_rho_inf(rho_inf)),
         uniform([0.0, 0.0], [2.0, 1.0], [20, 10]),
-        FlowSettings(1.0, mu, scheme=scheme),
+        FlowSettings(1.0, mu, scheme=scheme, element=element),
         [
             Patch("inlet", ("x-",), "velocity", inflow),
             Patch("outlet", ("x+",), "outflow"),
             Patch("walls", ("y-", "y+"), "no_slip"),
         ],
         wetted=("left", "right", "top"),
+        linear=linear,
     )

@@ -1,5 +1,7 @@
 """The functions of `solvers.fem`, each on a small mesh with a known answer: the same on every version of DOLFINx."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import ufl
@@ -158,6 +160,14 @@ def test_forms_constants_and_scalars(square):
     side = fem.compile_form(number * fem.surface_measure(square, "top", 1))
     assert fem.assemble_scalar(side, square.comm) == pytest.approx(10.0)
     assert fem.mean_cell_size(square) == pytest.approx(1.0)
+
+
+def test_the_same_form_has_one_name_whatever_was_made_before(square):
+    """The cache finds it by its signature, in which constants stand in a fixed order."""
+    dx = fem.volume_measure(square, 1)
+    constants = [fem.constant(square, 1.0) for _ in range(1200)]
+    pairs = pairwise(constants)
+    assert len({(a * b * dx).signature() for a, b in pairs}) == 1
 
 
 def test_matrices(square):

@@ -1,0 +1,75 @@
+"""The monolithic system by Krylov's methods: what the direct solver gives, and what happens when they stall."""
+
+import numpy as np
+import pytest
+from coupling_setup import post_in_flow
+
+from coupling.monolithic import Monolithic
+from solvers import linear
+from solvers.newton import Tolerance
+
+
+def after_two_steps(method, element):
+    coupled = post_in_flow(linear=method, element=element)
+    coupled.initialise(0.0, 0.02)
+    scheme = Monolithic(coupled, Tolerance(1e-10))
+    infos = [scheme.step(0.02 * number, 0.02) for number in range(2)]
+    return coupled, infos
+
+
+@pytest.fixture(scope="module", params=["q1q1", "q2q1"])
+def direct(request):
+    coupled, _ = after_two_steps("direct", request.param)
+    return request.param, coupled
+
+
+def same_state(one, other):
+    for a, b in ((one.flow.flow, other.flow.flow), (one.solid.structure.now.u, other.solid.structure.now.u)):
+        assert np.abs(b).max() > 1e-4
+        np.testing.assert_allclose(a, b, atol=1e-8 * np.abs(b).max())
+
+
+@pytest.mark.parametrize("method", ["iterative", "ilu"])
+def test_krylov_methods_give_what_the_direct_solver_gives(direct, method):
+    element, exact = direct
+    coupled, _ = after_two_steps(method, element)
+    assert coupled.flow.sequence.position == 0
+    assert coupled.flow.sequence.current != "direct"
+    same_state(coupled, exact)
+
+
+def test_a_method_that_stalls_is_followed_by_the_next(direct, monkeypatch):
+    """The first one fails once: the run goes on with the next one, says so, and finds the same state."""
+    element, exact = direct
+    solver, made = linear.coupled_solver, []
+
+    def stalls(*args, **options):
+        made.append(options["fill"])
+        if len(made) == 1:
+            raise linear.LinearSolveFailed("the linear solver stalled")
+        return solver(*args, **options)
+
+    monkeypatch.setattr(linear, "coupled_solver", stalls)
+    coupled, infos = after_two_steps("iterative", element)
+    assert coupled.flow.sequence.position == 1
+    following = {"q1q1": "incomplete factors with more fill and overlap", "q2q1": "the direct solver"}[element]
+    assert infos[0].notes[0].startswith(f"the linear solver stalled with multigrid: {following} from here on")
+    assert made[1:2] == ([True] if element == "q1q1" else [])
+    same_state(coupled, exact)
+
+
+def test_an_increment_can_be_taken_back():
+    """The line search takes back what Newton's method added: all of it leaves the state before."""
+    coupled = post_in_flow()
+    coupled.initialise(0.0, 0.02)
+    scheme = Monolithic(coupled)
+    coupled.begin_step(0.0, 0.02)
+    scheme.largest = np.zeros(2)
+    scheme.residual()
+    before = coupled.flow.flow.copy(), coupled.solid.structure.now.u.copy()
+    scheme.advance()
+    moved = coupled.flow.flow.copy(), coupled.solid.structure.now.u.copy()
+    scheme.retreat(0.25)
+    for start, end, now in zip(before, moved, (coupled.flow.flow, coupled.solid.structure.now.u), strict=True):
+        assert np.abs(end - start).max() > 1e-6
+        np.testing.assert_allclose(now, start + 0.75 * (end - start), atol=1e-12)
