@@ -98,7 +98,7 @@ class InterfaceTerms:
     def velocity_terms(self, g: Array) -> Array:
         """C g at local dofs, the ghosts' share still there; g [m/s] of shape (vertices, dim)."""
         g, fields, K = g[self.corners], *self._flat()
-        against = fields @ (g @ np.swapaxes(K, 1, 2)).reshape(len(g), -1, self.dim)
+        against = fields @ (g @ np.swapaxes(K, 1, 2)).reshape(len(g), fields.shape[2], self.dim)
         leak = np.einsum("pav,pv->pa", self.psi, np.einsum("pvi,pi->pv", g, self.n))
         size = self._unknowns.local
         total: Array = np.bincount(self.u.ravel(), against.ravel(), size).astype(float)
@@ -108,7 +108,7 @@ class InterfaceTerms:
         """This process' share of the force [N] on the vertices, shape (vertices, dim); `flow` at local dofs."""
         u, p, g, fields, K = flow[self.u], flow[self.p], g[self.corners], *self._flat()
         force = np.einsum("pav,pa->pv", self.psi, p)[:, :, None] * self.n[:, None, :]
-        force -= (np.swapaxes(fields, 1, 2) @ u).reshape(*g.shape[:2], -1) @ K
+        force -= (np.swapaxes(fields, 1, 2) @ u).reshape(*g.shape[:2], K.shape[1]) @ K
         force -= self.mass_of_pieces @ g @ self.penalty
         total = np.zeros((self.vertices, self.dim))
         np.add.at(total, self.corners, force)
@@ -116,9 +116,9 @@ class InterfaceTerms:
 
     def _flat(self) -> tuple[Array, Array]:
         """`fields` (pieces, functions, vertices x fields) and coefficients (pieces, fields x component, motion)."""
-        pieces, functions = self.fields.shape[:2]
-        flat = self.fields.reshape(pieces, functions, -1)
-        return flat, self.coupling.fields.reshape(pieces, -1, self.dim)
+        pieces, functions, vertices, fields = self.fields.shape  # a process may have no pieces: no -1 below
+        flat = self.fields.reshape(pieces, functions, vertices * fields)
+        return flat, self.coupling.fields.reshape(pieces, fields * self.dim, self.dim)
 
     @property
     def mass_blocks(self) -> Array:
