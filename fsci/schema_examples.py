@@ -92,6 +92,7 @@ EXAMPLES = {
     "Grid": "grid:\n  from: [0, 0]\n  to: [2.2, 0.41]\n  cells: [null, 41]\n"
     "  x: [{to: 0.1, cells: 10, ratio: 0.3}, {to: 0.3, cells: 50}, {to: 2.2, cells: 60, ratio: 12}]",
     "Stretch": "x: [{to: 0.3, cells: 30}, {to: 2.2, cells: 60, ratio: 12}]",
+    "Refinement": "refine: [{around: cylinder, level: 2}, {box: [[0.25, 0.1], [0.6, 0.3]], level: 1}]",
     "Patch": 'patches:\n  in: {on: x-, velocity: ["1 - y^2", 0]}\n  outlet: {on: x+, where: "y - 0.5", outflow: true}'
     "\n  walls: {on: [y-, y+], no_slip: true}",
     "RigidBody": "bodies:\n  cylinder: {mesh: {shape: disc, radius: 0.05, cells: [120, 1], translate: [0.2, 0.2]}}",

@@ -118,13 +118,17 @@ def _multigrid(comm) -> PETSc.PC:
 FlowMethod = Literal["multigrid", "ilu", "fill", "direct"]
 
 
-def choose_flow(method: Method, dim: int, dofs: int, *, degree: int, steady: bool) -> tuple[FlowMethod, ...]:
+def choose_flow(
+    method: Method, dim: int, dofs: int, *, degree: int, steady: bool, multigrid: bool = True
+) -> tuple[FlowMethod, ...]:
     """Solvers for a flow of this size from the usual one to the last resort, by the degree of its velocity.
 
-    More fill takes minutes for velocities of second degree.
+    More fill takes minutes for velocities of second degree. multigrid: all cells are those of one lattice.
     """
     if method == "direct" or (method == "auto" and dofs <= FLOW_DIRECT_LIMIT[dim]):
         return ("direct",)
+    if not multigrid:
+        return ("ilu", "direct") if degree > 1 else ("ilu", "fill", "direct")
     if method == "ilu" or (method == "auto" and not steady and dofs <= FLOW_INCOMPLETE_LIMIT[degree]):
         return ("ilu", "multigrid", "direct")
     return ("multigrid", "direct") if degree > 1 else ("multigrid", "fill", "direct")

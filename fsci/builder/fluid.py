@@ -16,6 +16,7 @@ from fsci.case import Case
 from fsci.case.fluid import FluidSection
 from fsci.case.probes import Reference
 from fsci.case.rigid_motion import rigid_motion
+from fsci.meshes.nested import read_grid
 from fsci.meshes.of_case import read_rigid_body, require_inside_period
 from solvers.fluid import probes
 from solvers.fluid.field import Fluid
@@ -44,12 +45,19 @@ def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Immer
     settings, linear = case.fluid, case.solver.linear
     solver = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
     bodies = [_with_layer(case, body) for body in bodies]
-    grid, flow, patches = Grid(settings.grid.planes), _flow(settings), _patches(settings)
+    grid, flow, patches = _grid(case, comm), _flow(settings), _patches(settings)
     try:
         return Fluid(grid, flow, patches, bodies, solver, timer=timer, comm=comm)
     except UncoveredFaces as error:
         faces = ", ".join(error.faces)
         raise case.error(("fluid", "patches"), f"no patch is on part of the box's boundary: {faces}") from None
+
+
+def _grid(case: Case, comm: MPI.Comm) -> Grid:
+    assert case.fluid is not None
+    if not case.fluid.grid.refine:
+        return Grid(case.fluid.grid.planes)
+    return on_first(comm, lambda: read_grid(case))
 
 
 def _flow(settings: FluidSection) -> FlowSettings:
@@ -99,10 +107,15 @@ def _with_layer(case: Case, body: ImmersedBody) -> ImmersedBody:
 
 def read_surface(case: Case, name: str, comm: MPI.Comm) -> tuple[Array, NDArray[np.int64]]:
     """Points [m] and facets of a rigid body, whole on every process. Raises CaseError (collective)."""
+    return on_first(comm, lambda: read_rigid_body(case, name)[1:])
+
+
+def on_first(comm: MPI.Comm, read: Callable[[], Any]) -> Any:
+    """What the first process reads, or the exception that it meets, on every process (collective)."""
     found: Any = None
     if comm.rank == 0:
         try:
-            found = read_rigid_body(case, name)[1:]
+            found = read()
         except Exception as raised:  # raised on every process below
             found = raised
     found = comm.bcast(found, root=0)

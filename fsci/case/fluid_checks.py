@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fsci.case.case import Case
-from fsci.case.errors import listed
+from fsci.case.errors import did_you_mean, listed
 from fsci.case.fluid import FACES, FluidSection, RigidBodySection
 from fsci.case.free_body import PLANE, Free
 from fsci.case.mesh_checks import Mistake, axis_mistakes, length_mistakes, mesh_mistakes, surface_mistakes
@@ -20,6 +20,7 @@ def fluid_mistakes(case: Case, fluid: FluidSection) -> Iterator[Mistake]:
     for name in ("gravity", "body_force", "initial_velocity"):
         yield from length_mistakes(getattr(fluid, name), dimension, ("fluid", name))
     yield from _patches(fluid)
+    yield from _refinements(case, fluid)
     for name, body in fluid.bodies.items():
         keys: Keys = ("fluid", "bodies", name)
         if name == "fluid":
@@ -67,6 +68,16 @@ def uncovered(fluid: FluidSection) -> list[str]:
         if not np.any(on, axis=0).all():
             found.append(face)
     return found
+
+
+def _refinements(case: Case, fluid: FluidSection) -> Iterator[Mistake]:
+    names = [*fluid.bodies, *case.elastic_bodies]
+    if fluid.grid.refine and any(patch.periodic for patch in fluid.patches.values()):
+        yield ("fluid", "grid", "refine"), "a grid with periodic patches cannot be refined: use stretches"
+    for number, refinement in enumerate(fluid.grid.refine):
+        if refinement.around is not None and refinement.around not in names:
+            hint = did_you_mean(refinement.around, names)
+            yield ("fluid", "grid", "refine", number, "around"), f"there is no body '{refinement.around}'{hint}"
 
 
 def _periods(fluid: FluidSection, name: str) -> Iterator[Mistake]:

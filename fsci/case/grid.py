@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 from pydantic import model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Count, EntryCount, Number, NumberVector, Positive
+from fsci.case.values import Count, EntryCount, Name, Number, NumberVector, Positive
 
 MOST_CELLS = 100_000  #: along one direction
 MOST_GROWTH = 1e6  #: of cells within a stretch
+MOST_LEVELS = 10  #: of cells in cells
+MOST_FINE = 10**8  #: cells of the finest level in the whole box: there are arrays of that size
 
 
 class Stretch(Section):
@@ -32,6 +34,31 @@ class Stretch(Section):
 Stretches = Annotated[tuple[Stretch, ...], EntryCount(1, None)]
 
 
+class Refinement(Section):
+    """Where cells are halved: in a box, or around the surface of a body where it is at the start."""
+
+    box: Annotated[tuple[NumberVector, ...], EntryCount(2, 2)] | None = setting(
+        None, "lowest and highest corner of a box", unit="m"
+    )
+    around: Name | None = setting(None, "instead of a box: name of a body")
+    layers: Count = setting(4, "cells of this level on both sides of the body's surface")
+    level: Count = setting(1, "how often the cells are halved: edges are 2^-level times as long")
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Refinement:
+        if (self.box is None) == (self.around is None):
+            raise fault("a refinement needs either 'box' or 'around'")
+        if self.level > MOST_LEVELS:
+            raise fault(f"must be at most {MOST_LEVELS}, not {self.level}", "level")
+        if self.box is not None:
+            for axis, (low, high) in enumerate(zip(*self.box, strict=False)):
+                if low >= high:
+                    raise fault(
+                        f"must be greater than that of the lowest corner, {low:g}, not {high:g}", "box", 1, axis
+                    )
+        return self
+
+
 class GridSection(Section):
     """A box of axis-aligned cells. Each direction has a number of equal `cells`, or a list of stretches `x`, `y`, `z`.
 
@@ -46,6 +73,10 @@ class GridSection(Section):
     x: Stretches | None = setting(None, "stretches along x")
     y: Stretches | None = setting(None, "stretches along y")
     z: Stretches | None = setting(None, "stretches along z")
+    refine: tuple[Refinement, ...] = setting(
+        tuple,
+        "where cells are halved; those that share a corner differ by one level at most, for which more are halved",
+    )
 
     @property
     def dimension(self) -> int:
@@ -55,6 +86,35 @@ class GridSection(Section):
     def graded(self) -> tuple[tuple[Stretch, ...] | None, ...]:
         """The stretches of each direction, None where there are none."""
         return (self.x, self.y, self.z)[: self.dimension]
+
+    @property
+    def levels(self) -> int:
+        """How often the finest cells are halved."""
+        return max((refinement.level for refinement in self.refine), default=0)
+
+    @property
+    def smallest(self) -> NDArray[np.float64]:
+        """Edges of the smallest cells [m] by direction."""
+        return np.array([float(np.diff(edges).min()) for edges in self.planes]) / 2**self.levels
+
+    def _check_refinements(self) -> None:
+        finest = int(np.prod([float(n) * 2**self.levels for n in self.shape]))
+        if self.refine and finest > MOST_FINE:
+            raise fault(
+                f"if all of its cells were of the finest level there would be {finest:.2g}: "
+                f"{MOST_FINE:.0e} are the most",
+                "refine",
+            )
+        for number, refinement in enumerate(self.refine):
+            for corner, x in enumerate(refinement.box or ()):
+                if len(x) != self.dimension:
+                    raise fault(
+                        f"must have {self.dimension} entries like 'from', not {len(x)}", "refine", number, "box", corner
+                    )
+            if refinement.box is not None and not all(
+                a < high and b > low for a, b, low, high in zip(*refinement.box, self.start, self.to, strict=True)
+            ):
+                raise fault("is outside of the grid", "refine", number, "box")
 
     @model_validator(mode="after")
     def _consistent(self) -> GridSection:
@@ -74,6 +134,7 @@ class GridSection(Section):
                 raise fault(f"{count} cells along {name} are too many: {MOST_CELLS} are the most")
             if not np.all(np.diff(self.edges(axis)) > 0.0):
                 raise fault(f"the cells along {name} are smaller than rounding errors of their coordinates")
+        self._check_refinements()
         return self
 
     def _check_direction(self, axis: int) -> None:

@@ -51,7 +51,7 @@ def _fast_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
 
 def fast_body(case: Case, fluid: FluidSection, motion: Movement, points: NDArray[np.float64]) -> str | None:
     """The warning if points [m] of a body, shape (n, dim), cross too many cells in a step, or None."""
-    smallest = np.array([float(np.diff(edges).min()) for edges in fluid.grid.planes])
+    smallest = fluid.grid.smallest
     time = case.time
     moved, cells = rigid_motion(points, motion, time.start, time.step), 0.0
     for t in np.linspace(time.start, max(time.end - time.step, time.start), 50):
@@ -82,10 +82,10 @@ def _thin_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
 
 def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, moves: bool) -> str | None:
     """Whether fluid passes through a body of this thickness [m], because both of its sides share unknowns."""
-    smallest = min(float(np.diff(edges).min()) for edges in fluid.grid.planes)
+    smallest = float(fluid.grid.smallest.min())
     rests = not case.elastic_bodies and not any(body.motion or body.free for body in fluid.bodies.values())
     plane = fluid.grid.dimension == 2 and not any(patch.periodic for patch in fluid.patches.values())
-    if rests and plane and length >= CELLS_ALONG * smallest:
+    if rests and plane and not fluid.grid.refine and length >= CELLS_ALONG * smallest:
         return None  # each side has unknowns of its own
     least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
     if extent >= least * smallest:

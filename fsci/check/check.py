@@ -11,6 +11,7 @@ from fsci.case.fluid import FluidSection
 from fsci.case.mesh import Mesh
 from fsci.case.shapes import Shape
 from fsci.case.structure import StructureSection
+from fsci.meshes.nested import cells_of, fluid_dofs
 from solvers.mesh import Mesh as BodyMesh
 
 Row = tuple[str, str]
@@ -30,7 +31,7 @@ def summary(case: Case, meshes: Mapping[str, BodyMesh] = {}, pairs: Mapping[str,
     if case.structure is not None:
         rows += _structure(case, case.structure, meshes)
     if case.fluid is not None:
-        rows += _fluid(case.fluid)
+        rows += _fluid(case, case.fluid)
     if case.coupling is not None:
         scheme, by = case.coupling.scheme, case.coupling.accelerator
         rows.append(("coupling", scheme if scheme == "monolithic" else f"{scheme}, {by}"))
@@ -79,18 +80,24 @@ def number_of_steps(case: Case) -> int:
     return ceil((case.time.end - case.time.start) / case.time.step - 1e-9)
 
 
-def _fluid(fluid: FluidSection) -> Iterator[Row]:
+def _fluid(case: Case, fluid: FluidSection) -> Iterator[Row]:
     flow = "Navier-Stokes" if fluid.flow == "navier_stokes" else "Stokes"
     yield "fluid", f"{flow}, {fluid.scheme.replace('_', ' ')}, {fluid.element}"
     cells = " x ".join(f"{count:,}" for count in fluid.grid.shape)
     box = " x ".join(f"[{low:g}, {high:g}]" for low, high in zip(fluid.grid.start, fluid.grid.to, strict=True))
-    yield "grid", f"{box}, {cells} cells"
+    yield "grid", f"{box}, {cells} cells{_finer(case)}"
     kinds = [f"{name} ({patch.kind.replace('_', ' ')})" for name, patch in fluid.patches.items()]
     yield "patches", ", ".join(kinds)
     for name, body in fluid.bodies.items():
         kind = "free" if body.free else "moved" if body.motion else "at rest"
         yield f"body {name}", f"{_name(body.mesh)}, rigid, {kind}"
-    yield "dofs", f"{fluid.dofs:,} with those inside of bodies"
+    yield "dofs", f"{fluid_dofs(case):,} with those inside of bodies"
+
+
+def _finer(case: Case) -> str:
+    assert case.fluid is not None
+    levels = case.fluid.grid.levels
+    return f", in parts halved {_count(levels, 'time')}: {cells_of(case):,} in all" if levels else ""
 
 
 def _sides(pair: PairSection) -> str:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from fsci.case import Case
 from fsci.check.check import number_of_steps, structure_dofs
+from fsci.meshes.nested import fluid_dofs
 from solvers.mesh import Mesh
 
 Point = tuple[float, float, float]  #: unknowns, seconds of a step, memory [MB]
@@ -44,7 +45,7 @@ def estimate(case: Case, structure: int | None, table: Table, dimension: int | N
             return None
         parts[f"structure {dim}D"] = structure
     if case.fluid is not None:
-        parts[f"fluid {dim}D {case.fluid.element}"] = case.fluid.dofs
+        parts[f"fluid {dim}D {case.fluid.element}"] = fluid_dofs(case)
     seconds = {kind: _seconds(table[kind], dofs) for kind, dofs in parts.items()}
     if case.contact is not None and structure is not None:
         seconds[f"structure {dim}D"] *= _factor(table["contact"], table["structure 2D"], structure)

@@ -20,6 +20,7 @@ from fsci.case.errors import Problem
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import fast_body, thin_body
 from fsci.case.rigid_motion import rigid_motion
+from fsci.meshes.nested import read_grid
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body, require_inside_period, slave_surfaces
 from solvers.fluid.inside import PointInBody, require_outside
 from solvers.fluid.surface import ImmersedSurface, Motion
@@ -78,6 +79,8 @@ def check_meshes(case: Case) -> Findings:
                 found.note(case, ("contact", "obstacles", name), mesh)
     if case.fluid is not None:
         _rigid(case, found)
+        if case.fluid.grid.refine and not found.problems:
+            found.attempt(partial(read_grid, case))
     return found
 
 

@@ -60,15 +60,21 @@ class Cutter:
 
     def __init__(self, grid: DistributedGrid, points: Array, films: Films | None = None):
         self.grid, self.points, self.films = grid, points, films
-        own = np.zeros(grid.grid.size, dtype=bool)
-        own[grid.numbers] = True
-        self._own = grid.grid.as_box(own)
+        self._own = grid.grid.as_box(grid.in_box)
         self._special = np.zeros(grid.grid.size, dtype=bool)
         self._depth = 0
         sizes = grid.grid.cell_sizes()
         self._slivers = NOTHING * sizes.prod(axis=1) / sizes.max(axis=1)  # areas of surface that do not count
         self._first: _First | None = None
         self._of_step: Cut | None = None
+
+    def on_coarse_cells(self, layers: int) -> bool:
+        """Some of the cells under the ghost penalty have coarser ones this near, as far as this process knows."""
+        nested = self.grid.nested
+        if nested is None or not self._special.any():
+            return False
+        near = _grow(self.grid.grid.as_box(self._special), layers).ravel(order="F")
+        return bool((near & nested.coarse).any())
 
     def begin_step(self) -> None:
         """Forget where the surfaces have been."""

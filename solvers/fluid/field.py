@@ -26,7 +26,7 @@ from solvers.fluid.immersed import ImmersedBody, sheets_of
 from solvers.fluid.krylov import FlowSolver, SolverSequence
 from solvers.fluid.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.pressure_level import Hold, hold_pressure, keep_levels, spread_excess
-from solvers.fluid.reach import require_history, require_within_period, strip_layers
+from solvers.fluid.reach import require_finest, require_history, require_within_period, strip_layers
 from solvers.fluid.space import Unknowns, set_velocity
 from solvers.fluid.surface import Motion, by_facets, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
@@ -68,7 +68,8 @@ class Fluid:
         self.linear_tolerance = solver.linear_tolerance
         wanted = solver.linear if isinstance(solver.linear, str) else "auto"
         wanted = wanted if sheets is None else "direct"  # the others need the nodes of a lattice
-        methods = linear.choose_flow(wanted, self.dim, self.dofs(), degree=settings.degree, steady=self.steady)
+        size, degree, equal = self.dofs(), settings.degree, self.grid.nested is None
+        methods = linear.choose_flow(wanted, self.dim, size, degree=degree, steady=self.steady, multigrid=equal)
         self.system = FlowSystem(
             self.grid,
             settings,
@@ -126,6 +127,7 @@ class Fluid:
         """The initial velocity, known everywhere."""
         if self.settings.initial_velocity is not None:
             set_velocity(self.flow, self.unknowns.velocity, self.settings.initial_velocity, t)
+            self.unknowns.share(self.system.flow)
         self.history.start(self.velocity())
         self.current = FlowStep(t, dt, self.history.difference(dt))
         if not self._coupled:
@@ -181,17 +183,15 @@ class Fluid:
         with self.timer("cut"):
             facets, motion = together([body.surface for body in self.bodies], motions, self.dim)
             cut = self.cutter(facets, motion, self._layers(motion), self._wet)
+            require_finest(self.cutter, self.comm)
         with self.timer("weights"):
             self.system.set_cut(cut)
             require_history(self.unknowns, cut, self.history.missing(self.current.difference))
             require_within_period(self.unknowns, cut)
             self.flow[~self.system.active_dofs] = 0.0
-            self.held = np.zeros(self.unknowns.owned, dtype=bool)
-            prescribed = self.boundary.dofs[self.boundary.dofs < self.unknowns.owned]
-            self.held[prescribed] = True
-            self.held |= ~self.system.active_dofs[: self.unknowns.owned]
-            if self.system.ghost is not None:
-                self.held |= self.system.ghost.outside
+            if self.unknowns.hanging is not None:
+                self.unknowns.share(self.system.flow)
+            self.held = self.system.held()
             self._hold_pressure(set_by_solids=with_solid and not self.settings.steady)
 
     def _layers(self, motion: Motion) -> int:
@@ -219,7 +219,7 @@ class Fluid:
         self._largest = 0.0
         info = converge(self, self.solver.newton)
         keep_levels(self.comm, self._holds, self.flow[: self.unknowns.owned])
-        self.system.flow.x.scatter_forward()
+        self.unknowns.share(self.system.flow)
         if not self._coupled:
             self._note_fast_bodies()
         return replace(info, notes=tuple(self.notes))
@@ -305,7 +305,7 @@ class Fluid:
 
     def _add(self, owned: Array) -> None:
         self.flow[: self.unknowns.owned] += owned
-        self.system.flow.x.scatter_forward()
+        self.unknowns.share(self.system.flow)
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from solvers import fem
 from solvers.api import Array
 from solvers.fluid.box import Grid, uniform
+from solvers.fluid.nested import Nested
 from solvers.fluid.sheets import Sheets
 
 __all__ = ["FACES", "DistributedGrid", "Grid", "Indices", "uniform"]
@@ -26,19 +27,59 @@ class DistributedGrid:
 
     def __init__(self, comm: MPI.Comm, grid: Grid, sheets: Sheets | None = None):
         self.comm, self.grid, self.sheets = comm, grid, sheets
+        self.nested = grid if isinstance(grid, Nested) else None
         mesh = (grid if sheets is None else sheets).mesh() if comm.rank == 0 else None
         self.domain = fem.distribute(comm, mesh)
         #: number of each local cell in the mesh, ghosts last
         self.original: Indices = fem.input_cells(self.domain)
-        #: number of the cell of the box in its place; only with `sheets` there are cells with the same
+        #: number of the cell of the box in its place, of coarser cells the lowest one; only with `sheets` there are
+        #: cells with the same
         self.numbers: Indices = self.original if sheets is None else sheets.place(self.original)
+        if self.nested is not None:
+            self.numbers = self.nested.first[self.original]
         self.owned = fem.owned_cells(self.domain)
-        self.sizes = grid.cell_sizes()[self.numbers]
+        #: edge lengths [m] of the local cells, shape (cells, dim)
+        self.sizes = grid.cell_sizes()[self.numbers] if self.nested is None else self._nested_sizes()
         self._seams: dict[tuple[int, ...], tuple[Indices, Indices]] = {}
 
     @property
     def dim(self) -> int:
         return self.grid.dim
+
+    def _nested_sizes(self) -> Array:
+        assert self.nested is not None
+        low, high = self.nested.bounds(self.original)
+        return high - low
+
+    @property
+    def in_box(self) -> NDArray[np.bool_]:
+        """Cells of the box that the local cells cover."""
+        if self.nested is None:
+            covered = np.zeros(self.grid.size, dtype=bool)
+            covered[self.numbers] = True
+            return covered
+        mine = np.zeros(len(self.nested.first), dtype=bool)
+        mine[self.original] = True
+        return mine[self.nested.cell_of]
+
+    @property
+    def joined(self) -> bool:
+        """Some cells have nodes in common that are not so in the mesh."""
+        return self.sheets is not None or self.nested is not None
+
+    @property
+    def apart(self) -> NDArray[np.bool_]:
+        """Local cells with nodes that others have, too, but not in the mesh."""
+        if self.nested is not None:
+            return self.nested.at_others[self.original]
+        return self.original >= self.grid.size
+
+    def cell_nodes(self, cells: NDArray[np.int32], degree: int) -> Indices:
+        """Numbers of the nodes of local cells if `joined`, in the order of DOLFINx, shape (cells, nodes)."""
+        steps = fem.node_steps(self.domain, degree)
+        table = self.sheets if self.nested is None else self.nested
+        assert table is not None
+        return table.nodes(self.original[cells], degree, steps)
 
     @cached_property
     def interior_faces(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.fluid.cut import off_boundary
 from solvers.fluid.grid import Grid
+from solvers.fluid.nested import Nested
 from solvers.fluid.sheets import Sheets, find_sheets
 from solvers.fluid.surface import ImmersedSurface, Motion, together
 
@@ -46,8 +47,8 @@ def rigid_body(
 
 
 def sheets_of(grid: Grid, bodies: Sequence[ImmersedBody]) -> Sheets | None:
-    """Sheets of the fluid around thin bodies at rest; None if there are none."""
-    if not bodies or not all(body.rests for body in bodies):
+    """Sheets of the fluid around thin bodies at rest; None if there are none, or where cells are nested."""
+    if isinstance(grid, Nested) or not bodies or not all(body.rests for body in bodies):
         return None
     motions = [body.motion(0.0) for body in bodies if body.motion is not None]
     facets, motion = together([body.surface for body in bodies], motions, grid.dim)

@@ -38,6 +38,7 @@ class OuterOnCut:
 
     residuals: tuple[Any, ...] = ()  #: forms over faces with fluid that no body covers
     tangents: tuple[Any, ...] = ()  #: their derivatives by the flow
+    hanging: tuple[Any, ...] = ()  #: the same at cells with hanging nodes
     covered: tuple[tuple[Term, CoveredFaces], ...] = ()  #: faces that bodies cover in part
 
 
@@ -82,21 +83,28 @@ class OuterFaces:
 
     def on_cut(self, cut: Cut, active: NDArray[np.bool_]) -> OuterOnCut:
         """The faces on a cut; active: which local cells have unknowns."""
-        residuals, tangents, covered, points = [], [], [], 2 * self.unknowns.degree + 1
+        residuals, tangents, hanging, covered, points = [], [], [], [], 2 * self.unknowns.degree + 1
         by_patch = self.boundary.facets, self.boundary.cells
         for term in self.terms:
             facets, cells = (np.concatenate([parts[n] for n in term.patches]) for parts in by_patch)
             uncovered, parts = covered_faces(self.grid, self.unknowns, cut, points, facets, cells)
-            free = np.sort(facets[active[cells] & uncovered])
-            residuals.append(term.residual.on(exterior_facet=free))
+            wet = active[cells] & uncovered
+            residuals.append(term.residual.on(exterior_facet=np.sort(facets[wet])))
             if term.tangent is not None:
-                tangents.append(term.tangent.on(exterior_facet=free))
+                apart = (
+                    np.zeros(len(wet), dtype=bool)
+                    if self.unknowns.hanging is None
+                    else self.unknowns.hanging.cells[cells]
+                )
+                tangents.append(term.tangent.on(exterior_facet=np.sort(facets[wet & ~apart])))
+                if self.unknowns.hanging is not None:
+                    hanging.append(term.tangent.on(exterior_facet=np.sort(facets[wet & apart])))
             with_fluid = [part.only(active) for part in parts]
             covered += [(term, part) for part in with_fluid if len(part.cells)]
         for term, _ in covered:
             if (term.kind.slope if term.kind.depends_on_flow else term.kind.stress) is None:
                 raise CannotBeCovered([self.boundary.patches[n] for n in term.patches])
-        return OuterOnCut(tuple(residuals), tuple(tangents), tuple(covered))
+        return OuterOnCut(tuple(residuals), tuple(tangents), tuple(hanging), tuple(covered))
 
     def add_covered(self, on_cut: OuterOnCut, out: Array, flow: Array, mu: float, rho: float, a: Array) -> None:
         """Add the same over the wet part of the others to local dofs; for rho, a see `slopes`."""

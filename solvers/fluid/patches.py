@@ -83,6 +83,8 @@ class Boundary:
                 on_patch, axes = component
                 dofs = fem.facet_dofs(unknowns.space, axes, np.sort(self.facets[number][on_patch]))
                 self.imposed[dofs] = number
+        if unknowns.hanging is not None:
+            self.imposed[unknowns.hanging.dofs] = -1
         #: local dofs with a prescribed velocity
         self.dofs: NDArray[np.int64] = np.flatnonzero(self.imposed >= 0)
         self._place = np.full((unknowns.local, 2), -1)

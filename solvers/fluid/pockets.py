@@ -35,7 +35,7 @@ def find_pockets(
     are connected, because they share unknowns; those at the ends of `periodic` axes share them across the period.
     """
     own = cut.active[cut.active < grid.owned]
-    if grid.sheets is not None:
+    if grid.joined:
         labels, count = connected_cells(grid, own)
     else:
         labels, count = _join(grid, *_label(grid, own), periodic)

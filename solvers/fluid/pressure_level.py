@@ -57,7 +57,8 @@ def _pressure_sizes(system: FlowSystem) -> Array:
     parts = volume[cells, None] * ((fluid * weights.rule) @ psi)
     size = np.bincount(unknowns.cell_pressure[cells].ravel(), parts.ravel(), unknowns.local).astype(float)
     fem.add_ghosts(unknowns.space, size)
-    return size[: unknowns.owned]
+    owned = size[: unknowns.owned]
+    return owned if unknowns.hanging is None else unknowns.hanging.rows(owned)
 
 
 def _hold(system: FlowSystem, pocket: Pocket, sizes: Array, *, keep_level: bool) -> Hold:
@@ -67,6 +68,8 @@ def _hold(system: FlowSystem, pocket: Pocket, sizes: Array, *, keep_level: bool)
     dofs = nodes.dofs[: nodes.owned, 0]
     inside = np.zeros(unknowns.owned, dtype=bool)
     inside[dofs] = system.dofs_of(np.flatnonzero(pocket.cells).astype(np.int32))[dofs]
+    if unknowns.hanging is not None:
+        inside &= ~unknowns.hanging.dofs[: unknowns.owned]
     numbers = np.where(inside[dofs], nodes.numbers[: nodes.owned], last)
     had_pressure = np.where(system.flow.x.array[dofs] != 0.0, numbers, last)
     choices = [had_pressure, numbers] if keep_level else [numbers]

@@ -18,6 +18,8 @@ from solvers.fluid.balances import leak
 from solvers.fluid.covered_faces import CoveredFaces, covered_faces
 from solvers.fluid.field import Fluid
 from solvers.fluid.inside import INSIDE, require_outside, winding
+from solvers.fluid.nested import Nested
+from solvers.fluid.regions import lagrange
 from solvers.fluid.space import FlowNodes
 
 Probe = Callable[[], dict[str, float]]
@@ -53,6 +55,8 @@ def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> P
 
 def interpolation(fluid: Fluid, nodes: FlowNodes, degree: int, x: Array) -> tuple[np.ndarray, Array]:
     """(dofs of shape (n, components), shape functions (n,)) at a point, of the nodes that this process owns."""
+    if (nested := fluid.grid.nested) is not None:
+        return _of_nodes(nodes, *_in_nested(nested, degree, x))
     number, weight, stride = np.zeros(1, dtype=np.int64), np.ones(1), 1
     indices: list[int] = []
     place: list[float] = []
@@ -71,6 +75,23 @@ def interpolation(fluid: Fluid, nodes: FlowNodes, degree: int, x: Array) -> tupl
         steps = np.indices((degree + 1,) * fluid.dim).reshape(fluid.dim, -1)[::-1].T  # the first direction fastest
         box = int(np.ravel_multi_index(indices, fluid.grid.grid.shape, order="F"))
         number = sheets.nodes(np.array([sheets.cell_at(box, np.array(place))]), degree, steps)[0]
+    return _of_nodes(nodes, number, weight)
+
+
+def _in_nested(grid: Nested, degree: int, x: Array) -> tuple[np.ndarray, Array]:
+    """(numbers of the nodes, shape functions) of the cell at a point."""
+    index = [
+        int(np.clip(np.searchsorted(edge, at) - 1, 0, len(edge) - 2)) for edge, at in zip(grid.edges, x, strict=True)
+    ]
+    cell = grid.cell_of[[np.ravel_multi_index(index, grid.shape, order="F")]].astype(np.int64)
+    low, high = grid.bounds(cell)
+    along = lagrange(np.arange(degree + 1) / degree, ((x - low) / (high - low))[0])
+    steps = np.indices((degree + 1,) * grid.dim).reshape(grid.dim, -1)
+    return grid.nodes(cell, degree, steps.T)[0], np.prod(np.take_along_axis(along, steps, axis=1), axis=0)
+
+
+def _of_nodes(nodes: FlowNodes, number: np.ndarray, weight: Array) -> tuple[np.ndarray, Array]:
+    """Dofs and weights of those nodes that this process owns."""
     owned = nodes.numbers[: nodes.owned]
     order = np.argsort(owned)
     at = np.minimum(np.searchsorted(owned[order], number), max(len(owned) - 1, 0))

@@ -9,8 +9,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from solvers.api import StepFailed
-from solvers.fluid.cut import Cut
+from solvers.fluid.cut import Cut, Cutter
 from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.nested import FINE_LAYERS
 from solvers.fluid.pieces import NOTHING
 from solvers.fluid.space import Unknowns
 from solvers.fluid.surface import Motion
@@ -34,6 +35,19 @@ def require_history(unknowns: Unknowns, cut: Cut, missing: NDArray[np.bool_]) ->
     if unknowns.grid.comm.allreduce(bool((used & missing).any()), op=MPI.LOR):
         reason = (
             "a body moved farther in one step than the velocity is extrapolated behind it: take a smaller time step"
+        )
+        raise StepFailed("fluid", reason)
+
+
+def require_finest(cutter: Cutter, comm: MPI.Comm) -> None:
+    """Raise StepFailed where bodies come close to cells that are not of the finest level (collective).
+
+    The cells from which poorly cut nodes take their values shall have no hanging nodes.
+    """
+    if cutter.grid.nested is not None and comm.allreduce(cutter.on_coarse_cells(FINE_LAYERS), op=MPI.LOR):
+        reason = (
+            f"a body comes within {FINE_LAYERS} cells of cells that are not of the finest level: "
+            "refine where it is and where it goes"
         )
         raise StepFailed("fluid", reason)
 

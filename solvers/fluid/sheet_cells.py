@@ -85,23 +85,22 @@ def _tensor(weights: Array) -> Array:
     return np.multiply.outer(weights, weights).ravel()
 
 
-def join_sheets(
+def join_nodes(
     grid: DistributedGrid, space: Any, degree: int, nodes: list[LatticeNodes]
 ) -> tuple[Any, list[LatticeNodes]]:
     """(the space in which nodes of the same number are one, velocity's and pressure's nodes with these numbers).
 
     degree: of the velocity. Collective.
     """
-    assert grid.sheets is not None
     size, dim, comm = int(space.dofmap.index_map_bs), grid.dim, grid.comm
+    everything = np.arange(len(grid.original), dtype=np.int32)
     start, end = space.dofmap.index_map.local_range
     columns = [(0, degree)] if size > 1 else [*((axis, degree) for axis in range(dim)), (dim, 1)]
     number = np.zeros(end - start + int(space.dofmap.index_map.num_ghosts), dtype=np.int64)
     for component, its_degree in columns:
         blocks = fem.component_cell_dofs(space, component) // size
-        steps = fem.node_steps(grid.domain, its_degree)
-        number[blocks] = component * FAR + grid.sheets.nodes(grid.original, its_degree, steps)
-    new = np.unique(number[fem.cell_blocks(space)[grid.original >= grid.grid.size]])
+        number[blocks] = component * FAR + grid.cell_nodes(everything, its_degree)
+    new = np.unique(number[fem.cell_blocks(space)[grid.apart]])
     shared = np.flatnonzero(np.isin(number, np.unique(np.concatenate(comm.allgather(new)))))
     mine = shared[shared < end - start]
     tables = comm.allgather((number[mine], start + mine))
@@ -125,8 +124,7 @@ def connected_cells(grid: DistributedGrid, cells: NDArray[np.int32]) -> tuple[In
 
     0 where none is. cells: of this process. Collective.
     """
-    assert grid.sheets is not None
-    corners = grid.sheets.nodes(grid.original[cells], 1, fem.node_steps(grid.domain, 1))
+    corners = grid.cell_nodes(cells, 1)
     gathered = grid.comm.allgather((grid.original[cells], corners))
     everything, nodes = (np.concatenate(column) for column in zip(*gathered, strict=True))
     ends = np.unique(nodes, return_inverse=True)[1].reshape(nodes.shape) + len(everything)

@@ -23,7 +23,7 @@ def _flow(fluid: Fluid) -> Snapshot | None:
     """
     unknowns, grid = fluid.unknowns, fluid.grid
     velocity, pressure = (
-        gather_nodal(fluid.comm, Nodal(fluid.flow[nodes.dofs[: nodes.owned]], nodes.numbers[: nodes.owned]))
+        gather_nodal(fluid.comm, Nodal(fluid.flow[nodes.dofs[: nodes.owned]], nodes.places[: nodes.owned]))
         for nodes in (unknowns.velocity, unknowns.pressure)
     )
     share = np.zeros(len(grid.numbers))
@@ -32,7 +32,7 @@ def _flow(fluid: Fluid) -> Snapshot | None:
     shares = gather_nodal(fluid.comm, Nodal(share[: grid.owned, None], grid.original[: grid.owned]))
     if velocity is None or pressure is None or shares is None:
         return None
-    mesh = grid.grid.mesh()
+    mesh = grid.grid.mesh() if grid.nested is None else grid.nested.picture()
     place = np.arange(len(shares)) if grid.sheets is None else grid.sheets.place(np.arange(len(shares)))
     fraction = np.bincount(place, shares[:, 0])[:, None]
     active = fraction[:, 0] > 0.0
@@ -45,7 +45,9 @@ def _flow(fluid: Fluid) -> Snapshot | None:
 
 
 def _corners(fluid: Fluid, degree: int) -> np.ndarray:
-    """Number of each corner of the cells, x fastest, in the lattice of nodes of this degree."""
+    """Place of each corner of the cells, x fastest, among the nodes of this degree."""
+    if (nested := fluid.grid.nested) is not None:
+        return np.searchsorted(nested.all_nodes(degree), nested.corners(degree))
     counts = fluid.unknowns.lattice_shape(degree)
     lattice = np.arange(int(np.prod(counts))).reshape(counts, order="F")
     indices = [

@@ -14,8 +14,9 @@ from solvers import fem
 from solvers.api import Array
 from solvers.distributed import Nodal
 from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.hanging import Hanging
 from solvers.fluid.periodic import LatticeNodes, join_ends
-from solvers.fluid.sheet_cells import join_sheets
+from solvers.fluid.sheet_cells import join_nodes
 from solvers.values import Value, evaluate
 
 Dofs = NDArray[np.int32]
@@ -28,8 +29,9 @@ class FlowNodes:
     dofs: Dofs  #: local dofs, shape (nodes, components)
     points: Array  #: positions [m], shape (nodes, dim)
     numbers: NDArray[np.int64]  #: number in the box's lattice, the same for every distribution
-    sizes: Array  #: edge lengths [m] of the cells around each, their mean, shape (nodes, dim)
+    sizes: Array  #: edge lengths [m] of the cells around each, their mean, shape (nodes, dim); not where these differ
     owned: int
+    places: NDArray[np.int64]  #: the same as `numbers` without gaps: all nodes in the order of their numbers
 
 
 class Unknowns:
@@ -43,8 +45,8 @@ class Unknowns:
         self.grid, self.degree, self.dim, self.periodic = grid, degree, grid.dim, tuple(periodic)
         self.space = fem.flow_space(grid.domain, degree)
         nodes = [self._lattice_nodes(range(self.dim), degree), self._lattice_nodes([self.dim], 1)]
-        if grid.sheets is not None:
-            self.space, nodes = join_sheets(grid, self.space, degree, nodes)
+        if grid.joined:
+            self.space, nodes = join_nodes(grid, self.space, degree, nodes)
         if self.periodic:
             self.space, nodes = join_ends(grid.comm, self.space, nodes)
         self.block_size = int(self.space.dofmap.index_map_bs)
@@ -66,6 +68,8 @@ class Unknowns:
         self.velocity, self.pressure = (self._nodes(some, d) for some, d in zip(nodes, (degree, 1), strict=True))
         self.velocity_mask = np.zeros(self.local, dtype=bool)  #: which local dofs are velocities
         self.velocity_mask[self.velocity.dofs] = True
+        #: nodes that take their values from coarser cells, if there are any
+        self.hanging = None if grid.nested is None else self._hanging()
 
     # ------------------------------------------------------------------------------------------- nodes of the lattice
 
@@ -90,10 +94,25 @@ class Unknowns:
         return LatticeNodes(dofs, points, number, at_start, at_end)
 
     def _nodes(self, nodes: LatticeNodes, degree: int) -> FlowNodes:
-        keep = np.unique(nodes.dofs[:, 0], return_index=True)[1] if self.periodic or self.grid.sheets else slice(None)
+        joined = self.periodic or self.grid.joined
+        keep = np.unique(nodes.dofs[:, 0], return_index=True)[1] if joined else slice(None)
         dofs, points = nodes.dofs[keep], nodes.points[keep]
         owned = int(np.count_nonzero(dofs[:, 0] < self.owned))
-        return FlowNodes(dofs, points, nodes.numbers[keep], self._sizes(points, degree), owned)
+        numbers, nested = nodes.numbers[keep], self.grid.nested
+        places = numbers if nested is None else np.searchsorted(nested.all_nodes(degree), numbers)
+        return FlowNodes(dofs, points, numbers, self._sizes(points, degree), owned, places)
+
+    def _hanging(self) -> Hanging:
+        assert self.grid.nested is not None
+        parts = ((self.velocity, self.degree), (self.pressure, 1))
+        return Hanging(
+            self.grid.comm,
+            self.grid.nested,
+            [(nodes.dofs, nodes.numbers, nodes.owned, degree) for nodes, degree in parts],
+            self.global_dofs,
+            self.owned,
+            (self.cell_velocity, self.cell_pressure),
+        )
 
     def _sizes(self, points: Array, degree: int) -> Array:
         """Edge lengths [m] of the cells around nodes, their mean, shape (nodes, dim)."""
@@ -115,8 +134,18 @@ class Unknowns:
         return order[np.searchsorted(self.velocity.numbers, numbers, sorter=order)]
 
     def size(self) -> int:
-        """Dofs on all processes."""
-        return int(self.index_map.size_global) * self.block_size
+        """Dofs on all processes; on nested cells without those of hanging nodes."""
+        if self.hanging is None:
+            return int(self.index_map.size_global) * self.block_size
+        dofs = np.concatenate([nodes.dofs[: nodes.owned].ravel() for nodes in (self.velocity, self.pressure)])
+        return int(self.grid.comm.allreduce(int(np.count_nonzero(~self.hanging.dofs[dofs]))))
+
+    def share(self, function) -> None:
+        """Values at hanging nodes and at ghosts become those of the owned unknowns (collective)."""
+        if self.hanging is not None:
+            values = function.x.array
+            values[: self.owned] = self.hanging.values(values[: self.owned])
+        function.x.scatter_forward()
 
     def parts(self, flow) -> tuple[ufl.core.expr.Expr, ufl.core.expr.Expr]:
         """(u, p) of a function, test or trial function of the space."""
@@ -130,7 +159,7 @@ class Unknowns:
 
     def to_nodes(self, values: Array, nodes: FlowNodes) -> Nodal:
         """Values at local dofs as those of owned nodes."""
-        return Nodal(values[nodes.dofs[: nodes.owned]].astype(float), nodes.numbers[: nodes.owned])
+        return Nodal(values[nodes.dofs[: nodes.owned]].astype(float), nodes.places[: nodes.owned])
 
     def from_nodes(self, values: Array, nodes: FlowNodes) -> Array:
         """Values at local dofs from those of owned nodes, zero elsewhere (collective)."""

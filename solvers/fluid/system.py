@@ -21,6 +21,7 @@ from solvers.fluid.film import film_cells
 from solvers.fluid.ghost import Scales
 from solvers.fluid.ghost_choice import choose_ghost_penalty
 from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.hanging_system import HangingSystem
 from solvers.fluid.interface import InterfaceTerms
 from solvers.fluid.matrix import Pattern, choose_pattern, create_matrix, fits, pattern_of
 from solvers.fluid.outer_faces import OuterFaces, OuterOnCut
@@ -85,6 +86,9 @@ class FlowSystem:
         self.terms = self._terms()
         self.ghost = choose_ghost_penalty(unknowns, self.terms, settings.penalties) if with_bodies else None
         self.forms = cell_forms(unknowns, self.terms, self.flow, self.weights if with_bodies else None)
+        self._hanging = (
+            None if unknowns.hanging is None else HangingSystem(unknowns, unknowns.hanging, self.forms.tangents[0])
+        )
         self._outer = OuterFaces(grid, boundary, unknowns, self.terms, self.flow)
         ghost = [] if self.ghost is None else self.ghost.integrals
         fem.compile_integrals([*self.forms.integrals(), *self._outer.integrals(), *ghost], "the flow")
@@ -181,11 +185,24 @@ class FlowSystem:
         )
         self._outer_on_cut = self._outer.on_cut(cut, active)
         self._tangents += self._outer_on_cut.tangents
+        if self._hanging is not None:
+            self._tangents[0] = self._hanging.set_cells(self.cells[0], self._outer_on_cut.hanging)
         if not fits(self.unknowns, self._pattern, cut):
             self._allocate(choose_pattern(self.unknowns, cut, by_faces=self._by_faces))
         elif pattern_changed:
             assert self._pattern is not None
             self._allocate(self._pattern)
+
+    def held(self) -> NDArray[np.bool_]:
+        """Owned dofs that are not solved for: prescribed, inactive, what the ghost penalty or coarser cells decide."""
+        unknowns = self.unknowns
+        held = ~self.active_dofs[: unknowns.owned]
+        held[self.boundary.dofs[self.boundary.dofs < unknowns.owned]] = True
+        if self.ghost is not None:
+            held |= self.ghost.outside
+        if unknowns.hanging is not None:
+            held |= unknowns.hanging.dofs[: unknowns.owned]
+        return held
 
     def dofs_of(self, cells: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Which local dofs belong to some local cells or, on other processes, to theirs (collective)."""
@@ -217,8 +234,13 @@ class FlowSystem:
     def _fill_pattern(self, pattern: Pattern) -> PETSc.Mat:
         """A matrix that has all entries of a pattern, with values that do not matter."""
         more = None if self.ghost is None else self.ghost.extra_entries()
+        if self._hanging is not None:
+            more = self._hanging.extra_entries() + (0 if more is None else more)
         matrix = create_matrix(self.unknowns, pattern, more, blocked=self._blocked)
         cells = np.flatnonzero(pattern.cells[: self.grid.owned]).astype(np.int32)
+        if self._hanging is not None:
+            cells = self._hanging.others(cells)
+            self._hanging.fill(matrix)
         fem.assemble_matrix(matrix, self.forms.tangents[0].on(cell=cells))
         if self.ghost is not None:
             self.ghost.fill(matrix, pattern)
@@ -311,7 +333,8 @@ class FlowSystem:
         flow, through = self.ghost_matrix.createVecs()
         flow.array[:] = self.flow.x.array[:owned]
         self.ghost_matrix.mult(flow, through)
-        return self._out[:owned] + through.array
+        rows = self._out[:owned]
+        return (rows if self._hanging is None else self._hanging.table.rows(rows)) + through.array
 
     def tangent(self, identity: Array, *, picard: bool) -> PETSc.Mat:
         """d(residual)/d(flow), with rows of the identity at the marked owned dofs; the next call overwrites it.
@@ -326,6 +349,8 @@ class FlowSystem:
         self.ghost_matrix.copy(matrix, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         for form in self._tangents:
             fem.assemble_matrix(matrix, form)
+        if self._hanging is not None:
+            self._hanging.add(matrix)
         for dofs, blocks in self._outer.slopes(self._outer_on_cut, *self._outer_scales()):
             for at, block in zip(dofs.reshape(len(dofs), -1).astype(PETSc.IntType), blocks, strict=True):
                 matrix.setValuesLocal(at, at, block.reshape(len(at), -1), PETSc.InsertMode.ADD_VALUES)

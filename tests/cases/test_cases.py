@@ -61,7 +61,7 @@ def test_first_steps(folder, tmp_path):
 
 @pytest.mark.parametrize(
     "name",
-    ["csm1", "csm2", "csm3", "cavity", "cook_membrane", "sealed_plate"]
+    ["csm1", "csm2", "csm3", "cavity", "cook_membrane", "sealed_plate", "cylinder_nested"]
     + [
         pytest.param(name, marks=pytest.mark.slow)
         for name in (

@@ -25,6 +25,9 @@ PROGRAM = Path(__file__).parents[1] / "setups" / "fluid_parallel.py"
         (2, "q2q1", "periodic"),
         (2, "q2q1", "film"),
         (3, "q1q1", "channel"),
+        (2, "q1q1", "nested"),
+        (2, "q2q1", "nested"),
+        (3, "q1q1", "nested"),
     ],
 )
 def test_processes_agree(tmp_path, dim, element, box):
@@ -49,6 +52,9 @@ def test_processes_agree(tmp_path, dim, element, box):
         (2, "q2q1", "periodic"),
         (2, "q2q1", "film"),
         (3, "q1q1", "channel"),
+        (2, "q1q1", "nested"),
+        (2, "q2q1", "nested"),
+        (3, "q1q1", "nested"),
     ],
 )
 def test_resumed_run_is_the_same_bit_for_bit(dim, element, box):

@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from solvers.distributed import Nodal, gather_nodal
 from solvers.fluid.grid import uniform
+from solvers.fluid.nested import RefinedBox, RefinedSurface, refined
 from solvers.fluid.patches import Patch
 from solvers.fluid.probes import mass_balance
 
@@ -16,7 +17,7 @@ from solvers.fluid.probes import mass_balance
 def scene(dim, element, comm, box="channel"):
     """A moving and a resting body in a channel, in a closed box, or in a periodic one that is open above.
 
-    In a "film" they come closer than a cell.
+    In a "film" they come closer than a cell; "nested" cells are fine around them and at the end of a longer channel.
     """
     inflow = field(*[lambda x, y, *zt: 4 * y * (1 - y), 0, 0][:dim])
     swirl = field(*[lambda x, y, *zt: y * y - 1 / 3, lambda x, y, *zt: 0.1 * x * x, 0][:dim])
@@ -29,6 +30,7 @@ def scene(dim, element, comm, box="channel"):
     patches = {
         "channel": channel,
         "film": channel,
+        "nested": channel,
         "closed": [Patch("box", ("x-", "x+", *sides), "velocity", swirl)],
         "periodic": [
             Patch("ends", ("x-", "x+"), "periodic"),
@@ -37,14 +39,20 @@ def scene(dim, element, comm, box="channel"):
         ],
     }[box]
     disc = (circle((0.4, 0.45), 0.17, 40), loop(40)) if dim == 2 else sphere((0.4, 0.45, 0.5), 0.2, 2)
+    brick = block([0.7 if box == "film" else 1.1, 0.3, 0.3][:dim], [1.3, 0.63, 0.71][:dim])
     v = np.array([0.7, 0.2, -0.1])[:dim]
     bodies = [
         body("disc", *disc, motion=lambda x, t: (x + t * v, 0 * x + v)),
-        body("brick", *block([0.7 if box == "film" else 1.1, 0.3, 0.3][:dim], [1.3, 0.63, 0.71][:dim])),
+        body("brick", *brick),
     ]
-    cells = [21, 13] if dim == 2 else [12, 7, 7]
+    grid = uniform([0] * dim, [1.6, 1, 1][:dim], [21, 13] if dim == 2 else [12, 7, 7])
+    if box == "nested":
+        coarse = uniform([0] * dim, [2.4, 1, 1][:dim], [24, 10] if dim == 2 else [12, 5, 5])
+        at_outlet = RefinedBox([2.2, 0, 0][:dim], [2.4, 0.25, 0.4][:dim], 1)
+        at_bodies = RefinedBox([0] * dim, [0.9, 0.9] if dim == 2 else [1.6, 1, 1], 1)
+        grid = refined(coarse, [at_outlet, at_bodies, RefinedSurface(*brick, 4, 1)])
     return make_fluid(
-        uniform([0] * dim, [1.6, 1, 1][:dim], cells), patches, bodies, mu=0.01, element=element, dt=0.03, comm=comm,
+        grid, patches, bodies, mu=0.01, element=element, dt=0.03, comm=comm,
         body_force=field(*[0.1, -0.5, 0][:dim]),
         solver=SolverSettings(Tolerance(1e-10), linear="direct" if dim == 2 else "iterative", linear_tolerance=1e-11),
     )  # fmt: skip
@@ -53,7 +61,7 @@ def scene(dim, element, comm, box="channel"):
 def everything(fluid):
     """Velocity and pressure by the numbers of nodes, on rank 0."""
     nodes = (fluid.unknowns.velocity, fluid.unknowns.pressure)
-    return [gather_nodal(fluid.comm, Nodal(fluid.flow[n.dofs[: n.owned]], n.numbers[: n.owned])) for n in nodes]
+    return [gather_nodal(fluid.comm, Nodal(fluid.flow[n.dofs[: n.owned]], n.places[: n.owned])) for n in nodes]
 
 
 def main(dim, element, box, out):

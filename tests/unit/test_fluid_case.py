@@ -1,5 +1,6 @@
 """The section `fluid` of a case: each mistake with its message, the text it points at, doubts, what grids become."""
 
+import re
 import subprocess
 import sys
 
@@ -8,8 +9,11 @@ import pytest
 from case_mistakes import assert_located, load, refused
 from case_text import with_section, without
 
+from fsci.case import CaseError
 from fsci.case.grid import GridSection
 from fsci.check.check import summary
+from fsci.check.meshes import check_meshes
+from fsci.meshes.nested import read_grid
 
 CASE = """\
 title: channel
@@ -100,6 +104,50 @@ MISTAKES = [
         "6:84: 'ratio' must be from 1e-06 to 1e+06, not 1e+09",
         "1e9",
     ),
+    (
+        GRID,
+        GRID + ", refine: [{level: 1}]",
+        "6:62: a refinement needs either 'box' or 'around'",
+        "{level",
+    ),
+    (
+        GRID,
+        GRID + ", refine: [{box: [[0, 0], [1, 1]], around: cylinder}]",
+        "6:62: a refinement needs either 'box' or 'around'",
+        "{box",
+    ),
+    (
+        GRID,
+        GRID + ", refine: [{around: cylinder, level: 11}]",
+        "6:88: 'level' must be at most 10, not 11",
+        "11",
+    ),
+    (
+        GRID,
+        GRID + ", refine: [{around: cylinder, level: 10}]",
+        "6:61: if all of its cells were of the finest level there would be 4.2e+08: 1e+08 are the most",
+        "[{around",
+    ),
+    (
+        GRID,
+        GRID + ", refine: [{around: cylindre}]",
+        "6:71: there is no body 'cylindre'; did you mean 'cylinder'?",
+        "cylindre",
+    ),
+    (
+        GRID,
+        GRID + ", refine: [{box: [[1, 0], [1, 1]]}]",
+        "6:78: entry 1 of entry 2 of 'box' must be greater than that of the lowest corner, 1, not 1",
+        "1, 1",
+    ),
+    (GRID, GRID + ", refine: [{box: [[0, 0]]}]", "6:68: 'box' must have 2 entries, not 1", "[[0"),
+    (
+        GRID,
+        GRID + ", refine: [{box: [[0, 0, 0], [1, 1, 1]]}]",
+        "6:69: entry 1 of 'box' must have 2 entries like 'from', not 3",
+        "[0, 0, 0]",
+    ),
+    (GRID, GRID + ", refine: [{box: [[5, 0], [6, 1]]}]", "6:68: 'box' is outside of the grid", "[[5"),
     # patches
     ("on: x-", "on: left", f"8:17: 'on' must be {FACES}, not 'left'", "left"),
     ("on: x-", "on: [x-, z-]", "8:22: a box in 2D has no face 'z-'", "z-"),
@@ -284,6 +332,24 @@ def test_a_flow_that_nothing_drives():
     assert load(still).warnings == (
         "case.yaml:7:3: nothing drives the flow: no velocity, traction, pressure, force or moving body",
     )
+
+
+def test_refined_grids():
+    refined = RESTING.replace(GRID, GRID + ", refine: [{around: cylinder, level: 2}]")
+    text = summary(load(refined))
+    grid = read_grid(load(refined))
+    assert set(grid.width) == {1, 2, 4}
+    assert f"40 x 10 cells, in parts halved 2 times: {len(grid.first):,} in all" in text
+    assert f"{3 * grid.unknowns(1):,} with" in text
+    coarse = refined.replace("level: 2", "layers: 2")
+    message = "body 'cylinder' comes within 3 cells of cells that are not of the finest level, 1: refine around it"
+    with pytest.raises(CaseError, match=f"case.yaml:6:61: {message}"):
+        read_grid(load(coarse))
+    assert [str(p).splitlines()[0] for p in check_meshes(load(coarse)).problems] == [f"case.yaml:6:61: {message}"]
+    ends = "ends: {on: [x-, x+], periodic: true}"
+    periodic = re.sub(r"inlet: .*\n    outlet: .*", ends, refined)
+    message = "6:61: a grid with periodic patches cannot be refined: use stretches"
+    assert_located(periodic, refused(periodic), message, "[{around")
 
 
 def test_a_steady_flow_without_a_velocity_of_its_own():

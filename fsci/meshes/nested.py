@@ -1,0 +1,71 @@
+"""The grid of a case with finer cells in boxes and around bodies. Nothing here needs a finite element."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsci.case import Case
+from fsci.case.grid import Refinement
+from fsci.meshes.of_case import read_body, read_rigid_body
+from solvers.fluid.box import Grid
+from solvers.fluid.nested import FINE_LAYERS, Nested, RefinedBox, RefinedRegion, RefinedSurface, refined
+from solvers.tessellation import tessellate
+
+Surface = tuple[NDArray[np.float64], NDArray[np.int64]]
+
+
+def read_grid(case: Case) -> Grid:
+    """The grid of the flow. Raises CaseError."""
+    assert case.fluid is not None
+    section = case.fluid.grid
+    grid = Grid(section.planes)
+    if not section.refine:
+        return grid
+    surfaces = {name: _surface(case, name) for name in [*case.fluid.bodies, *case.elastic_bodies]}
+    grid = refined(grid, [_region(refinement, surfaces) for refinement in section.refine])
+    assert isinstance(grid, Nested)
+    for name, (points, facets) in surfaces.items():
+        close = RefinedSurface(points, facets, FINE_LAYERS, section.levels).cells(grid)
+        if (close & grid.coarse).any():
+            message = (
+                f"body '{name}' comes within {FINE_LAYERS} cells of cells that are not of the finest level, "
+                f"{section.levels}: refine around it"
+            )
+            raise case.error(("fluid", "grid", "refine"), message)
+    return grid
+
+
+def cells_of(case: Case) -> int:
+    """Cells of the flow. Raises CaseError."""
+    grid = read_grid(case)
+    return len(grid.first) if isinstance(grid, Nested) else grid.size
+
+
+def fluid_dofs(case: Case) -> int:
+    """Unknowns of velocity and pressure, those inside of bodies included. Raises CaseError."""
+    assert case.fluid is not None
+    if not case.fluid.grid.refine:
+        return case.fluid.dofs
+    grid = read_grid(case)
+    assert isinstance(grid, Nested)
+    degree = 1 if case.fluid.element == "q1q1" else 2
+    return grid.dim * grid.unknowns(degree) + grid.unknowns(1)
+
+
+def _region(refinement: Refinement, surfaces: dict[str, Surface]) -> RefinedRegion:
+    if refinement.box is not None:
+        low, high = refinement.box
+        return RefinedBox(low, high, refinement.level)
+    assert refinement.around is not None
+    return RefinedSurface(*surfaces[refinement.around], refinement.layers, refinement.level)
+
+
+def _surface(case: Case, name: str) -> Surface:
+    """Points [m] and facets of a body at its start."""
+    if name in case.elastic_bodies:
+        mesh = read_body(case, name)
+        facets, nodes = tessellate(mesh, None)
+        return mesh.points[nodes], facets
+    _, points, facets = read_rigid_body(case, name)
+    return points, facets

@@ -1,0 +1,81 @@
+"""Hanging nodes: nodes of finer cells on the face or the edge of a coarser one that are no nodes of that.
+
+They are no unknowns, their values are those of the coarser cell's polynomial there: u_i = sum_b N_b(x_i) u_b. With
+T the matrix that has these rows and, for all other nodes, those of the identity, an equation r(u) = 0 becomes
+T^T r(T u) = 0, its tangent T^T K T. Since cells at a corner differ by one level at most, no b hangs itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from solvers.api import Array
+from solvers.fluid.directory import Directory
+from solvers.fluid.nested import Nested
+from solvers.rows import from_entries
+
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+
+class Hanging:
+    """Those of velocity and pressure. Arrays of rows and values are those of owned dofs."""
+
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        grid: Nested,
+        lattices: Sequence[tuple[NDArray[np.int32], Indices, int, int]],
+        global_dofs: Indices,
+        owned: int,
+        cell_dofs: Sequence[NDArray[np.int32]],
+    ):
+        """lattices: of each quantity local dofs (nodes, components), numbers of the nodes, how many are owned, degree.
+
+        cell_dofs: of local cells, in any number of arrays. Collective.
+        """
+        self.dofs: Mask = np.zeros(len(global_dofs), dtype=bool)  #: which local dofs
+        rows, columns, data = [], [], []
+        for dofs, numbers, own, degree in lattices:
+            known = grid.all_nodes(degree)
+            places, of_dofs = np.searchsorted(known, numbers[:own]), global_dofs[dofs]
+            directory = Directory(comm, places, of_dofs[:own], len(known))
+            hangs, masters, weights = grid.hanging(degree, numbers)
+            self.dofs[dofs[hangs]] = True
+            mine = np.flatnonzero(hangs)[: np.count_nonzero(hangs[:own])]
+            at, function = np.nonzero(weights[: len(mine)])
+            columns.append(directory(np.searchsorted(known, masters[at, function])))
+            rows.append(of_dofs[mine[at]])
+            data.append(np.broadcast_to(weights[at, function][:, None], rows[-1].shape))
+        free = global_dofs[:owned][~self.dofs[:owned]]
+        entries = [np.concatenate([first, *(some.ravel() for some in parts)])
+                   for first, parts in ((free, rows), (free, columns), (np.ones(len(free)), data))]  # fmt: skip
+        self._table = from_entries(comm, (owned, owned), *entries)
+        #: local cells with such nodes
+        self.cells: Mask = np.any([self.dofs[dofs].reshape(len(dofs), -1).any(axis=1) for dofs in cell_dofs], axis=0)
+
+    def values(self, values: Array) -> Array:
+        """T u (collective)."""
+        u, found = self._table.createVecs()
+        u.array[:] = values
+        self._table.mult(u, found)
+        return found.array
+
+    def rows(self, rows: Array) -> Array:
+        """T^T r (collective)."""
+        found, r = self._table.createVecs()
+        r.array[:] = rows
+        self._table.multTranspose(r, found)
+        return found.array
+
+    def matrix(self, matrix: PETSc.Mat) -> tuple[Indices, Indices, Array]:
+        """T^T K T by compressed rows (collective)."""
+        product = matrix.PtAP(self._table)
+        rows = product.getValuesCSR()
+        product.destroy()
+        return rows
