@@ -54,7 +54,9 @@ def close(points: Array, facets: Facets, inside: Array, corners: Array, box: tup
         raise DrySideError("the body must lie between its wetted surface and these points")
     for a, b in pairwise(line):
         if _crosses(a, b, *box):
-            raise DrySideError(f"the way from {_spoken(a)} to {_spoken(b)} passes through the box: go around it")
+            raise DrySideError(
+                f"the line from {_spoken(a)} to {_spoken(b)} crosses the box: add corners that lead around it"
+            )
     return way
 
 

@@ -40,7 +40,9 @@ def join_tied(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
             nodes.append(at)
         moved = relocated(Pair(sides[0], sides[1], settings.integration, Tied()))
         if moved is None:
-            raise case.error(("contact", "pairs", name), "the surfaces do not lie on each other: nothing to tie")
+            raise case.error(
+                ("contact", "pairs", name), "the surfaces do not touch at the start: there is nothing to tie"
+            )
         body = settings.sides[0][1].body or ""
         if np.abs(moved - sides[0].points).max() < ROUNDING * np.ptp(moved, axis=0).max():
             continue

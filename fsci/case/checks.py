@@ -74,7 +74,7 @@ def _element(case: Case, structure: StructureSection, body: BodySection, keys: K
     if body.element != "mixed":
         return
     if case.dimension == 2 and structure.plane == "stress":
-        yield (*keys, "element"), "'mixed' is not for plane stress, which does not lock; take 'displacement'"
+        yield (*keys, "element"), "'mixed' is not available in plane stress, which does not lock; take 'displacement'"
     elif isinstance(body.mesh, Shape) and body.mesh.cell in ("tri", "tet"):
         yield (*keys, "element"), NO_MIXED_SIMPLICES
 
@@ -115,7 +115,10 @@ def _needs(case: Case, structure: StructureSection, body: BodySection, keys: Key
     elif reason and not has_mass(body.material):
         yield (*keys, "material", "density"), f"'density' must be greater than 0: {reason} needs it"
     if body.slip_length and case.fluid is None:
-        yield (*keys, "slip_length"), "'slip_length' is of the flow around the body: it needs the section 'fluid'"
+        yield (
+            (*keys, "slip_length"),
+            "'slip_length' is a property of the flow around the body and needs the section 'fluid'",
+        )
     if body.initial_velocity and not dynamic:
         yield (*keys, "initial_velocity"), "'initial_velocity' needs 'dynamics' in 'structure'"
 
@@ -123,12 +126,15 @@ def _needs(case: Case, structure: StructureSection, body: BodySection, keys: Key
 def _contact(case: Case, contact: ContactSection) -> Iterator[Mistake]:
     if not contact.pairs and contact.bodies is None:
         missing: Keys = ("contact", "pairs") if "pairs" in contact.model_fields_set else ("contact",)
-        yield missing, "'contact' needs 'pairs', or 'bodies: all' to have them found"
+        yield missing, "'contact' needs 'pairs', or 'bodies: all' for automatic pairs"
     if contact.film.value and case.fluid is None:
-        yield ("contact", "film"), "'film' is of the fluid between surfaces: it needs the section 'fluid'"
+        yield ("contact", "film"), "'film' describes the fluid between surfaces and needs the section 'fluid'"
     for setting in ("friction", "reach"):
         if setting in contact.model_fields_set and contact.bodies is None:
-            yield ("contact", setting), f"'{setting}' is for the pairs that 'bodies' asks for"
+            yield (
+                ("contact", setting),
+                f"'{setting}' applies only to the pairs that 'bodies' finds; give 'bodies', too, or remove it",
+            )
     for i, name in enumerate(() if contact.bodies in (None, "all") else contact.bodies or ()):
         if name not in case.elastic_bodies:
             yield ("contact", "bodies", i), f"unknown body '{name}'{did_you_mean(name, case.elastic_bodies)}"
@@ -137,10 +143,8 @@ def _contact(case: Case, contact: ContactSection) -> Iterator[Mistake]:
         yield from length_mistakes(obstacle.motion, case.dimension, (*keys, "motion"))
         yield from surfaces_mistakes(obstacle.mesh, obstacle.on, (*keys, "on"))
         if case.fluid is not None and name in case.fluid.bodies:
-            message = (
-                f"a rigid body of the flow is called '{name}', too: remove the obstacle, the body can be the master"
-            )
-            yield keys, message
+            remedy = "remove the obstacle and take the body as master"
+            yield keys, f"'{name}' is also the name of a rigid body of the flow; {remedy}"
     for name, pair in contact.pairs.items():
         (_, slave), (_, master) = pair.sides
         for where, side in dict(pair.sides).items():

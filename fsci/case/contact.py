@@ -25,15 +25,21 @@ class Side(Section):
         if self.body is not None and self.on is None:
             raise fault("a side of a body needs the setting 'on', the name of its surface", "body")
         if self.obstacle is not None and self.on is not None:
-            raise fault("the surface of an obstacle is named where the obstacle is", "on")
+            raise fault(
+                "the surface of an obstacle is named in its own section under 'obstacles'; remove 'on' here", "on"
+            )
         return self
 
 
 class Friction(Section):
     """Coulomb's law by a coefficient, or Tresca's by a bound."""
 
-    coefficient: NotNegative | None = setting(None, "largest traction along the surface over the pressure", unit="1")
-    bound: Positive | None = setting(None, "largest traction along the surface, whatever the pressure", unit="Pa")
+    coefficient: NotNegative | None = setting(
+        None, "Coulomb's coefficient: largest tangential traction / pressure", unit="1"
+    )
+    bound: Positive | None = setting(
+        None, "Tresca's bound: largest tangential traction, independent of the pressure", unit="Pa"
+    )
 
     @property
     def some(self) -> bool:
@@ -50,15 +56,15 @@ class Friction(Section):
 class PairSection(Section):
     """Two surfaces that may touch, or one that may touch itself; the slave should be the finer or softer one."""
 
-    slave: Side | None = setting(None, "surface that carries the contact pressure; of a body")
-    master: Side | None = setting(None, "surface it may touch")
-    itself: Side | None = setting(None, "instead of both: a surface that may touch itself", name="self")
+    slave: Side | None = setting(None, "surface of a body; the contact pressure is an unknown of its nodes")
+    master: Side | None = setting(None, "the other surface, of a body or an obstacle")
+    itself: Side | None = setting(None, "instead of 'slave' and 'master': a surface that may touch itself", name="self")
     integration: Literal["segments", "elements"] = setting(
-        "segments", "segments: exact where facets overlap; elements: faster, fixed points on slave facets"
+        "segments", "segments: exact on each overlap of two facets; elements: fixed points on each slave facet, faster"
     )
 
-    friction: Friction = setting(Friction, "resistance against sliding; default: none")
-    tied: bool = setting(False, "true: one body where they lie on each other at the start")
+    friction: Friction = setting(Friction, "friction law; default: none")
+    tied: bool = setting(False, "true: the surfaces are joined where they touch at the start")
 
     @property
     def law(self) -> str:
@@ -115,10 +121,12 @@ class FilmSection(Section):
     """
 
     transmissivity: NotNegative | None = setting(
-        None, "flux in the layer per width, over pressure gradient / viscosity", unit="m^3"
+        None, "the flux per width in the layer is transmissivity / viscosity * pressure gradient", unit="m^3"
     )
     roughness: NotNegative | None = setting(
-        None, "instead of it: height of a gap that lets as much through, transmissivity = roughness^3 / 12", unit="m"
+        None,
+        "instead of 'transmissivity': height of a gap of the same transmissivity, which is roughness^3 / 12",
+        unit="m",
     )
 
     @model_validator(mode="after")
@@ -138,12 +146,19 @@ class ContactSection(Section):
 
     pairs: dict[Name, PairSection] = setting(dict, "pairs of surfaces by name")
     bodies: Literal["all"] | tuple[Name, ...] | None = setting(
-        None, "all, or names of bodies: the program finds the pairs among their surfaces, and with all that is rigid"
+        None,
+        "all, or names of elastic bodies: the program finds the pairs of their surfaces, also with rigid "
+        "bodies and obstacles",
     )
-    friction: Friction = setting(Friction, "resistance against sliding in the pairs that the program finds")
+    friction: Friction = setting(Friction, "friction law of the pairs that 'bodies' finds")
     reach: Positive | None = setting(
-        None, "distance up to which surfaces are a pair at the start; default: the extent of the smaller body", unit="m"
+        None,
+        "largest distance of two surfaces at the start that 'bodies' makes a pair; default: the "
+        "extent of the smaller body",
+        unit="m",
     )
     obstacles: dict[Name, ObstacleSection] = setting(dict, "rigid surfaces by name")
-    film: FilmSection = setting(FilmSection, "layer on the surfaces, in which fluid passes; default: none")
+    film: FilmSection = setting(
+        FilmSection, "rough or porous layer on the surfaces, through which fluid passes; default: none"
+    )
     c_n: Positive = setting(1.0, "factor of the complementarity parameter; the result does not depend on it", unit="1")

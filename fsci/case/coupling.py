@@ -20,17 +20,17 @@ class Coupling(Section):
     )
     wetted: dict[Name, Surfaces] = setting(
         dict,
-        "surfaces that the fluid touches, by body; default: all but what lies in other bodies or, without contact, "
-        "on the boundary of the box at the start",
+        "surfaces that the fluid touches, by body; default: all surfaces except those inside of other bodies and, "
+        "without contact, those on the boundary of the box at the start",
     )
     dry_side: dict[Name, Annotated[tuple[NumberVector, ...], EntryCount(1, None)]] = setting(
         dict,
-        "2D: corners of a way around the box, from one end of the wetted surface of a body to its other end; between "
-        "both there is no fluid, wherever the surface moves: for walls and membranes with fluid on one side",
+        "for walls and membranes with fluid on one side, 2D only: corners of a polygon outside of the box that leads "
+        "from one end of a body's wetted surface to the other end; there is no fluid between surface and polygon",
         unit="m",
     )
     accelerator: Literal["iqn", "aitken", "constant"] = setting(
-        "iqn", "partitioned: interface quasi-Newton, Aitken's relaxation, or a constant one"
+        "iqn", "partitioned: interface quasi-Newton (iqn), Aitken's relaxation, or constant relaxation"
     )
     relaxation: Positive = setting(0.5, "partitioned: relaxation factor of the first iteration", unit="1")
     reuse: CountOrZero = setting(8, "partitioned, iqn: number of earlier steps whose iterations are reused")
@@ -40,11 +40,11 @@ class Coupling(Section):
     tolerance_absolute: NotNegative = setting(
         0.0, "partitioned: absolute tolerance of the interface residual", unit="m"
     )
-    max_iterations: Count = setting(50, "partitioned: iterations after which a step has failed")
+    max_iterations: Count = setting(50, "partitioned: most iterations of a step; one that needs more has failed")
 
     @model_validator(mode="after")
     def _for_partitioned(self) -> Coupling:
         for name in PARTITIONED:
             if self.scheme == "monolithic" and name in self.model_fields_set:
-                raise fault(f"'{name}' is for the partitioned scheme", name)
+                raise fault(f"'{name}' applies only to the partitioned scheme", name)
         return self

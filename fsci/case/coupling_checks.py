@@ -29,10 +29,16 @@ def coupling_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
         return
     for name in case.fluid.bodies:
         if name in bodies:
-            yield ("fluid", "bodies", name), f"'{name}' is an elastic body already: give this rigid one another name"
+            yield (
+                ("fluid", "bodies", name),
+                f"'{name}' is already the name of an elastic body; give this rigid body another one",
+            )
     steady, static = case.fluid.scheme == "steady", case.structure.dynamics is None
     if steady and not static:
-        yield ("fluid", "scheme"), "a steady flow goes with a static structure: remove 'dynamics', or choose bdf2"
+        yield (
+            ("fluid", "scheme"),
+            "a steady flow needs a static structure: remove 'dynamics', or choose the scheme bdf2",
+        )
     if static and not steady:
         yield ("fluid", "scheme"), "a flow in time needs 'dynamics' in 'structure', or choose the scheme steady"
     is_open = any(patch.open for patch in case.fluid.patches.values())
@@ -58,7 +64,7 @@ def _dry_side_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
         if name not in bodies:
             yield keys, f"unknown body '{name}'{did_you_mean(name, bodies)}"
         elif case.dimension == 3:
-            yield keys, "'dry_side' is for 2D; in 3D a body is wet all round, or where 'wetted' says so"
+            yield keys, "'dry_side' is for 2D only; in 3D name the wet surfaces with 'wetted'"
         elif name not in coupling.wetted:
             yield keys, f"say which surface is wet: 'wetted: {{{name}: [..]}}'"
         for i, corner in enumerate(corners):

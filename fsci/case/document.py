@@ -130,7 +130,7 @@ def _steps(data: Any, dotted: str) -> list[tuple[Any, str | int]]:
         key: str | int = word
         if isinstance(data, list):
             if word not in map(str, range(len(data))):
-                raise KeyError(f"{where} is a list with entries 0 to {len(data) - 1}, '{word}' is none of them")
+                raise KeyError(f"{where} is a list with entries 0 to {len(data) - 1} and has no entry '{word}'")
             key = int(word)
         elif not isinstance(data, dict):
             raise KeyError(f"{where} is not a section, it has no setting '{word}'")

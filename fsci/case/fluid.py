@@ -44,23 +44,23 @@ class PatchSection(Section):
         None, "only the part of the faces where this is positive at the middle of a cell's face; default: all of it"
     )
     velocity: Vector | None = setting(None, "prescribed velocity", unit="m/s")
-    no_slip: Switch = setting(False, "true: a wall at rest that the flow sticks to")
-    slip: Switch = setting(False, "true: nothing flows through, and there is no shear stress")
+    no_slip: Switch = setting(False, "true: a wall at rest, the velocity is zero")
+    slip: Switch = setting(False, "true: the normal velocity and the shear stress are zero")
     slip_length: Positive | None = setting(
         None,
-        "nothing flows through, and the shear stress is viscosity / slip_length times the velocity along",
+        "Navier slip: the normal velocity is zero, the shear stress is viscosity / slip_length times the "
+        "tangential velocity",
         unit="m",
     )
     symmetry: Switch = setting(False, "true: a plane of symmetry, the same as slip")
     traction: Vector | None = setting(None, "prescribed force per area", unit="Pa")
-    pressure: Formula | None = setting(
-        None, "prescribed pressure of a flow that enters or leaves along the normal of the face", unit="Pa"
-    )
+    pressure: Formula | None = setting(None, "prescribed pressure; the tangential velocity is zero", unit="Pa")
     outflow: Switch = setting(
-        False, "true: the flow leaves as a parallel flow does, at pressure 0 in the mean, at pressure 0"
+        False, "true: the flow leaves at pressure 0, without disturbance if it is parallel: mu du/dn - p n = 0"
     )
     periodic: Switch = setting(
-        False, "true: the flow goes on at the opposite face; the patch is on both and has all of them"
+        False,
+        "true: the flow is periodic between two opposite faces; 'on' names both, and the patch covers all of them",
     )
 
     @model_validator(mode="after")
@@ -103,13 +103,13 @@ class PatchSection(Section):
 class Turn(Section):
     """A rotation that changes with time."""
 
-    centre: NumberVector = setting(..., "point that stays where it is", unit="m")
+    centre: NumberVector = setting(..., "centre of rotation", unit="m")
     axis: Annotated[tuple[Number, ...], EntryCount(3, 3)] | None = setting(
         None, "direction of the axis (3D only)", unit="1"
     )
     angle: TimeFormula | None = setting(None, "angle, counterclockwise seen against the axis", unit="degrees")
     angular_velocity: TimeFormula | None = setting(
-        None, "instead of the angle: its rate; the angle is 0 at the first time of the run", unit="degrees/s"
+        None, "instead of 'angle': its rate; the angle is 0 at the first time of the run", unit="degrees/s"
     )
 
     @model_validator(mode="after")
@@ -128,7 +128,7 @@ class Movement(Section):
 
     displacement: TimeVector | None = setting(None, "displacement by components", unit="m")
     velocity: TimeVector | None = setting(
-        None, "instead of the displacement: its rate; the displacement is 0 at the first time of the run", unit="m/s"
+        None, "instead of 'displacement': its rate; the displacement is 0 at the first time of the run", unit="m/s"
     )
     rotation: Turn | None = setting(None, "rotation")
 
@@ -146,14 +146,16 @@ def _one_of(section: Section, first: str, second: str) -> None:
 class RigidBodySection(Section):
     """A rigid body in the flow: at rest, moved as given, or free."""
 
-    mesh: Mesh = setting(..., "mesh file or built-in shape; only its surface counts, as fine as it is meshed")
+    mesh: Mesh = setting(..., "mesh file or built-in shape; only the facets of its boundary are used")
     on: Surfaces | None = setting(
         None, "names of the surfaces that enclose the body; default: the whole boundary of the mesh"
     )
-    motion: Movement | None = setting(None, "motion from the place of the mesh; default: at rest")
-    free: Free | None = setting(None, "instead of a motion: the flow and other forces move it")
+    motion: Movement | None = setting(None, "prescribed motion, relative to the position of the mesh; default: at rest")
+    free: Free | None = setting(
+        None, "instead of 'motion': the body moves under the forces of the flow, its weight, springs and contact"
+    )
     slip_length: NotNegative = setting(
-        0.0, "the flow slips along it with this times the slope of its velocity; 0: it sticks", unit="m"
+        0.0, "Navier slip: slip velocity = slip_length * shear rate; 0: no slip", unit="m"
     )
 
     @model_validator(mode="after")
@@ -169,12 +171,14 @@ class FluidSection(Section):
     density: Positive = setting(..., "mass per volume", unit="kg/m^3")
     viscosity: Positive = setting(..., "dynamic viscosity", unit="Pa s")
     flow: Literal["navier_stokes", "stokes"] = setting(
-        "navier_stokes", "stokes: slow flow, without the convective term"
+        "navier_stokes", "stokes: creeping flow, without the convective term"
     )
     scheme: Literal["bdf2", "backward_euler", "steady"] = setting(
-        "bdf2", "time integration; steady: each time step is the steady flow under the conditions of its time"
+        "bdf2", "time integration; steady: every step computes the steady flow for the boundary conditions of its time"
     )
-    element: Literal["q1q1", "q2q1"] = setting("q1q1", "velocity and pressure of first order, or velocity of second")
+    element: Literal["q1q1", "q2q1"] = setting(
+        "q1q1", "q1q1: velocity and pressure of first order; q2q1: velocity of second order"
+    )
     grid: GridSection = setting(..., "box and cells")
     patches: dict[Name, PatchSection] = setting(
         ..., "conditions on the boundary of the box by name; where patches meet, the one named last decides"

@@ -24,7 +24,7 @@ def fluid_mistakes(case: Case, fluid: FluidSection) -> Iterator[Mistake]:
     for name, body in fluid.bodies.items():
         keys: Keys = ("fluid", "bodies", name)
         if name == "fluid":
-            yield keys, "a body cannot be called 'fluid': the files of the flow are"
+            yield keys, "a body cannot be called 'fluid', which is the name of the files of the flow"
         yield from mesh_mistakes(body.mesh, dimension, case.folder, (*keys, "mesh"), "the grid")
         for i, surface in enumerate(body.on or ()):
             yield from surface_mistakes(body.mesh, surface, (*keys, "on", i))
@@ -46,7 +46,10 @@ def _patches(fluid: FluidSection) -> Iterator[Mistake]:
         yield from _periods(fluid, name)
     ends = {face[0] for patch in fluid.patches.values() if patch.periodic for face in patch.on}
     if fluid.scheme == "steady" and len(ends) == dimension and not fluid.bodies:
-        yield ("fluid", "scheme"), "a steady flow that is periodic in all directions has no velocity of its own"
+        yield (
+            ("fluid", "scheme"),
+            "a steady flow that is periodic in all directions does not determine its mean velocity",
+        )
     if any(patch.where is not None for patch in fluid.patches.values()) and (open_faces := uncovered(fluid)):
         yield ("fluid", "patches"), f"no patch is on part of the box's boundary: {', '.join(open_faces)}"
     if bare := [face for face in faces if not any(face in patch.on for patch in fluid.patches.values())]:
@@ -85,7 +88,10 @@ def _periods(fluid: FluidSection, name: str) -> Iterator[Mistake]:
     for i, face in enumerate(fluid.patches[name].on):
         for other, patch in fluid.patches.items():
             if patch.periodic and other != name and face in patch.on:
-                yield ("fluid", "patches", name, "on", i), f"the face '{face}' is periodic by the patch '{other}'"
+                yield (
+                    ("fluid", "patches", name, "on", i),
+                    f"the patch '{other}' makes the face '{face}' periodic, which allows no other patch on it",
+                )
 
 
 def _free(case: Case, fluid: FluidSection, free: Free, keys: Keys) -> Iterator[Mistake]:
@@ -93,9 +99,9 @@ def _free(case: Case, fluid: FluidSection, free: Free, keys: Keys) -> Iterator[M
     if case.coupling is None:
         yield keys, "a free body needs the section 'coupling'; 'coupling: {}' for its defaults"
     if case.structure is not None:
-        yield keys, "a flow moves either rigid bodies or elastic ones: give this one a material, or a 'motion'"
+        yield keys, "a case has either free rigid bodies or elastic ones: make this one elastic, or give it a 'motion'"
     if fluid.scheme == "steady":
-        yield keys, "a free body needs a flow in time: choose the scheme bdf2"
+        yield keys, "a free body needs a time-dependent flow: choose the scheme bdf2"
     for name in ("gravity", "initial_velocity"):
         yield from length_mistakes(getattr(free, name), dimension, (*keys, name))
     for i, spring in enumerate(free.springs):
@@ -103,10 +109,12 @@ def _free(case: Case, fluid: FluidSection, free: Free, keys: Keys) -> Iterator[M
             yield from length_mistakes(getattr(spring, name), dimension, (*keys, "springs", i, name))
     for i, way in enumerate(free.held):
         if dimension == 2 and way not in PLANE:
-            yield (*keys, "held", i), f"a body in 2D has no '{way}': {listed(PLANE)}"
+            yield (*keys, "held", i), f"a body in 2D has no degree of freedom '{way}'; choose {listed(PLANE)}"
     spins = 1 if dimension == 2 else 3
     if free.initial_spin is not None and len(free.initial_spin) != spins:
-        yield (*keys, "initial_spin"), f"'initial_spin' has {spins} in {dimension}D, not {len(free.initial_spin)}"
+        wanted = "1 entry" if spins == 1 else f"{spins} entries"
+        given = len(free.initial_spin)
+        yield (*keys, "initial_spin"), f"'initial_spin' must have {wanted} in {dimension}D, not {given}"
 
 
 def _motion(fluid: FluidSection, body: RigidBodySection, keys: Keys) -> Iterator[Mistake]:

@@ -26,7 +26,9 @@ class PointSpringSection(Section):
     stiffness: Annotated[tuple[NotNegative, ...], EntryCount(2, 3)] = setting(
         ..., "along each axis; in 2D per depth", unit="N/m"
     )
-    damping: NotNegative = setting(0.0, "force by velocity over force by displacement", unit="s")
+    damping: NotNegative = setting(
+        0.0, "damping over stiffness: the damping force is damping * stiffness * velocity", unit="s"
+    )
 
 
 class Free(Section):
@@ -47,7 +49,9 @@ class Free(Section):
 class RigidDynamics(Section):
     """Generalised-alpha time integration of rigid bodies."""
 
-    rho_inf: Share = setting(1.0, "spectral radius at infinite frequency: 1 keeps energy, smaller damps", unit="1")
+    rho_inf: Share = setting(
+        1.0, "spectral radius at infinite frequency: 1 conserves energy, smaller values damp high frequencies", unit="1"
+    )
 
 
 #: Ways that there are in 2D.

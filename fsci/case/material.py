@@ -12,7 +12,7 @@ from fsci.expression import Expression
 from solvers.structure import elastic_constants as constants
 from solvers.values import Value, combine
 
-DENSITY = "mass per reference volume; default: 0, which does for statics without gravity and probes of mass"
+DENSITY = "mass per reference volume; default: 0, enough for statics without gravity and without probes of mass"
 PAIRS = ({"E", "nu"}, {"lambda", "mu"}, {"mu", "nu"})
 
 

@@ -96,7 +96,7 @@ def _of_fluid(case: Case, fluid: FluidSection, name: str, probe: Probe) -> Itera
     bodies = [*fluid.bodies, *(case.elastic_bodies if case.coupling is not None else ())]
     if "body" not in probe.measured.needs:
         if probe.body is not None:
-            yield (*keys, "body"), f"quantity '{probe.quantity}' of the fluid is not that of a body"
+            yield (*keys, "body"), f"quantity '{probe.quantity}' of the fluid is not measured on a body"
     elif probe.body is not None and probe.body not in bodies:
         yield (*keys, "body"), f"unknown body '{probe.body}'{did_you_mean(probe.body, bodies)}"
     elif not bodies:

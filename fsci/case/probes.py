@@ -55,7 +55,7 @@ Vectors have the columns NAME.x, NAME.y, NAME.z (the last one in 3D); energy has
 column NAME. In 2D everything is per unit of depth.
 """
 
-    field: Field | None = setting(None, "which field is measured, where quantity and body do not tell")
+    field: Field | None = setting(None, "the measured field; needed where quantity and body do not determine it")
     body: Name | None = setting(
         None, "name of the body; default: the only one, or all bodies together where neither `at` nor `on` is given"
     )
@@ -66,11 +66,11 @@ column NAME. In 2D everything is per unit of depth.
         None, "another point of the fluid, whose value is subtracted from that of `at`", unit="m"
     )
     through: Text | None = setting(None, "name of a patch of the fluid")
-    pair: Name | None = setting(None, "name of a pair of contact")
+    pair: Name | None = setting(None, "name of a contact pair")
     extreme: Literal["largest", "least"] | None = setting(
         None, "of all slave nodes of the pair; default: the least gap, the largest pressure"
     )
-    reference: Reference | None = setting(None, "what coefficients refer to")
+    reference: Reference | None = setting(None, "reference values of drag and lift coefficients")
     about: NumberVector | None = setting(None, "point that a moment is about; default: the origin", unit="m")
 
     @property
@@ -111,18 +111,18 @@ column NAME. In 2D everything is per unit of depth.
             words for name, words in LOCATIONS.items() if any(name in self.measured.locations(f) for f in FIELDS)
         ]
         whole = "body" if self.measured.structure or "body" in self.measured.needs else "fluid"
-        whole = f"belongs to the whole {whole}: no 'at', no 'on'"
+        whole = f"is measured on the whole {whole}: remove 'at' and 'on'"
         wanted = f"needs {' or '.join(possible)}" if possible else whole
         raise fault(f"quantity '{self.quantity}' {wanted}", self.place or "quantity")
 
     def _check_extreme(self) -> None:
         if self.extreme is not None and self.place != "pair":
-            raise fault("'extreme' is for the nodes of a pair of contact: give 'pair'", "extreme")
+            raise fault("'extreme' applies to the nodes of a contact pair: give 'pair'", "extreme")
         if self.extreme is not None and self.at is not None:
             raise fault("give either 'at' or 'extreme', not both", "extreme")
         for key in ("at", "extreme"):
             if self.quantity == "first_contact" and getattr(self, key) is not None:
-                raise fault(f"'first_contact' is that of the whole pair: no '{key}'", key)
+                raise fault(f"'first_contact' is measured on the whole pair: remove '{key}'", key)
 
     def columns(self, name: str, dimension: int) -> tuple[str, ...]:
         """The columns of history.csv that the probe called `name` fills."""

@@ -53,7 +53,7 @@ _ALL = (
     ),
     Quantity("velocity", _SPEED, "vector", ("at",), ("at",), ("dynamics",), rigid=("at",)),
     Quantity("acceleration", (1, 0, -2), "vector", ("at",), needs=("dynamics",)),
-    Quantity("reaction", _FORCE, "vector", ("on",), meaning="force of supports and springs"),
+    Quantity("reaction", _FORCE, "vector", ("on",), meaning="force of supports and springs on the bodies"),
     Quantity("traction", _FORCE, "vector", ("on",), meaning="integral of P N over the reference surface"),
     Quantity("area", (2, 0, 0), "one", ("on",)),
     Quantity("gap", _LENGTH, "one", ("pair",), meaning="distance of the slave nodes to the master"),
@@ -89,7 +89,7 @@ def _lines(field: Field) -> Iterator[str]:
     words = {
         "at": "with `at`, at a point",
         "on": f"with `on`, on a {'surface' if field == 'structure' else 'patch'}",
-        "pair": "with `pair`, of a pair of contact",
+        "pair": "with `pair`, of a contact pair",
         "through": "with `through`, through a patch",
         WHOLE: "with none of them, of the whole",
     }

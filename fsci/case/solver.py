@@ -16,7 +16,7 @@ class Newton(Section):
     increment: Positive | None = setting(
         None, "tolerance of the increment, relative to the solution; default: none", unit="1"
     )
-    max_iterations: Count = setting(25, "iterations after which a step has failed")
+    max_iterations: Count = setting(25, "most iterations of a step; one that needs more has failed")
     line_search: Switch = setting(False, "halve increments that do not reduce the residual")
 
 

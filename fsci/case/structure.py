@@ -35,14 +35,16 @@ class DynamicsSection(Section):
     """Generalised-alpha time integration, by rho_inf or by its four parameters."""
 
     rho_inf: Share | None = setting(
-        None, "spectral radius at infinite frequency: 1 keeps energy, smaller damps; default 1", unit="1"
+        None,
+        "spectral radius at infinite frequency: 1 conserves energy, smaller values damp high frequencies; default 1",
+        unit="1",
     )
-    alpha_m: Number | None = setting(None, "weight of the old acceleration", unit="1")
-    alpha_f: Number | None = setting(None, "weight of the old forces", unit="1")
+    alpha_m: Number | None = setting(None, "weight of the acceleration at the start of the step", unit="1")
+    alpha_f: Number | None = setting(None, "weight of the forces at the start of the step", unit="1")
     beta: Positive | None = setting(None, "Newmark's beta", unit="1")
     gamma: Positive | None = setting(None, "Newmark's gamma", unit="1")
     predictor: Literal["constant_displacement", "constant_velocity"] = setting(
-        "constant_displacement", "first guess of a step"
+        "constant_displacement", "predictor: first iterate of Newton's method in a step"
     )
     damping: DampingSection = setting(DampingSection, "Rayleigh damping")
 
@@ -81,8 +83,8 @@ class BodySection(Section):
     kinematics: Literal["finite", "linear"] = setting(
         "finite", "linear: small displacements, Hooke's law with the constants of the material at small strain"
     )
-    supports: tuple[SupportSection, ...] = setting(tuple, "where the body is held")
-    springs: tuple[SpringSection, ...] = setting(tuple, "where it is held elastically")
+    supports: tuple[SupportSection, ...] = setting(tuple, "prescribed displacements")
+    springs: tuple[SpringSection, ...] = setting(tuple, "elastic supports")
     gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
     body_force: Vector | None = setting(None, "force per reference volume", unit="N/m^3")
     tractions: tuple[TractionSection, ...] = setting(tuple, "dead loads on surfaces")
@@ -90,7 +92,7 @@ class BodySection(Section):
     line_forces: tuple[LineForceSection, ...] = setting(tuple, "dead loads along lines, 3D only")
     point_forces: tuple[PointForceSection, ...] = setting(tuple, "dead loads at points")
     slip_length: NotNegative = setting(
-        0.0, "the flow around it slips along it with this times the slope of its velocity; 0: it sticks", unit="m"
+        0.0, "Navier slip of the flow around it: slip velocity = slip_length * shear rate; 0: no slip", unit="m"
     )
     initial_displacement: Vector | None = setting(None, "displacement at the start", unit="m")
     initial_velocity: Vector | None = setting(None, "velocity at the start", unit="m/s")

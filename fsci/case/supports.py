@@ -9,9 +9,9 @@ from pydantic import Discriminator, Tag, model_validator
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import EntryCount, Formula, NotNegativeFormula, NumberVector, Surfaces, Switch
 
-AT = "instead of names: position of one node, exact to a millionth of the body's size"
-DIRECTION = "only along this direction, of any length; it does not turn with the body"
-NORMAL = "true: only normal to the surface as it is without deformation, node by node"
+AT = "instead of 'on': position of one node, exact to a millionth of the body's size"
+DIRECTION = "only the component along this direction, a vector of any length that does not turn with the body"
+NORMAL = "true: only the component normal to the undeformed surface, node by node"
 
 #: One expression, or one for each component; null leaves a component free.
 Displacement = Annotated[
@@ -56,7 +56,7 @@ class SupportSection(Located):
     )
     direction: NumberVector | None = setting(None, DIRECTION, unit="1")
     normal: Switch = setting(False, NORMAL + "; a positive displacement is one outwards")
-    symmetry: Switch = setting(False, "true: a plane of symmetry, nothing moves across it")
+    symmetry: Switch = setting(False, "true: a plane of symmetry, zero displacement normal to it")
 
     @model_validator(mode="after")
     def _one_kind(self) -> SupportSection:

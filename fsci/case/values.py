@@ -63,7 +63,7 @@ def _expression(value: Any, wanted: str, variables: str, functions: Mapping[str,
     except ExpressionError as error:
         raise fault(f": {error.message}", column=error.column) from None
     if extra := sorted(expression.uses - set(variables)):
-        hint = " (it is a fixed number)" if not variables else ""
+        hint = " (it must be a constant)" if not variables else ""
         raise fault(f"must not depend on {' or '.join(extra)}{hint}")
     return expression
 

@@ -37,10 +37,10 @@ class Check(Section):
         ..., "column of history.csv: of a probe such as A.y, iterations, residual, structure.energy or fluid.mass"
     )
     statistic: Literal["final", "min", "max", "mean", "amplitude", "frequency"] = setting(
-        "final", "what is taken of the column's values"
+        "final", "how one number is computed from the values of the column"
     )
     start: Number | None = setting(
-        None, "start of the window of time; default: the start of the run", unit="s", name="from"
+        None, "start of the time window; default: the start of the run", unit="s", name="from"
     )
     reference: Number = setting(..., "the value to reach")
     relative: NotNegative | None = setting(None, "allowed deviation, relative to the reference", unit="1")

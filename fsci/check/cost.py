@@ -82,7 +82,7 @@ def spoken(cost: Cost, steps: int) -> str:
     whole = f", {_time(cost.step * steps)} for all" if steps > 1 else ""
     return (
         f"about {cost.unknowns:,} unknowns, {_time(cost.step)} per step{whole}, {_memory_words(cost.memory)}, "
-        "on one process (right within a factor of three or so)"
+        "on one process (accurate to a factor of about three)"
     )
 
 

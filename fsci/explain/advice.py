@@ -14,10 +14,10 @@ REASONS = {
         "a smaller time.step: the load or the motion of a step is too large for the elements",
         "a finer mesh, or rounder corners, where the element is",
     ),
-    "far larger than the body": ("supports or weak springs: a static body that nothing holds has no solution",),
+    "far larger than the body": ("supports or weak springs: a static body without them has no unique solution",),
     "active set cycles": (
         "a smaller time.step",
-        "slave and master exchanged: the slave should be the softer or the finer side",
+        "slave and master exchanged: the slave should be the softer or finer side",
         "a finer slave surface at the edge of the contact zone",
     ),
     "moved farther in one step": ("a smaller time.step: a body should cross less than two cells in a step",),
@@ -26,8 +26,8 @@ REASONS = {
         "coupling.scheme=monolithic",
         "coupling.accelerator=iqn, or a larger coupling.max_iterations",
     ),
-    "not a number": ("a smaller time.step", "loads and inflow that grow from zero, as ramp(t, 0, 0.5) does"),
-    "singular": ("supports or weak springs: a body that nothing holds has no solution in statics",),
+    "not a number": ("a smaller time.step", "loads and inflow that grow from zero, such as ramp(t, 0, 0.5)"),
+    "singular": ("supports or weak springs: a static body without them has no unique solution",),
     "linear solver": ("solver.linear.method=direct", "solver.linear.tolerance=1e-6"),
 }
 
@@ -71,7 +71,7 @@ def of_run(summary: Mapping[str, Any]) -> Iterator[str]:
     if share.get("output", 0.0) > 0.2:
         yield "output.fields_every=10: writing fields takes more than a fifth of the time"
     if share.get("start", 0.0) > 0.5:
-        yield "nothing: more than half of the time is the start, of which forms are compiled only once"
+        yield "nothing: more than half of the time is the start; the next run finds its forms compiled"
     if share.get("solve", 0.0) > 0.6 and summary["processes"] == 1:
         yield "mpirun -n 2: linear systems take more than 60 % of the time"
     if share.get("contact", 0.0) > 0.4:

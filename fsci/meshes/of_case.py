@@ -153,5 +153,5 @@ def require_inside_period(case: Case, keys: Keys, points: Array) -> None:
         planes = case.fluid.grid.edges(index)
         if points[:, index].min() < planes[1] or points[:, index].max() > planes[-2]:
             inside = f"{planes[1]:g} to {planes[-2]:g}"
-            message = f"the body must be within the period along {axis}, without the cells at its ends: {inside}"
+            message = f"the body must lie within the period along {axis}, without the cells at its ends: {inside}"
             raise case.error(keys, message)

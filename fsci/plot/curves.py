@@ -49,7 +49,7 @@ BALANCES = {
     "fluid.mass": ("error of the fluid's volume", "flow_rate"),
     "fluid.leak": ("volume through surfaces of bodies", "flow_rate"),
     "interface.momentum": ("error of the fluid's momentum", "force"),
-    "fluid.loss": ("power of the fluid that the method takes", "dissipation"),
+    "fluid.loss": ("numerical dissipation of the fluid", "dissipation"),
     "interface.work": ("error of the work at the interface", "energy"),
     "interface.force": ("relative error of the forces at the interface", ""),
 }

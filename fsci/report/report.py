@@ -99,7 +99,7 @@ def _verification(summary: Mapping[str, Any]) -> str:
 
 def _balances(summary: Mapping[str, Any]) -> str:
     rows = [(name, _number(v["final"]), _number(v["max_abs"])) for name, v in summary["balances"].items()]
-    return table(("what a discrete law leaves over", "at the end", "largest"), rows)
+    return table(("error of a balance", "at the end", "largest"), rows)
 
 
 def _probes(summary: Mapping[str, Any]) -> str:

@@ -35,7 +35,7 @@ FINISHED, FAILED, BAD_CASE, STOPPED = 0, 1, 2, 3  #: exit codes
 
 _NO_START = (
     "contact surfaces have no mass in dynamics, and no equilibrium was found for the loads and the overlap at the "
-    "start; let both grow from zero"
+    "start; increase both from zero in time"
 )
 
 
@@ -364,7 +364,7 @@ class Run:
         missed = any(not result["ok"] for result in results)
         if status == "finished":
             message = f"finished in {self.record.wall():.3g} s; results in {self.out}"
-            message += "; the verification was missed" if missed else ""
+            message += "; the verification failed" if missed else ""
             self.monitor.say(f"time: {shares(self.record.wall(), self.record.timer.seconds)}")
         self.monitor.finish(message, ok=status == "finished" and not missed)
         return {"finished": FAILED if missed else FINISHED, "stopped": STOPPED, "failed": FAILED}[status]

@@ -53,7 +53,7 @@ class ActiveSet:
             if self._returns > MAX_RETURNS:
                 flickering = int(np.sum(status != self.status))
                 raise StepFailed(
-                    "contact", f"the active set cycles: {flickering} nodes change their status without end"
+                    "contact", f"the active set cycles: {flickering} nodes change their status again and again"
                 )
             self._seen.append(known)
         self.status = status.copy()

@@ -25,8 +25,9 @@ def cells_per_step(grid: Grid, velocity: np.ndarray, dt: float) -> float:
 def warning(name: str, cells: float, dt: float) -> str:
     """What to say of a body that crosses so many cells in a step of this size [s]."""
     return (
-        f"body '{name}' crosses {cells:.2g} cells in a time step: the velocity is extrapolated where it was, "
-        f"and forces are inaccurate; a step below {MOST_CELLS * dt / cells:.2g} keeps it below {MOST_CELLS:g} cells"
+        f"body '{name}' crosses {cells:.2g} cells in a time step: the velocity is extrapolated to the cells that it "
+        "leaves, and forces are inaccurate; "
+        f"a step below {MOST_CELLS * dt / cells:.2g} keeps it below {MOST_CELLS:g} cells"
     )
 
 

@@ -44,7 +44,7 @@ class UncoveredFaces(ValueError):
     """Part of the boundary has no condition; `faces` names where."""
 
     def __init__(self, faces: Sequence[str]):
-        super().__init__("no condition is given on part of the box: " + ", ".join(faces))
+        super().__init__("no patch is on part of the box's boundary: " + ", ".join(faces))
         self.faces = tuple(faces)
 
 

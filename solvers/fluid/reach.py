@@ -33,9 +33,7 @@ def require_history(unknowns: Unknowns, cut: Cut, missing: NDArray[np.bool_]) ->
     blocks[unknowns.cell_blocks[np.concatenate([cut.uncut, cut.cut])]] = True
     used = unknowns.expand(blocks) & unknowns.velocity_mask
     if unknowns.grid.comm.allreduce(bool((used & missing).any()), op=MPI.LOR):
-        reason = (
-            "a body moved farther in one step than the velocity is extrapolated behind it: take a smaller time step"
-        )
+        reason = "a body moved farther in one step than the velocity is extrapolated into it: take a smaller time step"
         raise StepFailed("fluid", reason)
 
 

@@ -101,7 +101,7 @@ class Dynamics:
         if (reason := ksp.getConvergedReason()) < 0:  # x would be zero, or where the iterations stopped
             finite = np.isfinite(b.norm())
             why = f"PETSc reason {reason}" if finite else "a force is not a number"
-            raise StepFailed("structure", f"there is no acceleration at the start ({why})")
+            raise StepFailed("structure", f"the acceleration at the start cannot be computed ({why})")
         now.a[:] = x.array
 
     # ------------------------------------------------------------------------------------------------- steps

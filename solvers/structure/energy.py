@@ -34,7 +34,7 @@ class EnergyBalance:
             return ""
         self.warned = True
         return (
-            f"the bodies have gained energy from nothing, {self.error / before:.0%} of the most that they had: "
+            f"the energy of the bodies has grown without external work, by {self.error / before:.0%} of its maximum: "
             "the step does not resolve the impact; take a smaller 'step'"
         )
 

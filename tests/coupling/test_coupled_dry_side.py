@@ -124,7 +124,7 @@ MISTAKES = [
     (
         "[[0, 0], [1, 0]]",
         "[[0, 0.1], [1, 0.1]]",
-        "21:21: the way from (0, 0.1) to (1, 0.1) passes through the box: go around it",
+        "21:21: the line from (0, 0.1) to (1, 0.1) crosses the box: add corners that lead around it",
     ),
     (
         "[[0, 0], [1, 0]]",
@@ -145,7 +145,7 @@ def test_3d_has_no_dry_side(tmp_path):
     text = COLUMN.replace("[0, -10]", "[0, -10, 0]").replace("[5, 11]", "[5, 11, 5]")
     text = text.replace("from: [0, 0], to: [1, 1]", "from: [0, 0, 0], to: [1, 1, 1]")
     (tmp_path / "case.yaml").write_text(text)
-    with pytest.raises(CaseError, match="'dry_side' is for 2D; in 3D a body is wet all round, or where 'wetted' says"):
+    with pytest.raises(CaseError, match="'dry_side' is for 2D only; in 3D name the wet surfaces with 'wetted'"):
         load_case(tmp_path / "case.yaml")
 
 
@@ -163,5 +163,5 @@ def test_a_way_that_only_touches_the_box_is_good():
     for corners in ([[0.0, 0.0], [1.0, 0.0]], [[0.0, -1.0], [1.0, -1.0]], [[-1.0, 0.5], [0.5, -7.0], [2.0, 0.5]]):
         way = close(points, np.array([[0, 1]]), inside, np.array(corners), box)
         assert np.array_equal(way, corners)
-    with pytest.raises(DrySideError, match="passes through the box"):
+    with pytest.raises(DrySideError, match="crosses the box"):
         close(points, np.array([[0, 1]]), inside, np.array([[0.5, 0.0], [1.0, 0.0]]), box)

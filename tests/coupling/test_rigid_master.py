@@ -97,7 +97,7 @@ def test_the_program_finds_it(tmp_path):
         (("obstacle: ram", "obstacle: rum"), "unknown obstacle 'rum'; did you mean 'ram'?"),
         (
             ("plate:", "ram:"),
-            "a rigid body of the flow is called 'ram', too: remove the obstacle, the body can be the master",
+            "'ram' is also the name of a rigid body of the flow; remove the obstacle and take the body as master",
         ),
     ],
 )

@@ -81,7 +81,7 @@ def test_going_in_circles_is_reported():
     active_set.begin_step()
     with pytest.raises(StepFailed) as caught:
         flip(active_set, 100)
-    assert "contact: the active set cycles: 2 nodes change their status without end" in str(caught.value)
+    assert "contact: the active set cycles: 2 nodes change their status again and again" in str(caught.value)
     assert caught.value.field == "contact"
 
 

@@ -116,10 +116,10 @@ def test_check_lists_the_pairs(tmp_path):
 
 
 MISTAKES = {
-    "nothing": ("c_n: 1", "'contact' needs 'pairs', or 'bodies: all' to have them found"),
+    "nothing": ("c_n: 1", "'contact' needs 'pairs', or 'bodies: all' for automatic pairs"),
     "unknown": ("bodies: [low, sotf]", "unknown body 'sotf'; did you mean 'soft'?"),
     "far": ("bodies: all\n  reach: 1e-9", "no named surfaces of these bodies can meet: name the pairs"),
-    "reach": (f"{NAMED}\n  reach: 1", "'reach' is for the pairs that 'bodies' asks for"),
+    "reach": (f"{NAMED}\n  reach: 1", "'reach' applies only to the pairs that 'bodies' finds"),
 }
 
 

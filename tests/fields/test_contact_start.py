@@ -118,5 +118,5 @@ def test_no_balance_at_the_start(tmp_path):
     message = str(caught.value).split("\n")[0]
     assert message.startswith(
         f"{tmp_path / 'case.yaml'}:14:1: contact surfaces have no mass in dynamics, and no equilibrium was "
-        "found for the loads and the overlap at the start; let both grow from zero: structure: Newton did not"
+        "found for the loads and the overlap at the start; increase both from zero in time: structure: Newton did not"
     )

@@ -246,7 +246,7 @@ def test_a_body_at_the_end_of_a_period(tmp_path):
     (tmp_path / "case.yaml").write_text(text)
     with pytest.raises(CaseError) as caught:
         run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out")
-    rule = "the body must be within the period along x, without the cells at its ends: 0.0666667 to 1.93333"
+    rule = "the body must lie within the period along x, without the cells at its ends: 0.0666667 to 1.93333"
     assert str(caught.value).startswith(f"{tmp_path}/case.yaml:16:5: {rule}")
 
 

@@ -294,7 +294,7 @@ def test_plane_stress_is_refused(tmp_path):
     (tmp_path / "case.yaml").write_text(REFUSED.replace("PLANE", "plane: stress").replace("MESH", mesh))
     with pytest.raises(CaseError) as error:
         load_case(tmp_path)
-    message = "case.yaml:9:16: 'mixed' is not for plane stress, which does not lock; take 'displacement'"
+    message = "case.yaml:9:16: 'mixed' is not available in plane stress, which does not lock; take 'displacement'"
     assert message in str(error.value)
 
 

@@ -84,9 +84,9 @@ MISTAKES = [
         "",
         "a free body needs the section 'coupling'; 'coupling: {}' for its defaults",
     ),
-    ("grid:", "scheme: steady\n  grid:", "a free body needs a flow in time: choose the scheme bdf2"),
-    ("held: []", "held: [z]", "a body in 2D has no 'z': 'x', 'y' or 'rotation'"),
-    ("initial_spin: [1]", "initial_spin: [1, 2, 3]", "'initial_spin' has 1 in 2D, not 3"),
+    ("grid:", "scheme: steady\n  grid:", "a free body needs a time-dependent flow: choose the scheme bdf2"),
+    ("held: []", "held: [z]", "a body in 2D has no degree of freedom 'z'; choose 'x', 'y' or 'rotation'"),
+    ("initial_spin: [1]", "initial_spin: [1, 2, 3]", "'initial_spin' must have 1 entry in 2D, not 3"),
     ("stiffness: [3, 1]", "stiffness: [3, 1, 1]", "'stiffness' must have 2 entries in 2D, not 3"),
     ("gravity: [0, -5]", "gravity: [0, -5, 0]", "'gravity' must have 2 entries in 2D, not 3"),
     ("free:", "motion: {displacement: [0, t]}\n      free:", "give either 'motion' or 'free', not both"),
@@ -119,7 +119,7 @@ structure:
       material: {law: neo_hooke, E: 1000, nu: 0.3, density: 2}
 """
     )
-    with pytest.raises(CaseError, match="a flow moves either rigid bodies or elastic ones"):
+    with pytest.raises(CaseError, match="a case has either free rigid bodies or elastic ones"):
         load_case(write(tmp_path, text))
 
 

@@ -138,7 +138,10 @@ def test_tied_bodies_in_motion(tmp_path):
 
 MISTAKES = {
     "friction": (("tied: true", "tied: true, friction: {coefficient: 0.1}"), "tied surfaces do not slide"),
-    "apart": (("inner_radius: 1.5", "inner_radius: 1.8"), "the surfaces do not lie on each other: nothing to tie"),
+    "apart": (
+        ("inner_radius: 1.5", "inner_radius: 1.8"),
+        "the surfaces do not touch at the start: there is nothing to tie",
+    ),
 }
 
 

@@ -60,7 +60,7 @@ MISTAKES = [
     (
         "      gravity",
         "      slip_length: 0.1\n      gravity",
-        "12:20: 'slip_length' is of the flow around the body: it needs the section 'fluid'",
+        "12:20: 'slip_length' is a property of the flow around the body and needs the section 'fluid'",
         "0.1",
     ),
     # types
@@ -101,7 +101,7 @@ MISTAKES = [
     ("  bodies:\n", "  bodies: {}\n  bodies2:\n", "6:11: 'bodies' needs at least one body", "{}"),
     # expressions
     ("step: 0.1", "step: fast", "3:14: 'step': unknown name 'fast' (known: x, y, z, t, pi, e)", "fast"),
-    ("step: 0.1", "step: t/2", "3:14: 'step' must not depend on t (it is a fixed number)", "t/2"),
+    ("step: 0.1", "step: t/2", "3:14: 'step' must not depend on t (it must be a constant)", "t/2"),
     ("min(t, 1)", "mim(t, 1)", "14:39: entry 2 of 'value': unknown function 'mim'; did you mean 'min'?", "mim("),
     ("min(t, 1)", "min(t 1)", "14:45: entry 2 of 'value': found '1' where ')' is expected", "1)"),
     ("nu: 0.3", "nu: 0.3*t", "9:46: 'nu' must not depend on t", "0.3*t"),
@@ -172,7 +172,7 @@ MISTAKES = [
     (
         "quantity: energy",
         "quantity: energy, on: top",
-        "17:34: quantity 'energy' belongs to the whole body: no 'at', no 'on'",
+        "17:34: quantity 'energy' is measured on the whole body: remove 'at' and 'on'",
         "top",
     ),
     ("relative: 0.1", "relative: 0.1, absolute: 1", "19:78: give either 'relative' or 'absolute', not both", "1}"),
@@ -350,7 +350,7 @@ def test_bodies_of_different_dimensions():
         ("structure.bodies.beam.supports.0.on=lfet",
          "'rectangle' has no surface 'lfet'; did you mean 'left'? (available: left, right, bottom, top)"),
         ("structure.bodies.beam.supports.3.on=left",
-         "'structure.bodies.beam.supports' is a list with entries 0 to 0, '3' is none of them"),
+         "'structure.bodies.beam.supports' is a list with entries 0 to 0 and has no entry '3'"),
         ("structure.bodies.beam.gravity=[0, 1*]",
          "entry 2 of 'gravity': the expression ends where a number, a name or '(' is expected"),
         ("solver.newton.max_iteration=3", "unknown setting 'max_iteration'; did you mean 'max_iterations'?"),
@@ -370,7 +370,7 @@ def test_override(override, message):
 def test_mistakes_in_file_and_override_together():
     text = str(refused(CASE.replace("step: 0.1", "step: 0"), overrides=(("time.end", "x"),)))
     assert text.startswith(
-        "--set time.end=x: 'end' must not depend on x (it is a fixed number)\ncase.yaml:3:14: 'step'"
+        "--set time.end=x: 'end' must not depend on x (it must be a constant)\ncase.yaml:3:14: 'step'"
     )
 
 

@@ -21,7 +21,7 @@ MISTAKES = [
     (
         "  pairs:\n",
         "  film: {roughness: 0.1}\n  pairs:\n",
-        "15:9: 'film' is of the fluid between surfaces: it needs the section 'fluid'",
+        "15:9: 'film' describes the fluid between surfaces and needs the section 'fluid'",
         "{rough",
     ),
     ("body: block, on: top", "body: blok, on: top", "16:27: unknown body 'blok'; did you mean 'block'?", "blok"),
@@ -55,11 +55,11 @@ MISTAKES = [
     (
         "{obstacle: plate}",
         "{obstacle: plate, on: top}",
-        "16:74: the surface of an obstacle is named where the obstacle is",
+        "16:74: the surface of an obstacle is named in its own section under 'obstacles'; remove 'on' here",
         "top",
     ),
-    ("  pairs:\n" + PRESS, "  pairs: {}", "15:10: 'contact' needs 'pairs', or 'bodies: all' to have them found", "{}"),
-    ("  pairs:\n" + PRESS + "\n", "", "9:1: 'contact' needs 'pairs', or 'bodies: all' to have them found", "contact"),
+    ("  pairs:\n" + PRESS, "  pairs: {}", "15:10: 'contact' needs 'pairs', or 'bodies: all' for automatic pairs", "{}"),
+    ("  pairs:\n" + PRESS + "\n", "", "9:1: 'contact' needs 'pairs', or 'bodies: all' for automatic pairs", "contact"),
     (
         "body: block, on: top",
         "body: block, on: [left, tpo]",
@@ -95,7 +95,7 @@ MISTAKES = [
     (
         "quantity: displacement, at: [0.4, 0.5, 1]",
         "quantity: first_contact, pair: press, extreme: least",
-        "19:56: 'first_contact' is that of the whole pair: no 'extreme'",
+        "19:56: 'first_contact' is measured on the whole pair: remove 'extreme'",
         "least",
     ),
     (

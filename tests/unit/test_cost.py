@@ -48,7 +48,7 @@ def test_contact_and_coupling_are_factors(tmp_path):
 
 def test_words():
     assert spoken(Cost(12_345, 0.0042, 218.0), 1) == (
-        "about 12,345 unknowns, 4.2 ms per step, 220 MB, on one process (right within a factor of three or so)"
+        "about 12,345 unknowns, 4.2 ms per step, 220 MB, on one process (accurate to a factor of about three)"
     )
     assert "12 s per step, 33 h for all, 2.4 GB" in spoken(Cost(1, 12.0, 2400.0), 10_000)
     assert "0.5 s per step, 4 min for all" in spoken(Cost(1, 0.5, 100.0), 500)

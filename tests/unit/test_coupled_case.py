@@ -15,7 +15,7 @@ RIGID = "  bodies: {post: {mesh: {shape: disc, radius: 0.1, cells: [8, 1], trans
 MISTAKES = [
     (COUPLING, "coupling: {sceme: monolithic}", "18:12: unknown setting 'sceme'; did you mean 'scheme'?", "sceme"),
     (COUPLING, "coupling: {scheme: both}", "18:20: 'scheme' must be 'monolithic' or 'partitioned', not 'both'", "both"),
-    (COUPLING, "coupling: {reuse: 3}", "18:19: 'reuse' is for the partitioned scheme", "3"),
+    (COUPLING, "coupling: {reuse: 3}", "18:19: 'reuse' applies only to the partitioned scheme", "3"),
     (
         COUPLING,
         "coupling: {scheme: partitioned, relaxation: 0}",
@@ -51,13 +51,13 @@ MISTAKES = [
     (
         "structure:",
         RIGID,
-        "11:18: 'post' is an elastic body already: give this rigid one another name",
+        "11:18: 'post' is already the name of an elastic body; give this rigid body another one",
         "{mesh",
     ),
     (
         "  viscosity: 0.05\n",
         "  viscosity: 0.05\n  scheme: steady\n",
-        "6:11: a steady flow goes with a static structure: remove 'dynamics', or choose bdf2",
+        "6:11: a steady flow needs a static structure: remove 'dynamics', or choose the scheme bdf2",
         "steady",
     ),
     (

@@ -168,11 +168,16 @@ MISTAKES = [
     (
         "on: [y-, y+], no_slip: true",
         "on: [y-, y+], no_slip: true}\n    ends: {on: [x-, x+], periodic: true",
-        "8:17: the face 'x-' is periodic by the patch 'ends'",
+        "8:17: the patch 'ends' makes the face 'x-' periodic, which allows no other patch on it",
         "x-",
     ),
     # bodies
-    ("    cylinder:", "    fluid:", "12:5: a body cannot be called 'fluid': the files of the flow are", "fluid"),
+    (
+        "    cylinder:",
+        "    fluid:",
+        "12:5: a body cannot be called 'fluid', which is the name of the files of the flow",
+        "fluid",
+    ),
     (
         "{shape: disc, radius: 0.2, cells: [40, 1], translate: [1, 0.5]}",
         "{shape: sphere, radius: 0.2, cells: [4, 1]}",
@@ -210,7 +215,7 @@ MISTAKES = [
     (
         "{quantity: force}",
         "{quantity: force, at: [1, 1]}",
-        "16:32: quantity 'force' belongs to the whole body: no 'at', no 'on'",
+        "16:32: quantity 'force' is measured on the whole body: remove 'at' and 'on'",
         "[1, 1]",
     ),
     (
@@ -252,7 +257,7 @@ MISTAKES = [
     (
         "{quantity: force}",
         "{quantity: force, extreme: least}",
-        "16:37: 'extreme' is for the nodes of a pair of contact: give 'pair'",
+        "16:37: 'extreme' applies to the nodes of a contact pair: give 'pair'",
         "least",
     ),
     ("{quantity: force}", "{quantity: mass}", "16:21: quantity 'mass' needs the section 'structure'", "mass"),
@@ -356,7 +361,7 @@ def test_a_steady_flow_without_a_velocity_of_its_own():
     patches = "  patches:\n    all: {on: [x-, x+, y-, y+], periodic: true}\n  scheme: steady\n"
     periodic = without(with_section(ALONE, patches, "fluid", "patches"), "fluid", "bodies")
     assert str(refused(periodic).problems[0]).startswith(
-        "case.yaml:9:11: a steady flow that is periodic in all directions has no velocity of its own"
+        "case.yaml:9:11: a steady flow that is periodic in all directions does not determine its mean velocity"
     )
 
 
