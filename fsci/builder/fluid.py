@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fsci.builder.columns import Numbers, columns
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
+from fsci.case.contact import FilmSection
 from fsci.case.fluid import FluidSection
 from fsci.case.probes import Reference
 from fsci.case.rigid_motion import rigid_motion
@@ -94,15 +95,14 @@ def _patches(settings: FluidSection) -> list[Patch]:
 def _with_layer(case: Case, body: ImmersedBody) -> ImmersedBody:
     """The body with what the flow finds along its surface."""
     assert case.fluid is not None
-    name, film = body.surface.name, 0.0 if case.contact is None else case.contact.film.value
+    name, film = body.surface.name, FilmSection() if case.contact is None else case.contact.film
     settings = case.fluid.bodies.get(name) or case.elastic_bodies.get(name)
     if settings is None:
         return body
-    touches = film and name in case.bodies_in_contact
-    return replace(
-        body,
-        surface=replace(body.surface, slip_length=settings.slip_length, transmissivity=film if touches else 0.0),
-    )
+    surface = replace(body.surface, slip_length=settings.slip_length)
+    if name in case.bodies_in_contact:
+        surface = replace(surface, transmissivity=film.value, zone=film.zone)
+    return replace(body, surface=surface)
 
 
 def read_surface(case: Case, name: str, comm: MPI.Comm) -> tuple[Array, NDArray[np.int64]]:

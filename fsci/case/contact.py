@@ -129,6 +129,10 @@ class FilmSection(Section):
         unit="m",
     )
 
+    zone: Literal["dry", "wetted"] = setting(
+        "dry", "where contact is closed: dry: no fluid; wetted: fluid with the pressure of the rim"
+    )
+
     @model_validator(mode="after")
     def _one_of_them(self) -> FilmSection:
         if self.transmissivity is not None and self.roughness is not None:

@@ -45,6 +45,8 @@ class Balances:
     def __call__(self, held: NDArray[np.bool_]) -> tuple[Array, float]:
         """(force [N] of the fluid on all bodies together, shape (dim,); power [W] that the method takes) (collective).
 
+        The force in closed contact is no part of the fluid's momentum: it counts as it is.
+
         held: owned dofs whose rows are not solved for. Force: that on walls and patches less
         int rho (u_t + u . grad u) - f. Power, by stabilisation, ghost penalty and slip at the bodies: that of walls and
         patches less what bodies get and int (rho (u_t + u . grad u) - f) . u + 2 mu eps(u) : eps(u).
@@ -52,9 +54,10 @@ class Balances:
         system, dofs = self.system, self.system.unknowns.velocity.dofs
         assert system.cut is not None
         rows = self._outer_rows(held) - self._inner_rows()
-        force = system.grid.comm.allreduce(rows[dofs].sum(axis=0))
+        force, closed = system.grid.comm.allreduce(rows[dofs].sum(axis=0)), system.zone_force()
         given = system.grid.comm.allreduce(float((rows * system.flow.x.array)[dofs].sum()))
-        return force, given - float((system.surface_force() * system.cut.motion.v).sum())
+        of_flow = system.surface_force() - closed
+        return force + closed.sum(axis=0), given - float((of_flow * system.cut.motion.v).sum())
 
     def _outer_rows(self, held: NDArray[np.bool_]) -> Array:
         """Forces [N] on the fluid from walls and patches at local dofs, the ghosts' share still there."""

@@ -28,9 +28,10 @@ from solvers.fluid.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.pressure_level import Hold, hold_pressure, keep_levels, spread_excess
 from solvers.fluid.reach import require_finest, require_history, require_within_period, strip_layers
 from solvers.fluid.space import Unknowns, set_velocity
-from solvers.fluid.surface import Motion, by_facets, offsets, together, wetness
+from solvers.fluid.surface import Motion, by_facets, may_close, offsets, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
 from solvers.fluid.time_scheme import STEADY, FlowStep
+from solvers.fluid.zone_entries import with_zone
 from solvers.largest import position_of_largest
 from solvers.newton import converge
 from solvers.rounding import rounding_error
@@ -82,6 +83,7 @@ class Fluid:
         surfaces = [body.surface for body in self.bodies]
         self.system.slip_length = by_facets(surfaces, [surface.slip_length for surface in surfaces])
         self.system.transmissivity = by_facets(surfaces, [surface.transmissivity for surface in surfaces])
+        self.system.may_close = may_close(surfaces)
         films = films_of(patches, settings.penalties) if settings.films else None
         self.cutter = Cutter(self.grid, self.system.weights.points, films)
         self.history = History(settings.time, self.unknowns.local)
@@ -359,7 +361,9 @@ class Fluid:
     def interface_entries(self, surfaces: Sequence[str]) -> InterfaceEntries:
         """Derivatives of rows and force by the motion of some bodies (collective)."""
         operator, held, vertices = self.system.interface, self.held_everywhere(), self.vertices_of(surfaces)
-        return interface_entries(operator, self.unknowns, self.flow, self.current.difference.alpha, held, vertices)
+        found = interface_entries(operator, self.unknowns, self.flow, self.current.difference.alpha, held, vertices)
+        zone = self.system.zone
+        return found if zone is None else with_zone(found, zone, self.unknowns, self.flow, vertices)
 
     def balances(self) -> tuple[Array, float]:
         """(force [N] on all bodies by momentum, shape (dim,); power [W] that the method takes) (collective)."""

@@ -63,7 +63,7 @@ class InterfaceTerms:
         self.mu, self.dim, self._unknowns, self.vertices = mu, grid.dim, unknowns, len(cut.motion.x)
         moments = pieces.moments[mine][:, rule.order]
         self.n, self.penalty, self.mass_of_pieces = pieces.normal[mine], penalty[mine], pieces.mass[mine]
-        self.corners = cut.facets[facet]
+        self.facet, self.corners = facet, cut.facets[facet]
         self.x = cut.motion.x[self.corners]
         self.sizes = grid.sizes[cells]
         self.u, self.p = unknowns.cell_velocity[cells], unknowns.cell_pressure[cells]

@@ -30,13 +30,13 @@ def shape_derivatives(interface: InterfaceTerms, flow: Array) -> tuple[MotionOpe
 
     field = n[:, :, None] * grad_p[:, None, :] + at.penalty @ grad_u
     stress = pressure[:, None, None] * np.eye(at.dim) - mu * (grad_u + np.swapaxes(grad_u, 1, 2))
-    turned = np.einsum("pil,plvj->pivj", stress, _normal_derivative(at.x, n))
+    turned = np.einsum("pil,plvj->pivj", stress, normal_derivative(at.x, n))
     load = at.mass_of_pieces[:, :, :, None, None] * field[:, None, None]
     load += np.einsum("pb,pivj->pbvij", at.psi.sum(axis=1), turned)
     return at.coupling.of(-grad_u), load
 
 
-def _normal_derivative(x: Array, n: Array) -> Array:
+def normal_derivative(x: Array, n: Array) -> Array:
     """d(n ds)_l / dx_vj / ds of each piece's facet with corners x (pieces, vertices, dim); n points into the solid."""
     dim = x.shape[2]
     if dim == 2:

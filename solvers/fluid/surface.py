@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
+
+#: What fills closed contact: nothing, or fluid with the pressure of its rim.
+Zone = Literal["dry", "wetted"]
 
 
 @dataclass(frozen=True)
@@ -22,6 +26,7 @@ class ImmersedSurface:
     may_part: NDArray[np.bool_] | None = None  #: facets in contact: those on the boundary of the box may leave it
     slip_length: float = 0.0  #: shear stress = mu / slip_length times the velocity along it [m]; 0: the flow sticks
     transmissivity: float = 0.0  #: fluid passes along it in a thin layer, this / mu grad p [m^3]; 0: there is none
+    zone: Zone = "dry"  #: what facets in contact feel where no fluid is
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,16 @@ def wetness(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_]:
     """Which facets of all surfaces the fluid touches."""
     parts = [np.ones(len(s.facets), dtype=bool) if s.wet is None else s.wet for s in surfaces]
     return np.concatenate([*parts, np.empty(0, dtype=bool)])
+
+
+def may_close(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_] | None:
+    """Which facets of all surfaces feel fluid in closed contact; None if none do."""
+    if all(surface.zone == "dry" for surface in surfaces):
+        return None
+    parts = [
+        np.zeros(len(s.facets), dtype=bool) if s.zone == "dry" or s.may_part is None else s.may_part for s in surfaces
+    ]
+    return np.concatenate(parts) & wetness(surfaces)
 
 
 def by_facets(surfaces: Sequence[ImmersedSurface], numbers: Sequence[float]) -> Array | None:

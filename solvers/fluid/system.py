@@ -30,6 +30,7 @@ from solvers.fluid.pieces import Pieces
 from solvers.fluid.space import Unknowns, set_velocity
 from solvers.fluid.time_scheme import SCHEMES, FlowStep, FlowTimeScheme
 from solvers.fluid.weights import Weights
+from solvers.fluid.zone import ClosedZone, find_zone
 from solvers.values import Value
 
 
@@ -109,7 +110,9 @@ class FlowSystem:
         self.cut: Cut | None = None
         self.slip_length: Array | None = None  #: of the facets of all surfaces [m]; None: the flow sticks to them
         self.transmissivity: Array | None = None  #: the same of a layer on them [m^3]; None: there is none
+        self.may_close: NDArray[np.bool_] | None = None  #: facets that feel fluid in closed contact; None: none do
         self._interface: InterfaceTerms | None = None
+        self._zone: ClosedZone | None = None
         self._current = False  #: weights, interface and ghost penalty are those of cut and scales
 
     def _terms(self) -> forms.Coefficients:
@@ -262,6 +265,12 @@ class FlowSystem:
         assert self._interface is not None
         return self._interface
 
+    @property
+    def zone(self) -> ClosedZone | None:
+        """Closed contact that fluid reaches; None if there is none now (collective)."""
+        self._follow()
+        return self._zone
+
     def _follow(self) -> None:
         """Weights and ghost penalty as cut and scales ask for."""
         if self._current:
@@ -281,6 +290,8 @@ class FlowSystem:
                 self.slip_length,
                 self.transmissivity,
             )
+            if self.may_close is not None:
+                self._zone = find_zone(cut, self._interface, self.may_close, self.grid.comm)
         self._assemble_ghost_penalty()
         self._current = True
 
@@ -367,7 +378,15 @@ class FlowSystem:
     def surface_force(self) -> Array:
         """Force [N] of the fluid on the vertices of all surfaces, shape (n, dim) (collective)."""
         assert self.cut is not None
-        return self.grid.comm.allreduce(self.interface.force(self.flow.x.array, self.cut.motion.v))
+        return self.grid.comm.allreduce(self.interface.force(self.flow.x.array, self.cut.motion.v)) + self.zone_force()
+
+    def zone_force(self) -> Array:
+        """The part of it that acts where contact is closed (collective)."""
+        assert self.cut is not None
+        force = np.zeros_like(self.cut.motion.x)
+        if (zone := self.zone) is not None:
+            force[zone.facets.vertices] = zone.force(zone.pressure(self.flow.x.array))
+        return force
 
     def outer_rows(self) -> Array:
         """Rows of tractions and outflow alone at local dofs, the ghosts' share still there."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from fluid_setup import block, body, field, make_fluid, solve_steady
@@ -44,3 +46,40 @@ def test_block_pressed_and_lifted(tmp_path):
     assert not closed[opened:].any()
     assert history["block.y"][-1] > history["block.y"][pressed] + 5e-4
     assert np.abs(history["fluid.mass"]).max() < 1e-9  # what comes under it
+
+
+#: (until [s], pressure on the block [Pa]) above that at which it lets go; each is reached within 0.2 s.
+LOADS = ((1.0, 2.0), (2.0, 0.5))
+
+
+@pytest.mark.parametrize("zone", ["dry", "wetted"])
+@pytest.mark.parametrize("processes", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_load_at_which_it_lets_go(zone, processes, tmp_path):
+    """At rest contact carries F + p A (dry) or F (wetted) to 1e-8 p A, down to F near -p A and near 0.
+
+    Then it is pulled up, and lets go in the step after its load has become zero.
+    """
+    base = 0.0 if zone == "wetted" else -PRESSURE
+    steps = [f"{a - b!r}*min(max(t - {end}, 0)/0.2, 1)" for (end, a), (_, b) in pairwise(LOADS)]
+    value = " + ".join([f"{-2.0 - base!r}*min(t/0.1, 1)", *steps, "max(t - 2, 0)"])
+    settings = {
+        "contact.film.zone": zone,
+        "output.fields_every": 0,
+        "verify": "[]",
+        "time.end": 2.7,
+        "structure.bodies.block.tractions": f'[{{on: top, value: [0, "{value}"]}}]',
+    }
+    options = [part for name, new in settings.items() for part in ("--set", f"{name}={new}")]
+    done = fsci("run", "cases/hydrostatic_contact", "-o", tmp_path, *options, processes=processes, timeout=500)
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert "repeated" not in done.stdout
+    history = read_history(tmp_path / "history.csv")
+    t, area, contact = history["time"], 0.33 + history["corner.x"], history["contact.bottom.y"]
+    scale = PRESSURE * 0.33
+    for end, load in LOADS:
+        at = int(np.argmin(np.abs(t - end)))
+        expected = 0.33 * (load + base) + (0.0 if zone == "wetted" else PRESSURE * area[at])
+        assert contact[at] == pytest.approx(expected, abs=1e-8 * scale)
+    if zone == "wetted":
+        opened = t[np.flatnonzero(history["contact.active"] == 0)[0]]
+        assert 2.5 < opened < 2.5 + 1.01 * 0.05
