@@ -200,8 +200,10 @@ def gather(comm: MPI.Comm, owned: Array) -> Array:
 
 def gather_at(comm: MPI.Comm, owned: Array, start: int, dofs: NDArray[np.int64]) -> Array:
     """Values at global dofs on every process, zero where the dof is -1; same shape as `dofs`. Collective."""
+    if comm.size == 1:
+        return np.where(dofs >= 0, owned[dofs], 0.0)
     local = dofs - start
     mine = (local >= 0) & (local < len(owned)) & (dofs >= 0)
     values = np.zeros(dofs.shape)
     values[mine] = owned[local[mine]]
-    return values if comm.size == 1 else comm.allreduce(values)
+    return comm.allreduce(values)

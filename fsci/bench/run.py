@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fsci.bench import contact, cook, cost, flag, fluid, hertz, linear, moments, profile, small, static
+from fsci.bench import contact, cook, cost, flag, fluid, hertz, idle, linear, moments, profile, small, static
 from fsci.bench.compare import compare
 from fsci.bench.families import FAMILIES
 from fsci.bench.front_plot import plot_front
@@ -21,6 +21,7 @@ from fsci.run.summary import plain, versions
 #: Name -> (what it measures, how). One column of a row is one number or word.
 BENCHMARKS: dict[str, tuple[str, Callable[[], list[Row]]]] = {
     "small": ("one time step of small problems: milliseconds of the processor", small.run),
+    "idle": ("one Newton step with and without a part that the scene does not need", idle.run),
     "cost": ("one time step by kind of problem and size: what `fsci check` estimates from", cost.run),
     "static": ("one load step of a neo-Hookean cube, 25 x 25 x 25 hex8, as `fsci run` computes it", static.run),
     "linear": ("one linear system of a body under load: direct against iterative, by size", linear.run),

@@ -87,6 +87,8 @@ class Contact:
         self.touched_at = np.full(len(self.pairs), np.inf)  #: when each pair first touched [s], as probes have noted it
         self.terms: Terms | None = None
         self._D, self._covers = np.zeros(count), np.zeros(count, dtype=bool)  # at the latest evaluation
+        self._way = 0.0  # sum of the largest motions of any node between evaluations [m]
+        self._idle = False  # the latest evaluation found no facets near, and all is as it was before
         self._condensation: tuple[list[ActiveMultipliers], Linearised, Condensed] | None = None  # the latest
 
     # ------------------------------------------------------------------------------------------------- steps
@@ -97,6 +99,7 @@ class Contact:
         self._stiffness = np.divide(at_node, areas, out=np.zeros_like(areas), where=areas > 0.0)
         self.x = self.positions(u, t)
         self.x_old = self.x.copy()
+        self._search_anew()
         self._constraints.start(self.x)
 
     def positions(self, u: Array, t: float) -> Array:
@@ -117,12 +120,13 @@ class Contact:
         self._shares.begin_step()
         for mortar in self._mortars:
             mortar.begin_step(self.active_set.active)
-        self._sliding.begin_step(self.x)
+        self._sliding.begin_step(self.x, self._way)
         self.slip = None
 
     def end_step(self, weight: float) -> None:
         """Accept the step; weight: of the new contact force in the balance."""
-        self.work.end_step(weight, *self._force_and_slip())
+        if self._sliding.mortars or self._ties.pieces:
+            self.work.end_step(weight, *self._force_and_slip())
         self.slip = None
 
     @property
@@ -140,8 +144,11 @@ class Contact:
 
     def evaluate(self, u: Array, t: float) -> None:
         """Mortar terms and active set at the displacements u, shape (N, dim), of the present iterate."""
-        self.x = self.positions(u, t)
-        self.time = t
+        x = self.positions(u, t)
+        self._way += float(np.abs(x - self.x).max(initial=0.0))
+        self.x, self.time = x, t
+        if self._idle and self._all_clear():
+            return
         self.terms = self._evaluate_mortars()
         status = np.full(len(self.z), OPEN, dtype=np.int8)
         self._gap = np.zeros(len(self.z)) if self.terms is None else self._redistributed(self.terms.gap)
@@ -154,6 +161,17 @@ class Contact:
             self._drop_dependent(status)
         self.active_set.choose(status)
         self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
+        self._idle = self.terms is None
+
+    def _all_clear(self) -> bool:
+        """All pairs were so far apart when they were searched that no motion since then can have brought any near."""
+        return not self._ties.pieces and all(self._way < mortar.clear_until for mortar in self._mortars)
+
+    def _search_anew(self) -> None:
+        """Nodes may be anywhere."""
+        self._idle, self._way = False, 0.0
+        for mortar in self._mortars:
+            mortar.clear_until = -np.inf
 
     def point(self, which: NDArray[np.int64]) -> Point:
         """What a law is told of its multipliers."""
@@ -190,7 +208,7 @@ class Contact:
 
     def _evaluate_mortars(self) -> Terms | None:
         """Terms of all pairs, each process doing its share of the slave facets; None if no facets are near."""
-        near = [mortar.near(self.x, self.x_old) for mortar in self._mortars]
+        near = [mortar.near(self.x, self.x_old, self._way) for mortar in self._mortars]
         if not self._ties.pieces and all(len(facet_pairs) == 0 for facet_pairs, _ in near):
             return None
         normals = find_normals(self.multipliers, self.x)
@@ -391,6 +409,7 @@ class Contact:
         }
 
     def restore(self, state: State) -> None:
+        self._search_anew()
         self.z[:] = state["z"]
         self.x[:] = state["x"]
         self._mean_gap = state["mean_gap"].copy()

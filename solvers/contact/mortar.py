@@ -76,6 +76,11 @@ def join_masters(
 class FacetSearch(Protocol):
     """Finds facet pairs (slave, master) that may meet."""
 
+    @property
+    def clearance(self) -> float:
+        """Distance [m] of boxes around all that moved in the latest search, inflated; negative if they meet."""
+        ...
+
     def begin_step(self, pressed: NDArray[np.int64]) -> None:
         """pressed: how many multipliers of each slave facet are in contact."""
         ...
@@ -104,6 +109,7 @@ class Mortar:
         self.edge = edge
         self._evaluations = 0
         self._kept = np.empty(0, dtype=np.int64)
+        self.clear_until = -np.inf  #: way [m] of the fastest node up to which no facets can be near
 
     def begin_step(self, active: NDArray[np.bool_]) -> None:
         """Facet pairs are chosen anew; active: multipliers in contact, shape (C,)."""
@@ -125,11 +131,16 @@ class Mortar:
         if self._evaluations >= KEEP_AFTER:
             self._kept = np.union1d(self._kept, self._codes(used))
 
-    def near(self, x: Array, x_previous: Array) -> tuple[NDArray[np.int32], float]:
-        """Facet pairs that may meet, and the largest motion [m] of a node in this step; x of all nodes."""
+    def near(self, x: Array, x_previous: Array, way: float = 0.0) -> tuple[NDArray[np.int32], float]:
+        """Facet pairs that may meet, and the largest motion [m] of a node in this step; x of all nodes.
+
+        way: what any node has gone at most until here [m]. Once it is s longer, each of the two boxes has grown by s at
+        most, and the motion of a step, which inflates them, by 2 s: boxes that are 4 s apart stay apart.
+        """
         slave, master = self.patch.nodes, self.masters.nodes
         motion = max(float(np.abs(x[nodes] - x_previous[nodes]).max(initial=0.0)) for nodes in (slave, master))
         found = self.search.pairs(x[slave], x[master], self.edge + motion, x_previous[slave], x_previous[master])
+        self.clear_until = way + self.search.clearance / 4.0
         codes = self._codes(found)
         if len(self._kept) == 0 or np.isin(self._kept, codes).all():
             return found, motion

@@ -31,6 +31,7 @@ class Search:
         self._slave_facets = np.ascontiguousarray(slave_facets, dtype=np.int64)
         self._master_facets = np.ascontiguousarray(master_facets, dtype=np.int64)
         self.trees: tuple[Tree, Tree] | None = None
+        self.clearance = -np.inf  #: [m] between the inflated boxes at the latest search; negative if they meet
 
     def begin_step(self, pressed: NDArray[np.int64]) -> None:
         """Nothing to choose: one side is the slave, the other one the master."""
@@ -60,7 +61,8 @@ class Search:
 
         low_s, high_s = slave.box(*path_s)
         low_m, high_m = master.box(*path_m)
-        if np.any(low_s - radii.max() > high_m) or np.any(low_m > high_s + radii.max()):
+        self.clearance = float(np.maximum(low_s - high_m, low_m - high_s).max() - radii.max())
+        if self.clearance > 0.0:
             return np.empty((0, 2), np.int32)
         update(slave, path_s, radii)
         update(master, path_m, np.zeros(len(self._master_facets)))

@@ -26,6 +26,8 @@ class SelfSearch:
     the wall. A pair that overlaps by more than half of that thickness is the wall.
     """
 
+    clearance = -np.inf  #: [m]; a surface is never clear of itself
+
     def __init__(self, facets: Indices, facet_type: str, points: Array, others: Indices | None = None):
         """points: reference positions [m] of the nodes, shape (n, dim); others: masters of other bodies, with nodes
         numbered after these."""

@@ -58,13 +58,16 @@ class Sliding:
         self._count, self._shape = len(multipliers.node), shape
         self._beginning: Beginning | None = None
 
-    def begin_step(self, x: Array) -> None:
-        """Integrals at the positions x [m] at the beginning of a step, shape (N, dim)."""
+    def begin_step(self, x: Array, way: float) -> None:
+        """Integrals at the positions x [m] at the beginning of a step, shape (N, dim); way: see `Mortar.near`."""
+        self._beginning = None
+        if all(way < mortar.clear_until for mortar in self.mortars):
+            return
         (N, dim), C = self._shape, self._count
         D, parts = np.zeros(C), []
         normals = find_normals(self._multipliers, x) if self.mortars else None
         for index, mortar in enumerate(self.mortars):
-            facet_pairs, _ = mortar.near(x, x)
+            facet_pairs, _ = mortar.near(x, x, way)
             facet_pairs = self._shares.mine(index, facet_pairs, len(mortar.facets))
             if normals is None or len(facet_pairs) == 0:
                 continue

@@ -219,10 +219,12 @@ class Structure:
         if self.constraint is None:
             return
         self.constraint.evaluate(self.at_constraint(self.now.u), self.current.t)
+        self.now.constraint[:] = 0.0
+        if not self.constraint.near:
+            return
         dofs, force = self.constraint.dofs(), self.constraint.force()
         local = dofs - self.layout.start
         mine = (local >= 0) & (local < self.layout.size) & (dofs >= 0)
-        self.now.constraint[:] = 0.0
         self.now.constraint[local[mine]] = force[mine]
 
     def at_constraint(self, owned: Array) -> Array:

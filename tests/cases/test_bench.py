@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from programs import fsci
 
-from fsci.bench import hertz, linear, profile, small, studies
+from fsci.bench import hertz, idle, linear, profile, small, studies
 from fsci.bench.compare import compare
 from fsci.bench.families import FAMILIES
 from fsci.bench.family import Study, front
@@ -130,6 +130,24 @@ def test_small_row():
     row = small.measure("beam", *small.CASES["beam"], steps=2)
     assert row["unknowns"] == 138
     assert row["newton per step"] >= 1
+
+
+def test_idle_row():
+    """A pair that never meets changes no Newton step."""
+    (name, (text, part)), *_ = idle.SCENES.items()
+    row = idle.measure(name, text, part, steps=10)
+    assert row["newton with"] == row["newton without"]
+    assert row["ratio"] == pytest.approx(row["with [ms]"] / row["without [ms]"])
+
+
+@pytest.mark.slow
+def test_schemes_of_coupling_find_the_same_flag():
+    """FSI1 on half the cells: Aitken's, the quasi-Newton and the monolithic scheme have one error."""
+    fsi1 = FAMILIES["fsi1"]
+    rows = replace(fsi1, resolutions=dict([*fsi1.resolutions.items()][:1])).run()
+    errors = {row["option"]: row["error [%]"] for row in rows}
+    for scheme in ("Aitken", "IQN-ILS"):
+        assert errors[f"q2q1, {scheme}"] == pytest.approx(errors["q2q1, monolithic"], abs=1e-3)
 
 
 def test_linear_row():

@@ -82,11 +82,32 @@ def test_modules_of_absent_parts_are_not_imported(text, absent, tmp_path):
     assert [name for name in modules if name.startswith((*absent, *PLOTTING)) and name not in LIGHT] == []
 
 
-def test_bodies_far_apart_cost_a_comparison_of_boxes(tmp_path, monkeypatch):
+def test_bodies_far_apart_are_searched_once(tmp_path, monkeypatch):
+    """Then the ways of the nodes are added up, until they could have met: no box, no search, no integrals."""
     calls = counted(monkeypatch, search__pairs=Search, mortar___kernel=Mortar)
-    iterations = sum(iterations_of(written(tmp_path, FAR, 0.05), 3))
-    assert calls["search__pairs"] <= 2 * iterations + 6
-    assert calls["mortar___kernel"] == 0
+    assert len(iterations_of(written(tmp_path, FAR, 0.05), 3)) == 3
+    assert calls == {"search__pairs": 1}
+
+
+@pytest.mark.parametrize("law", ["", ", friction: {coefficient: 0.3}"])
+def test_bodies_that_come_near_are_searched_in_time(law, tmp_path, monkeypatch):
+    """A block is thrown onto a floor: bit for bit as if every iterate were searched."""
+    text = BLOCK.replace("0.001", "1.3").replace("{obstacle: floor}", f"{{obstacle: floor}}{law}")
+    fall = written(tmp_path, text.replace("gravity: [0,", "initial_velocity: [0, -8]\n      gravity: [0,"), 0.2)
+    found, searched = [], []
+    for always in (False, True):
+        calls = counted(monkeypatch, search__pairs=Search)
+        if always:
+            never = property(lambda mortar: -np.inf, lambda mortar, way: None)
+            monkeypatch.setattr(Mortar, "clear_until", never, raising=False)
+        simulation = build(fall, MPI.COMM_WORLD, Timer())
+        simulation.initialise(0.0, 0.005)
+        active = [simulation.scheme.step(n * 0.005, 0.005).numbers["contact.active"] for n in range(40)]
+        found.append((active, simulation.snapshots()[0].points.tobytes()))
+        searched.append(calls["search__pairs"])
+    assert found[0] == found[1]
+    assert max(found[0][0]) > 0.0
+    assert searched[0] < searched[1]
 
 
 def test_bodies_at_rest_are_cut_once(tmp_path, monkeypatch):

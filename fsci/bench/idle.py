@@ -1,0 +1,86 @@
+"""What a part costs that a scene does not need: time steps with it and without it, by turns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import process_time
+
+import numpy as np
+from mpi4py import MPI
+
+from fsci.bench.small import BLOCK, FLOW, POST
+from fsci.bench.table import Row
+from fsci.builder.build import Simulation, build
+from fsci.case import load_case
+from solvers.timing import Timer
+
+STEPS = 60
+BEGIN = 5  #: steps that do not count: they compile and build trees
+
+CUBE = """\
+time: {step: 0.005, end: 1}
+structure:
+  dynamics: {rho_inf: 0.9}
+  bodies:
+    block:
+      mesh: {shape: box, size: [1, 1, 1], cells: [8, 8, 8], origin: [0, 0, 50]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3, density: 1}
+      gravity: [0, 0, -10]
+contact:
+  obstacles:
+    floor: {mesh: {shape: box, size: [3, 3, 0.2], cells: [3, 3, 1], origin: [-1, -1, -0.2]}, on: top}
+  pairs:
+    floor: {slave: {body: block, on: bottom}, master: {obstacle: floor}}
+"""
+
+ROOF = """\
+contact:
+  obstacles:
+    roof: {mesh: {shape: rectangle, size: [3, 0.2], cells: [3, 1], origin: [-1, 9]}, on: bottom}
+  pairs:
+    roof: {slave: {body: post, on: top}, master: {obstacle: roof}}
+"""
+
+#: what -> (scene, the part that it does not need)
+SCENES = {
+    "block, a pair that never meets": (BLOCK.replace("0.001", "50"), "contact"),
+    "cube, a pair that never meets": (CUBE, "contact"),
+    "post in a flow, a pair that never meets": (FLOW + POST + ROOF, "contact"),
+}
+
+
+def run() -> list[Row]:
+    """Milliseconds of the processor per time step with and without the part, and their ratio."""
+    return [measure(name, text, part) for name, (text, part) in SCENES.items()]
+
+
+def measure(name: str, text: str, part: str, steps: int = STEPS) -> Row:
+    """Medians over the steps, which the two scenes take by turns: others who use the machine disturb both."""
+    both = [_simulation(scene) for scene in (text, text.split(f"{part}:")[0])]
+    spent, newton = np.zeros((2, steps)), np.zeros((2, steps))
+    for number in range(steps):
+        for which in (0, 1) if number % 2 else (1, 0):
+            simulation, dt = both[which]
+            begin = process_time()
+            newton[which, number] = simulation.scheme.step(number * dt, dt).iterations
+            spent[which, number] = process_time() - begin
+    per_newton = 1e3 * np.median((spent / newton)[:, BEGIN:], axis=1)
+    return {
+        "scene": name,
+        "unknowns": sum(both[0][0].dofs.values()),
+        "newton with": newton[0].mean(),
+        "newton without": newton[1].mean(),
+        "with [ms]": per_newton[0],
+        "without [ms]": per_newton[1],
+        "ratio": per_newton[0] / per_newton[1],
+    }
+
+
+def _simulation(text: str) -> tuple[Simulation, float]:
+    with TemporaryDirectory() as folder:
+        (Path(folder) / "case.yaml").write_text("title: a scene\n" + text)
+        case = load_case(Path(folder), [])
+        simulation = build(case, MPI.COMM_WORLD, Timer())
+    simulation.initialise(0.0, case.time.step)
+    return simulation, case.time.step
