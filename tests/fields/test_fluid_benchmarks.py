@@ -52,6 +52,16 @@ def test_steady_flow_around_a_cylinder(element, cells):
     assert abs(found["dp error [%]"]) < 0.5
 
 
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_newton_is_quadratic_in_the_end(element):
+    """2D-1: scales of the stabilisation that follow the iterate would leave a tenth of the residual in each step."""
+    fluid = bench.cylinder(bench.cylinder_grid(10), element, 0.2, tolerance=1e-10)
+    fluid.initialise(0.0, 1.0)
+    fluid.begin_step(0.0, 1.0)
+    *_, before, last = fluid.solve().residuals
+    assert last < 1e-3 * before
+
+
 def test_drag_on_a_coarse_mesh():
     """2D-1, quickly."""
     found = bench.steady("q2q1", 10)
