@@ -30,7 +30,8 @@ WELL, LITTLE = 0.6, 0.2
 NEAR = 2
 
 #: A parabola goes on for FAR cells in one direction and while it amplifies by sum_b |N_b| <= LARGEST, so that rounding
-#: stays rounding: a cell away that is 17 in one direction, 289 in two, 4913 in three. Then a straight line does.
+#: stays rounding: a cell away that is 17 in one direction, 289 in two, 4913 in three. Then a straight line does. Drags
+#: are the same to 2e-4 with LARGEST from 20 to 1e6.
 FAR, LARGEST = 2.0, 350.0
 
 #: Nodes that are looked at together, to bound the memory.

@@ -33,9 +33,10 @@ from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.patches import Patch
 from solvers.fluid.pieces import FLUSH
 
-#: eps: share of what a film does that the penalty may add; drags are the same to 1 % from 3e-3 to 1e-6.
+#: eps: share of what a film does that the penalty may add; drags are the same to 1.6 % from 3e-3 to 1e-6.
 SHARE = 3e-3
-#: g / h below which the factor does not fall any more: nodes that fluid hardly reaches have rounding errors over it.
+#: g / h below which the factor does not fall any more: nodes that fluid hardly reaches have rounding errors over it, of
+#: 1e-9 of the velocity. Drags of films from 0.05 cells on are the same to 1.3 % from 0.1 to 1e-4.
 LEAST = 0.1
 #: Sine of half the angle between the ways that a wall can face.
 OCTANT = np.sin(np.pi / 8)

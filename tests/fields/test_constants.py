@@ -10,12 +10,13 @@ from test_self_contact import CLAPPING, closing_c, fold, run
 
 from coupling import wetted
 from fsci import shapes
+from fsci.bench import fluid as flows
 from fsci.builder import facing
 from fsci.case import load_case
 from solvers.cell_types import CELL_TYPES
 from solvers.contact import dual_tree, mortar, self_search, share, sharp_edges
 from solvers.contact.sharp_edges import split_nodes
-from solvers.fluid import film
+from solvers.fluid import extension, film
 from solvers.fluid.surface import ImmersedSurface
 from solvers.mesh_topology import cut_out
 from solvers.structure import dynamics
@@ -151,3 +152,32 @@ def test_walls_of_a_film(monkeypatch):
     drag, force = drag_in_films()
     assert drag < 0.95 * wanted[0]
     assert force < 1.1 * wanted[1]  # both are negative
+
+
+def drags_of_films():
+    """Of a cylinder over a wall, over the exact one, in gaps of a fifth, a tenth and a twentieth of a cell."""
+    return [drag_ratio(2, gap * 0.1, 0.1, "q2q1") for gap in (0.2, 0.1, 0.05)]
+
+
+@pytest.mark.parametrize(("name", "value"), [("SHARE", 3e-4), ("SHARE", 3e-6), ("LEAST", 1e-2), ("LEAST", 1e-4)])
+def test_how_far_the_penalty_steps_back_in_films(monkeypatch, name, value):
+    """Down to a tenth of a cell the same to 0.4 %, to a twentieth to 1.6 %, over three decades of both."""
+    wanted = drags_of_films()
+    monkeypatch.setattr(film, name, value)
+    found = drags_of_films()
+    assert found[:2] == pytest.approx(wanted[:2], rel=4e-3)
+    assert found[2] == pytest.approx(wanted[2], rel=0.016)
+
+
+def test_largest_amplification_of_an_extension(monkeypatch):
+    """2D-1 is the same over three decades; with lines everywhere (1) its pressure difference is worse."""
+
+    def found(value):
+        monkeypatch.setattr(extension, "LARGEST", value)
+        row = flows.steady("q2q1", 10)
+        return [row[f"{name} error [%]"] for name in ("c_D", "c_L", "dp")]
+
+    wanted = found(350.0)
+    for value in (20.0, 2e4):
+        assert found(value) == pytest.approx(wanted, abs=1e-6)
+    assert abs(found(1.0)[2]) > abs(wanted[2]) + 0.5
