@@ -114,8 +114,8 @@ class Fluid:
     # ------------------------------------------------------------------------------------------------- the state
 
     def dofs(self) -> int:
-        """Unknowns on all processes, inactive ones included."""
-        return self.unknowns.size()
+        """Unknowns on all processes, inactive ones included (collective)."""
+        return self.unknowns.counted()
 
     @property
     def flow(self) -> Array:

@@ -134,9 +134,13 @@ class Unknowns:
         return order[np.searchsorted(self.velocity.numbers, numbers, sorter=order)]
 
     def size(self) -> int:
-        """Dofs on all processes; on nested cells without those of hanging nodes."""
+        """Dofs on all processes."""
+        return int(self.index_map.size_global) * self.block_size
+
+    def counted(self) -> int:
+        """The same, on nested cells without those of hanging nodes and those that no cell has (collective)."""
         if self.hanging is None:
-            return int(self.index_map.size_global) * self.block_size
+            return self.size()
         dofs = np.concatenate([nodes.dofs[: nodes.owned].ravel() for nodes in (self.velocity, self.pressure)])
         return int(self.grid.comm.allreduce(int(np.count_nonzero(~self.hanging.dofs[dofs]))))
 

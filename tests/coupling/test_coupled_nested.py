@@ -1,0 +1,110 @@
+"""Bodies that the flow moves on nested cells: as on equal cells, on any number of processes, resumed bit for bit."""
+
+import numpy as np
+import pytest
+from coupled_case import POST
+from programs import fsci
+
+from fsci.bench.small import CHANNEL
+from fsci.case import load_case
+from fsci.run.history import read_history
+from fsci.run.run import FINISHED, run_case
+
+NESTED = POST.replace("cells: [20, 10]}", "cells: [10, 5], refine: [{around: post, layers: 4, level: 1}]}")
+SOLVING = {"wall", "residual", "iterations", "coupling.newton", "coupling.linear"}
+SOLVING |= {"interface.force", "interface.momentum", "fluid.mass"}
+
+#: a free ball in 3D, with the iterative solver
+BALL = """\
+title: a ball sinks
+time: {step: 0.02, end: 0.06}
+fluid:
+  density: 1
+  viscosity: 0.1
+  gravity: [0, 0, -9.81]
+  grid: {from: [0, 0, 0], to: [1.5, 1, 1], cells: [6, 4, 4], refine: [{around: ball, layers: 4, level: 1}]}
+  patches:
+    top: {on: z+, outflow: true}
+    walls: {on: [x-, x+, y-, y+, z-], no_slip: true}
+  bodies:
+    ball:
+      mesh: {shape: sphere, radius: 0.15, cells: [4, 2], translate: [0.41, 0.52, 0.57]}
+      free: {density: 3}
+coupling: {scheme: monolithic}
+probes:
+  force: {quantity: force}
+  speed: {quantity: velocity, at: [1.4, 0.5, 0.5]}
+solver: {newton: {residual: 1.0e-11}, linear: {method: iterative, tolerance: 1.0e-12}}
+"""
+
+LEAVING = "title: a disc leaves\ntime: {step: 0.02, end: 0.4}\n"
+LEAVING += (
+    CHANNEL.replace("10]}", "10], refine: [{around: disc, level: 1}]}")
+    + """\
+  bodies:
+    disc:
+      mesh: {shape: disc, radius: 0.2, cells: [16, 2], translate: [0.78, 0.51]}
+      motion: {velocity: [1.5, 0]}
+"""
+)
+
+
+def run(text, folder, *overrides):
+    folder.mkdir(exist_ok=True)
+    (folder / "case.yaml").write_text(text)
+    assert run_case(load_case(folder / "case.yaml", [("verify", "[]"), *overrides]), folder / "out") == FINISHED
+    return read_history(folder / "out" / "history.csv")
+
+
+def differ(one, other, name):
+    """Relative to the largest component of what it belongs to."""
+    size = max(np.abs(one[n]).max() for n in one if n.partition(".")[0] == name.partition(".")[0])
+    return np.abs(one[name] - other[name]).max() / (size + 1e-12)
+
+
+@pytest.fixture(scope="module")
+def nested(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("nested")
+    return folder, run(NESTED, folder)
+
+
+def test_halved_everywhere_is_an_equal_grid(tmp_path):
+    everywhere = POST.replace("[20, 10]}", "[10, 5], refine: [{box: [[0, 0], [2, 1]]}]}")
+    one, other = run(POST, tmp_path / "equal"), run(everywhere, tmp_path / "halved")
+    for name in ("tip.x", "tip.y", "force.x", "force.y", "outflow"):
+        assert differ(one, other, name) < 1e-9, name
+
+
+def test_schemes_agree(nested, tmp_path):
+    other = run(NESTED.replace("scheme: monolithic", "scheme: partitioned, tolerance: 1.0e-8"), tmp_path)
+    for name in ("tip.x", "tip.y", "force.x", "force.y", "outflow"):
+        assert differ(nested[1], other, name) < 1e-7, name
+
+
+@pytest.mark.parametrize("text", [NESTED, BALL], ids=["post", "ball"])
+def test_two_processes(text, tmp_path):
+    one = run(text, tmp_path)
+    done = fsci("run", tmp_path, "-o", tmp_path / "two", "--set", "verify=[]", processes=2, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    two = read_history(tmp_path / "two" / "history.csv")
+    for name in one.keys() - SOLVING:
+        assert differ(one, two, name) < 1e-8, name
+
+
+def test_resumed_bit_for_bit(nested, tmp_path):
+    run(NESTED, tmp_path, ("time.end", "0.06"))
+    text = (tmp_path / "out" / "case.yaml").read_text()
+    (tmp_path / "out" / "case.yaml").write_text(text.replace("end: 0.06", "end: 0.1"))
+    done = fsci("resume", tmp_path / "out")
+    assert done.returncode == 0, done.stdout + done.stderr
+    resumed = read_history(tmp_path / "out" / "history.csv")
+    for name in nested[1].keys() - {"wall"}:
+        assert np.array_equal(nested[1][name], resumed[name]), name
+
+
+def test_a_body_that_leaves_the_finest_cells_stops_the_run(tmp_path):
+    (tmp_path / "case.yaml").write_text(LEAVING)
+    done = fsci("run", tmp_path, "-o", tmp_path / "out", "--set", "time.retry.halvings=0")
+    assert done.returncode == 1
+    message = "a body comes within 3 cells of cells that are not of the finest level: refine where it is and where it"
+    assert message in done.stdout + done.stderr
