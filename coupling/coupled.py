@@ -6,15 +6,15 @@ from collections.abc import Sequence
 
 from coupling.balance import Balance
 from coupling.interface import DrySide, Interface
-from coupling.ports import Flow, Solid
+from coupling.ports import Flow, Solid, Start
 from solvers.api import Array, State
 
 
 class Coupled:
     """The two parts at one time; collective calls."""
 
-    def __init__(self, flow: Flow, solid: Solid, dry_sides: Sequence[DrySide] = ()):
-        self.flow, self.solid = flow, solid
+    def __init__(self, flow: Flow, solid: Solid, dry_sides: Sequence[DrySide] = (), start: Start | None = None):
+        self.flow, self.solid, self.start = flow, solid, start
         self.interface = Interface(solid, flow.scheme.times, dry_sides)
         self.balance = Balance(flow, solid, self.interface)
 

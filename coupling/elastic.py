@@ -59,7 +59,7 @@ class Elastic:
     # ---------------------------------------------------------------------------------------------- the surface
 
     def displacement(self) -> Array:
-        return self._gather(self.structure.now.u)
+        return self.at_vertices(self.structure.now.u)
 
     def jacobian(self) -> VertexJacobian:
         columns = self.dofs.reshape(-1, 1)
@@ -87,16 +87,16 @@ class Elastic:
         structure, weight = self.structure, self.force_weight
         handed_over = weight * structure.now.surface + (1.0 - weight) * structure.old.surface
         free = structure.held.free_part(structure.time.averaged_load(structure))
-        return self._gather(free + structure.held.part(handed_over)).ravel()
+        return self.at_vertices(free + structure.held.part(handed_over)).ravel()
 
     def taken_at_start(self) -> Array:
         structure = self.structure
-        return self._gather(structure.held.free_part(structure.time.reaction(structure))).ravel()
+        return self.at_vertices(structure.held.free_part(structure.time.reaction(structure))).ravel()
 
     def moved(self) -> Array:
-        return self._gather(self.structure.now.u - self.structure.old.u).ravel()
+        return self.at_vertices(self.structure.now.u - self.structure.old.u).ravel()
 
-    def _gather(self, owned: Array) -> Array:
+    def at_vertices(self, owned: Array) -> Array:
         """Values at the vertices from those at owned dofs of the structure, shape (n, dim)."""
         return gather_at(self.comm, owned, self.structure.layout.start, self.dofs)
 

@@ -10,7 +10,7 @@ import numpy as np
 from coupling.ports import Solid
 from solvers.api import Array, State
 from solvers.fluid.surface import Motion
-from solvers.fluid.time_scheme import STEADY, Difference
+from solvers.fluid.time_scheme import STEADY, Difference, backward_euler
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,18 @@ class Interface:
         self.now = self.displacement()
         self.past = [self.now] * len(self.past)
 
+    def begin_start(self, dt: float, velocity: Array) -> Array:
+        """A step of length dt [s] to the same time, from velocities [m/s]; the displacements now [m]."""
+        place = self.displacement()
+        self.past[0], self._difference = place - dt * velocity, backward_euler(dt)
+        return place
+
+    def end_start(self, dt: float, velocity: Array, acceleration: Array) -> None:
+        """The displacements are those of the start; those before it follow from velocity and acceleration."""
+        self.now, self._difference = self.displacement(), STEADY
+        times = [-k * dt for k in range(1, len(self.past) + 1)]
+        self.past = [self.now + t * velocity + 0.5 * t**2 * acceleration for t in times]
+
     def begin_step(self, difference: Difference) -> None:
         """Remember the displacements."""
         self.past = [self.now, *self.past][: len(self.past)]
@@ -74,7 +86,14 @@ class Interface:
     def move(self, d: Array) -> dict[str, Motion]:
         """Take displacements d [m] and say how each surface moves."""
         self.now = d.copy()
-        motions = self._by_surface(self.points + d, self.velocity(d))
+        return self._motions(d, self.velocity(d))
+
+    def at_start(self, velocity: Array) -> dict[str, Motion]:
+        """How each surface moves that is where it is now, with velocities [m/s] of the vertices."""
+        return self._motions(self.now, velocity)
+
+    def _motions(self, d: Array, velocity: Array) -> dict[str, Motion]:
+        motions = self._by_surface(self.points + d, velocity)
         return motions | {side.name: side.motion(motions[side.behind]) for side in self.dry_sides}
 
     def _by_surface(self, x: Array, v: Array) -> dict[str, Motion]:

@@ -19,6 +19,7 @@ from petsc4py import PETSc
 from coupling.blocks import Blocks
 from coupling.coupled import Coupled
 from coupling.ports import Part
+from coupling.start import start_together
 from solvers import linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.lagged import Lagged, LaggedFactors
@@ -53,14 +54,23 @@ class Monolithic:
     def initialise(self, t: float, dt: float) -> None:
         """Both parts at the first time."""
         self.coupled.initialise(t, dt, with_solid=True)
+        start_together(self.coupled, t, dt, self._solve_unpredicted, with_solid=True)
 
-    def step(self, t: float, dt: float) -> StepInfo:
-        coupled = self.coupled
-        coupled.begin_step(t, dt)
+    def _begin_system(self) -> None:
+        """Nothing of an earlier system counts."""
         self.largest, self._linear_iterations = np.zeros(2), 0
         self._noise = self._prepared = None
         self._krylov.begin_step()
         self._direct.begin_step()
+
+    def _solve_unpredicted(self) -> None:
+        self._begin_system()
+        converge(self, self.tolerance)
+
+    def step(self, t: float, dt: float) -> StepInfo:
+        coupled = self.coupled
+        coupled.begin_step(t, dt)
+        self._begin_system()
         unmoved = 0.0
         if not coupled.flow.steady:
             unmoved = self.residual()

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from coupling.accelerate import Accelerator, QuasiNewton
 from coupling.coupled import Coupled
+from coupling.start import start_together
 from solvers.api import Array, State, StepFailed, StepInfo
 
 
@@ -40,14 +41,24 @@ class Partitioned:
     def initialise(self, t: float, dt: float) -> None:
         """Both fields at the first time."""
         self.coupled.initialise(t, dt)
+        start_together(self.coupled, t, dt, self._iterate)
+        self.accelerator.forget()
 
     def step(self, t: float, dt: float) -> StepInfo:
         coupled, interface = self.coupled, self.coupled.interface
         coupled.begin_step(t, dt)
-        self.accelerator.begin_step()
         if not coupled.flow.steady:
             coupled.flow.move(interface.move(interface.past[0]))
             coupled.predict(t + dt)
+        history, newton = self._iterate()
+        coupled.end_step()
+        numbers = {"coupling.newton": float(newton), **coupled.balance.numbers(), **coupled.solid.numbers()}
+        return StepInfo(len(history), tuple(history), numbers, tuple(coupled.flow.notes))
+
+    def _iterate(self) -> tuple[list[float], int]:
+        """(residuals [m], Newton steps of both fields) until the interface is in balance. Raises StepFailed."""
+        coupled, interface = self.coupled, self.coupled.interface
+        self.accelerator.begin_step()
         d = interface.displacement()
         history: list[float] = []
         newton = 0
@@ -61,7 +72,7 @@ class Partitioned:
             residual = _mean(found - d)
             history.append(residual)
             if residual <= self._small(found):
-                break
+                return history, newton
             if not math.isfinite(residual) or len(history) == self.tolerance.max_iterations:
                 reason = (
                     f"the coupling iteration did not converge in {len(history)} iterations (residual {residual:.3g} m)"
@@ -72,9 +83,6 @@ class Partitioned:
                 self.accelerator.forget()
             contact = touching
             d = self.accelerator.next(d, found)
-        coupled.end_step()
-        numbers = {"coupling.newton": float(newton), **coupled.balance.numbers(), **coupled.solid.numbers()}
-        return StepInfo(len(history), tuple(history), numbers, tuple(coupled.flow.notes))
 
     def _small(self, found: Array) -> float:
         """[m]; no less than a few roundings of the places: bodies that come to rest move by less in a step."""

@@ -8,18 +8,24 @@ import numpy as np
 
 from coupling.coupled import Coupled
 from coupling.elastic import Elastic
+from coupling.elastic_start import ElasticStart
+from coupling.interface import DrySide
+from coupling.ports import Start
 from coupling.wetted import immerse, wetted_surface
 from solvers.api import Array
 from solvers.fluid.field import Fluid
 from solvers.fluid.grid import Grid
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.patches import Patch
+from solvers.fluid.start import FlowStart
 from solvers.fluid.surface import ImmersedSurface
 from solvers.fluid.system import FlowSettings
 from solvers.rigid.field import RigidBodies
+from solvers.rigid.start import RigidStart
 from solvers.skin import cut_out_skin
 from solvers.solver_settings import SolverSettings
 from solvers.structure.field import Structure
+from solvers.structure.time_scheme import Statics
 from solvers.timing import Timer
 
 
@@ -49,7 +55,7 @@ def couple(
         surfaces.append(wetted_surface(structure, index, skin))
     immersed = immerse([surface.at_start for surface in surfaces], rigid_bodies, _box(grid), start)
     fluid = Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=comm)
-    return Coupled(fluid, Elastic(structure, surfaces))
+    return coupled_elastic(fluid, Elastic(structure, surfaces))
 
 
 def couple_rigid(
@@ -66,7 +72,19 @@ def couple_rigid(
     """Rigid bodies that the flow moves, for `Monolithic` or `Partitioned`; all else as in `couple` (collective)."""
     moved = [(ImmersedSurface(body.name, body.facets, len(body.points)), body.points) for body in bodies.bodies]
     immersed = immerse(moved, rigid_bodies, _box(grid), start, deform=False)
-    return Coupled(Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=bodies.comm), bodies)
+    return coupled_bodies(Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=bodies.comm), bodies)
+
+
+def coupled_elastic(fluid: Fluid, elastic: Elastic, dry_sides: Sequence[DrySide] = ()) -> Coupled:
+    """With a smooth start if there are accelerations, and a scheme of second order that would miss it."""
+    inertia = not isinstance(elastic.structure.time, Statics)
+    start = Start(FlowStart(fluid), ElasticStart(elastic)) if inertia and fluid.scheme.times > 1 else None
+    return Coupled(fluid, elastic, dry_sides, start)
+
+
+def coupled_bodies(fluid: Fluid, bodies: RigidBodies) -> Coupled:
+    """The same for rigid bodies."""
+    return Coupled(fluid, bodies, start=Start(FlowStart(fluid), RigidStart(bodies)) if fluid.scheme.times > 1 else None)
 
 
 def _box(grid: Grid) -> tuple[Array, Array]:

@@ -7,6 +7,8 @@ know. The solid says where they are, the flow which force [N] it exerts on them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -195,3 +197,46 @@ class Flow(Part, Protocol):
     def linear_tolerance(self) -> float: ...
 
     def set_up_multigrid(self, preconditioner: PETSc.PC, matrix: PETSc.Mat) -> None: ...
+
+
+class StartOfSolid(Protocol):
+    """Steps of a solid to the first time, with a = (u - u_n) / dt^2."""
+
+    @property
+    def steps(self) -> int:
+        """How many it takes until the acceleration is smooth."""
+        ...
+
+    def velocity(self) -> Array:
+        """Velocity [m/s] of all vertices, shape (n, dim)."""
+        ...
+
+    def step(self, t: float, dt: float) -> AbstractContextManager[None]:
+        """One of length dt, begun here and solved by who asks for it."""
+        ...
+
+    def end(self) -> None:
+        """Take acceleration and load of the last of these steps, and the deformation that they made."""
+        ...
+
+
+class StartOfFlow(Protocol):
+    """The same of a flow: steps of backward Euler, each from the initial velocity."""
+
+    def at_once(self, surfaces: Mapping[str, Motion]) -> bool:
+        """The initial velocity is not that of the boundary, or of surfaces by name (collective)."""
+        ...
+
+    def step(self, t: float, dt: float) -> AbstractContextManager[None]: ...
+
+    def end(self, dt: float) -> None:
+        """Back to the initial velocity; those before it follow from the rate of the last of these steps."""
+        ...
+
+
+@dataclass(frozen=True)
+class Start:
+    """How both find accelerations that belong together."""
+
+    flow: StartOfFlow
+    solid: StartOfSolid

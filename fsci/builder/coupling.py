@@ -15,6 +15,7 @@ from coupling.elastic import Elastic
 from coupling.interface import DrySide
 from coupling.monolithic import Monolithic
 from coupling.partitioned import FixedPointTolerance, Partitioned
+from coupling.parts import coupled_bodies, coupled_elastic
 from coupling.wetted import WettedSurface, immerse, wetted_surface
 from fsci.builder.dry_side import find_ends
 from fsci.builder.fluid import build_fluid, build_rigid_bodies
@@ -48,7 +49,7 @@ def build_coupled(
     dry_sides = [_dry_side(s, c) for s, (_, c) in zip(surfaces, skins, strict=True) if c is not None]
     immersed += [ImmersedBody(_dry_line(side), None, deforms=True) for side in dry_sides]
     fluid = build_fluid(case, comm, timer, immersed)
-    return _scheme(case, Coupled(fluid, Elastic(structure, surfaces), dry_sides)), fluid
+    return _scheme(case, coupled_elastic(fluid, Elastic(structure, surfaces), dry_sides)), fluid
 
 
 def build_coupled_rigid(
@@ -60,7 +61,7 @@ def build_coupled_rigid(
     box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
     immersed = immerse(moved, build_rigid_bodies(case, comm), box, case.time.start, deform=False)
     fluid = build_fluid(case, comm, timer, immersed)
-    return _scheme(case, Coupled(fluid, bodies)), fluid
+    return _scheme(case, coupled_bodies(fluid, bodies)), fluid
 
 
 def _scheme(case: Case, coupled: Coupled) -> Monolithic | Partitioned:

@@ -39,6 +39,13 @@ class History:
         """The initial velocity, known everywhere."""
         self.past[0] = Past(velocity, np.ones(len(velocity), dtype=bool))
 
+    def continue_back(self, dt: float, rate: Array, found: Mask) -> None:
+        """Velocities before the start by their rate [m/s^2] there, as if steps of length dt had led to it."""
+        start = self.past[0].velocity
+        back = [Past(start - k * dt * rate, found) for k in range(1, len(self.past))]
+        self.past = [self.past[0], *back]
+        self.steps = (dt,) * self.scheme.times
+
     def end_step(self, dt: float, velocity: Array, found: Mask) -> None:
         """Accept a step that found the flow at some local dofs."""
         self.past = [Past(velocity, found), *self.past][: len(self.past)]

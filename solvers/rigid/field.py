@@ -102,13 +102,14 @@ class RigidBodies:
         self.end_step()
         return info
 
-    def begin_step(self, t: float, dt: float) -> None:
-        """Remember the state at t; held components are those of t + dt."""
+    def begin_step(self, t: float, dt: float, held: Array | None = None) -> None:
+        """Remember the state at t; held components are those of t + dt, or go these ways, shape (bodies, 6)."""
         self.old, self.on_surface_old = list(self.now), self.on_surface.copy()
         self.current, self._noise = Step(t + dt, dt), None
         self._u[:] = self._held_u[:] = 0.0
-        for u, body in zip(self._held_u, self.bodies, strict=True):
-            u[body.held_components] = body.held_at(t + dt) - body.held_at(t)
+        for index, (u, body) in enumerate(zip(self._held_u, self.bodies, strict=True)):
+            way = body.held_at(t + dt) - body.held_at(t) if held is None else held[index, body.held_components]
+            u[body.held_components] = way
         self.place(self._held_u)
 
     def predict(self, t: float) -> None:

@@ -73,7 +73,8 @@ class Dynamics:
         if structure.comm.allreduce(len(structure.massless)):
             others = np.setdiff1d(np.arange(structure.layout.size), structure.massless)
             held = structure.held.stopped(others, structure.now.u)
-            structure.settle(FirstState(structure.massless, structure.damping), held, t, SHORT * dt)
+            with structure.by(FirstState(structure.massless, structure.damping), held, t, SHORT * dt):
+                structure.solve()
         self._solve_acceleration(structure)
 
     def _start_supports(self, structure: Moving, t: float, h: float) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 
@@ -127,20 +128,25 @@ class Structure:
         friction = 0.0 if self.constraint is None else self.constraint.friction_work
         return self.time.kinetic_energy(self), internal, friction
 
-    def settle(self, time: TimeScheme, held: Held, t: float, dt: float) -> None:
-        """A step to the same t by another scheme and with other supports, to find the state that a run starts from.
-
-        Raises StepFailed.
-        """
+    @contextmanager
+    def by(self, time: TimeScheme, held: Held, t: float, dt: float) -> Iterator[None]:
+        """A step to the same t by another scheme and supports, for a first state; solved by who asks for it."""
         own = self.time, self.held
         self.time, self.held = time, held
         try:
             self.begin_step(t - dt, dt)
-            self.solve()
+            yield
         finally:
             self.time, self.held = own
         if self.constraint is not None:
             self.constraint.end_step(time.force_weight)
+
+    def take_start(self, u: Array) -> None:
+        """Start from other displacements [m] of owned dofs, with velocity, acceleration and load as they are."""
+        self.now.u = self.held.free_part(u) + self.held.displacement(self.current.t)
+        self._assemble_bodies()
+        self._assemble_constraint()
+        self.energy.start(*self._energies())
 
     def _stiffness(self) -> Array:
         """Diagonal of the static tangent [N/m]."""

@@ -1,4 +1,4 @@
-"""The first state of a structure some nodes of which have no mass."""
+"""The first state of a structure: of nodes without mass, and of loads that depend on the acceleration."""
 
 from __future__ import annotations
 
@@ -9,6 +9,24 @@ from petsc4py import PETSc
 from solvers.api import Array
 from solvers.structure.instant import Moving, times
 from solvers.structure.time_scheme import Statics
+
+
+class SmoothAcceleration(Statics):
+    """M (u - u_n) / dt^2 + C v + f_int(u) = f_ext(t); v is as it was."""
+
+    def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
+        a = (structure.now.u - structure.old.u) / dt**2
+        a[structure.massless] = 0.0
+        return structure.now.v, a
+
+    def balance(self, structure: Moving) -> Array:
+        force = self.reaction(structure) + times(structure.mass, structure.now.a)
+        return force if structure.damping is None else force + times(structure.damping, structure.now.v)
+
+    def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat:
+        matrix = structure.mass.copy()
+        matrix.scale(1.0 / dt**2)
+        return matrix
 
 
 class FirstState(Statics):

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from solvers.api import Array
+from solvers.api import Array, StepInfo
 from solvers.structure.held import Held
 from solvers.structure.instant import Moving
 
@@ -16,8 +17,12 @@ from solvers.structure.instant import Moving
 class Settling(Moving, Protocol):
     """A structure whose first state a scheme can have found."""
 
-    def settle(self, time: TimeScheme, held: Held, t: float, dt: float) -> None:
-        """A step to the same t by another scheme and with other supports. Raises StepFailed."""
+    def by(self, time: TimeScheme, held: Held, t: float, dt: float) -> AbstractContextManager[None]:
+        """A step to the same t by another scheme and with other supports."""
+        ...
+
+    def solve(self) -> StepInfo:
+        """Raises StepFailed."""
         ...
 
 

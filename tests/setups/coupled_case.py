@@ -11,7 +11,7 @@ probes:
 
 REST = """\
 verify:
-  - {value: tip.x, reference: 0.01, relative: 1}
+  - {value: tip.x, reference: 0.02, relative: 1}
 solver: {newton: {residual: 1.0e-11}}
 """
 

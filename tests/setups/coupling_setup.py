@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from mpi4py import MPI
 
@@ -84,10 +86,11 @@ def post_in_flow(
     rho_inf: float = 0.8,
     element: str = "q1q1",
     linear: Method = "auto",
+    growth: Callable[[float], float] = lambda t: min(t / 0.1, 1.0),
 ) -> Coupled:
     """A soft square post that stands on the bottom of a channel, in a flow that begins to move."""
     a, b = lame(E, 0.3)
-    inflow = (lambda x, t: 4.0 * x[1] * (1.0 - x[1]) * np.minimum(t / 0.1, 1.0), 0.0)
+    inflow = (lambda x, t: 4.0 * x[1] * (1.0 - x[1]) * growth(t), 0.0)
     mesh = shapes.rectangle([0.23, 0.41], [3, 5], order=1, cell="quad")
     mesh.points[:, 0] += 0.62
     material, supports = StVenantKirchhoff(a, b, rho_s), [Support("bottom")]

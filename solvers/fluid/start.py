@@ -1,0 +1,73 @@
+"""The start of a flow that is coupled: its rate of change there, from which its past follows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+from mpi4py import MPI
+
+from solvers.fluid.field import Fluid
+from solvers.fluid.immersed import ImmersedBody
+from solvers.fluid.surface import Motion
+from solvers.fluid.time_scheme import FlowStep
+from solvers.values import evaluate_components
+
+#: Share of the largest velocity that boundary or bodies may differ from the initial flow if it does not start at once.
+JUMP = 1e-6
+
+
+class FlowStart:
+    """Steps of backward Euler from the initial velocity, with the loads of the first time."""
+
+    def __init__(self, fluid: Fluid):
+        self.fluid = fluid
+
+    def at_once(self, surfaces: Mapping[str, Motion]) -> bool:
+        """The initial velocity is not that of the boundary, or of bodies: `surfaces` by name, others as prescribed.
+
+        Collective.
+        """
+        fluid, t, initial = self.fluid, self.fluid.current.t, self.fluid.settings.initial_velocity
+        on_boundary, there = fluid.boundary.velocity(t), fluid.history.past[0].velocity[fluid.boundary.dofs]
+        pairs = [(on_boundary, there)]
+        for body in fluid.bodies:
+            motion = surfaces[body.surface.name] if body.motion is None else body.motion(t)
+            flow = np.zeros_like(motion.x) if initial is None else evaluate_components(initial, motion.x.T, t).T
+            pairs.append((motion.v, flow))
+        jump = max(np.abs(a - b).max(initial=0.0) for a, b in pairs)
+        speed = max(np.abs(some).max(initial=0.0) for pair in pairs for some in pair)
+        jump, speed = (fluid.comm.allreduce(float(size), op=MPI.MAX) for size in (jump, speed))
+        return jump > JUMP * speed
+
+    @contextmanager
+    def step(self, t: float, dt: float) -> Iterator[None]:
+        """A step of length dt that begins here; boundary and prescribed bodies are as fast as they will be at t + dt.
+
+        Its end has the places and loads of t.
+        """
+        fluid = self.fluid
+        bodies = fluid.bodies
+        fluid.bodies = [b if b.motion is None else _hurried(b, b.motion, dt) for b in bodies]
+        try:
+            fluid.begin_step(t - dt, dt)
+            fluid.flow[fluid.boundary.dofs] = fluid.boundary.velocity(t + dt)
+            yield
+        finally:
+            fluid.bodies = bodies
+
+    def end(self, dt: float) -> None:
+        """Back to the initial velocity; those before it follow from the rate of the last of these steps."""
+        fluid = self.fluid
+        found, start = fluid.system.active_dofs.copy(), fluid.history.past[0].velocity
+        fluid.history.continue_back(dt, np.where(found, fluid.velocity() - start, 0.0) / dt, found)
+        moving = fluid.unknowns.velocity_mask
+        fluid.flow[moving] = start[moving]
+        fluid.current = FlowStep(fluid.current.t, dt, fluid.history.difference(dt))
+
+
+def _hurried(body: ImmersedBody, motion: Callable[[float], Motion], dt: float) -> ImmersedBody:
+    """With the velocity that it has dt later."""
+    return replace(body, motion=lambda t: Motion(motion(t).x, motion(t + dt).v))

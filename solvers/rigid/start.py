@@ -1,0 +1,56 @@
+"""The start of rigid bodies whose loads depend on their acceleration; the method is in `coupling.start`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+
+from solvers.api import Array
+from solvers.generalised_alpha import GeneralisedAlpha
+from solvers.rigid import motion
+from solvers.rigid.field import RigidBodies
+
+#: For bodies that are at rest before.
+BACKWARD_EULER = GeneralisedAlpha(alpha_m=0.0, alpha_f=0.0, beta=1.0, gamma=1.0)
+
+
+class RigidStart:
+    """Steps of backward Euler to the first time. One is enough: nothing rings."""
+
+    steps = 1
+
+    def __init__(self, field: RigidBodies):
+        self.field, self._initial = field, list(field.now)
+
+    def velocity(self) -> Array:
+        """Of all vertices [m/s], shape (n, dim)."""
+        field, found = self.field, []
+        for body, now in zip(field.bodies, field.now, strict=True):
+            found.append(now.v[:3] + np.cross(motion.spin(now), body.arms(now.R, body.points)))
+        return np.concatenate(found)[:, : field.dim]
+
+    @contextmanager
+    def step(self, t: float, dt: float) -> Iterator[None]:
+        """From rest, so that a = (u - u_n) / dt^2; held components accelerate as they are asked to."""
+        field = self.field
+        self._initial = list(field.now)
+        own, ways = field.scheme, np.zeros((len(field.bodies), 6))
+        for index, (body, now) in enumerate(zip(field.bodies, field.now, strict=True)):
+            held = body.held_components
+            ways[index, held] = dt**2 * motion.acceleration(body, now)[held]
+            field.now[index] = replace(now, v=np.zeros(6), p=np.zeros(6))
+        field.scheme = BACKWARD_EULER
+        try:
+            field.begin_step(t - dt, dt, ways)
+            yield
+        finally:
+            field.scheme = own
+
+    def end(self) -> None:
+        """Where and as fast as before; rates of momentum are those of the step."""
+        field = self.field
+        field.now = [replace(initial, p=now.p) for initial, now in zip(self._initial, field.now, strict=True)]
+        field.old = list(field.now)
