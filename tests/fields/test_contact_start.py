@@ -17,6 +17,7 @@ from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
 from solvers.structure.dynamics import Damping, Dynamics
+from solvers.structure.instant import times
 from solvers.structure.loads import Pressure, Traction
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
 
@@ -109,6 +110,32 @@ def test_a_load_on_a_surface_that_touches(law, rho_inf):
         assert np.abs(structure.now.u).max() < 1e-12
         assert np.abs(structure.now.a).max() < 1e-9
     assert structure.energy.error == pytest.approx(0.0, abs=1e-12)
+
+
+def test_contact_accelerates_what_has_mass():
+    """A sheet of one cell between two blocks, the upper one overlapping it: only its lower, slave side has no mass.
+
+    Contact pushes the lowest layer of the block back, a strip of height h whose upper side cannot move at once, with
+    P = E s (s^2 - 1) / 2, s = 1 - overlap / h; it accelerates sheet and block by this force, and by nothing else.
+    """
+    E, h, overlap = 100.0, 0.25, 0.002
+    bodies = []
+    stack = (("base", 0.5, 2, -0.5), ("sheet", 0.1, 1, 0.0), ("block", 0.5, 2, 0.1 - overlap))
+    for name, height, cells, bottom in stack:
+        mesh = shapes.rectangle([1.0, height], [4, cells])
+        mesh.points[:, 1] += bottom
+        held = [Support("bottom", (constant(0), constant(0)))] if name == "base" else []
+        bodies.append(make_body(name, mesh, StVenantKirchhoff(E / 2.0, 0.0, 3.0), supports=held))
+    pairs = [(("block", "bottom"), ("sheet", "top")), (("sheet", "bottom"), ("base", "top"))]
+    structure, contact = make_contact(bodies, pairs, time=Dynamics(TRAPEZOIDAL), settings=TIGHT)
+    structure.initialise(0.0, 1e-3)
+    stretch = 1.0 - overlap / h
+    force = E * stretch * (1.0 - stretch**2) / 2.0
+    forces = structure.split(times(structure.mass, structure.now.a))
+    _, sheet, upper = (part.reshape(-1, 2).sum(axis=0) for part in forces)
+    assert contact.resultant(0) == pytest.approx([0.0, force], rel=1e-9, abs=1e-12)
+    assert sheet == pytest.approx([0.0, -force], rel=1e-9, abs=1e-12)
+    assert upper == pytest.approx([0.0, force], rel=1e-9, abs=1e-12)
 
 
 def test_no_balance_at_the_start(tmp_path):

@@ -210,7 +210,6 @@ def test_coincident_and_aligned_meshes_lose_nothing(slave, master, shift):
         np.testing.assert_allclose(M.sum(axis=1), result.D, atol=1e-13)
         np.testing.assert_allclose(result.gap, 0.0, atol=1e-12)
         for derivative in (result.dD, result.dgap, result.dforce):
-            assert np.isfinite(derivative[0]).all()
             assert np.abs(derivative[0]).max() < 10.0
 
 
@@ -240,7 +239,6 @@ def test_slivers_do_no_harm(slave, master):
             np.testing.assert_allclose(M.sum(axis=1), result.D, atol=1e-11 * scale)
             assert np.abs(M).max(initial=0.0) <= 40.0 * scale
             for derivative in (result.dD, result.dgap, result.dforce):
-                assert np.isfinite(derivative[0]).all()
                 assert np.abs(derivative[0]).max(initial=0.0) < 1e3
         assert scale <= last
         last = scale

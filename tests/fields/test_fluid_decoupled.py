@@ -1,0 +1,48 @@
+"""The matrix for incomplete factors of second-order flows: couplings of different velocity components are left out."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+from programs import PARALLEL
+
+from solvers.fluid.decoupled import decoupled
+
+SETUPS = Path(__file__).parents[1] / "setups"
+
+
+def check(comm):
+    """A full matrix of 10 unknowns: two components of the velocity and, numbered 2, the pressure."""
+    component = np.array([0, 1, 0, 1, 0, 1, 2, 2, 0, 1])
+    entries = 1.0 + np.arange(100.0).reshape(10, 10)
+    matrix = PETSc.Mat().createAIJ((10, 10), comm=comm)
+    matrix.setUp()
+    rows = np.arange(*matrix.getOwnershipRange())
+    matrix.setValues(rows.astype(np.int32), np.arange(10, dtype=np.int32), entries[rows])
+    matrix.assemble()
+    same = component[:, None] == component[None]
+    expected = np.where(same | (component[:, None] == 2) | (component[None] == 2), entries, 0.0)
+    found = decoupled(matrix, component[rows])
+    indptr, columns, values = found.getValuesCSR()
+    assert len(values) == np.count_nonzero(expected[rows])
+    np.testing.assert_array_equal(values, expected[rows][expected[rows] > 0.0])
+    np.testing.assert_array_equal(columns, np.nonzero(expected[rows])[1])
+    np.testing.assert_array_equal(np.diff(indptr), np.count_nonzero(expected[rows], axis=1))
+
+
+def test_what_is_left_out():
+    check(MPI.COMM_SELF)
+
+
+def test_the_same_on_two_processes():
+    """Columns of the other process have their components from there."""
+    command, environment = ["mpirun", "-n", "2", sys.executable, __file__], {**PARALLEL, "PYTHONPATH": str(SETUPS)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100)
+    assert done.returncode == 0, done.stderr
+
+
+if __name__ == "__main__":
+    check(MPI.COMM_WORLD)
