@@ -1,4 +1,4 @@
-"""Balances of the interface: what the solid took against what the fluid gave, force by force and as work."""
+"""Balances of the interface: the load in the solid's balance against the force of the fluid, as forces and as work."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ COLUMNS = {
 
 
 class Balance:
-    """What the last step left over.
+    """Residuals of force and work of the last step.
 
-    With the load f that the fluid's force is at the end of the step and f_n at its start, the solid's balance asks for
-    the mean m = w f + (1 - w) f_n. What the solid took is measured without it: its own balance, b, is inertia, damping,
-    inner forces, own loads and contact.
+    With the fluid's force f at the end of the step and f_n at its start, the load in the solid's balance is the mean
+    m = w f + (1 - w) f_n. It is compared with b, which is computed without it: the sum of inertia, damping, inner
+    forces, own loads and contact.
 
         force = |b - m| / |m|,  work = sum over steps of b . (d - d_n) - dt f . g
     """

@@ -1,4 +1,4 @@
-"""Surfaces of elastic bodies as contact sees them: facets, dofs, and what supports hold there."""
+"""Contact surfaces of elastic bodies: facets, dofs, and the components that supports prescribe."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def contact_surface(bodies: Sequence[Body], body: str, *surfaces: str) -> Surfac
 
 
 def _held(comm: MPI.Comm, start: int, body: Body, dofs: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Projections on what supports hold at nodes with these global dofs, shape (n, dim, dim) (collective)."""
+    """Projections on prescribed components at nodes with these global dofs, shape (n, dim, dim) (collective)."""
     supports = prescribe(body)
     along_axes = np.isin(dofs, np.concatenate(comm.allgather(start + supports.dofs)))
     found = along_axes[:, :, None] * np.eye(body.dim)

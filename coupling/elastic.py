@@ -80,9 +80,9 @@ class Elastic:
         return force.ravel()
 
     def taken(self) -> Array:
-        """What inertia, damping, inner forces, own loads and contact leave open, averaged over the step.
+        """The residual of inertia, damping, inner forces, own loads and contact, averaged over the step.
 
-        Supports would fill any gap: where they hold, it is the load that was handed over.
+        The reaction of a support balances any load: at prescribed components it is the given load.
         """
         structure, weight = self.structure, self.force_weight
         handed_over = weight * structure.now.surface + (1.0 - weight) * structure.old.surface

@@ -36,7 +36,7 @@ class DrySide:
 class Interface:
     """All wetted surfaces, vertices of one after those of the other; `dry_sides` close those with two ends.
 
-    The velocity that the fluid sees follows from the displacements by the fluid's own time rule,
+    The velocity of the surface in the fluid follows from the displacements by the fluid's own time rule,
     g = alpha d_{n+1} - sum_k beta_k d_{n-k}, so that fluid and surface sweep the same volume.
     """
 
@@ -84,7 +84,7 @@ class Interface:
         return g
 
     def move(self, d: Array) -> dict[str, Motion]:
-        """Take displacements d [m] and say how each surface moves."""
+        """Take displacements d [m]; returns the motion of each surface."""
         self.now = d.copy()
         return self._motions(d, self.velocity(d))
 

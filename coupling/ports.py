@@ -44,7 +44,7 @@ class Part(System, Stateful, Protocol):
 
     def begin_step(self, t: float, dt: float) -> None: ...
     def solve(self) -> StepInfo:
-        """Alone, what it gets from the other one held. Raises StepFailed."""
+        """Solve it alone, with the data of the other part fixed. Raises StepFailed."""
         ...
 
     def end_step(self) -> None:
@@ -56,7 +56,7 @@ class Part(System, Stateful, Protocol):
         ...
 
     def right_side(self) -> Array:
-        """What the increment has to make up for: minus the residual."""
+        """Right-hand side for the increment: minus the residual."""
         ...
 
     def update(self, increment: Array) -> float:
@@ -92,7 +92,7 @@ class Solid(Part, Protocol):
         ...
 
     def predict(self, t: float) -> None:
-        """A first guess for the time t."""
+        """The predictor for the time t."""
         ...
 
     def displacement(self) -> Array:
@@ -112,7 +112,7 @@ class Solid(Part, Protocol):
         ...
 
     def taken(self) -> Array:
-        """The load that its balance of the last step asked for, found without what `load` got, shape (m,)."""
+        """The load that follows from its balance of the last step, computed without that of `load`, shape (m,)."""
         ...
 
     def taken_at_start(self) -> Array:
@@ -124,7 +124,7 @@ class Solid(Part, Protocol):
         ...
 
     def row_transformation(self) -> RowTransformation | None:
-        """What takes the multipliers of contact out of its rows; None if nothing is near."""
+        """The transformation of its rows that eliminates contact multipliers; None if no surfaces are near."""
         ...
 
     def recover(self, taken: TakenRows, du: Array) -> None:
@@ -132,7 +132,7 @@ class Solid(Part, Protocol):
         ...
 
     def missing(self) -> Array:
-        """What supports still ask of its unknowns, zero at free ones."""
+        """Prescribed less present values of its unknowns, zero at free ones."""
         ...
 
     def impose_rows(self, blocks: Sequence[PETSc.Mat], x: Array, b: Array) -> list[PETSc.Mat]:
@@ -140,7 +140,7 @@ class Solid(Part, Protocol):
         ...
 
     def check(self, info: StepInfo) -> None:
-        """Raise StepFailed for a solution that cannot be."""
+        """Raise StepFailed for an inadmissible solution."""
         ...
 
     def touching(self) -> NDArray[np.bool_] | None:
@@ -172,7 +172,7 @@ class Flow(Part, Protocol):
     current: FlowStep  #: the step that it computes, with the rule for derivatives in time
 
     def predict(self) -> None:
-        """A first guess for the end of the step."""
+        """The predictor for the end of the step."""
         ...
 
     def move(self, surfaces: Mapping[str, Motion], *, with_solid: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""Surfaces of elastic bodies as the fluid sees them: closed, of segments or triangles, and where they are wet."""
+"""Surfaces of elastic bodies in the fluid: closed, of segments or triangles, with the wet facets marked."""
 
 from __future__ import annotations
 

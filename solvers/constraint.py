@@ -1,4 +1,4 @@
-"""What a field sees of constraints on its unknowns that are eliminated with multipliers: contact."""
+"""Constraints on a field's unknowns whose multipliers are eliminated: contact."""
 
 from __future__ import annotations
 
@@ -63,11 +63,11 @@ class Constraint(Stateful, Protocol):
         ...
 
     def violation(self, weight: float) -> float:
-        """Norm [N] of what the constraints miss."""
+        """Norm [N] of the residual of the constraints."""
         ...
 
     def condense(self, weight: float) -> RowTransformation:
-        """What takes the multipliers out of the linearised balance without `force`, whose weight in it is given."""
+        """Elimination of the multipliers from the linearised balance without `force`, which has a weight in it."""
         ...
 
     def recover(self, balance: Array, du: Array) -> None:

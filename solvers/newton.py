@@ -42,7 +42,7 @@ class System(Protocol):
 
 @dataclass(frozen=True)
 class Iterate:
-    """One look at the system."""
+    """The state of the iteration."""
 
     number: int  #: linear solves so far
     residual: float
@@ -90,7 +90,7 @@ def _halve(system: System, before: float, increment: float, residual: float) -> 
 def converge(system: System, tolerance: Tolerance, unmoved: float = 0.0) -> StepInfo:
     """Iterate until accepted. Raises StepFailed with the history of residuals and the worst place.
 
-    `unmoved`: residual [N] before a first guess moved the system; a good guess does not make the tolerance stricter.
+    `unmoved`: residual [N] before the predictor; a good predictor does not make the tolerance stricter.
     """
     history: list[float] = []
     for iterate in iterates(system, line_search=tolerance.line_search):

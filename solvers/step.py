@@ -1,4 +1,4 @@
-"""A step of time, as fields hand it on."""
+"""A time step."""
 
 from __future__ import annotations
 

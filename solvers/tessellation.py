@@ -1,4 +1,4 @@
-"""Surfaces of meshes as linear simplices: what a fluid sees of a solid, whatever cells the solid has."""
+"""Surfaces of meshes as linear simplices: the surface of a solid in a fluid, whatever cells the solid has."""
 
 from __future__ import annotations
 

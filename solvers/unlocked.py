@@ -1,4 +1,4 @@
-"""PETSc's solve without Python's global lock: other threads run meanwhile, such as the one that answers to signals.
+"""PETSc's solve without Python's global lock: other threads run meanwhile, such as the one that handles signals.
 
 petsc4py keeps the lock. Through ctypes it is released; callbacks of petsc4py take it again.
 """

@@ -1,4 +1,4 @@
-"""Which named surfaces of bodies can meet: those that see each other and are near enough."""
+"""Which named surfaces of bodies can meet: those that face each other and are near enough."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ def _patches(settings: FluidSection) -> list[Patch]:
 
 
 def _with_layer(case: Case, body: ImmersedBody) -> ImmersedBody:
-    """The body with what the flow finds along its surface."""
+    """The body with slip length and transmissivity of its surface."""
     assert case.fluid is not None
     name, film = body.surface.name, FilmSection() if case.contact is None else case.contact.film
     settings = case.fluid.bodies.get(name) or case.elastic_bodies.get(name)

@@ -1,4 +1,4 @@
-"""The boundary of an elastic body as the fluid sees it."""
+"""The boundary of an elastic body in the fluid."""
 
 from __future__ import annotations
 

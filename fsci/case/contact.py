@@ -115,9 +115,9 @@ class ObstacleSection(Section):
 
 
 class FilmSection(Section):
-    """How easily fluid passes between surfaces that touch or nearly do, by the one or the other number.
+    """Flow of fluid between surfaces that touch or nearly do, by one of two numbers.
 
-    Bodies in contact have a rough or porous layer on all of their surface; between two of them fluid passes in both.
+    Bodies in contact pairs have a rough or porous layer on their whole surface; between two of them the layers add up.
     """
 
     transmissivity: NotNegative | None = setting(

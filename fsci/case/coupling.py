@@ -13,7 +13,7 @@ PARTITIONED = ("accelerator", "relaxation", "reuse", "tolerance", "tolerance_abs
 
 
 class Coupling(Section):
-    """Fluid and structure at once (monolithic), or one after the other until they agree (partitioned)."""
+    """Fluid and structure in one system (monolithic), or alternately until they agree (partitioned)."""
 
     scheme: Literal["monolithic", "partitioned"] = setting(
         "monolithic", "monolithic: one Newton iteration for all; partitioned: Dirichlet-Neumann iterations"

@@ -96,7 +96,7 @@ class PatchSection(Section):
 
     @property
     def open(self) -> bool:
-        """It says how high the pressure is."""
+        """It determines the level of the pressure."""
         return PATCH_KINDS[self.kind].open
 
 
@@ -191,7 +191,7 @@ class FluidSection(Section):
 
     @property
     def free_bodies(self) -> dict[str, Free]:
-        """Those that the flow moves."""
+        """Bodies that move freely in the flow."""
         return {name: body.free for name, body in self.bodies.items() if body.free is not None}
 
     @property

@@ -1,4 +1,4 @@
-"""Rigid bodies that the flow moves: what is said of them besides their shape."""
+"""Rigid bodies that the flow moves: their settings besides the shape."""
 
 from __future__ import annotations
 
@@ -54,5 +54,5 @@ class RigidDynamics(Section):
     )
 
 
-#: Ways that there are in 2D.
+#: Degrees of freedom in 2D.
 PLANE = ("x", "y", "rotation")

@@ -42,7 +42,7 @@ def flow_doubts(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
 
 
 def _fast_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
-    """Bodies that cross too many cells in a step; how fast those are that turn only the mesh tells."""
+    """Bodies that cross too many cells in a step; rotating ones need the mesh."""
     for name, body in fluid.bodies.items():
         if body.motion is not None and body.motion.rotation is None:
             if doubt := fast_body(case, fluid, body.motion, np.zeros((1, fluid.grid.dimension))):
@@ -67,7 +67,7 @@ def fast_body(case: Case, fluid: FluidSection, motion: Movement, points: NDArray
 
 
 def _thin_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
-    """Built-in shapes through which fluid passes; of files only the mesh tells."""
+    """Built-in shapes through which fluid passes; those of files need the mesh."""
     rigid = fluid.bodies.items()
     moving = {("fluid", "bodies", name): (body.mesh, bool(body.motion or body.free)) for name, body in rigid}
     elastic = {("structure", "bodies", name): (body.mesh, True) for name, body in case.elastic_bodies.items()}

@@ -139,7 +139,7 @@ def _reference(reference: Reference, dimension: int, keys: Keys) -> Iterator[Mis
 
 
 def verify_mistakes(case: Case) -> Iterator[Mistake]:
-    """Of all checks: columns that there will not be, times that are not of the run."""
+    """Of all checks: columns that the run will not have, times outside of the run."""
     columns = [column for name, probe in case.probes.items() for column in probe.columns(name, case.dimension or 3)]
     columns += RUN_COLUMNS
     columns += [column for field, column in FIELD_COLUMNS.items() if getattr(case, field) is not None]

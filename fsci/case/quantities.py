@@ -1,4 +1,4 @@
-"""What probes can measure: each quantity with its places, unit, columns and needs, said once."""
+"""What probes can measure: each quantity with its places, unit, columns and needs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rigid motions that formulas of time prescribe."""
+"""Rigid motions prescribed by functions of time."""
 
 from __future__ import annotations
 

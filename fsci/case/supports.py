@@ -42,7 +42,7 @@ class Located(Section):
 
 
 class SupportSection(Located):
-    """Where the displacement is prescribed: all components, or only one along a direction, the others being free.
+    """A prescribed displacement: by components, or along one direction with the other directions free.
 
     At a node with several supports all of them hold; of those that contradict each other the last one counts.
     """
@@ -78,7 +78,7 @@ class SupportSection(Located):
 
 
 class SpringSection(Located):
-    """An elastic foundation: it pulls the body back to where it is without deformation."""
+    """An elastic foundation: it pulls the body back to its undeformed position."""
 
     on: Surfaces | None = setting(None, "name of a surface, or of points of a mesh file, or list of names")
     at: NumberVector | None = setting(None, AT, unit="m")

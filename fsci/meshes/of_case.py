@@ -1,4 +1,4 @@
-"""The meshes of a case with what the case names in them: all that they alone can tell is wrong, for `check` and a run.
+"""The meshes of a case with what the case names in them: the mistakes that only they show, for `check` and a run.
 
 Nothing here needs a finite element.
 """

@@ -1,4 +1,4 @@
-"""The active set: which multipliers are in contact, and whether they stick; a guard against circles."""
+"""The active set: which multipliers are in contact, and whether they stick; a guard against cycles."""
 
 from __future__ import annotations
 

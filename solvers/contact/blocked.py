@@ -1,4 +1,4 @@
-"""Multipliers that cannot be: supports, or another multiplier, leave them no direction to act in."""
+"""Multipliers that are excluded: supports, or another multiplier, leave them no direction to act in."""
 
 from __future__ import annotations
 

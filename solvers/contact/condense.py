@@ -6,7 +6,7 @@ With J the tangent and R the balance without multipliers, both at the interface,
     G zeta + H du + r = 0                    the law, one row for each zeta
 
 where w is the weight of the new contact force in the balance and F zeta the force of multipliers on all nodes. The
-columns of Q are the directions, orthonormal at each node, in which the nodes with multipliers feel them. Then
+columns of Q are the directions, orthonormal at each node, in which multipliers act on their nodes. Then
 B = Q^T F P is invertible, block by block,
 
     zeta = B^-1 Q^T ((J - w F Z) du + R) / w,

@@ -38,8 +38,9 @@ class Contact:
     z are the multipliers [Pa]: the negative traction on the slave, z_n = n.z >= 0 the contact pressure.
 
     keep_overlap: a node whose mean gap is negative at the start of a step need not close it, only not deepen it. That
-    happens where a slave slides onto a master: a node bends into it unseen. Closed at once, or as its area grows, it
-    would be shot away; kept, contact does no work. For dynamics; the first step closes all there is.
+    happens where a slave slides onto a master: a node bends into it before it has a master. Closed in one step, or as
+    its area grows, the overlap would accelerate the node; kept, contact does no work. For dynamics;
+    the first step closes all there is.
     """
 
     def __init__(
@@ -174,7 +175,7 @@ class Contact:
             mortar.clear_until = -np.inf
 
     def point(self, which: NDArray[np.int64]) -> Point:
-        """What a law is told of its multipliers."""
+        """Arguments of a law for its multipliers."""
         assert self.terms is not None
         stiffness, slip = self._stiffness[which], self.slip
         return Point(
@@ -262,7 +263,7 @@ class Contact:
         return on_slave + self.terms.M.T @ self.z
 
     def violation(self, weight: float) -> float:
-        """Norm [N] of what the multipliers in contact miss of their laws."""
+        """Norm [N] of the residual of the laws of multipliers in contact."""
         self._weight = weight
         if self.terms is None:
             return 0.0
@@ -294,7 +295,7 @@ class Contact:
         return linearise(self.interface, self._spans, parts, slopes, force, self.terms.dforce, weight)
 
     def condense(self, weight: float) -> RowTransformation:
-        """What makes rows without multipliers of the linearised balance without the new contact force.
+        """The transformation that eliminates the multipliers from the linearised balance without the new contact force.
 
         weight: of that force in the balance.
         """

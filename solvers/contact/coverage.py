@@ -1,4 +1,4 @@
-"""Which multipliers see enough of a master to have a constraint."""
+"""Which multipliers a master covers enough for a constraint."""
 
 from __future__ import annotations
 

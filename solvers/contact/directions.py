@@ -1,8 +1,9 @@
-"""Directions of force: those that multipliers have, and those in which their nodes feel them.
+"""Directions of force: those of multipliers, and those in which they act on their nodes.
 
-What a support holds feels nothing: a multiplier acts there on the support. So a node held in some components feels the
-normal traction in the others only, and one with several multipliers (an edge in a corner) each in a direction of its
-own. A multiplier whose node has no such direction left cannot be: it would contradict the support or another one.
+Along a direction that a support prescribes a multiplier acts on the support, not on the node. So the normal traction
+acts on a node with prescribed components along the free ones only, and on a node with several multipliers (an edge in a
+corner) each acts along a direction of its own. A multiplier without such a direction is excluded: it would contradict
+the support or another multiplier.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ LEAST_FREE = 1e-2
 
 @dataclass(frozen=True)
 class Directions:
-    """For m multipliers with K degrees of freedom zeta: z = P zeta + Z du, felt in the directions Q of the nodes."""
+    """For m multipliers with K degrees of freedom zeta: z = P zeta + Z du, along directions Q of the nodes."""
 
     basis: Sparse  #: P, shape (dim * m, K)
     felt: Sparse  #: Q, orthonormal, shape (dim * N, K)
@@ -31,7 +32,7 @@ class Directions:
 
 
 def free_normals(normals: Array, node: NDArray[np.int64], held: Array) -> Array:
-    """What each multiplier's node can feel of its normal when those before it have their share, shape (m, dim).
+    """The free part of each normal, orthogonal to those of earlier multipliers at the node, shape (m, dim).
 
     Made unit; zero where (almost) nothing is left. held: projections on what supports hold, shape (N, dim, dim).
     """

@@ -1,8 +1,8 @@
 """A binary tree on the facets of one surface, built bottom-up by joining neighbours.
 
-Every subtree is a connected piece of the surface. So a piece that is hardly bent is seen as one: if all its normals lie
-within a cone that is so narrow that no two of them are opposed, the piece cannot touch itself and is not looked into.
-Without that every search would end at all the neighbours of all facets.
+Every subtree is a connected piece of the surface. If all normals of a piece lie within a
+cone so narrow that no two of them are opposed, the piece cannot touch itself and its inside is not searched. Without
+this criterion every search would return all neighbours of all facets.
 Source: Yang & Laursen, Comput. Mech. 41 (2008), section 3: dual graph, curvature criterion.
 """
 

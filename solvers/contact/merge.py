@@ -1,8 +1,8 @@
 """Multipliers of one node that meet the same surface act as one.
 
-A node on a sharp edge has a multiplier for each side of it. In a corner between two walls each meets its own wall.
-Where the edge itself points at a surface both sides see that surface: their gaps then say the same of the node, and
-with two constraints no balance would be left along the surface. There the sides have one multiplier with the sum of
+A node on a sharp edge has a multiplier for each side of it. In a corner between two walls each has its own wall
+as master. Where the edge itself points at a surface both sides have that master: their gaps are then equivalent, and
+with two constraints no tangential balance would be left. There the sides have one multiplier with the sum of
 their functions, along the mean of their normals.
 """
 
@@ -55,7 +55,7 @@ class Merging:
         return connected_parts(pairs[:, 0], pairs[:, 1], len(own)) if len(pairs) else own
 
     def _same(self, terms: Terms, which: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Pairs of multipliers at one node whose gaps say the same of it, shape (p, 2)."""
+        """Pairs of multipliers at one node whose gaps are equivalent, shape (p, 2)."""
         which = which[np.argsort(self._node[which], kind="stable")]
         directions = _gap_directions(terms, which, self._node[which])
         found = [np.empty((0, 2), dtype=np.int64)]

@@ -124,8 +124,8 @@ class Mortar:
     def keep(self, used: NDArray[np.int32]) -> None:
         """Facet pairs in use (of all processes) stay in use until the next step, from some evaluation on.
 
-        Whether facets see each other is a hard decision: were it taken anew each time, Newton's last iterates could
-        jump to and fro between two sets of pairs. Pairs still come in, but none goes.
+        Whether facets see each other is a hard decision: taken again each time, Newton's last iterates could
+        alternate between two sets of pairs. Pairs are still added, but none is removed.
         """
         self._evaluations += 1
         if self._evaluations >= KEEP_AFTER:

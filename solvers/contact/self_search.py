@@ -22,8 +22,8 @@ CHUNK = 256
 class SelfSearch:
     """Pairs (slave facet, master facet) of one surface; roles are chosen anew in each step and stay within it.
 
-    A facet sees the other side of its own wall behind itself, like a master into which it has sunk by the thickness of
-    the wall. A pair that overlaps by more than half of that thickness is the wall.
+    The other side of a facet's own wall looks like a master that the facet has penetrated by the thickness of the
+    wall. A pair that overlaps by more than half of that thickness is the wall.
     """
 
     clearance = -np.inf  #: [m]; a surface is never clear of itself

@@ -1,6 +1,6 @@
 """Surfaces cut at their sharp edges: a node on one is split, one on each side, and no normal is a mean across it.
 
-Around a node, facets belong together if a way from one to the other crosses no sharp edge. So an edge may also end
+Around a node, facets belong together if a path from one to the other crosses no sharp edge. So an edge may also end
 within a surface: its last node is not split.
 """
 

@@ -5,7 +5,7 @@ With the integrals of the beginning (n) and of the iterate, and x the positions 
     D_j^n s_j = W_j^n x_slave - M_j^n x_master + int Phi_j (x_m - x_s) = -[(W - W^n) x_slave - (M - M^n) x_master]_j .
 
 W_jk = int Phi_j N_k is D but on slivers. Points that were together at the beginning are followed: a common rigid motion
-has no slip, for the integrals do not feel it. Only the part along the surface matters.
+does not change the integrals and has no slip. Only the part along the surface matters.
 Source: Gitterle, Popp, Gee & Wall, Int. J. Numer. Meth. Engng 84 (2010), section 3.
 """
 

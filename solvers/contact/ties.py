@@ -1,7 +1,7 @@
 """Mortar integrals of tied surfaces: computed once, where the bodies have no displacement.
 
 With W_jk = int Phi_j N_k over the slave and M_jl = int Phi_j N_l, both for the meshes as they were read, multiplier j
-asks for
+requires
 
     sum_k W_jk u_k - sum_l M_jl u_l = 0 .
 

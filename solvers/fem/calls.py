@@ -1,6 +1,6 @@
 """The calls that differ between generations of DOLFINx, chosen by what is installed.
 
-Both modules have the same functions. A generation is told by what it can do, not by its number.
+Both modules have the same functions. A generation is recognised by its functions, not by its number.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The cache of compiled forms, shared by all programs of a user: who compiles, who waits, and what is said meanwhile.
+"""The cache of compiled forms, shared by all programs of a user: which process compiles, which ones wait, messages.
 
 DOLFINx marks a form that is being compiled by a .c file without a .c.cached beside it. It waits for such a mark as
 long as its timeout allows, also when the process that made it was killed. Here the process that compiles locks a file.

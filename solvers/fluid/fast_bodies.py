@@ -23,7 +23,7 @@ def cells_per_step(grid: Grid, velocity: np.ndarray, dt: float) -> float:
 
 
 def warning(name: str, cells: float, dt: float) -> str:
-    """What to say of a body that crosses so many cells in a step of this size [s]."""
+    """The warning about a body that crosses so many cells in a step of this size [s]."""
     return (
         f"body '{name}' crosses {cells:.2g} cells in a time step: the velocity is extrapolated to the cells that it "
         "leaves, and forces are inaccurate; "
@@ -32,7 +32,7 @@ def warning(name: str, cells: float, dt: float) -> str:
 
 
 class FastBodies:
-    """Says of each body that it is too fast, again only when it is twice as fast."""
+    """Warns of each body that is too fast, again only when it is twice as fast."""
 
     def __init__(self, grid: Grid):
         self._grid = grid

@@ -1,8 +1,8 @@
 """Geometric multigrid for the flow: the planes of the grid are thinned out level by level.
 
-Velocity and pressure live on lattices, products of planes. A coarse lattice keeps some of the planes; values between
-them follow by multilinear interpolation P, coarse matrices are P^T A P. Held unknowns, those without fluid among them,
-get no correction. The first coarse lattice of a velocity of second degree is that of the vertices.
+The nodes of velocity and pressure are lattices, products of planes. A coarse lattice keeps some of the planes; values
+between them follow by multilinear interpolation P, coarse matrices are P^T A P. Held unknowns, those without fluid
+among them, get no correction. The first coarse lattice of a velocity of second degree is that of the vertices.
 Source: Trottenberg, Oosterlee, Schuller, Multigrid (2001), sections 2.4, 5.1 and 8.7.
 """
 

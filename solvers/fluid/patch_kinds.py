@@ -1,4 +1,4 @@
-"""Kinds of conditions on the faces of the box. All that a kind is, its record says; yours may be another one.
+"""Kinds of conditions on the faces of the box. A kind is defined by its record; you may add your own.
 
 A kind prescribes components of the velocity, or the stress t = sigma n [Pa] that acts on the fluid from outside. The
 equations then have -<t, v> with the test functions v of the velocity.
@@ -73,7 +73,7 @@ def _slip_slope(faces: WetPart, mu: float, mass_flux: Array, b: Array | None) ->
 
 
 def _outflow(flow: Coefficients, u: Expr, value: Expr, n: Expr, v: Expr) -> Expr:
-    """What a parallel flow leaves unharmed, mu d_n u - p n = 0, and no energy comes back.
+    """No disturbance of a parallel flow, mu d_n u - p n = 0, and no energy that flows in.
 
     -<mu (grad u)^T n, v> - rho/2 <min(0, u . n) u, v>. Source: Braack, Mucha, J. Comput. Math. 32 (2014) 507-521.
     """

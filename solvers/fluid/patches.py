@@ -21,8 +21,9 @@ class Patch:
     """Part of the box's boundary with one condition.
 
     velocity: all components; no_slip: zero; slip, symmetry: no flow through, no shear; traction [Pa]: sigma n;
-    pressure [Pa]: n . sigma n = -p, no velocity along the face; outflow: what a parallel flow does, without energy
-    coming back in; periodic: the flow goes on at the opposite face, which belongs to the patch, too. Or your own kind.
+    pressure [Pa]: n . sigma n = -p, no velocity along the face; outflow: mu du/dn - p n = 0, as a parallel flow has
+    it, without energy that flows in; periodic: the opposite face, which belongs to the patch, too, has the same flow.
+    Or your own kind.
     """
 
     name: str

@@ -24,7 +24,7 @@ FAR = 2**48
 
 @dataclass(frozen=True)
 class LatticeNodes:
-    """Where velocity or pressure live; local nodes."""
+    """Nodes of velocity or pressure; local ones."""
 
     dofs: NDArray[np.int32]  #: shape (n, components)
     points: Array  #: positions [m], shape (n, dim); of a node at the end those of its twin

@@ -1,4 +1,4 @@
-"""Parts of the fluid that bodies and walls close off: nothing says how high the pressure in them is."""
+"""Parts of the fluid that bodies and walls close off, whose pressure has no given level."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Pocket:
 
     cells: Mask  #: which local cells belong to it; cells of other processes are left out
     largest: bool  #: no pocket has more cells
-    elastic: bool  #: a surface that another field moves bounds it, by its elasticity its pressure may be known
+    elastic: bool  #: a surface that another field moves bounds it, whose elasticity may determine its pressure
 
 
 def find_pockets(

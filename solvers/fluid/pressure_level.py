@@ -1,4 +1,4 @@
-"""The level of the pressure where nothing determines it: held at one node meanwhile, and no node an outlet."""
+"""The level of a pressure that has no given one: fixed at one node in the linear system, without an outlet there."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Hold:
 
 
 def hold_pressure(system: FlowSystem, elastic: Mask, *, set_by_solids: bool) -> list[Hold]:
-    """One node of each pocket where nothing says how high the pressure is (collective).
+    """One node of each pocket whose pressure has no given level (collective).
 
     `elastic`: vertices that another field moves; `set_by_solids`: the pressure at them follows from the volume
     that they leave. The level is zero if all of the box is closed, else that of the time when the pocket closed.
@@ -91,7 +91,7 @@ def _shares(comm: MPI.Comm, sizes: Array) -> Array:
 def keep_levels(comm: MPI.Comm, holds: list[Hold], flow: Array) -> None:
     """Shift the pressure of each pocket that keeps its level so that its mean does (collective).
 
-    One node has held it meanwhile. Which one must not matter: the flow turned around would have another level.
+    It was fixed at one node. The result must not depend on which one: in a rotated flow it is another.
     """
     for hold in holds:
         if hold.keeps_level and comm.allreduce(float(hold.shares_before.sum())) > 0.0:
@@ -101,7 +101,7 @@ def keep_levels(comm: MPI.Comm, holds: list[Hold], flow: Array) -> None:
 def spread_excess(comm: MPI.Comm, holds: list[Hold], rows: Array) -> None:
     """Balance the net flux into a closed pocket by a uniform source in its fluid (collective).
 
-    Else the one node that fixes the pressure is all of the outlet: an error of pressure that no mesh cures.
+    Otherwise the fixed node would be an outlet: an error of the pressure that does not vanish with the cells.
     """
     for hold in holds:
         excess = comm.allreduce(float(rows[hold.inside].sum()))

@@ -191,7 +191,7 @@ def mass_balance(fluid: Fluid) -> Callable[[], dict[str, float]]:
 
 
 class Forces:
-    """The reactions of the bodies, found once for all probes until they are told to `forget`."""
+    """The reactions of the bodies, computed once for all probes of a step, until `forget`."""
 
     def __init__(self, fluid: Fluid):
         self.fluid = fluid

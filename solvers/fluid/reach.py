@@ -51,7 +51,7 @@ def require_finest(cutter: Cutter, comm: MPI.Comm) -> None:
 
 
 def require_within_period(unknowns: Unknowns, cut: Cut) -> None:
-    """Raise StepFailed where bodies reach its end: their surfaces know nothing of the cells beyond (collective)."""
+    """Raise StepFailed where bodies reach its end: their surfaces do not cut the cells beyond (collective)."""
     grid = unknowns.grid
     changed = cut.fraction < 1.0 - NOTHING
     changed[np.concatenate([cut.cut, cut.strip])] = True

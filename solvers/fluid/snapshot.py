@@ -59,7 +59,7 @@ def _corners(fluid: Fluid, degree: int) -> np.ndarray:
 def _bodies(fluid: Fluid) -> list[Snapshot]:
     """Rigid surfaces with their velocity and the fluid's force per area on them (zero before the first step).
 
-    An elastic body is the structure's to show.
+    Elastic bodies are in the snapshots of the structure.
     """
     found, start = [], 0
     forces = fluid.force() if fluid.bodies and fluid.started else {}

@@ -24,7 +24,7 @@ Dofs = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class FlowNodes:
-    """Where one quantity lives; local nodes, owned ones first."""
+    """Nodes of one quantity; local ones, owned ones first."""
 
     dofs: Dofs  #: local dofs, shape (nodes, components)
     points: Array  #: positions [m], shape (nodes, dim)
@@ -38,7 +38,7 @@ class Unknowns:
     """Q1-Q1 (degree 1) or Q2-Q1 (degree 2): velocity and pressure in one function space.
 
     Along `periodic` axes (0, 1, 2) the nodes at the end of the box are those at its beginning: cells at the end have
-    their unknowns. So nothing that is assembled by cells knows of the period.
+    their unknowns. So the assembly by cells does not depend on the period.
     """
 
     def __init__(self, grid: DistributedGrid, degree: int, periodic: Sequence[int] = ()):

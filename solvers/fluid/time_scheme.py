@@ -56,7 +56,7 @@ def bdf2(dt: float, dt_before: float) -> Difference:
 def _bdf2_started(dt: float, before: Sequence[float]) -> Difference:
     """The first two steps are backward Euler.
 
-    Both keep the order, and after only one BDF2 would take back half of what a flow that starts at once gained in it.
+    Both keep the order. After a single one BDF2 would reverse half of the velocity that an impulsive start gains.
     """
     return backward_euler(dt) if len(before) < 2 else bdf2(dt, before[0])
 

@@ -300,7 +300,7 @@ class RigidBodies:
         return self._add(np.linalg.solve(self._system(), right))
 
     def _system(self) -> Array:
-        """The tangent with rows and columns of the identity for held ways."""
+        """The tangent with rows and columns of the identity for held components."""
         matrix, held = self.tangent(), ~self._free
         matrix[held], matrix[:, held] = 0.0, 0.0
         matrix[held, held] = 1.0
@@ -333,7 +333,7 @@ class RigidBodies:
         self.place(self._u - fraction * self._last)
 
     def settled(self) -> bool:
-        """The residual says all: it vanishes only where gaps and pressures fit."""
+        """True: the residual vanishes only where gaps and pressures fit."""
         return True
 
     def rounded(self) -> Array:
@@ -369,11 +369,11 @@ class RigidBodies:
         """Pressures follow from the balance where it is evaluated next."""
 
     def missing(self) -> Array:
-        """Held ways are where they have to be from the start of the step on."""
+        """Zero: held components have their values from the start of the step on."""
         return np.zeros(self.size)
 
     def impose_rows(self, blocks: Sequence[PETSc.Mat], x: Array, b: Array) -> list[PETSc.Mat]:
-        """Rows of held ways ask for what x has there; the first of the blocks beside each other is its own."""
+        """Rows of held components become du = x there; the first of the blocks beside each other is its own."""
         changed = list(blocks)
         rows = np.flatnonzero(~self._free[: self.size]).astype(PETSc.IntType)
         for index, block in enumerate(changed):

@@ -21,7 +21,7 @@ def largest_extent(comm: MPI.Comm, bodies: Sequence[Body]) -> float:
 
 
 def flown_off(comm: MPI.Comm, u: Array, extent: float) -> str | None:
-    """Why displacements u [m] cannot be, for bodies of this size [m]; None if they can (collective)."""
+    """Why displacements u [m] are inadmissible, for bodies of this size [m]; None if they are not (collective)."""
     farthest = comm.allreduce(float(np.abs(u).max(initial=0.0)), op=MPI.MAX)
     if farthest > FLOWN_OFF * extent:
         return f"a displacement of {farthest:.3g} m is far larger than the body: is a body not supported?"
@@ -29,7 +29,7 @@ def flown_off(comm: MPI.Comm, u: Array, extent: float) -> str | None:
 
 
 def inverted(bodies: Sequence[Body]) -> tuple[str, tuple[float, ...]] | None:
-    """(why the deformation cannot be, reference position [m]) if a body is turned inside out anywhere (collective)."""
+    """(why the deformation is inadmissible, reference position [m]) if an element is inverted (collective)."""
     volume_ratio, name, place = min((body.smallest_jacobian() for body in bodies), key=lambda jacobian: jacobian[0])
     if volume_ratio > 0.0:
         return None

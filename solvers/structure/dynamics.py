@@ -36,7 +36,7 @@ class Dynamics:
     The forces f = f_int - f_ext - f_contact are averaged, not evaluated in the middle.
 
     Contact surfaces have no mass. Their rows are static balances at n+1, times 1 - alpha_f: the old forces there are in
-    balance and drop out; if they were not, they would ring for ever. Their velocity is (u_{n+1} - u_n) / dt.
+    balance and drop out; otherwise they would oscillate without damping. Their velocity is (u_{n+1} - u_n) / dt.
     """
 
     scheme: GeneralisedAlpha
@@ -78,7 +78,7 @@ class Dynamics:
         self._solve_acceleration(structure)
 
     def _start_supports(self, structure: Moving, t: float, h: float) -> None:
-        """One-sided differences, so that a support that starts to move does not ring."""
+        """One-sided differences, so that a support that starts to move excites no oscillation."""
         held, now = structure.held, structure.now
         u = [held.displacement(t + k * h) for k in range(4)]
         now.v[:] = held.free_part(now.v) + (-3.0 * u[0] + 4.0 * u[1] - u[2]) / (2.0 * h)

@@ -1,8 +1,8 @@
 """Elements: the integrals of a body's energy over its cells.
 
 The plain element integrates W(F) as it is. Where the material hardly changes its volume, its cells are then too stiff
-("locking"): every quadrature point asks for det F = 1, more conditions than the nodes of a cell can fulfil. The mixed
-element asks for less. The nodal displacements remain the only unknowns in both.
+("locking"): every quadrature point requires det F = 1, more conditions than the nodes of a cell can fulfil. The mixed
+element has fewer. The nodal displacements remain the only unknowns in both.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Mixed:
 
         B^T M^-1 C M^-1 B,   q^T B du = int q dJ/du . du dX,   M = int q r dX,   C = int U''(theta) q r dX.
 
-    Newton's method is that of the three fields: p in the tangent is the one of the last iterate and its linear change.
+    Newton's method linearises the three fields: p in the tangent is that of the last iterate and its linear change.
     With p = U'(theta) instead, an iterate could turn a cell by no more than about sqrt(mu/lambda): what a straight path
     of the nodes adds to the volume is of second order, but its pressure is not small.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from solvers.api import State
 
-#: Energy from nothing, relative to the most that the bodies ever had, that is said to the user.
+#: Energy without external work, relative to the most that the bodies ever had, from which the user is warned.
 GAIN = 0.1
 
 
@@ -28,7 +28,7 @@ class EnergyBalance:
         self.kinetic, self.internal, self.friction = kinetic, internal, friction
 
     def warning(self) -> str:
-        """Words for the user the first time that bodies in motion have more energy than they can; else nothing."""
+        """A warning the first time that the energy of bodies in motion exceeds its bound; else nothing."""
         before, self.largest = self.largest, max(self.largest, self.kinetic + self.internal)
         if self.warned or self.kinetic == 0.0 or before == 0.0 or self.error <= GAIN * before:
             return ""
@@ -40,7 +40,7 @@ class EnergyBalance:
 
     @property
     def error(self) -> float:
-        """What the balance misses [J]."""
+        """Residual of the balance [J]."""
         return self.kinetic + self.internal + self.damping + self.friction - self.work - self.initial
 
     def save(self) -> State:

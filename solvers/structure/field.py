@@ -189,7 +189,7 @@ class Structure:
         return info if self.constraint is None else replace(info, numbers=self.constraint.numbers())
 
     def check_deformation(self, iteration: int, history: tuple[float, ...]) -> None:
-        """Raise StepFailed if a body flies off, as one does that nothing holds, or is turned inside out anywhere."""
+        """Raise StepFailed if a body without supports moves off, or is turned inside out anywhere."""
         reason, where = flown_off(self.comm, self.now.u, self._extent), None
         if reason is not None:
             where = self.worst()
@@ -239,7 +239,7 @@ class Structure:
         return gather_at(self.comm, owned, self.layout.start, self.constraint.dofs())
 
     def residual(self) -> float:
-        """Norm [N] of the balance over the free dofs, and of what the constraint misses."""
+        """Norm [N] of the balance over the free dofs, and of the residual of the constraint."""
         with self.timer("assembly"):
             self._assemble_bodies()
         with self.timer("contact"):
@@ -308,17 +308,17 @@ class Structure:
         return size
 
     def missing_displacement(self) -> Array:
-        """What the supports still ask of owned dofs [m], zero at free ones."""
+        """Prescribed less present displacements at owned dofs [m], zero at free ones."""
         return self.target - self.held.part(self.now.u)
 
     def right_side(self) -> Array:
-        """What an increment has to make up for [N], without the new contact force where contact may be."""
+        """Right-hand side for the increment [N], without the new contact force where contact may be."""
         if self.constraint is None or not self.constraint.near:
             return -self.residual_force
         return -(self.residual_force + self.time.force_weight * self.now.constraint)
 
     def row_transformation(self) -> RowTransformation | None:
-        """What takes the multipliers of contact out of the tangent's rows and `right_side`; None if nothing is near."""
+        """Elimination of contact multipliers from the rows of tangent and `right_side`; None if none are near."""
         if self.constraint is None or not self.constraint.near:
             return None
         with self.timer("contact"):

@@ -1,8 +1,8 @@
 """Contact surfaces without mass: the rest of the body takes it over.
 
 A node with mass that hits an obstacle has to stop at once: it loses its kinetic energy, and the force that stops it
-rings from step to step, the more the smaller the step. A surface without mass is in static balance with the body
-behind it: pressures are continuous in time, and impacts keep energy.
+oscillates from step to step, with an amplitude that grows as the step gets smaller. A surface without mass is in static
+balance with the body behind it: pressures are continuous in time, and impacts keep energy.
 Source: Khenous, Laborde & Renard, Eur. J. Mech. A/Solids 27 (2008).
 """
 

@@ -1,4 +1,4 @@
-"""A body as its supports and springs see it."""
+"""What supports and springs need of a body."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class Settling(Moving, Protocol):
 
 
 class TimeScheme(Protocol):
-    """It has no state: what it says follows from the structure at both ends of the step. Only `start` changes that."""
+    """It has no state: all results follow from the structure at both ends of the step, which only `start` changes."""
 
     @property
     def force_weight(self) -> float:
@@ -47,7 +47,7 @@ class TimeScheme(Protocol):
         ...
 
     def guess(self, structure: Moving, dt: float) -> Array:
-        """Displacement [m] in a step of length dt as its first iterate has it, at owned dofs."""
+        """Displacement [m] in a step of length dt of the first iterate, at owned dofs."""
         ...
 
     def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:

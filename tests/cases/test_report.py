@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import base64
 import json
+import re
+import shutil
+import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -100,3 +103,27 @@ def test_pieces():
     assert '<td class="ok">&lt;i&gt;</td>' in text
     assert '<td class="number">1.5</td>' in text
     assert Page(bars({"b": 1.0, "a": 3.0}, "s")).texts == ["a", "3 s", "75 %", "b", "1 s", "25 %"]
+
+
+#: Written into the page: how many pictures are drawn, of how many, and whether the page is wider than its window.
+COUNT = """<script>window.onload = () => {
+  const pictures = [...document.images], shown = pictures.filter(one => one.naturalWidth > 0 && one.width > 0);
+  const wide = document.documentElement.scrollWidth > window.innerWidth;
+  document.body.dataset.shown = `${shown.length} of ${pictures.length}, ${wide ? "too wide" : "fits"}`;
+}</script>"""
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="there is no chromium: apt-get install chromium")
+def test_in_a_browser(out, tmp_path):
+    """All pictures are drawn, the page fits into the window, and it asks for no other file."""
+    assert fsci("report", out).returncode == 0
+    text = (out / "report.html").read_text()
+    count = len(Page(text).images)
+    (tmp_path / "page.html").write_text(text.replace("</body>", f"{COUNT}</body>"))
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1200,900", f"--user-data-dir={tmp_path}"]
+    command = ["chromium", *options, "--virtual-time-budget=5000", "--dump-dom", f"file://{tmp_path / 'page.html'}"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    found = re.search(r'data-shown="([^"]*)"', done.stdout)
+    assert found is not None, done.stderr[-2000:]
+    assert count > 0
+    assert found[1] == f"{count} of {count}, fits"

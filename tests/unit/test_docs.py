@@ -126,7 +126,7 @@ def test_the_gallery_has_every_case():
 
 
 def test_the_quickstart_has_every_section():
-    table = (ROOT / "docs" / "quickstart.md").read_text().split("| section | says |")[1].split("\n\n")[0]
+    table = (ROOT / "docs" / "quickstart.md").read_text().split("| section | describes |")[1].split("\n\n")[0]
     assert set(re.findall(r"^\| `([a-z]+)` \|", table, re.MULTILINE)) == SECTIONS
 
 

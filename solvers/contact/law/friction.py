@@ -28,7 +28,7 @@ EDGE = 1e-6
 
 
 class Bound(Protocol):
-    """What tells one law of friction from another; the functions below are methods of such a law."""
+    """The part in which laws of friction differ; the functions below are methods of such a law."""
 
     def radius(self, at: Point) -> Array:
         """s, the largest traction along the surface [Pa], shape (m,)."""
@@ -48,8 +48,8 @@ def trial_traction(at: Point) -> Array:
 def friction_status(law: Bound, at: Point) -> Statuses:
     """In contact where the trial pressure is positive; sticking inside the disc.
 
-    Where the trial traction points against the present one the node sticks first: sliding that turns around in one
-    Newton step can turn back in the next, for ever. In the solution they have the same direction.
+    Where the trial traction points against the present one the node sticks first: a slip that reverses in one
+    Newton step could reverse in every following one. In the solution they have the same direction.
     """
     q, radius = trial_traction(at), law.radius(at)
     turned = np.einsum("nd,nd->n", q, at.z) < 0.0

@@ -1,4 +1,4 @@
-"""What a law of contact is told, and what it says: the status of multipliers, and the rows that they fulfil."""
+"""The interface of contact laws: their arguments, the status of multipliers, and the rows that these fulfil."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Law(Protocol):
         ...
 
     def residual(self, at: Point, status: Statuses, weight: float) -> Array:
-        """What multipliers in contact miss [N], shape (m, dim); weight: of their forces in the balance."""
+        """Residual of multipliers in contact [N], shape (m, dim); weight: of their forces in the balance."""
         ...
 
     def rows(self, at: Point, slopes: Slopes, status: Statuses, weight: float) -> Rows:

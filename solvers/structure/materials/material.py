@@ -1,4 +1,4 @@
-"""What a material law has to say, and its parameters.
+"""The interface of material laws, and their parameters.
 
 Energies are per reference volume [J/m^3], functions of the deformation gradient F. Values are numbers or functions of
 the reference position; `energy` receives them as UFL coefficients by name. In 2D, F is 2x2: plane strain completes it
