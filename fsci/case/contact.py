@@ -129,14 +129,18 @@ class FilmSection(Section):
         unit="m",
     )
 
-    zone: Literal["dry", "wetted"] = setting(
-        "dry", "where contact is closed: dry: no fluid; wetted: fluid with the pressure of the rim"
+    zone: Literal["dry", "wetted", "seeping"] = setting(
+        "dry",
+        "where contact is closed: dry: no fluid; wetted: fluid with the pressure of the rim;"
+        " seeping: fluid passes through it, too, in the layer",
     )
 
     @model_validator(mode="after")
     def _one_of_them(self) -> FilmSection:
         if self.transmissivity is not None and self.roughness is not None:
             raise fault("give either 'transmissivity' or 'roughness', not both", "roughness")
+        if self.zone == "seeping" and not self.value:
+            raise fault("fluid seeps in a layer: give 'transmissivity' or 'roughness'", "zone")
         return self
 
     @property

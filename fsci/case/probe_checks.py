@@ -18,6 +18,7 @@ from fsci.case.verify import (
     FIELD_COLUMNS,
     FRICTION_COLUMNS,
     RUN_COLUMNS,
+    SEEPAGE_COLUMN,
 )
 from fsci.case.yaml_text import Keys
 
@@ -150,6 +151,7 @@ def verify_mistakes(case: Case) -> Iterator[Mistake]:
     if case.contact is not None:
         columns += [f"contact.{name}.{axis}" for name in case.contact.pairs for axis in "xyz"[: case.dimension or 3]]
         columns += CONTACT_COLUMNS
+        columns += [SEEPAGE_COLUMN] if case.contact.film.zone == "seeping" else []
         if any(pair.friction.some for pair in case.contact.pairs.values()):
             columns += FRICTION_COLUMNS
     for i, check in enumerate(case.verify):

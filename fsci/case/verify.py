@@ -17,6 +17,8 @@ FIELD_COLUMNS = {"structure": "structure.energy", "fluid": "fluid.mass"}
 
 #: volume that passes through the surfaces of bodies in a fluid
 BODY_COLUMN = "fluid.leak"
+#: and through closed contact that seeps
+SEEPAGE_COLUMN = "fluid.seepage"
 
 #: those of the interface between both
 COUPLING_COLUMNS = ("interface.force", "interface.momentum", "interface.power", "interface.work", "fluid.loss")

@@ -26,6 +26,11 @@ def leak(system: FlowSystem) -> float:
     return system.grid.comm.allreduce(float(np.abs(through).sum()))
 
 
+def seepage(system: FlowSystem) -> float:
+    """Volume [m^3/s] that passes through closed contact (collective)."""
+    return 0.0 if system.seepage is None else system.seepage.leak(system.flow.x.array)
+
+
 class Balances:
     """Sums of all momentum equations, tested with a constant velocity and with that of the fluid.
 

@@ -28,7 +28,7 @@ from solvers.fluid.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.pressure_level import Hold, hold_pressure, keep_levels, spread_excess
 from solvers.fluid.reach import require_finest, require_history, require_within_period, strip_layers
 from solvers.fluid.space import Unknowns, set_velocity
-from solvers.fluid.surface import Motion, by_facets, may_close, offsets, together, wetness
+from solvers.fluid.surface import Motion, by_facets, may_close, offsets, seeping, together, wetness
 from solvers.fluid.system import FlowSettings, FlowSystem
 from solvers.fluid.time_scheme import STEADY, FlowStep
 from solvers.fluid.zone_entries import with_zone
@@ -89,7 +89,7 @@ class Fluid:
         surfaces = [body.surface for body in self.bodies]
         self.system.slip_length = by_facets(surfaces, [surface.slip_length for surface in surfaces])
         self.system.transmissivity = by_facets(surfaces, [surface.transmissivity for surface in surfaces])
-        self.system.may_close = may_close(surfaces)
+        self.system.may_close, self.system.seeping = may_close(surfaces), seeping(surfaces)
         films = films_of(patches, settings.penalties) if settings.films else None
         self.cutter = Cutter(self.grid, self.system.weights.points, films)
         self.history = History(settings.time, self.unknowns.local)

@@ -14,7 +14,7 @@ import ufl
 from solvers import fem
 from solvers.api import Array
 from solvers.fluid import forms
-from solvers.fluid.balances import leak
+from solvers.fluid.balances import leak, seepage
 from solvers.fluid.covered_faces import CoveredFaces, covered_faces
 from solvers.fluid.field import Fluid
 from solvers.fluid.inside import INSIDE, require_outside, winding
@@ -182,6 +182,8 @@ def mass_balance(fluid: Fluid) -> Callable[[], dict[str, float]]:
         g, n = cut.motion.v[cut.facets[cut.pieces.facet[mine]]], cut.pieces.normal[mine]
         into_bodies = fluid.comm.allreduce(float(np.einsum("pv,pvi,pi->", swept, g, n)))
         passing = {"fluid.leak": leak(fluid.system)} if fluid.bodies else {}
+        if fluid.system.seeping is not None:
+            passing["fluid.seepage"] = seepage(fluid.system)
         return {"fluid.mass": rate(everywhere) + into_bodies, **passing}
 
     return balance

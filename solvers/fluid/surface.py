@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 
-#: What fills closed contact: nothing, or fluid with the pressure of its rim.
-Zone = Literal["dry", "wetted"]
+#: What fills closed contact: nothing, fluid with the pressure of its rim, or fluid that passes through it, too.
+Zone = Literal["dry", "wetted", "seeping"]
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,11 @@ def may_close(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_] | None:
         np.zeros(len(s.facets), dtype=bool) if s.zone == "dry" or s.may_part is None else s.may_part for s in surfaces
     ]
     return np.concatenate(parts) & wetness(surfaces)
+
+
+def seeping(surfaces: Sequence[ImmersedSurface]) -> Array | None:
+    """Transmissivity [m^3] of the facets of all surfaces where contact is closed; None if all are zero."""
+    return by_facets(surfaces, [s.transmissivity if s.zone == "seeping" else 0.0 for s in surfaces])
 
 
 def by_facets(surfaces: Sequence[ImmersedSurface], numbers: Sequence[float]) -> Array | None:

@@ -31,6 +31,7 @@ from solvers.fluid.space import Unknowns, set_velocity
 from solvers.fluid.time_scheme import SCHEMES, FlowStep, FlowTimeScheme
 from solvers.fluid.weights import Weights
 from solvers.fluid.zone import ClosedZone, find_zone
+from solvers.fluid.zone_seepage import ZoneSeepage
 from solvers.values import Value
 
 
@@ -112,7 +113,9 @@ class FlowSystem:
         self.transmissivity: Array | None = None  #: the same of a layer on them [m^3]; None: there is none
         self.may_close: NDArray[np.bool_] | None = None  #: facets that feel fluid in closed contact; None: none do
         self._interface: InterfaceTerms | None = None
+        self.seeping: Array | None = None  #: transmissivity of facets in closed contact [m^3]; None: nothing passes
         self._zone: ClosedZone | None = None
+        self._seepage: ZoneSeepage | None = None
         self._current = False  #: weights, interface and ghost penalty are those of cut and scales
 
     def _terms(self) -> forms.Coefficients:
@@ -271,6 +274,12 @@ class FlowSystem:
         self._follow()
         return self._zone
 
+    @property
+    def seepage(self) -> ZoneSeepage | None:
+        """What passes through closed contact (collective)."""
+        self._follow()
+        return self._seepage
+
     def _follow(self) -> None:
         """Weights and ghost penalty as cut and scales ask for."""
         if self._current:
@@ -291,7 +300,10 @@ class FlowSystem:
                 self.transmissivity,
             )
             if self.may_close is not None:
-                self._zone = find_zone(cut, self._interface, self.may_close, self.grid.comm)
+                zone = self._zone = find_zone(cut, self._interface, self.may_close, self.grid.comm)
+                self._seepage = None
+                if zone is not None and self.seeping is not None:
+                    self._seepage = ZoneSeepage(zone, self.seeping / self.settings.viscosity)
         self._assemble_ghost_penalty()
         self._current = True
 
@@ -338,6 +350,8 @@ class FlowSystem:
             self._out += self.interface.velocity_terms(self.cut.motion.v)
             for terms in self.interface.cell_blocks:
                 self._out += terms.rows(self.flow.x.array)
+        if self._seepage is not None:
+            self._seepage.add_rows(self._out, self.flow.x.array)
         self._add_covered(self._out)
         fem.add_ghosts(self.unknowns.space, self._out)
         owned = self.unknowns.owned
@@ -369,6 +383,8 @@ class FlowSystem:
             matrix.setValuesLocal(dofs, dofs, block, PETSc.InsertMode.ADD_VALUES)
         self._newton.value = 1.0
         matrix.assemble()
+        if self._seepage is not None:
+            matrix = self._seepage.added_to(matrix, self.unknowns)
         start = matrix.getOwnershipRange()[0]
         matrix.zeroRows((start + np.flatnonzero(identity)).astype(PETSc.IntType), 1.0)
         return matrix

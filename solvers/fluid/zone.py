@@ -101,7 +101,7 @@ class ClosedZone:
         self._facet = row[self._pieces]
         self._p, self._psi = at.p[self._pieces], at.psi[self._pieces]
         ones = (1.0 + np.eye(d)) / (d * (d + 1))
-        blocks = self._share[:, None, None] * stiffness(facets.x, facets.size) + facets.rim[:, None, None] * (
+        blocks = self.share[:, None, None] * stiffness(facets.x, facets.size) + facets.rim[:, None, None] * (
             facets.wet + NO_RIM * facets.size[:, None, None] * ones
         )
         rows, columns = np.repeat(facets.corners, d, axis=1), np.tile(facets.corners, (1, d))
@@ -110,7 +110,8 @@ class ClosedZone:
         self._shape = m, d
 
     @property
-    def _share(self) -> Array:
+    def share(self) -> Array:
+        """Of each facet, what is dry, shape (m,)."""
         return self.facets.dry.sum(axis=(1, 2)) / self.facets.size
 
     def _at_rim(self, by_piece: Array) -> Array:
@@ -174,7 +175,7 @@ class ClosedZone:
         moved = self._at_rim(np.einsum("pvw,pj,p->pvwj", mass, grad, np.where(area > 0.0, 1.0 / area, 0.0)))
         rows = (dim - 3.0) / (dim - 1.0) * facets.rim[:, None, None, None] * missing[:, :, None, None] * grown[:, None]
         rows -= facets.rim[:, None, None, None] * moved
-        rows += self._share[:, None, None, None] * stiffness_by_motion(facets.x, facets.size, grown, P[facets.corners])
+        rows += self.share[:, None, None, None] * stiffness_by_motion(facets.x, facets.size, grown, P[facets.corners])
         right = np.zeros((count, count, dim))
         np.add.at(right, (facets.corners[:, :, None], facets.corners[:, None, :]), rows)
         slope = -self._solve(right.reshape(count, -1)) if count else right.reshape(count, -1)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fluid_setup import BOX, block, body, field, make_fluid, solve_steady
 from mpi4py import MPI
 
 from fsci import shapes
@@ -18,7 +19,6 @@ from solvers.fluid.surface import ImmersedSurface, Motion
 from solvers.fluid.zone import stiffness, stiffness_by_motion
 from solvers.tessellation import area_vectors, tessellate
 from solvers.timing import Timer
-from tests.setups.fluid_setup import BOX, block, body, field, make_fluid, solve_steady
 
 PRESSURE = 7.0
 

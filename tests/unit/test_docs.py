@@ -14,7 +14,14 @@ import pytest
 from docs_pages import PAGES, ROOT, SCHEMA, fits_somewhere, has_setting, in_backticks, is_case, parsed, yaml_blocks
 
 from fsci.case import load_case
-from fsci.case.verify import BODY_COLUMN, CONTACT_COLUMNS, COUPLING_COLUMNS, FIELD_COLUMNS, FRICTION_COLUMNS
+from fsci.case.verify import (
+    BODY_COLUMN,
+    CONTACT_COLUMNS,
+    COUPLING_COLUMNS,
+    FIELD_COLUMNS,
+    FRICTION_COLUMNS,
+    SEEPAGE_COLUMN,
+)
 from fsci.check.meshes import check_meshes
 from fsci.cli import execute
 
@@ -23,7 +30,7 @@ SECTIONS = set(SCHEMA["properties"])
 FOLDERS = ("cases", "docs", "tests", "solvers", "fsci", "coupling")
 MADE = ("docs/_build", "docs/reference", "cases/stage")  #: by make docs
 NOT_OF_CASES = ("changelog", "library")  #: pages that name settings that are gone, and attributes in Python
-COLUMNS = {BODY_COLUMN, *FIELD_COLUMNS.values(), *COUPLING_COLUMNS, *CONTACT_COLUMNS, *FRICTION_COLUMNS}
+COLUMNS = {BODY_COLUMN, SEEPAGE_COLUMN, *FIELD_COLUMNS.values(), *COUPLING_COLUMNS, *CONTACT_COLUMNS, *FRICTION_COLUMNS}
 SUFFIXES = (".py", ".yaml", ".md", ".cpp")
 
 
