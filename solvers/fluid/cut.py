@@ -34,8 +34,8 @@ class Cut:
     ghost_faces: NDArray[np.int32]  #: faces between active cells, one of them cut or of the strip
     contact_cells: Cells  #: solid cells where surfaces touch each other or the box's boundary
     reach: NDArray[np.bool_]  #: local cells that the surfaces may soon cut or uncover
-    alive: NDArray[np.bool_]  #: active cells of the box, near those that this process holds
-    share: Array  #: share of fluid in these cells of the box, zero elsewhere and in the strip
+    alive: NDArray[np.bool_]  #: active cells of the mesh, near those that this process holds
+    share: Array  #: share of fluid in these cells of the mesh, zero elsewhere and in the strip
     depth: int  #: cells from the strip's farthest cell to a cut one
     fluid: Array  #: int_fluid L_q dx / (w_q |K|) on cut cells, shape (cut, points)
     fraction: Array  #: share of fluid in each local cell

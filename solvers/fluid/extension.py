@@ -21,6 +21,8 @@ from scipy import sparse
 
 from solvers.api import Array
 from solvers.fluid.grid import Grid
+from solvers.fluid.sheet_windows import SheetWindows
+from solvers.fluid.sheets import Sheets
 
 #: Shares of fluid, relative to the best cell nearby: from WELL on a cell is a root and its nodes are free, up to LITTLE
 #: the penalty on the distance to the extension has its full weight.
@@ -54,27 +56,30 @@ class Dependent:
 class Extension:
     """The extension of one lattice of nodes. Within a step nodes keep their roots, so that Newton's method settles."""
 
-    def __init__(self, grid: Grid, degree: int, shape: tuple[int, ...], numbers: Numbers):
-        """`numbers`: the nodes to look at, in the lattice of this degree and shape, x fastest."""
+    def __init__(self, grid: Grid, degree: int, shape: tuple[int, ...], numbers: Numbers, sheets: Sheets | None = None):
+        """`numbers`: the nodes to look at, in the lattice of this degree and shape, x fastest, or those of `sheets`."""
         self.grid, self.degree, self.shape = grid, degree, shape
-        self._index = np.stack(np.unravel_index(numbers, shape, order="F"), axis=1)
+        self._sheets = None if sheets is None else SheetWindows(sheets, degree, numbers)
+        self.size = int(np.prod(shape)) if sheets is None else sheets.node_count(degree)  #: numbers of nodes
+        places = numbers if sheets is None else sheets.on_lattice(numbers, degree)
+        self._index = np.stack(np.unravel_index(places, shape, order="F"), axis=1)
         self._strides = np.cumprod([1, *shape[:-1]])
-        #: place of each node of the lattice among those to look at, -1: none
-        self._place = np.full(int(np.prod(self.shape)), -1, dtype=np.int64)
+        #: place of each node among those to look at, -1: none
+        self._place = np.full(self.size, -1, dtype=np.int64)
         self._place[numbers] = np.arange(len(numbers))
         self._lattice = [
             np.interp(np.arange(degree * (len(edge) - 1) + 1) / degree, np.arange(len(edge)), edge)
             for edge in grid.edges
         ]
         #: row of E that each node to look at has in this step, -1: none yet
-        self._row_of, self._rows = np.full(len(numbers), -1), sparse.csr_matrix((0, int(np.prod(shape))))
+        self._row_of, self._rows = np.full(len(numbers), -1), sparse.csr_matrix((0, self.size))
 
     def begin_step(self) -> None:
         """Forget the roots."""
         self._row_of[:], self._rows = -1, self._rows[:0]
 
     def __call__(self, share: Array, active: NDArray[np.bool_], reach: int) -> Dependent:
-        """Dependent nodes of active box cells with these shares of fluid; roots are at most `reach` cells away."""
+        """Dependent nodes of active cells with these shares of fluid; roots are at most `reach` cells away."""
         nodes = self._nodes_of(np.flatnonzero(active & (share < WELL)))
         largest, best = (self._largest(nodes, share, layers) for layers in (0, NEAR))
         poor = (largest < WELL * best) | (largest == 0.0)
@@ -86,18 +91,24 @@ class Extension:
         return Dependent(nodes[known], rows, _weight(relative[known]), relative[known] == 0.0, nodes[~known])
 
     def _nodes_of(self, cells: Numbers) -> Numbers:
-        """The nodes of box cells, sorted, each once."""
-        index = np.unravel_index(cells, self.grid.shape, order="F")
-        steps = np.arange(self.degree + 1)
-        axes = [
-            (self.degree * i[:, None] + steps) % n * stride
-            for i, n, stride in zip(index, self.shape, self._strides, strict=True)
-        ]
-        positions = self._place[np.unique(reduce(_outer_sum, axes))]
+        """The nodes of cells, sorted, each once."""
+        if self._sheets is not None:
+            numbers = self._sheets.nodes(cells)
+        else:
+            index = np.unravel_index(cells, self.grid.shape, order="F")
+            steps = np.arange(self.degree + 1)
+            axes = [
+                (self.degree * i[:, None] + steps) % n * stride
+                for i, n, stride in zip(index, self.shape, self._strides, strict=True)
+            ]
+            numbers = reduce(_outer_sum, axes)
+        positions = self._place[np.unique(numbers)]
         return np.sort(positions[positions >= 0])
 
     def _cells_around(self, nodes: Numbers, layers: int) -> tuple[Numbers, NDArray[np.bool_]]:
-        """(box cells, whether they exist) of nodes and some layers around them, shape (nodes, cells)."""
+        """(cells, whether they exist) of nodes and some layers around them, shape (nodes, cells)."""
+        if self._sheets is not None:
+            return self._sheets.cells_around(nodes, self._index[nodes], layers)
         axes = [self._window(axis, nodes, layers) for axis in range(self.grid.dim)]
         strides = np.cumprod([1, *self.grid.shape[:-1]])
         cells = reduce(_outer_sum, (index * stride for (index, _), stride in zip(axes, strides, strict=True)))
@@ -137,12 +148,14 @@ class Extension:
         least = cost.min(axis=1, initial=np.inf)[:, None]
         at, chosen = np.nonzero((cost <= (1.0 + 1e-9) * least) & np.isfinite(cost))
         columns, weights = self._entries(nodes[at], layers, chosen, cost[at, chosen] > LARGEST)
+        if self._sheets is not None:
+            columns = self._sheets.nodes(cells[at, chosen])
         weights = weights / np.bincount(at, minlength=len(nodes))[at, None]
         found = np.unique(at)
         rows = np.broadcast_to(np.searchsorted(found, at)[:, None], columns.shape)
         kept = np.abs(weights) > 0.0
         entries = (weights[kept], (rows[kept], columns[kept]))
-        return nodes[found], sparse.csr_matrix(entries, shape=(len(found), int(np.prod(self.shape))))
+        return nodes[found], sparse.csr_matrix(entries, shape=(len(found), self.size))
 
     def _coordinates(self, axis: int, nodes: Numbers, layers: int) -> Array:
         """Where nodes lie in the cells of `_window`: from 0 to 1 inside, shape (nodes, cells)."""

@@ -49,10 +49,10 @@ class ExtensionPenalty:
 
     def _lattice(self, nodes: FlowNodes, degree: int) -> tuple[FlowNodes, Extension, Directory]:
         grid, owned = self.unknowns.grid, nodes.owned
-        extension = Extension(grid.grid, degree, self.unknowns.lattice_shape(degree), nodes.numbers[:owned])
+        numbers, shape = nodes.numbers[:owned], self.unknowns.lattice_shape(degree)
+        extension = Extension(grid.grid, degree, shape, numbers, grid.sheets)
         dofs = self.unknowns.global_dofs[nodes.dofs[:owned]]
-        size = int(np.prod(extension.shape))
-        return nodes, extension, Directory(self._comm, nodes.numbers[:owned], dofs, size)
+        return nodes, extension, Directory(self._comm, numbers, dofs, extension.size)
 
     def _matrix(self, entries: Entries) -> PETSc.Mat:
         return from_entries(self._comm, (self.unknowns.owned, self.unknowns.owned), *entries)

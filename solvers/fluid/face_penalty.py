@@ -27,11 +27,9 @@ class FacePenalty:
         self.outside = np.zeros(unknowns.owned, dtype=bool)
         self.undetermined = np.zeros(unknowns.local, dtype=bool)
         self._phi, self._convective, self._has_history = (fem.function(fem.cellwise_space(domain)) for _ in range(3))
-        self._film = fem.function(fem.cellwise_space(domain))
-        self._film.x.array[:] = 1.0
         test, trial = ufl.TestFunction(unknowns.space), ufl.TrialFunction(unknowns.space)
         dS = fem.measure(domain, "dS", 2 * unknowns.degree)
-        scales = forms.GhostScales(self._phi, self._convective, self._has_history, self._film)
+        scales = forms.GhostScales(self._phi, self._convective, self._has_history)
         form = forms.ghost_penalty(flow, penalties, scales, *unknowns.parts(trial), *unknowns.parts(test)) * dS
         self._form, history = fem.Integral(domain, ufl.lhs(form)), ufl.rhs(form)
         self._history = None if history.empty() else fem.Integral(domain, history)
@@ -53,9 +51,8 @@ class FacePenalty:
         self.stale = True
 
     def set_cut(self, cut: Cut, prescribed: NDArray[np.int64]) -> bool:
-        film = np.ones(len(self._grid.numbers)) if cut.film is None else cut.film[self._grid.numbers]
-        self.stale |= not (np.array_equal(self._faces, cut.ghost_faces) and np.array_equal(self._film.x.array, film))
-        self._faces, self._film.x.array[:] = cut.ghost_faces, film
+        self.stale |= not np.array_equal(self._faces, cut.ghost_faces)
+        self._faces = cut.ghost_faces
         return False
 
     def extra_entries(self) -> NDArray[np.int64] | None:

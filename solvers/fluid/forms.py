@@ -32,7 +32,6 @@ class Penalties:
     ghost_mass: float = 3e-3
     ghost_convection: float = 0.01
     ghost_pressure: float = 0.05
-    ghost_second: float = 0.05  #: second derivatives of q2q1 around thin bodies, relative to first ones
     ghost_memory: float = 0.9  #: share of the history per step; with 1, kinks in fluid at rest would not decay
     extension: float = 0.1  #: of the distance of poorly cut nodes to their extension; results do not depend on it
 
@@ -71,7 +70,6 @@ class GhostScales:
     phi: Expr  #: nu + |a| h + alpha h^2 [m^2/s]
     convective: Expr  #: phi_b [m^2/s]
     has_history: Expr  #: 1 in cells of which all nodes had a velocity before, else 0
-    film: Expr  #: factor of velocities of second degree, below 1 in films
 
 
 def nothing(dim: int) -> Expr:
@@ -157,10 +155,9 @@ def _rates(flow: Coefficients) -> tuple[list[Expr], Expr, Expr]:
 def ghost_penalty(
     flow: Coefficients, factors: Penalties, scales: GhostScales, u: Expr, p: Expr, v: Expr, q: Expr
 ) -> Expr:
-    """Integrand over faces, times the lesser factor of their cells, of gamma_p h^3 / (rho phi) [d_n p] [d_n q] and
+    """Integrand over faces, for first degree, of gamma_p h^3 / (rho phi) [d_n p] [d_n q] and
 
-    sum_j m_j h^(2j-1) ((gamma_v mu + gamma_b rho phi_b) [d_n^j u] + gamma_t rho h^2 [d_n^j u_t]) [d_n^j v],
-    u_t = alpha u - gamma_m history, m_1 = 1.
+    h ((gamma_v mu + gamma_b rho phi_b) [d_n u] + gamma_t rho h^2 [d_n u_t]) [d_n v],  u_t = alpha u - gamma_m history.
 
     So the share of the mass is one of the acceleration, as in a mass matrix. Were it one of alpha u (gamma_m = 0), as
     it is in cells without history, it would take a power from the flow that grows as steps get smaller.
@@ -175,24 +172,11 @@ def ghost_penalty(
         factor += factors.ghost_convection * flow.rho * avg(scales.convective)
     memory = factors.ghost_memory * scales.has_history("+") * scales.has_history("-")
 
-    def penalised(order: int) -> Expr:
-        change = flow.alpha * _jump(u, n, order) - memory * _jump(flow.history, n, order)
-        return dot(factor * _jump(u, n, order) + mass * change, _jump(v, n, order))
-
-    terms = factors.ghost_pressure * h**3 / (flow.rho * avg(scales.phi)) * _jump(p, n, 1) * _jump(q, n, 1)
-    terms += h * penalised(1)
-    if flow.degree == 1:
-        return terms
-    terms += factors.ghost_second * h**3 * penalised(2)
-    return ufl.min_value(scales.film("+"), scales.film("-")) * terms
+    change = flow.alpha * _jump(u, n) - memory * _jump(flow.history, n)
+    of_pressure = factors.ghost_pressure * h**3 / (flow.rho * avg(scales.phi)) * _jump(p, n) * _jump(q, n)
+    return of_pressure + h * dot(factor * _jump(u, n) + mass * change, _jump(v, n))
 
 
-def _jump(field: Expr, n: Expr, order: int) -> Expr:
-    """Jump of the order-th normal derivative across a face, counted along the normal of its '+' side."""
-    derivative = field
-    for _ in range(order):
-        derivative = grad(derivative)
-    jumped = derivative("+") - derivative("-")
-    for _ in range(order):
-        jumped = dot(jumped, n("+"))
-    return jumped
+def _jump(field: Expr, n: Expr) -> Expr:
+    """Jump of the normal derivative across a face, along the normal of its '+' side."""
+    return dot(grad(field)("+") - grad(field)("-"), n("+"))

@@ -1,9 +1,9 @@
 """What continues the flow into poorly cut cells and behind the surface, as the discrete equations see it.
 
-`FacePenalty`: jumps of derivatives across faces, for q1q1, and for q2q1 around thin bodies. `ExtensionPenalty`: the
-distance to the polynomial of a well-cut cell, for q2q1 elsewhere. Jumps are an artificial viscosity along bodies; the
-distance is not, and results do not depend on its factor. With q1q1 that gain is small, and the pressure, which is
-continued by its gradient in one cell, depends more on where the cut falls (docs/verification_fluid.md).
+`FacePenalty`: jumps of derivatives across faces, for q1q1. `ExtensionPenalty`: the distance to the polynomial of a
+well-cut cell, for q2q1. Jumps are an artificial viscosity along bodies; the distance is not, and results do not depend
+on its factor. With q1q1 that gain is small, and the pressure, which is continued by its gradient in one cell, depends
+more on where the cut falls (docs/verification_fluid.md).
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from solvers.fluid.space import Unknowns
 
 
 def choose_ghost_penalty(unknowns: Unknowns, flow: forms.Coefficients, penalties: forms.Penalties) -> GhostPenalty:
-    """The one that does better: `solvers.fluid.ghost` says why. Roots could be on the other side of thin bodies."""
-    if unknowns.degree == 2 and unknowns.grid.sheets is None:
+    """The one that does better: `solvers.fluid.ghost` says why."""
+    if unknowns.degree == 2:
         return ExtensionPenalty(unknowns, penalties.extension)
     return FacePenalty(unknowns, flow, penalties)

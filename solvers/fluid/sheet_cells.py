@@ -36,11 +36,15 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any) -> Any:
     fluid = np.where(rows[:, None] < 0, 1.0, cut.fluid[rows])
     fraction = np.where(empty, 0.0, cut.fraction)
     weights = _tensor(gauss(len(points))[1])
+    share, alive = (np.concatenate([some, np.zeros(len(sheets.cells), some.dtype)]) for some in (cut.share, cut.alive))
+    share[sheets.left], alive[sheets.left], alive[box : box + sheets.singles] = 0.0, False, True
+    for number, of_cell in sheets.shares.items():
+        share[number] = of_cell.fraction
     place = np.full(len(original), -1)
     place[cells] = np.arange(len(cells))
-    for number, share in sheets.shares.items():
-        if (cell := local[number]) >= 0 and (found := share.integrals(points)) is not None:
-            fluid[place[cell]], fraction[cell] = found / weights, share.fraction
+    for number, of_cell in sheets.shares.items():
+        if (cell := local[number]) >= 0 and (found := of_cell.integrals(points)) is not None:
+            fluid[place[cell]], fraction[cell] = found / weights, of_cell.fraction
     piece_box, target = grid.numbers[cut.cut[cut.pieces.cell]], np.full(len(cut.pieces.cell), -1)
     for piece, (number, facet) in enumerate(zip(piece_box.tolist(), cut.pieces.facet.tolist(), strict=True)):
         cells_there = sheets.successors.get(number)
@@ -56,6 +60,8 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any) -> Any:
         strip=cut.strip[original[cut.strip] < box],
         ghost_faces=cut.ghost_faces[_passable(grid, cut.ghost_faces, empty, for_faces)],
         contact_cells=cut.contact_cells[original[cut.contact_cells] < box],
+        alive=alive,
+        share=share,
         fluid=fluid,
         fraction=fraction,
         pieces=replace(

@@ -88,11 +88,18 @@ class Sheets:
     pairs: int  #: how many pairs there are
     #: which of the nodes at one place of the lattice of second degree the nodes of a cell are, 0 that of the box
     copies: Indices
+    around: Mask  #: cells of the box near surfaces: of these only `links` are neighbours
+    links: Indices  #: cells of the mesh with fluid on both sides of the face between them, shape (n, 2)
 
     @property
     def singles(self) -> int:
         """New cells with fluid."""
         return len(self.cells) - 2 * self.pairs
+
+    @property
+    def size(self) -> int:
+        """Cells of the mesh."""
+        return self.grid.size + len(self.cells)
 
     @cached_property
     def successors(self) -> dict[int, list[int]]:
@@ -143,6 +150,26 @@ class Sheets:
         """Nodes of the lattice of the box."""
         return int(np.prod([degree * n + 1 for n in self.grid.shape]))
 
+    def node_count(self, degree: int) -> int:
+        """Numbers of nodes, those of the lattice and the others."""
+        return self.lattice_size(degree) + len(self._further(degree))
+
+    def on_lattice(self, numbers: Indices, degree: int) -> Indices:
+        """Numbers in the lattice of the places of nodes."""
+        size = self.lattice_size(degree)
+        keys = np.concatenate([self._further(degree), [0]])[np.maximum(numbers - size, -1)]
+        return np.where(numbers < size, numbers, keys % size)
+
+    def among_finer(self, numbers: Indices, degree: int) -> Indices:
+        """The numbers that nodes of first degree have among those of a higher one."""
+        size, finer = self.lattice_size(1), self.lattice_size(degree)
+        keys = np.concatenate([self._further(1), [0]])[np.maximum(numbers - size, -1)]
+        copy = np.where(numbers < size, 0, keys // size)
+        index = np.unravel_index(self.on_lattice(numbers, 1), [n + 1 for n in self.grid.shape], order="F")
+        counts = [degree * n + 1 for n in self.grid.shape]
+        there = np.ravel_multi_index([degree * i for i in index], counts, order="F")
+        return np.where(copy > 0, finer + np.searchsorted(self._further(degree), copy * finer + there), there)
+
     def _lattice(self, cells: Indices, degree: int, steps: Indices) -> Indices:
         index = np.stack(np.unravel_index(cells, self.grid.shape, order="F"), axis=1)
         counts = [degree * n + 1 for n in self.grid.shape]
@@ -189,6 +216,9 @@ def find_sheets(grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_]
         for cell, kept in staying.items()
         if kept and len(kept) < len(by_cell[cell])
     }
+    cell_of = np.where(moved, -1, cells)
+    cell_of[new] = grid.size + np.arange(len(new))
+    linked_cells = cell_of[np.array(links, dtype=np.int64).reshape(-1, 3)[:, :2]]
     passing = {(parts[a].cell, parts[b].cell) for a, b, _ in links if not moved[a] and not moved[b]}
     touching = _neighbours(grid, [cell for cell, kept in staying.items() if kept])
     at_faces = [(a, b) for a, b, _ in links if (moved[a] or moved[b]) and special[[parts[a].cell, parts[b].cell]].any()]
@@ -201,6 +231,8 @@ def find_sheets(grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_]
         np.array([parts[n].cell for n in cells], dtype=np.int64),
         len(at_faces),
         copies[cells],
+        _grown(grid, special, AROUND),
+        np.unique(linked_cells[(linked_cells >= 0).all(axis=1)], axis=0),
     )
 
 

@@ -127,9 +127,12 @@ class Unknowns:
     @cached_property
     def at_pressure(self) -> NDArray[np.int64]:
         """Where the nodes of the pressure are among those of the velocity."""
-        index = np.unravel_index(self.pressure.numbers, self.lattice_shape(1), order="F")
-        fine = [self.degree * i for i in index]
-        numbers = np.ravel_multi_index(fine, self.lattice_shape(self.degree), order="F")
+        if self.grid.sheets is not None:
+            numbers = self.grid.sheets.among_finer(self.pressure.numbers, self.degree)
+        else:
+            index = np.unravel_index(self.pressure.numbers, self.lattice_shape(1), order="F")
+            fine = [self.degree * i for i in index]
+            numbers = np.ravel_multi_index(fine, self.lattice_shape(self.degree), order="F")
         order = np.argsort(self.velocity.numbers)
         return order[np.searchsorted(self.velocity.numbers, numbers, sorter=order)]
 
