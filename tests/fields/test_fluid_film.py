@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, solve_steady, step
+from mpi4py import MPI
 
 from solvers.fluid import film
+from solvers.fluid.cut import Cutter
 from solvers.fluid.forms import TRACE, Penalties
-from solvers.fluid.grid import uniform
+from solvers.fluid.grid import DistributedGrid, uniform
 from solvers.fluid.patches import Patch
+from solvers.fluid.surface import together
 
 H = 0.1
 
@@ -74,14 +77,18 @@ def test_stretched_cells():
 
 
 def test_three_dimensions():
+    """The cut alone: the forms of such a flow take ten seconds to compile."""
     patches = [
         Patch("walls", ("z-", "z+"), "no_slip"),
         Patch("ends", ("x-", "x+", "y-", "y+"), "traction", field(0, 0, 0)),
     ]
     grid = uniform([0, 0, 0], [1, 1, 1], [5, 5, 5])
-    lower, upper = (body(n, *block([0.1, 0.1, a], [0.9, 0.9, b])) for n, a, b in (("l", 0.1, 0.43), ("u", 0.5, 0.7)))
-    fluid = make_fluid(grid, patches, [lower, upper], element="q2q1", scheme="steady", convection=False)
-    found = fluid.cut.film
+    plates = [body(n, *block([0.1, 0.1, a], [0.9, 0.9, b])) for n, a, b in (("l", 0.1, 0.43), ("u", 0.5, 0.7))]
+    facets, motion = together([one.surface for one in plates], [one.motion(0.0) for one in plates], 3)
+    cutter = Cutter(
+        DistributedGrid(MPI.COMM_SELF, grid), np.linspace(0.0, 1.0, 5)[1:-1], film.films_of(patches, Penalties())
+    )
+    found = cutter(facets, motion, 1).film
     assert found.reshape(5, 5, 5, order="F")[1:4, 1:4, 2] == pytest.approx(expected(0.07, 0.2), rel=1e-6)
     assert found.reshape(5, 5, 5, order="F")[:, :, 0] == pytest.approx(expected(0.1, 0.2), rel=1e-6)
 
