@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from solvers.api import StepFailed
 from solvers.contact.law.law import OPEN, Statuses
 
-#: How often a step may come back to an active set it has left before it is given up.
-MAX_RETURNS = 6
+#: How often earlier active sets may recur in a step before it fails.
+MAX_RECURRENCES = 6
 
-#: What the complementarity parameter is multiplied by at every return: with a large one, iterates step over the
-#: solution to and fro.
-ON_RETURN = 0.1
+#: What the complementarity parameter is multiplied by at every recurrence: with a large one, iterates
+#: oscillate about the solution.
+ON_RECURRENCE = 0.1
 
 
 class ActiveSet:
@@ -28,8 +28,8 @@ class ActiveSet:
         self.changed = False  #: by the latest choice
         self.changes = 0  #: choices in this step that changed the set
         self.damping = 1.0  #: factor of the complementarity parameter in this step
-        self._seen: list[bytes] = []
-        self._returns = 0
+        self._earlier: list[bytes] = []
+        self._recurrences = 0
 
     @property
     def active(self) -> NDArray[np.bool_]:
@@ -37,23 +37,23 @@ class ActiveSet:
         return self.status != OPEN
 
     def begin_step(self) -> None:
-        """Clear the sets seen in the last step; the set itself is kept."""
+        """Clear the sets of the last step; the set itself is kept."""
         self.changed, self.changes, self.damping = False, 0, 1.0
-        self._seen, self._returns = [self.status.tobytes()], 0
+        self._earlier, self._recurrences = [self.status.tobytes()], 0
 
     def choose(self, status: Statuses) -> None:
         """Take the statuses of this iterate. Raises StepFailed if the set cycles."""
         self.changed = bool(np.any(status != self.status))
         self.changes += self.changed
         if self.changed:
-            known = status.tobytes()
-            if known in self._seen:
-                self._returns += 1
-                self.damping *= ON_RETURN
-            if self._returns > MAX_RETURNS:
-                flickering = int(np.sum(status != self.status))
+            chosen = status.tobytes()
+            if chosen in self._earlier:
+                self._recurrences += 1
+                self.damping *= ON_RECURRENCE
+            if self._recurrences > MAX_RECURRENCES:
+                alternating = int(np.sum(status != self.status))
                 raise StepFailed(
-                    "contact", f"the active set cycles: {flickering} nodes change their status again and again"
+                    "contact", f"the active set cycles: {alternating} nodes change their status again and again"
                 )
-            self._seen.append(known)
+            self._earlier.append(chosen)
         self.status = status.copy()

@@ -21,11 +21,11 @@ class Coverage:
 
     def __init__(self, areas: Array):
         self._areas = np.maximum(areas, np.finfo(float).tiny)
-        self._seen = np.zeros(len(self._areas), dtype=bool)
+        self._constrained = np.zeros(len(self._areas), dtype=bool)
         self._evaluations = 0
 
     def begin_step(self) -> None:
-        self._seen = np.zeros(len(self._areas), dtype=bool)
+        self._constrained = np.zeros(len(self._areas), dtype=bool)
         self._evaluations = 0
 
     def enough(self, D: Array, least: float = LEAST_COVERED) -> NDArray[np.bool_]:
@@ -34,8 +34,8 @@ class Coverage:
 
     def choose(self, D: Array) -> NDArray[np.bool_]:
         """Those of an iterate that can have a constraint, shape (C,)."""
-        found = self.enough(D) | (self._seen & self.enough(D, LEAST_KEPT))
+        found = self.enough(D) | (self._constrained & self.enough(D, LEAST_KEPT))
         self._evaluations += 1
         if self._evaluations >= KEEP_AFTER:
-            self._seen |= found
+            self._constrained |= found
         return found

@@ -46,7 +46,7 @@ def test_full_disk(tmp_path, full_disk, monkeypatch, capfd):
     assert read_history(tmp_path / "out" / "history.csv")["step"].tolist() == [1, 2, 3, 4, 5]
 
 
-def test_full_disk_without_room_for_a_checkpoint(tmp_path, full_disk, monkeypatch, capfd):
+def test_full_disk_without_space_for_a_checkpoint(tmp_path, full_disk, monkeypatch, capfd):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "elsewhere"))
     original = write_checkpoint
 

@@ -47,7 +47,7 @@ def test_error_of_one_process_ends_all(tmp_path, processes, rank):
     assert "RuntimeError: injected error" in errors
 
 
-def test_full_disk_of_one_process_is_said_without_a_traceback(tmp_path):
+def test_full_disk_of_one_process_is_reported_without_a_traceback(tmp_path):
     process = disturbed("disk", tmp_path, rank=0, processes=2)
     output, errors = process.communicate(timeout=60)
     assert process.returncode == 1, output + errors

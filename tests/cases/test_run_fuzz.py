@@ -22,7 +22,7 @@ def test_mutants_are_the_same_every_time():
     assert [mutant(seed) for seed in range(20)] == [mutant(seed) for seed in range(20)]
 
 
-def test_what_goes_wrong_is_told(tmp_path, monkeypatch):
+def test_failures_are_reported(tmp_path, monkeypatch):
     monkeypatch.setattr("fsci.run.run.run_case", lambda *arguments, **more: print("Traceback") or 1)
     assert "Traceback" in trouble(CASES[0], tmp_path)
 

@@ -139,7 +139,7 @@ def test_twins_have_to_agree():
 
 
 @pytest.mark.slow
-def test_the_twin_turned_the_wrong_way_is_noticed(tmp_path, monkeypatch):
+def test_a_twin_rotated_the_wrong_way_is_detected(tmp_path, monkeypatch):
     """A whole draw whose twin is turned, but brought back as if it were not."""
     seed = next(s for s in range(1000) if s % 5 != 4 and draw(s).twin == "rotated" and draw(s).scene.name == "beam")
     assert run.judge(seed).verdict == "right"
@@ -167,7 +167,7 @@ def test_a_beam_in_units_in_which_its_stiffness_is_tiny():
 
 
 @pytest.mark.slow
-def test_an_impact_that_the_step_does_not_resolve_is_told():
+def test_an_impact_that_the_step_does_not_resolve_is_reported():
     """The block leaves with twice its energy."""
     one = run.judge(166)
     assert (one.scene, one.verdict) == ("drop", "right")

@@ -71,7 +71,7 @@ def test_a_steady_flow_is_not_repeated_with_half_its_step(scheme, tmp_path, monk
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["steps"]["retried"] == 0
 
 
-def test_a_room_in_a_body(tmp_path):
+def test_a_cavity_in_a_body(tmp_path):
     said = message(RING.replace("monolithic", "partitioned"), tmp_path)
     assert "case.yaml:17:20: bodies enclose a part of the fluid, and the partitioned scheme does not determine" in said
     run(RING, tmp_path)

@@ -151,7 +151,7 @@ def test_resumed_bit_for_bit(whole, tmp_path):
 
 
 @pytest.mark.parametrize("at", [1, 3])
-def test_a_failed_step_leaves_no_trace(at, whole, tmp_path, monkeypatch):
+def test_a_failed_step_does_not_change_the_state(at, whole, tmp_path, monkeypatch):
     """It is repeated as two halves; the same to the last bit whether it fails at its end or before it begins."""
     scheme, _, _ = whole
     histories = []

@@ -53,7 +53,7 @@ def test_both_schemes_take_the_same_way(accelerator):
         assert max(newton) <= 3
 
 
-def test_steps_begin_on_the_parabola_through_the_last_places(monkeypatch):
+def test_steps_begin_on_the_parabola_through_the_last_displacements(monkeypatch):
     """After the cut of the old place, which cells that the surface leaves in this step need."""
     dt, steps = 0.1, 6
     scheme = Partitioned(bar_and_column(1.0), QuasiNewton(0.5), FixedPointTolerance(1e-9))

@@ -6,7 +6,7 @@ from contact_setup import make_body, make_contact, solve_step
 
 from fsci import shapes
 from solvers.api import StepFailed
-from solvers.contact.active_set import MAX_RETURNS, ActiveSet
+from solvers.contact.active_set import MAX_RECURRENCES, ActiveSet
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import Point
 from solvers.contact.surface import Surface
@@ -89,7 +89,7 @@ def test_a_new_step_forgets_the_circles():
     active_set = ActiveSet(3)
     for _ in range(5):
         active_set.begin_step()
-        flip(active_set, MAX_RETURNS)
+        flip(active_set, MAX_RECURRENCES)
 
 
 def test_growing_is_no_circle():

@@ -62,7 +62,7 @@ def test_share_of_the_mass_is_one_of_the_acceleration(memory):
         assert np.abs(share).max() > 0.0
 
 
-def test_share_of_the_mass_where_no_velocity_was_known():
+def test_mass_term_without_an_earlier_velocity():
     """It is one of the velocity then, as if all there had begun at rest."""
     fluids = [kinked_flow(1e-3, ghost_mass=factor) for factor in (0.0, 1.0)]
     rows = []

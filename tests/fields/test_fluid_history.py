@@ -14,8 +14,8 @@ from solvers.fluid.time_scheme import FlowStep
 VELOCITY, DT = field(2.0, 0.0), 0.01
 
 
-def carried():
-    """A block that another field moves with the flow, in a flow that does not notice it."""
+def block_in_uniform_flow():
+    """A block that another field moves with the velocity of a uniform flow, which it does not disturb."""
     points, facets = block([0.23, 0.32], [0.57, 0.66])
     body = ImmersedBody(ImmersedSurface("block", facets, len(points)), motion=None)
     fluid = make_fluid(
@@ -40,11 +40,11 @@ def advance(fluid, points, number, x, *, hasty=False):
 
 def test_restart_knows_all_that_the_steps_knew():
     """More cells stay active through a step than its last iterate asks for; the next step may need them."""
-    fluid, points = carried()
+    fluid, points = block_in_uniform_flow()
     place(fluid, points, 0.0)
     for number in range(3):
         advance(fluid, points, number, 0.02 * (number + 1), hasty=True)
-    other, _ = carried()
+    other, _ = block_in_uniform_flow()
     other.restore(fluid.save())
     for some in (fluid, other):
         advance(some, points, 3, 0.25)
@@ -73,7 +73,7 @@ def test_restart_among_cells_that_come_and_go():
 
 
 def test_block_that_was_nowhere_near_is_an_error():
-    fluid, points = carried()
+    fluid, points = block_in_uniform_flow()
     place(fluid, points, 0.0)
     for number in range(3):
         advance(fluid, points, number, 0.02 * (number + 1))
@@ -81,8 +81,8 @@ def test_block_that_was_nowhere_near_is_an_error():
         advance(fluid, points, 3, 0.25)
 
 
-def test_initial_velocity_is_known_where_bodies_are():
-    fluid, points = carried()
+def test_initial_velocity_is_defined_inside_bodies():
+    fluid, points = block_in_uniform_flow()
     place(fluid, points, 0.0)
     fluid.begin_step(0.0, DT)
     x, y = fluid.unknowns.velocity.dofs.T

@@ -43,7 +43,7 @@ def test_a_plate_is_tight(tmp_path, thickness, motion, rate):
     assert np.allclose(history["flow"], rate, atol=1e-10)
 
 
-def test_what_passes_a_thin_plate_is_seen(tmp_path):
+def test_leak_through_a_thin_plate_is_measured(tmp_path):
     """It hardly moves. Both of its faces see at least the flow that leaves the channel."""
     code, history = history_of(tmp_path, 0.02, MOVED.replace("0.05", "1e-9"))
     assert code == 1, "verify is missed"

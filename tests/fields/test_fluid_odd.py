@@ -139,7 +139,7 @@ def test_sealed_pocket_has_no_pressure_level():
 
 
 def test_body_that_outruns_the_flow_behind_it_is_named():
-    """It jumps without the velocity that would have told so."""
+    """It moves by a jump that its velocity does not contain."""
     points = circle((0.3, 0.5), 0.22, 40)
     jump = body("jumper", points, loop(40), motion=lambda x, t: (x + np.array([0.3 * (t > 0.015), 0.0]), 0 * x))
     fluid = make_fluid(uniform([0, 0], [1, 1], [20, 20]), [wall(STILL)], [jump], dt=0.01)

@@ -77,7 +77,7 @@ def test_resumed_run_is_the_same_bit_for_bit(dim, element, box):
     assert (fluid.cut.film is not None) == (box == "film")
 
 
-def test_a_step_that_is_taken_back_leaves_no_trace():
+def test_a_restored_state_gives_the_same_step():
     dt, fluid = 0.03, scene(2, "q1q1", MPI.COMM_SELF)
     for number in range(3):
         step(fluid, dt * number, dt)

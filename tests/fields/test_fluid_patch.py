@@ -152,13 +152,13 @@ def test_hydrostatic(dim, scheme):
 
 @pytest.mark.parametrize("scheme", ["backward_euler", "bdf2"])
 @pytest.mark.parametrize("element", ELEMENTS)
-def test_body_that_moves_with_the_flow_is_not_noticed_2d(element, scheme):
+def test_body_that_moves_with_the_flow_does_not_disturb_it_2d(element, scheme):
     points, facets = circle((0.3, 0.4), 0.16, 50), loop(50)
     changes = galilean(2, element, scheme, points, facets, 12, 20)
     assert changes > 10
 
 
-def test_body_that_moves_with_the_flow_is_not_noticed_3d():
+def test_body_that_moves_with_the_flow_does_not_disturb_it_3d():
     points, facets = sphere((0.35, 0.45, 0.5), 0.21, 2)
     changes = galilean(3, "q1q1", "bdf2", points, facets, 6, 6)
     assert changes > 2

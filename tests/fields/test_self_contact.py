@@ -108,7 +108,7 @@ def test_work_grows_like_n_log_n(name):
     assert more_tests / tests < 1.3 * more * np.log(more) / (k * np.log(k))
 
 
-def test_a_flat_surface_is_seen_as_one():
+def test_a_flat_surface_needs_one_comparison():
     """Its root has a cone of normals: one comparison."""
     x = np.stack([np.linspace(0, 1, 101), np.zeros(101)], axis=1)
     tree = DualTree(np.stack([np.arange(100), np.arange(1, 101)], axis=1), "line", x)

@@ -38,7 +38,7 @@ def history(folder, bodies, *, dynamics, processes=1):
 
 
 @pytest.mark.parametrize("dynamics", ["# static", "dynamics: {rho_inf: 0.8}"], ids=["static", "dynamic"])
-def test_bodies_do_not_feel_each_other(dynamics, tmp_path):
+def test_bodies_do_not_influence_each_other(dynamics, tmp_path):
     alone = {name: history(tmp_path, [name], dynamics=dynamics) for name in BODIES}
     for processes in (1, 2):
         both = history(tmp_path, list(BODIES), dynamics=dynamics, processes=processes)

@@ -151,7 +151,7 @@ def test_rayleigh_damping():
 
 
 def test_moving_support_does_not_ring():
-    """A body carried at constant velocity by its support: velocity and acceleration are exact from the first step."""
+    """A body that its support moves at constant velocity: velocity and acceleration are exact from the first step."""
     structure = make_structure(
         block("quad", 1),
         NeoHooke(30.0, 50.0, 2.0),

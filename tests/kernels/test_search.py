@@ -194,7 +194,7 @@ def swap_places(x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return x - centres + rng.permutation(centres)
 
 
-def test_earlier_calls_leave_no_trace():
+def test_earlier_calls_do_not_change_results():
     """Refitted, degraded and rebuilt trees give what a fresh search gives; degraded ones are rebuilt."""
     rng = np.random.default_rng(3)
     (start, slave), (xm, master) = loose_sheet(20), wavy_sheet(23, 0.01)

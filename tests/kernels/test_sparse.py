@@ -64,7 +64,7 @@ def test_times_vectors(shape):
     np.testing.assert_allclose(A @ np.asfortranarray(values), DENSE_A @ values, rtol=1e-14)
 
 
-def test_entries_of_equal_places_add_up():
+def test_entries_of_equal_indices_add_up():
     rows, columns, data = NUMBERS.integers(5, size=200), NUMBERS.integers(4, size=200), NUMBERS.random(200)
     found, expected = sparse_from_entries(rows, columns, data, (5, 4)), np.zeros((5, 4))
     np.add.at(expected, (rows, columns), data)

@@ -62,7 +62,7 @@ def test_quasi_newton_needs_one_iteration_per_mode(rank: int):
     assert len(residuals) <= rank + 4
 
 
-def test_quasi_newton_reuses_earlier_steps_until_told_to_forget():
+def test_quasi_newton_reuses_earlier_steps_until_reset():
     G, b = random_map(6, 8.0, 3)
     accelerator = QuasiNewton(0.1, filter=1e-10)
     first = len(iterate(accelerator, G, b, 30)[1])

@@ -68,7 +68,7 @@ def test_a_pipe_is_not_waited_for(tmp_path):
 
 
 @pytest.mark.parametrize("time", ["step: 1, end: 1e90", "step: 1e-300, end: 1", "start: -1e20, step: 1, end: 0"])
-def test_a_step_that_time_does_not_feel(tmp_path, time):
+def test_a_step_below_the_rounding_of_time(tmp_path, time):
     assert "is lost in rounding" in message(tmp_path, BLOCK.replace("step: 1, end: 1", time))
 
 

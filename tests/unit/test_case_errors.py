@@ -324,7 +324,7 @@ def test_all_mistakes_at_once_in_the_order_of_lines():
     )
 
 
-def test_the_column_inside_a_text_is_not_guessed_where_it_cannot_be_seen():
+def test_the_column_inside_a_text_is_not_guessed():
     folded = CASE.replace('"1e3*min(t, 1)"', '"1e3*\n          mim(t, 1)"')
     assert str(refused(folded)).startswith("case.yaml:14:34: entry 2 of 'value': unknown function 'mim'")
 

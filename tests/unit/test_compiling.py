@@ -46,7 +46,7 @@ def a_form(folder):
     return sorted((folder / "fenics").glob("libffcx_forms_*.c"))[0]
 
 
-def test_what_is_compiled_is_said(cache):
+def test_compilation_is_reported(cache):
     folder, said = cache
     assert said.splitlines() == ["compiling form 1 of 2 of the test", "compiling form 2 of 2 of the test", "[2.0, 9.0]"]
     assert compile_in(folder).stdout == "[2.0, 9.0]\n"

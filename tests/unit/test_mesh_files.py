@@ -323,7 +323,7 @@ def test_mesh_is_rotated_then_translated():
         (2, None, (1, 2, 3), "translate has 3 numbers, the mesh has 2 dimensions"),
     ],
 )
-def test_impossible_places_are_refused(dim, rotate, translate, message):
+def test_impossible_positions_are_refused(dim, rotate, translate, message):
     mesh = shapes.rectangle((1, 1), (1, 1)) if dim == 2 else shapes.box((1, 1, 1), (1, 1, 1))
     with pytest.raises(MeshError, match=message):
         place(mesh, rotate, translate)

@@ -104,7 +104,7 @@ def test_the_mesh_has_the_cells_at_the_back_of_the_box(out):
     assert len(body.edges) == 24 * 8
 
 
-def test_contact_is_seen_from_where_it_acts():
+def test_contact_is_drawn_from_the_side_where_it_acts():
     assert look_at(np.array([0.0, 0.0, -3.0]))[2] < -0.5
     assert look_at(np.array([1.0, 0.0, 0.0]))[0] > 0.5
     for normal in np.eye(3):
