@@ -10,7 +10,7 @@ import numpy as np
 from coupling.ports import Solid
 from solvers.api import Array, State
 from solvers.fluid.surface import Motion
-from solvers.fluid.time_scheme import STEADY, Difference, backward_euler
+from solvers.fluid.time_scheme import STEADY, Difference
 
 
 @dataclass(frozen=True)
@@ -54,11 +54,9 @@ class Interface:
         self.now = self.displacement()
         self.past = [self.now] * len(self.past)
 
-    def begin_start(self, dt: float, velocity: Array) -> Array:
-        """A step of length dt [s] to the same time, from velocities [m/s]; the displacements now [m]."""
-        place = self.displacement()
-        self.past[0], self._difference = place - dt * velocity, backward_euler(dt)
-        return place
+    def begin_start(self, difference: Difference, velocity: Array) -> None:
+        """The place now is the first one, left with these velocities [m/s]: g = velocity + alpha (d - d_0)."""
+        self.past[0], self._difference = self.displacement() - velocity / difference.alpha, difference
 
     def end_start(self, dt: float, velocity: Array, acceleration: Array) -> None:
         """The displacements are those of the start; those before it follow from velocity and acceleration."""

@@ -221,7 +221,7 @@ class StartOfSolid(Protocol):
 
 
 class StartOfFlow(Protocol):
-    """The same of a flow: steps of backward Euler, each from the initial velocity."""
+    """The same of a flow: short steps of backward Euler, each from the initial velocity."""
 
     def at_once(self, surfaces: Mapping[str, Motion]) -> bool:
         """The initial velocity is not that of the boundary, or of surfaces by name (collective)."""

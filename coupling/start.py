@@ -4,7 +4,7 @@ The acceleration of a structure alone, and no force at the start, would make sol
 begin 1.7 times too fast. A body that is let go also rings: within an instant only its boundary feels the fluid. What a
 step of length h does not resolve has to be in balance from the start on. One step of backward Euler to the same time,
 
-    M (u - u_0) / h^2 + f_int(u) = f_ext(t) + f_fluid,   rho (w - w_0) / h + ... = 0,   w = v_0 + (u - u_0) / h,
+    M (u - u_0) / h^2 + f_int(u) = f_ext(t) + f_fluid,   rho (w - w_0) / k + ... = 0,   w = v_0 + k (u - u_0) / h^2,
 
 gives an acceleration a = (u - u_0) / h^2 in which motions of frequency omega have the share F = 1 / (1 + (omega h)^2).
 n such steps, each from where the last one ended and from the same velocities, leave F^n. The run starts with
@@ -40,9 +40,11 @@ def start_together(
     initial = coupled.save()
     try:
         for _ in range(start.solid.steps):
-            place = interface.begin_start(dt, velocity)
-            with start.flow.step(t, dt), start.solid.step(t, dt):
-                solve()
+            place = interface.displacement()
+            with start.flow.step(t, dt):
+                interface.begin_start(coupled.flow.current.difference, velocity)
+                with start.solid.step(t, dt):
+                    solve()
         acceleration = (interface.displacement() - place) / dt**2
         force = coupled.force()
     except StepFailed:
