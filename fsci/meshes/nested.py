@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,8 +11,10 @@ from fsci.case import Case
 from fsci.case.grid import Refinement
 from fsci.meshes.of_case import read_body, read_rigid_body
 from solvers.fluid.box import Grid
-from solvers.fluid.nested import FINE_LAYERS, Nested, RefinedBox, RefinedRegion, RefinedSurface, refined
 from solvers.tessellation import tessellate
+
+if TYPE_CHECKING:  # SciPy, which cases without nested cells do not need to be checked
+    from solvers.fluid.nested import Nested, RefinedRegion
 
 Surface = tuple[NDArray[np.float64], NDArray[np.int64]]
 
@@ -18,28 +22,15 @@ Surface = tuple[NDArray[np.float64], NDArray[np.int64]]
 def read_grid(case: Case) -> Grid:
     """The grid of the flow. Raises CaseError."""
     assert case.fluid is not None
-    section = case.fluid.grid
-    grid = Grid(section.planes)
-    if not section.refine:
-        return grid
-    surfaces = {name: _surface(case, name) for name in [*case.fluid.bodies, *case.elastic_bodies]}
-    grid = refined(grid, [_region(refinement, surfaces) for refinement in section.refine])
-    assert isinstance(grid, Nested)
-    for name, (points, facets) in surfaces.items():
-        close = RefinedSurface(points, facets, FINE_LAYERS, section.levels).cells(grid)
-        if (close & grid.coarse).any():
-            message = (
-                f"body '{name}' comes within {FINE_LAYERS} cells of cells that are not of the finest level, "
-                f"{section.levels}: refine around it"
-            )
-            raise case.error(("fluid", "grid", "refine"), message)
-    return grid
+    grid = Grid(case.fluid.grid.planes)
+    return _refined(case, grid) if case.fluid.grid.refine else grid
 
 
 def cells_of(case: Case) -> int:
     """Cells of the flow. Raises CaseError."""
-    grid = read_grid(case)
-    return len(grid.first) if isinstance(grid, Nested) else grid.size
+    assert case.fluid is not None
+    grid = Grid(case.fluid.grid.planes)
+    return len(_refined(case, grid).first) if case.fluid.grid.refine else grid.size
 
 
 def fluid_dofs(case: Case) -> int:
@@ -47,13 +38,34 @@ def fluid_dofs(case: Case) -> int:
     assert case.fluid is not None
     if not case.fluid.grid.refine:
         return case.fluid.dofs
-    grid = read_grid(case)
-    assert isinstance(grid, Nested)
+    grid = _refined(case, Grid(case.fluid.grid.planes))
     degree = 1 if case.fluid.element == "q1q1" else 2
     return grid.dim * grid.unknowns(degree) + grid.unknowns(1)
 
 
+def _refined(case: Case, grid: Grid) -> Nested:
+    """Raises CaseError if a body is too close to coarse cells."""
+    from solvers.fluid.nested import FINE_LAYERS, Nested, RefinedSurface, refined
+
+    assert case.fluid is not None
+    section = case.fluid.grid
+    surfaces = {name: _surface(case, name) for name in [*case.fluid.bodies, *case.elastic_bodies]}
+    nested = refined(grid, [_region(refinement, surfaces) for refinement in section.refine])
+    assert isinstance(nested, Nested)
+    for name, (points, facets) in surfaces.items():
+        close = RefinedSurface(points, facets, FINE_LAYERS, section.levels).cells(nested)
+        if (close & nested.coarse).any():
+            message = (
+                f"body '{name}' comes within {FINE_LAYERS} cells of cells that are not of the finest level, "
+                f"{section.levels}: refine around it"
+            )
+            raise case.error(("fluid", "grid", "refine"), message)
+    return nested
+
+
 def _region(refinement: Refinement, surfaces: dict[str, Surface]) -> RefinedRegion:
+    from solvers.fluid.nested import RefinedBox, RefinedSurface
+
     if refinement.box is not None:
         low, high = refinement.box
         return RefinedBox(low, high, refinement.level)

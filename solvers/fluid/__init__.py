@@ -9,6 +9,6 @@ __getattr__, __all__ = lazy_names(
         "grid": ["Grid", "uniform"],
         "immersed": ["ImmersedBody", "rigid_body"],
         "patches": ["Patch"],
-        "system": ["FlowSettings"],
+        "flow_settings": ["FlowSettings"],
     },
 )

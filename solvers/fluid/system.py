@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import chain
-from typing import Literal
 
 import numpy as np
 from mpi4py import MPI
@@ -18,6 +15,7 @@ from solvers.fluid import forms, nitsche
 from solvers.fluid.cell_forms import cell_forms
 from solvers.fluid.cut import Cut
 from solvers.fluid.film import film_cells
+from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.ghost import Scales
 from solvers.fluid.ghost_choice import choose_ghost_penalty
 from solvers.fluid.grid import DistributedGrid
@@ -28,42 +26,10 @@ from solvers.fluid.outer_faces import OuterFaces, OuterOnCut
 from solvers.fluid.patches import Boundary
 from solvers.fluid.pieces import Pieces
 from solvers.fluid.space import Unknowns, set_velocity
-from solvers.fluid.time_scheme import SCHEMES, FlowStep, FlowTimeScheme
+from solvers.fluid.time_scheme import FlowStep
 from solvers.fluid.weights import Weights
 from solvers.fluid.zone import ClosedZone, find_zone
 from solvers.fluid.zone_seepage import ZoneSeepage
-from solvers.values import Value
-
-
-@dataclass(frozen=True)
-class FlowSettings:
-    """What the user says of the flow, besides grid, patches and bodies."""
-
-    density: float  #: [kg/m^3]
-    viscosity: float  #: [Pa s]
-    element: Literal["q1q1", "q2q1"] = "q1q1"
-    convection: bool = True  #: False: Stokes
-    scheme: str | FlowTimeScheme = "bdf2"  #: one of `SCHEMES`, or another
-    body_force: Sequence[Value] | None = None  #: [N/m^3]
-    initial_velocity: Sequence[Value] | None = None  #: [m/s]
-    penalties: forms.Penalties = forms.Penalties()
-
-    @property
-    def degree(self) -> int:
-        return 1 if self.element == "q1q1" else 2
-
-    @property
-    def time(self) -> FlowTimeScheme:
-        return SCHEMES[self.scheme] if isinstance(self.scheme, str) else self.scheme
-
-    @property
-    def steady(self) -> bool:
-        return self.time.steady
-
-    @property
-    def films(self) -> bool:
-        """Films are looked for: one first-order cell across could not bend as they do."""
-        return self.degree > 1
 
 
 class FlowSystem:

@@ -8,9 +8,9 @@ from fluid_setup import block, body, circle, field, loop, make_fluid, step, turn
 
 from fsci.bench import fluid as bench
 from solvers.fluid.extension import WELL, Extension
+from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.forms import Penalties
 from solvers.fluid.grid import Grid, uniform
-from solvers.fluid.system import FlowSettings
 
 
 def around_a_disc(scheme="steady", **settings):

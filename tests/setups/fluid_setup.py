@@ -11,11 +11,11 @@ from mpi4py import MPI
 from solvers import fem
 from solvers.fluid.cut import Cutter
 from solvers.fluid.field import Fluid
+from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.grid import Grid, uniform
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.patches import Patch
 from solvers.fluid.surface import ImmersedSurface, Motion
-from solvers.fluid.system import FlowSettings
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 

@@ -1,0 +1,42 @@
+"""What a flow is, besides grid, patches and bodies: fluid, element, scheme."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from solvers.fluid import forms
+from solvers.fluid.time_scheme import SCHEMES, FlowTimeScheme
+from solvers.values import Value
+
+
+@dataclass(frozen=True)
+class FlowSettings:
+    """What the user says of the flow, besides grid, patches and bodies."""
+
+    density: float  #: [kg/m^3]
+    viscosity: float  #: [Pa s]
+    element: Literal["q1q1", "q2q1"] = "q1q1"
+    convection: bool = True  #: False: Stokes
+    scheme: str | FlowTimeScheme = "bdf2"  #: one of `SCHEMES`, or another
+    body_force: Sequence[Value] | None = None  #: [N/m^3]
+    initial_velocity: Sequence[Value] | None = None  #: [m/s]
+    penalties: forms.Penalties = forms.Penalties()
+
+    @property
+    def degree(self) -> int:
+        return 1 if self.element == "q1q1" else 2
+
+    @property
+    def time(self) -> FlowTimeScheme:
+        return SCHEMES[self.scheme] if isinstance(self.scheme, str) else self.scheme
+
+    @property
+    def steady(self) -> bool:
+        return self.time.steady
+
+    @property
+    def films(self) -> bool:
+        """Films are looked for: one first-order cell across could not bend as they do."""
+        return self.degree > 1
