@@ -15,7 +15,7 @@ def plot_front(rows: Sequence[Row], title: str, path: Path) -> None:
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
     from fsci.plot.curves import COLOURS, DOTS, STYLE
 
@@ -31,8 +31,11 @@ def plot_front(rows: Sequence[Row], title: str, path: Path) -> None:
             best = [(float(row[cost]), float(row[ERROR])) for row in rows if row[FRONT]]
             panel.loglog(*zip(*best, strict=True), "o", ms=12, mfc="none", mec="black", label="front of time and error")
             panel.set_xlabel(cost)
-            panel.xaxis.set_minor_formatter(NullFormatter())  # labels of a short axis would overlap
-            panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            panel.xaxis.set_minor_formatter(NullFormatter())
+            spent = [float(row[cost]) for row in rows]
+            ratio = max(spent) / min(spent)
+            subs = (1.0, 2.0, 5.0) if ratio < 10.0 else (1.0, 3.0)  # more labels would overlap
+            panel.xaxis.set_major_locator(MaxNLocator(4) if ratio < 3.0 else LogLocator(subs=subs))
             panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         panels[0].set_ylabel("largest error of all values [%]")
         panels[0].legend()
