@@ -15,6 +15,7 @@ class Coupled:
 
     def __init__(self, flow: Flow, solid: Solid, dry_sides: Sequence[DrySide] = (), start: Start | None = None):
         self.flow, self.solid, self.start = flow, solid, start
+        self.notes: list[str] = []  #: what the user should know of the start
         self.interface = Interface(solid, flow.scheme.times, dry_sides)
         self.balance = Balance(flow, solid, self.interface)
 
@@ -45,6 +46,12 @@ class Coupled:
         self.solid.end_step()
         self.flow.end_step()
         self.balance.add_step(self.flow.current.dt)
+
+    def take_notes(self) -> tuple[str, ...]:
+        """What the user should know of this step, and once of the start."""
+        notes = (*self.notes, *self.flow.notes)
+        self.notes.clear()
+        return notes
 
     def force(self) -> Array:
         """Force [N] of the fluid on the vertices, shape (n, dim)."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import AbstractContextManager
 
 import numpy as np
+from mpi4py import MPI
 
 from coupling.elastic import Elastic
 from solvers.api import Array
@@ -24,6 +25,10 @@ class ElasticStart:
 
     def velocity(self) -> Array:
         return self.elastic.at_vertices(self._structure.now.v)
+
+    def acceleration(self) -> float:
+        largest = float(np.abs(self._structure.now.a).max(initial=0.0))
+        return self._structure.comm.allreduce(largest, op=MPI.MAX)
 
     def step(self, t: float, dt: float) -> AbstractContextManager[None]:
         """Supports accelerate as they are asked to."""

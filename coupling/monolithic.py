@@ -80,7 +80,7 @@ class Monolithic:
         coupled.end_step()
         numbers = coupled.balance.numbers() | {"coupling.linear": float(self._linear_iterations)}
         numbers.update(coupled.solid.numbers())
-        return StepInfo(info.iterations, info.residuals, numbers, tuple(coupled.flow.notes))
+        return StepInfo(info.iterations, info.residuals, numbers, coupled.take_notes())
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 

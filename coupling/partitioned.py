@@ -53,7 +53,7 @@ class Partitioned:
         history, newton = self._iterate()
         coupled.end_step()
         numbers = {"coupling.newton": float(newton), **coupled.balance.numbers(), **coupled.solid.numbers()}
-        return StepInfo(len(history), tuple(history), numbers, tuple(coupled.flow.notes))
+        return StepInfo(len(history), tuple(history), numbers, coupled.take_notes())
 
     def _iterate(self) -> tuple[list[float], int]:
         """(residuals [m], Newton steps of both fields) until the interface is in balance. Raises StepFailed."""

@@ -211,6 +211,10 @@ class StartOfSolid(Protocol):
         """Velocity [m/s] of all vertices, shape (n, dim)."""
         ...
 
+    def acceleration(self) -> float:
+        """The largest [m/s^2] without fluid (collective)."""
+        ...
+
     def step(self, t: float, dt: float) -> AbstractContextManager[None]:
         """One of length dt, begun here and solved by who asks for it."""
         ...
@@ -222,6 +226,11 @@ class StartOfSolid(Protocol):
 
 class StartOfFlow(Protocol):
     """The same of a flow: short steps of backward Euler, each from the initial velocity."""
+
+    @property
+    def smallest_cell(self) -> float:
+        """Shortest edge [m]."""
+        ...
 
     def at_once(self, surfaces: Mapping[str, Motion]) -> bool:
         """The initial velocity is not that of the boundary, or of surfaces by name (collective)."""

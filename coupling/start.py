@@ -21,6 +21,12 @@ from collections.abc import Callable
 from coupling.coupled import Coupled
 from solvers.api import StepFailed
 
+#: Note for the user.
+NO_BALANCE = (
+    "the first accelerations of flow and solid were not found together ({}); the run starts with that of the solid "
+    "alone, and its first steps are less accurate"
+)
+
 
 def start_together(
     coupled: Coupled, t: float, dt: float, solve: Callable[[], object], *, with_solid: bool = False
@@ -28,14 +34,18 @@ def start_together(
     """From the initial state to the one that the first step of length dt [s] starts from (collective).
 
     solve: bring both fields into balance at the end of a step that they have begun; with_solid: as one system.
-    Flows that start at once keep the initial state: they have no acceleration. So do those for which no balance is
-    found, what has no inertia, and flows by backward Euler: their velocities are those of the middle of a step.
+    Flows that start at once keep the initial state: they have no acceleration. So do solids without inertia, and flows
+    by backward Euler: their velocities are those of the middle of a step. So do bodies that the start would move by a
+    cell or more, away from the first place of the fluid, and, with a note for the user, those for which no balance is
+    found.
     """
     if coupled.start is None:
         return
     start, interface = coupled.start, coupled.interface
     velocity = start.solid.velocity()
     if start.flow.at_once(interface.at_start(velocity)):
+        return
+    if start.solid.steps * dt**2 * start.solid.acceleration() >= start.flow.smallest_cell:
         return
     initial = coupled.save()
     try:
@@ -47,8 +57,9 @@ def start_together(
                     solve()
         acceleration = (interface.displacement() - place) / dt**2
         force = coupled.force()
-    except StepFailed:
+    except StepFailed as failure:
         coupled.restore(initial)
+        coupled.notes.append(NO_BALANCE.format(failure.reason))
         return
     start.solid.end()
     start.flow.end(dt)

@@ -68,7 +68,7 @@ def _balances(draw: Draw, run: Ended) -> Iterator[tuple[str, float, float]]:
         sums = [history[f"top.{i}"] + history[f"bottom.{i}"] for i in axes]
         size = max(_largest(history, f"{name}.{i}") for name in ("top", "bottom") for i in axes)
         yield "the sum of reactions", float(np.abs(sums).max()), BALANCE * size
-    if draw.scene.name.startswith("drop") and "energy from nothing" not in run.words:
+    if draw.scene.name.startswith("drop") and "without external work" not in run.words:
         had = float((history["energy.kinetic"] + history["energy.internal"]).max())
         yield "energy from nothing", float(history["structure.energy"].max()), GAIN * had
 

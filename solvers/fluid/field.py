@@ -96,7 +96,7 @@ class Fluid:
         self.history = History(settings.time, self.unknowns.local)
         self.current = FlowStep(0.0, 0.0, STEADY)  #: the step that is computed now or was last
         self.started = False  #: a step was accepted, so that there are forces
-        self._smallest = min(float(np.diff(edge).min()) for edge in grid.edges)
+        self.smallest_cell = min(float(np.diff(edge).min()) for edge in grid.edges)
         self.motions: list[Motion] = []
         self._wet = wetness([body.surface for body in self.bodies])
         self._fast_bodies = FastBodies(grid)
@@ -208,7 +208,7 @@ class Fluid:
         if self.settings.steady or all(body.rests for body in self.bodies):
             return 0
         times = self.settings.time.times
-        return strip_layers(self.grid, motion, times * self.current.dt, self._smallest)
+        return strip_layers(self.grid, motion, times * self.current.dt, self.smallest_cell)
 
     def _hold_pressure(self, *, set_by_solids: bool) -> None:
         elastic = np.concatenate([np.full(b.surface.vertices, b.deforms) for b in self.bodies] + [[]]) > 0.0
@@ -261,7 +261,7 @@ class Fluid:
         return self._size
 
     def _norm(self, rows: Array) -> float:
-        settings, h = self.settings, self._smallest
+        settings, h = self.settings, self.smallest_cell
         impedance = settings.viscosity / h + settings.density * (
             self.system.fastest + h * self.current.difference.alpha
         )

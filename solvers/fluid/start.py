@@ -30,6 +30,11 @@ class FlowStart:
     def __init__(self, fluid: Fluid):
         self.fluid = fluid
 
+    @property
+    def smallest_cell(self) -> float:
+        """Shortest edge [m]."""
+        return self.fluid.smallest_cell
+
     def at_once(self, surfaces: Mapping[str, Motion]) -> bool:
         """The initial velocity is not that of the boundary, or of bodies: `surfaces` by name, others as prescribed.
 

@@ -32,6 +32,15 @@ class RigidStart:
             found.append(now.v[:3] + np.cross(motion.spin(now), body.arms(now.R, body.points)))
         return np.concatenate(found)[:, : field.dim]
 
+    def acceleration(self) -> float:
+        """At most: that of the centre, and of the point farthest from it."""
+        largest = 0.0
+        for body, now in zip(self.field.bodies, self.field.now, strict=True):
+            a, turning = np.split(motion.acceleration(body, now), 2)
+            arm = np.linalg.norm(body.arms(now.R, body.points), axis=1).max()
+            largest = max(largest, float(np.linalg.norm(a) + np.linalg.norm(turning) * arm))
+        return largest
+
     @contextmanager
     def step(self, t: float, dt: float) -> Iterator[None]:
         """From rest, so that a = (u - u_n) / dt^2; held components accelerate as they are asked to."""

@@ -7,9 +7,11 @@ import pytest
 from coupling_setup import BAR_MODES, TIGHT, bar_and_column, post_in_flow
 
 from coupling.monolithic import Monolithic
+from coupling.start import NO_BALANCE, start_together
 from fsci.case import load_case
 from fsci.run.history import read_history
 from fsci.run.run import FINISHED, run_case
+from solvers.api import StepFailed
 
 #: A disc of the density of the fluid is let go. Waves cross it in 0.01 s, less than most steps.
 DISC = """\
@@ -115,3 +117,36 @@ def test_flows_that_start_at_once_keep_two_steps_of_backward_euler(growth, at_on
     Monolithic(coupled, TIGHT).initialise(0.0, 0.01)
     assert coupled.flow.history.steps == (() if at_once else (0.01, 0.01))
     assert np.abs(coupled.flow.history.past[1].velocity).max() == pytest.approx(0.0 if at_once else 0.1, rel=0.2)
+
+
+def test_a_start_without_balance_is_told():
+    """The state is the initial one, and the first step says so once."""
+
+    def fail():
+        raise StepFailed("fluid", "no balance")
+
+    scheme = Monolithic(post_in_flow(growth=lambda t: t / 0.1), TIGHT)
+    scheme.coupled.initialise(0.0, 0.01)
+    before = scheme.coupled.interface.now.copy()
+    start_together(scheme.coupled, 0.0, 0.01, fail)
+    assert np.array_equal(scheme.coupled.interface.now, before)
+    assert scheme.step(0.0, 0.01).notes == (NO_BALANCE.format("no balance"),)
+    assert scheme.step(0.01, 0.01).notes == ()
+
+
+def test_bodies_that_the_start_would_move_by_a_cell_keep_the_initial_state():
+    """Its six steps move a body by 6 h^2 a; nothing is solved."""
+
+    def fail():
+        raise AssertionError("solved")
+
+    coupled = post_in_flow(growth=lambda t: t / 0.1)
+    coupled.initialise(0.0, 0.01)
+    assert coupled.start is not None
+    cell = coupled.start.flow.smallest_cell
+    coupled.solid.structure.now.a[:] = -1.01 * cell / (6.0 * 0.01**2)
+    start_together(coupled, 0.0, 0.01, fail)
+    assert coupled.flow.history.steps == () and coupled.notes == []
+    coupled.solid.structure.now.a[:] *= 0.98
+    with pytest.raises(AssertionError, match="solved"):
+        start_together(coupled, 0.0, 0.01, fail)
