@@ -146,7 +146,8 @@ def test_bodies_that_the_start_would_move_by_a_cell_keep_the_initial_state():
     cell = coupled.start.flow.smallest_cell
     coupled.solid.structure.now.a[:] = -1.01 * cell / (6.0 * 0.01**2)
     start_together(coupled, 0.0, 0.01, fail)
-    assert coupled.flow.history.steps == () and coupled.notes == []
+    assert coupled.flow.history.steps == ()
+    assert coupled.notes == []
     coupled.solid.structure.now.a[:] *= 0.98
     with pytest.raises(AssertionError, match="solved"):
         start_together(coupled, 0.0, 0.01, fail)
