@@ -1,4 +1,4 @@
-"""Momentum and power of the whole fluid: what its bodies get by them, found without the interface terms."""
+"""Balances of volume, momentum and power of the whole fluid, computed without the interface terms."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from solvers.fluid.system import FlowSystem
 
 
 def leak(system: FlowSystem) -> float:
-    """Volume [m^3/s] that passes through the surfaces of bodies: sum over pieces of |int (u - g) . n ds| (collective).
+    """Flow rate [m^3/s] through the surfaces of bodies: sum over pieces of |int (u - g) . n ds| (collective).
 
-    Nitsche's method lets the velocity differ from that of the surface by the error of the grid. Where both sides of a
-    thin body share unknowns, the sum is as large as the flow through it.
+    With Nitsche's method the velocity differs from that of the surface by the discretisation error. Where both sides of
+    a thin body share unknowns, this is the flow through the body.
     """
     assert system.cut is not None
     at = system.interface
@@ -27,14 +27,14 @@ def leak(system: FlowSystem) -> float:
 
 
 def seepage(system: FlowSystem) -> float:
-    """Volume [m^3/s] that passes through closed contact (collective)."""
+    """Flow rate [m^3/s] through closed contact (collective)."""
     return 0.0 if system.seepage is None else system.seepage.leak(system.flow.x.array)
 
 
 class Balances:
-    """Sums of all momentum equations, tested with a constant velocity and with that of the fluid.
+    """The momentum equations tested with a constant velocity (force) and with that of the fluid (power).
 
-    Stabilisation and ghost penalty vanish in the first sum; what they take from the second is lost by the method.
+    Stabilisation and ghost penalty vanish in the force. Their contribution to the power is the loss of the method.
     """
 
     def __init__(self, system: FlowSystem):
@@ -48,13 +48,13 @@ class Balances:
         self._inner = self._over_fluid(everywhere, in_film)
 
     def __call__(self, held: NDArray[np.bool_]) -> tuple[Array, float]:
-        """(force [N] of the fluid on all bodies together, shape (dim,); power [W] that the method takes) (collective).
+        """(force [N] of the fluid on all bodies together, shape (dim,); power [W] lost by the method) (collective).
 
-        The force in closed contact is no part of the fluid's momentum: it counts as it is.
-
-        held: owned dofs whose rows are not solved for. Force: that on walls and patches less
-        int rho (u_t + u . grad u) - f. Power, by stabilisation, ghost penalty and slip at the bodies: that of walls and
-        patches less what bodies get and int (rho (u_t + u . grad u) - f) . u + 2 mu eps(u) : eps(u).
+        held: owned dofs whose rows are not solved for.
+        Force: that on walls and patches, minus int rho (u_t + u . grad u) - f, plus the force in closed contact, which
+        does not appear in the momentum of the fluid.
+        Power of stabilisation, ghost penalty and slip at the bodies: the power of walls and patches, minus that of the
+        force on the bodies, minus int (rho (u_t + u . grad u) - f) . u + 2 mu eps(u) : eps(u).
         """
         system, dofs = self.system, self.system.unknowns.velocity.dofs
         assert system.cut is not None
@@ -65,14 +65,14 @@ class Balances:
         return force + closed.sum(axis=0), given - float((of_flow * system.cut.motion.v).sum())
 
     def _outer_rows(self, held: NDArray[np.bool_]) -> Array:
-        """Forces [N] on the fluid from walls and patches at local dofs, the ghosts' share still there."""
+        """Forces [N] on the fluid from walls and patches at local dofs; contributions to ghosts are not added up."""
         owned = np.where(held, self.system.residual(), 0.0)
         rows = -self.system.outer_rows()
         rows[: len(owned)] += owned
         return rows
 
     def _over_fluid(self, integrand, in_film) -> list[fem.Integral]:
-        """Its integral over uncut cells, over the fluid's part of cut cells, and that of another one in films."""
+        """Integrals over uncut cells, over the fluid in cut cells, and of another integrand in films."""
         system, domain, weights = self.system, self.system.grid.domain, self.system.weights
         parts = [fem.Integral(domain, integrand * fem.measure(domain, "dx", 2 * system.unknowns.degree + 1))]
         if system.with_bodies:
@@ -81,9 +81,9 @@ class Balances:
         return parts
 
     def _inner_rows(self) -> Array:
-        """int (rho (u_t + u . grad u) - f) . v + 2 mu eps(u) : eps(v) at local dofs, the ghosts' share still there.
+        """int (rho (u_t + u . grad u) - f) . v + 2 mu eps(u) : eps(v) at local dofs, in films without convection.
 
-        Without convection in films, as in the equations.
+        Contributions to ghosts are not added up.
         """
         system = self.system
         rows = np.zeros(system.unknowns.local)

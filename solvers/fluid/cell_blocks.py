@@ -1,4 +1,4 @@
-"""Terms of surfaces that are linear in the flow, as dense blocks of the cells that they cut."""
+"""Terms of surfaces that are linear in the flow, as dense blocks of cut cells."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from solvers.api import Array
 
 @dataclass(frozen=True)
 class CellBlocks:
-    """Rows B w of a flow w, cell by cell."""
+    """A matrix B as a sum of dense blocks, one per cell."""
 
     dofs: NDArray[np.int32]  #: local, shape (cells, n)
     blocks: Array  #: shape (cells, n, n)
 
     def rows(self, flow: Array) -> Array:
-        """B w at local dofs, the ghosts' share still there."""
+        """B w for a flow w, at local dofs; contributions to ghosts are not added up."""
         found = np.einsum("cab,cb->ca", self.blocks, flow[self.dofs])
         return np.bincount(self.dofs.ravel(), found.ravel(), len(flow)).astype(float)
 
@@ -28,7 +28,10 @@ class CellBlocks:
 
 
 def cell_blocks(cells: NDArray[np.int32], dofs: NDArray[np.int32], by_piece: Array) -> CellBlocks:
-    """From blocks of pieces, whose cells are sorted, with dofs of any shape (pieces, ..) and (pieces, .., ..)."""
+    """Sum the blocks of pieces, sorted by cell, to those of cells.
+
+    dofs: (pieces, ...), with any shape of the functions of a cell; by_piece: (pieces, ..., ...).
+    """
     first = np.unique(cells, return_index=True)[1]
     size = int(np.prod(dofs.shape[1:]))
     dofs, blocks = dofs.reshape(len(dofs), size), by_piece.reshape(len(dofs), size, size)

@@ -21,16 +21,16 @@ class CellForms:
     tangents: tuple[fem.Integral, ...]
 
     def integrals(self) -> list[fem.Integral]:
-        """What is to be compiled; forms of films are when there is one."""
+        """Forms to compile at the start; those of films are compiled when a film appears."""
         return [*self.residuals[:2], *self.tangents[:2]]
 
 
 def cell_forms(unknowns: Unknowns, flow: forms.Coefficients, function: Any, weights: Weights | None) -> CellForms:
-    """Forms at the function of velocity and pressure; weights: of the interface, if there is one."""
+    """Forms at a function of velocity and pressure; weights: coefficients of cut cells, None without bodies."""
     domain = unknowns.grid.domain
     test, trial = ufl.TestFunction(unknowns.space), ufl.TrialFunction(unknowns.space)
     residuals = _residuals(unknowns, flow, function, test, weights)
-    # the body force has no derivative: flows with and without one share their compiled tangents
+    # the body force has no derivative: without it, all flows share their compiled tangents
     same_slope = _residuals(unknowns, replace(flow, force=forms.nothing(unknowns.grid.dim)), function, test, weights)
     tangents = [ufl.derivative(form, function, trial) for form in same_slope]
     return CellForms(
@@ -42,7 +42,7 @@ def cell_forms(unknowns: Unknowns, flow: forms.Coefficients, function: Any, weig
 def _residuals(
     unknowns: Unknowns, flow: forms.Coefficients, function: Any, test: Any, weights: Weights | None
 ) -> list[Any]:
-    """Over uncut cells and, with weights, over cut ones and films."""
+    """Forms over uncut cells and, with weights, over cut ones and films."""
     domain, degree = unknowns.grid.domain, unknowns.degree
     (u, p), (v, q) = (unknowns.parts(f) for f in (function, test))
     everywhere = forms.bulk(flow, u, p, v, q) + forms.residual_based(flow, u, p, v, q)

@@ -1,4 +1,4 @@
-"""The blocks of a monolithic system that belong to the flow's side of the interface.
+"""The coupling blocks of a monolithic system: derivatives of the flow's rows and force by the motion of surfaces.
 
 With the operators of `interface` and the derivatives of `shape`, for displacements d of the vertices of some bodies,
 whose velocity is g = alpha d - ..., rows r and force f of the flow change by
@@ -23,9 +23,9 @@ from solvers.sparse import Sparse
 
 @dataclass(frozen=True)
 class InterfaceEntries:
-    """Derivatives by motion and flow; each process has those of its cells. Rows: dofs of the vertices.
+    """Derivatives by motion and flow. Each process has those of its cells.
 
-    Columns of the flow are its global unknowns.
+    Rows are dofs of the vertices. Columns of the flow are its global unknowns.
     """
 
     into_flow: Sparse  #: dr/dd transposed; held rows of the flow are zero
@@ -41,9 +41,9 @@ def interface_entries(
     held: NDArray[np.bool_],
     vertices: NDArray[np.int64],
 ) -> InterfaceEntries:
-    """For the motion of some vertices, numbered as they are given.
+    """Entries for the motion of some vertices, in the given order.
 
-    flow, held: velocity and pressure at local dofs, and which of these have no rows. alpha [1/s]: dg/dd.
+    flow: velocity and pressure at local dofs; held: local dofs with rows of the identity; alpha [1/s]: dg/dd.
     """
     by_shape, load_by_shape = shape_derivatives(operator, flow)
     C = operator.coupling
@@ -58,7 +58,7 @@ def interface_entries(
 
 
 class _Sums:
-    """Matrices from what the pieces have at some of the vertices; rows are these vertices' dofs."""
+    """Assembles matrices from blocks of pieces; rows are the dofs of some of the vertices."""
 
     def __init__(self, operator: InterfaceTerms, unknowns: Unknowns, vertices: NDArray[np.int64]):
         self._operator, self._dim, number = operator, operator.dim, np.full(operator.vertices, -1)
@@ -71,14 +71,14 @@ class _Sums:
         self._pressure = self._beside(operator.p[:, :, None])
 
     def _beside(self, dofs: NDArray[np.int32]) -> OverlappingBlocks:
-        """Functions of the cell of each piece, dofs (pieces, functions, components), beside its vertices."""
+        """Couplings of the vertices of each piece with functions of its cell, dofs (pieces, functions, components)."""
         dofs, vertices = dofs[self._ours], self._corner.shape[1]
         numbers = np.repeat(dofs, vertices, axis=1).reshape(-1, dofs.shape[2])
         rows = np.repeat(self._corner[:, None], dofs.shape[1], axis=1).ravel()
         return OverlappingBlocks(rows, numbers[:, 0], numbers, self._shape, self._shape[1])
 
     def with_flow(self, coefficients: MotionOperator) -> Sparse:
-        """An operator and its transposed, columns: local dofs of the flow."""
+        """The transposed matrix of an operator; columns are local dofs of the flow."""
         at, dim, ours = self._operator, self._dim, self._ours
         fields = at.fields[ours]
         turned = np.swapaxes(coefficients.fields[ours], 2, 3).reshape(len(fields), fields.shape[3], dim * dim)
@@ -87,7 +87,7 @@ class _Sums:
         return (self._velocity.matrix(velocity) + self._pressure.matrix(pressure)).ordered()
 
     def with_surface(self, blocks: Array) -> Sparse:
-        """Blocks (pieces, vertices, vertices, dim, dim), columns: dofs of the vertices."""
+        """The matrix of blocks (pieces, vertices, vertices, dim, dim); columns are dofs of the vertices."""
         dim, n, corner = self._dim, self._shape[0], self._corner
         rows, columns = (np.repeat(corner, corner.shape[1], axis=1).ravel(), np.tile(corner, corner.shape[1]).ravel())
         numbers = columns[:, None] * dim + np.arange(dim)

@@ -1,4 +1,4 @@
-"""Faces of cells at the boundary of the box that bodies cover in part or whole, and what acts on the rest of them."""
+"""Faces of cells on the boundary of the box that bodies cover in part or whole: integrals over their wet part."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from solvers.gauss import gauss
 
 @dataclass(frozen=True)
 class CoveredFaces:
-    """Those on one face of the box, with Gauss points and weights of their wet part."""
+    """Covered faces on one face of the box, with Gauss points and weights of their wet part."""
 
     grid: DistributedGrid
     unknowns: Unknowns
@@ -29,27 +29,27 @@ class CoveredFaces:
     weights: Array  #: wet weights times areas [m^(dim-1)], shape (cells, points)
 
     def only(self, marked: NDArray[np.bool_]) -> CoveredFaces:
-        """Those of marked local cells."""
+        """The faces of marked local cells."""
         keep = marked[self.cells]
         return replace(self, cells=self.cells[keep], weights=self.weights[keep])
 
     def velocity(self, values: Array) -> Array:
-        """Of values at local dofs, at the points, shape (cells, points, dim)."""
+        """Velocity at the points from values at local dofs, shape (cells, points, dim)."""
         shapes, _ = fem.tabulate_lagrange(self.grid.domain, self.unknowns.degree, self.reference)
         return np.einsum("qa,cai->cqi", shapes, values[self.unknowns.cell_velocity[self.cells]])
 
     def pressure(self, values: Array) -> Array:
-        """The same of the pressure, shape (cells, points)."""
+        """Pressure at the points from values at local dofs, shape (cells, points)."""
         shapes, _ = fem.tabulate_lagrange(self.grid.domain, 1, self.reference)
         return values[self.unknowns.cell_pressure[self.cells]] @ shapes.T
 
     def outward(self, vectors: Array) -> Array:
-        """Components of vectors along the normal that points out of the box."""
+        """Components of vectors along the outward normal of the box."""
         normal: Array = vectors[..., self.axis]
         return normal if self.side else -normal
 
     def along_normal(self, values: Array) -> Array:
-        """Vectors of some lengths along that normal."""
+        """Vectors of given lengths along the outward normal."""
         vectors = np.zeros((*values.shape, self.grid.dim))
         vectors[..., self.axis] = values if self.side else -values
         return vectors
@@ -61,7 +61,7 @@ class CoveredFaces:
         return self.unknowns.cell_velocity[self.cells], np.einsum("qa,cqi->cai", shapes, weighted)
 
     def outflow(self, mu: float, mass_flux: Array) -> Array:
-        """d/du of the outflow's form over the wet part [Pa s m^(dim-2)], shape (cells, functions, dim, functions, dim).
+        """d/du of the form of an outflow over the wet part [Pa s m^(dim-2)], (cells, functions, dim, functions, dim).
 
         -<mu (grad u)^T n, v> - <min(0, rho a . n) u, v> / 2; mass_flux: rho a at the points, (cells, points, dim).
         """
@@ -92,10 +92,10 @@ def covered_faces(
     facets: NDArray[np.int32],
     cells: NDArray[np.int32],
 ) -> tuple[NDArray[np.bool_], list[CoveredFaces]]:
-    """(which of some outer facets no body covers, the others), with Gauss points in each direction of a face.
+    """(mask of the facets that no body covers, the others as covered faces).
 
-    facets: local; cells: the local cells that they belong to. Polynomials of the degree points - 1 are integrated
-    exactly.
+    points: Gauss points in each direction of a face; polynomials of the degree points - 1 are integrated exactly.
+    facets: local facets on the boundary of the box; cells: the local cell of each.
     """
     free, covered = np.ones(len(facets), dtype=bool), []
     if len(cut.facets):
@@ -118,24 +118,24 @@ def _covered(
     points_per_direction: int,
     cells: NDArray[np.int32],
 ) -> tuple[CoveredFaces, NDArray[np.int64]]:
-    """(the covered ones of the faces of local cells, which of the cells they belong to)."""
+    """(the covered faces, indices of their cells in `cells`)."""
     axis, side = "xyz".index(face[0]), int(face[1] == "+")
     points = gauss(points_per_direction)[0]
     indices = np.unravel_index(grid.numbers[cells], grid.grid.shape, order="F")
     others = [i for i in range(grid.dim) if i != axis]
     shape = [grid.grid.shape[i] for i in others]
     number = np.ravel_multi_index([indices[i] for i in others], shape, order="F")
-    row = np.full(int(np.prod(shape)), -1)
-    row[found.cells] = np.arange(len(found.cells))
-    touched = np.flatnonzero(row[number] >= 0)
+    row_of = np.full(int(np.prod(shape)), -1)
+    row_of[found.cells] = np.arange(len(found.cells))
+    touched = np.flatnonzero(row_of[number] >= 0)
     reference = np.full((len(points) ** len(others), grid.dim), float(side))
     for k, i in enumerate(others):
         reference[:, i] = np.tile(np.repeat(points, len(points) ** k), len(points) ** (len(others) - 1 - k))
     areas = grid.sizes[cells[touched]][:, others].prod(axis=1)
-    wet = found.weights[row[number[touched]]]
+    wet = found.weights[row_of[number[touched]]]
     if grid.sheets is not None:
-        for place, cell in enumerate(grid.original[cells[touched]].tolist()):
+        for row, cell in enumerate(grid.original[cells[touched]].tolist()):
             if cell in grid.sheets.shares:
-                wet[place] = grid.sheets.shares[cell].wet(axis, side, points)
+                wet[row] = grid.sheets.shares[cell].wet(axis, side, points)
     weights = wet * areas[:, None]
     return CoveredFaces(grid, unknowns, cells[touched], axis, side, reference, weights), touched

@@ -1,4 +1,4 @@
-"""Where surfaces cut the grid: active cells, and the moments that turn integrals on cut cells into weights."""
+"""The cut of the grid by surfaces: active cells, and the moments that give the quadrature weights of cut cells."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from solvers.fluid.surface import Motion
 from solvers.gauss import gauss
 from solvers.tessellation import unit_normals
 
-#: Layers around the cells of a process, besides those of the strip, that it cuts too: roots are found there.
+#: Layers of cells around those of a process that it cuts too, beyond those of the strip: roots may lie there.
 MARGIN = 4
 
 Cells = NDArray[np.int32]
@@ -26,17 +26,18 @@ Cells = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Cut:
-    """The grid as the surfaces at one time leave it; cells are local and sorted."""
+    """The grid as cut by the surfaces at one time; cells are local and sorted."""
 
     uncut: Cells  #: cells full of fluid
     cut: Cells  #: cells with a piece of surface, or partly solid
-    strip: Cells  #: solid cells that the flow is extended to
+    strip: Cells  #: solid cells behind the surface to which the flow is extended
     ghost_faces: NDArray[np.int32]  #: faces between active cells, one of them cut or of the strip
     contact_cells: Cells  #: solid cells where surfaces touch each other or the box's boundary
-    reach: NDArray[np.bool_]  #: local cells that the surfaces may soon cut or uncover
-    alive: NDArray[np.bool_]  #: active cells of the mesh, near those that this process holds
+    reach: NDArray[np.bool_]  #: local cells that the surfaces may cut or uncover in the next steps
+    #: active cells of the whole mesh, for the cells that this process cuts: its own and those near
+    alive: NDArray[np.bool_]
     share: Array  #: share of fluid in these cells of the mesh, zero elsewhere and in the strip
-    depth: int  #: cells from the strip's farthest cell to a cut one
+    depth: int  #: layers of cells in the strip
     fluid: Array  #: int_fluid L_q dx / (w_q |K|) on cut cells, shape (cut, points)
     fraction: Array  #: share of fluid in each local cell
     pieces: Pieces
@@ -51,11 +52,11 @@ class Cut:
 
 
 class Cutter:
-    """Cuts one grid again and again; `points` (n,) are the 1D points of the rule on cut cells.
+    """Cuts one grid by surfaces that move; `points` (n,) are the 1D points of the quadrature on cut cells.
 
-    Within a step no cell leaves the ghost penalty that once was under it: iterates that go to and fro across a cell's
-    face would otherwise solve two systems in turn and never settle. Surfaces that have not moved are not cut again.
-    Films, if they are looked for, are those of its first cut.
+    Within a step a cell that the ghost penalty has acted on keeps it. Otherwise iterates that alternate between two
+    sides of a face would change the system each time, and Newton's method would not converge. Surfaces that have not
+    moved are not cut again. Films, where they are detected, are those of the first cut of a step.
     """
 
     def __init__(self, grid: DistributedGrid, points: Array, films: Films | None = None):
@@ -64,12 +65,12 @@ class Cutter:
         self._special = np.zeros(grid.grid.size, dtype=bool)
         self._depth = 0
         sizes = grid.grid.cell_sizes()
-        self._slivers = NOTHING * sizes.prod(axis=1) / sizes.max(axis=1)  # areas of surface that do not count
+        self._slivers = NOTHING * sizes.prod(axis=1) / sizes.max(axis=1)  # areas of surface that are neglected
         self._first: _First | None = None
         self._of_step: Cut | None = None
 
     def on_coarse_cells(self, layers: int) -> bool:
-        """Some of the cells under the ghost penalty have coarser ones this near, as far as this process knows."""
+        """Whether a coarser cell is within some layers of those with ghost penalty, among the cells of this process."""
         nested = self.grid.nested
         if nested is None or not self._special.any():
             return False
@@ -77,7 +78,7 @@ class Cutter:
         return bool((near & nested.coarse).any())
 
     def begin_step(self) -> None:
-        """Forget where the surfaces have been."""
+        """Discard the cells with ghost penalty of the last step."""
         self._special[:] = False
         self._of_step = None
         self._depth = 0
@@ -85,9 +86,9 @@ class Cutter:
     def __call__(
         self, facets: NDArray[np.int64], motion: Motion, layers: int, wet: NDArray[np.bool_] | None = None
     ) -> Cut:
-        """Cells and weights for the surfaces, with this many layers of cells behind them kept active.
+        """The cut by surfaces, with so many layers of cells behind them kept active.
 
-        Facets that are not `wet`, and those on the boundary of the box, only close the solid.
+        wet: facets that the flow acts on. The others, and those on the boundary of the box, only close the solid.
         """
         if not len(facets):
             return self._whole(facets, motion)
@@ -111,7 +112,7 @@ class Cutter:
         normal = -unit_normals(motion.x[facets])
         off = off_boundary(box, motion.x[facets])
         counts = off if wet is None else off & wet
-        # on sheets, cells that are solid but for rounding belong to nobody
+        # on sheets, cells that are solid except for rounding have no fluid
         overlap = moments.fraction > (1.0 + NOTHING if grid.sheets is None else 1.0 - NOTHING)
         piece_normal = normal[moments.piece_facet]
         cells, piece_moments = put_where_fluid_is(box, self.points, moments, piece_normal, overlap)
@@ -157,7 +158,7 @@ class Cutter:
         return found if grid.sheets is None else on_sheets(grid, self.points, found)
 
     def _whole(self, facets: NDArray[np.int64], motion: Motion) -> Cut:
-        """No surface at all."""
+        """The cut without surfaces."""
         dim, points = self.grid.dim, len(self.points) ** self.grid.dim
         none, nothing = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.int64)
         pieces = Pieces(nothing, nothing, np.empty((0, points, dim)), np.empty((0, dim, dim)), np.empty((0, dim)))
@@ -181,7 +182,7 @@ class Cutter:
         )
 
     def _film(self, motion: Motion, facets, moments, normal, cells, solid) -> Array | None:
-        """Factor of the stabilisation in cells of the box; `cells` of the pieces, negative where none counts."""
+        """Factor of the penalty in cells of the box, `Films.factor`; cells: that of each piece, negative: neglected."""
         if self._of_step is not None or self.films is None:
             return None if self._of_step is None else self._of_step.film
         at = np.flatnonzero(cells >= 0)
@@ -189,7 +190,7 @@ class Cutter:
         return self.films.factor(self.grid.grid, walls_of(cells[at], corners, motion.x, lengths, normal[at]), solid)
 
     def _reach(self, special: NDArray[np.bool_], layers: int) -> NDArray[np.bool_]:
-        """One layer more than the strip has, none around bodies at rest."""
+        """Cells with ghost penalty and one layer around them; without the layer around bodies at rest."""
         return _grow(special, 1 if layers else 0).ravel(order="F")[self.grid.numbers]
 
     def _cut_cells(self, moments, cells, touched) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -218,21 +219,21 @@ class Cutter:
         weights, numbers = _tensor_weights(self.points, self.grid.dim), self.grid.numbers[cut]
         fluid = np.tile(1.0 - np.round(moments.fraction[numbers])[:, None], (1, len(weights)))
         row = np.minimum(np.searchsorted(moments.cells, numbers), len(moments.cells) - 1)
-        known = moments.cells[row] == numbers if len(moments.cells) else np.zeros(len(cut), dtype=bool)
-        fluid[known] = 1.0 - moments.solid[row[known]] / weights
+        has_moments = moments.cells[row] == numbers if len(moments.cells) else np.zeros(len(cut), dtype=bool)
+        fluid[has_moments] = 1.0 - moments.solid[row[has_moments]] / weights
         return fluid
 
 
 @dataclass(frozen=True)
 class _First:
-    """The first cut of a step: it serves as long as the surfaces stay where they were."""
+    """The first cut of a step, which is used again while the surfaces do not move."""
 
     cut: Cut
     layers: int
     special: NDArray[np.bool_]  #: box cells under the ghost penalty
 
     def where(self, facets: NDArray[np.int64], motion: Motion, layers: int) -> _First | None:
-        """It for surfaces that are where they were, with the velocities that they have now; None if they moved."""
+        """This cut with the present velocities of the surfaces; None if their positions have changed."""
         cut = self.cut
         if (
             layers != self.layers
@@ -244,17 +245,17 @@ class _First:
 
 
 def off_boundary(grid: Grid, corners: Array) -> NDArray[np.bool_]:
-    """Facets that do not lie on the boundary of the box; those that do are in dry contact with it."""
+    """Mask of the facets that do not lie on the boundary of the box; those that do are in dry contact with it."""
     off = np.ones(len(corners), dtype=bool)
     for axis, edge in enumerate(grid.edges):
         near = FLUSH * float(np.diff(edge).min())
-        for place in (edge[0], edge[-1]):
-            off &= (np.abs(corners[:, :, axis] - place) > near).any(axis=1)
+        for end in (edge[0], edge[-1]):
+            off &= (np.abs(corners[:, :, axis] - end) > near).any(axis=1)
     return off
 
 
 def cells_between(box: Grid, low: Array, high: Array) -> NDArray[np.int64]:
-    """Numbers of the cells that boxes between two corners [m] overlap, shape (boxes, dim) each; some several times."""
+    """Numbers of the cells that boxes overlap, with repetitions; low, high: corners of the boxes [m], (boxes, dim)."""
     first, last = (
         [
             np.clip(np.searchsorted(edge, x[:, axis], side="right") - 1, 0, len(edge) - 2)
@@ -284,7 +285,7 @@ def _tensor_weights(points: Array, dim: int) -> Array:
 
 
 def _grow(marked: NDArray[np.bool_], layers: int) -> NDArray[np.bool_]:
-    """Marked cells and their neighbours across vertices, as many layers as wanted."""
+    """Marked cells and so many layers of neighbours, across vertices."""
     if layers == 0 or marked.all():
         return marked
     return ndimage.binary_dilation(marked, np.ones((3,) * marked.ndim, dtype=bool), iterations=layers)

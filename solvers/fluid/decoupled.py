@@ -1,4 +1,4 @@
-"""The matrix from which incomplete factors are made for velocities of second degree."""
+"""The matrix whose incomplete factors precondition flows with velocities of second degree."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from petsc4py import PETSc
 
 
 def decoupled(matrix: PETSc.Mat, component: NDArray[np.int64]) -> PETSc.Mat:
-    """The matrix without what couples different components of the velocity (collective).
+    """The matrix without couplings between different components of the velocity (collective).
 
-    component: number of that of each owned unknown, the pressure's is the largest. With these couplings (of the
-    symmetric gradient and of div u div v) the velocity's block is that of elasticity, of which incomplete factors
-    break down in stretched cells. Without them it consists of Laplace operators, and has a third of the entries.
+    component: component of each owned unknown; that of the pressure has the largest number. With these couplings, of
+    the symmetric gradient and of div u div v, the block of the velocity is that of elasticity, whose incomplete factors
+    break down in stretched cells. Without them it consists of Laplace operators and has a third of the entries.
     """
     indptr, columns, values = matrix.getValuesCSR()
     of_row, of_column = np.repeat(component, np.diff(indptr)), _at_columns(matrix, component, columns)

@@ -1,11 +1,12 @@
-"""Nodes that fluid hardly reaches take the polynomial of a well-cut cell nearby: which nodes do, and by which weights.
+"""Discrete extension of the flow to poorly cut nodes: which nodes depend on others, and by which weights.
 
-A node is as well cut as the best of its cells: k = max |K in fluid| / |K|, relative to the best cell nearby. It is free
-where k >= WELL; where less, it depends on a root, a cell that is better cut. Its extension is
+The share of fluid of a node is that of the best of its cells, k = max |K in fluid| / |K|, relative to the best cell
+nearby. Nodes with k >= WELL are free. The others are dependent: each has a root, a well-cut cell nearby, and the
+extension
 
     E u(x_i) = sum_b N_b(x_i) u_b,     N_b: shape functions of the root, continued outside of it.
 
-Of all well-cut cells nearby the root is the one whose polynomial amplifies least at the node, sum_b |N_b(x_i)| -> min.
+The root is the well-cut cell nearby whose polynomial amplifies least at the node, sum_b |N_b(x_i)| -> min.
 Sources: Badia, Neiva, Verdugo, arXiv:2106.13728 (the penalty on the distance to the extension does not lock, its limit
 is the aggregated finite element method); Burman, Hansbo, Larson, arXiv:2205.01340.
 """
@@ -24,19 +25,19 @@ from solvers.fluid.grid import Grid
 from solvers.fluid.sheet_windows import SheetWindows
 from solvers.fluid.sheets import Sheets
 
-#: Shares of fluid, relative to the best cell nearby: from WELL on a cell is a root and its nodes are free, up to LITTLE
-#: the penalty on the distance to the extension has its full weight.
+#: Shares of fluid, relative to the best cell nearby. From WELL on a cell may be a root and its nodes are free. Up to
+#: LITTLE the penalty on the distance to the extension has its full weight.
 WELL, LITTLE = 0.6, 0.2
 
-#: Layers of cells around those of a node that are near.
+#: Layers of cells around those of a node that count as nearby.
 NEAR = 2
 
-#: A parabola goes on for FAR cells in one direction and while it amplifies by sum_b |N_b| <= LARGEST, so that rounding
-#: stays rounding: a cell away that is 17 in one direction, 289 in two, 4913 in three. Then a straight line does. Drags
-#: are the same to 2e-4 with LARGEST from 20 to 1e6.
+#: Parabolas are continued over FAR cells in one direction, and while they amplify by sum_b |N_b| <= LARGEST, which
+#: bounds the amplification of rounding errors: one cell away it is 17 in one direction, 289 in two, 4913 in three.
+#: Beyond, straight lines are continued. Drags are the same to 2e-4 with LARGEST from 20 to 1e6.
 FAR, LARGEST = 2.0, 350.0
 
-#: Nodes that are looked at together, to bound the memory.
+#: Nodes that are processed together, to bound the memory.
 CHUNK = 4096
 
 Numbers = NDArray[np.int64]
@@ -44,51 +45,54 @@ Numbers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Dependent:
-    """Nodes with an extension, by their positions among the nodes that were asked for, sorted."""
+    """Nodes with an extension, sorted, as indices into `numbers` of the `Extension`."""
 
     nodes: Numbers
     rows: sparse.csr_matrix  #: E, shape (dependent nodes, nodes of the lattice)
-    weight: Array  #: of the distance to the extension: 1 for small shares of fluid, falling to 0 where a node is free
-    dry: NDArray[np.bool_]  #: nodes that no fluid reaches: they are what the extension says
-    undetermined: Numbers  #: nodes of active cells with no fluid nearby
+    weight: Array  #: of the distance to the extension: 1 for small shares of fluid, decreasing to 0 at free nodes
+    dry: NDArray[np.bool_]  #: nodes whose cells have no fluid: their values are those of the extension
+    undetermined: Numbers  #: nodes of active cells with no root
 
 
 class Extension:
-    """The extension of one lattice of nodes. Within a step nodes keep their roots, so that Newton's method settles."""
+    """The extension of one lattice of nodes. Roots are fixed within a step, so that Newton's method converges."""
 
     def __init__(self, grid: Grid, degree: int, shape: tuple[int, ...], numbers: Numbers, sheets: Sheets | None = None):
-        """`numbers`: the nodes to look at, in the lattice of this degree and shape, x fastest, or those of `sheets`."""
+        """numbers: the nodes of this process, in the lattice of this degree and shape, x fastest, or in `sheets`."""
         self.grid, self.degree, self.shape = grid, degree, shape
         self._sheets = None if sheets is None else SheetWindows(sheets, degree, numbers)
-        self.size = int(np.prod(shape)) if sheets is None else sheets.node_count(degree)  #: numbers of nodes
-        places = numbers if sheets is None else sheets.on_lattice(numbers, degree)
-        self._index = np.stack(np.unravel_index(places, shape, order="F"), axis=1)
+        self.size = int(np.prod(shape)) if sheets is None else sheets.node_count(degree)  #: count of node numbers
+        lattice_numbers = numbers if sheets is None else sheets.on_lattice(numbers, degree)
+        self._index = np.stack(np.unravel_index(lattice_numbers, shape, order="F"), axis=1)
         self._strides = np.cumprod([1, *shape[:-1]])
-        #: place of each node among those to look at, -1: none
-        self._place = np.full(self.size, -1, dtype=np.int64)
-        self._place[numbers] = np.arange(len(numbers))
+        #: index of each node into `numbers`, -1: none
+        self._index_of = np.full(self.size, -1, dtype=np.int64)
+        self._index_of[numbers] = np.arange(len(numbers))
         self._lattice = [
             np.interp(np.arange(degree * (len(edge) - 1) + 1) / degree, np.arange(len(edge)), edge)
             for edge in grid.edges
         ]
-        #: row of E that each node to look at has in this step, -1: none yet
+        #: row of E of each node in this step, -1: none yet
         self._row_of, self._rows = np.full(len(numbers), -1), sparse.csr_matrix((0, self.size))
 
     def begin_step(self) -> None:
-        """Forget the roots."""
+        """Discard the roots of the last step."""
         self._row_of[:], self._rows = -1, self._rows[:0]
 
     def __call__(self, share: Array, active: NDArray[np.bool_], reach: int) -> Dependent:
-        """Dependent nodes of active cells with these shares of fluid; roots are at most `reach` cells away."""
+        """Dependent nodes and their extension.
+
+        share: fluid in each cell of the mesh; active: cells with unknowns; reach: largest distance of a root [cells].
+        """
         nodes = self._nodes_of(np.flatnonzero(active & (share < WELL)))
         largest, best = (self._largest(nodes, share, layers) for layers in (0, NEAR))
         poor = (largest < WELL * best) | (largest == 0.0)
         nodes = nodes[poor]
         relative = np.divide(largest, best, out=np.zeros(len(largest)), where=best > 0.0)[poor]
         self._find_roots(nodes[self._row_of[nodes] < 0], share, reach)
-        known = self._row_of[nodes] >= 0
-        rows = self._rows[self._row_of[nodes[known]]]
-        return Dependent(nodes[known], rows, _weight(relative[known]), relative[known] == 0.0, nodes[~known])
+        rooted = self._row_of[nodes] >= 0
+        rows = self._rows[self._row_of[nodes[rooted]]]
+        return Dependent(nodes[rooted], rows, _weight(relative[rooted]), relative[rooted] == 0.0, nodes[~rooted])
 
     def _nodes_of(self, cells: Numbers) -> Numbers:
         """The nodes of cells, sorted, each once."""
@@ -102,11 +106,11 @@ class Extension:
                 for i, n, stride in zip(index, self.shape, self._strides, strict=True)
             ]
             numbers = reduce(_outer_sum, axes)
-        positions = self._place[np.unique(numbers)]
-        return np.sort(positions[positions >= 0])
+        indices = self._index_of[np.unique(numbers)]
+        return np.sort(indices[indices >= 0])
 
     def _cells_around(self, nodes: Numbers, layers: int) -> tuple[Numbers, NDArray[np.bool_]]:
-        """(cells, whether they exist) of nodes and some layers around them, shape (nodes, cells)."""
+        """(cells, whether they exist) around nodes, with some further layers, shape (nodes, cells)."""
         if self._sheets is not None:
             return self._sheets.cells_around(nodes, self._index[nodes], layers)
         axes = [self._window(axis, nodes, layers) for axis in range(self.grid.dim)]
@@ -122,7 +126,7 @@ class Extension:
         return np.clip(index, 0, n - 1), exists
 
     def _largest(self, nodes: Numbers, share: Array, layers: int) -> Array:
-        """Largest share of fluid in the cells of nodes and some layers around them."""
+        """Largest share of fluid in the cells around nodes, with some further layers."""
         found = []
         for part in _chunks(nodes):
             cells, inside = self._cells_around(part, layers)
@@ -130,7 +134,7 @@ class Extension:
         return np.concatenate(found)
 
     def _find_roots(self, nodes: Numbers, share: Array, reach: int) -> None:
-        """Add rows of E for nodes that have none, as far as there is a root."""
+        """Add rows of E for nodes that have none, where a root exists: first among cells nearby, then up to `reach`."""
         for layers in dict.fromkeys([min(NEAR, reach), reach]):
             parts = [self._search(part, share, layers) for part in _chunks(nodes)]
             found = np.concatenate([part for part, _ in parts])
@@ -139,7 +143,7 @@ class Extension:
             nodes = nodes[self._row_of[nodes] < 0]
 
     def _search(self, nodes: Numbers, share: Array, layers: int) -> tuple[Numbers, sparse.csr_matrix]:
-        """(nodes with a root, their rows); of roots that amplify equally the mean."""
+        """(nodes with a root, their rows of E). The row is the mean over roots that amplify equally."""
         cost = reduce(_outer_product, (self._amplification(axis, nodes, layers) for axis in range(self.grid.dim)))
         cells, inside = self._cells_around(nodes, layers)
         fluid = np.where(inside, share[cells], 0.0)
@@ -158,7 +162,7 @@ class Extension:
         return nodes[found], sparse.csr_matrix(entries, shape=(len(found), self.size))
 
     def _coordinates(self, axis: int, nodes: Numbers, layers: int) -> Array:
-        """Where nodes lie in the cells of `_window`: from 0 to 1 inside, shape (nodes, cells)."""
+        """Reference coordinates of nodes in the cells of `_window`: from 0 to 1 inside, shape (nodes, cells)."""
         index, _ = self._window(axis, nodes, layers)
         edge, m = self.grid.edges[axis], self._index[nodes, axis, None]
         outside = (self._lattice[axis][m] - edge[index]) / (edge[index + 1] - edge[index])
@@ -167,7 +171,7 @@ class Extension:
         return np.where(within, local / self.degree, outside)
 
     def _amplification(self, axis: int, nodes: Numbers, layers: int) -> Array:
-        """Sum of the absolute 1D shape functions, of a parabola however far it is, shape (nodes, cells)."""
+        """Sum of the absolute values of the 1D shape functions, continued to any distance, shape (nodes, cells)."""
         s = self._coordinates(axis, nodes, layers)
         return np.abs(_lagrange(s, self.degree)).sum(axis=2)
 
@@ -177,17 +181,17 @@ class Extension:
         columns, weights = np.zeros((len(nodes), 1), dtype=np.int64), np.ones((len(nodes), 1))
         for axis in range(self.grid.dim):
             # the window's cells are numbered with the first direction slowest, see _outer_sum
-            place = (chosen // width ** (self.grid.dim - 1 - axis) % width)[:, None]
+            column = (chosen // width ** (self.grid.dim - 1 - axis) % width)[:, None]
             index, _ = self._window(axis, nodes, layers)
-            first = self.degree * np.take_along_axis(index, place, axis=1)
+            first = self.degree * np.take_along_axis(index, column, axis=1)
             lattice = (first + np.arange(self.degree + 1)) % self.shape[axis] * self._strides[axis]
-            s = np.take_along_axis(self._coordinates(axis, nodes, layers), place, axis=1)[:, 0]
+            s = np.take_along_axis(self._coordinates(axis, nodes, layers), column, axis=1)[:, 0]
             columns, weights = _outer_sum(columns, lattice), _outer_product(weights, _continued(s, self.degree, steep))
         return columns, weights
 
 
 def _continued(s: Array, degree: int, steep: NDArray[np.bool_]) -> Array:
-    """1D shape functions at s, outside of the cell those of a line where steep or far, shape (points, functions)."""
+    """1D shape functions at s, shape (points, functions); outside of the cell those of a line where steep or far."""
     outside = np.maximum(-s, s - 1.0)
     straight = (outside > FAR) | steep & (outside > 0.0)
     line = np.stack([1.0 - s, *[0.0 * s] * (degree - 1), s], axis=1)
@@ -195,14 +199,14 @@ def _continued(s: Array, degree: int, steep: NDArray[np.bool_]) -> Array:
 
 
 def _lagrange(s: Array, degree: int) -> Array:
-    """1D shape functions at s, one more axis."""
+    """1D shape functions at s, along one more axis."""
     if degree == 1:
         return np.stack([1.0 - s, s], axis=-1)
     return np.stack([(2.0 * s - 1.0) * (s - 1.0), 4.0 * s * (1.0 - s), s * (2.0 * s - 1.0)], axis=-1)
 
 
 def _weight(relative: Array) -> Array:
-    """Smooth from 1 at LITTLE to 0 at WELL."""
+    """Weight of the penalty: a cubic from 1 at LITTLE to 0 at WELL with zero slope at both."""
     s = np.clip((WELL - relative) / (WELL - LITTLE), 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 

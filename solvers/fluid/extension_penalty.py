@@ -1,11 +1,11 @@
-"""The ghost penalty by the distance of poorly cut nodes to their extension: c_i u = u_i - E u(x_i).
+"""The extension penalty, on the distance of poorly cut nodes to their extension, c_i u = u_i - E u(x_i).
 
     s(u, v) = sum_i d_i (c_i u) (c_i v),   d_i = gamma w_i phi V / h^2 (velocity),  d_i = gamma w_i V / phi (pressure),
 
-phi = mu + rho |a| h + rho alpha h^2, V the volume of a cell at the node, w_i from 1 where the cells of a node have
-hardly any fluid to 0 where one has much. It does not lock: what the extension continues exactly has no distance. Nodes
-that no fluid reaches are no unknowns, so that they do not amplify rounding: their velocity, which the next steps ask
-for, is what the extension says, their pressure nothing.
+with phi = mu + rho |a| h + rho alpha h^2, V the volume of a cell at the node, and w_i between 1 (hardly any fluid in
+the cells of the node) and 0 (a well-cut cell). The penalty does not lock: it is zero for polynomials. Nodes whose cells
+have no fluid are no unknowns, so that they do not amplify rounding errors. Their velocity is that of the extension,
+which later steps use as history. Their pressure is not used.
 Source: Badia, Neiva, Verdugo, Comput. Methods Appl. Mech. Engrg. 388 (2022) 114232.
 """
 
@@ -30,7 +30,7 @@ Entries = tuple[Numbers, Numbers, Array]  #: global rows, global columns, values
 
 
 class ExtensionPenalty:
-    """Implements `GhostPenalty` by S = C^T D C; arrays are those of owned dofs."""
+    """Implements `GhostPenalty` by S = C^T D C; arrays have an entry per owned dof."""
 
     by_faces = False
 
@@ -40,7 +40,7 @@ class ExtensionPenalty:
         self._lattices = [self._lattice(unknowns.velocity, unknowns.degree), self._lattice(unknowns.pressure, 1)]
         self._entries: tuple[Numbers, Numbers] = (np.empty(0, dtype=np.int64),) * 2
         self._scales, self._weight = np.zeros((2, unknowns.owned))
-        #: owned dofs that no fluid reaches, and those with a distance to their extension
+        #: owned dofs of nodes without fluid, and those that are penalised
         self.outside, self.dependent = np.zeros((2, unknowns.owned), dtype=bool)
         self.undetermined = np.zeros(unknowns.local, dtype=bool)
         none = (self._entries[0], self._entries[0], np.empty(0))
@@ -62,7 +62,7 @@ class ExtensionPenalty:
         return []
 
     def begin_step(self, unknown: NDArray[np.bool_]) -> None:
-        """Nodes may take other roots."""
+        """Choose the roots anew."""
         for _, extension, _ in self._lattices:
             extension.begin_step()
 
@@ -87,7 +87,7 @@ class ExtensionPenalty:
         return self._comm.allreduce(int(same)) < self._comm.size
 
     def _film(self, cut: Cut) -> Array:
-        """Least factor of films in the cells of local dofs."""
+        """Smallest factor of films in the cells of each local dof."""
         unknowns, factor = self.unknowns, np.ones(self.unknowns.local)
         if cut.film is not None:
             by_cell = cut.film[unknowns.grid.numbers]
@@ -98,7 +98,7 @@ class ExtensionPenalty:
     def _find(
         self, cut: Cut, free: NDArray[np.bool_], nodes: FlowNodes, extension: Extension, directory: Directory
     ) -> Entries:
-        """E of one quantity."""
+        """Entries of E of one quantity, velocity or pressure."""
         found = extension(cut.share, cut.alive, cut.depth + NEAR)
         entries, dofs = found.rows.tocoo(), nodes.dofs[found.nodes]
         dry = free[dofs] & found.dry[:, None]

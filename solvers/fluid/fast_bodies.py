@@ -1,4 +1,4 @@
-"""Bodies that cross more than a cell in a time step."""
+"""Warnings of bodies that cross more than two cells in a time step."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ if TYPE_CHECKING:
     from solvers.fluid.grid import Grid
     from solvers.fluid.surface import Motion
 
-#: Cells per step up to which nothing is said. The drag of a disc of 8 cells at Reynolds number 40 is off by 1.1 % with
-#: 2 cells per step, less than it varies on its way with short steps, and by 15 % with 3 (docs/verification_fluid.md).
+#: Cells per step above which there is a warning. The error of the drag of a disc of 8 cells at Reynolds number 40 is
+#: 1.1 % with 2 cells per step, less than its variation along the grid with short steps, and 15 % with 3
+#: (docs/verification_fluid.md).
 MOST_CELLS = 2.0
 
 
@@ -32,18 +33,18 @@ def warning(name: str, cells: float, dt: float) -> str:
 
 
 class FastBodies:
-    """Warns of each body that is too fast, again only when it is twice as fast."""
+    """Warns once of each body that is too fast, and again when it is twice as fast."""
 
     def __init__(self, grid: Grid):
         self._grid = grid
-        self._said: dict[str, float] = {}
+        self._warned: dict[str, float] = {}  #: cells per step in the last warning, by name of the body
 
     def notes(self, motions: Mapping[str, Motion], dt: float) -> list[str]:
-        """What is new at the end of a step."""
+        """New warnings at the end of a step of length dt [s]; motions: by name of the body."""
         found = []
         for name, motion in motions.items():
             cells = cells_per_step(self._grid, motion.v, dt)
-            if cells > max(MOST_CELLS, 2.0 * self._said.get(name, 0.0)):
-                self._said[name] = cells
+            if cells > max(MOST_CELLS, 2.0 * self._warned.get(name, 0.0)):
+                self._warned[name] = cells
                 found.append(warning(name, cells, dt))
         return found

@@ -1,4 +1,4 @@
-"""The fluid: incompressible flow on the fixed grid around surfaces that stand still or move."""
+"""The field `Fluid`: incompressible flow on a fixed grid that surfaces at rest or in motion cut."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ from solvers.timing import Timer
 NEWTON_FROM = 0.02
 
 #: Share of the largest residual of a steady flow below which the velocity that scales stabilisation stays as it is.
-#: The tangent does not know this velocity: Newton's method is linear while it follows the iterate, and does not always
-#: converge. Between 1e-5 and 1e-2 drag and pressure difference of 2D-1 differ by 5e-6, its lift (0.2 % of the drag) by
-#: 2e-4.
+#: The tangent has no derivative by this velocity. While it follows the iterate, Newton's method converges linearly, or
+#: not at all. Between 1e-5 and 1e-2 drag and pressure difference of 2D-1 differ by 5e-6, its lift (0.2 % of the drag)
+#: by 2e-4.
 SCALES_UNTIL = 1e-3
 
 
 class Fluid:
-    """Velocity and pressure by Newton's method, step by step."""
+    """Velocity and pressure on the cut grid; each step is solved by Newton's method."""
 
     name = "fluid"
 
@@ -72,10 +72,10 @@ class Fluid:
         self.unknowns = Unknowns(self.grid, settings.degree, periodic)
         self.size = self.unknowns.owned  #: unknowns that this process owns
         self.boundary = Boundary(self.grid, self.unknowns, patches)
-        self.steady, self.scheme = settings.steady, settings.time  #: each step a flow at rest; how it takes rates
+        self.steady, self.scheme = settings.steady, settings.time  #: steps are steady states; the time scheme
         self.linear_tolerance = solver.linear_tolerance
         wanted = solver.linear if isinstance(solver.linear, str) else "auto"
-        wanted = wanted if sheets is None else "direct"  # the others need the nodes of a lattice
+        wanted = wanted if sheets is None else "direct"  # the others need nodes on a lattice
         size, degree, equal = self.dofs(), settings.degree, self.grid.nested is None
         methods = linear.choose_flow(wanted, self.dim, size, degree=degree, steady=self.steady, multigrid=equal)
         self.system = FlowSystem(
@@ -95,17 +95,17 @@ class Fluid:
         self.cutter = Cutter(self.grid, self.system.weights.points, films)
         self.history = History(settings.time, self.unknowns.local)
         self.current = FlowStep(0.0, 0.0, STEADY)  #: the step that is computed now or was last
-        self.started = False  #: a step was accepted, so that there are forces
+        self.started = False  #: a step was accepted, hence forces exist
         self.smallest_cell = min(float(np.diff(edge).min()) for edge in grid.edges)
         self.motions: list[Motion] = []
         self._wet = wetness([body.surface for body in self.bodies])
         self._fast_bodies = FastBodies(grid)
-        self.notes: list[str] = []  #: what the user should know of this step
+        self.notes: list[str] = []  #: notes to the user on this step
         self.sequence = SolverSequence(comm, methods, self.dofs(), self.notes.append)
         self.linear_solver = FlowSolver(self.unknowns, self.sequence, solver.linear_tolerance, steady=settings.steady)
         self.linear_iterations = 0  #: of the last linear system
-        self.rounding: Array | None = None  #: rounding error of `residual_rows`, as far as this step knows
-        self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is there already
+        self.rounding: Array | None = None  #: rounding error of `residual_rows`; None before this step linearises
+        self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is assembled already
         owned = self.unknowns.owned
         self.held = np.zeros(owned, dtype=bool)  #: owned dofs with rows of the identity
         self._holds: list[Hold] = []
@@ -133,7 +133,7 @@ class Fluid:
         return np.where(self.unknowns.velocity_mask, self.flow, 0.0)
 
     def initialise(self, t: float, dt: float) -> None:
-        """The initial velocity, known everywhere."""
+        """Set the initial velocity at time t [s]; dt [s]: the first step."""
         if self.settings.initial_velocity is not None:
             set_velocity(self.flow, self.unknowns.velocity, self.settings.initial_velocity, t)
             self.unknowns.share(self.system.flow)
@@ -157,7 +157,7 @@ class Fluid:
         return info
 
     def begin_step(self, t: float, dt: float) -> None:
-        """Remember the state at t; boundary, loads and moving bodies at t + dt."""
+        """Store the state at t; set boundary values, loads and moving bodies at t + dt. Times in [s]."""
         difference, last = self.history.difference(dt), self.history.past[0].velocity
         self.current = FlowStep(t + dt, dt, difference)
         self.cutter.begin_step()
@@ -172,7 +172,7 @@ class Fluid:
             self.move({})
 
     def predict(self) -> None:
-        """Extrapolate the velocity linearly from the last two steps, where both have it."""
+        """Predictor: extrapolate the velocity linearly from the last two steps, where both have one."""
         if len(self.current.difference.beta) < 2 or not self.history.steps:
             return
         old, older = self.history.past[:2]
@@ -182,10 +182,12 @@ class Fluid:
         self.flow[continued] += growth * (old.velocity - older.velocity)[continued]
 
     def move(self, coupled: Mapping[str, Motion], *, with_solid: bool = False) -> None:
-        """Cut the grid by the surfaces where they are now: `coupled` bodies by name, all others as prescribed.
+        """Cut the grid by the surfaces at their present positions (collective).
 
-        with_solid: their equations are solved with these, and bound the pressure in closed pockets. Raises StepFailed
-        if surfaces ran out of the strip.
+        coupled: motions of the bodies that another field moves, by name; the others move as prescribed.
+        with_solid: a monolithic scheme solves the equations of these bodies too, which determine the pressure level of
+        closed pockets.
+        Raises StepFailed if surfaces left the strip of cells that have a velocity from earlier steps.
         """
         motions = [coupled[b.surface.name] if b.motion is None else b.motion(self.current.t) for b in self.bodies]
         self.motions = motions
@@ -204,7 +206,7 @@ class Fluid:
             self._hold_pressure(set_by_solids=with_solid and not self.settings.steady)
 
     def _layers(self, motion: Motion) -> int:
-        """Cells behind the surface that the next two steps may uncover."""
+        """Number of cell layers behind the surface that the next steps may uncover."""
         if self.settings.steady or all(body.rests for body in self.bodies):
             return 0
         times = self.settings.time.times
@@ -220,11 +222,11 @@ class Fluid:
 
     @property
     def level_unknown(self) -> bool:
-        """An elastic body could determine the pressure that is held."""
+        """True where a pressure level is held that an elastic body could determine."""
         return any(hold.elastic for hold in self._holds)
 
     def solve(self) -> StepInfo:
-        """Newton to the tolerance. Raises StepFailed."""
+        """Newton's method to the tolerance. Raises StepFailed."""
         self._largest = 0.0
         info = converge(self, self.solver.newton)
         keep_levels(self.comm, self._holds, self.flow[: self.unknowns.owned])
@@ -238,7 +240,7 @@ class Fluid:
             self.notes += self._fast_bodies.notes({body.surface.name: m for body, m in self.moved()}, self.current.dt)
 
     def end_step(self) -> None:
-        """Accept the step. Between surfaces that touch now the velocity of this step is zero."""
+        """Accept the step. Cells between surfaces in contact get the velocity zero."""
         if self._coupled:
             self._note_fast_bodies()
         self.system.settle()
@@ -269,7 +271,7 @@ class Fluid:
         return math.sqrt(self.comm.allreduce(float(scaled @ scaled)))
 
     def advance(self) -> float:
-        """One Newton step; the increment relative to the solution."""
+        """One iteration of Newton's method; returns the increment relative to the solution. Raises StepFailed."""
         matrix, self._tangent = self._tangent or self.linearise(), None
         b, x = matrix.createVecs()
         b.array[:] = self.right_side()
@@ -285,31 +287,31 @@ class Fluid:
         with self.timer("assembly"):
             matrix = self.system.tangent(self.held, picard=self._far())
         self._diagonal = np.abs(matrix.getDiagonal().array)
-        # entries are sums over the 2^dim cells at a node, which may cancel
+        # an entry is a sum over the 2^dim cells at a node, whose terms may cancel
         self.rounding = 2.0**self.dim * rounding_error(matrix, self.rounded())
         return matrix
 
     def right_side(self) -> Array:
-        """What an increment of the owned dofs has to make up for."""
+        """Right-hand side for the increment of owned dofs: minus the residual."""
         return -self.residual_rows
 
     def rounded(self) -> Array:
-        """What is rounded: velocity [m/s] and pressure [Pa] at owned dofs."""
+        """The values whose rounding enters the residual: velocity [m/s] and pressure [Pa] at owned dofs."""
         return self.flow[: self.unknowns.owned]
 
     def update(self, increment: Array) -> float:
-        """Add an increment of the owned dofs; its size relative to the flow."""
+        """Add an increment of the owned dofs; returns its norm relative to that of the flow."""
         self._increment = increment.copy()
         self._add(self._increment)
         size = self._norm(self._diagonal * self.flow[: self.unknowns.owned])
         return self._norm(self._diagonal * self._increment) / size if size > 0.0 else 0.0
 
     def _far(self) -> bool:
-        """The iterate of a steady flow is not yet where Newton's method converges."""
+        """The iterate of a steady flow is too far from the solution for Newton's method: Picard's is used."""
         return self.settings.steady and self.settings.convection and self._size > NEWTON_FROM * self._largest
 
     def set_up_multigrid(self, preconditioner: PETSc.PC, matrix: PETSc.Mat) -> None:
-        """Make a preconditioner a cycle of multigrid for the tangent (collective)."""
+        """Set a preconditioner up as a multigrid cycle for the tangent (collective)."""
         self.linear_solver.multigrid.set_up(preconditioner, matrix, self.held)
 
     def _add(self, owned: Array) -> None:
@@ -321,16 +323,16 @@ class Fluid:
         self._add(-fraction * self._increment)
 
     def settled(self) -> bool:
-        """Nothing is imposed that an iterate does not fulfil."""
+        """True: a flow has no active set that an iterate could change."""
         return True
 
     def add_rounding(self, error: Array) -> None:
-        """Rounding errors that another field brings into the equations, after `linearise`, at owned dofs."""
+        """Add rounding errors at owned dofs that another field causes in these equations; call it after `linearise`."""
         assert self.rounding is not None
         self.rounding = self.rounding + error
 
     def round_off(self) -> float:
-        """Norm [N] of the rounding error of the residual where the flow was linearised last in this step."""
+        """Norm [N] of the rounding error of the residual, at the iterate that this step linearised last."""
         if self.rounding is None:
             self._tangent = self.linearise()
         assert self.rounding is not None
@@ -351,12 +353,12 @@ class Fluid:
     # ---------------------------------------------------------------------------------------------- reactions
 
     def _vertices(self) -> dict[str, slice]:
-        """Of each body among those of all."""
+        """Range of each body's vertices among those of all bodies."""
         starts = offsets([body.surface for body in self.bodies])
         return {body.surface.name: slice(a, b) for body, a, b in zip(self.bodies, starts, starts[1:], strict=False)}
 
     def vertices_of(self, names: Sequence[str]) -> NDArray[np.int64]:
-        """Numbers among all vertices of those of some bodies, in the order of the names."""
+        """Numbers of the vertices of some bodies among those of all, in the order of the names."""
         part = self._vertices()
         return np.concatenate([np.arange(part[name].start, part[name].stop, dtype=np.int64) for name in names])
 
@@ -373,7 +375,7 @@ class Fluid:
         return found if zone is None else with_zone(found, zone, self.unknowns, self.flow, vertices)
 
     def balances(self) -> tuple[Array, float]:
-        """(force [N] on all bodies by momentum, shape (dim,); power [W] that the method takes) (collective)."""
+        """(force [N] on all bodies by the balance of momentum, (dim,); power [W] lost by the method) (collective)."""
         return self._balances(self.held)
 
     @cached_property
@@ -383,7 +385,7 @@ class Fluid:
     # ---------------------------------------------------------------------------------------- save and restore
 
     def save(self) -> State:
-        """Everything a step starts from."""
+        """The state that the next step starts from."""
         return self.history.save(self.unknowns) | {
             "pressure": self.unknowns.to_nodes(self.flow, self.unknowns.pressure),
             "pattern": Nodal(self.system.pattern_state(), self.grid.original[: self.grid.owned]),
@@ -393,7 +395,7 @@ class Fluid:
         }
 
     def restore(self, state: State) -> None:
-        """Back to a saved state."""
+        """Restore a saved state."""
         self.history.restore(self.unknowns, state)
         self.flow[:] = self.history.past[0].velocity
         self.flow[:] += self.unknowns.from_nodes(state["pressure"].values, self.unknowns.pressure)
@@ -406,5 +408,5 @@ class Fluid:
         self.flow[:] = kept
 
     def moved(self) -> Iterator[tuple[ImmersedBody, Motion]]:
-        """Bodies with their present motions."""
+        """Pairs of each body and its present motion."""
         return zip(self.bodies, self.motions, strict=True)

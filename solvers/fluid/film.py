@@ -1,17 +1,19 @@
-"""Films between walls that are closer than a cell: how far the stabilisation steps back there.
+"""Films between walls that are closer than a cell: the factor by which stabilisation is reduced in their cells.
 
-A film of height g between two walls lets g^3 / (12 mu) dp/dx through. The stabilisation of a cell of size h > g acts
-over h instead of g. Its shares of what the film does, where pressure and height change along one cell, are
+A film of height g between two walls has the flux g^3 / (12 mu) dp/dx. The stabilisation of a cell of size h > g acts
+over h instead of g. Relative to the film's own flux or resistance its terms are, where pressure and height change along
+one cell,
 
-    PSPG                 12 mu tau_M / g^2 < (h / g)^2 / 4    lets fluid through
-    extension, pressure  12 gamma (h / g)^3                   lets fluid through
-    extension, velocity  3 gamma (h / g)^3                    resists: the parabola goes on to h behind the walls
-    grad-div             tau_C / mu, about 8 in the plane     resists where the pressure falls off within a few cells
+    PSPG                 12 mu tau_M / g^2 < (h / g)^2 / 4    additional flux
+    extension, pressure  12 gamma (h / g)^3                   additional flux
+    extension, velocity  3 gamma (h / g)^3                    resistance: the parabola continues to h behind the walls
+    grad-div             tau_C / mu, about 8 in the plane     resistance where the pressure decays within a few cells
 
-The second one is gamma h^2 / mu (c p)^2 at a node with c p = h^2 p'' = h p', over g^3 / (12 mu) p'^2 times h. The third
-one is gamma mu (c u)^2 with c u = u = 4 U y/g (1 - y/g) at y = h, over mu int u_y^2 dy = 16/3 mu U^2 / g times h.
-The penalty on the distance to the extension is multiplied by eps min(1, (g/h)^3 / (12 gamma)), which leaves shares
-below eps. PSPG and grad-div terms are left out: second-order velocities with first-order pressures do without them.
+Pressure: gamma h^2 / mu (c p)^2 at a node with c p = h^2 p'' = h p', over g^3 / (12 mu) p'^2 times h. Velocity:
+gamma mu (c u)^2 with c u = u = 4 U y/g (1 - y/g) at y = h, over mu int u_y^2 dy = 16/3 mu U^2 / g times h.
+The penalty on the distance to the extension is multiplied by eps min(1, (g/h)^3 / (12 gamma)), so that its relative
+contribution is below eps. PSPG and grad-div terms are left out: second-order velocities with first-order pressures are
+stable without them.
 """
 
 from __future__ import annotations
@@ -33,20 +35,20 @@ from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.patches import Patch
 from solvers.fluid.pieces import FLUSH
 
-#: eps: share of what a film does that the penalty may add; drags are the same to 1.6 % from 3e-3 to 1e-6.
+#: eps, the largest relative contribution of the penalty to a film. Drags are the same to 1.6 % from 3e-3 to 1e-6.
 SHARE = 3e-3
-#: g / h below which the factor does not fall any more: nodes that fluid hardly reaches have rounding errors over it, of
-#: 1e-9 of the velocity. Drags of films from 0.05 cells on are the same to 1.3 % from 0.1 to 1e-4.
+#: g / h below which the factor is constant. Nodes with little fluid have rounding errors of 1e-9 of the velocity,
+#: divided by the factor. Drags of films from 0.05 cells on are the same to 1.3 % from 0.1 to 1e-4.
 LEAST = 0.1
-#: Sine of half the angle between the ways that a wall can face.
+#: Sine of half of 45 degrees: normals are grouped by the nearest of eight directions in the plane.
 OCTANT = np.sin(np.pi / 8)
-#: Walls of a film are parallel up to 60 degrees.
+#: Product of the unit normals below which two walls are opposite: the angle between them is at most 60 degrees.
 OPPOSITE = -0.5
 
 
 @dataclass(frozen=True)
 class Walls:
-    """Pieces of surface as planes, sorted by cell."""
+    """Plane pieces of surface, sorted by cell."""
 
     cell: NDArray[np.int64]  #: number in the box
     x: Array  #: middle [m], shape (n, dim)
@@ -55,21 +57,21 @@ class Walls:
 
 @dataclass(frozen=True)
 class Films:
-    """Which faces of the box are walls, and what the factor of the penalty is made of."""
+    """Faces of the box that are walls, and the penalty factor; `factor` reduces it in films."""
 
     faces: Sequence[tuple[int, int]]  #: axis and side (0, 1)
     penalty: float  #: gamma
 
     def factor(self, grid: Grid, walls: Walls, solid: NDArray[np.bool_]) -> Array | None:
-        """f of each cell of the box, 1 where walls are not closer than a cell; None if that is so everywhere.
+        """Factor of the penalty in each cell of the box; 1 outside of films. None if there is no film.
 
-        Solid cells around those of a film take part: they share nodes, and so the parabola goes on in them.
+        Solid cells around those of a film have its factor: they share nodes with it.
         """
         index = np.unravel_index(walls.cell, grid.shape, order="F")
         sizes = np.stack([np.diff(edge)[i] for edge, i in zip(grid.edges, index, strict=True)], axis=1)
         across = 1.0 / np.linalg.norm(walls.n / sizes, axis=1)
         gap = np.minimum(self._to_faces(grid, walls), _to_walls(grid, walls, across))
-        near = gap < (1.0 - FLUSH) * across  # rounding does not make a film of a gap of one cell
+        near = gap < (1.0 - FLUSH) * across  # a gap of one cell is no film, whatever the rounding
         if not near.any():
             return None
         ratio = np.maximum(gap[near] / sizes[near].max(axis=1), LEAST)
@@ -90,20 +92,21 @@ class Films:
 
 
 def films_of(patches: Sequence[Patch], penalties: Penalties) -> Films:
-    """Films in a flow with second-order velocities."""
+    """Films of a flow with second-order velocities: faces of the box that hold the normal velocity are walls."""
     walls = {face for patch in patches if patch.record.prescribed in ("all", "normal") for face in patch.faces}
     faces = sorted(("xyz".index(face[0]), int(face[1] == "+")) for face in walls)
     return Films(faces, penalties.extension)
 
 
 def walls_of(cell: NDArray[np.int64], corners: NDArray[np.int64], x: Array, lengths: Array, normal: Array) -> Walls:
-    """Connected pieces in one cell that face the same way, in the plane one of eight, as one.
+    """Merge connected pieces of one cell with similar normals, in 2D within one of eight directions, into planes.
 
-    corners: vertices of the facets that they are of, shape (pieces, dim), with positions x; lengths: int lambda_v ds
-    over each piece [m^(dim-1)], of the same shape; normal: unit normals out of the fluid.
+    corners: vertices of the pieces' facets, shape (pieces, dim), with positions x [m]; lengths: int lambda_v ds over
+    each piece [m^(dim-1)], of the same shape; normal: unit normals out of the fluid.
     """
     count, dim = corners.shape
-    corner = np.unique(cell[:, None] * len(x) + corners, return_inverse=True)[1].ravel()  # in each cell its own
+    # a vertex has one number per cell: pieces in different cells are not connected
+    corner = np.unique(cell[:, None] * len(x) + corners, return_inverse=True)[1].ravel()
     links = coo_array((np.ones(corner.size), (np.repeat(np.arange(count), dim), count + corner)), [2 * corner.size] * 2)
     part = connected_components(links, directed=False)[1][:count]
     facing = (np.where(np.abs(normal) > OCTANT, np.sign(normal), 0.0) + 1.0) @ 3.0 ** np.arange(dim)
@@ -120,10 +123,10 @@ def walls_of(cell: NDArray[np.int64], corners: NDArray[np.int64], x: Array, leng
 
 
 def _to_walls(grid: Grid, walls: Walls, reach: Array) -> Array:
-    """Distance [m] through the fluid, along the normal, to the closest wall opposite in the cells around.
+    """Distance [m] through the fluid, along the normal, to the closest opposite wall in the neighbouring cells.
 
-    None farther than `reach`. Infinite where there is none. What is behind the wall itself is on the other side of a
-    body, not of a film.
+    Infinite where there is none within `reach` [m]. Surfaces at negative distance do not count: they are on the other
+    side of the body.
     """
     index = np.stack(np.unravel_index(walls.cell, grid.shape, order="F"))
     shape = np.array(grid.shape)[:, None]
@@ -148,7 +151,7 @@ def _to_walls(grid: Grid, walls: Walls, reach: Array) -> Array:
 
 
 def film_cells(grid: DistributedGrid, cells: NDArray[np.int32], factor: Array | None) -> NDArray[np.int32] | None:
-    """Those of some local cells that this process owns and that are in films; None if nobody has any (collective)."""
+    """Owned cells among some local ones that are in films; None if there are no films on any process (collective)."""
     if not grid.comm.allreduce(factor is not None, op=MPI.LOR):
         return None
     owned = cells[cells < grid.owned]

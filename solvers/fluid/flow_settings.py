@@ -1,4 +1,4 @@
-"""What a flow is, besides grid, patches and bodies: fluid, element, scheme."""
+"""Settings of a flow, except grid, patches and bodies: fluid, element, time scheme."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from solvers.values import Value
 
 @dataclass(frozen=True)
 class FlowSettings:
-    """What the user says of the flow, besides grid, patches and bodies."""
+    """Properties of the fluid, element, time scheme and initial velocity."""
 
     density: float  #: [kg/m^3]
     viscosity: float  #: [Pa s]
@@ -38,5 +38,5 @@ class FlowSettings:
 
     @property
     def films(self) -> bool:
-        """Films are looked for: one first-order cell across could not bend as they do."""
+        """Whether films are detected. One cell across does not resolve a film with first-order velocities."""
         return self.degree > 1

@@ -1,8 +1,8 @@
-"""The equations of the flow on a cut grid: bulk, stabilisation, ghost penalty; those of surfaces are in `nitsche`.
+"""Weak forms of the flow on a cut grid: bulk, stabilisation, ghost penalty. The terms at surfaces are in `nitsche`.
 
-sigma(u, p) = 2 mu eps(u) - p I, h edge length of the cell.
-The time derivative is alpha u - history, alpha = 0 if the flow is steady; `a` is the velocity that scales
-the stabilisation, from before the iterate.
+sigma(u, p) = 2 mu eps(u) - p I is the stress and h an edge length of the cell. The time derivative is
+alpha u - history, with alpha = 0 in steady flow. `a` is the velocity that scales the stabilisation: that of an earlier
+step or iterate.
 Sources: Massing, Schott, Wall, Comput. Methods Appl. Mech. Engrg. 328 (2018) 262-300; Schott, Wall, ibid. 276 (2014)
 233-265; Burman, Fernandez, ibid. 279 (2014) 497-514; Tezduyar, Osawa, ibid. 190 (2000) 411-430 (tau).
 """
@@ -23,7 +23,7 @@ TRACE = {(2, 1): 1.43426, (2, 2): 4.19708, (3, 1): 1.59307, (3, 2): 4.27784}
 
 @dataclass(frozen=True)
 class Penalties:
-    """Factors of the stabilisation; all without unit. The values are those of design and verification."""
+    """Dimensionless factors of the stabilisation. All verification uses the default values."""
 
     nitsche: float = 35.0  #: gamma of the viscous Nitsche penalty, times C_T
     mass: float = 35.0 / 40.0  #: normal Nitsche penalty rho h alpha
@@ -32,13 +32,15 @@ class Penalties:
     ghost_mass: float = 3e-3
     ghost_convection: float = 0.01
     ghost_pressure: float = 0.05
-    ghost_memory: float = 0.9  #: share of the history per step; with 1, kinks in fluid at rest would not decay
-    extension: float = 0.1  #: of the distance of poorly cut nodes to their extension; results do not depend on it
+    #: share of the history that the penalty of the mass subtracts; with 1, kinks of the velocity would not decay in
+    #: fluid at rest
+    ghost_memory: float = 0.9
+    extension: float = 0.1  #: penalty on the distance of poorly cut nodes to their extension
 
 
 @dataclass(frozen=True)
 class Coefficients:
-    """What the terms share: functions, numbers and what the case leaves out."""
+    """Coefficients that all terms share, and flags of the terms that a case leaves out."""
 
     rho: Expr  #: density [kg/m^3]
     mu: Expr  #: viscosity [Pa s]
@@ -61,19 +63,19 @@ class Coefficients:
 
 @dataclass(frozen=True)
 class GhostScales:
-    """What the ghost penalty takes from each cell.
+    """Scales of the ghost penalty in each cell.
 
-    phi_b = (|a| h)^2 / phi is small where viscosity or the time step rule. Were it phi, the term would be an artificial
-    viscosity along bodies that grows as steps get smaller.
+    phi_b = (|a| h)^2 / phi is small where viscosity or the term of the time step dominates phi. With phi instead, the
+    term would be an artificial viscosity along bodies that grows as steps get smaller.
     """
 
     phi: Expr  #: nu + |a| h + alpha h^2 [m^2/s]
     convective: Expr  #: phi_b [m^2/s]
-    has_history: Expr  #: 1 in cells of which all nodes had a velocity before, else 0
+    has_history: Expr  #: 1 in cells whose nodes all have a velocity from the last step, else 0
 
 
 def nothing(dim: int) -> Expr:
-    """A vector field of zeros, which leaves no trace in a compiled form."""
+    """A zero vector field. Terms with it vanish before a form is compiled."""
     return ufl.as_vector([0.0] * dim)
 
 
@@ -104,10 +106,10 @@ def residual_based(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Ex
     """Integrand of the SUPG, PSPG and grad-div terms, (rho a . grad v + grad q, T R) + (tau_C div u, div v).
 
     tau_M = (4 rho^2 alpha^2 + rho^2 a . G a + 36 mu^2 G : G)^(-1/2), 144 for second degree, tau_C = 1 / (tau_M tr G),
-    G = diag(4 / h_i^2), T = tau_M I. For first degree T = diag(tau_i) with dim G_ii^2 in the place of G : G: with
-    the shortest edge for all directions the pressure would hardly be stabilised along the longer ones, and the error
-    would grow with their ratio. For second degree the viscous part of R, that of a field without divergence, mu lap u,
-    bounds tau by the shortest edge; for first degree it is zero.
+    G = diag(4 / h_i^2), T = tau_M I for second degree. For first degree T = diag(tau_i), with dim G_ii^2 in the place
+    of G : G. A common tau would be that of the shortest edge: it would hardly stabilise the pressure along longer ones,
+    and the error would grow with the ratio of edges. For second degree the shortest edge bounds tau, because R has a
+    viscous part: mu lap u, that of a field without divergence. For first degree this part is zero.
     Source of tau by direction: Blasco, Comput. Methods Appl. Mech. Engrg. 197 (2008) 3712-3723.
     """
     test = grad(q)
@@ -119,16 +121,17 @@ def residual_based(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Ex
 
 
 def film(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
-    """Integrand in cut cells with a film, where viscosity rules: `bulk` of a flow without convection.
+    """Integrand in cut cells with a film, where viscosity dominates: `bulk` of a flow without convection.
 
-    Second-order velocities are parabolas across the film that go on in the rest of the cell, (h / g)^2 times as large.
-    The rule for cut cells is exact for the squares of such velocities, but not for cubes of them.
+    A second-order velocity is a parabola across the film. Its continuation to the rest of the cell is (h / g)^2 times
+    as large. The quadrature of cut cells is exact for products of two such velocities, but not for the products of
+    three in the convective term.
     """
     return bulk(creeping(flow), u, p, v, q)
 
 
 def creeping(flow: Coefficients) -> Coefficients:
-    """The flow without convection."""
+    """Coefficients of the same flow without convection."""
     return replace(flow, convection=False)
 
 
@@ -159,8 +162,8 @@ def ghost_penalty(
 
     h ((gamma_v mu + gamma_b rho phi_b) [d_n u] + gamma_t rho h^2 [d_n u_t]) [d_n v],  u_t = alpha u - gamma_m history.
 
-    So the share of the mass is one of the acceleration, as in a mass matrix. Were it one of alpha u (gamma_m = 0), as
-    it is in cells without history, it would take a power from the flow that grows as steps get smaller.
+    With gamma_m = 1 the term of the mass would be one of the acceleration u_t, as in a mass matrix. With gamma_m = 0,
+    its value in cells without history, it penalises alpha u and dissipates a power that grows as steps get smaller.
     Source of mass matrices with it: Sticko, Kreiss, J. Sci. Comput. 80 (2019), doi:10.1007/s10915-019-01004-2.
     """
     n = ufl.FacetNormal(flow.mesh)

@@ -1,9 +1,9 @@
-"""What continues the flow into poorly cut cells and behind the surface, as the discrete equations see it.
+"""The interface `GhostPenalty` of the terms that stabilise poorly cut cells and extend the flow behind the surface.
 
-`FacePenalty`: jumps of derivatives across faces, for q1q1. `ExtensionPenalty`: the distance to the polynomial of a
-well-cut cell, for q2q1. Jumps are an artificial viscosity along bodies; the distance is not, and results do not depend
-on its factor. With q1q1 that gain is small, and the pressure, which is continued by its gradient in one cell, depends
-more on where the cut falls (docs/verification_fluid.md).
+`FacePenalty`, for q1q1, penalises jumps of derivatives across faces. `ExtensionPenalty`, for q2q1, penalises the
+distance to the polynomial of a well-cut cell. Jumps act as an artificial viscosity along bodies. The distance does not,
+and results do not depend on its factor. With q1q1 this advantage is small, and the pressure, which is extended with its
+gradient in one cell, depends more on the position of the cut (docs/verification_fluid.md).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from solvers.fluid.matrix import Pattern
 
 @dataclass(frozen=True)
 class Scales:
-    """What the equations are like before an iterate."""
+    """Scales of the terms of the momentum equation at the last iterate."""
 
     viscosity: float  #: [Pa s]
     density: float  #: [kg/m^3]
@@ -33,55 +33,55 @@ class Scales:
 
 
 class GhostPenalty(Protocol):
-    """A symmetric matrix of one cut, and nodes that it continues the flow to; arrays of owned dofs."""
+    """A symmetric matrix for one cut, and the nodes whose values are extended from others."""
 
     @property
     def by_faces(self) -> bool:
-        """It couples the unknowns of cells with a common face."""
+        """Whether it couples the unknowns of cells with a common face."""
         ...
 
     @property
     def integrals(self) -> list[fem.Integral]:
-        """What is to be compiled."""
+        """Forms to compile."""
         ...
 
     @property
     def outside(self) -> NDArray[np.bool_]:
-        """Owned dofs that are no unknowns: `settle` says what they are."""
+        """Mask of owned dofs that are no unknowns: `settle` sets their values."""
         ...
 
     @property
     def undetermined(self) -> NDArray[np.bool_]:
-        """Local dofs of active cells that nothing determines."""
+        """Mask of local dofs of active cells that no equation determines."""
         ...
 
     def begin_step(self, unknown: NDArray[np.bool_]) -> None:
-        """`unknown`: local dofs whose velocity before no step has found."""
+        """Start a step; unknown: mask of local dofs without the velocities of earlier steps that it needs."""
         ...
 
     def set_scales(self, scales: Scales) -> None: ...
 
     def set_cut(self, cut: Cut, prescribed: NDArray[np.int64]) -> bool:
-        """Take a cut; True if `extra_entries` has changed. `prescribed`: local dofs with given values (collective)."""
+        """Set the cut (collective); prescribed: local dofs with given values. True if `extra_entries` has changed."""
         ...
 
     @property
     def stale(self) -> bool:
-        """Cut or scales are others than those of the last `assemble`."""
+        """Whether cut or scales have changed since the last `assemble`."""
         ...
 
     def extra_entries(self) -> NDArray[np.int64] | None:
-        """Entries in each owned row besides those of the pattern (collective)."""
+        """Count of entries in each owned row in addition to those of the pattern (collective)."""
         ...
 
     def fill(self, matrix: PETSc.Mat, pattern: Pattern) -> None:
-        """Insert all entries that it may have, with any values (collective)."""
+        """Insert all entries that it may have, with arbitrary values (collective)."""
         ...
 
     def assemble(self, matrix: PETSc.Mat, history: Array) -> None:
-        """Add its matrix, and set what it has of the times behind at local dofs (collective)."""
+        """Add its matrix, and set its term of the earlier steps at local dofs (collective)."""
         ...
 
     def settle(self, values: Array) -> Array:
-        """Owned values with those of `outside` (collective)."""
+        """Values at owned dofs, with those of `outside` extended from the others (collective)."""
         ...

@@ -1,4 +1,4 @@
-"""Which ghost penalty an element has."""
+"""The choice of the ghost penalty by element."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from solvers.fluid.space import Unknowns
 
 
 def choose_ghost_penalty(unknowns: Unknowns, flow: forms.Coefficients, penalties: forms.Penalties) -> GhostPenalty:
-    """The one that does better: `solvers.fluid.ghost` says why."""
+    """The more accurate one for the element; `solvers.fluid.ghost` has the reason."""
     if unknowns.degree == 2:
         return ExtensionPenalty(unknowns, penalties.extension)
     return FacePenalty(unknowns, flow, penalties)

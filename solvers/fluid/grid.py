@@ -1,4 +1,4 @@
-"""The background grid, distributed, with its cells and faces in the numbering of the box."""
+"""The distributed background grid, with its cells and faces in the numbering of the box."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class DistributedGrid:
         self.domain = fem.distribute(comm, mesh)
         #: number of each local cell in the mesh, ghosts last
         self.original: Indices = fem.input_cells(self.domain)
-        #: number of the cell of the box in its place, of coarser cells the lowest one; only with `sheets` there are
-        #: cells with the same
+        #: number in the box of each local cell; of a coarser cell that of its lowest one. Only with `sheets` several
+        #: cells have the same number
         self.numbers: Indices = self.original if sheets is None else sheets.place(self.original)
         if self.nested is not None:
             self.numbers = self.nested.first[self.original]
@@ -53,7 +53,7 @@ class DistributedGrid:
 
     @property
     def in_box(self) -> NDArray[np.bool_]:
-        """Cells of the box that the local cells cover."""
+        """Mask of the cells of the box that the local cells cover."""
         if self.nested is None:
             covered = np.zeros(self.grid.size, dtype=bool)
             covered[self.numbers] = True
@@ -64,12 +64,12 @@ class DistributedGrid:
 
     @property
     def joined(self) -> bool:
-        """Some cells have nodes in common that are not so in the mesh."""
+        """Whether some cells share nodes that are different vertices in the mesh."""
         return self.sheets is not None or self.nested is not None
 
     @property
     def apart(self) -> NDArray[np.bool_]:
-        """Local cells with nodes that others have, too, but not in the mesh."""
+        """Mask of local cells with nodes that they share with others, but not in the mesh."""
         if self.nested is not None:
             return self.nested.at_others[self.original]
         return self.original >= self.grid.size
@@ -88,22 +88,23 @@ class DistributedGrid:
 
     @cached_property
     def outer_faces(self) -> tuple[NDArray[np.int32], NDArray[np.int32], Array]:
-        """(local faces, their cells, midpoints of shape (faces, dim)) on the box's boundary that this process knows."""
+        """(local faces on the boundary of the box, their cells, midpoints [m] of shape (faces, dim))."""
         faces, cells = fem.boundary_facets(self.domain)
         return faces, cells, fem.facet_midpoints(self.domain, faces)
 
     @cached_property
     def window(self) -> tuple[Indices, tuple[int, ...], Indices]:
-        """Lowest index and shape of the smallest box around the owned cells; their places in it, last axis fastest."""
+        """(lowest index, shape, numbers of the owned cells) of the smallest box around them, last axis fastest."""
         index = np.stack(np.unravel_index(self.numbers[: self.owned], self.grid.shape, order="F"))
         low = index.min(axis=1, initial=np.iinfo(np.int64).max) if self.owned else np.zeros(self.dim, dtype=np.int64)
         shape = tuple((index.max(axis=1) - low + 1).tolist()) if self.owned else (0,) * self.dim
         return low, shape, np.ravel_multi_index(tuple(index - low[:, None]), shape) if self.owned else np.empty(0, int)
 
     def seams(self, periodic: tuple[int, ...] = ()) -> tuple[Indices, Indices]:
-        """(owned cells, numbers of corners) where these meet cells of others, or cells across a period.
+        """(owned cells, numbers of corners) for corners that are shared with cells of other processes or of a period.
 
-        Corners are numbered as in the lattice of all corners, those of a `periodic` axis's end as those of its start.
+        Corners are numbered in the lattice of all corners. Those at the end of a `periodic` axis have the numbers of
+        those at its start.
         """
         if periodic not in self._seams:
             self._seams[periodic] = self._find_seams(periodic)
@@ -132,7 +133,7 @@ class DistributedGrid:
         return cell[seam], number[seam]
 
     def on_face(self, midpoints: Array, name: str) -> NDArray[np.bool_]:
-        """Which midpoints lie on a box face such as 'x-'."""
+        """Mask of the midpoints that lie on a box face such as 'x-'."""
         axis = "xyz".index(name[0])
         edge = self.grid.edges[axis]
         plane = edge[0] if name[1] == "-" else edge[-1]

@@ -1,8 +1,8 @@
-"""Hanging nodes: nodes of finer cells on the face or the edge of a coarser one that are no nodes of that.
+"""Hanging nodes: nodes of finer cells on a face or edge of a coarser cell that are no nodes of the coarser cell.
 
-They are no unknowns, their values are those of the coarser cell's polynomial there: u_i = sum_b N_b(x_i) u_b. With
-T the matrix that has these rows and, for all other nodes, those of the identity, an equation r(u) = 0 becomes
-T^T r(T u) = 0, its tangent T^T K T. Since cells at a corner differ by one level at most, no b hangs itself.
+They are no unknowns. Their values are those of the polynomial of the coarser cell, u_i = sum_b N_b(x_i) u_b. Let T be
+the matrix with these rows, and rows of the identity for all other nodes. An equation r(u) = 0 becomes T^T r(T u) = 0,
+and its tangent T^T K T. No b is a hanging node itself, because cells at a corner differ by one level at most.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Mask = NDArray[np.bool_]
 
 
 class Hanging:
-    """Those of velocity and pressure. Arrays of rows and values are those of owned dofs."""
+    """Hanging nodes of velocity and pressure. Rows and values are arrays over owned dofs."""
 
     def __init__(
         self,
@@ -35,28 +35,29 @@ class Hanging:
         owned: int,
         cell_dofs: Sequence[NDArray[np.int32]],
     ):
-        """lattices: of each quantity local dofs (nodes, components), numbers of the nodes, how many are owned, degree.
+        """Collective.
 
-        cell_dofs: of local cells, in any number of arrays. Collective.
+        lattices: for each quantity local dofs (nodes, components), numbers of the nodes, count of owned ones, degree.
+        cell_dofs: dofs of the local cells, in any number of arrays.
         """
-        self.dofs: Mask = np.zeros(len(global_dofs), dtype=bool)  #: which local dofs
+        self.dofs: Mask = np.zeros(len(global_dofs), dtype=bool)  #: mask of the local dofs of hanging nodes
         rows, columns, data = [], [], []
         for dofs, numbers, own, degree in lattices:
-            known = grid.all_nodes(degree)
-            places, of_dofs = np.searchsorted(known, numbers[:own]), global_dofs[dofs]
-            directory = Directory(comm, places, of_dofs[:own], len(known))
+            all_numbers = grid.all_nodes(degree)
+            consecutive, of_dofs = np.searchsorted(all_numbers, numbers[:own]), global_dofs[dofs]
+            directory = Directory(comm, consecutive, of_dofs[:own], len(all_numbers))
             hangs, masters, weights = grid.hanging(degree, numbers)
             self.dofs[dofs[hangs]] = True
             mine = np.flatnonzero(hangs)[: np.count_nonzero(hangs[:own])]
             at, function = np.nonzero(weights[: len(mine)])
-            columns.append(directory(np.searchsorted(known, masters[at, function])))
+            columns.append(directory(np.searchsorted(all_numbers, masters[at, function])))
             rows.append(of_dofs[mine[at]])
             data.append(np.broadcast_to(weights[at, function][:, None], rows[-1].shape))
         free = global_dofs[:owned][~self.dofs[:owned]]
         entries = [np.concatenate([first, *(some.ravel() for some in parts)])
                    for first, parts in ((free, rows), (free, columns), (np.ones(len(free)), data))]  # fmt: skip
         self._table = from_entries(comm, (owned, owned), *entries)
-        #: local cells with such nodes
+        #: mask of the local cells with hanging nodes
         self.cells: Mask = np.any([self.dofs[dofs].reshape(len(dofs), -1).any(axis=1) for dofs in cell_dofs], axis=0)
 
     def values(self, values: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The tangent of cells with hanging nodes: assembled by itself, then brought to the unknowns."""
+"""The tangent of cells with hanging nodes: assembled separately, then condensed to the unknowns."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Cells = NDArray[np.int32]
 
 
 class HangingSystem:
-    """T^T K T of these cells; the others, most by far, are assembled as without hanging nodes."""
+    """T^T K T of the cells with hanging nodes. All other cells are assembled directly."""
 
     def __init__(self, unknowns: Unknowns, table: Hanging, tangent: fem.Integral):
         """tangent: over uncut cells; no cell near a body has hanging nodes."""
@@ -27,20 +27,23 @@ class HangingSystem:
         self._forms: list[Any] = []
 
     def others(self, cells: Cells) -> Cells:
-        """Those of some local cells without hanging nodes."""
+        """The cells without hanging nodes among some local ones."""
         return cells[~self.table.cells[cells]]
 
     def set_cells(self, uncut: Cells, more: Sequence[Any]) -> Any:
-        """Take owned cells, and forms over outer faces of such with hanging nodes; the form over all other cells."""
+        """Set the owned uncut cells. Returns the form over those without hanging nodes.
+
+        more: forms over outer faces of cells with hanging nodes.
+        """
         self._forms = [self._tangent.on(cell=uncut[self.table.cells[uncut]]), *more]
         return self._tangent.on(cell=self.others(uncut))
 
     def extra_entries(self) -> NDArray[np.int64]:
-        """Entries in each owned row, of which some are those of other cells, too (collective)."""
+        """Count of entries in each owned row; some of them coincide with those of other cells (collective)."""
         return np.diff(self._everywhere()[0]).astype(np.int64)
 
     def fill(self, matrix: PETSc.Mat) -> None:
-        """Add values that do not matter wherever there may be some (collective)."""
+        """Insert all entries that the tangent may have, with arbitrary values (collective)."""
         matrix.setValuesCSR(*self._everywhere(), addv=PETSc.InsertMode.ADD_VALUES)
 
     def add(self, matrix: PETSc.Mat) -> None:

@@ -1,4 +1,4 @@
-"""The velocities of earlier steps, which the rate du/dt of a step needs."""
+"""The velocities of earlier steps, from which a time scheme computes the rate du/dt."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Past:
-    """Velocities [m/s] of a time behind, at local dofs, and where a step has found them."""
+    """Velocities [m/s] at an earlier time, at local dofs, and where that step had unknowns."""
 
     velocity: Array
     found: Mask
 
 
 class History:
-    """Velocities and lengths of the accepted steps, the last one first: as many as the time scheme needs."""
+    """Velocities and lengths of the last accepted steps, newest first: as many as the time scheme needs."""
 
     def __init__(self, scheme: FlowTimeScheme, size: int):
         self.scheme = scheme
@@ -32,34 +32,34 @@ class History:
         self.steps: tuple[float, ...] = ()  #: lengths [s]
 
     def difference(self, dt: float) -> Difference:
-        """The rule of a step of length dt from now on."""
+        """The difference formula of a next step of length dt [s]."""
         return self.scheme.difference(dt, self.steps)
 
     def start(self, velocity: Array) -> None:
-        """The initial velocity, known everywhere."""
+        """Set the initial velocity, which exists at all nodes."""
         self.past[0] = Past(velocity, np.ones(len(velocity), dtype=bool))
 
     def continue_back(self, dt: float, rate: Array, found: Mask) -> None:
-        """Velocities before the start by their rate [m/s^2] there, as if steps of length dt had led to it."""
+        """Extrapolate velocities back before the start by their rate [m/s^2], in steps of length dt [s]."""
         start = self.past[0].velocity
         back = [Past(start - k * dt * rate, found) for k in range(1, len(self.past))]
         self.past = [self.past[0], *back]
         self.steps = (dt,) * self.scheme.times
 
     def end_step(self, dt: float, velocity: Array, found: Mask) -> None:
-        """Accept a step that found the flow at some local dofs."""
+        """Accept a step of length dt; found: local dofs at which it had a velocity."""
         self.past = [Past(velocity, found), *self.past][: len(self.past)]
         self.steps = (dt, *self.steps)[: self.scheme.times]
 
     def rate(self, difference: Difference) -> Array:
-        """What u_t takes from the times behind, sum_k beta_k u_{n-k} [m/s^2]."""
+        """The history in u_t = alpha u - history: sum_k beta_k u_{n-k} [m/s^2], at local dofs."""
         total = np.zeros(len(self.past[0].velocity))
         for weight, past in zip(difference.beta, self.past, strict=False):
             total += weight * past.velocity
         return total
 
     def missing(self, difference: Difference) -> Mask:
-        """Where that asks for a velocity that no step has found."""
+        """Mask of the local dofs where `rate` needs a velocity that its step did not have."""
         missing = np.zeros(len(self.past[0].found), dtype=bool)
         for weight, past in zip(difference.beta, self.past, strict=False):
             if weight:
@@ -77,7 +77,7 @@ class History:
         }
 
     def restore(self, unknowns: Unknowns, state: State) -> None:
-        """Back to a saved state (collective)."""
+        """Restore a saved state (collective)."""
         nodes, found = unknowns.velocity, state["found"].values
         self.past = [
             Past(

@@ -18,7 +18,7 @@ from solvers.fluid.surface import ImmersedSurface, Motion, together
 
 @dataclass(frozen=True)
 class ImmersedBody:
-    """A surface in the flow; `motion` gives its vertices at a time, None if another field moves it."""
+    """A surface in the flow; motion: time [s] -> motion of its vertices; None if another field moves it."""
 
     surface: ImmersedSurface
     motion: Callable[[float], Motion] | None
@@ -32,7 +32,7 @@ def rigid_body(
     facets: NDArray[np.int64],
     motion: Callable[[float], tuple[Array, Array]] | None = None,
 ) -> ImmersedBody:
-    """A body that the flow does not move.
+    """A body with a prescribed motion.
 
     points: vertices [m], shape (n, dim). facets: segments (2D) or triangles (3D) as vertex numbers, shape (m, dim);
     their right-hand normals point out of the body: in 2D they run with the body on their left.

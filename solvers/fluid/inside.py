@@ -1,4 +1,4 @@
-"""Which points lie in bodies."""
+"""Tests whether points lie in bodies."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.fluid.surface import ImmersedSurface, Motion, together
 
-#: winding number above which a point is in a body; in a dent of the surface it is more than 0.5
+#: Winding number above which a point is in a body. Near a concave corner outside of it, it may exceed 0.5.
 INSIDE = 1.0 - 1e-6
 
 
@@ -27,10 +27,11 @@ def require_outside(x: Array, surfaces: Sequence[ImmersedSurface], motions: Sequ
 
 
 def winding(x: Array, motion: Motion, facets: NDArray[np.int64]) -> float:
-    """How often closed surfaces go round a point: 1 in a body, 0 outside, less than 1 on the surface.
+    """Winding number of closed surfaces around a point: 1 in a body, 0 outside, between them on the surface.
 
-    The sum of the angles of segments, or of the solid angles of triangles (van Oosterom, Strackee, IEEE Trans. Biomed.
-    Eng. 30 (1983) 125-126), as part of the full one; a facet in line with the point has none, whatever its rounding.
+    It is the sum of the angles of segments, or of the solid angles of triangles, divided by the full angle. A facet
+    whose plane contains the point contributes zero: rounding would decide its sign.
+    Source: van Oosterom, Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125-126.
     """
     corners = motion.x[facets] - x
     lengths = np.linalg.norm(corners, axis=2)

@@ -1,11 +1,11 @@
-"""What fluid and surface exchange: velocity of the surface into the fluid, force of the fluid on the surface.
+"""The interface operators: from the motion of surfaces to the rows of the flow, and from the flow to the force.
 
-With N_b the shape functions of the surface's vertices, g = sum_b N_b g_b and the terms of `nitsche`, whose stress is t,
+With the shape functions N_b of the vertices of a surface, g = sum_b N_b g_b, and the traction t of `nitsche`,
 
     C[(v, q), b i] = <t(v, 0) + q n, N_b e_i>                                    fluid rows:  r += C g
     f_b i = -<t(u, g) - p n, N_b e_i> = (C^T S (u, p) - M g)_bi,   S = -1 for u, +1 for p,   M = <P N_b, N_c>.
 
-Both come from the same moments of the same pieces, so that the sum of all forces vanishes to round-off.
+Both use the same moments of the same pieces, so that the sum of all forces vanishes to rounding errors.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from solvers.fluid.weights import Weights
 
 @dataclass(frozen=True)
 class MotionOperator:
-    """An operator from the surface's motion to the flow's rows, by pieces."""
+    """An operator from the motion of a surface to the rows of the flow, by pieces: coefficients of shape functions."""
 
-    fields: Array  #: of `InterfaceTerms.fields` in velocity rows (pieces, fields, component, component of the motion)
-    psi: Array  #: of psi in pressure rows (pieces, component of the motion)
+    fields: Array  #: coefficients of `InterfaceTerms.fields` in momentum rows (pieces, fields, component, motion)
+    psi: Array  #: coefficients of psi in continuity rows (pieces, component of the motion)
 
     def __rmul__(self, factor: float) -> MotionOperator:
         return MotionOperator(factor * self.fields, factor * self.psi)
@@ -38,7 +38,7 @@ class MotionOperator:
         return MotionOperator(self.fields + other.fields, self.psi + other.psi)
 
     def of(self, by_motion: Array) -> MotionOperator:
-        """After a map of the motion, shape (pieces, dim, dim)."""
+        """The operator applied after a map of the motion, shape (pieces, dim, dim)."""
         return MotionOperator(self.fields @ by_motion[:, None], np.einsum("pi,pij->pj", self.psi, by_motion))
 
 
@@ -56,7 +56,7 @@ class InterfaceTerms:
         slip_length: Array | None = None,
         transmissivity: Array | None = None,
     ):
-        """penalty: P by pieces [Pa s/m]; slip_length [m], transmissivity [m^3]: by facets, None where all are zero."""
+        """mu [Pa s]; penalty: P by pieces [Pa s/m]; slip_length [m], transmissivity [m^3]: by facets, None if zero."""
         pieces = cut.pieces
         mine = cut.cut[pieces.cell] < grid.owned
         cells, facet = cut.cut[pieces.cell[mine]], pieces.facet[mine]
@@ -73,12 +73,12 @@ class InterfaceTerms:
         #: int phi_a N_b, int grad phi_a N_b over each piece, shape (pieces, functions, vertices, 1 + dim)
         self.fields = np.ascontiguousarray(np.tensordot(moments, table, (1, 0)).transpose(0, 2, 1, 3))
         self.fields[..., 1:] /= self.sizes[:, None, None, :]
-        #: int psi_a N_b and int grad psi_a
+        #: int psi_a N_b, (pieces, functions, vertices), and int grad psi_a, (pieces, functions, dim)
         self.psi = np.tensordot(moments, psi, (1, 0)).transpose(0, 2, 1)
         area = moments.sum(axis=2)
         self.pressure_slope = np.tensordot(area, psi_gradient, (1, 0)) / self.sizes[:, None, :]
         self.coupling = MotionOperator(nitsche.stress(mu, self.n, self.penalty), self.n)  #: C
-        self.cell_blocks: list[CellBlocks] = []  #: what surfaces that give way add to the rows of the flow
+        self.cell_blocks: list[CellBlocks] = []  #: terms of slip and seepage in the rows of the flow
         D, along = np.zeros_like(self.penalty), self.n[:, :, None] * self.n[:, None, :]
         tangents = np.eye(self.dim) - along
         if slip_length is not None:
@@ -96,7 +96,7 @@ class InterfaceTerms:
             self.penalty = self.penalty @ R
 
     def velocity_terms(self, g: Array) -> Array:
-        """C g at local dofs, the ghosts' share still there; g [m/s] of shape (vertices, dim)."""
+        """C g at local dofs, contributions to ghosts not added up; g [m/s], shape (vertices, dim)."""
         g, fields, K = g[self.corners], *self._flat()
         against = fields @ (g @ np.swapaxes(K, 1, 2)).reshape(len(g), fields.shape[2], self.dim)
         leak = np.einsum("pav,pv->pa", self.psi, np.einsum("pvi,pi->pv", g, self.n))
@@ -105,7 +105,7 @@ class InterfaceTerms:
         return total + np.bincount(self.p.ravel(), leak.ravel(), size)
 
     def force(self, flow: Array, g: Array) -> Array:
-        """This process' share of the force [N] on the vertices, shape (vertices, dim); `flow` at local dofs."""
+        """Contribution of this process to the force [N] on the vertices, shape (vertices, dim); flow at local dofs."""
         u, p, g, fields, K = flow[self.u], flow[self.p], g[self.corners], *self._flat()
         force = np.einsum("pav,pa->pv", self.psi, p)[:, :, None] * self.n[:, None, :]
         force -= (np.swapaxes(fields, 1, 2) @ u).reshape(*g.shape[:2], K.shape[1]) @ K

@@ -1,4 +1,4 @@
-"""Iterative solution of the flow's linear systems, and what is tried when that stalls."""
+"""Iterative solution of the linear systems of the flow, and the sequence of solvers to try when one fails."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from solvers.fluid.multigrid import Multigrid
 from solvers.fluid.space import Unknowns
 from solvers.lagged import Lagged, LaggedFactors
 
-#: What the messages call it.
+#: Names of the methods in messages.
 WORDS: dict[linear.FlowMethod, str] = {
     "multigrid": "multigrid",
     "ilu": "incomplete factors",
@@ -29,7 +29,7 @@ FACTORS = 1_100.0
 
 
 class SolverSequence:
-    """Which of several solvers is in use, and the next one if it fails. Its `position` is part of the state."""
+    """A sequence of solvers: if the current one fails, the next one replaces it. `position` is part of the state."""
 
     def __init__(self, comm: MPI.Comm, methods: Sequence[linear.FlowMethod], dofs: int, say: Callable[[str], None]):
         self.comm, self.methods, self._dofs, self._say = comm, methods, dofs, say
@@ -40,14 +40,14 @@ class SolverSequence:
         return self.methods[self.position]
 
     def advance(self, failure: linear.LinearSolveFailed) -> None:
-        """Take the next solver from now on. Raises LinearSolveFailed if there is none (collective)."""
+        """Change to the next solver for the rest of the run. Raises LinearSolveFailed if there is none (collective)."""
         if failure.singular or self.position == len(self.methods) - 1:
             raise failure
-        need, there = FACTORS * self._dofs ** (4.0 / 3.0), free_memory(self.comm)
-        if self.methods[self.position + 1] == "direct" and need > there:
+        need, free = FACTORS * self._dofs ** (4.0 / 3.0), free_memory(self.comm)
+        if self.methods[self.position + 1] == "direct" and need > free:
             raise linear.LinearSolveFailed(
                 f"{failure} with {WORDS[self.current]}, and the direct solver would need about {need / 1e9:.3g} GB "
-                f"of the {there / 1e9:.3g} GB that are free; take cells that grow less from one to the next, "
+                f"of the {free / 1e9:.3g} GB that are free; take cells that grow less from one to the next, "
                 f"'element: q1q1', or a larger 'solver.linear.tolerance'"
             ) from failure
         before = WORDS[self.current]
@@ -56,14 +56,14 @@ class SolverSequence:
 
 
 def free_memory(comm: MPI.Comm) -> float:
-    """Bytes that are free where there is least (collective)."""
+    """Smallest free memory of all processes [bytes] (collective)."""
     return float(comm.allreduce(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"), op=MPI.MIN))
 
 
 class FlowSolver:
-    """Solves with the present solver of the sequence, preconditioned with an earlier matrix of the step if possible.
+    """Solves with the current solver of the sequence, and reuses the preconditioner of an earlier matrix of the step.
 
-    Nothing but the position of the sequence is kept from step to step, so that resumed runs are the same.
+    Only the position of the sequence is kept from step to step, so that resumed runs give the same results.
     """
 
     def __init__(self, unknowns: Unknowns, sequence: SolverSequence, tolerance: float, *, steady: bool):
@@ -73,16 +73,16 @@ class FlowSolver:
 
     @cached_property
     def multigrid(self) -> Multigrid:
-        """The levels (collective)."""
+        """The levels of multigrid (collective)."""
         return Multigrid(self.sequence.comm, self._unknowns)
 
     def begin_step(self) -> None:
-        """The next matrix is one of another step."""
+        """Discard preconditioners of the last step."""
         self._krylov.begin_step()
         self._direct.begin_step()
 
     def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, held: NDArray[np.bool_]) -> int:
-        """Solve matrix x = b; how many iterations that took. Raises LinearSolveFailed.
+        """Solve matrix x = b. Returns the count of iterations. Raises LinearSolveFailed (collective).
 
         held: owned unknowns whose rows are those of the identity.
         """

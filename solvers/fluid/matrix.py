@@ -1,4 +1,4 @@
-"""The matrix of the flow: unknowns of active cells, coupled within cells and across ghost faces."""
+"""The sparsity pattern of the flow's matrix: couplings within active cells and across ghost faces."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from solvers.fluid.space import Unknowns
 
 @dataclass(frozen=True)
 class Pattern:
-    """Allocated couplings of a matrix: within cells and across faces of this process."""
+    """Allocated couplings of a matrix, for the cells and faces of this process."""
 
-    cells: NDArray[np.bool_]  #: per local cell
-    faces: NDArray[np.bool_]  #: per local face with two cells, in the order of `interior_faces`
-    reach: NDArray[np.bool_]  #: per local cell: all its faces with cells of the pattern belong to it
-    by_faces: bool  #: couplings across faces are wanted
+    cells: NDArray[np.bool_]  #: local cells with couplings within them
+    faces: NDArray[np.bool_]  #: interior faces with couplings across them, in the order of `interior_faces`
+    reach: NDArray[np.bool_]  #: local cells whose faces with other cells of the pattern have couplings
+    by_faces: bool  #: whether the ghost penalty has couplings across faces
 
     def covers(self, cut: Cut, faces: NDArray[np.int32]) -> bool:
-        """A cut needs no more than this."""
-        wanted = self.faces[np.searchsorted(faces, cut.ghost_faces)] if self.by_faces else np.True_
-        return bool(self.cells[cut.active].all() and wanted.all())
+        """Whether the pattern contains all couplings of a cut on this process; faces: `interior_faces`."""
+        needed = self.faces[np.searchsorted(faces, cut.ghost_faces)] if self.by_faces else np.True_
+        return bool(self.cells[cut.active].all() and needed.all())
 
 
 def choose_pattern(unknowns: Unknowns, cut: Cut, *, by_faces: bool) -> Pattern:
-    """A sparsity pattern for a cut and for those that its bodies may make in the next steps."""
+    """A sparsity pattern for a cut and for the cuts of the next steps, which the motion of its bodies may cause."""
     cells = cut.reach.copy()
     cells[cut.active] = True
     faces, sides = unknowns.grid.interior_faces
@@ -40,14 +40,14 @@ def choose_pattern(unknowns: Unknowns, cut: Cut, *, by_faces: bool) -> Pattern:
 
 
 def pattern_of(unknowns: Unknowns, cells: NDArray[np.bool_], reach: NDArray[np.bool_], *, by_faces: bool) -> Pattern:
-    """Some local cells, and the faces between them of those in reach of a body."""
+    """The pattern of some local cells; reach: cells whose faces with others have couplings, if `by_faces`."""
     _, sides = unknowns.grid.interior_faces
     faces = reach[sides].any(axis=1) & cells[sides].all(axis=1) & by_faces
     return Pattern(cells, faces, reach, by_faces)
 
 
 def fits(unknowns: Unknowns, pattern: Pattern | None, cut: Cut) -> bool:
-    """The pattern contains the couplings of a cut on every process (collective)."""
+    """Whether the pattern contains the couplings of a cut on every process (collective)."""
     faces, _ = unknowns.grid.interior_faces
     return unknowns.grid.comm.allreduce(pattern is not None and pattern.covers(cut, faces), op=MPI.LAND)
 
@@ -55,7 +55,10 @@ def fits(unknowns: Unknowns, pattern: Pattern | None, cut: Cut) -> bool:
 def create_matrix(
     unknowns: Unknowns, pattern: Pattern, more: NDArray[np.int64] | None = None, *, blocked: bool
 ) -> PETSc.Mat:
-    """An empty matrix with the entries of a pattern and `more` in owned rows; blocked: in dense blocks (collective)."""
+    """Allocate an empty matrix (collective).
+
+    more: count of entries in each owned row in addition to those of the pattern; blocked: store dense blocks.
+    """
     size = unknowns.block_size
     index_map = unknowns.index_map
     owned, local = int(index_map.size_local), int(index_map.size_local + index_map.num_ghosts)
@@ -86,7 +89,7 @@ def create_matrix(
 
 
 def _neighbours(unknowns: Unknowns, pattern: Pattern, local: int) -> NDArray[np.int64]:
-    """Blocks that each local block is coupled with, by what this process holds."""
+    """Count of blocks that each local block is coupled with by cells and faces of this process."""
     blocks = unknowns.cell_blocks
     _, sides = unknowns.grid.interior_faces
     cells = blocks[pattern.cells]

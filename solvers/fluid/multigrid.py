@@ -1,8 +1,8 @@
-"""Geometric multigrid for the flow: the planes of the grid are thinned out level by level.
+"""Geometric multigrid for the flow: each level has a subset of the planes of the next finer one.
 
-The nodes of velocity and pressure are lattices, products of planes. A coarse lattice keeps some of the planes; values
-between them follow by multilinear interpolation P, coarse matrices are P^T A P. Held unknowns, those without fluid
-among them, get no correction. The first coarse lattice of a velocity of second degree is that of the vertices.
+The nodes of velocity and pressure are lattices, products of planes. A coarse lattice has some of the planes. P is the
+multilinear interpolation to the others, and coarse matrices are P^T A P. Held unknowns, which include those without
+fluid, get no correction. The first coarse lattice of a velocity of second degree is that of the vertices.
 Source: Trottenberg, Oosterlee, Schuller, Multigrid (2001), sections 2.4, 5.1 and 8.7.
 """
 
@@ -42,10 +42,10 @@ class LevelGrid:
         return tuple(len(some) - (axis in self.periodic) for axis, some in enumerate(self.planes))
 
     def coarser(self) -> LevelGrid:
-        """Neighbouring cells are joined where they are smallest.
+        """The next coarser lattice: pairs of the smallest neighbouring cells are merged.
 
-        A pair becomes one cell if that is no wider than H, the same for all directions: stretched cells are joined
-        across their short edges first. H is doubled until less than THINNER of the nodes is left.
+        A pair is merged if the new cell is no wider than H, which is the same for all directions. Hence stretched cells
+        are merged across their short edges first. H is doubled until at most the share THINNER of the nodes remains.
         """
         width = 2.0 * min(float(np.diff(some).min()) for some in self.planes)
         while True:
@@ -56,7 +56,7 @@ class LevelGrid:
 
     @property
     def smallest(self) -> bool:
-        """A single cell."""
+        """Whether it is a single cell."""
         return all(len(some) == 2 for some in self.planes)
 
 
@@ -73,8 +73,8 @@ class Component:
     """Owned nodes of one velocity component, or of the pressure, on one level."""
 
     lattice: LevelGrid
-    nodes: Indices  #: their planes, shape (owned, dim)
-    dofs: Indices  #: their global unknowns
+    nodes: Indices  #: indices of their planes, shape (owned, dim)
+    dofs: Indices  #: their global unknowns, shape (owned,)
 
     @property
     def numbers(self) -> Indices:
@@ -90,7 +90,7 @@ class Level:
     owned: int
 
     def component_of(self) -> Indices:
-        """Component of each owned unknown; those of no component count as pressures."""
+        """Component of each owned unknown; unknowns without one have that of the pressure."""
         found = np.full(self.owned, len(self.components) - 1, dtype=np.int64)
         for number, component in enumerate(self.components):
             found[component.dofs - self.start] = number
@@ -98,7 +98,7 @@ class Level:
 
 
 def finest(unknowns: Unknowns) -> Level:
-    """The unknowns of the flow as they are."""
+    """The finest level: the unknowns of the flow."""
     found = []
     for nodes, degree in ((unknowns.velocity, unknowns.degree), (unknowns.pressure, 1)):
         planes = tuple(
@@ -112,17 +112,18 @@ def finest(unknowns: Unknowns) -> Level:
 
 
 def coarsen(comm: MPI.Comm, fine: Level, lattices: Sequence[LevelGrid]) -> Level:
-    """A level on coarser lattices; a node belongs to the process that has it on the finer one (collective).
+    """A level on coarser lattices (collective).
 
-    Unknowns at one point are neighbours, points in the order of the lattice.
+    A node belongs to the process that owns it on the finer level. Unknowns are numbered point by point, in the order of
+    the lattice.
     """
     kept, points = [], []
     for component, lattice in zip(fine.components, lattices, strict=True):
         nodes, own = np.empty_like(component.nodes), np.ones(len(component.nodes), dtype=bool)
         for axis, (some, every) in enumerate(zip(lattice.planes, component.lattice.planes, strict=True)):
-            place = every[component.nodes[:, axis]]
-            nodes[:, axis] = np.searchsorted(some, place)
-            own &= some[nodes[:, axis]] == place
+            coordinate = every[component.nodes[:, axis]]
+            nodes[:, axis] = np.searchsorted(some, coordinate)
+            own &= some[nodes[:, axis]] == coordinate
         kept.append(nodes[own])
         points.append(np.stack([some[i] for some, i in zip(lattice.planes, nodes[own].T, strict=True)], axis=1))
     every = np.concatenate(points)
@@ -151,21 +152,21 @@ def interpolation(comm: MPI.Comm, fine: Level, coarse: Level) -> PETSc.Mat:
             rows.append(here.dofs[used] - fine.start)
             columns.append(unknown[np.ravel_multi_index(parents, shape, order="F")[used]])
             data.append(weight[used])
-    place = (np.concatenate(rows), np.concatenate(columns))
-    local = sparse.csr_matrix((np.concatenate(data), place), shape=(fine.owned, comm.allreduce(coarse.owned)))
+    entries = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
+    local = sparse.csr_matrix(entries, shape=(fine.owned, comm.allreduce(coarse.owned)))
     csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
     return PETSc.Mat().createAIJ(((fine.owned, None), (coarse.owned, None)), csr=csr, comm=comm)
 
 
 def _everywhere(comm: MPI.Comm, component: Component) -> Indices:
-    """Unknown of every node of a coarse lattice, once for all cuts (collective)."""
+    """Global unknown of every node of a coarse lattice (collective)."""
     found = np.zeros(int(np.prod(component.lattice.shape)), dtype=np.int64)
     found[component.numbers] = component.dofs
     return found if comm.size == 1 else comm.allreduce(found)
 
 
 def _weights(fine: Array, coarse: Array) -> tuple[Indices, Array]:
-    """(first coarse plane, weights of it and the next one) of each fine plane."""
+    """(index of the coarse plane before each fine plane, weights of it and of the next one, shape (planes, 2))."""
     first = np.clip(np.searchsorted(coarse, fine, side="right") - 1, 0, len(coarse) - 2)
     second = (fine - coarse[first]) / (coarse[first + 1] - coarse[first])
     return first, np.stack([1.0 - second, second], axis=1)
@@ -178,8 +179,8 @@ class Multigrid:
         self.comm, self._second = comm, unknowns.degree > 1
         self.levels = [finest(unknowns)]
         self._interpolations: list[PETSc.Mat] = []
-        #: the finest matrix that a preconditioner was made for last, what it was converted to, and by levels the
-        #: interpolation and the coarse matrix: while that matrix is in use, its pattern stays
+        #: the finest matrix of the last preconditioner, its conversion to AIJ, and for each level the interpolation and
+        #: the coarse matrix; these are reused while the matrix, and thus its pattern, is the same
         self._last: PETSc.Mat | None = None
         self._converted: PETSc.Mat | None = None
         self._kept: list[tuple[PETSc.Mat, PETSc.Mat]] = []
@@ -193,10 +194,10 @@ class Multigrid:
             self._interpolations.append(interpolation(comm, *self.levels[-2:]))
 
     def set_up(self, preconditioner: PETSc.PC, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> None:
-        """Make a preconditioner one V-cycle for a matrix; it stays what it is when the matrix changes (collective).
+        """Set a preconditioner up as one V-cycle for a matrix; it does not follow later changes (collective).
 
-        It takes the place of the one before, whose matrices are overwritten.
-        held: owned unknowns whose rows are those of the identity.
+        The coarse matrices of the preconditioner before are overwritten.
+        held: owned unknowns with rows of the identity.
         """
         matrices, interpolations = self._galerkin(matrix, held)
         count = len(matrices)
@@ -222,13 +223,13 @@ class Multigrid:
         preconditioner.setReusePreconditioner(True)
 
     def _smooth(self, smoother: PETSc.KSP, matrix: PETSc.Mat, level: Level) -> None:
-        """Incomplete factors by process, with a layer of its neighbours: without that it takes twice as long."""
+        """Smoother: incomplete factors on each process with one layer of overlap, which halves the time."""
         prefix = "flow_second_" if self._second else "flow_first_"
         PETSc.Options(prefix)["sub_pc_type"] = "ilu"
         PETSc.Options(prefix)["sub_pc_factor_zeropivot"] = ZERO_PIVOT
         smoother.setOptionsPrefix(prefix)
         if self._second:
-            # one step alone would diverge on stretched cells; in the given order it takes 20 iterations instead of 13
+            # a single step diverges on stretched cells; without reordering there are 20 iterations instead of 13
             PETSc.Options(prefix)["sub_pc_factor_mat_ordering_type"] = "rcm"
             smoother.setType(PETSc.KSP.Type.GMRES)
             smoother.setTolerances(max_it=2)
@@ -248,17 +249,17 @@ class Multigrid:
         if "baij" in matrix.getType():
             product = self._converted = matrix.convert(PETSc.Mat.Type.AIJ, self._converted or PETSc.Mat())
         for number, level in enumerate(self._interpolations):
-            P, known = self._kept[number] if number < len(self._kept) else (level.copy(), None)
+            P, earlier = self._kept[number] if number < len(self._kept) else (level.copy(), None)
             level.copy(P, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
             coarse, fine = P.createVecs()
             fine.array[:] = free
             P.diagonalScale(fine, None)
             P.multTranspose(fine, coarse)
             free = (coarse.array > 0.0).astype(float)
-            product = product.ptap(P, result=known)
-            if known is None:
+            product = product.ptap(P, result=earlier)
+            if earlier is None:
                 self._kept.append((P, product))
-            coarse.array[:] = 1.0 - free  # coarse unknowns that correct nothing get rows of the identity
+            coarse.array[:] = 1.0 - free  # coarse unknowns without free fine ones get rows of the identity
             product.setDiagonal(coarse, addv=PETSc.InsertMode.ADD_VALUES)
             product.assemble()
             matrices.append(product)

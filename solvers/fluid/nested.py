@@ -1,8 +1,8 @@
-"""Nested cells: a grid whose cells are halved in some regions, again and again.
+"""Nested cells: a grid whose cells are halved in some regions, up to several levels.
 
-A cell of level l has 2^-l times the edges of the cell of the coarsest grid that it lies in. Cells that share a corner
-differ by one level at most (2:1). All are unions of cells of the finest lattice, of which each is known by its number.
-So whatever looks at the surroundings of a body works on that lattice as on a grid of equal cells.
+The edges of a cell of level l are 2^-l times those of the cell of the coarsest grid that contains it. Cells that share
+a corner differ by one level at most (2:1). Every cell is a union of cells of the finest lattice. Hence algorithms near
+bodies, where all cells are of the finest level, work on this lattice as on a uniform grid.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from solvers.fluid.sheets import CORNER_STEPS
 from solvers.gauss import gauss
 from solvers.mesh import Mesh
 
-#: Layers of cells of the finest level around cut cells. Poorly cut nodes take their values from cells up to two layers
-#: away (`solvers.fluid.extension`), which shall have no hanging nodes.
+#: Layers of cells of the finest level around cut cells. The roots of poorly cut nodes are up to two layers away
+#: (`solvers.fluid.extension`) and must not have hanging nodes.
 FINE_LAYERS = 3
 
 Indices = NDArray[np.int64]
@@ -36,7 +36,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Nested(Grid):
-    """`edges`, and with them shape, size and numbers, are those of the finest lattice."""
+    """A nested grid. `edges`, shape, size and numbers of the base class are those of the finest lattice."""
 
     first: Indices  #: number of the lowest cell of the lattice in each cell of the mesh, increasing
     width: Indices  #: cells of the lattice along each of its edges
@@ -63,7 +63,7 @@ class Nested(Grid):
 
     @cached_property
     def coarse(self) -> Mask:
-        """Cells of the lattice that are not cells of the mesh."""
+        """Mask of the cells of the lattice that are not of the finest level in the mesh."""
         return np.asarray(self.width[self.cell_of] > 1)
 
     def bounds(self, cells: Indices) -> tuple[Array, Array]:
@@ -84,19 +84,19 @@ class Nested(Grid):
         return np.ravel_multi_index(tuple(np.moveaxis(index, 2, 0)), self._node_counts(degree), order="F")
 
     def all_nodes(self, degree: int) -> Indices:
-        """Numbers of all nodes of the mesh in that lattice, increasing."""
+        """Numbers of all nodes of the mesh in the lattice of nodes of a degree, increasing."""
         steps = np.array(list(product(range(degree + 1), repeat=self.dim)))
         return np.unique(self.nodes(np.arange(len(self.first)), degree, steps))
 
     def corners(self, degree: int) -> Indices:
-        """The same of the points of `picture` alone, in their order."""
+        """Numbers of the points of `picture` in the lattice of nodes of a degree, in the order of the points."""
         index = np.unravel_index(self.all_nodes(1), self._node_counts(1), order="F")
         return np.ravel_multi_index([degree * i for i in index], self._node_counts(degree), order="F")
 
     def mesh(self) -> Mesh:
-        """Cells that share a corner have it in common as far as faces between cells of one size link them there.
+        """The mesh for DOLFINx: two cells share a vertex if faces between equal cells connect them around it.
 
-        DOLFINx finds what is common to several processes by such faces only.
+        DOLFINx finds vertices that processes share only by way of such faces.
         """
         corner, steps = np.arange(len(self.first) * 2**self.dim).reshape(len(self.first), -1), CORNER_STEPS[self.dim]
         low, first, second = self._lowest(np.arange(len(self.first))), [], []
@@ -121,19 +121,19 @@ class Nested(Grid):
         )
 
     def picture(self) -> Mesh:
-        """Each point once."""
+        """The mesh for files and pictures, with one vertex at each point."""
         numbers = self.nodes(np.arange(len(self.first)), 1, CORNER_STEPS[self.dim])
-        known, cells = np.unique(numbers, return_inverse=True)
-        return Mesh(self._points(known), cells.reshape(numbers.shape), "quad" if self.dim == 2 else "hexahedron")
+        distinct, cells = np.unique(numbers, return_inverse=True)
+        return Mesh(self._points(distinct), cells.reshape(numbers.shape), "quad" if self.dim == 2 else "hexahedron")
 
     def _points(self, numbers: Indices) -> Array:
         index = np.unravel_index(numbers, self._node_counts(1), order="F")
         return np.stack([edge[i] for edge, i in zip(self.edges, index, strict=True)], axis=1)
 
     def hanging(self, degree: int, nodes: Indices) -> tuple[Mask, Indices, Array]:
-        """(which of some nodes hang, the nodes that these take their values from, the shape functions of these).
+        """(mask of the hanging ones among some nodes, the nodes of their coarser cells, the shape functions of these).
 
-        The last two are of the shape (hanging, functions).
+        The last two have the shape (hanging, functions).
         """
         cells, at = self._coarsest_at(nodes, degree)
         hangs = (at % self.width[cells, None]).any(axis=1)
@@ -149,7 +149,7 @@ class Nested(Grid):
         return len(nodes) - int(np.count_nonzero(self.hanging(degree, nodes)[0]))
 
     def _coarsest_at(self, nodes: Indices, degree: int) -> tuple[Indices, Indices]:
-        """Of the cells at nodes the widest, and where they lie in it, from 0 to degree * width, shape (nodes, dim)."""
+        """The widest cell at each node, and the position of the node in it from 0 to degree * width, (nodes, dim)."""
         at = np.stack(np.unravel_index(nodes, self._node_counts(degree), order="F"), axis=1)
         best, width = np.zeros(len(nodes), dtype=np.int64), np.zeros(len(nodes), dtype=np.int64)
         for side in product((0, 1), repeat=self.dim):
@@ -168,19 +168,19 @@ class Nested(Grid):
 
 
 class RefinedRegion(Protocol):
-    """Where cells are to have a level or more."""
+    """A region whose cells have at least some level."""
 
     @property
     def level(self) -> int: ...
 
     def cells(self, grid: Grid) -> Mask:
-        """Which cells of the grid of this level, one after the other."""
+        """Mask of the cells of a grid of this level that are in the region."""
         ...
 
 
 @dataclass(frozen=True)
 class RefinedBox:
-    """All that lies between two corners [m]."""
+    """The box between two corners [m]."""
 
     low: Sequence[float]
     high: Sequence[float]
@@ -213,7 +213,7 @@ class RefinedSurface:
 
 
 def refined(grid: Grid, regions: Sequence[RefinedRegion]) -> Grid:
-    """The grid with finer cells in some regions and around them, as few as 2:1 allows."""
+    """The grid with finer cells in some regions, and around them as few as 2:1 allows."""
     depth = max((region.level for region in regions), default=0)
     if depth == 0:
         return grid
@@ -240,14 +240,14 @@ def refined(grid: Grid, regions: Sequence[RefinedRegion]) -> Grid:
 
 
 def grown(marked: Mask, layers: int) -> Mask:
-    """Marked cells and their neighbours across corners, so many layers of them."""
+    """Marked cells and so many layers of neighbours, across corners."""
     if layers == 0:
         return marked
     return ndimage.binary_dilation(marked, np.ones((3,) * marked.ndim, dtype=bool), iterations=layers)
 
 
 def _halved(grid: Grid, times: int) -> Grid:
-    """Each cell in the middle of each direction, so many times."""
+    """The grid with each cell halved in each direction, so many times."""
     parts = 2**times
     return Grid(tuple(np.interp(np.arange(parts * n + 1) / parts, np.arange(n + 1), e) for n, e in _lengths(grid)))
 
@@ -257,7 +257,7 @@ def _lengths(grid: Grid) -> list[tuple[int, Array]]:
 
 
 def _coarsened(cells: Mask) -> Mask:
-    """Cells twice as wide that have one of these."""
+    """Mask of the cells twice as wide that contain a marked one."""
     for axis in range(cells.ndim):
         cells = np.logical_or.reduceat(cells, np.arange(0, cells.shape[axis], 2), axis=axis)
     return cells

@@ -1,22 +1,23 @@
-"""Nitsche's method on the surfaces of bodies: the one place that says how flow and surface act on each other.
+"""Nitsche's method on the surfaces of bodies: all terms by which flow and surface act on each other.
 
-For a flow (u, p) and a surface with the velocity g, tested with (v, q) and a motion h of the surface,
+For a flow (u, p) and a surface with the velocity g, with the test functions (v, q) and a virtual motion h of the
+surface, the terms are
 
     N = -<2 mu eps(u) n - p n, v - h> - <u - g, 2 mu eps(v) n + q n> + <P (u - g), v - h>,   P = s I + s_n n n^T.
 
-With t(u, g) = 2 mu eps(u) n - P (u - g) that is
+With t(u, g) = 2 mu eps(u) n - P (u - g) they read
 
     N = -<2 mu eps(u) n - p n, v> - <u, t(v, 0) + q n>      the flow's own block: `own`, for the form compiler
         + <g, t(v, 0) + q n>                                C
         + <t(u, g) - p n, h>                                less the force on the surface: C^T, the mass <P g, h>
 
-so that the coefficients of t, `stress`, and P give every operator of the surface (`interface.InterfaceTerms`).
+Hence every operator of the surface (`interface.InterfaceTerms`) follows from P and the coefficients of t, `stress`.
 
-Surfaces that give way: where a law asks for u - g = -c t in the directions of a projector (slip along the surface,
-c = b / mu with the slip length b; seepage into it), one more term -<D t(u, g), t(v, -h)> with D = projector /
-(1 / c + s), s the penalty in these directions, brings that about exactly for every c from 0 (no slip) to infinity
-(no stress), and all blocks stay symmetric. It multiplies what the surface has by R = I - D P: t becomes R t in C, P
-becomes P R in the mass. The flow's own block gets `released`.
+Compliant conditions, u - g = -c t in the directions of a projector, describe slip along the surface (c = b / mu with
+the slip length b) and seepage into it. They need one more term, -<D t(u, g), t(v, -h)> with D = projector / (1 / c + s)
+and s the penalty in these directions. It is consistent for every c from 0 (no slip) to infinity (no stress), and all
+blocks stay symmetric. With R = I - D P it replaces t by R t in C, and P by P R in the mass. The flow's own block gets
+`released`.
 Sources: Massing, Schott, Wall, Comput. Methods Appl. Mech. Engrg. 328 (2018) 262-300, section 3; Juntunen, Stenberg,
 Math. Comp. 78 (2009) 1353-1374.
 """
@@ -31,12 +32,12 @@ from ufl import dot, inner, outer, tr
 from solvers.api import Array
 from solvers.fluid.forms import TRACE, Coefficients, Expr, Penalties, eps, sigma
 
-#: Pieces that are worked on at once: what is at their quadrature points is large in 3D.
+#: Pieces that are evaluated together. Arrays at their quadrature points are large in 3D.
 AT_ONCE = 256
 
 
 def own(flow: Coefficients, weights: Any, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
-    """Integrand over cut cells of the flow's own block, by its weights n and P."""
+    """Integrand over cut cells of the flow's own block; `weights` has the moments of n and P as coefficients."""
     u_n = outer(u, weights.n)
     return (
         -dot(dot(sigma(flow, u, p), weights.n), v)
@@ -64,21 +65,24 @@ def penalties(
 
 
 def stress(mu: float, n: Array, P: Array) -> Array:
-    """t of a velocity phi e_k: t_i = sum_f K[f, k, i] (phi, grad phi)_f, shape (pieces, 1 + dim, dim, dim)."""
+    """Coefficients K of the traction t for a velocity phi e_k: t_i = sum_f K[f, k, i] (phi, grad phi)_f.
+
+    mu [Pa s]; n: (pieces, dim); P: (pieces, dim, dim). Shape (pieces, 1 + dim, dim, dim).
+    """
     identity = np.eye(n.shape[1])
     slope = np.einsum("pj,ki->pjki", n, identity) + np.einsum("pk,ij->pjki", n, identity)
     return np.concatenate([-P[:, None], mu * slope], axis=1)
 
 
 def compliance(c: Array, projector: Array, P: Array) -> Array:
-    """D [m/Pa s] where surfaces give way by c [m/Pa s] in the directions of projectors, shape (pieces, dim, dim)."""
+    """D [m/Pa s] for the compliance c [m/Pa s], (pieces,), in the directions of projectors (pieces, dim, dim)."""
     s = np.einsum("pij,pij->p", P, projector) / np.einsum("pii->p", projector)
     with np.errstate(divide="ignore"):
         return (1.0 / (1.0 / c + s))[:, None, None] * projector
 
 
 def released(mu: float, n: Array, P: Array, D: Array, area: Array, table: tuple[Array, Array], sizes: Array) -> Array:
-    """-<D t(u), t(v)> by pieces, shape (pieces, functions, dim, functions, dim); zero where D is.
+    """-<D t(u), t(v)> by pieces, shape (pieces, functions, dim, functions, dim); zero where D is zero.
 
     area: int L_q, (pieces, points); table: values (points, functions) and reference gradients (points, functions, dim)
     at these points; sizes: edge lengths of the cells [m], (pieces, dim).

@@ -1,4 +1,4 @@
-"""What the patches of the box add to the equations of the flow: stresses that act on it from outside."""
+"""The terms of patches of the box in the equations of the flow: stresses that act on it from outside."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from solvers.fluid.space import Unknowns, set_velocity
 
 @dataclass(frozen=True)
 class Term:
-    """The form of patches of one kind: of one patch with its value, or of all that are given none."""
+    """The form of one patch with a value, or of all patches of a kind without values."""
 
     kind: PatchKind
     patches: tuple[int, ...]
-    value: Any  #: function on the flow's space, its velocity is the given value; None without one
+    value: Any  #: function of the flow's space with the given value as its velocity; None without one
     residual: fem.Integral
-    tangent: fem.Integral | None  #: of forms with u
+    tangent: fem.Integral | None  #: None for forms without u
 
 
 @dataclass(frozen=True)
 class OuterOnCut:
-    """The outer faces as bodies leave them."""
+    """Forms over the outer faces that bodies do not cover, and the faces that they cover in part."""
 
     residuals: tuple[Any, ...] = ()  #: forms over faces with fluid that no body covers
     tangents: tuple[Any, ...] = ()  #: their derivatives by the flow
@@ -48,7 +48,7 @@ class OuterFaces:
     def __init__(
         self, grid: DistributedGrid, boundary: Boundary, unknowns: Unknowns, flow: forms.Coefficients, function: Any
     ):
-        """flow: what the forms share; function: velocity and pressure."""
+        """flow: coefficients of the forms; function: velocity and pressure."""
         self.grid, self.boundary, self.unknowns = grid, boundary, unknowns
         ds, test = fem.measure(grid.domain, "ds", 2 * unknowns.degree + 1), ufl.TestFunction(unknowns.space)
         u, v, n = unknowns.parts(function)[0], unknowns.parts(test)[0], ufl.FacetNormal(flow.mesh)
@@ -69,11 +69,11 @@ class OuterFaces:
             self.terms.append(term(kind, tuple(n for n, patch in with_form if patch.record == kind), None))
 
     def integrals(self) -> list[fem.Integral]:
-        """What is to be compiled."""
+        """Forms to compile."""
         return [form for term in self.terms for form in (term.residual, term.tangent) if form is not None]
 
     def begin_step(self, t: float) -> None:
-        """The given values at a time."""
+        """Set the given values to those at a time [s]."""
         nodes = self.unknowns.velocity
         for term in self.terms:
             if term.value is not None:
@@ -82,7 +82,7 @@ class OuterFaces:
                 set_velocity(term.value.x.array, nodes, value, t)
 
     def on_cut(self, cut: Cut, active: NDArray[np.bool_]) -> OuterOnCut:
-        """The faces on a cut; active: which local cells have unknowns."""
+        """The forms over outer faces on a cut; active: mask of local cells with unknowns."""
         residuals, tangents, hanging, covered, points = [], [], [], [], 2 * self.unknowns.degree + 1
         by_patch = self.boundary.facets, self.boundary.cells
         for term in self.terms:
@@ -107,7 +107,7 @@ class OuterFaces:
         return OuterOnCut(tuple(residuals), tuple(tangents), tuple(hanging), tuple(covered))
 
     def add_covered(self, on_cut: OuterOnCut, out: Array, flow: Array, mu: float, rho: float, a: Array) -> None:
-        """Add the same over the wet part of the others to local dofs; for rho, a see `slopes`."""
+        """Add the residual over the wet part of covered faces to local dofs; for mu, rho, a see `slopes`."""
         for term, part in on_cut.covered:
             if term.kind.stress is not None and term.value is not None:
                 dofs, load = part.load(term.kind.stress(part, part.velocity(term.value.x.array)))
@@ -116,7 +116,7 @@ class OuterFaces:
             np.add.at(out, dofs, np.einsum("caibk,cbk->cai", block, flow[dofs]))
 
     def slopes(self, on_cut: OuterOnCut, mu: float, rho: float, a: Array) -> Iterator[tuple[NDArray[np.int32], Array]]:
-        """(local dofs, derivatives) of terms with u there.
+        """(local dofs, derivatives by the flow) of terms with u over the wet part of covered faces.
 
         mu [Pa s]; rho [kg/m^3], zero without convection; a [m/s]: velocity of the step before, at local dofs.
         """
@@ -127,7 +127,7 @@ class OuterFaces:
 
 
 class CannotBeCovered(ValueError):
-    """A body covers part of a patch whose kind does not say what is to be done there."""
+    """A body covers part of a patch whose kind has neither `stress` nor `slope` for covered faces."""
 
     def __init__(self, patches: list[Patch]):
         super().__init__("a body covers part of " + ", ".join(f"patch '{patch.name}'" for patch in patches))

@@ -1,4 +1,4 @@
-"""Kinds of conditions on the faces of the box. A kind is defined by its record; you may add your own.
+"""Kinds of conditions on the faces of the box. A record `PatchKind` defines each, and users may add their own.
 
 A kind prescribes components of the velocity, or the stress t = sigma n [Pa] that acts on the fluid from outside. The
 equations then have -<t, v> with the test functions v of the velocity.
@@ -19,14 +19,14 @@ Expr = Any
 
 
 class WetPart(Protocol):
-    """Faces of cells that bodies cover in part, on one face of the box, with points on the rest of them."""
+    """Faces of cells on one face of the box that bodies cover in part, with points on their wet part."""
 
     def along_normal(self, values: Array) -> Array:
-        """Vectors of some lengths along the outward normal."""
+        """Vectors of given lengths along the outward normal."""
         ...
 
     def outflow(self, mu: float, mass_flux: Array) -> Array:
-        """d/du of the outflow's form."""
+        """d/du of the form of an outflow."""
         ...
 
     def friction(self, factor: Array) -> Array:
@@ -36,16 +36,16 @@ class WetPart(Protocol):
 
 @dataclass(frozen=True)
 class PatchKind:
-    """One condition. n: outward normal."""
+    """One kind of condition. n: outward normal."""
 
     prescribed: Literal["all", "normal", "tangential", "none"] = "none"  #: components of the velocity
     value: Literal["velocity", "vector", "number"] | None = None  #: what a patch of this kind is given
-    open: bool = False  #: the flow through it is free: it determines the level of the pressure
+    open: bool = False  #: the normal velocity is free: the condition determines the level of the pressure
     periodic: bool = False
     #: (flow, u, value, n, v) -> integrand of -<t, v>; a number comes as such
     form: Callable[[Coefficients, Expr, Expr, Expr, Expr], Expr] | None = None
     depends_on_flow: bool = False  #: the form has u, and is linear in it
-    #: Where bodies cover part of a cell's face the same is integrated over points of the wet part, with numbers:
+    #: The same for faces that bodies cover in part, at points of the wet part:
     #: (faces, values at the points) -> t [Pa], shape (cells, points, dim); not for forms with u
     stress: Callable[[WetPart, Array], Array] | None = None
     #: (faces, mu, rho a, values at the points) -> d<-t, v>/du; a: velocity of the step before; for forms with u
@@ -63,7 +63,7 @@ def _pressure(flow: Coefficients, u: Expr, p: Expr, n: Expr, v: Expr) -> Expr:
 
 
 def _slip_length(flow: Coefficients, u: Expr, b: Expr, n: Expr, v: Expr) -> Expr:
-    """<mu/b u, v>: the shear stress is -mu/b times the velocity along the wall; that through it is held at zero."""
+    """<mu/b u, v>: the shear stress is -mu/b times the tangential velocity; the normal one is prescribed as zero."""
     return flow.mu / b * _dot(u, v)
 
 
@@ -73,9 +73,10 @@ def _slip_slope(faces: WetPart, mu: float, mass_flux: Array, b: Array | None) ->
 
 
 def _outflow(flow: Coefficients, u: Expr, value: Expr, n: Expr, v: Expr) -> Expr:
-    """No disturbance of a parallel flow, mu d_n u - p n = 0, and no energy that flows in.
+    """Directional do-nothing condition: mu d_n u - p n = rho/2 min(0, u . n) u, so that no energy enters.
 
-    -<mu (grad u)^T n, v> - rho/2 <min(0, u . n) u, v>. Source: Braack, Mucha, J. Comput. Math. 32 (2014) 507-521.
+    -<mu (grad u)^T n, v> - rho/2 <min(0, u . n) u, v>. A parallel flow fulfils it.
+    Source: Braack, Mucha, J. Comput. Math. 32 (2014) 507-521.
     """
     import ufl
 
@@ -87,7 +88,7 @@ def _outflow(flow: Coefficients, u: Expr, value: Expr, n: Expr, v: Expr) -> Expr
 
 
 def _dot(a: Expr, b: Expr) -> Expr:
-    import ufl  # here: the case file asks for the names of the kinds, and shall not wait for it
+    import ufl  # here: case files need the names of the kinds only, and the import takes long
 
     return ufl.dot(a, b)
 

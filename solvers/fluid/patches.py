@@ -20,29 +20,29 @@ from solvers.values import Value, evaluate
 class Patch:
     """Part of the box's boundary with one condition.
 
-    velocity: all components; no_slip: zero; slip, symmetry: no flow through, no shear; traction [Pa]: sigma n;
-    pressure [Pa]: n . sigma n = -p, no velocity along the face; outflow: mu du/dn - p n = 0, as a parallel flow has
-    it, without energy that flows in; periodic: the opposite face, which belongs to the patch, too, has the same flow.
-    Or your own kind.
+    velocity: all components are given; no_slip: they are zero; slip, symmetry: no normal velocity, no shear stress;
+    traction [Pa]: sigma n is given; pressure [Pa]: n . sigma n = -p, no tangential velocity; outflow:
+    mu du/dn - p n = 0, modified where fluid enters; periodic: the flow is the same on the opposite face, which belongs
+    to the patch too. `kind` may also be a record of the user.
     """
 
     name: str
     faces: tuple[str, ...]
     kind: str | PatchKind
     value: Sequence[Value] | None = None  #: velocity, traction or pressure
-    where: Value | None = None  #: positive on the part of the faces that belongs to it; default: all
+    where: Value | None = None  #: positive on the part of the faces that belongs to the patch; None: all
 
     def __post_init__(self) -> None:
         assert set(self.faces) <= set(FACES)
 
     @property
     def record(self) -> PatchKind:
-        """What its kind is."""
+        """The record of its kind."""
         return PATCH_KINDS[self.kind] if isinstance(self.kind, str) else self.kind
 
 
 class UncoveredFaces(ValueError):
-    """Part of the boundary has no condition; `faces` names where."""
+    """Part of the boundary has no condition; faces: names of the faces of the box."""
 
     def __init__(self, faces: Sequence[str]):
         super().__init__("no patch is on part of the box's boundary: " + ", ".join(faces))
@@ -57,7 +57,7 @@ def periodic_axes(patches: Sequence[Patch]) -> tuple[int, ...]:
 
 
 class Boundary:
-    """All patches on one grid. Where patches meet, the one named last decides. Raises UncoveredFaces (collective)."""
+    """All patches on one grid. Where patches meet, the last one applies. Raises UncoveredFaces (collective)."""
 
     def __init__(self, grid: DistributedGrid, unknowns: Unknowns, patches: Sequence[Patch]):
         self.patches = list(patches)
@@ -76,7 +76,7 @@ class Boundary:
         self.facets = [facets[patch_of == number] for number in range(len(patches))]
         self.cells = [self._cells[patch_of == number] for number in range(len(patches))]
         last = np.any([grid.on_face(midpoints, f"{axis}+") for axis in "xyz"[: grid.dim]], axis=0)
-        #: of these, those that count as the section of a flow: of a period only its end
+        #: mask of the facets that count in flow rates, by patch: of a period only those at its end
         self.at_end = [last[patch_of == n] | (not patch.record.periodic) for n, patch in enumerate(patches)]
         self.imposed = np.full(unknowns.local, -1)
         for number, patch in enumerate(patches):
@@ -88,10 +88,10 @@ class Boundary:
             self.imposed[unknowns.hanging.dofs] = -1
         #: local dofs with a prescribed velocity
         self.dofs: NDArray[np.int64] = np.flatnonzero(self.imposed >= 0)
-        self._place = np.full((unknowns.local, 2), -1)
+        self._node_and_axis = np.full((unknowns.local, 2), -1)  #: of each local velocity dof
         for axis in range(unknowns.dim):
             dofs = unknowns.velocity.dofs[:, axis]
-            self._place[dofs] = np.stack([np.arange(len(dofs)), np.full(len(dofs), axis)], axis=1)
+            self._node_and_axis[dofs] = np.stack([np.arange(len(dofs)), np.full(len(dofs), axis)], axis=1)
 
     def _check(self, grid: DistributedGrid, bare: Array) -> None:
         found = {face for face in FACES[: 2 * grid.dim] if grid.on_face(bare, face).any()}
@@ -100,7 +100,7 @@ class Boundary:
             raise UncoveredFaces([face for face in FACES if face in together])
 
     def _held(self, grid: DistributedGrid, patch: Patch, midpoints: Array):
-        """(which facets of the patch, component that they hold)."""
+        """Pairs of (mask of facets of the patch, component of the velocity that they prescribe)."""
         prescribed = patch.record.prescribed
         if prescribed == "all":
             return [(np.ones(len(midpoints), dtype=bool), axis) for axis in range(grid.dim)]
@@ -112,19 +112,19 @@ class Boundary:
         return []
 
     def closed(self) -> bool:
-        """The velocity is prescribed all round, so that the pressure has no level."""
+        """Whether no patch is open, so that the pressure level is not determined."""
         return not any(patch.record.open for patch in self.patches)
 
     def open_cells(self) -> NDArray[np.int32]:
-        """Local cells at the rest of the boundary."""
+        """Local cells at open patches."""
         cells = [cells for cells, patch in zip(self.cells, self.patches, strict=True) if patch.record.open]
         return np.concatenate([np.empty(0, dtype=np.int32), *cells]).astype(np.int32)
 
     def velocity(self, t: float) -> Array:
-        """Prescribed velocities [m/s] of `dofs` at a time."""
+        """Prescribed velocities [m/s] of `dofs` at the time t [s]."""
         values = np.zeros(len(self.dofs))
         owner = self.imposed[self.dofs]
-        node, axis = self._place[self.dofs].T
+        node, axis = self._node_and_axis[self.dofs].T
         for number, patch in enumerate(self.patches):
             if patch.record.value != "velocity":
                 continue

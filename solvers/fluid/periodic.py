@@ -1,7 +1,7 @@
-"""Periodic directions: cells at the end of the box get the unknowns of the nodes at its beginning.
+"""Periodic directions: cells at the end of the box have the unknowns of the nodes at its beginning.
 
-Nothing that is assembled by cells needs to know of the period then. The unknowns that no cell has any more stay, like
-those inside of bodies, without a part in the equations.
+Hence assembly does not need to treat periods. The unknowns of the nodes at the end belong to no cell. They remain as
+inactive unknowns, like those inside of bodies.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ FAR = 2**48
 
 @dataclass(frozen=True)
 class LatticeNodes:
-    """Nodes of velocity or pressure; local ones."""
+    """Local nodes of velocity or pressure, with their numbers in a lattice."""
 
     dofs: NDArray[np.int32]  #: shape (n, components)
     points: Array  #: positions [m], shape (n, dim); of a node at the end those of its twin
@@ -34,7 +34,7 @@ class LatticeNodes:
 
 
 def join_ends(comm: MPI.Comm, space: Any, parts: list[LatticeNodes]) -> tuple[Any, list[LatticeNodes]]:
-    """(the space in which nodes at the end are their twins, its nodes) (collective)."""
+    """Identify nodes at the end of periods with those at the beginning; (the new space, its nodes) (collective)."""
     size = int(space.dofmap.index_map_bs)
     start, end = space.dofmap.index_map.local_range
     # a block has the unknowns of all components
@@ -44,10 +44,10 @@ def join_ends(comm: MPI.Comm, space: Any, parts: list[LatticeNodes]) -> tuple[An
     at_start, at_end = (np.concatenate([getattr(part, name) for part, _ in columns]) for name in ("at_start", "at_end"))
     mine = at_start & ~at_end & (blocks < end - start)
     tables = comm.allgather((keys[mine], start + blocks[mine].astype(np.int64)))
-    owners = np.repeat(np.arange(comm.size, dtype=np.int32), [len(known) for known, _ in tables])
-    known, masters = (np.concatenate(column) for column in zip(*tables, strict=True))
-    order = np.argsort(known)
-    twin = order[np.searchsorted(known[order], keys[at_end])]
+    owners = np.repeat(np.arange(comm.size, dtype=np.int32), [len(at_starts) for at_starts, _ in tables])
+    start_keys, masters = (np.concatenate(column) for column in zip(*tables, strict=True))
+    order = np.argsort(start_keys)
+    twin = order[np.searchsorted(start_keys[order], keys[at_end])]
     space, local = fem.identify_blocks(space, blocks[at_end], masters[twin], owners[twin])
     joined = np.arange(blocks.max(initial=-1) + 1, dtype=np.int32)
     joined[blocks[at_end]] = local

@@ -1,4 +1,4 @@
-"""The surface by pieces, each in the cell whose fluid it bounds."""
+"""Pieces of surface: parts of facets, each in the cell whose fluid it bounds."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NOTHING = 1e-10
 
 @dataclass(frozen=True)
 class Pieces:
-    """The surface by pieces, each in one cut cell that this process owns or knows; sorted by cell."""
+    """Pieces of surface in local cut cells, sorted by cell."""
 
     cell: NDArray[np.int64]  #: index into the cut cells
     facet: NDArray[np.int64]
@@ -30,11 +30,11 @@ class Pieces:
 def put_where_fluid_is(
     grid: Grid, points: Array, moments, normal: Array, full: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], Array]:
-    """Cell of the box that each piece of a kernel's result bounds, -1 if there is no fluid, and its moments there.
+    """(cell of the box whose fluid each piece bounds, -1: none; moments of the piece in that cell).
 
-    In a `full` cell none does; but a piece that lies in the face towards the fluid belongs to the cell behind that
-    face: rounding decides on which side of its plane a facet is. `normal` (pieces, dim) points out of the fluid,
-    `points` are those of the rule in one direction.
+    A piece in a `full` cell bounds no fluid there. If it lies in a face of the cell towards the fluid, it is moved to
+    the cell behind this face: rounding decides on which side of the face the facet is.
+    moments: result of the kernel; normal: out of the fluid, (pieces, dim); points: of the quadrature in one direction.
     """
     cell, found = moments.cells[moments.piece_cell], moments.piece_moments
     inside = np.flatnonzero(full[cell])
@@ -53,8 +53,8 @@ def put_where_fluid_is(
             across = by_layer.sum(axis=1)
             area = across.reshape(len(at), -1).sum(axis=1)
             square = np.einsum("pa,a->p", by_layer.reshape(len(at), count, -1).sum(axis=2), (points - side) ** 2)
-            place = index[axis, at] + (1 if side else -1)
-            flush = (square <= FLUSH**2 * area) & (place >= 0) & (place < grid.shape[axis])
+            next_index = index[axis, at] + (1 if side else -1)
+            flush = (square <= FLUSH**2 * area) & (next_index >= 0) & (next_index < grid.shape[axis])
             stride = int(np.prod(grid.shape[:axis]))
             behind[at[flush]] = cell[at[flush]] + (stride if side else -stride)
             moved = np.moveaxis(np.multiply.outer(_values(points, 1.0 - side), across), 1, 0)

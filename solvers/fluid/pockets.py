@@ -1,4 +1,4 @@
-"""Parts of the fluid that bodies and walls close off, whose pressure has no given level."""
+"""Pockets: parts of the fluid that bodies and walls enclose, so that no boundary condition determines the pressure."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Pocket:
-    """Active cells that are connected with each other and with no part of the boundary that is open."""
+    """A connected set of active cells without cells at an open boundary."""
 
-    cells: Mask  #: which local cells belong to it; cells of other processes are left out
+    cells: Mask  #: mask of its owned cells, over local cells
     largest: bool  #: no pocket has more cells
-    elastic: bool  #: a surface that another field moves bounds it, whose elasticity may determine its pressure
+    elastic: bool  #: bounded by a surface that another field moves, which may determine the pressure level
 
 
 def find_pockets(
@@ -31,8 +31,8 @@ def find_pockets(
 ) -> list[Pocket]:
     """All pockets, the same list on every process (collective).
 
-    `is_open`: local cells at an open boundary; `elastic`: vertices that another field moves. Cells that share a vertex
-    are connected, because they share unknowns; those at the ends of `periodic` axes share them across the period.
+    is_open: local cells at an open boundary; elastic: mask of vertices that another field moves. Cells that share a
+    vertex are connected, because they share unknowns, also across `periodic` axes.
     """
     own = cut.active[cut.active < grid.owned]
     if grid.joined:
@@ -51,9 +51,9 @@ def find_pockets(
 
 
 def _label(grid: DistributedGrid, own: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Parts of this process alone: number of that of each local cell, from 1 on, 0 where none is; first cell of each.
+    """Connected parts of this process: (part of each local cell, from 1 on, 0 for others; first cell of each part).
 
-    Of the cells of a part, the first is that with the smallest number, the last axis running fastest.
+    The first cell is that with the smallest number, with the last axis fastest.
     """
     low, shape, indices = grid.window
     window = np.zeros(int(np.prod(shape)), dtype=bool)
@@ -71,7 +71,7 @@ def _label(grid: DistributedGrid, own: NDArray[np.int32]) -> tuple[NDArray[np.in
 def _join(
     grid: DistributedGrid, labels: NDArray[np.int64], first: NDArray[np.int64], periodic: Sequence[int]
 ) -> tuple[NDArray[np.int64], int]:
-    """The same of the parts of all processes together: they meet in corners on the seams between them (collective)."""
+    """Connected parts of all processes, joined at corners on seams: (part of each local cell, count) (collective)."""
     cells, corners = grid.seams(tuple(periodic))
     at, corners_in_all = labels[cells] > 0, int(np.prod([n + 1 for n in grid.grid.shape]))
     links = np.stack(np.divmod(np.unique(labels[cells[at]] * corners_in_all + corners[at]), corners_in_all))

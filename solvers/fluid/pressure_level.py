@@ -1,4 +1,4 @@
-"""The level of a pressure that has no given one: fixed at one node in the linear system, without an outlet there."""
+"""The pressure level of pockets: fixed at one node in the linear system, without a source of volume at this node."""
 
 from __future__ import annotations
 
@@ -18,22 +18,23 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Hold:
-    """A pocket whose pressure is held."""
+    """A pocket whose pressure level is held."""
 
-    dofs: NDArray[np.int64]  #: owned dofs with identity rows, none or one
-    inside: Mask  #: owned pressure dofs of the pocket
-    shares: Array  #: of its fluid, at owned dofs; their sum on all processes is one
-    keeps_level: bool  #: the pressure stays what it was when the pocket closed; else zero at the node
-    shares_before: Array  #: the same of where there was a pressure before; their sum is one or zero
-    level: float  #: the mean pressure there [Pa]
-    elastic: bool  #: a surface that another field moves bounds the pocket
+    dofs: NDArray[np.int64]  #: owned dofs with rows of the identity: one on one process, none on the others
+    inside: Mask  #: mask of its owned pressure dofs
+    shares: Array  #: share of its fluid at each owned dof; their sum over all processes is one
+    keeps_level: bool  #: the mean pressure is that of the time when the pocket closed; else zero at the node
+    shares_before: Array  #: the same for nodes that had a pressure before; their sum is one or zero
+    level: float  #: mean pressure at these nodes [Pa]
+    elastic: bool  #: bounded by a surface that another field moves
 
 
 def hold_pressure(system: FlowSystem, elastic: Mask, *, set_by_solids: bool) -> list[Hold]:
-    """One node of each pocket whose pressure has no given level (collective).
+    """The pockets whose level is held, with one node each (collective).
 
-    `elastic`: vertices that another field moves; `set_by_solids`: the pressure at them follows from the volume
-    that they leave. The level is zero if all of the box is closed, else that of the time when the pocket closed.
+    elastic: mask of vertices that another field moves; set_by_solids: the equations of these fields determine the
+    level of their pockets, which are not held. In a closed box, the level of the largest pocket is zero at its node.
+    Other levels are those of the time when the pocket closed.
     """
     closed = system.boundary.closed()
     if not (closed or system.with_bodies):
@@ -47,7 +48,7 @@ def hold_pressure(system: FlowSystem, elastic: Mask, *, set_by_solids: bool) -> 
 
 
 def _pressure_sizes(system: FlowSystem) -> Array:
-    """int q dx over the fluid of each owned dof's pressure function [m^dim] (collective)."""
+    """int q dx over the fluid for the shape function q of each owned pressure dof [m^dim] (collective)."""
     assert system.cut is not None
     grid, cut, unknowns, weights = system.grid, system.cut, system.unknowns, system.weights
     volume, (psi, _) = grid.sizes.prod(axis=1), weights.pressure_table
@@ -62,7 +63,7 @@ def _pressure_sizes(system: FlowSystem) -> Array:
 
 
 def _hold(system: FlowSystem, pocket: Pocket, sizes: Array, *, keep_level: bool) -> Hold:
-    """At the first of its nodes of the box's lattice, or the first that had a pressure before (collective)."""
+    """Hold a pocket at its first node in the lattice, if possible one that had a pressure before (collective)."""
     unknowns, comm = system.unknowns, system.grid.comm
     nodes, last = unknowns.pressure, np.iinfo(np.int64).max
     dofs = nodes.dofs[: nodes.owned, 0]
@@ -89,9 +90,9 @@ def _shares(comm: MPI.Comm, sizes: Array) -> Array:
 
 
 def keep_levels(comm: MPI.Comm, holds: list[Hold], flow: Array) -> None:
-    """Shift the pressure of each pocket that keeps its level so that its mean does (collective).
+    """Shift the pressure of each pocket that keeps its level, so that its mean is kept (collective).
 
-    It was fixed at one node. The result must not depend on which one: in a rotated flow it is another.
+    The linear system fixes it at one node. The result must not depend on the choice of this node.
     """
     for hold in holds:
         if hold.keeps_level and comm.allreduce(float(hold.shares_before.sum())) > 0.0:
@@ -99,9 +100,9 @@ def keep_levels(comm: MPI.Comm, holds: list[Hold], flow: Array) -> None:
 
 
 def spread_excess(comm: MPI.Comm, holds: list[Hold], rows: Array) -> None:
-    """Balance the net flux into a closed pocket by a uniform source in its fluid (collective).
+    """Balance the net flux into each held pocket by a uniform source in its fluid (collective).
 
-    Otherwise the fixed node would be an outlet: an error of the pressure that does not vanish with the cells.
+    Otherwise the fixed node would be a point source, which causes an error of the pressure that does not converge.
     """
     for hold in holds:
         excess = comm.allreduce(float(rows[hold.inside].sum()))

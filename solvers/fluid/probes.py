@@ -1,7 +1,7 @@
-"""What can be measured on the fluid: at points, on patches of the box, on bodies, of the whole.
+"""Probes of the fluid: at points, on patches of the box, on bodies, of the whole fluid.
 
-A probe is a function without arguments that every process calls; it returns the values by component. In 2D everything
-is per unit of depth.
+A probe is a function without arguments that every process calls. It returns values by name of the component. In 2D
+all extensive quantities are per depth.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ AXES = ("x", "y", "z")
 
 
 def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> Probe:
-    """velocity [m/s] or pressure [Pa] at a point of the box; nan while a body covers it.
+    """Probe of the velocity [m/s] or pressure [Pa] at a point of the box; nan while a body covers it (collective).
 
-    Raises PointInBody if one does at the time t (of bodies whose motion is given). Collective.
+    Raises PointInBody if a body with a prescribed motion covers the point at the time t [s].
     """
     x = np.asarray(point, dtype=float)
     given = [body for body in fluid.bodies if body.motion is not None]
@@ -54,32 +54,32 @@ def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> P
 
 
 def interpolation(fluid: Fluid, nodes: FlowNodes, degree: int, x: Array) -> tuple[np.ndarray, Array]:
-    """(dofs of shape (n, components), shape functions (n,)) at a point, of the nodes that this process owns."""
+    """(dofs (n, components), shape functions (n,)) of the owned nodes whose cell has the point x [m]."""
     if (nested := fluid.grid.nested) is not None:
         return _of_nodes(nodes, *_in_nested(nested, degree, x))
     number, weight, stride = np.zeros(1, dtype=np.int64), np.ones(1), 1
     indices: list[int] = []
-    place: list[float] = []
+    reference: list[float] = []
     counts = fluid.unknowns.lattice_shape(degree)
     for edge, coordinate, count in zip(fluid.grid.grid.edges, x, counts, strict=True):
         cell = int(np.clip(np.searchsorted(edge, coordinate) - 1, 0, len(edge) - 2))
-        s, places = (coordinate - edge[cell]) / (edge[cell + 1] - edge[cell]), np.arange(degree + 1) / degree
-        shape = [np.prod((s - np.delete(places, i)) / (at - np.delete(places, i))) for i, at in enumerate(places)]
+        s, at_nodes = (coordinate - edge[cell]) / (edge[cell + 1] - edge[cell]), np.arange(degree + 1) / degree
+        shape = lagrange(at_nodes, np.array(s))
         steps = (degree * cell + np.arange(degree + 1)) % count
         number = np.add.outer(stride * steps, number).ravel()
-        weight = np.multiply.outer(np.array(shape), weight).ravel()
+        weight = np.multiply.outer(shape, weight).ravel()
         stride *= count
         indices.append(cell)
-        place.append(s)
+        reference.append(s)
     if (sheets := fluid.grid.sheets) is not None:
         steps = np.indices((degree + 1,) * fluid.dim).reshape(fluid.dim, -1)[::-1].T  # the first direction fastest
         box = int(np.ravel_multi_index(indices, fluid.grid.grid.shape, order="F"))
-        number = sheets.nodes(np.array([sheets.cell_at(box, np.array(place))]), degree, steps)[0]
+        number = sheets.nodes(np.array([sheets.cell_at(box, np.array(reference))]), degree, steps)[0]
     return _of_nodes(nodes, number, weight)
 
 
 def _in_nested(grid: Nested, degree: int, x: Array) -> tuple[np.ndarray, Array]:
-    """(numbers of the nodes, shape functions) of the cell at a point."""
+    """(numbers of the nodes, shape functions) of the nested cell at a point."""
     index = [
         int(np.clip(np.searchsorted(edge, at) - 1, 0, len(edge) - 2)) for edge, at in zip(grid.edges, x, strict=True)
     ]
@@ -91,7 +91,7 @@ def _in_nested(grid: Nested, degree: int, x: Array) -> tuple[np.ndarray, Array]:
 
 
 def _of_nodes(nodes: FlowNodes, number: np.ndarray, weight: Array) -> tuple[np.ndarray, Array]:
-    """Dofs and weights of those nodes that this process owns."""
+    """(dofs, weights) of the nodes that this process owns."""
     owned = nodes.numbers[: nodes.owned]
     order = np.argsort(owned)
     at = np.minimum(np.searchsorted(owned[order], number), max(len(owned) - 1, 0))
@@ -100,7 +100,7 @@ def _of_nodes(nodes: FlowNodes, number: np.ndarray, weight: Array) -> tuple[np.n
 
 
 def difference(first: Probe, second: Probe) -> Probe:
-    """What one probe measures less what another does."""
+    """Probe of the difference of two probes."""
 
     def probe() -> dict[str, float]:
         subtracted = second()
@@ -113,7 +113,7 @@ def difference(first: Probe, second: Probe) -> Probe:
 
 
 def on_patch(fluid: Fluid, quantity: str, patch: str) -> Probe:
-    """flow_rate [m^3/s] out of the box through a patch, or pressure [Pa], its mean over the patch. Collective."""
+    """Probe of the flow_rate [m^3/s] out of the box through a patch, or of its mean pressure [Pa] (collective)."""
     if quantity == "flow_rate":
         rate = flow_rate(fluid)
         return lambda: {"": rate([patch])}
@@ -135,7 +135,7 @@ def on_patch(fluid: Fluid, quantity: str, patch: str) -> Probe:
 
 
 def flow_rate(fluid: Fluid) -> Callable[[Sequence[str]], float]:
-    """Patches -> volume [m^3/s] that flows out of the box through them. Collective."""
+    """A function: names of patches -> flow rate [m^3/s] out of the box through them (collective)."""
     domain, u = fluid.grid.domain, fluid.unknowns.parts(fluid.system.flow)[0]
     form = fem.Integral(
         domain, ufl.dot(u, ufl.FacetNormal(domain.mesh)) * fem.measure(domain, "ds", fluid.unknowns.degree)
@@ -153,7 +153,7 @@ def flow_rate(fluid: Fluid) -> Callable[[Sequence[str]], float]:
 
 
 def _facets(fluid: Fluid, patches: Sequence[str]) -> tuple[np.ndarray, list[CoveredFaces]]:
-    """Local faces of patches that are all wet, sorted, and those that bodies cover in part; of a period its end."""
+    """(sorted local facets of patches that are wet, those that bodies cover in part); of a period those at its end."""
     boundary, grid, cut = fluid.boundary, fluid.grid, fluid.cut
     chosen = [i for i, patch in enumerate(boundary.patches) if patch.name in patches]
     facets = np.concatenate([boundary.facets[i][boundary.at_end[i]] for i in chosen])
@@ -167,10 +167,12 @@ def _facets(fluid: Fluid, patches: Sequence[str]) -> tuple[np.ndarray, list[Cove
 
 
 def mass_balance(fluid: Fluid) -> Callable[[], dict[str, float]]:
-    """fluid.mass [m^3/s]: what flows out of the box, and into the volume that bodies leave; zero but for the solver.
+    """Probe of the balance of volume (collective).
 
-    Tested with q = 1, the discrete equation of continuity is exactly the sum of both. With bodies also `fluid.leak`,
-    the volume that passes through their surfaces: an error of the grid.
+    fluid.mass [m^3/s]: flow rate out of the box, plus the volume that bodies leave per time. It is the discrete
+    continuity equation tested with q = 1, and zero up to the tolerance of the solver.
+    fluid.leak, with bodies: the flow rate through their surfaces, a discretisation error. fluid.seepage: that through
+    closed contact.
     """
     rate = flow_rate(fluid)
     everywhere = [patch.name for patch in fluid.boundary.patches if not patch.record.periodic]
@@ -193,18 +195,18 @@ def mass_balance(fluid: Fluid) -> Callable[[], dict[str, float]]:
 
 
 class Forces:
-    """The reactions of the bodies, computed once for all probes of a step, until `forget`."""
+    """Probes of the forces on bodies, which are computed once per step; `forget` starts a new step."""
 
     def __init__(self, fluid: Fluid):
         self.fluid = fluid
         self._found: dict[str, Array] | None = None
 
     def forget(self) -> None:
-        """A new step begins."""
+        """Discard the forces of the last step."""
         self._found = None
 
     def probe(self, quantity: str, body: str | None, about: Sequence[float] | None = None) -> Probe:
-        """force [N] of the fluid on a body (None: on all), or moment [N m] of it about a point (the origin)."""
+        """Probe of the force [N] on a body (None: on all), or of its moment [N m] about a point (None: the origin)."""
         fluid = self.fluid
         names = [body] if body is not None else [b.surface.name for b in fluid.bodies]
         vertices = fluid.vertices_of(names)
@@ -222,7 +224,7 @@ class Forces:
         return measure
 
     def coefficient(self, body: str | None, scale: Array) -> Probe:
-        """Force on a body (None: on all), times a vector [1/N]."""
+        """Probe of the force on a body (None: on all), times a vector [1/N]."""
         names = [body] if body is not None else [b.surface.name for b in self.fluid.bodies]
         return lambda: {"": float(self._on(names).sum(axis=0) @ scale)}
 
@@ -237,7 +239,7 @@ class Forces:
 
 
 def of_fluid(fluid: Fluid, quantity: str) -> Probe:
-    """volume [m^3], kinetic_energy [J] or dissipation [W] (of the viscous stress) of all fluid. Collective."""
+    """Probe of the volume [m^3], kinetic_energy [J] or viscous dissipation [W] of the whole fluid (collective)."""
     if quantity == "volume":
 
         def volume() -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""How far bodies may move in a step: within the cells to which the velocity is extrapolated, and within the period."""
+"""Limits of the motion of bodies in a step: cells with earlier velocities, cells of the finest level, periods."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from solvers.fluid.surface import Motion
 
 
 def strip_layers(grid: DistributedGrid, motion: Motion, time: float, smallest: float) -> int:
-    """Cells behind the surfaces that they may uncover within some time [s]; smallest: edge of a cell [m]."""
+    """Layers of cells that surfaces may uncover within some time [s]; smallest: shortest edge of a cell [m]."""
     fastest = float(np.linalg.norm(motion.v, axis=1).max(initial=0.0))
     layers = 1.25 * time * fastest / smallest
-    return math.ceil(min(max(1.0, layers), max(grid.grid.shape)))  # no more than there are
+    return math.ceil(min(max(1.0, layers), max(grid.grid.shape)))  # the grid has no more layers
 
 
 def require_history(unknowns: Unknowns, cut: Cut, missing: NDArray[np.bool_]) -> None:
-    """Raise StepFailed where the flow needs a velocity at a time behind that no step has found (collective).
+    """Raise StepFailed if a cell with fluid has no velocity from an earlier step (collective).
 
-    missing: local dofs without one.
+    missing: mask of local dofs without one.
     """
     blocks = np.zeros(unknowns.local // unknowns.block_size, dtype=bool)
     blocks[unknowns.cell_blocks[np.concatenate([cut.uncut, cut.cut])]] = True
@@ -38,9 +38,9 @@ def require_history(unknowns: Unknowns, cut: Cut, missing: NDArray[np.bool_]) ->
 
 
 def require_finest(cutter: Cutter, comm: MPI.Comm) -> None:
-    """Raise StepFailed where bodies come close to cells that are not of the finest level (collective).
+    """Raise StepFailed if bodies are close to cells that are not of the finest level (collective).
 
-    The cells from which poorly cut nodes take their values shall have no hanging nodes.
+    The roots of poorly cut nodes must not have hanging nodes.
     """
     if cutter.grid.nested is not None and comm.allreduce(cutter.on_coarse_cells(FINE_LAYERS), op=MPI.LOR):
         reason = (
@@ -51,7 +51,7 @@ def require_finest(cutter: Cutter, comm: MPI.Comm) -> None:
 
 
 def require_within_period(unknowns: Unknowns, cut: Cut) -> None:
-    """Raise StepFailed where bodies reach its end: their surfaces do not cut the cells beyond (collective)."""
+    """Raise StepFailed if a body reaches a periodic face: it would not cut cells at the opposite face (collective)."""
     grid = unknowns.grid
     changed = cut.fraction < 1.0 - NOTHING
     changed[np.concatenate([cut.cut, cut.strip])] = True

@@ -1,8 +1,8 @@
-"""Connected parts of the fluid in single cells, in the plane: a body thinner than a cell leaves two of them.
+"""Connected regions of the fluid in one cell, in 2D: a body thinner than a cell divides its fluid into two.
 
-The surface enters and leaves a cell through its perimeter. Between the place where one chord of the surface enters and
-the next one, counterclockwise, where a chord leaves, the perimeter is wet. So a part of the fluid is bounded by chords,
-run backwards, and pieces of the perimeter in turn (Weiler, Atherton, SIGGRAPH 1977).
+The surface crosses a cell in chords, which begin and end on the perimeter. The perimeter is wet from the point where a
+chord enters to the next one, counterclockwise, where a chord leaves. Hence the boundary of a region alternates between
+reversed chords and wet pieces of the perimeter (Weiler, Atherton, SIGGRAPH 1977).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from solvers.api import Array
 from solvers.fluid.box import Grid
 from solvers.gauss import gauss
 
-#: Length, relative to a cell, below which two points are one, and area below which two areas are the same.
+#: Length and area, relative to a cell, below which two points coincide and two areas are equal.
 SAME = 1e-9
 
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -26,19 +26,19 @@ CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 @dataclass(frozen=True)
 class Region:
-    """Part of the fluid in a cell; lengths are relative to the cell."""
+    """A connected part of the fluid in a cell; lengths are relative to the cell."""
 
     cell: int  #: number in the box
-    share: float  #: of the cell
+    share: float  #: its area, as a share of the cell
     #: wet parts of the cell's faces: (axis, side), begin and end
     faces: tuple[tuple[tuple[int, int], float, float], ...]
-    facets: frozenset[int] | None = None  #: facets that bound it here; None: all that are in the cell
-    polygon: Array = field(default_factory=lambda: np.empty((0, 2)))  #: corners, if it is not all fluid of the cell
+    facets: frozenset[int] | None = None  #: facets that bound it in this cell; None: it is all fluid of the cell
+    polygon: Array = field(default_factory=lambda: np.empty((0, 2)))  #: corners; empty if it is all fluid of the cell
 
     def integrals(self, points: Array) -> Array:
-        """int L_q of the Lagrange basis on the tensor points, the first direction fastest, by Gauss' theorem.
+        """int L_q of the Lagrange basis on the tensor points, the first direction fastest, shape (points^2,).
 
-        int l_a(x) l_b(y) = sum over edges of int (int_0^x l_a) l_b dy.
+        By Gauss' theorem, int l_a(x) l_b(y) = sum over edges of int (int_0^x l_a) l_b dy.
         """
         nodes, weights = gauss(len(points) + 1)
         start, along = self.polygon, np.roll(self.polygon, -1, axis=0) - self.polygon
@@ -49,7 +49,7 @@ class Region:
         return np.asarray(total).ravel()
 
     def contains(self, x: Array) -> bool:
-        """A point of the cell lies in it: the angles at which the edges are seen add up to a full one."""
+        """Whether a point of the cell lies in the region: its winding number is one."""
         if self.facets is None:
             return True
         a = self.polygon - x
@@ -62,13 +62,15 @@ WHOLE = tuple(((axis, side), 0.0, 1.0) for axis in (0, 1) for side in (0, 1))
 
 
 def regions_in_cell(cell: int, fluid: float, chords: Sequence[tuple[Array, Sequence[int]]]) -> list[Region]:
-    """Parts of the fluid in a cell that directed polylines cut, each with the facets that it consists of.
+    """Regions of the fluid in a cell that chords cut.
 
-    fluid: share of it in the cell. Polylines begin and end on the perimeter of the unit square and have the solid on
-    their left. One part with wet faces all round if they do not fit together.
+    fluid: share of fluid in the cell; chords: polylines with the numbers of their facets, which begin and end on the
+    perimeter of the unit square and have the solid on their left.
+    Chords that do not form closed boundaries, with rounding or with bodies that overlap, give one region whose faces
+    are wet all round.
     """
     everything = [Region(cell, fluid, WHOLE)]
-    begins, ends = ([_perimeter(chord[place]) for chord, _ in chords] for place in (0, -1))
+    begins, ends = ([_perimeter(chord[end]) for chord, _ in chords] for end in (0, -1))
     if np.isnan([*begins, *ends]).any():
         return everything
     left, found = set(range(len(chords))), []
@@ -97,7 +99,10 @@ def regions_in_cell(cell: int, fluid: float, chords: Sequence[tuple[Array, Seque
 
 
 def chords_of(grid: Grid, cell: int, x: Array, facets: NDArray[np.int64], numbers: Sequence[int]):
-    """The surface in a cell as polylines in its coordinates, with their facets: some of `facets`, by their numbers."""
+    """The surface in a cell as polylines in its reference coordinates, each with the numbers of its facets.
+
+    numbers: candidates among `facets`. None if a polyline is closed within the cell.
+    """
     i, j = np.unravel_index(cell, grid.shape, order="F")
     low = np.array([grid.edges[0][i], grid.edges[1][j]])
     size = np.array([grid.edges[0][i + 1], grid.edges[1][j + 1]]) - low
@@ -119,11 +124,11 @@ def chords_of(grid: Grid, cell: int, x: Array, facets: NDArray[np.int64], number
             line.append(a + t1 * (b - a))
             of.append(number)
         chords.append((np.array(line), of))
-    return None if pieces else chords  # what is left closes on itself
+    return None if pieces else chords  # facets that are left form a closed line
 
 
 def _clip(a: Array, b: Array) -> tuple[float, float] | None:
-    """Where on the way from a to b the unit square begins and ends."""
+    """Parameters from 0 at a to 1 at b where the segment enters and leaves the unit square; None if it misses it."""
     t0, t1 = 0.0, 1.0
     for p, q in zip(a, b, strict=True):
         if p == q:
@@ -136,7 +141,7 @@ def _clip(a: Array, b: Array) -> tuple[float, float] | None:
 
 
 def _perimeter(x: Array) -> float:
-    """Way along the perimeter of the unit square to a point of it, counterclockwise from (0, 0); NaN: off it."""
+    """Arc length of a point on the perimeter of the unit square, counterclockwise from (0, 0); NaN if it is off it."""
     off = np.abs([x[1], 1.0 - x[0], 1.0 - x[1], x[0]])
     side = int(np.argmin(off))
     if off[side] > SAME:
@@ -146,7 +151,7 @@ def _perimeter(x: Array) -> float:
 
 
 def _wet(s: float, to: float) -> list[tuple[tuple[int, int], float, float]]:
-    """The pieces of the sides between two places on the perimeter."""
+    """Pieces of the sides between two arc lengths on the perimeter: ((axis, side), begin, end)."""
     found = []
     for k in range(int(np.floor(s)), int(np.ceil(to))):
         a, b = max(s, k) - k, min(to, k + 1) - k
@@ -162,5 +167,5 @@ def _area(polygon: Array) -> float:
 
 
 def lagrange(points: Array, x: Array) -> Array:
-    """Lagrange polynomials on some points at x, one more axis."""
+    """Lagrange polynomials on some points, evaluated at x, along one more axis."""
     return np.stack([np.prod([(x - p) / (q - p) for p in points if p != q], axis=0) for q in points], axis=-1)

@@ -1,17 +1,17 @@
-"""Rough or porous surfaces: fluid passes along them in a layer too thin for the grid.
+"""Seepage along rough or porous surfaces: flow in a layer at the surface that is too thin for the grid.
 
-Its flux along the surface is -kappa / mu grad_t p with the transmissivity kappa [m^3]; for a roughness R it is that of
-a gap of this height, R^3 / 12. What the layer takes from the fluid at one place it gives back at another,
+The flux in the layer is -kappa / mu grad_t p with the transmissivity kappa [m^3]. For a roughness R, kappa is that of a
+gap of this height, R^3 / 12. The layer conserves volume: its divergence is the normal velocity at the surface,
 
     (u - g) . n = -div_t (kappa / mu grad_t p):    <kappa / mu grad_t p, grad_t q> beside <q, div u> - <q, (u - g) . n>.
 
-A film of height g in front lets (g^3 / 12 + kappa) / mu times the pressure gradient through: its force on bodies that
-approach each other stays finite down to contact.
+A film of height g in front of the surface has the flux (g^3 / 12 + kappa) / mu times the pressure gradient. Hence the
+force of the film on bodies that approach each other is finite down to contact.
 
-The pressure sees to it that no more than this passes. Nitsche's penalty must not hold it back: along the normal the
-surface gives way (`nitsche`) by c = theta kappa / (mu h^2). So n . 2 mu eps(u) n = -(u - g) . n / c on it, where a wall
-that nothing passes has 0. A film of the width l passes u_n = kappa p / (mu l^2): the stress that remains is
-(h / l)^2 / theta of the pressure. Without layer c = 0.
+The continuity equation limits this normal velocity. Nitsche's penalty must not suppress it: along the normal the
+surface has the compliance (`nitsche`) c = theta kappa / (mu h^2), zero without a layer. Then n . 2 mu eps(u) n =
+-(u - g) . n / c on the surface, a viscous stress that should vanish. In a film of length l, u_n = kappa p / (mu l^2),
+and this stress is (h / l)^2 / theta of the pressure.
 Source of the layer: Frei, Gerosa, Burman, Fernandez, Comput. Methods Appl. Mech. Engrg. 392 (2022) 114637.
 """
 
@@ -21,12 +21,15 @@ import numpy as np
 
 from solvers.api import Array
 
-#: theta; the force of a film in contact is the same to 1 % from 10 to 1000.
+#: theta. The force of a film in contact is the same to 1 % from 10 to 1000.
 RELEASE = 100.0
 
 
 def release(mobility: Array, sizes: Array) -> Array:
-    """C = theta kappa / (mu h^2) [m/Pa s] by pieces, from kappa / mu [m^3/Pa s] and edge lengths [m] (pieces, dim)."""
+    """c = theta kappa / (mu h^2) [m/Pa s] by pieces, shape (pieces,).
+
+    mobility: kappa / mu [m^3/Pa s], (pieces,); sizes: edge lengths of the cells [m], (pieces, dim).
+    """
     return RELEASE * mobility / sizes.min(axis=1) ** 2
 
 

@@ -1,13 +1,13 @@
-"""How the interface terms change when the surface moves: what makes a monolithic Newton iteration fast.
+"""Shape derivatives of the interface terms: by the displacement of the surface, for monolithic Newton iterations.
 
-For displacements dd of the surface, with u - g = 0 and the momentum equation fulfilled at the interface, what remains
-of the derivative of the discrete equations with respect to the shape of the fluid's domain is
+Assume u - g = 0 and the momentum equation at the interface. For displacements dd of the surface, the derivative of the
+discrete equations by the shape of the fluid domain is then
 
-    dr(v, q) = -<(grad u) dd, 2 mu eps(v) n + q n> + <P (grad u) dd, v>           the surface sees another velocity
+    dr(v, q) = -<(grad u) dd, 2 mu eps(v) n + q n> + <P (grad u) dd, v>
     df_b i   =  <n_i grad p . dd + (P (grad u) dd)_i, N_b> + <(p I - 2 mu eps(u)) d(n ds), N_b e_i>
 
-Fields are those of the present iterate, averaged over each piece of the surface. The residual does not depend on this:
-it costs no accuracy, and halves the Newton steps.
+The first row is the change of velocity at the displaced surface. Fields are those of the present iterate, averaged over
+each piece of surface. They enter the tangent only, so that they do not change the solution. They halve the iterations.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from solvers.fluid.interface import InterfaceTerms, MotionOperator
 
 
 def shape_derivatives(interface: InterfaceTerms, flow: Array) -> tuple[MotionOperator, Array]:
-    """(dr/dd, df/dd) by pieces, as `InterfaceTerms.coupling` and `mass_blocks`; `flow` at local dofs."""
+    """(dr/dd, df/dd) by pieces, of the form of `InterfaceTerms.coupling` and `mass_blocks`; flow at local dofs."""
     at, n, mu = interface, interface.n, interface.mu
     u, p = flow[at.u], flow[at.p]
     area = at.psi.sum(axis=(1, 2))
@@ -37,7 +37,10 @@ def shape_derivatives(interface: InterfaceTerms, flow: Array) -> tuple[MotionOpe
 
 
 def normal_derivative(x: Array, n: Array) -> Array:
-    """d(n ds)_l / dx_vj / ds of each piece's facet with corners x (pieces, vertices, dim); n points into the solid."""
+    """d(n ds)_l / dx_vj / ds of each facet, shape (facets, dim, vertices, dim).
+
+    x: corners [m], (facets, vertices, dim); n: unit normals into the solid, (facets, dim).
+    """
     dim = x.shape[2]
     if dim == 2:
         length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)

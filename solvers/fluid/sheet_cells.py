@@ -19,7 +19,7 @@ Indices = NDArray[np.int64]
 
 
 def on_sheets(grid: DistributedGrid, points: Array, cut: Any) -> Any:
-    """A `Cut` of the box, in which the new cells are as those in their places, with what each has of the fluid."""
+    """A `Cut` of the box extended to new cells: each has its own share of the fluid and of the pieces of surface."""
     sheets, original = grid.sheets, grid.original
     assert sheets is not None
     box, local = sheets.grid.size, np.full(sheets.grid.size + len(sheets.cells), -1)
@@ -78,10 +78,10 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any) -> Any:
 def _passable(
     grid: DistributedGrid, faces: NDArray[np.int32], empty: NDArray[np.bool_], for_faces: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Faces with fluid on both sides that belongs together."""
+    """Faces with linked fluid on both sides."""
     assert grid.sheets is not None
-    known, sides = grid.interior_faces
-    ends = sides[np.searchsorted(known, faces)]
+    interior, sides = grid.interior_faces
+    ends = sides[np.searchsorted(interior, faces)]
     pairs = np.sort(grid.numbers[ends], axis=1)
     parted = np.array([pair in grid.sheets.parted for pair in map(tuple, pairs.tolist())], dtype=bool)
     return for_faces[ends].all(axis=1) | ~(empty[ends].any(axis=1) | parted)
@@ -94,9 +94,9 @@ def _tensor(weights: Array) -> Array:
 def join_nodes(
     grid: DistributedGrid, space: Any, degree: int, nodes: list[LatticeNodes]
 ) -> tuple[Any, list[LatticeNodes]]:
-    """(the space in which nodes of the same number are one, velocity's and pressure's nodes with these numbers).
+    """Identify nodes with equal numbers (collective).
 
-    degree: of the velocity. Collective.
+    degree: of the velocity. Returns (the new space, the nodes of velocity and pressure with their numbers).
     """
     size, dim, comm = int(space.dofmap.index_map_bs), grid.dim, grid.comm
     everything = np.arange(len(grid.original), dtype=np.int32)
@@ -110,10 +110,10 @@ def join_nodes(
     shared = np.flatnonzero(np.isin(number, np.unique(np.concatenate(comm.allgather(new)))))
     mine = shared[shared < end - start]
     tables = comm.allgather((number[mine], start + mine))
-    owners = np.repeat(np.arange(comm.size, dtype=np.int32), [len(known) for known, _ in tables])
-    known, masters = (np.concatenate(column) for column in zip(*tables, strict=True))
-    known, first = np.unique(known, return_index=True)
-    twin = first[np.searchsorted(known, number[shared])]
+    owners = np.repeat(np.arange(comm.size, dtype=np.int32), [len(numbers) for numbers, _ in tables])
+    numbers, masters = (np.concatenate(column) for column in zip(*tables, strict=True))
+    numbers, first = np.unique(numbers, return_index=True)
+    twin = first[np.searchsorted(numbers, number[shared])]
     space, local = fem.identify_blocks(space, shared.astype(np.int32), masters[twin], owners[twin])
     joined = np.arange(len(number), dtype=np.int32)
     joined[shared] = local
@@ -126,9 +126,9 @@ def join_nodes(
 
 
 def connected_cells(grid: DistributedGrid, cells: NDArray[np.int32]) -> tuple[Indices, int]:
-    """Parts of the cells of all processes that share corners: that of each local cell, from 1 on, and their number.
+    """Connected parts of some cells on all processes; cells are connected if they share corners (collective).
 
-    0 where none is. cells: of this process. Collective.
+    cells: those of this process. Returns (part of each local cell, from 1 on, 0 for other cells; count of parts).
     """
     corners = grid.cell_nodes(cells, 1)
     gathered = grid.comm.allgather((grid.original[cells], corners))
@@ -138,8 +138,8 @@ def connected_cells(grid: DistributedGrid, cells: NDArray[np.int32]) -> tuple[In
     part = connected_parts(first, ends.ravel(), len(everything) + int(ends.max(initial=0)) + 1)[: len(everything)]
     order = np.full(len(everything), np.iinfo(np.int64).max)
     np.minimum.at(order, part, everything)  # parts by their first cell, on any number of processes
-    known = np.unique(order[part])
+    first_cells = np.unique(order[part])
     labels = np.zeros(len(grid.original), dtype=np.int64)
     before = sum(len(numbers) for numbers, _ in gathered[: grid.comm.rank])
-    labels[cells] = 1 + np.searchsorted(known, order[part[before : before + len(cells)]])
-    return labels, len(known)
+    labels[cells] = 1 + np.searchsorted(first_cells, order[part[before : before + len(cells)]])
+    return labels, len(first_cells)

@@ -1,7 +1,7 @@
-"""Cells near a node on its own side of thin bodies: where the flow at the node may be continued from.
+"""Cells near a node on its own side of thin bodies: candidates for the root of its extension.
 
-A cell is near if a way from the node leads to it through faces with fluid on both sides and never away from it. What
-lies on the other side of a thin body is behind such a way's end, also next to the tip: there every way is a detour.
+A cell is near if a path of cells leads from the node to it through faces with fluid on both sides, and every step of
+the path increases the distance from the node. No such path leads around a thin body, not even around its tip.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Indices = NDArray[np.int64]
 
 
 class SheetWindows:
-    """Windows of cells around some nodes of one degree on a grid with sheets; nodes by their positions in `numbers`."""
+    """Windows of cells around nodes of one degree on a grid with sheets; nodes are given as indices into `numbers`."""
 
     def __init__(self, sheets: Sheets, degree: int, numbers: Indices):
         grid = sheets.grid
@@ -28,28 +28,28 @@ class SheetWindows:
         place = sheets.place(np.arange(sheets.size))
         self._index = np.stack(np.unravel_index(place, grid.shape, order="F"), axis=1)
         self._neighbours = _neighbours(sheets)
-        self._fluid = np.ones(sheets.size)  #: share of fluid where there are several cells in one place
+        self._fluid = np.ones(sheets.size)  #: share of fluid of cells that are copies of one cell of the box
         for cell, share in sheets.shares.items():
             self._fluid[cell] = share.fraction
-        fluid = np.zeros(sheets.size, dtype=bool)  # cells for faces have none
+        fluid = np.zeros(sheets.size, dtype=bool)  # pairs of cells for faces have no fluid
         fluid[: grid.size] = ~sheets.around
         fluid[sheets.links] = True
         cells = np.flatnonzero(fluid)
         nodes = self.nodes(cells)
         position = np.full(sheets.node_count(degree), -1)
         position[numbers] = np.arange(len(numbers))
-        known = position[nodes] >= 0
-        entries = (position[nodes[known]], np.repeat(cells, known.sum(axis=1)))
+        given = position[nodes] >= 0
+        entries = (position[nodes[given]], np.repeat(cells, given.sum(axis=1)))
         #: cells with fluid of each node
         self._own = sparse.csr_matrix((np.ones(len(entries[0])), entries), shape=(len(numbers), sheets.size))
-        self._tables: dict[int, Indices] = {}  #: cells of the windows by layers, -1: none, -2: not known yet
+        self._tables: dict[int, Indices] = {}  #: cells of the windows by layers, -1: none, -2: not computed yet
 
     def nodes(self, cells: Indices) -> Indices:
         """Numbers of the nodes of cells of the mesh, the first direction slowest, shape (cells, nodes)."""
         return self._sheets.nodes(cells, self._degree, self._steps)
 
     def cells_around(self, nodes: Indices, index: Indices, layers: int) -> tuple[Indices, NDArray[np.bool_]]:
-        """(cells, whether they exist) around nodes at these places of the lattice, shape (nodes, cells)."""
+        """(cells, whether they exist) around nodes, shape (nodes, cells); index: of the nodes in the lattice."""
         width = 2 * layers + 2
         table = self._tables.setdefault(layers, np.full((self._count, width**self._sheets.grid.dim), -2))
         some, first = np.unique(nodes, return_index=True)
@@ -76,13 +76,13 @@ class SheetWindows:
                 row, cell = row[kept], cell[kept]
                 reached = sparse.csr_matrix((np.ones(len(row)), (row, cell)), shape=reached.shape)
             place = (self._index[cell] - corner[row]) @ width ** np.arange(dim)[::-1]
-            order = np.argsort(self._fluid[cell], kind="stable")  # of several in one place that with the most
+            order = np.argsort(self._fluid[cell], kind="stable")  # of several copies the one with the most fluid
             found[row[order], place[order]] = cell[order]
         return found
 
 
 def _neighbours(sheets: Sheets) -> sparse.csr_matrix:
-    """Cells of the mesh with a common face through which fluid passes: all those of the box away from surfaces."""
+    """Adjacency of cells of the mesh by faces with fluid on both sides; away from surfaces by all faces of the box."""
     grid = sheets.grid
     number = grid.as_box(np.arange(grid.size))
     pairs = [sheets.links]

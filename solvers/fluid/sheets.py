@@ -1,14 +1,15 @@
-"""Sheets of fluid: where a body is thinner than a cell, the fluid on each side of it has a cell of its own.
+"""Sheets of fluid: where a body is thinner than a cell, the fluid on each side of it has its own copy of the cell.
 
-A cell with two parts of fluid becomes two cells. Parts of neighbouring cells are linked if both are wet at the same
-place of the common face, and only linked parts share a node. So the nodes around a thin body come several times, once
-for each part of the fluid around the node, and each side knows of the other one as little as of one behind a thick
-body. Where the parts join within the cells around a node, at the tip of a body, there is one node.
+A cell with two parts of fluid becomes two cells. Parts of neighbouring cells are linked if both touch the same piece of
+the common face, and only linked parts share nodes. Hence a node near a thin body has a copy for each part of the fluid
+around it, and the fluid on one side does not depend on that on the other. Where the parts are connected within the
+cells around a node, as at the tip of a body, the node has one copy.
 Source: the rule by which 4C's cut library gives nodes several sets of unknowns: Schott, Wall, Comput. Methods Appl.
 Mech. Engrg. 276 (2014) 233-265, section 3.
 
-The new cells are put behind those of the box; faces between them and their neighbours, which the ghost penalty needs,
-come as pairs of cells that are there for nothing else. All get their unknowns by the numbers of their nodes.
+New cells follow those of the box in the mesh. Faces between a new cell and its neighbour, which the ghost penalty
+integrates over, are represented by further pairs of cells, which have no other purpose. The numbers of nodes determine
+which cells share unknowns.
 """
 
 from __future__ import annotations
@@ -34,18 +35,18 @@ from solvers.mesh import Mesh
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-THIN = 2  #: cells apart, at most, of the fluid on two sides that the ghost penalty or a node would join
-AROUND = 3  #: cells within which parts around the end of a body are linked
-OPPOSED = -0.7  #: product of unit normals below which two surfaces face opposite ways: corners below 45 degrees do
+THIN = 2  #: largest distance [cells] across a body at which a node or the ghost penalty couples the fluid on two sides
+AROUND = 3  #: distance [cells] within which parts that are linked around the end of a body belong together
+OPPOSED = -0.7  #: product of unit normals below which two surfaces face opposite directions: corners below 45 degrees
 
-#: From the first corner of a cell to each, in the order of `Grid.mesh`.
+#: Steps from the first corner of a cell to each corner, in the order of `Grid.mesh`.
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
 CORNER_STEPS = {2: np.array(SQUARE), 3: np.array([[*xy, z] for z in (0, 1) for xy in SQUARE])}
 
 
 @dataclass(frozen=True)
 class FluidShare:
-    """What a cell of the mesh has of the fluid and the surface in its place, if that is not everything."""
+    """The regions of fluid in a cell of the box that one cell of the mesh has, if it does not have all."""
 
     regions: tuple[Region, ...]
 
@@ -54,7 +55,7 @@ class FluidShare:
         return sum(region.share for region in self.regions)
 
     def integrals(self, points: Array) -> Array | None:
-        """int L_q over the fluid; None if it has all of the fluid after all."""
+        """int L_q over the fluid, relative to the cell; None if the cell has all of the fluid."""
         if any(region.facets is None for region in self.regions):
             return None
         total = np.zeros(len(points) ** 2)
@@ -63,11 +64,11 @@ class FluidShare:
         return total
 
     def has(self, facet: int) -> bool:
-        """The facet bounds it."""
+        """Whether the facet bounds this fluid."""
         return any(region.facets is None or facet in region.facets for region in self.regions)
 
     def wet(self, axis: int, side: int, points: Array) -> Array:
-        """int L_q over the wet part of a face."""
+        """int L_q over the wet part of a face, relative to the face."""
         nodes, weights = gauss(len(points) + 1)
         total = np.zeros(len(points))
         for face, a, b in (wet for region in self.regions for wet in region.faces):
@@ -78,17 +79,17 @@ class FluidShare:
 
 @dataclass(frozen=True)
 class Sheets:
-    """Cells behind those of the box: first those with fluid, then pairs of cells with a face between them."""
+    """Cells that follow those of the box: first those with fluid, then pairs of cells with a face between them."""
 
     grid: Grid
     shares: dict[int, FluidShare]  #: of cells of the mesh, by their numbers in it
-    left: Indices  #: cells of the box from which all fluid has gone to new ones
-    parted: frozenset[tuple[int, int]]  #: neighbours in the box, the lower first, with no fluid on the face between
+    left: Indices  #: cells of the box whose fluid belongs to new cells only
+    parted: frozenset[tuple[int, int]]  #: neighbours in the box, the lower first, with no fluid on their common face
     cells: Indices  #: number in the box of each new cell
     pairs: int  #: how many pairs there are
-    #: which of the nodes at one place of the lattice of second degree the nodes of a cell are, 0 that of the box
+    #: number of the copy that each node of a new cell is, in the lattice of second degree; 0: the node of the box
     copies: Indices
-    around: Mask  #: cells of the box near surfaces: of these only `links` are neighbours
+    around: Mask  #: cells of the box near surfaces, where only `links` are neighbours
     links: Indices  #: cells of the mesh with fluid on both sides of the face between them, shape (n, 2)
 
     @property
@@ -103,20 +104,20 @@ class Sheets:
 
     @cached_property
     def successors(self) -> dict[int, list[int]]:
-        """Cells of the mesh with fluid in the place of one of the box that lost some."""
+        """Cells of the mesh that have the fluid of a cell of the box, for those that share or lose it."""
         found: dict[int, list[int]] = {int(cell): [] for cell in self.left}
         for cell in self.shares:
             found.setdefault(int(self.place(np.array([cell]))[0]), []).append(cell)
         return found
 
     def cell_at(self, cell: int, x: Array) -> int:
-        """Cell of the mesh with the fluid at x, in the coordinates of a cell of the box."""
+        """Cell of the mesh that has the fluid at x, given in the reference coordinates of a cell of the box."""
         there = self.successors.get(cell) or [cell]
         regions = ((c, region) for c in there if c in self.shares for region in self.shares[c].regions)
         return next((c for c, region in regions if region.contains(x)), there[0])
 
     def mesh(self) -> Mesh:
-        """The box and the new cells; of these only pairs are connected."""
+        """Mesh of the box and of the new cells, which are not connected to others, except pairs to each other."""
         box, dim = self.grid.mesh(), self.grid.dim
         index = np.stack(np.unravel_index(self.cells, self.grid.shape, order="F"), axis=1)
         units = [[cell] for cell in range(self.singles)]
@@ -124,18 +125,18 @@ class Sheets:
         points, cells, count = [], [], len(box.points)
         for unit in units:
             lattice = (index[unit][:, None, :] + CORNER_STEPS[dim]).reshape(-1, dim)
-            places, number = np.unique(lattice, axis=0, return_inverse=True)
-            points.append(np.stack([edge[i] for edge, i in zip(self.grid.edges, places.T, strict=True)], axis=1))
+            corners, number = np.unique(lattice, axis=0, return_inverse=True)
+            points.append(np.stack([edge[i] for edge, i in zip(self.grid.edges, corners.T, strict=True)], axis=1))
             cells.append(count + number.reshape(len(unit), -1))
-            count += len(places)
+            count += len(corners)
         return Mesh(np.concatenate([box.points, *points]), np.concatenate([box.cells, *cells]), box.cell_type)
 
     def place(self, original: Indices) -> Indices:
-        """Number in the box of cells of the mesh."""
+        """Number in the box of each cell of the mesh; new cells have that of the cell they are a copy of."""
         return np.concatenate([np.arange(self.grid.size), self.cells])[original]
 
     def nodes(self, original: Indices, degree: int, steps: Indices) -> Indices:
-        """Numbers of the nodes of cells of the mesh, shape (cells, nodes): those of the lattice, then the others.
+        """Numbers of the nodes of cells of the mesh, shape (cells, nodes); copies have those after the lattice's.
 
         steps: from the first node of a cell to each in the lattice of this degree, shape (nodes, dim).
         """
@@ -151,17 +152,17 @@ class Sheets:
         return int(np.prod([degree * n + 1 for n in self.grid.shape]))
 
     def node_count(self, degree: int) -> int:
-        """Numbers of nodes, those of the lattice and the others."""
+        """Count of nodes: those of the lattice and the copies."""
         return self.lattice_size(degree) + len(self._further(degree))
 
     def on_lattice(self, numbers: Indices, degree: int) -> Indices:
-        """Numbers in the lattice of the places of nodes."""
+        """Number in the lattice of each node; copies have that of the node they are a copy of."""
         size = self.lattice_size(degree)
         keys = np.concatenate([self._further(degree), [0]])[np.maximum(numbers - size, -1)]
         return np.where(numbers < size, numbers, keys % size)
 
     def among_finer(self, numbers: Indices, degree: int) -> Indices:
-        """The numbers that nodes of first degree have among those of a higher one."""
+        """Numbers of nodes of first degree among those of a higher degree."""
         size, finer = self.lattice_size(1), self.lattice_size(degree)
         keys = np.concatenate([self._further(1), [0]])[np.maximum(numbers - size, -1)]
         copy = np.where(numbers < size, 0, keys // size)
@@ -176,7 +177,7 @@ class Sheets:
         return np.ravel_multi_index(tuple(np.moveaxis(degree * index[:, None, :] + steps, 2, 0)), counts, order="F")
 
     def _further(self, degree: int) -> Indices:
-        """All nodes that the lattice does not have, as copy * size + number."""
+        """All copies of nodes, each as copy * size + number in the lattice."""
         steps = np.array(list(product(range(degree + 1), repeat=self.grid.dim)))
         copy = self.copies[:, _in_cell(steps, degree)]
         return np.unique((copy * self.lattice_size(degree) + self._lattice(self.cells, degree, steps))[copy > 0])
@@ -188,7 +189,7 @@ def _in_cell(steps: Indices, degree: int) -> Indices:
 
 
 def find_sheets(grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_]) -> Sheets | None:
-    """Sheets of the fluid around surfaces with vertices at x [m]; None if no body is thin.
+    """Sheets of the fluid around surfaces with vertices at x [m]; None in 3D and if no body is thin.
 
     bounds: facets that are not on the boundary of the box.
     """
@@ -205,7 +206,7 @@ def find_sheets(grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_]
     moved = (copies > 0).any(axis=1)
     linked = np.zeros(len(parts), dtype=bool)
     linked[[n for a, b, _ in links for n in (a, b)]] = True
-    new = np.flatnonzero(moved & linked)  # what is closed off within a cell counts as solid
+    new = np.flatnonzero(moved & linked)  # fluid that is enclosed within one cell counts as solid
     by_cell: dict[int, list[int]] = {}
     for number, part in enumerate(parts):
         by_cell.setdefault(part.cell, []).append(number)
@@ -239,10 +240,10 @@ def find_sheets(grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_]
 def _is_thin(
     grid: Grid, parts: Sequence[Region], links: Sequence[tuple[int, int, int]], facing: Array, close: Indices
 ) -> bool:
-    """Somewhere two parts that face opposite ways, a few cells apart, are not linked nearby: a thin body is between.
+    """Whether a thin body is between two parts: they face opposite directions at THIN cells, and are not linked nearby.
 
-    Parts around a corner of a thick body do not face opposite ways or are linked around it. facing: mean normal of the
-    surface in each part, nan where there is none; close: parts at which to look.
+    Parts around a corner of a thick body do not face opposite directions, or are linked around it.
+    facing: mean normal of the surface in each part, nan where there is none; close: parts to test.
     """
     index = np.stack(np.unravel_index([part.cell for part in parts], grid.shape, order="F"), axis=1)
     ends = np.array(links, dtype=np.int64).reshape(-1, 3)[:, :2]
@@ -299,7 +300,7 @@ def _grown(grid: Grid, cells: Mask, layers: int) -> Mask:
 
 
 def _links(grid: Grid, parts: Sequence[Region]) -> list[tuple[int, int, int]]:
-    """(part, part of the next cell, axis) where both are wet at the same place of the face between them."""
+    """(part, part of the next cell, axis) for parts whose wet pieces of the common face overlap."""
     at: dict[tuple[int, int, int], list[tuple[int, float, float]]] = {}
     for number, part in enumerate(parts):
         for (axis, side), a, b in part.faces:
@@ -316,9 +317,9 @@ def _links(grid: Grid, parts: Sequence[Region]) -> list[tuple[int, int, int]]:
 
 
 def _copies(grid: Grid, parts: Sequence[Region], links: Sequence[tuple[int, int, int]], special: Mask) -> Indices:
-    """Which of the nodes at its place each node of a part's cell is, in the lattice of second degree.
+    """Number of the copy that each node of a part's cell is, in the lattice of second degree, shape (parts, nodes).
 
-    Of the parts around a node those with the most fluid keep that of the box.
+    Among the parts around a node, those with the most fluid keep the node of the box, copy 0.
     """
     steps = np.array(list(product(range(3), repeat=grid.dim)))[:, ::-1]  # the first direction fastest
     size = len(steps)
@@ -341,15 +342,15 @@ def _copies(grid: Grid, parts: Sequence[Region], links: Sequence[tuple[int, int,
     rank = np.zeros(len(group), dtype=np.int64)
     rank[order] = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
     around = np.zeros(int(np.prod(counts)), dtype=bool)  # all cells around these nodes are among the parts
-    places = np.stack(np.unravel_index(np.flatnonzero(special), grid.shape, order="F"), axis=1)
-    around[np.ravel_multi_index(tuple(np.moveaxis(2 * places[:, None] + steps, 2, 0)), counts, order="F")] = True
+    near = np.stack(np.unravel_index(np.flatnonzero(special), grid.shape, order="F"), axis=1)
+    around[np.ravel_multi_index(tuple(np.moveaxis(2 * near[:, None] + steps, 2, 0)), counts, order="F")] = True
     return np.where(around[node], rank[group], 0).reshape(-1, size)
 
 
 def _neighbours(grid: Grid, cells: Sequence[int]) -> set[tuple[int, int]]:
-    """Pairs of them with a common face, the lower first."""
-    index, known, found = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1), set(cells), set()
+    """Pairs of these cells with a common face, the lower first."""
+    index, members, found = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1), set(cells), set()
     for axis, count in enumerate(grid.shape):
         stride = int(np.prod(grid.shape[:axis]))
         found |= {(c, c + stride) for c, i in zip(cells, index[:, axis], strict=True) if i + 1 < count}
-    return {pair for pair in found if pair[1] in known}
+    return {pair for pair in found if pair[1] in members}

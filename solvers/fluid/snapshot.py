@@ -1,4 +1,4 @@
-"""The flow as files and pictures show it: the cells with fluid in them, and the bodies' surfaces where they are now."""
+"""Snapshots of the flow for files and pictures: cells with fluid, and the surfaces of bodies at their positions."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from solvers.tessellation import area_vectors
 
 
 def snapshots(fluid: Fluid) -> list[Snapshot]:
-    """The flow, then each body, on rank 0; an empty list elsewhere (collective)."""
+    """Snapshots of the flow and of each body on rank 0, an empty list on others (collective)."""
     flow, bodies = _flow(fluid), _bodies(fluid)
     return [] if flow is None else [flow, *bodies]
 
 
 def _flow(fluid: Fluid) -> Snapshot | None:
-    """Velocity and pressure at the corners of all cells with fluid; of q2q1 the values at other nodes are left out.
+    """Velocity and pressure at the corners of all cells with fluid; other nodes of q2q1 are left out.
 
-    Corners inside of bodies carry the flow's smooth extension, so that colours reach the surface undisturbed.
+    Corners inside of bodies have the values of the smooth extension, so that pictures are correct up to the surface.
     """
     unknowns, grid = fluid.unknowns, fluid.grid
     velocity, pressure = (
@@ -45,7 +45,7 @@ def _flow(fluid: Fluid) -> Snapshot | None:
 
 
 def _corners(fluid: Fluid, degree: int) -> np.ndarray:
-    """Place of each corner of the cells, x fastest, among the nodes of this degree."""
+    """Index of each corner of the cells, x fastest, among the nodes of a degree."""
     if (nested := fluid.grid.nested) is not None:
         return np.searchsorted(nested.all_nodes(degree), nested.corners(degree))
     counts = fluid.unknowns.lattice_shape(degree)
@@ -57,7 +57,7 @@ def _corners(fluid: Fluid, degree: int) -> np.ndarray:
 
 
 def _bodies(fluid: Fluid) -> list[Snapshot]:
-    """Rigid surfaces with their velocity and the fluid's force per area on them (zero before the first step).
+    """Rigid surfaces with their velocity and the traction of the fluid on them (zero before the first step).
 
     Elastic bodies are in the snapshots of the structure.
     """

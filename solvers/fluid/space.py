@@ -1,4 +1,4 @@
-"""The unknowns of the flow: velocity and pressure on the grid, which dofs and nodes they have."""
+"""The unknowns of the flow, velocity and pressure: their dofs and nodes on the grid."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ Dofs = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class FlowNodes:
-    """Nodes of one quantity; local ones, owned ones first."""
+    """Local nodes of one quantity, owned ones first."""
 
     dofs: Dofs  #: local dofs, shape (nodes, components)
     points: Array  #: positions [m], shape (nodes, dim)
     numbers: NDArray[np.int64]  #: number in the box's lattice, the same for every distribution
-    sizes: Array  #: edge lengths [m] of the cells around each, their mean, shape (nodes, dim); not where these differ
+    sizes: Array  #: mean edge lengths [m] of the cells around each, of the finest lattice, shape (nodes, dim)
     owned: int
-    places: NDArray[np.int64]  #: the same as `numbers` without gaps: all nodes in the order of their numbers
+    places: NDArray[np.int64]  #: consecutive numbers from 0, in the order of `numbers`, which has gaps on nested cells
 
 
 class Unknowns:
     """Q1-Q1 (degree 1) or Q2-Q1 (degree 2): velocity and pressure in one function space.
 
-    Along `periodic` axes (0, 1, 2) the nodes at the end of the box are those at its beginning: cells at the end have
-    their unknowns. So the assembly by cells does not depend on the period.
+    Along `periodic` axes (0, 1, 2) the nodes at the end of the box are identified with those at its beginning. The
+    last cells have the unknowns of the first nodes, so that assembly does not need to treat periods.
     """
 
     def __init__(self, grid: DistributedGrid, degree: int, periodic: Sequence[int] = ()):
@@ -68,13 +68,13 @@ class Unknowns:
         self.velocity, self.pressure = (self._nodes(some, d) for some, d in zip(nodes, (degree, 1), strict=True))
         self.velocity_mask = np.zeros(self.local, dtype=bool)  #: which local dofs are velocities
         self.velocity_mask[self.velocity.dofs] = True
-        #: nodes that take their values from coarser cells, if there are any
+        #: hanging nodes, whose values are interpolated from coarser cells; None on a uniform grid
         self.hanging = None if grid.nested is None else self._hanging()
 
     # ------------------------------------------------------------------------------------------- nodes of the lattice
 
     def lattice_shape(self, degree: int) -> tuple[int, ...]:
-        """Nodes of this degree per direction; along a periodic axis the last one is the first."""
+        """Count of nodes of this degree per direction; along a periodic axis the last one is not counted."""
         return tuple(degree * n + (axis not in self.periodic) for axis, n in enumerate(self.grid.grid.shape))
 
     def _lattice_nodes(self, components: Sequence[int], degree: int) -> LatticeNodes:
@@ -84,12 +84,12 @@ class Unknowns:
         points = points.copy()
         for axis, (edge, count) in enumerate(zip(self.grid.grid.edges, self.lattice_shape(degree), strict=True)):
             lattice = np.interp(np.arange(degree * (len(edge) - 1) + 1) / degree, np.arange(len(edge)), edge)
-            place = np.searchsorted(0.5 * (lattice[1:] + lattice[:-1]), points[:, axis])
+            index = np.searchsorted(0.5 * (lattice[1:] + lattice[:-1]), points[:, axis])
             if axis in self.periodic:
-                at_start |= place == 0
-                at_end |= place == count
-                points[place == count, axis] = edge[0]
-            number += stride * (place % count)
+                at_start |= index == 0
+                at_end |= index == count
+                points[index == count, axis] = edge[0]
+            number += stride * (index % count)
             stride *= count
         return LatticeNodes(dofs, points, number, at_start, at_end)
 
@@ -115,7 +115,7 @@ class Unknowns:
         )
 
     def _sizes(self, points: Array, degree: int) -> Array:
-        """Edge lengths [m] of the cells around nodes, their mean, shape (nodes, dim)."""
+        """Mean edge lengths [m] of the cells around nodes, shape (nodes, dim)."""
         sizes = np.empty(points.shape)
         for axis, edge in enumerate(self.grid.grid.edges):
             lattice = np.interp(np.arange(degree * (len(edge) - 1) + 1) / degree, np.arange(len(edge)), edge)
@@ -126,7 +126,7 @@ class Unknowns:
 
     @cached_property
     def at_pressure(self) -> NDArray[np.int64]:
-        """Where the nodes of the pressure are among those of the velocity."""
+        """Index of the velocity node at each pressure node."""
         if self.grid.sheets is not None:
             numbers = self.grid.sheets.among_finer(self.pressure.numbers, self.degree)
         else:
@@ -141,14 +141,14 @@ class Unknowns:
         return int(self.index_map.size_global) * self.block_size
 
     def counted(self) -> int:
-        """The same, on nested cells without those of hanging nodes and those that no cell has (collective)."""
+        """Dofs on all processes; on nested cells without those of hanging nodes (collective)."""
         if self.hanging is None:
             return self.size()
         dofs = np.concatenate([nodes.dofs[: nodes.owned].ravel() for nodes in (self.velocity, self.pressure)])
         return int(self.grid.comm.allreduce(int(np.count_nonzero(~self.hanging.dofs[dofs]))))
 
     def share(self, function) -> None:
-        """Values at hanging nodes and at ghosts become those of the owned unknowns (collective)."""
+        """Update values at hanging nodes and ghosts from the owned unknowns (collective)."""
         if self.hanging is not None:
             values = function.x.array
             values[: self.owned] = self.hanging.values(values[: self.owned])
@@ -159,24 +159,24 @@ class Unknowns:
         return ufl.as_vector([flow[i] for i in range(self.dim)]), flow[self.dim]
 
     def expand(self, blocks: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """A mark per local dof from one per local block."""
+        """Mask of local dofs from a mask of local blocks."""
         return np.repeat(blocks, self.block_size)
 
     # ---------------------------------------------------------------------------------------------- to save values
 
     def to_nodes(self, values: Array, nodes: FlowNodes) -> Nodal:
-        """Values at local dofs as those of owned nodes."""
+        """The values of owned nodes, from those at local dofs."""
         return Nodal(values[nodes.dofs[: nodes.owned]].astype(float), nodes.places[: nodes.owned])
 
     def from_nodes(self, values: Array, nodes: FlowNodes) -> Array:
-        """Values at local dofs from those of owned nodes, zero elsewhere (collective)."""
+        """The values at local dofs, from those of owned nodes; zero at other dofs (collective)."""
         owned = np.zeros(self.local)
         owned[nodes.dofs[: nodes.owned]] = values
         return fem.share_owned(self.space, owned)
 
 
 def set_velocity(values: Array, nodes: FlowNodes, components: Sequence[Value], t: float) -> None:
-    """Set components of a vector at the nodes to given values; `values`: local dofs, changed in place."""
+    """Set velocity components at the nodes to given values at time t [s]; `values` at local dofs, changed in place."""
     points = np.zeros((3, len(nodes.points)))
     points[: nodes.points.shape[1]] = nodes.points.T
     for axis, component in enumerate(components):

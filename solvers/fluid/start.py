@@ -1,4 +1,4 @@
-"""The start of a flow that is coupled: its rate of change there, from which its past follows."""
+"""The start of a coupled flow: its initial rate, from which the velocities before the start are extrapolated."""
 
 from __future__ import annotations
 
@@ -15,30 +15,31 @@ from solvers.fluid.surface import Motion
 from solvers.fluid.time_scheme import Difference, FlowStep
 from solvers.values import evaluate_components
 
-#: Share of the largest velocity that boundary or bodies may differ from the initial flow if it does not start at once.
+#: Difference of the velocity of boundary or bodies from the initial flow, relative to the largest one, above which the
+#: flow starts impulsively.
 JUMP = 1e-6
 
-#: Length of its steps over that of the first step of the run: what the flow loses in it by friction does not count.
+#: Length of a start step over that of the first step of the run. It is short, so that friction hardly changes the flow.
 #: From 1 to 0.1 the first rate of a disc in fluid of its density changes by 0.1 %, from there to 0.001 by less than
-#: 0.03 %; the first velocity of a sphere on a coarse grid by 12 % and 7 % (docs/verification_coupling.md).
+#: 0.03 %. The first velocity of a sphere on a coarse grid changes by 12 % and 7 % (docs/verification_coupling.md).
 SHARE = 0.01
 
 
 class FlowStart:
-    """Steps of backward Euler from the initial velocity, with the loads of the first time."""
+    """Short steps of backward Euler from the initial velocity, with the loads at the start."""
 
     def __init__(self, fluid: Fluid):
         self.fluid = fluid
 
     @property
     def smallest_cell(self) -> float:
-        """Shortest edge [m]."""
+        """Shortest edge of a cell [m]."""
         return self.fluid.smallest_cell
 
     def at_once(self, surfaces: Mapping[str, Motion]) -> bool:
-        """The initial velocity is not that of the boundary, or of bodies: `surfaces` by name, others as prescribed.
+        """Whether the flow starts impulsively: boundary or bodies have another velocity than the flow (collective).
 
-        Collective.
+        surfaces: motions of coupled bodies by name; the others are as prescribed.
         """
         fluid, t, initial = self.fluid, self.fluid.current.t, self.fluid.settings.initial_velocity
         on_boundary, there = fluid.boundary.velocity(t), fluid.history.past[0].velocity[fluid.boundary.dofs]
@@ -54,9 +55,10 @@ class FlowStart:
 
     @contextmanager
     def step(self, t: float, dt: float) -> Iterator[None]:
-        """A short step that begins here; boundary and prescribed bodies are as fast as they will be at its end.
+        """A short start step: a context in which the flow can be solved for the motion of coupled surfaces.
 
-        Its end has the places and loads of t. A surface that moves by dt^2 a gets the velocity a times its length.
+        Positions and loads are those of t. Velocities of boundary and prescribed bodies are those at the end of the
+        step. A coupled surface that is displaced by dt^2 a gets the velocity a times the length of the step.
         """
         fluid, short = self.fluid, SHARE * dt
         bodies, rate = fluid.bodies, short / dt**2
@@ -70,7 +72,7 @@ class FlowStart:
             fluid.bodies = bodies
 
     def end(self, dt: float) -> None:
-        """Back to the initial velocity; those before it follow from the rate of the last of these steps."""
+        """Restore the initial velocity, and extrapolate those before it by the rate of the last start step."""
         fluid = self.fluid
         found, start = fluid.system.active_dofs.copy(), fluid.history.past[0].velocity
         fluid.history.continue_back(dt, np.where(found, fluid.velocity() - start, 0.0) / (SHARE * dt), found)
@@ -80,5 +82,5 @@ class FlowStart:
 
 
 def _hurried(body: ImmersedBody, motion: Callable[[float], Motion], dt: float) -> ImmersedBody:
-    """With the velocity that it has dt later."""
+    """The body with the velocity that it has dt [s] later."""
     return replace(body, motion=lambda t: Motion(motion(t).x, motion(t + dt).v))

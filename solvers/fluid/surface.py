@@ -1,4 +1,4 @@
-"""Surfaces in the flow: closed, of segments or triangles, with the solid inside."""
+"""Surfaces in the flow: closed surfaces of segments or triangles around solids, and their motion."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 
-#: What fills closed contact: nothing, fluid with the pressure of its rim, or fluid that passes through it, too.
+#: Closed contact: without fluid, with the fluid pressure of its rim, or with seepage through it in addition.
 Zone = Literal["dry", "wetted", "seeping"]
 
 
 @dataclass(frozen=True)
 class ImmersedSurface:
-    """One body's surface; the right-hand normal of each facet points out of the solid."""
+    """The surface of one body. The right-hand normal of each facet points out of the solid."""
 
     name: str
     facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
     vertices: int
-    wet: NDArray[np.bool_] | None = None  #: facets that the fluid touches; the others only close the solid; None: all
-    may_part: NDArray[np.bool_] | None = None  #: facets in contact: those on the boundary of the box may leave it
-    slip_length: float = 0.0  #: shear stress = mu / slip_length times the velocity along it [m]; 0: the flow sticks
-    transmissivity: float = 0.0  #: fluid passes along it in a thin layer, this / mu grad p [m^3]; 0: there is none
-    zone: Zone = "dry"  #: what facets in contact feel where no fluid is
+    wet: NDArray[np.bool_] | None = None  #: facets that the fluid acts on; the others only close the solid; None: all
+    may_part: NDArray[np.bool_] | None = None  #: facets that take part in contact
+    slip_length: float = 0.0  #: b [m]: the shear stress is mu / b times the tangential velocity; 0: no slip
+    transmissivity: float = 0.0  #: kappa [m^3]: the flux of a layer along it is kappa / mu grad p; 0: no layer
+    zone: Zone = "dry"  #: fluid in closed contact
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Where the vertices of a surface are and how they move."""
+    """Positions and velocities of the vertices of a surface."""
 
     x: Array  #: positions [m], shape (n, dim)
     v: Array  #: velocities [m/s], shape (n, dim)
@@ -40,7 +40,7 @@ class Motion:
 def together(
     surfaces: Sequence[ImmersedSurface], motions: Sequence[Motion], dim: int
 ) -> tuple[NDArray[np.int64], Motion]:
-    """All surfaces as one: (facets, motion), vertices of one surface after those of the other."""
+    """All surfaces as one: (facets, motion), with the vertices surface by surface."""
     if not surfaces:
         return np.empty((0, dim), dtype=np.int64), Motion(np.empty((0, dim)), np.empty((0, dim)))
     starts = offsets(surfaces)[:-1]
@@ -49,13 +49,13 @@ def together(
 
 
 def wetness(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_]:
-    """Which facets of all surfaces the fluid touches."""
+    """Mask of the facets of all surfaces that the fluid acts on."""
     parts = [np.ones(len(s.facets), dtype=bool) if s.wet is None else s.wet for s in surfaces]
     return np.concatenate([*parts, np.empty(0, dtype=bool)])
 
 
 def may_close(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_] | None:
-    """Which facets of all surfaces feel fluid in closed contact; None if none do."""
+    """Mask of the facets of all surfaces with fluid pressure in closed contact; None if there are none."""
     if all(surface.zone == "dry" for surface in surfaces):
         return None
     parts = [
@@ -70,12 +70,12 @@ def seeping(surfaces: Sequence[ImmersedSurface]) -> Array | None:
 
 
 def by_facets(surfaces: Sequence[ImmersedSurface], numbers: Sequence[float]) -> Array | None:
-    """Numbers of surfaces for all of their facets; None if all are zero."""
+    """One number per surface repeated for its facets; None if all numbers are zero."""
     if not any(numbers):
         return None
     return np.concatenate([np.full(len(s.facets), number) for s, number in zip(surfaces, numbers, strict=True)])
 
 
 def offsets(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.int64]:
-    """First vertex of each surface among all, and their number."""
+    """Index of the first vertex of each surface among those of all, and at the end their count."""
     return np.concatenate([[0], np.cumsum([s.vertices for s in surfaces])]).astype(np.int64)

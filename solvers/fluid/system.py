@@ -1,4 +1,4 @@
-"""The discrete equations of the flow on one cut: residual, tangent, and the stress that bodies feel."""
+"""The discrete equations of the flow on one cut: residual, tangent and the force on surfaces."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from solvers.fluid.zone_seepage import ZoneSeepage
 
 
 class FlowSystem:
-    """Assembles the flow at the function `flow` (velocity and pressure) for the step, scales and cut taken last."""
+    """Assembles the equations at the iterate `flow` (velocity and pressure), for the present step, scales and cut."""
 
     def __init__(
         self,
@@ -60,29 +60,29 @@ class FlowSystem:
         self._outer = OuterFaces(grid, boundary, unknowns, self.terms, self.flow)
         ghost = [] if self.ghost is None else self.ghost.integrals
         fem.compile_integrals([*self.forms.integrals(), *self._outer.integrals(), *ghost], "the flow")
-        #: owned cells of the cut, uncut ones and cut ones, and forms over these and the outer faces
+        #: owned cells: uncut ones, cut ones, and those in films if there are any; forms over them and the outer faces
         self.cells: list[NDArray[np.int32]] = []
         self._residuals: list = []
         self._tangents: list = []
         self._outer_on_cut = OuterOnCut()
-        self.speed = np.zeros(len(grid.numbers))  #: largest one of a cell's scales [m/s]
-        self.fastest = 0.0
-        self.active_dofs = np.zeros(unknowns.local, dtype=bool)
-        #: the ghost penalty's share of the residual is a matrix times the flow, less that of the history
+        self.speed = np.zeros(len(grid.numbers))  #: largest |a| at the nodes of each local cell [m/s]
+        self.fastest = 0.0  #: largest |a| of all cells [m/s]
+        self.active_dofs = np.zeros(unknowns.local, dtype=bool)  #: dofs of active cells
+        #: the ghost penalty adds `ghost_matrix` times the flow to the residual, minus this part of the history
         self._ghost_history = np.zeros(unknowns.local)
         self._out = np.zeros(unknowns.local)
         self._matrix: PETSc.Mat | None = None
         self.ghost_matrix: PETSc.Mat | None = None
         self._pattern: Pattern | None = None
         self.cut: Cut | None = None
-        self.slip_length: Array | None = None  #: of the facets of all surfaces [m]; None: the flow sticks to them
-        self.transmissivity: Array | None = None  #: the same of a layer on them [m^3]; None: there is none
-        self.may_close: NDArray[np.bool_] | None = None  #: facets that feel fluid in closed contact; None: none do
+        self.slip_length: Array | None = None  #: of the facets of all surfaces [m]; None: no slip
+        self.transmissivity: Array | None = None  #: of the layer on these facets [m^3]; None: no layer
+        self.may_close: NDArray[np.bool_] | None = None  #: facets with fluid pressure in closed contact; None: none
         self._interface: InterfaceTerms | None = None
-        self.seeping: Array | None = None  #: transmissivity of facets in closed contact [m^3]; None: nothing passes
+        self.seeping: Array | None = None  #: transmissivity of facets in closed contact [m^3]; None: no seepage
         self._zone: ClosedZone | None = None
         self._seepage: ZoneSeepage | None = None
-        self._current = False  #: weights, interface and ghost penalty are those of cut and scales
+        self._current = False  #: weights, interface and ghost penalty belong to the present cut and scales
 
     def _terms(self) -> forms.Coefficients:
         settings, domain = self.settings, self.grid.domain
@@ -107,10 +107,10 @@ class FlowSystem:
     # ------------------------------------------------------------------------------------------------- a new step
 
     def begin_step(self, step: FlowStep, rate: Array, missing: NDArray[np.bool_], velocity: Array) -> None:
-        """Loads at the end of a step; all arrays at local dofs (collective).
+        """Set the time derivative, the loads at the end of a step, and the scales (collective).
 
-        u_t = alpha u - rate [m/s^2]; missing: where no step has found what the rate asks for; velocity [m/s]: for the
-        scales.
+        Arrays are at local dofs. rate: the history in u_t = alpha u - rate [m/s^2]; missing: where the history is
+        incomplete; velocity [m/s]: for the scales.
         """
         self._alpha.value = step.difference.alpha
         self.history.x.array[:] = rate
@@ -122,7 +122,7 @@ class FlowSystem:
         self.set_scales(velocity)
 
     def set_scales(self, velocity: Array) -> None:
-        """Take local velocity dofs [m/s] that scale stabilisation and penalties from now on (collective)."""
+        """Set the velocity a [m/s], at local dofs, that scales stabilisation and penalties (collective)."""
         settings, unknowns = self.settings, self.unknowns
         self._scale_velocity.x.array[:], self._current = velocity, False
         speed = np.linalg.norm(velocity[unknowns.velocity.dofs], axis=1)
@@ -136,7 +136,7 @@ class FlowSystem:
             self.ghost.set_scales(Scales(*numbers, self.speed, speed * settings.convection))
 
     def set_cut(self, cut: Cut) -> None:
-        """Take a cut; cells, faces and the matrix follow."""
+        """Set the cut: cells, faces, active dofs, and a larger sparsity pattern if it needs one (collective)."""
         if cut is self.cut:
             return
         self.cut, self._current, grid = cut, False, self.grid
@@ -147,7 +147,6 @@ class FlowSystem:
         if self.ghost is not None:
             pattern_changed = self.ghost.set_cut(cut, self.boundary.dofs)
             self.active_dofs &= ~self.ghost.undetermined
-        #: owned cells of each of the forms: uncut, cut, and those in films if there are any
         self.cells = [some[some < grid.owned] for some in (cut.uncut, cut.cut)]
         if self.settings.films and (films := film_cells(grid, cut.cut, cut.film)) is not None:
             self.cells = [self.cells[0], np.setdiff1d(self.cells[1], films, assume_unique=True), films]
@@ -166,7 +165,7 @@ class FlowSystem:
             self._allocate(self._pattern)
 
     def held(self) -> NDArray[np.bool_]:
-        """Owned dofs that are not solved for: prescribed, inactive, what the ghost penalty or coarser cells decide."""
+        """Owned dofs with rows of the identity: prescribed, inactive, hanging, and those of nodes without fluid."""
         unknowns = self.unknowns
         held = ~self.active_dofs[: unknowns.owned]
         held[self.boundary.dofs[self.boundary.dofs < unknowns.owned]] = True
@@ -177,19 +176,19 @@ class FlowSystem:
         return held
 
     def dofs_of(self, cells: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """Which local dofs belong to some local cells or, on other processes, to theirs (collective)."""
+        """Mask of the local dofs that belong to some cells; every process passes its local ones (collective)."""
         blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)
         blocks[self.unknowns.cell_blocks[cells]] = True
         blocks = fem.sum_ghosts(self.unknowns.space, blocks.astype(float)) > 0.0
         return self.unknowns.expand(blocks)
 
     def pattern_state(self) -> Array:
-        """Allocated couplings of the matrix per owned cell: couplings within it, and across its faces."""
+        """Sparsity pattern of the matrix per owned cell: whether it has couplings in the cell, and across its faces."""
         assert self._pattern is not None
         return np.stack([self._pattern.cells, self._pattern.reach], axis=1)[: self.grid.owned].astype(float)
 
     def restore_pattern(self, state: Array) -> None:
-        """Make the matrix of a saved state: the rounding of a direct solver depends on its pattern (collective)."""
+        """Allocate the matrix of a saved state: rounding in a direct solver depends on the pattern (collective)."""
         both = np.zeros((2, len(self.grid.numbers)))
         both[:, : self.grid.owned] = state.T
         cells, reach = (fem.share_owned(fem.cellwise_space(self.grid.domain), column) > 0.5 for column in both)
@@ -204,7 +203,7 @@ class FlowSystem:
         self.ghost_matrix = None
 
     def _fill_pattern(self, pattern: Pattern) -> PETSc.Mat:
-        """A matrix that has all entries of a pattern, with values that do not matter."""
+        """A matrix with all entries of a pattern; their values are arbitrary."""
         more = None if self.ghost is None else self.ghost.extra_entries()
         if self._hanging is not None:
             more = self._hanging.extra_entries() + (0 if more is None else more)
@@ -220,8 +219,8 @@ class FlowSystem:
         diagonal.set(1.0)
         matrix.setDiagonal(diagonal, addv=PETSc.InsertMode.ADD_VALUES)
         matrix.assemble()
-        # Its copy multiplies a vector 4 times as fast where this was measured (Intel's Xeon of 2024, PETSc 3.18): by
-        # BLAS, the original by a kernel that fetches blocks past the caches.
+        # A copy multiplies vectors 4 times as fast (Intel Xeon of 2024, PETSc 3.18): it uses BLAS, the original a
+        # kernel whose loads of blocks bypass the caches.
         matrix = matrix.duplicate(copy=True)
         matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
         matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)
@@ -236,18 +235,18 @@ class FlowSystem:
 
     @property
     def zone(self) -> ClosedZone | None:
-        """Closed contact that fluid reaches; None if there is none now (collective)."""
+        """Fluid pressure in closed contact; None if no contact is closed (collective)."""
         self._follow()
         return self._zone
 
     @property
     def seepage(self) -> ZoneSeepage | None:
-        """What passes through closed contact (collective)."""
+        """Seepage through closed contact; None if there is none (collective)."""
         self._follow()
         return self._seepage
 
     def _follow(self) -> None:
-        """Weights and ghost penalty as cut and scales ask for."""
+        """Update weights, interface and ghost penalty to the present cut and scales (collective)."""
         if self._current:
             return
         assert self.cut is not None
@@ -286,7 +285,7 @@ class FlowSystem:
         self.ghost_matrix.assemble()
 
     def settle(self) -> None:
-        """Give nodes that no fluid reaches their values (collective)."""
+        """Set the values of nodes without fluid by extension (collective)."""
         if self.ghost is not None:
             owned = self.unknowns.owned
             self.flow.x.array[:owned] = self.ghost.settle(self.flow.x.array[:owned])
@@ -305,7 +304,7 @@ class FlowSystem:
     # --------------------------------------------------------------------------------------- residual and tangent
 
     def residual(self) -> Array:
-        """Left-hand side of the equations at owned dofs: forces [N] of velocity rows, volume rates of pressure rows."""
+        """Residual at owned dofs (collective): forces [N] in momentum rows, flow rates [m^3/s] in continuity rows."""
         self._follow()
         assert self.ghost_matrix is not None
         assert self.cut is not None
@@ -330,7 +329,7 @@ class FlowSystem:
     def tangent(self, identity: Array, *, picard: bool) -> PETSc.Mat:
         """d(residual)/d(flow), with rows of the identity at the marked owned dofs; the next call overwrites it.
 
-        Picard: the velocity that carries momentum is taken as known; right if it is that of `set_scales`.
+        picard: u . grad u is linearised without its second term, about the velocity of `set_scales`.
         """
         self._follow()
         assert self._matrix is not None
@@ -363,7 +362,7 @@ class FlowSystem:
         return self.grid.comm.allreduce(self.interface.force(self.flow.x.array, self.cut.motion.v)) + self.zone_force()
 
     def zone_force(self) -> Array:
-        """The part of it that acts where contact is closed (collective)."""
+        """The part of `surface_force` that acts in closed contact (collective)."""
         assert self.cut is not None
         force = np.zeros_like(self.cut.motion.x)
         if (zone := self.zone) is not None:
@@ -371,7 +370,7 @@ class FlowSystem:
         return force
 
     def outer_rows(self) -> Array:
-        """Rows of tractions and outflow alone at local dofs, the ghosts' share still there."""
+        """Rows of tractions and outflow alone, at local dofs; the contributions to ghosts are not yet added up."""
         out = np.zeros(self.unknowns.local)
         for form in self._outer_on_cut.residuals:
             fem.assemble_vector(form, out)

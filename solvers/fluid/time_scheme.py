@@ -1,6 +1,6 @@
 """Backward differentiation formulas for the time derivative of the velocity.
 
-A scheme says from the lengths of the steps how much of which velocity counts. Another one is another `FlowTimeScheme`.
+A scheme gives the weights of the velocities for any sequence of step lengths. To add one, add a `FlowTimeScheme`.
 """
 
 from __future__ import annotations
@@ -21,18 +21,19 @@ class Difference:
 
 @dataclass(frozen=True)
 class FlowStep(step.Step):
-    """A step of the flow, with its rule for derivatives in time."""
+    """A step of the flow, with its difference formula."""
 
     difference: Difference
 
 
 @dataclass(frozen=True)
 class FlowTimeScheme:
-    """difference(dt, before): the rule of a step of length dt [s], from the lengths of those before, the last first."""
+    """A time scheme, defined by its difference formulas."""
 
+    #: (dt, lengths of the steps before, newest first) [s] -> formula of a step of length dt
     difference: Callable[[float, Sequence[float]], Difference]
-    times: int  #: largest number of velocities u_n, u_{n-1}, ... in a rule, and of lengths that it asks for
-    steady: bool = False  #: each step is a flow at rest of its own
+    times: int  #: largest count of velocities u_n, u_{n-1}, ... and of step lengths in a formula
+    steady: bool = False  #: each step is a steady state
 
 
 STEADY = Difference(0.0)
@@ -54,9 +55,10 @@ def bdf2(dt: float, dt_before: float) -> Difference:
 
 
 def _bdf2_started(dt: float, before: Sequence[float]) -> Difference:
-    """The first two steps are backward Euler.
+    """BDF2 after two steps of backward Euler.
 
-    Both keep the order. After a single one BDF2 would reverse half of the velocity that an impulsive start gains.
+    The order is that of BDF2. After a single step of backward Euler, BDF2 would reverse half of the velocity that an
+    impulsive start gains.
     """
     return backward_euler(dt) if len(before) < 2 else bdf2(dt, before[0])
 

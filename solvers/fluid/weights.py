@@ -1,10 +1,10 @@
-"""Integrals over cut cells and the interface in them as coefficients at quadrature points.
+"""Integrals over the fluid and the surface in cut cells, as coefficients at quadrature points.
 
 On a cell K with points x_q, weights w_q and Lagrange basis L_q on these points, a quantity c of the interface has
 
     W[c](K, q) = 1 / (w_q |K|) int_(Gamma in K) L_q c ds,   so that   sum_q w_q |K| f(x_q) W[c](K, q) = int_Gamma f c ds
 
-exactly for every f in the tensor-product space of the points (design: all physics UFL, geometry as weights).
+exactly for every f in the tensor-product space of the points. Hence weak forms need no knowledge of the cut.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from solvers.gauss import gauss
 
 
 class Weights:
-    """The coefficients of one grid: fluid part, normal and penalty; zero outside cut cells."""
+    """The coefficients of one grid: share of fluid, normal and penalty; zero outside cut cells."""
 
     def __init__(self, grid: DistributedGrid, velocity_degree: int):
         self.grid, dim, self.velocity_degree = grid, grid.dim, velocity_degree
@@ -34,7 +34,7 @@ class Weights:
         self.points = gauss(points_per_direction)[0]
         assert len(rule) == points_per_direction**dim
         self.rule = rule
-        #: kernel's number (x fastest) of each point of the rule
+        #: number in the kernel (x fastest) of each point of the rule
         self.order = _kernel_numbers(self.reference, self.points)
         shapes: dict[str, tuple[int, ...]] = {
             "fluid": (), "n": (dim,), "penalty": (dim, dim),
@@ -50,11 +50,11 @@ class Weights:
 
     @cached_property
     def pressure_table(self) -> tuple[Array, Array]:
-        """The same of the pressure."""
+        """Shape functions and reference gradients of the pressure, of the same shapes."""
         return fem.tabulate_lagrange(self.grid.domain, 1, self.reference)
 
     def set(self, cut: Cut, penalty: Array) -> None:
-        """Take a new cut and the penalty tensors [Pa s/m] of its pieces, shape (pieces, dim, dim)."""
+        """Set the coefficients to those of a cut; penalty: tensors of its pieces [Pa s/m], (pieces, dim, dim)."""
         pieces, cells = cut.pieces, cut.cut
         size, area = len(cells), pieces.moments.sum(axis=2)
         self._fill(self.fluid, cells, cut.fluid[:, self.order])

@@ -1,7 +1,7 @@
-"""The part of the box's faces that bodies leave to the fluid, where these cross or touch the boundary of the box.
+"""The wet part of the faces of the box, where bodies cross or touch its boundary.
 
 On a face of a cell with Gauss points x_q, tensor weights w_q and Lagrange basis L_q on these points, the wet weights
-are w_q - int_solid L_q dA / A: they integrate polynomials of the points' degree exactly over the fluid's part.
+are w_q - int_solid L_q dA / A. They integrate polynomials of the degree of the basis exactly over the wet part.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ Facets = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class WetFace:
-    """One face of the box; its cells' faces are numbered with the lowest direction fastest."""
+    """The cells on one face of the box that solids cover in part or whole."""
 
-    cells: NDArray[np.int64]  #: numbers of the faces of cells that solids cover in part or whole
-    weights: Array  #: wet weights of these, shape (cells, points), points with the lowest direction fastest
+    cells: NDArray[np.int64]  #: their numbers on the face, the lowest direction fastest
+    weights: Array  #: their wet weights, shape (cells, points), points with the lowest direction fastest
 
 
 def wet_face(box: Grid, face: str, points: Array, facets: Facets, motion: Motion) -> WetFace:
-    """What closed surfaces leave of a face such as 'x-'; `points` (n,) are Gauss points on [0, 1].
+    """The part of a face of the box such as 'x-' that closed surfaces do not cover; points: Gauss points on [0, 1].
 
-    Where facets lie in the plane of the face but for rounding, the surfaces are cut a little further inwards.
+    If facets lie in the plane of the face up to rounding, the surfaces are cut a little further inwards.
     """
     axis, edge = "xyz".index(face[0]), box.edges["xyz".index(face[0])]
     plane, inwards = (edge[0], 1.0) if face[1] == "-" else (edge[-1], -1.0)
@@ -60,7 +60,7 @@ def wet_face(box: Grid, face: str, points: Array, facets: Facets, motion: Motion
 
 
 def _crossings(corners: Array, axis: int, place: float) -> tuple[Array, Array]:
-    """Where segments cross a line, and how much solid begins there going upwards: 1 or -1."""
+    """(coordinate [m] at which each segment crosses a line, 1 if solid begins there going upwards, -1 if it ends)."""
     other, (a, b) = 1 - axis, (corners[:, 0], corners[:, 1])
     along = b - a
     share = (place - a[:, axis]) / along[:, axis]
@@ -69,7 +69,7 @@ def _crossings(corners: Array, axis: int, place: float) -> tuple[Array, Array]:
 
 
 def _line(edge: Array, points: Array, at: Array, begins: Array) -> tuple[Array, Array]:
-    """(int_solid L_q / h of each cell of a line, the solid's share of it) from what begins where."""
+    """(int_solid L_q / h, share of solid) of each cell of a line, from the crossings `at` and their signs `begins`."""
     start = np.clip((at[:, None] - edge[:-1]) / np.diff(edge), 0.0, 1.0)  # of the solid in each cell, if it begins
     nodes, weights = gauss(len(points))
     t = start[:, :, None] + (1.0 - start[:, :, None]) * nodes
@@ -80,7 +80,7 @@ def _line(edge: Array, points: Array, at: Array, begins: Array) -> tuple[Array, 
 
 
 def _segments(x: Array, triangles: Facets, axis: int, place: float) -> Array:
-    """Where triangles cut a plane, solid on the left of each segment, shape (triangles, 2 ends, 2 directions)."""
+    """Segments in which triangles cut a plane, with solid on their left, shape (triangles, 2 ends, 2 directions)."""
     others = [i for i in range(3) if i != axis]
     ends = np.empty((len(triangles), 2, 2))
     for row, triangle in enumerate(triangles):
@@ -99,7 +99,7 @@ def _segments(x: Array, triangles: Facets, axis: int, place: float) -> Array:
 
 
 def _plane(edges: list[Array], points: Array, x: Array, segments: Facets) -> tuple[Array, Array]:
-    """The same of each cell of a plane, from the segments around the solid."""
+    """(int_solid L_q / area, share of solid) of each cell of a plane, from the segments around the solid."""
     count = int(np.prod([len(edge) - 1 for edge in edges]))
     if not len(segments):
         return np.zeros((count, len(points) ** 2)), np.zeros(count)

@@ -1,12 +1,13 @@
-"""Closed contact that fluid reaches: the pressure in the zone where surfaces touch and no cell has fluid.
+"""Fluid pressure in closed contact: on facets that touch another surface, so that no cell of the flow is in front.
 
-Facets in contact are wet, dry, or both in part. On their dry part D the pressure P is that of a thin layer at rest, and
-on the wet facets W around, the rim, it is the p of the flow; P is linear on facets, continuous, and minimises
+A facet in contact has a wet part, a dry part D, or both. On D the pressure P is that of a thin layer of fluid, and on
+the wet parts W around it, the rim, P is the pressure p of the flow. P is continuous, linear on facets, and minimises
 
     1/2 int_D |grad_t P|^2 ds + 1/2 sum_W beta / h^2 int_W (P - p)^2 ds,    h^(dim-1): size of a facet,
 
-so that div_t(grad_t P) = 0 and P = p at the rim. The zone gives the body the force int_D P n N_b ds beside that of the
-flow. With a facet that opens or closes, wet and dry part change by turns: what it feels stays p = P.
+so that div_t(grad_t P) = 0 on D and P = p at the rim. The force of the zone on the body is int_D P n N_b ds, in
+addition to that of the flow. While a facet opens or closes, D shrinks or grows continuously and p = P at its boundary,
+so that the force is continuous.
 """
 
 from __future__ import annotations
@@ -26,30 +27,30 @@ from solvers.fluid.interface import InterfaceTerms
 from solvers.fluid.shape import normal_derivative
 from solvers.tessellation import area_vectors
 
-#: beta; what P misses of p at the rim is of its size^-1.
+#: beta; the difference of P and p at the rim is proportional to 1 / beta.
 RIM = 1e4
-#: Share of a facet that does not count: rounding of areas.
+#: Smallest dry or wet share of a facet, above the rounding of areas.
 SLIVER = 1e-9
-#: Share of beta with which P is zero where no rim is.
+#: Share of beta that penalises P everywhere: it makes P zero in a zone without rim.
 NO_RIM = 1e-15
 
 
 @dataclass(frozen=True)
 class Facets:
-    """Those of the zone and of its rim, the same on every process; m facets with d = dim vertices."""
+    """Facets of the zone and of its rim, the same on every process: m facets with d = dim vertices each."""
 
-    numbers: NDArray[np.int64]  #: among those of all surfaces, shape (m,)
-    corners: NDArray[np.int64]  #: numbers in `vertices`, shape (m, d)
-    vertices: NDArray[np.int64]  #: of the flow's surfaces
-    x: Array  #: shape (m, d, dim)
+    numbers: NDArray[np.int64]  #: number of each among the facets of all surfaces, shape (m,)
+    corners: NDArray[np.int64]  #: indices into `vertices`, shape (m, d)
+    vertices: NDArray[np.int64]  #: numbers among the vertices of all surfaces, shape (n,)
+    x: Array  #: positions of the corners [m], shape (m, d, dim)
     n: Array  #: unit normals out of the fluid, shape (m, dim)
     size: Array  #: [m^(dim-1)], shape (m,)
     dry: Array  #: int_D lambda_v lambda_w ds, shape (m, d, d)
-    wet: Array  #: int_W lambda_v lambda_w ds, zero where it is no rim, shape (m, d, d)
+    wet: Array  #: int_W lambda_v lambda_w ds, zero on facets that are not of the rim, shape (m, d, d)
 
     @property
     def rim(self) -> Array:
-        """beta / h^2."""
+        """beta / h^2 [1/m^2], shape (m,)."""
         return RIM * self.size ** (-2.0 / (self.x.shape[2] - 1))
 
     def add_up(self, by_facet: Array) -> Array:
@@ -60,7 +61,10 @@ class Facets:
 
 
 def find_facets(cut: Cut, at: InterfaceTerms, may_close: NDArray[np.bool_], comm: MPI.Comm) -> Facets | None:
-    """None without a zone; may_close: facets that take part in contact (collective)."""
+    """Facets of the zone of a cut; None if there is no zone (collective).
+
+    at: terms of the wet pieces of surface; may_close: which facets take part in contact.
+    """
     d, x = cut.facets.shape[1], cut.motion.x[cut.facets]
     wet = np.zeros((len(cut.facets), d, d))
     np.add.at(wet, at.facet, at.mass_of_pieces)
@@ -83,13 +87,13 @@ def find_facets(cut: Cut, at: InterfaceTerms, may_close: NDArray[np.bool_], comm
 
 
 def find_zone(cut: Cut, at: InterfaceTerms, may_close: NDArray[np.bool_], comm: MPI.Comm) -> ClosedZone | None:
-    """That of a cut; None if all facets that may close are wet (collective)."""
+    """The zone of a cut; None if all facets that may close are wet (collective)."""
     facets = find_facets(cut, at, may_close, comm)
     return None if facets is None else ClosedZone(facets, at, comm)
 
 
 class ClosedZone:
-    """Pressure and force of the zone for the pressure of the flow."""
+    """Pressure and force of the zone as linear functions of the pressure of the flow."""
 
     def __init__(self, facets: Facets, at: InterfaceTerms, comm: MPI.Comm):
         self.facets, self.comm, m = facets, comm, len(facets.size)
@@ -97,7 +101,7 @@ class ClosedZone:
         row = np.searchsorted(facets.numbers, at.facet)
         row[row == m] = 0
         rim = facets.wet.any(axis=(1, 2))
-        self._pieces = np.flatnonzero((facets.numbers[row] == at.facet) & rim[row])  #: those of the rim
+        self._pieces = np.flatnonzero((facets.numbers[row] == at.facet) & rim[row])  #: pieces of the rim
         self._facet = row[self._pieces]
         self._p, self._psi = at.p[self._pieces], at.psi[self._pieces]
         ones = (1.0 + np.eye(d)) / (d * (d + 1))
@@ -111,11 +115,11 @@ class ClosedZone:
 
     @property
     def share(self) -> Array:
-        """Of each facet, what is dry, shape (m,)."""
+        """Dry share of each facet, shape (m,)."""
         return self.facets.dry.sum(axis=(1, 2)) / self.facets.size
 
     def _at_rim(self, by_piece: Array) -> Array:
-        """Sums over the pieces of each facet on all processes (collective)."""
+        """Sums over the rim's pieces of each facet on all processes, shape (m, ...) (collective)."""
         total = np.zeros((self._shape[0], *by_piece.shape[1:]))
         np.add.at(total, self._facet, by_piece)
         return self.comm.allreduce(total)
@@ -125,23 +129,23 @@ class ClosedZone:
         return self._at_rim(np.einsum("pav,pa->pv", self._psi, flow[self._p]))
 
     def pressure(self, flow: Array) -> Array:
-        """P [Pa] at `vertices` for the flow at local dofs (collective)."""
+        """P [Pa] at `vertices`, shape (n,), for the flow at local dofs (collective)."""
         facets = self.facets
         return self._solve(facets.add_up(facets.rim[:, None] * self._trace(flow)))
 
     def _load(self, P: Array) -> Array:
-        """int_D P lambda_v ds, shape (m, d)."""
+        """int_D P lambda_v ds [N], shape (m, d)."""
         return np.einsum("fvw,fw->fv", self.facets.dry, P[self.facets.corners])
 
     def force(self, P: Array) -> Array:
-        """On `vertices` [N], shape (n, dim)."""
+        """Force [N] of the zone on `vertices`, shape (n, dim)."""
         return self.facets.add_up(self._load(P)[:, :, None] * self.facets.n[:, None, :])
 
     # ----------------------------------------------------------------------------------------------- derivatives
 
     @cached_property
     def by_pressure(self) -> tuple[NDArray[np.int32], Array]:
-        """(local dofs of the rim's pressure, dP at `vertices` by them)."""
+        """(local pressure dofs of the rim, derivatives of P at `vertices` by them, shape (n, dofs))."""
         dofs, column = np.unique(self._p, return_inverse=True)
         facets, column = self.facets, column.reshape(self._p.shape)
         right = np.zeros((len(facets.vertices), len(dofs)))
@@ -150,7 +154,7 @@ class ClosedZone:
         return dofs, self._solve(right) if len(dofs) else right
 
     def force_by_flow(self) -> tuple[NDArray[np.int32], Array]:
-        """(dofs, d force at `vertices` by them, shape (n, dim, dofs))."""
+        """(local pressure dofs of the rim, derivatives of the force on `vertices` by them, shape (n, dim, dofs))."""
         dofs, slope = self.by_pressure
         return dofs, self._force_by_pressure(slope)
 
@@ -160,9 +164,10 @@ class ClosedZone:
         return facets.add_up(facets.n[:, None, :, None] * load[:, :, None, :])
 
     def force_by_motion(self, flow: Array) -> Array:
-        """d force by positions of `vertices` and the trace of p that moves with them, shape (n, dim, n, dim).
+        """Derivatives of the force by the positions of `vertices`, shape (n, dim, n, dim) (collective).
 
-        Shares of the dry part stay, as those of the pieces do in `shape` (collective).
+        They include that of the trace of p, which moves with the surface. The dry share of a facet is held constant, as
+        the shares of pieces are in `shape`.
         """
         facets, (count, dim) = self.facets, (len(self.facets.vertices), self.facets.x.shape[2])
         P, trace = self.pressure(flow), self._trace(flow)
@@ -194,7 +199,7 @@ def stiffness(x: Array, size: Array) -> Array:
 
 
 def stiffness_by_motion(x: Array, size: Array, grown: Array, P: Array) -> Array:
-    """d (K P)_v by x_wj, shape (m, d, d, dim), K of `stiffness`; grown: d ln(size), shape (m, d, dim).
+    """Derivatives of (K P)_v by x_wj, shape (m, d, d, dim), with K of `stiffness`; grown: d ln(size), (m, d, dim).
 
     With edges J = x^T G and g = J^T J: K = |f| G g^-1 G^T, dg = dJ^T J + J^T dJ.
     """
@@ -209,7 +214,7 @@ def stiffness_by_motion(x: Array, size: Array, grown: Array, P: Array) -> Array:
 
 
 def _edges(x: Array) -> tuple[Array, Array, Array]:
-    """(G, J, g^-1)."""
+    """(G: gradients in the reference simplex, (d, d - 1); J, (m, dim, d - 1); g^-1, (m, d - 1, d - 1))."""
     d = x.shape[1]
     G = np.concatenate([-np.ones((1, d - 1)), np.eye(d - 1)])
     J = np.einsum("fvj,va->fja", x, G)

@@ -1,4 +1,4 @@
-"""What closed contact adds to the blocks of a monolithic system."""
+"""Contribution of closed contact to the coupling blocks of a monolithic system."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from solvers.sparse import Sparse, nothing, sparse_from_entries
 def with_zone(
     entries: InterfaceEntries, zone: ClosedZone, unknowns: Unknowns, flow: Array, vertices: NDArray[np.int64]
 ) -> InterfaceEntries:
-    """Entries for the motion of some vertices with the derivatives of the zone's force; `flow` at local dofs.
+    """Interface entries plus the derivatives of the zone's force (collective).
 
-    Collective.
+    flow: values at local dofs; vertices: those whose motion the entries are for.
     """
     dim, number = zone.facets.n.shape[1], np.full(1 + max(vertices.max(), zone.facets.vertices.max()), -1)
     number[vertices] = np.arange(len(vertices))
@@ -32,7 +32,7 @@ def with_zone(
     into_force = _dense(rows, dofs, by_flow[kept].reshape(len(rows), -1), (n, unknowns.local))
     if unknowns.grid.comm.size > 1:
         into_force = into_force.with_columns(unknowns.global_dofs, unknowns.size())
-    first = unknowns.grid.comm.rank == 0  # all processes know it
+    first = unknowns.grid.comm.rank == 0  # all processes have this block; one adds it
     shape = _dense(rows, rows, by_motion, (n, n)) if first else nothing((n, n))
     return replace(
         entries,

@@ -1,10 +1,11 @@
-"""Fluid that passes through closed contact: the layer of `seepage` where no flow is in front of it.
+"""Seepage through closed contact: the layer of `seepage` where no cell of the flow is in front of it.
 
-With the pressure P = E p of `zone`, linear on facets and fixed by the p of the flow at the rim, the rows of volume have
+With the pressure P = E p of `zone`, linear on facets and determined by the p of the flow at the rim, the continuity
+equation has the term
 
     sum over facets of kappa / mu int_D grad_t P . grad_t Q ds,   Q = E q,
 
-beside <q, div u>: what leaves the flow at one side of the zone comes back at the other, as E 1 = 1.
+in addition to <q, div u>. It conserves volume, because E 1 = 1: the flux into the zone equals that out of it.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from solvers.sparse import Sparse, sparse_from_entries
 
 
 class ZoneSeepage:
-    """Terms of one zone."""
+    """The term of one zone."""
 
     def __init__(self, zone: ClosedZone, mobility: Array):
         """mobility: kappa / mu of the facets of all surfaces [m^3/Pa s]."""
@@ -42,7 +43,7 @@ class ZoneSeepage:
         return self._matrix @ self._zone.pressure(flow)
 
     def leak(self, flow: Array) -> float:
-        """All that enters, which is what comes out (collective)."""
+        """Flow rate [m^3/s] through the zone, half of the sum of all fluxes into and out of it (collective)."""
         return 0.5 * float(np.abs(self.flux(flow)).sum())
 
     def add_rows(self, out: Array, flow: Array) -> None:
@@ -52,7 +53,7 @@ class ZoneSeepage:
         out[dofs] += E.T @ flux
 
     def added_to(self, matrix: PETSc.Mat, unknowns: Unknowns) -> PETSc.Mat:
-        """A tangent with E^T K E, which couples all of the rim, as a new matrix (collective)."""
+        """A new matrix: the tangent plus E^T K E, which couples all pressure dofs of the rim (collective)."""
         dofs, E = self._zone.by_pressure
         columns = [unknowns.global_dofs[dofs], E]
         parts = self._zone.comm.allgather(columns)
