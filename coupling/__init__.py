@@ -1,4 +1,4 @@
-"""Fluid and structure together: what they exchange, and the schemes that bring them into balance."""
+"""Coupling of a flow with solids: interface operators, and partitioned and monolithic schemes."""
 
 from solvers.lazy import lazy_names
 

@@ -1,6 +1,6 @@
-"""Fixed-point iterations d -> D(d) made faster: constant relaxation, Aitken's, interface quasi-Newton.
+"""Accelerators of fixed-point iterations d -> D(d): constant relaxation, Aitken's, interface quasi-Newton.
 
-r = D(d) - d is the residual of the interface. All arrays are whole on every process.
+r = D(d) - d is the residual of the interface. Arrays are the same on every process.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from solvers.api import Array, State
 
 
 class Accelerator(Protocol):
-    """Remembers iterates of this step and perhaps of earlier ones."""
+    """Computes the next iterate from those of this step and of earlier ones."""
 
     def begin_step(self) -> None: ...
 
@@ -23,7 +23,7 @@ class Accelerator(Protocol):
         ...
 
     def forget(self) -> None:
-        """The map has changed (contact opened or closed): earlier differences do not hold any more."""
+        """Discard all differences: the map has changed, because contact opened or closed."""
         ...
 
     def save(self) -> State: ...
@@ -85,12 +85,12 @@ class Aitken:
 
 
 class QuasiNewton:
-    """IQN-ILS: the least-squares combination of known differences that makes the residual vanish.
+    """IQN-ILS: the combination of earlier differences that minimises the residual in the least-squares sense.
 
-    Columns of V are differences of r, those of W of D(d), newest first, this step's and those of `reuse` steps before;
-    with V = Q R and R a = -Q^T r the next iterate is D(d) + W a. Columns that depend on newer ones are dropped:
-    |R_ii| < `filter` |V_i|. Sources: Degroote, Bathe, Vierendeels, Comput. Struct. 87 (2009) 793-801; Haelterman,
-    Bogaers, Scheufele, Uekermann, Mehl, Comput. Struct. 171 (2016) 9-17 (filter).
+    Columns of V are differences of r, those of W differences of D(d), newest first, of this step and of `reuse` steps
+    before. With V = Q R and R a = -Q^T r the next iterate is D(d) + W a. Columns that depend on newer ones,
+    |R_ii| < `filter` |V_i|, are dropped. Sources: Degroote, Bathe, Vierendeels, Comput. Struct. 87 (2009) 793-801;
+    Haelterman, Bogaers, Scheufele, Uekermann, Mehl, Comput. Struct. 171 (2016) 9-17 (filter).
     """
 
     def __init__(self, first: float = 0.1, reuse: int = 8, filter: float = 0.1):
@@ -123,7 +123,7 @@ class QuasiNewton:
         return (mapped + W[:, kept] @ a).reshape(d.shape)
 
     def independent(self, V: Array) -> list[int]:
-        """Columns that do not depend on newer ones, by modified Gram-Schmidt."""
+        """Indices of the columns that do not depend on newer ones, by modified Gram-Schmidt."""
         basis: list[Array] = []
         kept = []
         for index in range(min(V.shape)):
@@ -149,7 +149,7 @@ class QuasiNewton:
         self._before = None
 
 
-#: Name in the case file -> accelerator, from the share of the first correction that is taken and the steps reused.
+#: Name in the case file -> (factor of the first correction, count of reused steps) -> accelerator.
 ACCELERATORS: Mapping[str, Callable[[float, int], Accelerator]] = {
     "iqn": QuasiNewton,
     "aitken": lambda first, reuse: Aitken(first),

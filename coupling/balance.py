@@ -1,4 +1,4 @@
-"""Balances of the interface: the load in the solid's balance against the force of the fluid, as forces and as work."""
+"""Balances of the interface: the load in the balance of the solid against the force of the fluid, force and work."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from coupling.interface import Interface
 from coupling.ports import Flow, Solid
 from solvers.api import Array, State
 
-#: columns of the history -> attributes
+#: Columns of the history -> attributes of `Balance`.
 COLUMNS = {
     "interface.force": "force",
     "interface.momentum": "momentum",
@@ -21,28 +21,28 @@ COLUMNS = {
 class Balance:
     """Residuals of force and work of the last step.
 
-    With the fluid's force f at the end of the step and f_n at its start, the load in the solid's balance is the mean
-    m = w f + (1 - w) f_n. It is compared with b, which is computed without it: the sum of inertia, damping, inner
-    forces, own loads and contact.
+    Let f be the force of the fluid at the end of the step and f_n that at its start. The load in the balance of the
+    solid is the mean m = w f + (1 - w) f_n. It is compared with b, which is computed without it: the sum of inertia,
+    damping, internal forces, own loads and contact.
 
         force = |b - m| / |m|,  work = sum over steps of b . (d - d_n) - dt f . g
     """
 
     def __init__(self, flow: Flow, solid: Solid, interface: Interface) -> None:
         self._flow, self._solid, self._interface = flow, solid, interface
-        self.force = 0.0  #: |load that the solid took - mean load by the fluid| / |that load|, 1
-        self.momentum = 0.0  #: |force on all bodies - what it is by the momentum of the fluid| [N]
-        self.power = 0.0  #: of the fluid on the solid [W]
-        self.loss = 0.0  #: power that the method takes from the fluid [W]
-        self.work = 0.0  #: of the solid's load less that of the fluid's force, all steps [J]
-        self.given: Array  #: load [N] by the fluid at the end of the last step, as `Solid.reduced` has it
+        self.force = 0.0  #: |b - m| / |m| of the last step, dimensionless
+        self.momentum = 0.0  #: |force on all bodies - that by the balance of momentum of the fluid| [N]
+        self.power = 0.0  #: power of the fluid on the solid [W]
+        self.loss = 0.0  #: power that the fluid loses by the method [W]
+        self.work = 0.0  #: work of b minus that of f, sum over all steps [J]
+        self.given: Array  #: generalised force of the fluid at the end of the last step, see `Solid.reduced`
 
     def start(self) -> None:
-        """The state before the first step; the solid starts without the fluid's force."""
+        """Set the force at the start: that of the initial balance of the solid."""
         self.given = self._solid.taken_at_start()
 
     def add_step(self, dt: float) -> None:
-        """After both have accepted a step of length dt [s]."""
+        """Compute the balances of a step of length dt [s] that both parts have accepted."""
         flow, interface, solid = self._flow, self._interface, self._solid
         by_surface = flow.force()
         at_vertices = interface.join(by_surface)

@@ -1,4 +1,4 @@
-"""The matrix of a monolithic Newton step, field by field."""
+"""The matrix of a monolithic Newton iteration as blocks of fields."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from solvers.rows import Numbering, RowTransformation, TakenRows, transform_rows
 
 @dataclass
 class Blocks:
-    """[[solid, into_solid], [into_flow, flow]]."""
+    """The blocks [[solid, into_solid], [into_flow, flow]]."""
 
     solid: PETSc.Mat
     into_solid: PETSc.Mat
@@ -20,7 +20,7 @@ class Blocks:
     flow: PETSc.Mat
 
     def create_vectors(self) -> tuple[PETSc.Vec, PETSc.Vec]:
-        """Two vectors with, on each process, the solid's rows and then the flow's."""
+        """Two vectors; each process has the rows of the solid, then those of the flow."""
         own = self.solid.getLocalSize()[0] + self.flow.getLocalSize()[0]
         vector = PETSc.Vec().create(comm=self.flow.comm)
         vector.setSizes((own, None))
@@ -28,23 +28,26 @@ class Blocks:
         return vector, vector.duplicate()
 
     def transform(self, change: RowTransformation, b: PETSc.Vec, numbering: Numbering) -> TakenRows:
-        """Eliminate the multipliers of contact; the solid's rows and those of b change (collective)."""
+        """Eliminate the multipliers of contact (collective). The rows of the solid and of b change in place.
+
+        Returns the rows before the change, from which `Solid.recover` computes the multipliers.
+        """
         rows = PETSc.Mat().createNest([[self.solid, self.into_solid]], comm=self.flow.comm)
         rows, taken = transform_rows(rows.convert(PETSc.Mat.Type.AIJ, PETSc.Mat()), b, change, numbering)
         self.solid, self.into_solid = numbering.split(rows)
         return taken
 
     def hold(self, part: Solid, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Rows of prescribed displacements ask for what x has there (collective)."""
+        """Replace the rows of prescribed displacements by du = x; b changes in place (collective)."""
         own = self.solid.getLocalSize()[0]
         beside = [self.solid, self.into_solid]
         self.solid, self.into_solid = part.impose_rows(beside, x.array[:own], b.array[:own])
 
     def nested(self) -> PETSc.Mat:
-        """The matrix that still consists of the blocks."""
+        """The matrix as a nested matrix of the blocks."""
         blocks = [[self.solid, self.into_solid], [self.into_flow, self.flow]]
         return PETSc.Mat().createNest(blocks, comm=self.flow.comm)
 
     def assembled(self) -> PETSc.Mat:
-        """The same as one sparse matrix."""
+        """The matrix as one sparse matrix."""
         return self.nested().convert(PETSc.Mat.Type.AIJ, PETSc.Mat())

@@ -17,9 +17,9 @@ from solvers.structure.supports import prescribe, symmetric_dofs
 
 
 def contact_surface(bodies: Sequence[Body], body: str, *surfaces: str) -> Surface:
-    """Named surfaces of one of the bodies of a structure as one, whole on every process (collective).
+    """Named surfaces of one body of a structure as one contact surface, the same on every process (collective).
 
-    `bodies`: all bodies of the structure in their order, which numbers the dofs.
+    bodies: all bodies of the structure, in the order in which their dofs are numbered.
     """
     index = next(i for i, other in enumerate(bodies) if other.name == body)
     chosen, comm = bodies[index], bodies[index].domain.comm

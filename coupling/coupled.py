@@ -1,4 +1,4 @@
-"""A solid and a flow with their interface: what both coupling schemes share."""
+"""A solid, a flow and their interface: the steps and states that both coupling schemes share."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from solvers.api import Array, State
 
 
 class Coupled:
-    """The two parts at one time; collective calls."""
+    """The two parts and their interface; all calls are collective."""
 
     def __init__(self, flow: Flow, solid: Solid, dry_sides: Sequence[DrySide] = (), start: Start | None = None):
         self.flow, self.solid, self.start = flow, solid, start
-        self.notes: list[str] = []  #: what the user should know of the start
+        self.notes: list[str] = []  #: notes to the user on the start
         self.interface = Interface(solid, flow.scheme.times, dry_sides)
         self.balance = Balance(flow, solid, self.interface)
 
     def initialise(self, t: float, dt: float, *, with_solid: bool = False) -> None:
-        """Both at the first time, the flow around the solid as it starts; with_solid: solved as one."""
+        """Set both parts to the first time, and cut the flow by the solid; with_solid: see `Flow.move`."""
         self.solid.initialise(t, dt)
         self.interface.initialise()
         self.flow.initialise(t, dt)
@@ -28,15 +28,15 @@ class Coupled:
         self.balance.start()
 
     def begin_step(self, t: float, dt: float) -> None:
-        """Boundary and loads at t + dt, both as they were at t."""
+        """Set boundary values and loads to t + dt; both parts keep their state at t."""
         self.flow.begin_step(t, dt)
         self.interface.begin_step(self.flow.current.difference)
         self.solid.begin_step(t, dt)
 
     def predict(self, t: float) -> None:
-        """Predict both at t.
+        """Set the predictors of both parts for the time t [s].
 
-        Cut the grid at the old positions before that: cells that the surface leaves keep their ghost penalty.
+        Cut the grid at the old positions before that, so that cells that the surface leaves have the ghost penalty.
         """
         self.flow.predict()
         self.solid.predict(t)
@@ -48,7 +48,7 @@ class Coupled:
         self.balance.add_step(self.flow.current.dt)
 
     def take_notes(self) -> tuple[str, ...]:
-        """What the user should know of this step, and once of the start."""
+        """Notes to the user on this step; those on the start are returned once."""
         notes = (*self.notes, *self.flow.notes)
         self.notes.clear()
         return notes

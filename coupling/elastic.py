@@ -1,4 +1,4 @@
-"""Elastic bodies as the solid of a coupled system: a structure with the surfaces that the fluid touches."""
+"""Elastic bodies as the solid of a coupled system: a structure and its wetted surfaces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from solvers.vertices import VertexJacobian
 
 
 class Elastic:
-    """A `Solid`. Each dof of a vertex is an unknown of the structure."""
+    """Implements `Solid`. Each dof of a vertex is an unknown of the structure."""
 
     def __init__(self, structure: Structure, surfaces: Sequence[WettedSurface]):
         self.structure = structure
@@ -41,7 +41,7 @@ class Elastic:
         self.predictor.add(t, self.structure.old.u)
 
     def predict(self, t: float) -> None:
-        """Displacements on a parabola, unless the structure has a predictor of its own."""
+        """Extrapolate displacements by a parabola, unless the structure has a predictor of its own."""
         held, now = self.structure.held, self.structure.now
         own_predictor = not np.array_equal(held.free_part(now.u), held.free_part(self.structure.old.u))
         if not self.comm.allreduce(own_predictor, op=MPI.LOR):
@@ -69,7 +69,7 @@ class Elastic:
         self.structure.load(self.spread(force))
 
     def spread(self, force: Array) -> Array:
-        """Forces [N] on vertices as owned dofs of the structure."""
+        """Forces [N] at owned dofs of the structure, from those on vertices (n, dim)."""
         local = self.dofs - self.structure.layout.start
         mine = (local >= 0) & (local < self.size)
         total = np.zeros(self.size)
@@ -80,9 +80,9 @@ class Elastic:
         return force.ravel()
 
     def taken(self) -> Array:
-        """The residual of inertia, damping, inner forces, own loads and contact, averaged over the step.
+        """The residual of inertia, damping, internal forces, own loads and contact, averaged over the step.
 
-        The reaction of a support balances any load: at prescribed components it is the given load.
+        At prescribed components it is the load of the flow itself, because the reaction of a support balances any load.
         """
         structure, weight = self.structure, self.force_weight
         handed_over = weight * structure.now.surface + (1.0 - weight) * structure.old.surface
@@ -158,7 +158,7 @@ class Elastic:
         return {} if contact is None else contact.numbers()
 
     def save(self) -> State:
-        """The predictor has three displacements at all times, so that all states have the same parts."""
+        """All states have three displacements of the predictor, so that they have the same parts."""
         displacements = [*self.predictor.displacements, *[self.structure.now.u] * 3][:3]
         by_name: State = {str(i): self.structure.per_body(u) for i, u in enumerate(displacements)}
         return self.structure.save() | {"predictor": by_name | {"times": list(self.predictor.times)}}

@@ -1,4 +1,4 @@
-"""The start of elastic bodies in a flow: what a step resolves accelerates, the rest of their deformation is at rest."""
+"""The start of elastic bodies in a flow: start steps that remove accelerations which time steps do not resolve."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from coupling.elastic import Elastic
 from solvers.api import Array
 from solvers.structure.first_state import SmoothAcceleration
 
-#: n steps leave (1 + n x) / (1 + x)^n, x = (omega dt)^2, of a motion of frequency omega.
+#: n steps leave the share (1 + n x) / (1 + x)^n, x = (omega dt)^2, of a motion of frequency omega.
 STEPS = 6
 
 
 class ElasticStart:
-    """A `StartOfSolid`."""
+    """Implements `StartOfSolid`."""
 
     steps = STEPS
 
@@ -31,13 +31,13 @@ class ElasticStart:
         return self._structure.comm.allreduce(largest, op=MPI.MAX)
 
     def step(self, t: float, dt: float) -> AbstractContextManager[None]:
-        """Supports accelerate as they are asked to."""
+        """Begin a start step in which supports have their prescribed accelerations."""
         structure = self._structure
         accelerated = structure.now.u + dt**2 * structure.now.a
         held = structure.held.stopped(np.empty(0, dtype=np.int64), accelerated)
         return structure.by(SmoothAcceleration(), held, t, dt)
 
     def end(self) -> None:
-        """Less the displacement that the last acceleration would have made in each of the steps."""
+        """Set the displacement u_0 + sum_k (du_k - du_n), see `coupling.start`."""
         now, old = self._structure.now, self._structure.old
         self._structure.take_start(now.u - self.steps * (now.u - old.u))

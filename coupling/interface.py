@@ -1,4 +1,4 @@
-"""The wetted surfaces: vertices that solid and fluid share, and their motion."""
+"""The interface: vertices of the wetted surfaces, which solid and fluid share, and their motion."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from solvers.fluid.time_scheme import STEADY, Difference
 
 @dataclass(frozen=True)
 class DrySide:
-    """The line that closes the solid behind a wetted surface with two ends, 2D.
+    """The line that closes the solid behind a wetted surface with two ends, in 2D.
 
-    It goes from the end of the surface along corners that stay in their place to its start.
+    It leads from the end of the surface along fixed corners to its start.
     """
 
-    name: str  #: of its surface in the fluid
+    name: str  #: name of this surface in the fluid
     behind: str  #: name of the wetted surface
-    ends: tuple[int, int]  #: vertices of that at its end and at its start
+    ends: tuple[int, int]  #: vertices of the wetted surface at its end and at its start
     corners: Array  #: positions [m], shape (n, dim)
 
     def motion(self, wetted: Motion) -> Motion:
-        """That of its vertices: those of the wetted surface's ends first and last."""
+        """Motion of its vertices; the first and the last are the ends of the wetted surface."""
         end, start = self.ends
         x = np.concatenate([wetted.x[[end]], self.corners, wetted.x[[start]]])
         v = np.concatenate([wetted.v[[end]], np.zeros_like(self.corners), wetted.v[[start]]])
@@ -34,43 +34,43 @@ class DrySide:
 
 
 class Interface:
-    """All wetted surfaces, vertices of one after those of the other; `dry_sides` close those with two ends.
+    """All wetted surfaces, with vertices surface by surface; `dry_sides` close those with two ends.
 
-    The velocity of the surface in the fluid follows from the displacements by the fluid's own time rule,
+    The velocity of the surface in the fluid follows from the displacements by the difference formula of the fluid,
     g = alpha d_{n+1} - sum_k beta_k d_{n-k}, so that fluid and surface sweep the same volume.
     """
 
     def __init__(self, solid: Solid, times: int, dry_sides: Sequence[DrySide] = ()):
-        """times: how many times behind the rule may ask for."""
+        """times: count of earlier displacements in the difference formula."""
         self.solid, self.surfaces, self.dry_sides = solid, list(solid.surfaces), list(dry_sides)
         self.points = np.concatenate(list(solid.surfaces.values()))
         self._ends = np.cumsum([len(points) for points in solid.surfaces.values()])[:-1]
         self.now = np.zeros_like(self.points)
-        self.past = [self.now] * max(1, times)  #: displacements [m] at the times behind, the last one first
+        self.past = [self.now] * max(1, times)  #: displacements [m] at earlier times, newest first
         self._difference = STEADY
 
     def initialise(self) -> None:
-        """The solid is where it starts."""
+        """Set all displacements to those of the solid at the start."""
         self.now = self.displacement()
         self.past = [self.now] * len(self.past)
 
     def begin_start(self, difference: Difference, velocity: Array) -> None:
-        """The place now is the first one, left with these velocities [m/s]: g = velocity + alpha (d - d_0)."""
+        """Begin a start step: g = velocity + alpha (d - d_0), with the present displacement d_0 and velocity [m/s]."""
         self.past[0], self._difference = self.displacement() - velocity / difference.alpha, difference
 
     def end_start(self, dt: float, velocity: Array, acceleration: Array) -> None:
-        """The displacements are those of the start; those before it follow from velocity and acceleration."""
+        """End the start: extrapolate displacements back by velocity [m/s] and acceleration [m/s^2], in steps dt [s]."""
         self.now, self._difference = self.displacement(), STEADY
         times = [-k * dt for k in range(1, len(self.past) + 1)]
         self.past = [self.now + t * velocity + 0.5 * t**2 * acceleration for t in times]
 
     def begin_step(self, difference: Difference) -> None:
-        """Remember the displacements."""
+        """Store the displacements at the start of a step; difference: its formula."""
         self.past = [self.now, *self.past][: len(self.past)]
         self._difference = difference
 
     def displacement(self) -> Array:
-        """Displacement [m] of the vertices as the solid has it now, shape (n, dim) (collective)."""
+        """Present displacement [m] of the vertices, shape (n, dim) (collective)."""
         return self.solid.displacement()
 
     def velocity(self, d: Array) -> Array:
@@ -82,12 +82,12 @@ class Interface:
         return g
 
     def move(self, d: Array) -> dict[str, Motion]:
-        """Take displacements d [m]; returns the motion of each surface."""
+        """Set displacements d [m] at the end of the step; returns the motion of each surface."""
         self.now = d.copy()
         return self._motions(d, self.velocity(d))
 
     def at_start(self, velocity: Array) -> dict[str, Motion]:
-        """How each surface moves that is where it is now, with velocities [m/s] of the vertices."""
+        """Motion of each surface at the present positions, with given velocities [m/s] of the vertices."""
         return self._motions(self.now, velocity)
 
     def _motions(self, d: Array, velocity: Array) -> dict[str, Motion]:

@@ -1,11 +1,11 @@
-"""Monolithic coupling: one Newton iteration for solid and flow, contact condensed, the cut following each iterate.
+"""Monolithic coupling: one Newton iteration for solid and flow, with condensed contact and a new cut for each iterate.
 
     [ K + w alpha B^T M B    -w B^T C^T S ] [du]       [ r_s ]      w: weight of the load in the solid's balance
     [ alpha C B                    A      ] [dw]  =  - [ r_f ]      B: vertices by unknowns of the solid
 
-C, S, M: see solvers.fluid.interface, g = alpha d - ...
-To alpha C and M come the derivatives with respect to the shape of the fluid's domain (solvers.fluid.shape): in steady
-flows, where alpha = 0, they are the whole dependence of the flow on du; in time they halve the number of Newton steps.
+C, S and M are those of solvers.fluid.interface, with g = alpha d - ...
+The shape derivatives of solvers.fluid.shape are added to alpha C and M. In steady flows, where alpha = 0, they are the
+whole dependence of the flow on du. In unsteady flows they halve the number of Newton iterations.
 Source: Schott, Ager, Wall, Int. J. Numer. Meth. Engng 119 (2019) 757-796.
 """
 
@@ -39,25 +39,25 @@ class Monolithic:
         solid, flow = coupled.solid, coupled.flow
         self.comm = solid.comm
         self._numbering = Numbering(self.comm, solid.size, flow.size)
-        # in time the matrix of the first guess is too far from the later ones to serve for all of them
+        # unsteady: the factors of the first iterate do not precondition the later ones well enough
         self._direct = LaggedFactors(self.comm, fresh=math.inf if flow.steady else 2)
         self._farther: Part = flow
         self._krylov = Lagged()
         self._linear_iterations = 0  #: of this step
-        #: rounding errors of the residuals of solid and flow [N], as far as this step knows
+        #: rounding errors of the residuals of solid and flow [N]; None before this step linearises
         self._noise: Array | None = None
         self._found, self.largest = np.zeros(2), np.zeros(2)  #: residuals of solid and flow: now, largest of the step
-        self._prepared: Blocks | None = None  #: the matrix at the present iterate, if it is there already
+        self._prepared: Blocks | None = None  #: the matrix at the present iterate, if it is assembled already
 
     # ------------------------------------------------------------------------------------------------- steps
 
     def initialise(self, t: float, dt: float) -> None:
-        """Both parts at the first time."""
+        """Set both parts to the first time t [s]; dt [s]: length of the first step."""
         self.coupled.initialise(t, dt, with_solid=True)
         start_together(self.coupled, t, dt, self._solve_unpredicted, with_solid=True)
 
     def _begin_system(self) -> None:
-        """Nothing of an earlier system counts."""
+        """Discard largest residuals, rounding errors and preconditioners of the last step."""
         self.largest, self._linear_iterations = np.zeros(2), 0
         self._noise = self._prepared = None
         self._krylov.begin_step()
@@ -85,7 +85,7 @@ class Monolithic:
     # ---------------------------------------------------------------------------- the system that Newton solves
 
     def residual(self) -> float:
-        """The larger of both parts' residuals, relative to its largest of the step, times the sum of those [N]."""
+        """Residual [N]: the larger relative residual of the parts, times the sum of their largest in this step."""
         flow, solid, interface = self.coupled.flow, self.coupled.solid, self.coupled.interface
         flow.move(interface.move(interface.displacement()), with_solid=True)
         of_flow = flow.residual()
@@ -99,7 +99,7 @@ class Monolithic:
         return float(relative.max() * self.largest.sum())
 
     def advance(self) -> float:
-        """One Newton step; the larger of both parts' relative increments."""
+        """One Newton iteration; returns the larger of the relative increments of both parts. Raises StepFailed."""
         solid, flow = self.coupled.solid, self.coupled.flow
         blocks, self._prepared = self._prepared or self.blocks(), None
         b, x = blocks.create_vectors()
@@ -147,10 +147,10 @@ class Monolithic:
         K, A = solid.linearise(), flow.linearise()
         with flow.timer("coupling"):
             into_flow, into_solid, mass = self.coupling_blocks()
-            PETSc.garbage_cleanup(K.comm)  # the K of earlier iterates, on a communicator that no solver has
+            PETSc.garbage_cleanup(K.comm)  # frees the K of earlier iterates; no solver has this communicator
             K = K.copy()
             K.axpy(1.0, mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-            # what the parts exchange is rounded too: positions and velocities of the surface, and the force
+            # the exchanged positions, velocities and forces are rounded too
             flow.add_rounding(2.0**flow.dim * rounding_error(into_flow, solid.rounded()))
             solid.add_rounding(rounding_error(into_solid, flow.rounded()))
             solid.add_rounding(rounding_error(mass, solid.rounded()))
@@ -158,7 +158,7 @@ class Monolithic:
             return Blocks(K, into_solid, into_flow, A)
 
     def coupling_blocks(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
-        """alpha C B, -w B^T C^T S and w alpha B^T M B ; rows of held dofs of the flow are empty."""
+        """alpha C B, -w B^T C^T S and w alpha B^T M B; rows of held dofs of the flow are empty."""
         flow, solid = self.coupled.flow, self.coupled.solid
         entries, w = flow.interface_entries(self.coupled.interface.surfaces), solid.force_weight
         B = solid.jacobian().transposed(self._numbering.first.getSize())
@@ -181,18 +181,18 @@ class Monolithic:
         self.coupled.flow.retreat(fraction)
 
     def settled(self) -> bool:
-        """Supports and active sets are fulfilled."""
+        """Whether supports and active sets are fulfilled."""
         return self.coupled.solid.settled()
 
     def round_off(self) -> float:
-        """No residual is too large if those of both parts are rounding errors; other ones are left out already."""
+        """Infinite if both residuals are rounding errors, else zero: `residual` leaves out a part below its error."""
         if self._noise is None:
             self._prepared = self.blocks()
         assert self._noise is not None
         return math.inf if (self._found <= self._noise).all() else 0.0
 
     def worst(self) -> tuple[float, ...] | None:
-        """Where the part that is farther off has its largest residual [m] (collective)."""
+        """Position [m] of the largest residual, of the part with the larger relative residual (collective)."""
         return self._farther.worst()
 
     # ---------------------------------------------------------------------------------------- save and restore

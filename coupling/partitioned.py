@@ -1,6 +1,6 @@
-"""Partitioned Dirichlet-Neumann coupling: the flow takes the surface's motion, the solid the fluid's force.
+"""Partitioned Dirichlet-Neumann coupling: the flow takes the motion of the surface, the solid the force of the flow.
 
-d_k -> flow around the surface at d_k -> force f_k -> solid under f_k -> displacement D(d_k), until D(d) = d.
+Displacement d_k -> flow around the surface at d_k -> force f_k -> solid under f_k -> D(d_k), until D(d) = d.
 Source: Kuttler, Wall, Comput. Mech. 43 (2008) 61-72.
 """
 
@@ -20,9 +20,9 @@ from solvers.api import Array, State, StepFailed, StepInfo
 
 @dataclass(frozen=True)
 class FixedPointTolerance:
-    """When the interface is in balance: |D(d) - d| in the root mean square of all vertices."""
+    """Tolerance of the interface residual |D(d) - d|, a root mean square over the vertices."""
 
-    relative: float = 1e-6  #: to the displacement of the step
+    relative: float = 1e-6  #: relative to the displacement of the step
     absolute: float = 0.0  #: [m]
     max_iterations: int = 50
 
@@ -39,7 +39,7 @@ class Partitioned:
         self.coupled, self.accelerator, self.tolerance = coupled, accelerator or QuasiNewton(0.5), tolerance
 
     def initialise(self, t: float, dt: float) -> None:
-        """Both fields at the first time."""
+        """Set both fields to the first time t [s]; dt [s]: length of the first step."""
         self.coupled.initialise(t, dt)
         start_together(self.coupled, t, dt, self._iterate)
         self.accelerator.forget()
@@ -56,7 +56,7 @@ class Partitioned:
         return StepInfo(len(history), tuple(history), numbers, coupled.take_notes())
 
     def _iterate(self) -> tuple[list[float], int]:
-        """(residuals [m], Newton steps of both fields) until the interface is in balance. Raises StepFailed."""
+        """Iterate to the tolerance. Returns (residuals [m], Newton iterations of both fields). Raises StepFailed."""
         coupled, interface = self.coupled, self.coupled.interface
         self.accelerator.begin_step()
         d = interface.displacement()
@@ -85,7 +85,7 @@ class Partitioned:
             d = self.accelerator.next(d, found)
 
     def _small(self, found: Array) -> float:
-        """[m]; no less than a few roundings of the places: bodies that come to rest move by less in a step."""
+        """Tolerance [m], at least a few rounding errors of positions: bodies may move by less in a step."""
         interface = self.coupled.interface
         moved, rounding = _mean(found - interface.past[0]), 4.0 * np.finfo(float).eps * _mean(interface.points + found)
         return max(self.tolerance.relative * moved, self.tolerance.absolute, float(rounding))
@@ -99,5 +99,5 @@ class Partitioned:
 
 
 def _mean(vectors: Array) -> float:
-    """Root mean square length."""
+    """Root mean square of the lengths of vectors."""
     return float(np.sqrt((vectors**2).sum() / len(vectors)))

@@ -1,4 +1,4 @@
-"""A coupled system from its parts, for use as a library."""
+"""Assembly of a coupled system from its parts, for use as a library."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ def couple(
 ) -> Coupled:
     """Elastic bodies in a flow, for `Monolithic` or `Partitioned` (collective).
 
-    grid: the box of cells around the bodies. patches: conditions on the faces of the box. rigid_bodies: others that the
-    flow does not move. wetted: body -> names of the surfaces that the fluid touches; by default it touches all that is
-    neither in another body nor, without contact, on the boundary of the box at the first time, `start` [s].
+    grid: the box of cells around the bodies. patches: conditions on the faces of the box. rigid_bodies: further bodies
+    with prescribed motion. wetted: body -> names of its wetted surfaces. Without a name the whole surface is wetted,
+    except parts in other bodies and, without contact, on the boundary of the box at the first time `start` [s].
     """
     comm, bodies = structure.comm, structure.bodies
     surfaces = []
@@ -76,17 +76,17 @@ def couple_rigid(
 
 
 def coupled_elastic(fluid: Fluid, elastic: Elastic, dry_sides: Sequence[DrySide] = ()) -> Coupled:
-    """With a smooth start if there are accelerations, and a scheme of second order that would miss it."""
+    """A structure in a flow. There is a start (`coupling.start`) if the solid has inertia and the flow uses BDF2."""
     inertia = not isinstance(elastic.structure.time, Statics)
     start = Start(FlowStart(fluid), ElasticStart(elastic)) if inertia and fluid.scheme.times > 1 else None
     return Coupled(fluid, elastic, dry_sides, start)
 
 
 def coupled_bodies(fluid: Fluid, bodies: RigidBodies) -> Coupled:
-    """The same for rigid bodies."""
+    """Rigid bodies in a flow. There is a start if the flow uses BDF2."""
     return Coupled(fluid, bodies, start=Start(FlowStart(fluid), RigidStart(bodies)) if fluid.scheme.times > 1 else None)
 
 
 def _box(grid: Grid) -> tuple[Array, Array]:
-    """Lowest and highest corner [m]."""
+    """Lowest and highest corner of a grid [m]."""
     return np.array([edge[0] for edge in grid.edges]), np.array([edge[-1] for edge in grid.edges])

@@ -1,7 +1,7 @@
-"""The protocols that coupling needs: of a solid and of a flow.
+"""The protocols `Solid` and `Flow` that coupling schemes use.
 
-Each has unknowns of its own, distributed over the processes, and its surfaces consist of vertices that all processes
-know. The solid says where they are, the flow which force [N] it exerts on them. All calls are collective.
+Each part has its own unknowns, distributed over the processes. The vertices of the surfaces are the same on all
+processes. The solid gives their positions, the flow the force [N] on them. All calls are collective.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ class Part(System, Stateful, Protocol):
         ...
 
     def initialise(self, t: float, dt: float) -> None:
-        """The state at the first time; dt: length of the first step."""
+        """Set the state at the first time t [s]; dt [s]: length of the first step."""
         ...
 
     def begin_step(self, t: float, dt: float) -> None: ...
     def solve(self) -> StepInfo:
-        """Solve it alone, with the data of the other part fixed. Raises StepFailed."""
+        """Solve this part alone, with the data of the other one fixed. Raises StepFailed."""
         ...
 
     def end_step(self) -> None:
@@ -60,22 +60,23 @@ class Part(System, Stateful, Protocol):
         ...
 
     def update(self, increment: Array) -> float:
-        """Add an increment; its size relative to the solution."""
+        """Add an increment; returns its norm relative to that of the solution."""
         ...
 
     def rounded(self) -> Array:
-        """Values whose last digit is lost where the residual is evaluated, for `rounding_error`."""
+        """The values whose rounding enters the residual, for `rounding_error`."""
         ...
 
     def add_rounding(self, error: Array) -> None:
-        """Rounding errors that the other part brings into the residual, after `linearise`."""
+        """Add rounding errors that the other part causes in the residual; call it after `linearise`."""
         ...
 
 
 class Solid(Part, Protocol):
-    """It moves its surfaces and takes a load on them. What is in contact is condensed by a transformation of its rows.
+    """A part that moves its surfaces and takes a load on them. Contact is condensed by a transformation of its rows.
 
-    Its forces by unknowns are equal on all processes where the shape is (m,): one for each way that a load can act.
+    Arrays of the shape (m,) are generalised forces or displacements, the same on all processes: the components at all
+    vertices for elastic bodies, forces and moments for rigid ones.
     """
 
     @property
@@ -83,44 +84,44 @@ class Solid(Part, Protocol):
 
     @property
     def surfaces(self) -> Mapping[str, Array]:
-        """Name of a surface in the flow -> reference positions [m] of its vertices, shape (n, dim)."""
+        """Names of the surfaces in the flow -> reference positions [m] of their vertices, shape (n, dim)."""
         ...
 
     @property
     def force_weight(self) -> float:
-        """Weight of the load at the end of the step in its balance; that at the start has the rest."""
+        """Weight w of the load at the end of the step in the balance; that at the start has 1 - w."""
         ...
 
     def predict(self, t: float) -> None:
-        """The predictor for the time t."""
+        """Set the predictor for the time t [s]."""
         ...
 
     def displacement(self) -> Array:
-        """Displacement [m] of all vertices, those of one surface after those of the other, shape (n, dim)."""
+        """Displacement [m] of all vertices, surface by surface, shape (n, dim)."""
         ...
 
     def jacobian(self) -> VertexJacobian:
-        """The derivative of that by its unknowns."""
+        """Derivative of the displacement of the vertices by the unknowns."""
         ...
 
     def load(self, force: Array) -> None:
-        """Take the force [N] on all vertices at the end of the step, shape (n, dim)."""
+        """Set the force [N] on all vertices at the end of the step, shape (n, dim)."""
         ...
 
     def reduced(self, force: Array) -> Array:
-        """What forces [N] on the vertices, shape (n, dim), do to it as it is now, shape (m,)."""
+        """Generalised forces of forces [N] on the vertices, (n, dim), at the present positions, shape (m,)."""
         ...
 
     def taken(self) -> Array:
-        """The load that follows from its balance of the last step, computed without that of `load`, shape (m,)."""
+        """The load by the balance of the last step, computed without that of `load`, shape (m,)."""
         ...
 
     def taken_at_start(self) -> Array:
-        """The same for the state that the first step starts from."""
+        """The load by the balance of the initial state, shape (m,)."""
         ...
 
     def moved(self) -> Array:
-        """Its displacement in the last step, with which `taken` does work, shape (m,)."""
+        """Displacement of the last step, on which `taken` does work, shape (m,)."""
         ...
 
     def row_transformation(self) -> RowTransformation | None:
@@ -128,15 +129,15 @@ class Solid(Part, Protocol):
         ...
 
     def recover(self, taken: TakenRows, du: Array) -> None:
-        """The multipliers from rows as they were before, and the increment of all unknowns of the system."""
+        """Recover the multipliers from the rows before the transformation and the increment of all unknowns."""
         ...
 
     def missing(self) -> Array:
-        """Prescribed less present values of its unknowns, zero at free ones."""
+        """Prescribed minus present values of its unknowns, zero at free ones."""
         ...
 
     def impose_rows(self, blocks: Sequence[PETSc.Mat], x: Array, b: Array) -> list[PETSc.Mat]:
-        """Rows of its supports ask for x; of the blocks beside each other the first is its own. b changes."""
+        """Replace the rows of supports by du = x. blocks: one row of blocks, its own first; b changes in place."""
         ...
 
     def check(self, info: StepInfo) -> None:
@@ -144,7 +145,7 @@ class Solid(Part, Protocol):
         ...
 
     def touching(self) -> NDArray[np.bool_] | None:
-        """Which multipliers are in contact; None without contact."""
+        """Mask of the multipliers in contact; None without contact."""
         ...
 
     def numbers(self) -> dict[str, float]:
@@ -153,7 +154,7 @@ class Solid(Part, Protocol):
 
 
 class Flow(Part, Protocol):
-    """It follows surfaces and exerts a force on them."""
+    """A part whose domain follows surfaces, and which exerts a force on them."""
 
     @property
     def dim(self) -> int: ...
@@ -162,21 +163,21 @@ class Flow(Part, Protocol):
     def steady(self) -> bool: ...
 
     timer: Timer
-    notes: list[str]  #: what the user should know of this step
+    notes: list[str]  #: notes to the user on this step
 
     @property
     def scheme(self) -> FlowTimeScheme:
-        """How it takes derivatives in time."""
+        """The time scheme."""
         ...
 
-    current: FlowStep  #: the step that it computes, with the rule for derivatives in time
+    current: FlowStep  #: the present step, with its difference formula
 
     def predict(self) -> None:
-        """The predictor for the end of the step."""
+        """Set the predictor for the end of the step."""
         ...
 
     def move(self, surfaces: Mapping[str, Motion], *, with_solid: bool = False) -> None:
-        """Surfaces by name are here and move so; with_solid: the solid's rows are solved with its own."""
+        """Set the motion of surfaces by name; with_solid: the rows of the solid are solved in the same system."""
         ...
 
     def force(self) -> dict[str, Array]:
@@ -184,14 +185,14 @@ class Flow(Part, Protocol):
         ...
 
     def interface_entries(self, surfaces: Sequence[str]) -> InterfaceEntries:
-        """How its rows and its force change with the motion of these surfaces."""
+        """Derivatives of its rows and of its force by the motion of these surfaces."""
         ...
 
     def balances(self) -> tuple[Array, float]:
-        """Force [N] on all bodies by its momentum, shape (dim,), and power [W] that the method takes."""
+        """(force [N] on all bodies by the balance of momentum, shape (dim,); power [W] lost by the method)."""
         ...
 
-    sequence: SolverSequence  #: which linear solver is used, from fast to safe
+    sequence: SolverSequence  #: linear solvers, from fast to robust
 
     @property
     def linear_tolerance(self) -> float: ...
@@ -200,11 +201,11 @@ class Flow(Part, Protocol):
 
 
 class StartOfSolid(Protocol):
-    """Steps of a solid to the first time, with a = (u - u_n) / dt^2."""
+    """Start steps of a solid, with the acceleration a = (u - u_n) / dt^2."""
 
     @property
     def steps(self) -> int:
-        """How many it takes until the acceleration is smooth."""
+        """Count of steps after which the acceleration is smooth."""
         ...
 
     def velocity(self) -> Array:
@@ -212,40 +213,42 @@ class StartOfSolid(Protocol):
         ...
 
     def acceleration(self) -> float:
-        """The largest [m/s^2] without fluid (collective)."""
+        """Largest acceleration without fluid [m/s^2] (collective)."""
         ...
 
     def step(self, t: float, dt: float) -> AbstractContextManager[None]:
-        """One of length dt, begun here and solved by who asks for it."""
+        """Begin a start step of length dt; the caller solves it within the context."""
         ...
 
     def end(self) -> None:
-        """Take acceleration and load of the last of these steps, and the deformation that they made."""
+        """Set the state from the acceleration, the load and the deformation of the start steps."""
         ...
 
 
 class StartOfFlow(Protocol):
-    """The same of a flow: short steps of backward Euler, each from the initial velocity."""
+    """Start steps of a flow: short steps of backward Euler, each from the initial velocity."""
 
     @property
     def smallest_cell(self) -> float:
-        """Shortest edge [m]."""
+        """Shortest edge of a cell [m]."""
         ...
 
     def at_once(self, surfaces: Mapping[str, Motion]) -> bool:
-        """The initial velocity is not that of the boundary, or of surfaces by name (collective)."""
+        """Whether boundary or surfaces have another velocity than the flow: an impulsive start (collective)."""
         ...
 
-    def step(self, t: float, dt: float) -> AbstractContextManager[None]: ...
+    def step(self, t: float, dt: float) -> AbstractContextManager[None]:
+        """Begin a start step; the caller solves it within the context."""
+        ...
 
     def end(self, dt: float) -> None:
-        """Back to the initial velocity; those before it follow from the rate of the last of these steps."""
+        """Restore the initial velocity, and extrapolate those before it by the rate of the last start step."""
         ...
 
 
 @dataclass(frozen=True)
 class Start:
-    """How both find accelerations that belong together."""
+    """The two parts of a start, from which the schemes compute consistent accelerations."""
 
     flow: StartOfFlow
     solid: StartOfSolid

@@ -1,17 +1,19 @@
-"""The first state of a coupled run: accelerations of both fields that belong together.
+"""The initial state of a coupled run: consistent accelerations of both fields.
 
-The acceleration of a structure alone, and no force at the start, would make solids in a fluid of their own density
-begin 1.7 times too fast. A body that is let go also rings: within an instant only its boundary feels the fluid. What a
-step of length h does not resolve has to be in balance from the start on. One step of backward Euler to the same time,
+With the acceleration of the structure alone, and no force of the fluid, a solid in a fluid of its own density would
+start 1.7 times too fast. An elastic body would also oscillate, because the force of the fluid acts on its boundary
+only. Motions that steps of length h do not resolve have to be in equilibrium from the start. One step of backward Euler
+to the same time,
 
     M (u - u_0) / h^2 + f_int(u) = f_ext(t) + f_fluid,   rho (w - w_0) / k + ... = 0,   w = v_0 + k (u - u_0) / h^2,
 
 gives an acceleration a = (u - u_0) / h^2 in which motions of frequency omega have the share F = 1 / (1 + (omega h)^2).
-n such steps, each from where the last one ended and from the same velocities, leave F^n. The run starts with
+n such steps, each from the displacement of the last one and from the same velocities, leave the share F^n. The run
+starts with
 
     u_0 + sum_k (du_k - du_n),   a = du_n / h^2,   the force of the last step,
 
-which changes slow motions by a term of the order of h^4, whole bodies not at all.
+which changes slow motions by a term of order h^4, and rigid motions not at all.
 """
 
 from __future__ import annotations
@@ -31,13 +33,12 @@ NO_BALANCE = (
 def start_together(
     coupled: Coupled, t: float, dt: float, solve: Callable[[], object], *, with_solid: bool = False
 ) -> None:
-    """From the initial state to the one that the first step of length dt [s] starts from (collective).
+    """Compute the state from which the first step of length dt [s] starts (collective).
 
-    solve: bring both fields into balance at the end of a step that they have begun; with_solid: as one system.
-    Flows that start at once keep the initial state: they have no acceleration. So do solids without inertia, and flows
-    by backward Euler: their velocities are those of the middle of a step. So do bodies that the start would move by a
-    cell or more, away from the first place of the fluid, and, with a note for the user, those for which no balance is
-    found.
+    solve: solves a step of both fields that has begun; with_solid: as one system.
+    The initial state is kept in these cases: the flow starts impulsively and has no acceleration; the solid has no
+    inertia; the flow uses backward Euler, whose velocities are those of the middle of a step; the start would move
+    bodies by a cell or more; a start step does not converge, with a note to the user.
     """
     if coupled.start is None:
         return
@@ -50,12 +51,12 @@ def start_together(
     initial = coupled.save()
     try:
         for _ in range(start.solid.steps):
-            place = interface.displacement()
+            before = interface.displacement()
             with start.flow.step(t, dt):
                 interface.begin_start(coupled.flow.current.difference, velocity)
                 with start.solid.step(t, dt):
                     solve()
-        acceleration = (interface.displacement() - place) / dt**2
+        acceleration = (interface.displacement() - before) / dt**2
         force = coupled.force()
     except StepFailed as failure:
         coupled.restore(initial)

@@ -1,4 +1,4 @@
-"""Surfaces of elastic bodies in the fluid: closed, of segments or triangles, with the wet facets marked."""
+"""Wetted surfaces: the surfaces of bodies in the fluid, closed, of segments or triangles, with marked wet facets."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ from solvers.structure.field import Structure
 #: Distance to the face of the box, in sizes of the box, below which a facet is on it.
 ON_BOX = 1e-9
 
-#: Winding number above which the middle of a facet is in another body; on its surface it is one half.
+#: Winding number above which the middle of a facet is in another body; on the surface of the body it is one half.
 INSIDE = 0.75
 
 
 @dataclass(frozen=True)
 class WettedSurface:
-    """The surface of one body; the same on every process."""
+    """The surface of one elastic body, the same on every process."""
 
-    name: str  #: of the body in structure and fluid
+    name: str  #: name of the body in structure and fluid
     points: Array  #: reference positions [m] of its vertices, shape (n, dim)
     dofs: NDArray[np.int64]  #: their global dofs in the structure, shape (n, dim)
     facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
-    wet: NDArray[np.bool_] | None = None  #: facets that the fluid touches; None: found by `find_wet`
-    may_part: NDArray[np.bool_] | None = None  #: facets in contact: what they lie on may let them go
+    wet: NDArray[np.bool_] | None = None  #: wet facets; None: found by `find_wet`
+    may_part: NDArray[np.bool_] | None = None  #: facets that take part in contact
 
     @property
     def at_start(self) -> tuple[ImmersedSurface, Array]:
-        """The surface in the flow, and positions of its vertices [m]."""
+        """(the surface in the flow, reference positions of its vertices [m])."""
         return ImmersedSurface(self.name, self.facets, len(self.points), self.wet, self.may_part), self.points
 
 
 def wetted_surface(structure: Structure, index: int, skin: Skin) -> WettedSurface:
-    """A skin with the dofs of its body, the one of that index among all of the structure (collective)."""
+    """The wetted surface of a skin; index: of its body in the structure (collective)."""
     bodies, constraint = structure.bodies, structure.constraint
     body = bodies[index]
     layout = Layout(body.domain.comm, [other.size for other in bodies])
@@ -60,10 +60,10 @@ def immerse(
     *,
     deform: bool = True,
 ) -> list[ImmersedBody]:
-    """All bodies for the fluid, first the given ones, whose motion is known, then those that a solid moves.
+    """All bodies in the fluid: first those with prescribed motion, `given`, then those that a solid moves, `moved`.
 
     moved: surfaces with the positions of their vertices [m] at the start; box: lowest and highest corner [m]; t: the
-    first time [s]; deform: the volume of those that are moved may change.
+    first time [s]; deform: the volume of the moved ones may change.
     """
     at_start = [(body.surface, body.motion(t).x) for body in given if body.motion is not None]
     wet = find_wet([*at_start, *moved], box)
@@ -72,10 +72,10 @@ def immerse(
 
 
 def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]], box: tuple[Array, Array]) -> list[ImmersedSurface]:
-    """Surfaces, given with the positions of their vertices [m], with the facets marked that the fluid touches.
+    """The surfaces, given with the positions of their vertices [m], with marked wet facets.
 
-    It does not touch facets in other bodies, where bodies are one piece, nor those on the box's boundary, unless they
-    are in contact with something there. What a surface says itself of its facets stays.
+    Facets in other bodies are not wet, nor those on the boundary of the box, except where they take part in contact.
+    Marks that a surface has already are kept.
     """
     low, high = box
     found = []

@@ -1,4 +1,4 @@
-"""Rigid bodies in motion: free, on springs, held in some directions, against rigid obstacles."""
+"""Rigid bodies: free or with held components, on springs, in contact with rigid obstacles."""
 
 from solvers.lazy import lazy_names
 

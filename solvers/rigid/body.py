@@ -1,4 +1,4 @@
-"""What makes a rigid body: its surface, its inertia, and what acts on it besides the flow."""
+"""A rigid body: surface, inertia, and its own loads by gravity and springs."""
 
 from __future__ import annotations
 
@@ -13,32 +13,32 @@ from solvers.rigid.inertia import Inertia
 from solvers.rigid.rotation import skew
 from solvers.values import Value, evaluate
 
-#: Components of motion: displacements of its centre and rotations about the axes through it.
+#: Components of motion: displacements of the centre of mass, and rotations about axes through it.
 COMPONENTS = ("x", "y", "z", "rotation_x", "rotation_y", "rotation_z")
 
 
 @dataclass(frozen=True)
 class PointSpring:
-    """From a point of the body to where that point is at the start: -k d along each axis."""
+    """A spring from a point of the body to its position at the start, with the force -k (d + damping d') by axis."""
 
-    at: Sequence[float]  #: [m], shape (dim,)
-    stiffness: float | Sequence[float]  #: [N/m], of all directions or by axis; in 2D per depth
-    damping: float = 0.0  #: in units of the stiffness [s]: -k damping d'
+    at: Sequence[float]  #: the point at the start [m], shape (dim,)
+    stiffness: float | Sequence[float]  #: k [N/m], for all directions or by axis; in 2D per depth
+    damping: float = 0.0  #: damping over stiffness [s]
 
 
 @dataclass(frozen=True)
 class RigidBody:
-    """A rigid body with 6 unknowns, in 2D with 3. `held` components follow functions of time [m, rad], 0 for none."""
+    """A rigid body with 6 unknowns, 3 in 2D. `held` components follow functions of time [m, rad]."""
 
     name: str
     points: Array  #: vertices of its surface [m], shape (n, dim)
-    facets: NDArray[np.int64]  #: segments or triangles, the solid on their left or below, shape (m, dim)
+    facets: NDArray[np.int64]  #: segments or triangles, right-hand normals out of the solid, shape (m, dim)
     inertia: Inertia
     gravity: Sequence[Value] | None = None  #: [m/s^2], by components
     springs: Sequence[PointSpring] = ()
-    held: Mapping[str, Callable[[float], float]] = field(default_factory=dict)  #: by `COMPONENTS`
+    held: Mapping[str, Callable[[float], float]] = field(default_factory=dict)  #: by names of `COMPONENTS`
     initial_velocity: Sequence[float] = ()  #: of the centre [m/s], shape (dim,)
-    initial_spin: Sequence[float] = ()  #: [rad/s], shape (3,)
+    initial_spin: Sequence[float] = ()  #: angular velocity [rad/s], shape (3,)
 
     @property
     def dim(self) -> int:
@@ -46,26 +46,27 @@ class RigidBody:
 
     @property
     def extent(self) -> float:
-        """Largest distance [m] of a vertex from the centre."""
+        """Largest distance [m] of a vertex from the centre of mass."""
         return float(np.linalg.norm(self.points - self.inertia.centre, axis=1).max())
 
     @property
     def held_components(self) -> NDArray[np.int64]:
-        """Numbers of the components that are held."""
+        """Indices of the held components into `COMPONENTS`."""
         return np.array([i for i, name in enumerate(COMPONENTS) if name in self.held], dtype=np.int64)
 
     def held_at(self, t: float) -> Array:
-        """Held components at the time t."""
+        """Values of the held components at the time t [s]."""
         return np.array([self.held[COMPONENTS[i]](t) for i in self.held_components])
 
     def arms(self, R: Array, points: Array) -> Array:
-        """From the centre to points of the reference configuration [m], shape (n, dim), turned by R, shape (n, 3)."""
+        """Vectors [m] from the centre to points, rotated by R, shape (n, 3); points: at the start [m], (n, dim)."""
         return in_space(points - self.inertia.centre) @ R.T
 
     def own_load(self, t: float, shift: Array, R: Array, velocity: Array, spin: Array) -> Array:
-        """Force [N] and moment [N m] about the centre of gravity and springs, shape (6,).
+        """Force [N] and moment [N m] about the centre by gravity and springs, shape (6,).
 
-        shift: displacement [m] of the centre; R: rotation; velocity [m/s] of the centre, spin [rad/s] in space.
+        shift: displacement of the centre [m]; R: rotation; velocity: of the centre [m/s]; spin: angular velocity in
+        space [rad/s].
         """
         load = np.zeros(6)
         if self.gravity is not None:
@@ -77,9 +78,9 @@ class RigidBody:
         return load
 
     def own_load_tangent(self, shift: Array, R: Array, velocity: Array, spin: Array, rate: Array) -> Array:
-        """Its derivative by the centre's displacement and a further rotation in space, shape (6, 6).
+        """Derivative of `own_load` by the displacement of the centre and a further rotation in space, shape (6, 6).
 
-        rate: derivative of (velocity, spin) by both.
+        rate: derivative of (velocity, spin) by both, shape (6, 6).
         """
         tangent = np.zeros((6, 6))
         for spring in self.springs:
@@ -103,5 +104,5 @@ class RigidBody:
 
 
 def in_space(vectors: Array) -> Array:
-    """Vectors with zeros as the missing components, shape (n, 3)."""
+    """Vectors in 3D, with zeros as the missing components, shape (n, 3)."""
     return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))

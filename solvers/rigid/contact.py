@@ -1,12 +1,12 @@
-"""Rigid bodies against rigid obstacles, without friction: no vertex passes an obstacle, and nothing pulls.
+"""Frictionless contact of rigid bodies with rigid obstacles, vertex against facet.
 
-For the gaps g_j of vertices, their derivatives G by the unknowns, and pressures z_j [N],
+For the gaps g_j of vertices, their derivatives G by the unknowns, and contact forces z_j [N] averaged over the step,
 
-    g_j >= 0,   z_j >= 0,   z_j g_j = 0,        balance - G^T z = 0        z: means over the step
+    g_j >= 0,   z_j >= 0,   z_j g_j = 0,        balance - G^T z = 0.
 
-Each Newton step finds who is in contact from a small quadratic problem: the increment nearest to that without contact,
-in the metric of the tangent, that leaves no gap negative. Of several pressures for one force it takes few.
-An impact takes the velocity towards the obstacle, but for a share of it, the restitution.
+Each Newton iteration finds the active set by a small quadratic program: the increment nearest to that without contact,
+in the metric of the tangent, for which no gap is negative. Where several z give the same force, few are not zero. After
+an impact, the velocity away from the obstacle is the restitution times that towards it before.
 Sources: Lawson, Hanson, Solving Least Squares Problems (1974), chapter 23 (least distance); Moreau in Moreau,
 Panagiotopoulos, Nonsmooth Mechanics and Applications (1988) (impact).
 """
@@ -26,28 +26,28 @@ from solvers.sparse import nothing, sparse_from_array
 
 @dataclass(frozen=True)
 class Obstacle:
-    """Segments or triangles whose right-hand normals point to where bodies may be."""
+    """A rigid obstacle of segments or triangles, whose right-hand normals point towards the bodies."""
 
     name: str
     points: Array  #: vertices [m], shape (n, dim)
     facets: NDArray[np.int64]  #: shape (m, dim)
-    motion: Callable[[float], Array] | None = None  #: positions [m] of the vertices at a time; None: it rests
+    motion: Callable[[float], Array] | None = None  #: time [s] -> positions of the vertices [m]; None: it rests
 
     def at(self, t: float) -> Array:
-        """Positions [m] of the vertices."""
+        """Positions [m] of the vertices at the time t [s]."""
         return self.points if self.motion is None else self.motion(t)
 
 
 @dataclass(frozen=True)
 class Gaps:
-    """Of vertices from an obstacle."""
+    """Gaps of vertices to an obstacle."""
 
-    gap: Array  #: [m], negative behind it, shape (n,)
-    normal: Array  #: unit vectors away from it, shape (n, dim)
+    gap: Array  #: [m], negative behind the obstacle, shape (n,)
+    normal: Array  #: unit normals of the obstacle, shape (n, dim)
 
 
 def gaps(x: Array, corners: Array) -> Gaps:
-    """Of points (n, dim) from the nearest of flat facets with corners (m, dim, dim)."""
+    """Gaps of points (n, dim) to the nearest of flat facets with corners (m, dim, dim), positions in [m]."""
     closest, gap, normal = np.full(len(x), np.inf), np.full(len(x), np.inf), np.zeros_like(x)
     for facet in corners:
         n = _normal(facet)
@@ -67,7 +67,7 @@ def _normal(facet: Array) -> Array:
 
 
 def _nearest(x: Array, facet: Array) -> Array:
-    """Nearest point of a segment or triangle to each point."""
+    """The point of a segment or triangle nearest to each point, shape (n, dim)."""
     edges = [(facet[a], facet[b]) for b in range(len(facet)) for a in range(b)]
     feet = []
     for a, b in edges:
@@ -86,59 +86,65 @@ def _nearest(x: Array, facet: Array) -> Array:
 
 @dataclass(frozen=True)
 class RigidPair:
-    """Vertices of one body, by its number, and an obstacle."""
+    """A body that may touch an obstacle."""
 
-    body: int
-    vertices: int  #: of the body's surface
+    body: int  #: index of the body
+    vertices: int  #: count of vertices of its surface
     obstacle: Obstacle
 
 
 class RigidContact:
-    """All pairs; arrays over all vertices of one pair after those of the other, shape (m,)."""
+    """All pairs. Arrays have the shape (m,): the vertices of all bodies, pair by pair."""
 
     def __init__(self, pairs: Sequence[RigidPair], unknowns: int, *, restitution: float = 0.0):
         self.pairs, self.restitution = list(pairs), restitution
         count = sum(pair.vertices for pair in pairs)
-        self.z = np.zeros(count)  #: pressures [N]
+        self.z = np.zeros(count)  #: contact forces [N]
         self.gap = np.full(count, np.inf)  #: [m]
         self.G = np.zeros((count, unknowns))  #: derivatives of the gaps by the unknowns
 
     @property
     def force(self) -> Array:
-        """Force and moment of the pressures, of all unknowns."""
+        """Generalised contact force: force [N] and moment [N m] by unknown."""
         return self.G.T @ self.z
 
     @property
     def active(self) -> NDArray[np.bool_]:
-        """Which vertices are in contact."""
+        """Mask of the vertices in contact, shape (m,)."""
         return self.z > 0.0
 
-    def measure(self, positions: Sequence[Array], arms: Sequence[Array], ways: NDArray[np.int64], t: float) -> None:
-        """Gaps and their derivatives for vertices (n, dim) and their arms (n, 3) of each body at the time t."""
+    def measure(
+        self, positions: Sequence[Array], arms: Sequence[Array], components: NDArray[np.int64], t: float
+    ) -> None:
+        """Set gaps and their derivatives at the time t [s].
+
+        positions, arms: of the vertices [m] and from the centres to them [m], by body, (n, dim) and (n, 3);
+        components: the unknowns of a body among `COMPONENTS`.
+        """
         self.G[:] = 0.0
         start = 0
         for pair in self.pairs:
             rows = slice(start, start + pair.vertices)
             found = gaps(positions[pair.body], pair.obstacle.at(t)[pair.obstacle.facets])
             n = np.pad(found.normal, ((0, 0), (0, 3 - found.normal.shape[1])))
-            by_way = np.hstack([n, np.cross(arms[pair.body], n)])[:, ways]
+            by_component = np.hstack([n, np.cross(arms[pair.body], n)])[:, components]
             self.gap[rows] = found.gap
-            self.G[rows, pair.body * len(ways) : (pair.body + 1) * len(ways)] = by_way
+            self.G[rows, pair.body * len(components) : (pair.body + 1) * len(components)] = by_component
             start = rows.stop
 
     def press(self, tangent: Array, right: Array) -> None:
-        """The pressures of a Newton step from here; right: minus the balance without contact.
+        """Set the contact forces for a Newton iteration; right: minus the balance without contact.
 
-        Once they leave nothing of the balance, the gaps and pressures are as they must be.
+        When the balance with these forces vanishes, gaps and forces fulfil the complementarity conditions.
         """
         without = np.linalg.solve(tangent, right)
         too_far = 0.0 - self.gap - self.G @ without
         self.z = pressures(0.5 * (tangent + tangent.T), self.G, too_far)
 
     def transformation(self, tangent: Array) -> RowTransformation | None:
-        """Rows of J du = b + G^T z without z, which ask for G du = -g where there is contact.
+        """Transformation that eliminates z from J du = b + G^T z with G du = -g; None without contact.
 
-        With S = G K^-1 G^T: L = 1 - G^T S^-1 G K^-1, A = G^T S^-1 G, c = -G^T S^-1 g. None without contact.
+        With S = G K^-1 G^T: rows L = 1 - G^T S^-1 G K^-1, added A = G^T S^-1 G, right c = -G^T S^-1 g.
         """
         G, g, n = self.G[self.active], self.gap[self.active], len(tangent)
         if not len(G):
@@ -155,17 +161,17 @@ class RigidContact:
         )
 
     def after_impact(self, mass: Array, before: Array, without: Array, force: Array) -> tuple[Array, Array]:
-        """(velocities, rates of momentum) at the end of a step with contact, of all unknowns.
+        """(velocities, rates of momentum) by unknown at the end of a step with contact.
 
-        mass: matrix; before: velocities at the start of the step, of which the restitution gives back its share;
-        without: those at its end if there were no contact; force: that at its end. What stays in contact does not
-        accelerate towards the obstacle.
+        mass: mass matrix; before: velocities at the start of the step, to which restitution applies; without: those at
+        its end without contact; force: that at its end. Vertices that stay in contact do not accelerate towards the
+        obstacle.
         """
         G: Array = self.G[self.active]
-        wanted = -self.restitution * np.minimum(G @ before, 0.0)
-        missing: Array = wanted - G @ without
+        rebound = -self.restitution * np.minimum(G @ before, 0.0)
+        missing: Array = rebound - G @ without
         velocity = without + np.linalg.solve(mass, G.T @ pressures(mass, G, missing))
-        staying: Array = G[wanted == 0.0]
+        staying: Array = G[rebound == 0.0]
         inwards: Array = -(staying @ np.linalg.solve(mass, force))
         return velocity, force + staying.T @ pressures(mass, staying, inwards)
 
@@ -175,7 +181,7 @@ class RigidContact:
 
 
 def pressures(K: Array, G: Array, f: Array) -> Array:
-    """z >= 0 of the smallest d = K^-1 G^T z, in the metric of K, with G d >= f; shapes (n, n), (m, n), (m,)."""
+    """z >= 0 of the smallest d = K^-1 G^T z, in the metric of K, with G d >= f; K (n, n), G (m, n), f (m,)."""
     if not (f > 0.0).any():
         return np.zeros(len(f))
     half = np.linalg.cholesky(K)
@@ -186,8 +192,8 @@ def pressures(K: Array, G: Array, f: Array) -> Array:
 
 
 def least_distance(E: Array, f: Array) -> Array:
-    """z >= 0 of the shortest y = E^T z with E y >= f, shapes (m, n), (m,); few of them are not zero."""
-    from scipy.optimize import nnls  # a fifth of a second, which runs without contact do not need
+    """z >= 0 of the shortest y = E^T z with E y >= f, E (m, n), f (m,); few components of z are not zero."""
+    from scipy.optimize import nnls  # the import takes a fifth of a second: only runs with contact need it
 
     system = np.vstack([E.T, f])
     target = np.zeros(len(system))

@@ -1,4 +1,4 @@
-"""Rigid bodies as a field: six unknowns for each body, three in 2D, in one balance of forces and moments."""
+"""The field `RigidBodies`: six unknowns for each body, three in 2D, and their balance of forces and moments."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from petsc4py import PETSc
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance, converge
-from solvers.rigid import motion
+from solvers.rigid import motion, surface
 from solvers.rigid.body import RigidBody, in_space
 from solvers.rigid.contact import RigidContact
 from solvers.rigid.motion import RigidInstant
@@ -24,7 +24,7 @@ from solvers.step import Step
 from solvers.timing import Timer
 from solvers.vertices import VertexJacobian
 
-#: Ways to move that count as unknowns, by dimension of space.
+#: Unknowns of a body among `COMPONENTS`, by dimension of space.
 UNKNOWNS = {2: np.array([0, 1, 5]), 3: np.arange(6)}
 
 #: Angle [rad] of one step from which rotation vectors are ambiguous.
@@ -32,10 +32,10 @@ HALF_TURN = np.pi
 
 
 class RigidBodies:
-    """A `Solid`: all bodies are whole on every process; the first one owns the unknowns.
+    """Implements `Solid`. Every process has all bodies; the first one owns the unknowns.
 
-    The unknowns of a body are increments of its position in a step: displacement of the centre [m] and a rotation about
-    the axes of space [rad]. `held` components are given, others follow from the balance of forces and moments.
+    The unknowns of a body are its increments in a step: displacement of the centre [m] and rotation vector in space
+    [rad]. `held` components are prescribed, the others follow from the balance of forces and moments.
     """
 
     name = "rigid bodies"
@@ -54,23 +54,23 @@ class RigidBodies:
         self.comm, self.timer, self.contact = comm, timer or Timer(), contact
         self.dim, self.extents = bodies[0].dim, np.array([body.extent for body in bodies])
         self.components = UNKNOWNS[self.dim]
-        self.unknowns = len(bodies) * len(self.components)  #: of all processes
+        self.unknowns = len(bodies) * len(self.components)  #: count on all processes
         self.size = self.unknowns if comm.rank == 0 else 0
         self.surfaces = {body.name: body.points for body in bodies}
         self.now = [RigidInstant.at_rest() for _ in bodies]
         self.old = list(self.now)
-        self.on_surface = np.zeros((len(bodies), 6))  #: force and moment by the flow [N, N m], now
+        self.on_surface = np.zeros((len(bodies), 6))  #: force and moment by the flow [N, N m], at present
         self.on_surface_old = np.zeros((len(bodies), 6))
         self._forces = [np.zeros((len(body.points), self.dim)) for body in bodies]  #: on the vertices [N]
         self._u, self._last = np.zeros((len(bodies), 6)), np.zeros((len(bodies), 6))
         self._held_u = np.zeros((len(bodies), 6))  #: increments of the held components in this step
-        self.current = Step(0.0, 0.0)  #: the step that is computed now or was last
+        self.current = Step(0.0, 0.0)  #: the present step, or the last one
         free = np.ones((len(bodies), 6), dtype=bool)
         for index, body in enumerate(bodies):
             free[index, body.held_components] = False
         self._free = free[:, self.components].ravel()
         self.balance = np.zeros(self.unknowns)
-        self._noise: Array | None = None  #: rounding errors of the balance, as far as this step knows
+        self._noise: Array | None = None  #: rounding errors of the balance; None before this step linearises
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -79,7 +79,7 @@ class RigidBodies:
         return 1.0 - self.scheme.alpha_f
 
     def initialise(self, t: float, dt: float) -> None:
-        """Initial velocities, and the accelerations that are in balance with the loads at t."""
+        """Set initial velocities, and accelerations by the loads at the time t [s]; dt [s]: the first step."""
         for index, body in enumerate(self.bodies):
             v = np.zeros(6)
             v[: len(body.initial_velocity)] = body.initial_velocity
@@ -89,8 +89,8 @@ class RigidBodies:
             rate, held, h = load.copy(), body.held_components, 1e-3 * dt
             x = [body.held_at(t + k * h) for k in range(4)]
             v[held] = (-3.0 * x[0] + 4.0 * x[1] - x[2]) / (2.0 * h)
-            course = (2.0 * x[0] - 5.0 * x[1] + 4.0 * x[2] - x[3]) / h**2
-            rate[held] = np.diag(motion.mass(body, start.R))[held] * course
+            acceleration = (2.0 * x[0] - 5.0 * x[1] + 4.0 * x[2] - x[3]) / h**2
+            rate[held] = np.diag(motion.mass(body, start.R))[held] * acceleration
             self.now[index] = RigidInstant(start.shift, start.R, v, rate, load)
         self.old = list(self.now)
 
@@ -103,23 +103,23 @@ class RigidBodies:
         return info
 
     def begin_step(self, t: float, dt: float, held: Array | None = None) -> None:
-        """Remember the state at t; held components are those of t + dt, or go these ways, shape (bodies, 6)."""
+        """Store the state at t; held: increments of held components, shape (bodies, 6), None: by their functions."""
         self.old, self.on_surface_old = list(self.now), self.on_surface.copy()
         self.current, self._noise = Step(t + dt, dt), None
         self._u[:] = self._held_u[:] = 0.0
         for index, (u, body) in enumerate(zip(self._held_u, self.bodies, strict=True)):
-            way = body.held_at(t + dt) - body.held_at(t) if held is None else held[index, body.held_components]
-            u[body.held_components] = way
+            prescribed = body.held_at(t + dt) - body.held_at(t) if held is None else held[index, body.held_components]
+            u[body.held_components] = prescribed
         self.place(self._held_u)
 
     def predict(self, t: float) -> None:
-        """Free components go on with their velocity."""
+        """Predictor: free components keep their velocity."""
         u, path = self._held_u.copy(), self.current.dt * self._velocity(self.old)
         u[:, self.components] += np.where(self._free, path, 0.0).reshape(len(u), -1)
         self.place(u)
 
     def place(self, u: Array) -> None:
-        """Go to the increments u since the start of the step, shape (bodies, 6)."""
+        """Set the increments u since the start of the step, shape (bodies, 6)."""
         self._u = u
         self.now = [
             motion.moved(body, self.scheme, old, part, self.current.t, self.current.dt)
@@ -127,20 +127,20 @@ class RigidBodies:
         ]
 
     def solve(self) -> StepInfo:
-        """Newton to the tolerance under the load there is. Raises StepFailed."""
+        """Newton's method to the tolerance, under the present load. Raises StepFailed."""
         info = converge(self, self.tolerance)
         self.check(info)
         return info
 
     def check(self, info: StepInfo) -> None:
-        """Raise StepFailed for a body that turns by half a turn in a step."""
+        """Raise StepFailed for a body that rotates by half a turn or more in a step."""
         for body, u in zip(self.bodies, self._u, strict=True):
             if not np.linalg.norm(u[3:]) < HALF_TURN:
                 reason = f"body '{body.name}' turned by more than half a turn: take a smaller time step"
                 raise StepFailed(self.name, reason, iteration=info.iterations, history=info.residuals)
 
     def end_step(self) -> None:
-        """Accept the step; an impact takes velocity away."""
+        """Accept the step; with contact, velocities and rates of momentum are those after the impact."""
         self.balance = self._own_balance()
         if self.contact is None or not self.contact.active.any():
             return
@@ -166,63 +166,33 @@ class RigidBodies:
             self.now[index] = replace(now, v=v, p=p)
 
     def _velocity(self, instants: Sequence[RigidInstant]) -> Array:
-        """Velocities of the centres [m/s] and spins in space [rad/s], of all unknowns."""
+        """Velocities of the centres [m/s] and angular velocities in space [rad/s], by unknown."""
         return self._by_component(np.array([np.concatenate([now.v[:3], motion.spin(now)]) for now in instants]))
 
     # ---------------------------------------------------------------------------------------------- the surface
 
-    def _positions(self) -> list[Array]:
-        """Of the vertices [m], by body, shape (n, dim)."""
-        pairs = zip(self.bodies, self.now, strict=True)
-        return [body.inertia.centre + (now.shift + body.arms(now.R, body.points))[:, : self.dim] for body, now in pairs]
-
     def displacement(self) -> Array:
-        """Of all vertices [m], shape (n, dim)."""
-        moved = zip(self.bodies, self._positions(), strict=True)
+        """Displacements [m] of all vertices, shape (n, dim)."""
+        moved = zip(self.bodies, surface.positions(self.bodies, self.now), strict=True)
         return np.concatenate([x - body.points for body, x in moved])
 
     def jacobian(self) -> VertexJacobian:
-        """A vertex moves by dc + w x r: k = 2 entries in 2D, 4 in 3D."""
-        columns, values = [], []
-        axes = np.arange(self.dim)
-        turns = np.arange(self.dim, len(self.components))
-        for index, (body, now) in enumerate(zip(self.bodies, self.now, strict=True)):
-            r = body.arms(now.R, body.points)
-            swept = np.cross(np.eye(3)[None, :, :], r[:, None, :])  # (n, axis of rotation, component)
-            by_turn = swept[:, self.components[turns] - 3, : self.dim].transpose(0, 2, 1)
-            first, n = index * len(self.components), len(r)
-            columns.append(
-                np.concatenate(
-                    [
-                        np.broadcast_to(first + axes[None, :, None], (n, self.dim, 1)),
-                        np.broadcast_to(first + turns, (n, self.dim, len(turns))),
-                    ],
-                    axis=2,
-                ).reshape(n * self.dim, -1)
-            )
-            values.append(np.concatenate([np.ones((n, self.dim, 1)), by_turn], axis=2).reshape(n * self.dim, -1))
-        return VertexJacobian(np.concatenate(columns), np.concatenate(values))
+        return surface.jacobian(self.bodies, self.now, self.components)
+
+    def _by_body(self, force: Array) -> list[Array]:
+        return np.split(force, np.cumsum([len(body.points) for body in self.bodies])[:-1])
 
     def load(self, force: Array) -> None:
-        """Take the force [N] of the flow on all vertices, shape (n, dim)."""
-        self._forces = np.split(force, np.cumsum([len(body.points) for body in self.bodies])[:-1])
-        self.on_surface = self._resultants(self._forces)
-
-    def _resultants(self, forces: Sequence[Array]) -> Array:
-        """Forces and moments about the centres, shape (bodies, 6)."""
-        found = []
-        for body, now, given in zip(self.bodies, self.now, forces, strict=True):
-            f = in_space(given)
-            found.append(np.concatenate([f.sum(axis=0), np.cross(body.arms(now.R, body.points), f).sum(axis=0)]))
-        return np.array(found)
+        """Set the force [N] of the flow on all vertices, shape (n, dim)."""
+        self._forces = self._by_body(force)
+        self.on_surface = surface.resultants(self.bodies, self.now, self._forces)
 
     def reduced(self, force: Array) -> Array:
-        """Forces [N] and moments [N m] of forces on the vertices, of all unknowns."""
-        parts = np.split(force, np.cumsum([len(body.points) for body in self.bodies])[:-1])
-        return self._by_component(self._resultants(parts))
+        """Forces [N] and moments [N m], by unknown, of forces on the vertices, (n, dim)."""
+        return self._by_component(surface.resultants(self.bodies, self.now, self._by_body(force)))
 
     def taken(self) -> Array:
-        """What momentum, own loads and contact leave open [N, N m]; for held components what was handed over."""
+        """Load [N, N m] by the balance of momentum, own loads and contact; of held components that of the flow."""
         weight = self.force_weight
         handed_over = self._by_component(weight * self.on_surface + (1.0 - weight) * self.on_surface_old)
         return np.where(self._free, self.balance, handed_over)
@@ -240,7 +210,7 @@ class RigidBodies:
     # ---------------------------------------------------------------------------- the system that Newton solves
 
     def _own_balance(self) -> Array:
-        """(1 - alpha_m) p + alpha_m p_n less the averaged own loads and the contact force, of all unknowns."""
+        """(1 - alpha_m) p + alpha_m p_n, minus the averaged own loads and the contact force, by unknown."""
         m, f = self.scheme.alpha_m, self.scheme.alpha_f
         parts = zip(self.now, self.old, strict=True)
         rows = [(1 - m) * now.p + m * old.p - (1 - f) * now.load - f * old.load for now, old in parts]
@@ -248,7 +218,7 @@ class RigidBodies:
         return balance if self.contact is None else balance - self.contact.force
 
     def residual(self) -> float:
-        """Norm [N] of the balance; moments count over the size of the body."""
+        """Norm [N] of the balance; moments are divided by the size of the body."""
         weight = self.force_weight
         mean = self._by_component(weight * self.on_surface + (1.0 - weight) * self.on_surface_old)
         if self.contact is not None:
@@ -257,7 +227,7 @@ class RigidBodies:
         if self.contact is None:
             return self._norm(self.balance)
         arms = [body.arms(now.R, body.points) for body, now in zip(self.bodies, self.now, strict=True)]
-        self.contact.measure(self._positions(), arms, self.components, self.current.t)
+        self.contact.measure(surface.positions(self.bodies, self.now), arms, self.components, self.current.t)
         self.contact.G[:, ~self._free] = 0.0
         self.contact.press(self._system(), -self.balance)
         return self._norm(self.balance - self.contact.force)
@@ -267,7 +237,7 @@ class RigidBodies:
         return float(np.linalg.norm(rows / arms))
 
     def tangent(self) -> Array:
-        """d(balance)/d(unknowns), dense; what forces on the vertices turn with the body is in it."""
+        """d(balance)/d(unknowns), dense, including the change of moments of forces on the vertices by rotation."""
         found, n, weight = np.zeros((self.unknowns, self.unknowns)), len(self.components), self.force_weight
         parts = zip(self.bodies, self.old, self.now, self._u, self._forces, strict=True)
         for index, (body, old, now, u, force) in enumerate(parts):
@@ -282,7 +252,7 @@ class RigidBodies:
         return found
 
     def linearise(self) -> PETSc.Mat:
-        """The same as a distributed matrix."""
+        """The tangent as a distributed matrix."""
         own = (self.size, None)
         matrix, values = PETSc.Mat().createAIJ((own, own), nnz=(self.unknowns, 0), comm=self.comm), self.tangent()
         if self.size:
@@ -293,7 +263,7 @@ class RigidBodies:
         return matrix
 
     def advance(self) -> float:
-        """One Newton step; the size of the increment over that of the step."""
+        """One Newton iteration; returns the norm of the increment relative to that of the step."""
         right = -self.balance
         if self.contact is not None:
             right += self.contact.force
@@ -311,7 +281,7 @@ class RigidBodies:
         return -self.balance[: self.size]
 
     def update(self, increment: Array) -> float:
-        """Add increments of the owned unknowns; their size relative to the step."""
+        """Add increments of the owned unknowns; returns their norm relative to that of the step."""
         return self._add(self.comm.bcast(increment.copy() if self.comm.rank == 0 else None, root=0))
 
     def _add(self, increment: Array) -> float:
@@ -325,7 +295,7 @@ class RigidBodies:
         return float(np.linalg.norm(self._scaled(added)) / size) if size > 0.0 else 0.0
 
     def _scaled(self, u: Array) -> Array:
-        """Displacements and rotations, these times the size of the body [m]."""
+        """Increments with rotations multiplied by the size of the body [m]."""
         return np.where(np.arange(6) < 3, 1.0, self.extents[:, None]) * u
 
     def retreat(self, fraction: float) -> None:
@@ -333,29 +303,29 @@ class RigidBodies:
         self.place(self._u - fraction * self._last)
 
     def settled(self) -> bool:
-        """True: the residual vanishes only where gaps and pressures fit."""
+        """True: the residual includes the contact conditions."""
         return True
 
     def rounded(self) -> Array:
-        """Positions are known to eps times displacement and size [m], rotations to eps."""
+        """Magnitudes that are rounded: displacement plus size for positions [m], one for rotations."""
         sizes = np.ones((len(self.bodies), 6))
         sizes[:, :3] = np.array([[np.abs(now.shift).max()] for now in self.now]) + self.extents[:, None]
         return self._by_component(sizes)[: self.size]
 
     def add_rounding(self, error: Array) -> None:
-        """Rounding errors that the flow brings into the balance, after `linearise`, of the owned unknowns."""
+        """Add rounding errors that the flow causes in the balance, by owned unknown; call it after `linearise`."""
         assert self._noise is not None
         self._noise = self._noise + error
 
     def round_off(self) -> float:
-        """Norm [N] of the rounding error of the balance where it was linearised last in this step (collective)."""
+        """Norm [N] of the rounding error of the balance, at the iterate that this step linearised last (collective)."""
         if self._noise is None:
             self.linearise()
         noise = self.comm.bcast(self._noise if self.comm.rank == 0 else None, root=0)
         return self._norm(np.where(self._free, noise, 0.0))
 
     def worst(self) -> tuple[float, ...] | None:
-        """Centre [m] of the body with the largest residual."""
+        """Position [m] of the centre of the body with the largest residual."""
         norms = np.abs(np.nan_to_num(self.balance, nan=np.inf)).reshape(len(self.bodies), -1).max(axis=1)
         index = int(np.argmax(norms))
         return tuple((self.bodies[index].inertia.centre + self.now[index].shift[: self.dim]).tolist())
@@ -366,14 +336,14 @@ class RigidBodies:
         return None if self.contact is None else self.contact.transformation(self._system())
 
     def recover(self, taken: TakenRows, du: Array) -> None:
-        """Pressures follow from the balance where it is evaluated next."""
+        """Nothing to do: the next evaluation of the balance computes the contact forces."""
 
     def missing(self) -> Array:
-        """Zero: held components have their values from the start of the step on."""
+        """Zero: held components have their values since the start of the step."""
         return np.zeros(self.size)
 
     def impose_rows(self, blocks: Sequence[PETSc.Mat], x: Array, b: Array) -> list[PETSc.Mat]:
-        """Rows of held components become du = x there; the first of the blocks beside each other is its own."""
+        """Replace the rows of held components by du = x. blocks: one row of blocks, its own first."""
         changed = list(blocks)
         rows = np.flatnonzero(~self._free[: self.size]).astype(PETSc.IntType)
         for index, block in enumerate(changed):

@@ -12,17 +12,18 @@ from solvers.api import Array
 
 @dataclass(frozen=True)
 class Inertia:
-    """Of a body in its reference configuration."""
+    """Mass properties of a body at the start."""
 
     mass: float  #: [kg]
     centre: Array  #: centre of mass [m], shape (dim,)
-    tensor: Array  #: about the centre [kg m^2], shape (3, 3); in 2D only its last entry counts
+    tensor: Array  #: moments of inertia about the centre [kg m^2], shape (3, 3); in 2D only the last entry is used
 
 
 def inertia_of_surface(points: Array, facets: NDArray[np.int64], density: float) -> Inertia:
-    """Of a homogeneous body with a closed surface: vertices [m] of shape (n, dim), segments or triangles (m, dim).
+    """Inertia of a homogeneous body with a closed surface.
 
-    Sums over the signed simplices between the facets and the mean vertex, exact for the polyhedron:
+    points: vertices [m], (n, dim); facets: segments or triangles, (m, dim); density [kg/m^3].
+    It is a sum over signed simplices with corners a_i, from the mean vertex to the facets, and exact for polyhedra:
     int x x^T = V / ((d + 1) (d + 2)) (sum_i a_i a_i^T + s s^T), s = sum_i a_i.
     """
     dim, origin = points.shape[1], points.mean(axis=0)

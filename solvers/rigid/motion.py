@@ -1,4 +1,4 @@
-"""How a rigid body moves in a time step: generalised-alpha for its momentum, rotations included.
+"""The time scheme of rigid bodies: generalised-alpha for momentum and angular momentum.
 
 With P = (m v, R J W), the momentum of the centre and the angular momentum about it in space (R: rotation, J: inertia,
 W: spin, both in the body), and its rate p, a step of length dt by u = (dc, theta) from (c_n, R_n) is
@@ -8,8 +8,9 @@ W: spin, both in the body), and its rate p, a step of length dt by u = (dc, thet
     p = (P - P_n) / (gamma dt) - (1 - gamma) / gamma p_n,                    a = p / m,  J A = R^T p - W x J W
     (1 - alpha_m) p + alpha_m p_n = (1 - alpha_f) f + alpha_f f_n
 
-For the centre that is Chung and Hulbert's method. Without moments, p = 0 and R J W stays exactly; with rho_inf = 1 then
-also W . J W, because W - W_n = J^-1 (R^T - R_n^T) R J W and theta is the axis of R R_n^T.
+For the centre this is Chung and Hulbert's method. Without moments, p = 0 and the angular momentum R J W is conserved
+exactly. With rho_inf = 1 the energy W . J W is conserved too, because W - W_n = J^-1 (R^T - R_n^T) R J W and theta is
+the axis of R R_n^T.
 Source: for rho_inf = 1 Simo, Wong, Int. J. Numer. Meth. Engng 31 (1991) 19-52.
 """
 
@@ -27,7 +28,7 @@ from solvers.rigid.rotation import rotation, skew, vector_rate
 
 @dataclass(frozen=True)
 class RigidInstant:
-    """One body at one time."""
+    """The state of one body at one time."""
 
     shift: Array  #: displacement [m] of the centre since the start of the run, shape (3,)
     R: Array  #: rotation since then, shape (3, 3)
@@ -45,35 +46,35 @@ class RigidInstant:
 
 
 def spin(now: RigidInstant) -> Array:
-    """[rad/s] in space."""
+    """Angular velocity in space [rad/s], shape (3,)."""
     return now.R @ now.v[3:]
 
 
 def momentum(body: RigidBody, R: Array, v: Array) -> Array:
-    """P [kg m/s, kg m^2/s], shape (6,)."""
+    """P: momentum [kg m/s] and angular momentum about the centre [kg m^2/s], shape (6,)."""
     return np.concatenate([body.inertia.mass * v[:3], R @ body.inertia.tensor @ v[3:]])
 
 
 def mass(body: RigidBody, R: Array) -> Array:
-    """Of the centre's velocity and the spin in space, shape (6, 6)."""
+    """Mass matrix for the velocity of the centre and the angular velocity in space [kg, kg m^2], shape (6, 6)."""
     found = np.zeros((6, 6))
     found[:3, :3], found[3:, 3:] = body.inertia.mass * np.eye(3), R @ body.inertia.tensor @ R.T
     return found
 
 
 def kinetic_energy(body: RigidBody, now: RigidInstant) -> float:
-    """[J]"""
+    """Kinetic energy [J]."""
     return 0.5 * float(body.inertia.mass * now.v[:3] @ now.v[:3] + now.v[3:] @ body.inertia.tensor @ now.v[3:])
 
 
 def acceleration(body: RigidBody, now: RigidInstant) -> Array:
-    """a [m/s^2], and A [rad/s^2] in the body, shape (6,)."""
+    """Accelerations: a of the centre [m/s^2], A of the rotation in the body [rad/s^2], shape (6,)."""
     J, W = body.inertia.tensor, now.v[3:]
     return np.concatenate([now.p[:3] / body.inertia.mass, np.linalg.solve(J, now.R.T @ now.p[3:] - np.cross(W, J @ W))])
 
 
 def moved(body: RigidBody, scheme: GeneralisedAlpha, old: RigidInstant, u: Array, t: float, dt: float) -> RigidInstant:
-    """The body after a step to t by u, shape (6,), under its own loads."""
+    """State after a step of length dt to the time t [s] by the increment u = (dc, theta), shape (6,)."""
     R = rotation(u[3:]) @ old.R
     shift = old.shift + u[:3]
     in_body = np.concatenate([u[:3], old.R.T @ u[3:]])
@@ -84,7 +85,7 @@ def moved(body: RigidBody, scheme: GeneralisedAlpha, old: RigidInstant, u: Array
 
 
 def velocity_rate(scheme: GeneralisedAlpha, old: RigidInstant, now: RigidInstant, theta: Array, dt: float) -> Array:
-    """Derivative of (v, spin in space) by dc and a further rotation w in space, shape (6, 6)."""
+    """Derivative of (v, angular velocity in space) by dc and a further rotation w in space, shape (6, 6)."""
     rate = scheme.gamma / (scheme.beta * dt)
     by_w = rate * now.R @ old.R.T @ vector_rate(theta) - skew(spin(now))
     return np.block([[rate * np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), by_w]])

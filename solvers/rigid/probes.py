@@ -1,4 +1,4 @@
-"""What can be measured on rigid bodies: functions without arguments that return the values by component."""
+"""Probes of rigid bodies: functions without arguments that return values by component."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Probe = Callable[[], dict[str, float]]
 
 
 def at_point(bodies: RigidBodies, index: int, quantity: str, point: Sequence[float]) -> Probe:
-    """displacement [m] or velocity [m/s] of a point of a body, given where it is at the start."""
+    """Probe of the displacement [m] or velocity [m/s] of a point of a body; point: its position at the start [m]."""
     body, at = bodies.bodies[index], np.array([point], dtype=float)
 
     def probe() -> dict[str, float]:
@@ -28,7 +28,7 @@ def at_point(bodies: RigidBodies, index: int, quantity: str, point: Sequence[flo
 
 
 def of_body(bodies: RigidBodies, index: int, quantity: str) -> Probe:
-    """mass [kg], centre [m], momentum [kg m/s] or angular_momentum [kg m^2/s] about the origin."""
+    """Probe of the mass [kg], centre [m], momentum [kg m/s] or angular_momentum [kg m^2/s] about the origin."""
     body = bodies.bodies[index]
 
     def probe() -> dict[str, float]:

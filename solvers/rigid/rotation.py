@@ -1,4 +1,4 @@
-"""Finite rotations in 3D: rotation vectors theta [rad], spins [rad/s], and the maps between them."""
+"""Finite rotations in 3D: rotation vectors theta [rad], rotation matrices, and their derivatives."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from solvers.api import Array
 
-#: Angle below which series replace quotients of rounding errors; their next terms are of the size angle^4 / 1e4.
+#: Angle below which series replace quotients of small numbers; the neglected terms are about angle^4 / 1e4.
 SMALL = 1e-3
 
 

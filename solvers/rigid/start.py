@@ -1,4 +1,4 @@
-"""The start of rigid bodies whose loads depend on their acceleration; the method is in `coupling.start`."""
+"""The start of rigid bodies in a flow: a step that finds their initial acceleration (`coupling.start`)."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.rigid import motion
 from solvers.rigid.field import RigidBodies
 
-#: For bodies that are at rest before.
+#: Backward Euler, written as generalised-alpha.
 BACKWARD_EULER = GeneralisedAlpha(alpha_m=0.0, alpha_f=0.0, beta=1.0, gamma=1.0)
 
 
 class RigidStart:
-    """Steps of backward Euler to the first time. One is enough: nothing rings."""
+    """Implements `StartOfSolid`. One step is enough, because rigid bodies do not oscillate."""
 
     steps = 1
 
@@ -26,14 +26,14 @@ class RigidStart:
         self.field, self._initial = field, list(field.now)
 
     def velocity(self) -> Array:
-        """Of all vertices [m/s], shape (n, dim)."""
+        """Velocities of all vertices [m/s], shape (n, dim)."""
         field, found = self.field, []
         for body, now in zip(field.bodies, field.now, strict=True):
             found.append(now.v[:3] + np.cross(motion.spin(now), body.arms(now.R, body.points)))
         return np.concatenate(found)[:, : field.dim]
 
     def acceleration(self) -> float:
-        """At most: that of the centre, and of the point farthest from it."""
+        """Upper bound of the accelerations of vertices [m/s^2]."""
         largest = 0.0
         for body, now in zip(self.field.bodies, self.field.now, strict=True):
             a, turning = np.split(motion.acceleration(body, now), 2)
@@ -43,23 +43,23 @@ class RigidStart:
 
     @contextmanager
     def step(self, t: float, dt: float) -> Iterator[None]:
-        """From rest, so that a = (u - u_n) / dt^2; held components accelerate as they are asked to."""
+        """Begin a start step from rest, so that a = (u - u_n) / dt^2; held components have their accelerations."""
         field = self.field
         self._initial = list(field.now)
-        own, ways = field.scheme, np.zeros((len(field.bodies), 6))
+        own, increments = field.scheme, np.zeros((len(field.bodies), 6))
         for index, (body, now) in enumerate(zip(field.bodies, field.now, strict=True)):
             held = body.held_components
-            ways[index, held] = dt**2 * motion.acceleration(body, now)[held]
+            increments[index, held] = dt**2 * motion.acceleration(body, now)[held]
             field.now[index] = replace(now, v=np.zeros(6), p=np.zeros(6))
         field.scheme = BACKWARD_EULER
         try:
-            field.begin_step(t - dt, dt, ways)
+            field.begin_step(t - dt, dt, increments)
             yield
         finally:
             field.scheme = own
 
     def end(self) -> None:
-        """Where and as fast as before; rates of momentum are those of the step."""
+        """Restore positions and velocities; rates of momentum are those of the start step."""
         field = self.field
         field.now = [replace(initial, p=now.p) for initial, now in zip(self._initial, field.now, strict=True)]
         field.old = list(field.now)
