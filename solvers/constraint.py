@@ -1,4 +1,4 @@
-"""Constraints on a field's unknowns whose multipliers are eliminated: contact."""
+"""The interface `Constraint`: conditions on a field whose multipliers are eliminated, such as contact."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from solvers.rows import RowTransformation
 
 
 class Constraint(Stateful, Protocol):
-    """Something that couples nodes of a field through multipliers, which it eliminates: contact.
+    """Conditions that couple nodes of a field by multipliers, which are eliminated.
 
-    Arrays over its nodes have the shape (N, dim) and are the same on every process. Calls are collective.
+    Arrays over its nodes have the shape (N, dim) and are the same on every process. All calls are collective.
     """
 
     @property
     def near(self) -> bool:
-        """Some constraint may be active at the latest `evaluate`."""
+        """Whether some condition may be active at the latest `evaluate`."""
         ...
 
     @property
     def settled(self) -> bool:
-        """The latest `evaluate` changed no active set."""
+        """Whether the latest `evaluate` left the active set unchanged."""
         ...
 
     def dofs(self) -> NDArray[np.int64]:
@@ -32,30 +32,30 @@ class Constraint(Stateful, Protocol):
         ...
 
     def touching_dofs(self) -> NDArray[np.int64]:
-        """Global dofs of the nodes of surfaces that come and go, each once."""
+        """Global dofs of the nodes of surfaces that are not tied, each once."""
         ...
 
     def multiplier_dofs(self) -> NDArray[np.int64]:
-        """Those of them that carry multipliers."""
+        """Global dofs of those of these nodes that have multipliers."""
         ...
 
     def start(self, u: Array, stiffness: Array, t: float) -> None:
-        """Take the displacements [m] at the start and the diagonal of the stiffness [N/m]."""
+        """Set the displacements at the start [m] and the diagonal of the stiffness [N/m], both of shape (N, dim)."""
         ...
 
     def begin_step(self) -> None: ...
 
     def end_step(self, weight: float) -> None:
-        """Accept the step; weight: of the new force in the balance."""
+        """Accept the step; weight: that of the force at its end in the balance."""
         ...
 
     @property
     def friction_work(self) -> float:
-        """What friction has dissipated so far [J]."""
+        """Energy that friction has dissipated since the start [J]."""
         ...
 
     def evaluate(self, u: Array, t: float) -> None:
-        """Everything at the displacements of the present iterate."""
+        """Compute gaps and active set at the displacements u [m] of an iterate, shape (N, dim), and the time t [s]."""
         ...
 
     def force(self) -> Array:
@@ -67,15 +67,15 @@ class Constraint(Stateful, Protocol):
         ...
 
     def condense(self, weight: float) -> RowTransformation:
-        """Elimination of the multipliers from the linearised balance without `force`, which has a weight in it."""
+        """The transformation that eliminates the multipliers from the linearised balance without `force`."""
         ...
 
     def recover(self, balance: Array, du: Array) -> None:
-        """Multipliers from that balance (of replaced rows) and the increment [m] at the dofs, shapes (N * dim,)."""
+        """Compute the multipliers from the linearised balance [N] and the increment [m] at the dofs, (N * dim,)."""
         ...
 
     def active(self) -> NDArray[np.bool_]:
-        """Which multipliers are in contact."""
+        """Mask of the multipliers in contact."""
         ...
 
     def numbers(self) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""The active set: which multipliers are in contact, and whether they stick; a guard against cycles."""
+"""The active set: the status of every multiplier (open, slip, stick), with damping and detection of cycles."""
 
 from __future__ import annotations
 
@@ -8,41 +8,40 @@ from numpy.typing import NDArray
 from solvers.api import StepFailed
 from solvers.contact.law.law import OPEN, Statuses
 
-#: How often earlier active sets may recur in a step before it fails.
+#: Largest count of recurrences of earlier active sets in a step.
 MAX_RECURRENCES = 6
 
-#: What the complementarity parameter is multiplied by at every recurrence: with a large one, iterates
-#: oscillate about the solution.
+#: Factor of the complementarity parameter at every recurrence: with a large parameter, iterates oscillate.
 ON_RECURRENCE = 0.1
 
 
 class ActiveSet:
-    """Statuses of all multipliers as the laws choose them, iterate by iterate.
+    """Statuses of all multipliers, which the laws choose in every iterate.
 
-    Choosing anew in every iterate is the semi-smooth Newton reading of the complementarity conditions.
+    This choice in every iterate is a semi-smooth Newton method for the complementarity conditions.
     Source: Alart & Curnier (1991); Hueber & Wohlmuth, Comput. Methods Appl. Mech. Engng 194 (2005).
     """
 
     def __init__(self, size: int):
         self.status: Statuses = np.full(size, OPEN, dtype=np.int8)
-        self.changed = False  #: by the latest choice
-        self.changes = 0  #: choices in this step that changed the set
+        self.changed = False  #: whether the latest choice changed the set
+        self.changes = 0  #: count of choices in this step that changed the set
         self.damping = 1.0  #: factor of the complementarity parameter in this step
         self._earlier: list[bytes] = []
         self._recurrences = 0
 
     @property
     def active(self) -> NDArray[np.bool_]:
-        """In contact."""
+        """Mask of the multipliers in contact."""
         return self.status != OPEN
 
     def begin_step(self) -> None:
-        """Clear the sets of the last step; the set itself is kept."""
+        """Discard the earlier sets of the last step; the present set is kept."""
         self.changed, self.changes, self.damping = False, 0, 1.0
         self._earlier, self._recurrences = [self.status.tobytes()], 0
 
     def choose(self, status: Statuses) -> None:
-        """Take the statuses of this iterate. Raises StepFailed if the set cycles."""
+        """Set the statuses of this iterate. Raises StepFailed if the set cycles."""
         self.changed = bool(np.any(status != self.status))
         self.changes += self.changed
         if self.changed:

@@ -1,4 +1,4 @@
-"""Multipliers that are excluded: supports, or another multiplier, leave them no direction to act in."""
+"""Blocked multipliers: excluded because supports or other multipliers leave them no free direction."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from solvers.contact.terms import find_normals
 
 
 def find_blocked(interface: ContactInterface, x: Array) -> NDArray[np.bool_]:
-    """Which they are with all nodes at x [m], shape (C,): decided once, at the start of a run."""
+    """Mask of the blocked multipliers for nodes at x [m], shape (C,). It is found once, at the start of a run."""
     multipliers, held = interface.multipliers, interface.nodes.held
     node, slaves = multipliers.node, multipliers.areas > 0.0
     if not held[node[slaves]].any() and multipliers.only_one.all():
         return np.zeros(len(node), dtype=bool)
     normals = find_normals(multipliers, x).values
-    own = np.arange(len(node))  # as if every multiplier had its node for itself
+    own = np.arange(len(node))  # treat every multiplier as the only one of its node
     feels = np.abs(free_normals(normals, own, held[node])).max(axis=1) > 0.0
     whole = slaves & (interface.spans == "space")
     first = np.zeros(len(node), dtype=bool)

@@ -16,7 +16,7 @@ Part = tuple[Sparse, NDArray[np.int64], NDArray[np.int64]]
 
 
 def expand(matrix: Sparse, dim: int) -> Sparse:
-    """matrix (x) I: the same for every component of a vector."""
+    """The Kronecker product matrix (x) I, which applies the matrix to every component of a vector."""
     rows, columns = matrix.shape
     repeated = matrix[np.repeat(np.arange(rows), dim)]
     indices = dim * repeated.indices + repeated.row_numbers() % dim
@@ -24,7 +24,7 @@ def expand(matrix: Sparse, dim: int) -> Sparse:
 
 
 def add_up(parts: Sequence[Part], shape: tuple[int, int]) -> Sparse:
-    """The sum of matrices whose rows and columns have other numbers in it: (matrix, rows, columns) each."""
+    """The sum of matrices, each with the numbers of its rows and columns in the sum."""
     if not parts:
         return nothing(shape)
     data = np.concatenate([matrix.data for matrix, _, _ in parts])
@@ -34,22 +34,22 @@ def add_up(parts: Sequence[Part], shape: tuple[int, int]) -> Sparse:
 
 
 def components(items: NDArray[np.int64], dim: int) -> NDArray[np.int64]:
-    """dim * item + component, shape (dim * n,)."""
+    """Numbers dim * item + component of all components, shape (dim * n,)."""
     return (dim * items[:, None] + np.arange(dim)).ravel()
 
 
 def block_diagonal(blocks: Array) -> Sparse:
-    """Blocks of shape (m, rows, columns) along the diagonal."""
+    """The block diagonal matrix of blocks of shape (m, rows, columns)."""
     m, rows, columns = blocks.shape
-    place = np.arange(m * columns, dtype=np.int32).reshape(m, 1, columns)
+    numbers = np.arange(m * columns, dtype=np.int32).reshape(m, 1, columns)
     indptr = np.arange(0, m * rows * columns + 1, columns, dtype=np.int32)
-    return Sparse(blocks.ravel(), np.broadcast_to(place, blocks.shape).ravel(), indptr, (m * rows, m * columns))
+    return Sparse(blocks.ravel(), np.broadcast_to(numbers, blocks.shape).ravel(), indptr, (m * rows, m * columns))
 
 
 def inverse(matrix: Sparse) -> Sparse:
     """The inverse of a matrix that is block diagonal up to the order of its rows and columns.
 
-    Coupled unknowns are found as connected parts of its graph; each part is inverted densely.
+    Blocks are the connected parts of its graph. Each is inverted as a dense matrix.
     """
     n = matrix.shape[0]
     row, column = matrix.row_numbers(), matrix.indices
@@ -57,7 +57,7 @@ def inverse(matrix: Sparse) -> Sparse:
     order = np.argsort(part, kind="stable")
     sizes = np.bincount(part, minlength=n)
     starts = np.cumsum(sizes) - sizes
-    at = np.empty(n, dtype=np.int64)  # place within the part
+    at = np.empty(n, dtype=np.int64)  # index within the part
     at[order] = np.arange(n) - starts[part[order]]
     rows, columns, data = [], [], []
     for size in np.unique(sizes[sizes > 0]):

@@ -1,25 +1,25 @@
 """Condensation of dual multipliers: the linearised balance becomes one without multipliers.
 
-With J the tangent and R the balance without multipliers, both at the interface, a Newton step solves
+Let J be the tangent and R the balance without multipliers, both at the interface. A Newton iteration solves
 
-    J du + R - w F z = 0                     z = P zeta + Z du: multipliers and the directions they may have
+    J du + R - w F z = 0                     z = P zeta + Z du: multipliers in their admissible directions
     G zeta + H du + r = 0                    the law, one row for each zeta
 
-where w is the weight of the new contact force in the balance and F zeta the force of multipliers on all nodes. The
-columns of Q are the directions, orthonormal at each node, in which multipliers act on their nodes. Then
+where w is the weight in the balance of the contact force at the end of the step, and F z the force of multipliers on
+all nodes. The columns of Q are the directions, orthonormal at each node, in which multipliers act on their nodes. Then
 B = Q^T F P is invertible, block by block,
 
     zeta = B^-1 Q^T ((J - w F Z) du + R) / w,
 
-and what is left is one linear transformation of the rows:
+and the elimination of zeta is one linear transformation of the rows:
 
     [L (J - w F Z) + Q H] du = -L R - Q r,   L = I - (F P - Q G / w) B^-1 Q^T.
 
-As Q^T L = G B^-1 Q^T / w, the directions Q carry the law and all others the balance. J contains the derivative of the
-contact force at fixed multipliers. Without friction P = Q = n at an
-ordinary node, B = -D, and the law is the closing gap.
-Source: Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010), section 4.4, written for several multipliers
-at a node and for supports that hold some of its components.
+Since Q^T L = G B^-1 Q^T / w, the rows in the directions Q are those of the law, and all others those of the balance. J
+contains the derivative of the contact force at fixed multipliers. Without friction P = Q = n at an ordinary node,
+B = -D, and the law is a zero gap.
+Source: Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010), section 4.4, generalised to several
+multipliers at a node and to supports that hold some of its components.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from solvers.api import Array
 from solvers.contact.blocks import inverse
 from solvers.sparse import Sparse, diagonal
 
-#: Entries of L below this are rounding of 1 - 1.
+#: Entries of L below this are rounding errors of 1 - 1.
 ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)
 class Linearised:
-    """What m multipliers with K degrees of freedom add to a Newton step; n = dim * N interface dofs."""
+    """Linearised force and law of m multipliers with K degrees of freedom; n = dim * N interface dofs."""
 
     weight: float  #: w
     force: Sparse  #: F, shape (n, dim * m)
@@ -49,22 +49,22 @@ class Linearised:
     by_multiplier: Sparse  #: G, shape (K, K)
     by_displacement: Sparse  #: H, shape (K, n)
     residual: Array  #: r, shape (K,)
-    transformation: Sparse | None = None  #: of the rows to the basis that multipliers are dual to, shape (n, n)
+    transformation: Sparse | None = None  #: of rows to the basis that multipliers are dual to, (n, n); None: nodal
 
 
 @dataclass(frozen=True)
 class Condensed:
-    """The transformation of the rows and what it takes to get the multipliers back."""
+    """The transformation of the rows, and the operator that recovers the multipliers."""
 
     rows: Sparse  #: L, shape (n, n)
-    stiffness: Sparse  #: of contact, to be added to J first, shape (n, n)
+    stiffness: Sparse  #: of contact, added to J before the transformation, shape (n, n)
     added: Sparse  #: Q H, shape (n, n)
     right: Array  #: - Q r, shape (n,)
     inverse: Sparse  #: B^-1 Q^T / w, shape (K, n)
 
 
 def condense(terms: Linearised) -> Condensed:
-    """Eliminate the multipliers."""
+    """Eliminate the multipliers from the linearised balance."""
     Q, back, FP, to_basis = terms.felt, terms.felt.T, terms.force @ terms.basis, terms.transformation
     if to_basis is not None:
         FP = to_basis.T @ FP

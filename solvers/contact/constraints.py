@@ -1,4 +1,4 @@
-"""Which multipliers have a constraint in an iterate, and which are means of their neighbours."""
+"""The choice of multipliers with a constraint: by coverage, supports and merging; redistribution to the others."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from solvers.sparse import Sparse
 
 @dataclass(frozen=True)
 class Constrained:
-    """The multipliers of one iterate."""
+    """The choice for one iterate."""
 
     terms: Terms  #: with mean normals where multipliers are merged
-    covers: NDArray[np.bool_]  #: those with a constraint, shape (C,)
-    merged: NDArray[np.bool_]  #: those that act with another one of their node, shape (C,)
-    spans: NDArray[np.str_]  #: directions that each may have, shape (C,)
-    shared: Sparse | None  #: what the others get of those with a constraint, shape (C, C)
+    covers: NDArray[np.bool_]  #: mask of the multipliers with a constraint, shape (C,)
+    merged: NDArray[np.bool_]  #: mask of those that are merged into another one of their node, shape (C,)
+    spans: NDArray[np.str_]  #: admissible directions of each, shape (C,)
+    shared: Sparse | None  #: redistribution from those with a constraint to those without, shape (C, C)
 
 
 class Constraints:
-    """Coverage, merging and redistribution; decisions of a step stay, see there."""
+    """Combines coverage, merging and redistribution; for how decisions are kept in a step see these."""
 
     def __init__(self, interface: ContactInterface):
         self._interface = interface
@@ -41,7 +41,7 @@ class Constraints:
         self._blocked = np.zeros(len(multipliers.node), dtype=bool)
 
     def start(self, x: Array) -> None:
-        """All nodes are at x [m], shape (N, dim)."""
+        """Find the blocked multipliers for nodes at x [m], shape (N, dim)."""
         self._blocked = find_blocked(self._interface, x)
 
     def begin_step(self) -> None:
@@ -49,7 +49,7 @@ class Constraints:
         self._merging.begin_step()
 
     def choose(self, terms: Terms) -> Constrained:
-        """By the mortar integrals of an iterate."""
+        """The choice by the mortar integrals of an iterate."""
         able = self.coverage.choose(terms.D) & ~self._blocked
         into = self._merging.into(terms, able)
         merged = into != np.arange(len(into))

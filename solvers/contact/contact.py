@@ -1,4 +1,4 @@
-"""Contact between surfaces: multipliers, active set and the terms of one iterate."""
+"""The constraint `Contact`: multipliers, active set and mortar terms of all pairs at one iterate."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from solvers.contact.active_set import ActiveSet
 from solvers.contact.condense import Condensed, Linearised, condense, recover
 from solvers.contact.constraints import Constraints
 from solvers.contact.directions import admissible, free_normals
-from solvers.contact.distance import distances
+from solvers.contact.force import force_matrix, nodal_force
 from solvers.contact.friction_work import FrictionWork
 from solvers.contact.interface import ContactInterface, describe_interface
 from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
@@ -26,21 +26,20 @@ from solvers.contact.slip import Sliding, Slip
 from solvers.contact.terms import Terms, find_normals, total_terms
 from solvers.contact.ties import Ties
 from solvers.rows import RowTransformation
-from solvers.sparse import Sparse, nothing, sparse_from_entries
+from solvers.sparse import Sparse, nothing
 
-#: Gap, as a share of the extent of all surfaces, up to which nodes without pressure touch: rounding of positions.
+#: Gap relative to the extent of all surfaces up to which nodes without pressure touch: the rounding of positions.
 TOUCHING = 1e-12
 
 
 class Contact:
-    """All pairs together: arrays over `nodes` (N) and over `multipliers` (C), the same on every process.
+    """All pairs together. Arrays over `nodes` (N) and `multipliers` (C) are the same on every process.
 
-    z are the multipliers [Pa]: the negative traction on the slave, z_n = n.z >= 0 the contact pressure.
+    z are the multipliers [Pa]: the negative traction on the slave, with the contact pressure z_n = n.z >= 0.
 
-    keep_overlap: a node whose mean gap is negative at the start of a step need not close it, only not deepen it. That
-    happens where a slave slides onto a master: a node bends into it before it has a master. Closed in one step, or as
-    its area grows, the overlap would accelerate the node; kept, contact does no work. For dynamics;
-    the first step closes all there is.
+    keep_overlap: for dynamics. A mean gap that is negative at the start of a step may stay, but not decrease. It occurs
+    where a slave slides onto a master: a node enters the master before its area is covered. If one step closed this
+    overlap, it would accelerate the node. If it stays, contact does no work. The first step closes all overlaps.
     """
 
     def __init__(
@@ -66,10 +65,10 @@ class Contact:
         self._spans = self.interface.spans  # at the latest evaluation
         self._keep_overlap = keep_overlap
         self._gap = np.zeros(count)  # weighted gap at the latest evaluation
-        self._mean_gap = np.zeros(count)  # the same over D [m], zero where no master is seen
+        self._mean_gap = np.zeros(count)  # weighted gap over D [m], zero where D is zero
         self._kept = np.zeros(count)  # mean gap that may stay in this step [m], <= 0
         self._constraints = Constraints(self.interface)
-        self.merged = np.zeros(count, dtype=bool)  #: multipliers that act with another one of their node
+        self.merged = np.zeros(count, dtype=bool)  #: multipliers that are merged into another one of their node
         self._stiffness = np.zeros(count)
         self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
         self._shared: Sparse | None = None  # redistribution at the latest evaluation
@@ -85,17 +84,17 @@ class Contact:
         self._weight = 1.0  # of the new contact force in the balance
         self.work = FrictionWork((count, self.dim))
         self.time = np.nan  #: of the latest evaluation [s]
-        self.touched_at = np.full(len(self.pairs), np.inf)  #: when each pair first touched [s], as probes have noted it
+        self.touched_at = np.full(len(self.pairs), np.inf)  #: time of the first contact of each pair [s], set by probes
         self.terms: Terms | None = None
         self._D, self._covers = np.zeros(count), np.zeros(count, dtype=bool)  # at the latest evaluation
-        self._way = 0.0  # sum of the largest motions of any node between evaluations [m]
-        self._idle = False  # the latest evaluation found no facets near, and all is as it was before
+        self._travel = 0.0  # sum over evaluations of the largest motion of a node [m]
+        self._idle = False  # the latest evaluation found no facet pairs
         self._condensation: tuple[list[ActiveMultipliers], Linearised, Condensed] | None = None  # the latest
 
     # ------------------------------------------------------------------------------------------------- steps
 
     def start(self, u: Array, stiffness: Array, t: float) -> None:
-        """Take the positions at the start and the diagonal of the stiffness [N/m]; both of shape (N, dim)."""
+        """Set the displacements at the start [m] and the diagonal of the stiffness [N/m], both of shape (N, dim)."""
         at_node, areas = stiffness.mean(axis=1)[self.multipliers.node], self.multipliers.areas
         self._stiffness = np.divide(at_node, areas, out=np.zeros_like(areas), where=areas > 0.0)
         self.x = self.positions(u, t)
@@ -112,7 +111,7 @@ class Contact:
         return x
 
     def begin_step(self) -> None:
-        """Facets may have moved from here on."""
+        """Store the positions and active set at the start of a step."""
         self.x_old = self.x.copy()
         if self._keep_overlap:
             self._kept = np.minimum(0.0, self._mean_gap)
@@ -121,22 +120,22 @@ class Contact:
         self._shares.begin_step()
         for mortar in self._mortars:
             mortar.begin_step(self.active_set.active)
-        self._sliding.begin_step(self.x, self._way)
+        self._sliding.begin_step(self.x, self._travel)
         self.slip = None
 
     def end_step(self, weight: float) -> None:
-        """Accept the step; weight: of the new contact force in the balance."""
+        """Accept the step; weight: that of the contact force at its end in the balance."""
         if self._sliding.mortars or self._ties.pieces:
             self.work.end_step(weight, *self._force_and_slip())
         self.slip = None
 
     @property
     def friction_work(self) -> float:
-        """What friction has dissipated so far [J]."""
+        """Energy that friction has dissipated since the start [J]."""
         return self.work.total
 
     def _force_and_slip(self) -> tuple[Array, Array]:
-        """Along the surface: force [N] of the multipliers in contact, and their slip in this step [m]."""
+        """(force [N], slip in this step [m]) along the surface for multipliers in contact, shapes (C, dim)."""
         if self.terms is None or self.slip is None:
             return np.zeros_like(self.z), np.zeros_like(self.z)
         tangent = along(self.terms.normals) * self.active_set.active[:, None, None]
@@ -144,9 +143,9 @@ class Contact:
         return self._D[:, None] * np.einsum("nij,nj->ni", tangent, self.z), slip
 
     def evaluate(self, u: Array, t: float) -> None:
-        """Mortar terms and active set at the displacements u, shape (N, dim), of the present iterate."""
+        """Compute mortar terms and active set at displacements u [m], shape (N, dim), and the time t [s]."""
         x = self.positions(u, t)
-        self._way += float(np.abs(x - self.x).max(initial=0.0))
+        self._travel += float(np.abs(x - self.x).max(initial=0.0))
         self.x, self.time = x, t
         if self._idle and self._all_clear():
             return
@@ -165,17 +164,17 @@ class Contact:
         self._idle = self.terms is None
 
     def _all_clear(self) -> bool:
-        """All pairs were so far apart when they were searched that no motion since then can have brought any near."""
-        return not self._ties.pieces and all(self._way < mortar.clear_until for mortar in self._mortars)
+        """Whether no facets can be near: the clearance of the last search exceeds the motion since then."""
+        return not self._ties.pieces and all(self._travel < mortar.clear_until for mortar in self._mortars)
 
     def _search_anew(self) -> None:
-        """Nodes may be anywhere."""
-        self._idle, self._way = False, 0.0
+        """Require a search in the next evaluation."""
+        self._idle, self._travel = False, 0.0
         for mortar in self._mortars:
             mortar.clear_until = -np.inf
 
     def point(self, which: NDArray[np.int64]) -> Point:
-        """Arguments of a law for its multipliers."""
+        """The arguments of a law for some multipliers."""
         assert self.terms is not None
         stiffness, slip = self._stiffness[which], self.slip
         return Point(
@@ -193,7 +192,7 @@ class Contact:
         )
 
     def _drop_dependent(self, status: Statuses) -> None:
-        """Of several multipliers at a node whose normals depend on each other the later ones are not in contact."""
+        """Open later multipliers of a node whose normals depend linearly on those of earlier ones."""
         assert self.terms is not None
         several = np.flatnonzero((status != OPEN) & ~self.multipliers.only_one & (self._spans == "normal"))
         if len(several) == 0:
@@ -208,8 +207,8 @@ class Contact:
         return redistributed(rows, self._shared)
 
     def _evaluate_mortars(self) -> Terms | None:
-        """Terms of all pairs, each process doing its share of the slave facets; None if no facets are near."""
-        near = [mortar.near(self.x, self.x_old, self._way) for mortar in self._mortars]
+        """Terms of all pairs; each process integrates its share of the slave facets. None if no facets are near."""
+        near = [mortar.near(self.x, self.x_old, self._travel) for mortar in self._mortars]
         if not self._ties.pieces and all(len(facet_pairs) == 0 for facet_pairs, _ in near):
             return None
         normals = find_normals(self.multipliers, self.x)
@@ -241,26 +240,13 @@ class Contact:
             self.slip = tied if self.slip is None or not self._sliding.mortars else self.slip.plus(tied)
         return terms
 
-    # ------------------------------------------------------------------------------------- what the balance needs
-
-    def _force_matrix(self) -> Sparse:
-        """Forces on the nodes per unit multiplier [m^(dim-1)], shape (N, C)."""
-        assert self.terms is not None
-        count = len(self.z)
-        on_slave = sparse_from_entries(self.multipliers.node, np.arange(count), -self.terms.D, (self.size, count))
-        if self.interface.basis is not None:
-            on_slave = self.interface.basis[1].T @ on_slave
-        return on_slave + self.terms.M.T
+    # ---------------------------------------------------------------------------- forces, laws and condensation
 
     def force(self) -> Array:
         """Contact force [N] on all nodes for the present multipliers, shape (N, dim)."""
-        on_slave = np.zeros((self.size, self.dim))
         if self.terms is None:
-            return on_slave
-        np.add.at(on_slave, self.multipliers.node, -self.terms.D[:, None] * self.z)
-        if self.interface.basis is not None:
-            on_slave = self.interface.basis[1].T @ on_slave
-        return on_slave + self.terms.M.T @ self.z
+            return np.zeros((self.size, self.dim))
+        return nodal_force(self.interface, self.terms, self.z)
 
     def violation(self, weight: float) -> float:
         """Norm [N] of the residual of the laws of multipliers in contact."""
@@ -278,26 +264,26 @@ class Contact:
         return float(np.sqrt(total))
 
     def in_contact(self) -> list[ActiveMultipliers]:
-        """Multipliers in contact, law by law."""
+        """The multipliers in contact, law by law."""
         parts = [(law, which[self.active_set.active[which]]) for law, which in self.interface.laws]
         status = self.active_set.status
         return [ActiveMultipliers(law, which, self.point(which), status[which]) for law, which in parts if len(which)]
 
     def linearised(self, parts: Sequence[ActiveMultipliers], weight: float) -> Linearised:
-        """What multipliers in contact add to a Newton step."""
+        """Contribution of the multipliers in contact to a Newton iteration, linearised."""
         assert self.terms is not None
         count, n, dgap = len(self.z), self.dim * self.size, self._redistributed(self.terms.dgap)
         slip = nothing((self.dim * count, n)) if self.slip is None else self.slip.slopes
         slopes = Slopes(gap=dgap, normals=self.terms.dnormals, slip=slip)
-        force = self._force_matrix()
+        force = force_matrix(self.interface, self.terms)
         if self._shared is not None:
             force = force + force @ self._shared
         return linearise(self.interface, self._spans, parts, slopes, force, self.terms.dforce, weight)
 
     def condense(self, weight: float) -> RowTransformation:
-        """The transformation that eliminates the multipliers from the linearised balance without the new contact force.
+        """The transformation that eliminates the multipliers from the linearised balance without contact force.
 
-        weight: of that force in the balance.
+        weight: that of the contact force at the end of the step in the balance.
         """
         parts = self.in_contact()
         linearised = self.linearised(parts, weight)
@@ -317,7 +303,7 @@ class Contact:
         )
 
     def recover(self, balance: Array, du: Array) -> None:
-        """Multipliers in contact from J du + R, the linearised balance, and du [m] at the nodes, shapes (N * dim,)."""
+        """Compute the multipliers in contact from the linearised balance J du + R [N] and du [m], shapes (N * dim,)."""
         own = np.zeros_like(self.z)
         assert self._condensation is not None, "condense comes first"
         parts, linearised, condensed = self._condensation
@@ -338,24 +324,24 @@ class Contact:
         return dofs[dofs >= 0]
 
     def multiplier_dofs(self) -> NDArray[np.int64]:
-        """Those of slave nodes."""
+        """Global dofs of slave nodes that are not tied."""
         slaves = (self.multipliers.areas > 0.0) & ~self._tied
         return self.nodes.dofs[np.unique(self.multipliers.node[slaves])].ravel()
 
     @property
     def near(self) -> bool:
-        """Any facets within reach of each other at the latest `evaluate`."""
+        """Whether the latest `evaluate` found facets near each other."""
         return self.terms is not None
 
     @property
     def settled(self) -> bool:
-        """The latest `evaluate` left the active set as it was."""
+        """Whether the latest `evaluate` left the active set unchanged."""
         return not self.active_set.changed
 
     # ------------------------------------------------------------------------------------------- results and state
 
     def active(self) -> NDArray[np.bool_]:
-        """Which multipliers are in contact, shape (C,)."""
+        """Mask of the multipliers in contact, shape (C,)."""
         return self.active_set.active
 
     def numbers(self) -> dict[str, float]:
@@ -376,24 +362,13 @@ class Contact:
         """Contact force [N] of a pair on its slave side, shape (dim,)."""
         return np.zeros(self.dim) if self.terms is None else -self.terms.D_of_pair[index] @ self.z
 
-    def distances(self, index: int) -> Array:
-        """Distances [m] of the slave nodes of a pair to its master, as of the latest `evaluate`.
-
-        Of a surface to itself: the mean gaps, nan where nothing is near.
-        """
-        pair = self.pairs[index]
-        if pair.master is pair.slave:
-            return self.interface.at_nodes(pair.slave, self.mean_gap(), np.fmin)
-        slave, master = (self.interface.nodes_of(surface) for surface in (pair.slave, pair.master))
-        return distances(self.x[slave], self.x[master], pair.master.facets, pair.master.facet_type)
-
     @property
     def imbalance(self) -> dict[str, float]:
-        """Of the contact work of processes; see `Shares`."""
+        """Imbalance of the contact work of the processes; see `Shares`."""
         return self._shares.imbalance
 
     def mean_gap(self) -> Array:
-        """Mean gap [m] at each multiplier, NaN where no master is near, shape (C,)."""
+        """Mean gap [m] at each multiplier, NaN where too little area is covered, shape (C,)."""
         if self.terms is None:
             return np.full(len(self.z), np.nan)
         covered = self._constraints.coverage.enough(self.terms.D)

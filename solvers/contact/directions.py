@@ -1,9 +1,9 @@
-"""Directions of force: those of multipliers, and those in which they act on their nodes.
+"""Directions of multipliers, and directions in which they act on their nodes.
 
-Along a direction that a support prescribes a multiplier acts on the support, not on the node. So the normal traction
-acts on a node with prescribed components along the free ones only, and on a node with several multipliers (an edge in a
-corner) each acts along a direction of its own. A multiplier without such a direction is excluded: it would contradict
-the support or another multiplier.
+Along a direction that a support prescribes, a multiplier acts on the support and not on the node. Hence the normal
+traction acts on a node with prescribed components along the free ones only. At a node with several multipliers, such as
+an edge in a corner, each acts along a direction of its own. A multiplier without such a direction is excluded, because
+its constraint would contradict the support or depend on another multiplier.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from solvers.api import Array
 from solvers.contact.blocks import block_diagonal
 from solvers.sparse import Sparse, sparse_from_entries
 
-#: Least sine of the angle between a normal and what is taken already (supports, other normals): below, a node that is
-#: to close its gap would have to move a hundred times as far.
+#: Smallest sine of the angle between a normal and the span of held directions and earlier normals. Below it, a node
+#: would have to move a hundred times its gap to close it.
 LEAST_FREE = 1e-2
 
 
 @dataclass(frozen=True)
 class Directions:
-    """For m multipliers with K degrees of freedom zeta: z = P zeta + Z du, along directions Q of the nodes."""
+    """Directions of m multipliers with K degrees of freedom zeta: z = P zeta + Z du, acting on nodes along Q."""
 
     basis: Sparse  #: P, shape (dim * m, K)
     felt: Sparse  #: Q, orthonormal, shape (dim * N, K)
@@ -32,9 +32,9 @@ class Directions:
 
 
 def free_normals(normals: Array, node: NDArray[np.int64], held: Array) -> Array:
-    """The free part of each normal, orthogonal to those of earlier multipliers at the node, shape (m, dim).
+    """Unit vectors along the free part of each normal, orthogonal to earlier ones of the node, shape (m, dim).
 
-    Made unit; zero where (almost) nothing is left. held: projections on what supports hold, shape (N, dim, dim).
+    Zero where the free part is below LEAST_FREE. held: projections on the held directions of nodes, (N, dim, dim).
     """
     left = normals - np.einsum("nij,nj->ni", held[node], normals)
     order = _order_at_node(node)
@@ -53,7 +53,7 @@ def free_normals(normals: Array, node: NDArray[np.int64], held: Array) -> Array:
 
 
 def _order_at_node(node: NDArray[np.int64]) -> NDArray[np.int64]:
-    """0 for the first multiplier of a node, 1 for the second, ..."""
+    """Index of each multiplier among those of its node, shape (m,)."""
     order = np.argsort(node, kind="stable")
     ordered = node[order]
     first = np.searchsorted(ordered, ordered)
@@ -65,10 +65,10 @@ def _order_at_node(node: NDArray[np.int64]) -> NDArray[np.int64]:
 def find_directions(
     z: Array, normals: Array, node: NDArray[np.int64], held: Array, spans: NDArray[np.str_]
 ) -> Directions:
-    """Directions of multipliers z at nodes with normals; held: as above.
+    """Directions of multipliers z [Pa] with given normals at nodes; held: see `free_normals`.
 
-    spans: of each multiplier 'normal' (n alone), 'surface' (n, and what is free along the surface) or 'space' (all that
-    is free, whatever the normal).
+    spans: for each multiplier 'normal' (n alone), 'surface' (n and the free tangential directions) or 'space' (all free
+    directions, whatever the normal).
     """
     m, dim = normals.shape
     holds = np.rint(np.einsum("nii->n", held[node])).astype(int)
@@ -106,10 +106,10 @@ def find_directions(
 
 
 def admissible(missed: Array, normals: Array, held: Array, spans: NDArray[np.str_]) -> Array:
-    """What multipliers miss of their laws, in the directions that they have, shape (m, dim).
+    """Residuals of laws, projected on the admissible directions of the multipliers, shape (m, dim).
 
-    In others nothing is asked for: there a support carries what comes, or the node has multipliers of other surfaces.
-    held: of the node of each multiplier, shape (m, dim, dim); spans: as above.
+    In other directions there is no equation: a support takes the force, or the node has other multipliers.
+    missed: residuals, (m, dim); held: projections of the node of each multiplier, (m, dim, dim); spans: as above.
     """
     found = missed - np.einsum("nij,nj->ni", held, missed)
     holds = np.rint(np.einsum("nii->n", held)).astype(int)
@@ -123,13 +123,13 @@ def admissible(missed: Array, normals: Array, held: Array, spans: NDArray[np.str
 
 
 def _wide(spans: NDArray[np.str_], holds: NDArray[np.int64], dim: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Multipliers with all directions that are free; those with two of three; shapes (m,). All others have one."""
+    """Masks of the multipliers with all free directions, and of those with two of three; the others have one, (m,)."""
     whole = (spans == "space") | ((spans == "surface") & (holds == 0))
     return whole, (spans == "surface") & (holds == 1) & (dim == 3)
 
 
 def _along_surface(n: Array, held: Array) -> tuple[Array, Array, Array]:
-    """(e, t, |e x n|) with the one direction e that is held and t = e x n, made unit."""
+    """(e, t, |e x n|) with the only held direction e and the unit vector t along e x n."""
     e = np.linalg.eigh(held)[1][:, :, -1]
     t = np.cross(e, n)
     size = np.linalg.norm(t, axis=1)
@@ -137,7 +137,7 @@ def _along_surface(n: Array, held: Array) -> tuple[Array, Array, Array]:
 
 
 def _free_directions(held: Array) -> Array:
-    """Orthonormal columns, those that are free first, shape (m, dim, dim); the axes where nothing is held."""
+    """Orthonormal columns, free directions first, shape (m, dim, dim); the axes where nothing is held."""
     found = np.broadcast_to(np.eye(held.shape[1]), held.shape).copy()
     some = np.einsum("nii->n", held) > 0.5
     found[some] = np.linalg.eigh(held[some])[1]  # eigenvalues 0 come first, then 1
@@ -147,9 +147,9 @@ def _free_directions(held: Array) -> Array:
 def _span_partly(
     which: NDArray[np.int64], z: Array, normals: Array, held: Array, P: Array, Q: Array, turn: Array
 ) -> None:
-    """n and t = e x n, made unit, span what a multiplier has where the direction e is held; both turn with n.
+    """Set P, Q and turn where one direction e of three is held: multipliers act along n and t, a unit vector on e x n.
 
-    The node feels n along t x e and t along itself: each law's row stands where its diagonal is.
+    Both turn with n. On the node n acts along t x e, and t along itself, so that rows of the laws have diagonals.
     """
     n = normals[which]
     e, t, size = _along_surface(n, held[which])

@@ -1,4 +1,4 @@
-"""Distances of points to a surface, however far they are from it: what a probe of the gap shows."""
+"""Distances of points to a surface, without a limit, for probes of the gap."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from solvers.cell_types import CELL_TYPES
 
 
 def distances(points: Array, x: Array, facets: NDArray[np.int64], facet_type: str) -> Array:
-    """Distances [m] of points (n, dim) to facets with nodes at x, taken as flat pieces through their nodes."""
+    """Distances [m] of points (n, dim) to facets with nodes at x [m]; facets are divided into flat simplices."""
     simplices = np.array(CELL_TYPES[facet_type].simplices)
     corners = x[facets[:, simplices].reshape(-1, simplices.shape[1])]
     closest = np.full(len(points), np.inf)
@@ -30,7 +30,7 @@ def _to_segment(points: Array, a: Array, b: Array) -> Array:
 
 
 def _to_inside(points: Array, corners: Array) -> Array:
-    """Distance to the plane of a triangle where the point is above its inside, else infinity."""
+    """Distance to the plane of a triangle for points whose projection is inside the triangle, else infinity."""
     first, second = corners[1] - corners[0], corners[2] - corners[0]
     normal = np.cross(first, second)
     size = float(normal @ normal)

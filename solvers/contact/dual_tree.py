@@ -1,8 +1,8 @@
-"""A binary tree on the facets of one surface, built bottom-up by joining neighbours.
+"""The search tree of self contact: a binary tree on the facets of one surface, built bottom-up from neighbours.
 
-Every subtree is a connected piece of the surface. If all normals of a piece lie within a
-cone so narrow that no two of them are opposed, the piece cannot touch itself and its inside is not searched. Without
-this criterion every search would return all neighbours of all facets.
+Every subtree is a connected piece of the surface. If all normals of a piece lie in a cone so narrow that no two of them
+are opposed, the piece cannot touch itself and is not searched. Without this criterion every search would return all
+neighbours of all facets.
 Source: Yang & Laursen, Comput. Mech. 41 (2008), section 3: dual graph, curvature criterion.
 """
 
@@ -19,10 +19,10 @@ from solvers.cell_types import CELL_TYPES
 from solvers.contact.search import OPPOSED
 from solvers.tessellation import unit_normals
 
-#: Two normals that both have this product with a vector are not opposed: cos(2 a) = OPPOSED.
+#: Two normals whose product with a common unit vector exceeds this are not opposed: cos(2 a) = OPPOSED.
 CONE = np.sqrt(0.5 * (1.0 + OPPOSED))
 
-#: Vectors with which normals are compared: at most 64, as bits of an integer.
+#: Count of unit vectors that normals are compared with, by dimension; at most 64, the bits of an integer.
 SAMPLES = {2: 32, 3: 64}
 
 Indices = NDArray[np.int64]
@@ -30,7 +30,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class TreeLevel:
-    """Nodes of one depth: the two children of each in the next finer level, the same twice if there is only one."""
+    """Nodes of one depth, with two children each in the next finer level; a single child is given twice."""
 
     children: Indices  #: shape (n, 2)
 
@@ -56,9 +56,9 @@ class DualTree:
         return unit_normals(x[self.facets[:, self._simplices]])
 
     def pairs(self, x: Array, inflation: float, x_previous: Array | None = None) -> Indices:
-        """Facets i < j whose paths from x_previous to x come closer than `inflation` [m], or little more, shape (p, 2).
+        """Pairs of facets i < j whose paths from x_previous to x come closer than `inflation` [m], shape (p, 2).
 
-        Only those without a common node that are opposed to each other.
+        Some pairs that are slightly farther apart are included. Only opposed facets without a common node are.
         """
         normals = self.normals(x)
         low, high = self.slabs(x, x_previous, 0.5 * inflation)
@@ -74,14 +74,14 @@ class DualTree:
         return found[self.may_touch(found, normals)]
 
     def may_touch(self, pairs: Indices, normals: Array) -> NDArray[np.bool_]:
-        """Those without a common node that are opposed somewhere."""
+        """Mask of the pairs without a common node that are opposed somewhere."""
         nodes = self.facets[pairs]
         apart = ~(nodes[:, 0, :, None] == nodes[:, 1, None, :]).any(axis=(1, 2))
         products = np.einsum("pad,pbd->pab", normals[pairs[:, 0]], normals[pairs[:, 1]])
         return apart & (products < OPPOSED).any(axis=(1, 2))
 
     def slabs(self, x: Array, x_previous: Array | None, radius: float) -> tuple[Array, Array]:
-        """Least and largest extent of the facets along some directions, shapes (k, directions)."""
+        """Lowest and highest coordinates of the facets along the directions of the k-DOPs [m], (k, directions)."""
         ends = [x[self.facets] @ self._directions.T]
         if x_previous is not None:
             ends.append(x_previous[self.facets] @ self._directions.T)
@@ -89,7 +89,7 @@ class DualTree:
         return extents.min(axis=1) - radius, extents.max(axis=1) + radius
 
     def _descend(self, masks: Sequence[NDArray], lows: Sequence[Array], highs: Sequence[Array]) -> Indices:
-        """From the root down, level by level: nodes against themselves, and against others."""
+        """Pairs of facets from the root down, level by level: tests of nodes with themselves and with others."""
         alone, both = np.arange(len(masks[-1])), np.empty((0, 2), dtype=np.int64)
         self.tests = 0
         for depth in range(len(masks) - 1, -1, -1):
@@ -111,7 +111,7 @@ class DualTree:
 
 
 def _sample_vectors(dim: int) -> Array:
-    """Unit vectors in all directions, evenly, shape (n, dim)."""
+    """Uniformly distributed unit vectors, shape (n, dim)."""
     n = SAMPLES[dim]
     if dim == 2:
         angles = 2.0 * np.pi * np.arange(n) / n
@@ -123,7 +123,7 @@ def _sample_vectors(dim: int) -> Array:
 
 
 def _directions(dim: int) -> Array:
-    """Along which facets are compared: those of k-DOPs with 8 (2D) and 18 (3D) sides."""
+    """Directions of k-DOPs with 8 (2D) or 18 (3D) sides, shape (directions, dim)."""
     axes = np.eye(dim)
     found = [*axes]
     for i in range(dim):
@@ -147,7 +147,7 @@ def neighbours(corners: Indices, dim: int) -> Indices:
 
 
 def _join(count: int, edges: Indices, middles: Array) -> list[TreeLevel]:
-    """Levels from the facets to the root: neighbours become one node, the nearest first."""
+    """Levels from the facets to the root: pairs of neighbours become one node, the nearest first."""
     levels: list[TreeLevel] = []
     weights: Array = np.ones(count)
     while count > 1:
@@ -159,13 +159,13 @@ def _join(count: int, edges: Indices, middles: Array) -> list[TreeLevel]:
                 parent[a] = parent[b] = len(children)
                 children.append((a, b))
         rest = np.flatnonzero(parent < 0).tolist()
-        if not children:  # pieces that do not hang together
+        if not children:  # disconnected pieces
             children = list(zip(rest[::2], rest[1::2], strict=False))
             rest = rest[len(rest) // 2 * 2 :]
         children += [(a, a) for a in rest]
         level = TreeLevel(np.array(children, dtype=np.int64))
-        for place, both in enumerate(children):
-            parent[list(both)] = place
+        for number, both in enumerate(children):
+            parent[list(both)] = number
         total = np.asarray(np.bincount(parent, weights, len(children)), dtype=float)
         sums = [np.bincount(parent, weights * component, len(children)) for component in middles.T]
         middles = np.stack(sums, axis=1) / total[:, None]

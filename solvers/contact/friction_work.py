@@ -1,4 +1,4 @@
-"""The work of friction: traction along the surface times slip, step by step."""
+"""The work of friction: tangential force times slip, summed over steps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from solvers.api import Array, State
 
 
 class FrictionWork:
-    """What friction has dissipated, and the slip and the forces along the surface at the end of the latest step."""
+    """Energy that friction has dissipated, and slip and tangential forces at the end of the last step."""
 
     def __init__(self, shape: tuple[int, int]):
         self.total = 0.0  #: [J]
@@ -16,7 +16,7 @@ class FrictionWork:
         self._force = np.zeros(shape)  # [N]
 
     def of_step(self, weight: float, force: Array, slip: Array) -> float:
-        """Work [J] of the forces along the surface, those at the end of the step with a weight; shapes (C, dim)."""
+        """Work [J] of a step. weight: of the forces at its end; force: tangential [N], slip [m]: (C, dim)."""
         return float(np.sum((weight * force + (1.0 - weight) * self._force) * slip))
 
     def end_step(self, weight: float, force: Array, slip: Array) -> None:

@@ -1,4 +1,4 @@
-"""What does not change in a run: surfaces, multipliers and their laws, and which slave meets which masters."""
+"""The contact interface: surfaces, nodes, multipliers, laws and mortars of all pairs, which a run does not change."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from solvers.contact.self_search import SelfSearch
 from solvers.contact.surface import ContactNodes, Surface, longest_edge, number_nodes
 from solvers.sparse import Sparse, sparse
 
-#: T with N~ = N T over all nodes, and its inverse
+#: T with N~ = N T over all nodes, and its inverse.
 Basis = tuple[Sparse, Sparse]
 
 
@@ -36,14 +36,14 @@ class ContactInterface:
     mortars: tuple[Mortar, ...]
     patch_of: dict[int, int]  #: patch of each slave surface, by its id
     facets_of: dict[int, NDArray[np.int64]]  #: facets of each slave surface in numbers of its patch, by its id
-    basis: Basis | None  #: that multipliers are dual to, where it is not the nodal one (tri6)
+    basis: Basis | None  #: basis that multipliers are dual to; None: the nodal basis (all but tri6)
 
     def nodes_of(self, surface: Surface) -> NDArray[np.int64]:
-        """Among all nodes."""
+        """Numbers of the nodes of a surface among all nodes."""
         return self.nodes.of_surface[_index(self.surfaces, surface)]
 
     def unmoved(self) -> Array:
-        """Positions [m] of all nodes before those of tied surfaces were moved, shape (N, dim)."""
+        """Positions [m] of all nodes as meshed, before those of tied surfaces were relocated, shape (N, dim)."""
         x = self.nodes.points.copy()
         for surface, numbers in zip(self.surfaces, self.nodes.of_surface, strict=True):
             if surface.unmoved is not None:
@@ -51,11 +51,14 @@ class ContactInterface:
         return x
 
     def law_of(self, patch: SlavePatch) -> Law:
-        """Of a patch: all its multipliers have the same."""
+        """The law of a patch, which all its multipliers have."""
         return next(law for law, which in self.laws if np.isin(patch.multipliers, which).all())
 
     def spans_among(self, constrained: NDArray[np.bool_]) -> NDArray[np.str_]:
-        """Directions of multipliers where those given (C,) have constraints: of several at a node each its normal."""
+        """Admissible directions of multipliers, shape (C,); of several constrained ones at a node only the normals.
+
+        constrained: mask of the multipliers with a constraint, shape (C,).
+        """
         if self.multipliers.only_one.all():
             return self.spans
         node = self.multipliers.node
@@ -63,21 +66,24 @@ class ContactInterface:
         return np.where(several & (self.spans == "surface"), "normal", self.spans)
 
     def at_nodes(self, slave: Surface, values: Array, join: np.ufunc) -> Array:
-        """Values at the nodes of a slave surface from those (C,) of all multipliers, shape (n,)."""
+        """Values at the nodes of a slave surface, shape (n,), from those of all multipliers, (C,).
+
+        join: combines the values of several multipliers at a node, such as np.fmax.
+        """
         which, node = self.multipliers_of(slave)
         found = np.full(len(slave.points), np.nan)
         join.at(found, node, values[which])
         return found
 
     def multipliers_of(self, slave: Surface) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(multipliers of a slave surface, the nodes of the surface that they belong to), in the order of the nodes."""
+        """(multipliers of a slave surface, the node of the surface that each belongs to)."""
         patch = self.multipliers.patches[self.patch_of[id(slave)]]
         split, first = np.unique(self.facets_of[id(slave)], return_index=True)
         return patch.multipliers[split], slave.facets.ravel()[first]
 
 
 def describe_interface(pairs: Sequence[Pair]) -> ContactInterface:
-    """Number nodes and multipliers, and bring together what belongs to one slave surface."""
+    """Number nodes and multipliers of all pairs, and make the mortars of each slave surface."""
     surfaces = _distinct([surface for pair in pairs for surface in (pair.slave, pair.master)])
     slaves = _distinct([pair.slave for pair in pairs])
     nodes = number_nodes(surfaces)
@@ -133,7 +139,7 @@ def _mortars_of(
     found = []
     for integration in ("segments", "elements"):
         mine = [i for i, pair in enumerate(pairs) if pair.slave is slave and pair.integration == integration]
-        mine.sort(key=lambda i: pairs[i].master is not slave)  # its own facets come first
+        mine.sort(key=lambda i: pairs[i].master is not slave)  # in self contact its own facets come first
         masters = [pairs[i].master for i in mine]
         for joined in join_masters(masters, [numbers[id(master)] for master in masters], mine):
             search: FacetSearch
@@ -159,13 +165,13 @@ def _nodal_basis(multipliers: Multipliers, size: int) -> Basis | None:
     return both[0], both[1]
 
 
-def _index(surfaces: Sequence[Surface], wanted: Surface) -> int:
-    return next(i for i, surface in enumerate(surfaces) if surface is wanted)
+def _index(surfaces: Sequence[Surface], one: Surface) -> int:
+    return next(i for i, surface in enumerate(surfaces) if surface is one)
 
 
 def _distinct(surfaces: Sequence[Surface]) -> list[Surface]:
     found: list[Surface] = []
     for surface in surfaces:
-        if not any(surface is known for known in found):
+        if not any(surface is other for other in found):
             found.append(surface)
     return found

@@ -1,4 +1,4 @@
-"""The multipliers in contact with their laws, linearised at an iterate."""
+"""Linearisation of the multipliers in contact and their laws at an iterate."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ def linearise(
     dforce: Sparse,
     w: float,
 ) -> Linearised:
-    """What they add to a Newton step.
+    """Linearised force and laws of the multipliers in contact, for the condensation.
 
-    spans: directions of all multipliers; slopes: of all multipliers; force: on the nodes per unit multiplier
-    [m^(dim-1)], shape (N, C); dforce: derivative of the contact force at fixed multipliers; w: weight of the contact
-    force in the balance.
+    spans: admissible directions of all multipliers, (C,); slopes: derivatives for all multipliers; force: on the nodes
+    per unit multiplier [m^(dim-1)], (N, C); dforce: derivative of the contact force at fixed multipliers; w: weight of
+    the contact force in the balance.
     """
     N, dim = interface.nodes.points.shape
     which = np.concatenate([part.which for part in parts] or [np.empty(0, dtype=np.int64)])
@@ -68,7 +68,7 @@ def linearise(
 def _law_rows(
     parts: Sequence[ActiveMultipliers], slopes: Slopes, weight: float, columns: int
 ) -> tuple[Sparse, Sparse, Array]:
-    """(by z, by u, residual) of all multipliers in contact, law by law."""
+    """(derivative by z, derivative by u, residual) of all multipliers in contact, law by law."""
     by_z, by_u, residual = [], [], []
     for part in parts:
         rows_of = components(part.which, part.point.z.shape[1])

@@ -1,9 +1,9 @@
-"""Multipliers of one node that meet the same surface act as one.
+"""Merging: multipliers of one node whose masters are the same surface become one.
 
-A node on a sharp edge has a multiplier for each side of it. In a corner between two walls each has its own wall
-as master. Where the edge itself points at a surface both sides have that master: their gaps are then equivalent, and
-with two constraints no tangential balance would be left. There the sides have one multiplier with the sum of
-their functions, along the mean of their normals.
+A node on a sharp edge has a multiplier for each side of the edge. In a corner between two walls, each side has its own
+wall as master. Where the edge points at one surface, both sides have this master and their gaps are equivalent. Two
+constraints would leave no tangential balance. The sides are then merged into one multiplier, whose function is the sum
+of theirs and whose normal is the mean of theirs.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from solvers.contact.patch import Multipliers
 from solvers.contact.terms import Terms
 from solvers.sparse import sparse_from_entries
 
-#: Two gaps say the same of a node if the product of their directions there is above this (45 degrees: half of the way
-#: from one surface to two that are square to each other).
+#: Product of the directions of two gaps at a node above which they are equivalent: 45 degrees, half of the angle
+#: between two perpendicular surfaces.
 SAME = np.sqrt(0.5)
 
 
 class Merging:
-    """Decides in every evaluation of a step; after KEEP_AFTER of them what is merged stays so, as with coverage."""
+    """Chooses the merged multipliers in every evaluation; after KEEP_AFTER of them, they stay merged in a step."""
 
     def __init__(self, multipliers: Multipliers):
         self._node = multipliers.node
@@ -42,7 +42,10 @@ class Merging:
         self._evaluations = 0
 
     def into(self, terms: Terms, constrained: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """The multiplier in which each is merged, mostly itself, shape (C,); constrained: those with constraints."""
+        """The multiplier into which each is merged, itself if it is not, shape (C,).
+
+        constrained: mask of the multipliers that may have constraints.
+        """
         own = np.arange(len(self._node))
         if not self._any:
             return own
@@ -69,7 +72,7 @@ class Merging:
 
 
 def with_mean_normals(terms: Terms, into: NDArray[np.int64]) -> Terms:
-    """Terms with the normals of merged multipliers: the mean of their own, made unit."""
+    """Terms in which merged multipliers have the normalised mean of their normals."""
     C, dim = terms.normals.shape
     count = np.bincount(into, minlength=C)[into]
     first = sparse_from_entries(into, np.arange(C), np.ones(C), (C, C))  # sum over those merged, at the first
@@ -82,7 +85,7 @@ def with_mean_normals(terms: Terms, into: NDArray[np.int64]) -> Terms:
 
 
 def _gap_directions(terms: Terms, which: NDArray[np.int64], node: NDArray[np.int64]) -> Array:
-    """Directions in which the gaps of multipliers open for their own nodes, of unit length, shape (m, dim)."""
+    """Unit vectors along the derivative of each gap by the position of its node, shape (m, dim)."""
     dim = terms.normals.shape[1]
     own = terms.dgap[which]
     row, component = own.row_numbers(), own.indices - dim * node[own.row_numbers()]

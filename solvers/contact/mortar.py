@@ -1,4 +1,4 @@
-"""One slave surface against all its masters: search, mortar integrals, and their full derivatives."""
+"""The mortar integrals of one slave surface and its masters, with full derivatives."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from solvers.contact.surface import Surface
 from solvers.kernels import MortarResult, mortar
 from solvers.sparse import Sparse, nothing, sparse, stack
 
-#: Slave facets take part when a master is nearer than this share of the longest edge (and the motion of the step).
+#: Largest distance to a master at which slave facets take part, relative to the longest edge; the motion is added.
 NEAR = 0.3
 
-#: Evaluations of a step after which facet pairs that are in use stay in use. With 12 instead of 3 the two tori need up
-#: to 14 Newton steps instead of 6.
+#: Evaluations of a step after which facet pairs stay in use. With 12 instead of 3, the two tori need up to 14 Newton
+#: iterations instead of 6.
 KEEP_AFTER = 3
 
 Integration = Literal["segments", "elements"]
@@ -30,7 +30,7 @@ Integration = Literal["segments", "elements"]
 
 @dataclass(frozen=True)
 class MortarTerms:
-    """Mortar integrals; columns are dofs of the patch, then of the masters (dim * node + component)."""
+    """Mortar integrals of ns slave and nm master nodes; columns: dofs of the patch, then of the masters."""
 
     D: Array  #: diagonal of D [m^(dim-1)], shape (ns,)
     M: Sparse  #: coupling [m^(dim-1)], shape (ns, nm)
@@ -38,12 +38,12 @@ class MortarTerms:
     dgap: Sparse  #: shape (ns, dim * (ns + nm))
     dforce: Sparse  #: derivative of the contact force at fixed multipliers, shape (dim * (ns + nm),) * 2
     area: Array  #: covered area of each slave facet [m^(dim-1)], shape (k,)
-    used: NDArray[np.int32]  #: facet pairs that took part, shape (p, 2)
+    used: NDArray[np.int32]  #: facet pairs that contributed, shape (p, 2)
 
 
 @dataclass(frozen=True)
 class Masters:
-    """The masters of a slave surface as one surface; every one of them keeps its own nodes."""
+    """The masters of a slave surface as one surface; each keeps its own nodes."""
 
     facets: NDArray[np.int64]
     facet_type: str
@@ -54,7 +54,7 @@ class Masters:
 def join_masters(
     surfaces: Sequence[Surface], nodes: Sequence[NDArray[np.int64]], pairs: Sequence[int]
 ) -> list[Masters]:
-    """One for each kind of facets; triangles beside quadrilaterals become quadrilaterals with two corners in one."""
+    """Join masters by type of facet; triangles beside quadrilaterals become degenerate quadrilaterals."""
     kinds = {surface.facet_type for surface in surfaces}
     as_quads = {"triangle", "quad"} <= kinds
     found = []
@@ -74,24 +74,26 @@ def join_masters(
 
 
 class FacetSearch(Protocol):
-    """Finds facet pairs (slave, master) that may meet."""
+    """Finds facet pairs (slave, master) that may touch."""
 
     @property
     def clearance(self) -> float:
-        """Distance [m] of boxes around all that moved in the latest search, inflated; negative if they meet."""
+        """Distance [m] between the inflated boxes around both surfaces in the latest search; negative: they overlap."""
         ...
 
     def begin_step(self, pressed: NDArray[np.int64]) -> None:
-        """pressed: how many multipliers of each slave facet are in contact."""
+        """Start a step; pressed: count of multipliers in contact of each slave facet."""
         ...
 
     def pairs(
         self, xs: Array, xm: Array, inflation: float, xs_previous: Array, xm_previous: Array
-    ) -> NDArray[np.int32]: ...
+    ) -> NDArray[np.int32]:
+        """Facet pairs that come closer than `inflation` [m] between previous and present positions, shape (p, 2)."""
+        ...
 
 
 class Mortar:
-    """A slave surface, given by facets of a patch, and its masters: other surfaces, or itself."""
+    """A slave surface, given by facets of a patch, and its masters: other surfaces, or itself in self contact."""
 
     def __init__(
         self,
@@ -109,38 +111,39 @@ class Mortar:
         self.edge = edge
         self._evaluations = 0
         self._kept = np.empty(0, dtype=np.int64)
-        self.clear_until = -np.inf  #: way [m] of the fastest node up to which no facets can be near
+        self.clear_until = -np.inf  #: travel [m], see `near`, up to which no facets can be near
 
     def begin_step(self, active: NDArray[np.bool_]) -> None:
-        """Facet pairs are chosen anew; active: multipliers in contact, shape (C,)."""
+        """Discard the kept facet pairs; active: mask of the multipliers in contact, shape (C,)."""
         self._evaluations = 0
         self._kept = np.empty(0, dtype=np.int64)
         self.search.begin_step(active[self.patch.multipliers][self.facets].sum(axis=1))
 
     def _codes(self, facet_pairs: NDArray[np.int32]) -> NDArray[np.int64]:
-        """One number for each facet pair, in the same order."""
+        """One number for each facet pair, increasing with the pairs."""
         return facet_pairs[:, 0].astype(np.int64) * len(self.masters.facets) + facet_pairs[:, 1]
 
     def keep(self, used: NDArray[np.int32]) -> None:
-        """Facet pairs in use (of all processes) stay in use until the next step, from some evaluation on.
+        """Keep the used facet pairs of all processes until the next step, after KEEP_AFTER evaluations.
 
-        Whether facets see each other is a hard decision: taken again each time, Newton's last iterates could
-        alternate between two sets of pairs. Pairs are still added, but none is removed.
+        The decision whether two facets contribute is discontinuous. Newton's method could alternate between two sets
+        of pairs. Pairs may still be added, but none is removed.
         """
         self._evaluations += 1
         if self._evaluations >= KEEP_AFTER:
             self._kept = np.union1d(self._kept, self._codes(used))
 
-    def near(self, x: Array, x_previous: Array, way: float = 0.0) -> tuple[NDArray[np.int32], float]:
-        """Facet pairs that may meet, and the largest motion [m] of a node in this step; x of all nodes.
+    def near(self, x: Array, x_previous: Array, travel: float = 0.0) -> tuple[NDArray[np.int32], float]:
+        """(facet pairs that may touch, largest motion [m] of a node in this step); x: positions [m] of all nodes.
 
-        way: what any node has gone at most until here [m]. Once it is s longer, each of the two boxes has grown by s at
-        most, and the motion of a step, which inflates them, by 2 s: boxes that are 4 s apart stay apart.
+        travel: upper bound of the path of any node so far [m]. When it has increased by s, each of the two boxes has
+        grown by s at most, and the motion of a step, which inflates them, by 2 s. Hence boxes with a clearance of 4 s
+        do not overlap.
         """
         slave, master = self.patch.nodes, self.masters.nodes
         motion = max(float(np.abs(x[nodes] - x_previous[nodes]).max(initial=0.0)) for nodes in (slave, master))
         found = self.search.pairs(x[slave], x[master], self.edge + motion, x_previous[slave], x_previous[master])
-        self.clear_until = way + self.search.clearance / 4.0
+        self.clear_until = travel + self.search.clearance / 4.0
         codes = self._codes(found)
         if len(self._kept) == 0 or np.isin(self._kept, codes).all():
             return found, motion
@@ -157,7 +160,10 @@ class Mortar:
         motion: float,
         z: Array,
     ) -> MortarTerms:
-        """All terms at the positions x [m] of all nodes; normals and multipliers z [Pa] are those of the patch."""
+        """All terms at the positions x [m] of all nodes.
+
+        normals, their derivatives and multipliers z [Pa] are those of the patch, shape (ns, dim); motion: see `near`.
+        """
         slave, master = self.patch.nodes, self.masters.nodes
         ns, nm, dim = len(slave), len(master), x.shape[1]
         kept = np.isin(self._codes(facet_pairs), self._kept).astype(np.uint8)
@@ -183,7 +189,7 @@ class Mortar:
         return mortar(*surfaces, normals, facet_pairs, method=self.integration, **settings)
 
     def tie(self, x: Array, normals: Array, facet_pairs: NDArray[np.int32]) -> tuple[MortarTerms, Sparse, Sparse]:
-        """(terms, W, M) at the positions x [m]; forces follow from D and M, and have no derivatives."""
+        """(terms without derivatives, W, M) of tied surfaces at the positions x [m]."""
         slave, master = self.patch.nodes, self.masters.nodes
         ns, nm, columns = len(slave), len(master), x.shape[1] * (len(slave) + len(master))
         result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(0.0))
@@ -204,7 +210,7 @@ class Mortar:
         return derivative + _widen(through, columns) if len(through.data) else derivative
 
     def begin(self, x: Array, normals: Array, facet_pairs: NDArray[np.int32]) -> tuple[Array, Sparse, Sparse]:
-        """(D, W, M) at the beginning of a step. Facets count from farther away than for contact: they may come."""
+        """(D, W, M) at the beginning of a step, for the slip. Facets contribute up to a distance of one edge."""
         slave, master = self.patch.nodes, self.masters.nodes
         result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(self.edge))
         W = sparse(result.W, (len(slave), len(slave))) @ self.patch.basis()[1]
@@ -213,7 +219,7 @@ class Mortar:
     def gap_vectors(
         self, x: Array, normals: Array, dnormals: Sparse, used: NDArray[np.int32]
     ) -> tuple[Array, list[Sparse]]:
-        """int Phi (x_m - x_s), shape (ns, dim), over facet pairs that took part, and derivatives of each component."""
+        """(int Phi (x_m - x_s) over the used facet pairs, shape (ns, dim); derivatives of each component)."""
         ns, nm, dim = len(self.patch.nodes), len(self.masters.nodes), x.shape[1]
         values, slopes = np.zeros((ns, dim)), []
         for axis in range(dim):

@@ -1,4 +1,4 @@
-"""Two surfaces that may touch, or one that may touch itself."""
+"""A contact pair: a slave and a master surface, or one surface in self contact."""
 
 from __future__ import annotations
 

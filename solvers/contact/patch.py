@@ -1,4 +1,4 @@
-"""Slave patches: surfaces that hang together, and the multipliers at their nodes, one on each side of a sharp edge."""
+"""Slave patches, which are connected slave surfaces, and their multipliers, one per node and side of a sharp edge."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class SlavePatch:
         return found, sparse(slopes, (x.size, x.size))
 
     def basis(self) -> tuple[Sparse, Sparse]:
-        """T with N~ = N T, the basis that multipliers are dual to, and its inverse; the identity but for tri6."""
+        """T of the basis N~ = N T that multipliers are dual to, and its inverse; the identity except for tri6."""
         n = len(self.nodes)
         return tuple(  # type: ignore[return-value]
             sparse(csr, (n, n)) for csr in basis_transformation(self.facets, self._kernel_type, n)
@@ -50,7 +50,7 @@ class SlavePatch:
 class Multipliers:
     """All multipliers: one for each split node of a slave patch.
 
-    The first N belong to the N nodes (most of which have none in use), the others to nodes that were split.
+    The first N multipliers belong to the N nodes, and most of them are not used. The others belong to split nodes.
     """
 
     node: NDArray[np.int64]  #: of each multiplier, shape (C,)
@@ -61,14 +61,14 @@ class Multipliers:
 
     @property
     def only_one(self) -> NDArray[np.bool_]:
-        """The only multipliers of their nodes, shape (C,)."""
+        """Mask of the multipliers that are the only ones of their nodes, shape (C,)."""
         return np.bincount(self.node[self.areas > 0.0], minlength=len(self.node))[self.node] <= 1
 
 
 def number_multipliers(
     slaves: Sequence[Surface], numbers: Sequence[NDArray[np.int64]], nodes: ContactNodes, laws: Sequence[Law]
 ) -> Multipliers:
-    """Join slave surfaces of one law that have common nodes to patches, and number the multipliers.
+    """Join slave surfaces with common nodes and the same law to patches, and number the multipliers.
 
     numbers: of the nodes of each surface; laws: of each surface.
     """
@@ -80,7 +80,7 @@ def number_multipliers(
     for group in _join(slaves, numbers, laws):
         facets, number, owner = _facets([slaves[i] for i in group], [numbers[i] for i in group])
         facet_type = slaves[group[0]].facet_type
-        # what is tied may go any way: there a sharp edge matters only between surfaces that a case names apart
+        # multipliers of tied surfaces have no normal: there only edges between different surfaces are sharp
         split = split_nodes(nodes.points, facets, facet_type, owner if laws[group[0]].span == "space" else None)
         share = np.zeros(len(split.nodes))
         np.add.at(share, split.facets, facet_areas(nodes.points, facets, facet_type)[:, None] / facets.shape[1])
@@ -115,15 +115,15 @@ def _join(slaves: Sequence[Surface], numbers: Sequence[NDArray[np.int64]], laws:
 def _facets(
     surfaces: Sequence[Surface], numbers: Sequence[NDArray[np.int64]]
 ) -> tuple[NDArray[np.int64], list[NDArray[np.int64]], NDArray[np.int64]]:
-    """(facets of surfaces, each once; the numbers of those of each surface; the first surface of each)."""
+    """(facets of all surfaces, each once; numbers of the facets of each surface; first surface of each facet)."""
     every = np.concatenate([own[surface.facets] for surface, own in zip(surfaces, numbers, strict=True)])
     owner = np.arange(len(surfaces)).repeat([len(surface.facets) for surface in surfaces])
     _, first, number = np.unique(np.sort(every, axis=1), axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
     ends = np.cumsum([len(surface.facets) for surface in surfaces])[:-1]
-    return every[first[order]], np.split(place[number.ravel()], ends), owner[first[order]]
+    return every[first[order]], np.split(rank[number.ravel()], ends), owner[first[order]]
 
 
 def _mask(surfaces: Sequence[Surface], numbers: Sequence[NDArray[np.int64]], nodes: ContactNodes) -> Array:

@@ -1,6 +1,6 @@
-"""What can be measured where surfaces touch: at a node of the slave, or the largest and the least of them.
+"""Probes of contact: pressure and gap at a slave node, or their extremes.
 
-A probe is a function without arguments that every process calls; it returns the values by component.
+A probe is a function without arguments that every process calls. It returns values by component.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 
 from solvers.api import Array
 from solvers.contact.contact import Contact
+from solvers.contact.distance import distances
 
 Probe = Callable[[], dict[str, float]]
 
@@ -19,12 +20,12 @@ Extreme = Literal["largest", "least"]
 
 
 def at_slave(contact: Contact, pair: int, quantity: str, where: Sequence[float] | Extreme) -> Probe:
-    """pressure [Pa] or gap [m] of a pair at the slave node nearest to a point (reference coordinates), or an extreme.
+    """Probe of the pressure [Pa] or gap [m] of a pair, at the slave node nearest to a point, or of an extreme.
 
-    The pressure is the normal part of the traction between the surfaces, zero where they are apart. The gap is the
-    distance of a slave node from the master surface; of a surface to itself the mean gap, nan while nothing is near.
+    where: the point in the reference configuration [m], or 'largest' or 'least'. The pressure is the normal part of
+    the traction, zero without contact.
     """
-    values = {"pressure": lambda: pressures(contact, pair), "gap": lambda: contact.distances(pair)}[quantity]
+    values = {"pressure": lambda: pressures(contact, pair), "gap": lambda: gaps(contact, pair)}[quantity]
     if where == "largest":
         return lambda: {"": float(np.fmax.reduce(values()))}
     if where == "least":
@@ -43,8 +44,20 @@ def pressures(contact: Contact, pair: int) -> Array:
     return contact.interface.at_nodes(slave, found, np.fmax)
 
 
+def gaps(contact: Contact, pair: int) -> Array:
+    """Distances [m] of the slave nodes of a pair to its master, shape (n,).
+
+    In self contact the mean gaps, nan where nothing is near.
+    """
+    slave, master = contact.pairs[pair].slave, contact.pairs[pair].master
+    if master is slave:
+        return contact.interface.at_nodes(slave, contact.mean_gap(), np.fmin)
+    x, at_master = (contact.x[contact.interface.nodes_of(surface)] for surface in (slave, master))
+    return distances(x, at_master, master.facets, master.facet_type)
+
+
 def first_contact(contact: Contact, pair: int) -> Probe:
-    """Time [s] of the end of the first step in which a pair touches, nan before."""
+    """Probe of the time [s] at the end of the first step in which a pair touches, nan before."""
 
     def probe() -> dict[str, float]:
         if contact.touched_at[pair] == np.inf and contact.resultant(pair).any():

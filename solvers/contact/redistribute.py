@@ -1,4 +1,4 @@
-"""Slave nodes without a constraint of their own: their share of the multipliers of their neighbours."""
+"""Redistribution: multipliers without a constraint are means of those of their neighbours."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from solvers.sparse import Sparse, sparse
 
 
 def redistributed(rows, shares: Sparse | None):
-    """Rows of multipliers, one each or one for each component, plus those that are redistributed to them."""
+    """Rows of multipliers plus the rows of multipliers without a constraint that are redistributed to them.
+
+    rows: one per multiplier, or one per component of each; shares: see `Redistribution.shares`.
+    """
     if shares is None:
         return rows
     components = rows.shape[0] // shares.shape[0]
@@ -21,12 +24,11 @@ def redistributed(rows, shares: Sparse | None):
 
 
 class Redistribution:
-    """What multipliers without a constraint get of those of their neighbours.
+    """Computes the shares of multipliers without a constraint in those of their neighbours.
 
-    They are those that would contradict a support or another multiplier, and those of which a master covers a sliver,
-    too little for a constraint. With the mean of their neighbours' the multipliers still contain all constants, so that
-    a patch test is passed; the constraint of the neighbours is then that of their own and the redistributed functions
-    together.
+    A multiplier has no constraint if it would contradict a support or another multiplier, or if too little of its area
+    is covered. Its value is the mean of its neighbours. Hence the multipliers still contain constants, and patch tests
+    are passed. The function of a neighbour's constraint is the sum of its own and the redistributed functions.
     Source: Popp, Seitz, Gee & Wall, Comput. Methods Appl. Mech. Engng 264 (2013), section 3.
     """
 
@@ -40,9 +42,9 @@ class Redistribution:
         self._latest: tuple[bytes, Sparse | None] = (b"", None)
 
     def shares(self, receive: NDArray[np.bool_], give: NDArray[np.bool_], into: NDArray[np.int64]) -> Sparse | None:
-        """Shares, rows of those that receive and columns of those that give, shape (C, C); None if there are none.
+        """Shares: rows of multipliers that receive, columns of those that give, shape (C, C); None if all are zero.
 
-        into: the multiplier in which each is merged, mostly itself.
+        into: the multiplier into which each is merged, itself if it is not.
         """
         merged = into != np.arange(len(into))
         if not receive.any() and not merged.any():
@@ -62,7 +64,7 @@ class Redistribution:
         own = sp.diags(give.astype(float)).tocsr()
         whole = sp.csr_matrix((merged[merged].astype(float), (np.flatnonzero(merged), into[merged])), shape=own.shape)
         served, shares = give | merged, own + whole
-        while True:  # a corner may have only neighbours that receive: it comes after them
+        while True:  # a corner may have only neighbours that receive: it is served after them
             count = np.where(receive & ~served, self._beside @ served.astype(float), 0.0)
             if not count.any():
                 return (

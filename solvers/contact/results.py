@@ -15,10 +15,10 @@ PartFields = dict[str, dict[str, tuple[NDArray[np.int64], Array]]]
 def surface_fields(contact: Contact) -> PartFields:
     """Results on slave surfaces.
 
-    contact_traction [Pa] acts on the slave, contact_pressure is its normal part, contact_gap [m] the mean gap,
-    contact_status 0 without contact, 1 in contact and free to slide, 2 sticking. With friction also the part of the
-    traction along the surface (contact_friction) and the slip of the latest step [m] (contact_slip). At a node of
-    several surfaces: the sum of the tractions, the largest pressure, the smallest gap.
+    contact_traction [Pa] acts on the slave. contact_pressure is its normal part, contact_gap [m] the mean gap, and
+    contact_status 0 without contact, 1 with slip, 2 with stick. With friction there are also the tangential part of the
+    traction, contact_friction [Pa], and the slip of the last step, contact_slip [m]. A node of several surfaces has the
+    sum of the tractions, the largest pressure and the smallest gap.
     """
     z, gap = contact.z, contact.mean_gap()
     normals = np.zeros_like(z) if contact.terms is None else contact.terms.normals

@@ -1,4 +1,4 @@
-"""Slaves and masters among facets that may touch each other."""
+"""The choice of slaves and masters among the facets of self contact."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ Roles = NDArray[np.int8]
 
 
 def choose_roles(roles: Roles, pressed: NDArray[np.int64], pairs: NDArray[np.int64]) -> Roles:
-    """Roles (SLAVE, MASTER or 0) of facets with undirected pairs (p, 2); those that are not 0 stay.
+    """Roles (SLAVE, MASTER or 0) of facets with undirected pairs (p, 2); roles that are not 0 are kept.
 
-    In each connected part of the graph of pairs neighbours get different roles. In the graph with two copies of every
-    facet, where a pair joins the one copy of one with the other copy of the other, such a part falls into two halves,
-    which are the two ways to do it. The way with more pressed facets among the slaves is taken, else the one in which
-    the first facet is a slave. A part with an odd circle has no such way: all its facets are slaves.
+    Neighbours in the graph of pairs get different roles: a two-colouring of each connected part. Take a graph with two
+    copies of every facet, in which a pair joins different copies. There a part that can be coloured has two connected
+    components, which are its two colourings. The colouring with more pressed facets among the slaves is chosen, else
+    the one in which the first facet is a slave. In a part with an odd cycle all facets are slaves.
     Source: Yang & Laursen, Comput. Mech. 41 (2008), section 4, for the alternation.
     """
     k = len(roles)
@@ -26,7 +26,7 @@ def choose_roles(roles: Roles, pressed: NDArray[np.int64], pairs: NDArray[np.int
     part = connected_parts(np.concatenate([i, i + k]), np.concatenate([j + k, j]), 2 * k)
     first, second = part[:k], part[k:]
     low = np.minimum(first, second)
-    # pressed facets speak for themselves as slaves, roles that are fixed count for more than all of them
+    # pressed facets vote for themselves as slaves; a fixed role outweighs all votes
     vote = pressed + (1.0 + pressed.sum()) * ((roles == SLAVE).astype(float) - (roles == MASTER))
     balance = np.bincount(low, np.where(first == low, vote, -vote), minlength=2 * k)
     slave = (first == second) | ((first == low) == (balance[low] >= 0.0))

@@ -1,4 +1,4 @@
-"""Search: which slave facets may touch which master facets; only these pairs reach the mortar kernel."""
+"""Search: pairs of slave and master facets that may touch. Only these are passed to the mortar kernel."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from solvers.api import Array, StepFailed
 from solvers.kernels import KdopTree2, KdopTree3
 
-#: Build a tree anew once its nodes cover this many times as much as when it was new (a build costs 4 refits).
+#: Volume of a tree's nodes, relative to that when it was built, above which it is rebuilt, at the cost of 4 refits.
 REBUILD_ABOVE = 2.0
 
-#: Facets can touch if the product of their unit normals is below this (they face each other within 60 degrees).
+#: Product of the unit normals below which facets can touch: they face each other within 60 degrees.
 OPPOSED = -0.5
 
 Facets = NDArray[np.int64]  #: node indices in VTK order, shape (k, nodes per facet)
@@ -21,20 +21,20 @@ Tree: TypeAlias = KdopTree2 | KdopTree3
 
 
 class Search:
-    """Facet pairs of two surfaces: a tree of k-DOPs on each, built when they first come near, then refitted.
+    """Facet pairs of two surfaces, by a tree of k-DOPs on each, which is built when they first come near.
 
-    Facets: line2, line3 (2D), tri3, quad4, tri6, quad9 (3D). The result depends on the arguments of
-    `pairs`, never on earlier calls. One object serves one thread at a time.
+    Facets: line2, line3 (2D), tri3, quad4, tri6, quad9 (3D). The result depends on the arguments of `pairs` only, not
+    on earlier calls. An object must not be used by several threads at a time.
     """
 
     def __init__(self, slave_facets: Facets, master_facets: Facets):
         self._slave_facets = np.ascontiguousarray(slave_facets, dtype=np.int64)
         self._master_facets = np.ascontiguousarray(master_facets, dtype=np.int64)
         self.trees: tuple[Tree, Tree] | None = None
-        self.clearance = -np.inf  #: [m] between the inflated boxes at the latest search; negative if they meet
+        self.clearance = -np.inf  #: distance [m] of the inflated boxes in the latest search; negative: they overlap
 
     def begin_step(self, pressed: NDArray[np.int64]) -> None:
-        """Nothing to choose: one side is the slave, the other one the master."""
+        """Nothing to do: slave and master are given."""
 
     def pairs(
         self,
@@ -44,11 +44,11 @@ class Search:
         xs_previous: Array | None = None,
         xm_previous: Array | None = None,
     ) -> NDArray[np.int32]:
-        """Every (slave facet, master facet) closer than `inflation`, and some more; shape (p, 2), sorted.
+        """All (slave facet, master facet) closer than `inflation`, and some others, shape (p, 2), sorted.
 
-        xs, xm: node positions [m], shapes (n, dim). inflation [m]: one number, or one per slave facet. With
-        previous positions also every pair that comes so close while the nodes go straight from there to here.
-        ValueError if shapes do not fit, StepFailed if a position is not finite.
+        xs, xm: positions of the nodes [m], (n, dim); inflation [m]: one number, or one per slave facet. With previous
+        positions, pairs that come so close on straight paths of the nodes are included.
+        Raises ValueError if shapes do not fit, StepFailed if a position is not finite.
         """
         path_s, path_m = _path(xs, xs_previous), _path(xm, xm_previous)
         if not all(np.isfinite(x).all() for x in path_s + path_m):

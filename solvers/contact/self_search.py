@@ -1,4 +1,4 @@
-"""Search of a surface that may touch itself: facet pairs, and which facet of a pair is the slave."""
+"""Search in self contact: facet pairs of one surface, and which facet of a pair is the slave."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from solvers.contact.search import OPPOSED, Search
 
 Indices = NDArray[np.int64]
 
-#: A pair that overlaps by more than this share of the wall's thickness is the wall.
+#: Overlap relative to the thickness of the wall above which a pair is the two sides of the wall.
 THROUGH = 0.5
 
-#: Facets whose distances from all others are found together.
+#: Facets whose distances from all others are computed together, to bound the memory.
 CHUNK = 256
 
 
 class SelfSearch:
-    """Pairs (slave facet, master facet) of one surface; roles are chosen anew in each step and stay within it.
+    """Pairs (slave facet, master facet) of one surface; roles are chosen in each step and kept within it.
 
-    The other side of a facet's own wall looks like a master that the facet has penetrated by the thickness of the
-    wall. A pair that overlaps by more than half of that thickness is the wall.
+    The opposite side of its own wall is like a master that a facet has penetrated by the thickness of the wall. Hence
+    pairs that overlap by more than half of the thickness are excluded.
     """
 
     clearance = -np.inf  #: [m]; a surface is never clear of itself
 
     def __init__(self, facets: Indices, facet_type: str, points: Array, others: Indices | None = None):
-        """points: reference positions [m] of the nodes, shape (n, dim); others: masters of other bodies, with nodes
-        numbered after these."""
+        """points: reference positions [m] of the nodes, shape (n, dim); others: facets of other bodies, whose
+        nodes are numbered after these."""
         self.tree = DualTree(facets, facet_type, points)
         self._others = None if others is None or len(others) == 0 else Search(facets, others)
         self._count, self._nodes = len(facets), len(points)
@@ -40,7 +40,7 @@ class SelfSearch:
         self._directed = np.empty(0, dtype=np.int64)  # codes of directed pairs, sorted
 
     def begin_step(self, pressed: NDArray[np.int64]) -> None:
-        """pressed: how many multipliers of each facet are in contact; such facets are slaves again, shape (k,)."""
+        """Discard the roles; pressed: count of multipliers in contact of each facet, (k,), which are slaves again."""
         self._pressed = pressed
         self._roles = np.zeros(self._count, dtype=np.int8)
         self._directed = np.empty(0, dtype=np.int64)
@@ -48,7 +48,7 @@ class SelfSearch:
     def pairs(
         self, xs: Array, xm: Array, inflation: float, xs_previous: Array | None = None, xm_previous: Array | None = None
     ) -> NDArray[np.int32]:
-        """As those of `Search`; among the masters its own nodes come first, and only there are they each once."""
+        """Facet pairs as in `Search.pairs`; xm: positions of its own nodes, then of those of `others`."""
         n = self._nodes
         own_x, own_previous = xm[:n], None if xm_previous is None else xm_previous[:n]
         own = self._own_pairs(own_x, inflation, own_previous)
@@ -64,8 +64,8 @@ class SelfSearch:
         found = self.tree.pairs(xs, inflation, xs_previous)
         found = found[~self._through_the_wall(found, xs)]
         k = self._count
-        known = np.isin(found @ [k, 1], self._directed) | np.isin(found @ [1, k], self._directed)
-        new = found[~known]
+        has_roles = np.isin(found @ [k, 1], self._directed) | np.isin(found @ [1, k], self._directed)
+        new = found[~has_roles]
         if len(new):
             self._roles = choose_roles(self._roles, self._pressed, found)
             turned = (self._roles[new[:, 0]] == MASTER) & (self._roles[new[:, 1]] == SLAVE)
@@ -87,7 +87,7 @@ class SelfSearch:
 
 
 def wall_thickness(middles: Array, normals: Array) -> Array:
-    """Distance [m] of facets from what is behind them, infinite if there is nothing, shape (k,)."""
+    """Distance [m] of facets from the nearest opposed facet behind them, infinite if there is none, shape (k,)."""
     found = np.full(len(middles), np.inf)
     for start in range(0, len(middles), CHUNK):
         part = slice(start, start + CHUNK)

@@ -1,7 +1,7 @@
-"""Surfaces cut at their sharp edges: a node on one is split, one on each side, and no normal is a mean across it.
+"""Splitting of surfaces at sharp edges: a node on an edge becomes one node per side, each with its own normal.
 
-Around a node, facets belong together if a path from one to the other crosses no sharp edge. So an edge may also end
-within a surface: its last node is not split.
+Two facets at a node are on the same side if a path between them around the node crosses no sharp edge. Hence an edge
+may end within a surface, and its last node is not split.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from solvers.cell_types import CELL_TYPES
 from solvers.connected import connected_parts
 from solvers.kernels import nodal_normals
 
-#: Angle by which normals turn over an edge from which on the edge is sharp [degrees].
+#: Angle between the normals of neighbouring facets above which their edge is sharp [degrees].
 SHARP = 60.0
 
 Indices = NDArray[np.int64]
@@ -24,16 +24,16 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class SplitNodes:
-    """Nodes, those on sharp edges once for each side, in the order of the nodes."""
+    """Nodes of a surface, with one node per side on sharp edges, in the order of the original nodes."""
 
-    nodes: Indices  #: the node that each is or was split from, shape (n,)
-    facets: Indices  #: in numbers of the split nodes, shape (k, nodes per facet)
+    nodes: Indices  #: the original node of each, shape (n,)
+    facets: Indices  #: facets in numbers of the split nodes, shape (k, nodes per facet)
 
 
 def split_nodes(points: Array, facets: Indices, facet_type: str, among: Indices | None = None) -> SplitNodes:
-    """Facets (k, nodes per facet) of nodes at reference positions points [m], shape (n, dim).
+    """Split the nodes of facets (k, nodes per facet) at sharp edges; points: reference positions [m], (n, dim).
 
-    among: numbers of the facets, between equal ones of which no edge counts as sharp, shape (k,).
+    among: a number per facet, (k,); edges between facets with equal numbers are not sharp.
     """
     k, n = facets.shape
     of_facet, ends, normals = np.arange(k).repeat(n), facets.ravel(), _corner_normals(points, facets, facet_type)
@@ -54,7 +54,7 @@ def _corner_normals(points: Array, facets: Indices, facet_type: str) -> Array:
 
 
 def _across_edges(facets: Indices, facet_type: str) -> tuple[Indices, Indices]:
-    """Nodes of facets (facet * nodes per facet + local node) that are one node of one edge (in 2D: one end)."""
+    """Pairs of local nodes, facet * nodes per facet + number, that are the same node of a common edge (2D: end)."""
     k, n = facets.shape
     corners = CELL_TYPES[facet_type].corners
     edges = [(0,), (1,)] if corners == 2 else [(c, (c + 1) % corners) for c in range(corners)]

@@ -1,11 +1,12 @@
-"""The slip of a step at the multipliers, from the mortar integrals at its two ends.
+"""The slip of multipliers in a step, from the mortar integrals at its beginning and at the iterate.
 
-With the integrals of the beginning (n) and of the iterate, and x the positions of the iterate, multiplier j slips
+With the integrals at the beginning (superscript n) and at the iterate, and positions x of the iterate, the slip s_j of
+multiplier j follows from
 
     D_j^n s_j = W_j^n x_slave - M_j^n x_master + int Phi_j (x_m - x_s) = -[(W - W^n) x_slave - (M - M^n) x_master]_j .
 
-W_jk = int Phi_j N_k is D but on slivers. Points that were together at the beginning are followed: a common rigid motion
-does not change the integrals and has no slip. Only the part along the surface matters.
+W_jk = int Phi_j N_k equals D where the area is fully covered. The formula is objective: a common rigid motion does not
+change the integrals and has no slip. Laws use the tangential part of the slip only.
 Source: Gitterle, Popp, Gee & Wall, Int. J. Numer. Meth. Engng 84 (2010), section 3.
 """
 
@@ -32,7 +33,7 @@ class Beginning:
     """The integrals at the beginning of a step."""
 
     difference: Sparse  #: (W^n, -M^n) over all nodes, shape (C, N)
-    slopes: Sparse  #: the same for all components, shape (dim * C, dim * N)
+    slopes: Sparse  #: `difference` for all components, shape (dim * C, dim * N)
     D: Array  #: shape (C,)
 
 
@@ -40,12 +41,12 @@ class Beginning:
 class Slip:
     """The slip of the step up to an iterate."""
 
-    values: Array  #: [m], shape (C, dim), zero where it is not known
+    values: Array  #: [m], shape (C, dim), zero where it is not defined
     slopes: Sparse  #: derivatives, shape (dim * C, dim * N)
-    defined: NDArray[np.bool_]  #: multipliers that saw a master at the beginning, shape (C,)
+    defined: NDArray[np.bool_]  #: mask of the multipliers that a master covered at the beginning, shape (C,)
 
     def plus(self, other: Slip) -> Slip:
-        """With that of other multipliers."""
+        """The slip of these and of other multipliers."""
         return Slip(self.values + other.values, self.slopes + other.slopes, self.defined | other.defined)
 
 
@@ -58,16 +59,16 @@ class Sliding:
         self._count, self._shape = len(multipliers.node), shape
         self._beginning: Beginning | None = None
 
-    def begin_step(self, x: Array, way: float) -> None:
-        """Integrals at the positions x [m] at the beginning of a step, shape (N, dim); way: see `Mortar.near`."""
+    def begin_step(self, x: Array, travel: float) -> None:
+        """Integrals at the positions x [m] at the beginning of a step, (N, dim); travel: see `Mortar.near`."""
         self._beginning = None
-        if all(way < mortar.clear_until for mortar in self.mortars):
+        if all(travel < mortar.clear_until for mortar in self.mortars):
             return
         (N, dim), C = self._shape, self._count
         D, parts = np.zeros(C), []
         normals = find_normals(self._multipliers, x) if self.mortars else None
         for index, mortar in enumerate(self.mortars):
-            facet_pairs, _ = mortar.near(x, x, way)
+            facet_pairs, _ = mortar.near(x, x, travel)
             facet_pairs = self._shares.mine(index, facet_pairs, len(mortar.facets))
             if normals is None or len(facet_pairs) == 0:
                 continue
@@ -85,7 +86,7 @@ class Sliding:
         used: Sequence[tuple[Mortar, NDArray[np.int32]]],
         redistributed: Callable[[Any], Any],
     ) -> Slip:
-        """Slip at the positions x [m] with the facet pairs that took part in the integrals there."""
+        """Slip at the positions x [m]; used: the facet pairs of each mortar that contributed to the integrals there."""
         assert self._beginning is not None
         (N, dim), C = self._shape, self._count
         gap, parts = np.zeros((C, dim)), []
@@ -99,8 +100,8 @@ class Sliding:
             parts += [(part, dim * rows + axis, columns) for axis, part in enumerate(slopes)]
         gap, dgap = self._shares.total_of(gap, add_up(parts, (dim * C, dim * N)))
         D = redistributed(self._beginning.D)
-        known = D > 0.0
-        share = np.divide(1.0, D, out=np.zeros_like(D), where=known)
+        defined = D > 0.0
+        share = np.divide(1.0, D, out=np.zeros_like(D), where=defined)
         values = share[:, None] * redistributed(self._beginning.difference @ x + gap)
         slopes = redistributed(self._beginning.slopes + dgap).scaled_rows(share.repeat(dim))
-        return Slip(values, slopes, known)
+        return Slip(values, slopes, defined)

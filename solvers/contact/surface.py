@@ -1,4 +1,4 @@
-"""Surfaces that may touch, and the numbering of all their nodes together."""
+"""Contact surfaces, and the common numbering of their nodes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from solvers.cell_types import CELL_TYPES
 
 @dataclass(frozen=True)
 class Surface:
-    """One side of a contact pair, whole on every process.
+    """One side of a contact pair, the same on every process.
 
-    A rigid surface has no dofs; it stands still or follows `motion`.
+    A rigid surface has no dofs. It is at rest or follows `motion`.
     """
 
     name: str
@@ -25,7 +25,7 @@ class Surface:
     facet_type: str  #: line, line3, triangle, triangle6, quad, quad9
     dofs: NDArray[np.int64] | None  #: global dofs of each node, shape (n, dim); None if rigid
     held: Array | None = None  #: projections on the directions that supports prescribe, shape (n, dim, dim)
-    body: str = ""  #: whose surface it is
+    body: str = ""  #: name of its body
     symmetric: NDArray[np.bool_] | None = None  #: held by planes of symmetry: normals have no such component, (n, dim)
     mesh_nodes: NDArray[np.int64] | None = None  #: number of each node in the mesh of the body
     unmoved: Array | None = None  #: positions [m] before nodes of tied surfaces were moved, shape (n, dim)
@@ -39,7 +39,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class ContactNodes:
-    """All nodes of all surfaces, each deformable node once."""
+    """The nodes of all surfaces, each deformable node once."""
 
     points: Array  #: reference positions [m], shape (N, dim)
     dofs: NDArray[np.int64]  #: global dofs, -1 where rigid, shape (N, dim)
@@ -52,14 +52,14 @@ class ContactNodes:
 
     @property
     def fixed(self) -> NDArray[np.bool_]:
-        """Held in all directions, shape (N,)."""
+        """Mask of the nodes that are held in all directions, shape (N,)."""
         return np.einsum("nii->n", self.held) > self.dim - 0.5
 
 
 def number_nodes(surfaces: Sequence[Surface]) -> ContactNodes:
     """Number the nodes of the surfaces together: nodes with the same dofs are the same node."""
     points, dofs, held, numbers = [], [], [], []
-    known: dict[int, int] = {}
+    number_of: dict[int, int] = {}  #: by the first dof of a node
     count = 0
     for surface in surfaces:
         n, dim = surface.points.shape
@@ -69,12 +69,12 @@ def number_nodes(surfaces: Sequence[Surface]) -> ContactNodes:
         number = np.empty(n, dtype=np.int64)
         new = []
         for i, first in enumerate(own[:, 0].tolist()):
-            if first >= 0 and first in known:
-                number[i] = known[first]
+            if first >= 0 and first in number_of:
+                number[i] = number_of[first]
                 continue
             number[i] = count
             if first >= 0:
-                known[first] = count
+                number_of[first] = count
             new.append(i)
             count += 1
         points.append(surface.points[new])
@@ -94,5 +94,5 @@ def facet_areas(points: Array, facets: NDArray[np.int64], facet_type: str) -> Ar
 
 
 def longest_edge(corners: Array) -> float:
-    """Of facets given by their corners, shape (k, corners, dim) [m]."""
+    """Longest edge [m] of facets with given corners [m], shape (k, corners, dim)."""
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())

@@ -22,19 +22,19 @@ class Normals:
 
     values: Array  #: shape (C, dim)
     slopes: Sparse  #: derivatives with respect to all nodes, shape (dim * C, dim * N)
-    of_patch: tuple[tuple[Array, Sparse], ...]  #: the same by patch, in its own numbers
+    of_patch: tuple[tuple[Array, Sparse], ...]  #: values and derivatives by patch, in the numbers of the patch
 
     def at(self, multipliers: Multipliers, patch: SlavePatch) -> tuple[Array, Sparse]:
-        """Those of a patch."""
+        """Normals and derivatives of a patch."""
         return self.of_patch[next(k for k, other in enumerate(multipliers.patches) if other is patch)]
 
 
 @dataclass(frozen=True)
 class Terms:
-    """Mortar integrals of all pairs at one iterate; columns are interface dofs (dim * node + component)."""
+    """Mortar integrals of all pairs at one iterate; columns: interface dofs dim * node + component."""
 
-    D: Array  #: shape (C,), zero where no master is seen
-    D_of_pair: Array  #: the part of D that each pair has, shape (pairs, C)
+    D: Array  #: covered areas [m^(dim-1)], shape (C,)
+    D_of_pair: Array  #: contribution of each pair to D, shape (pairs, C)
     M: Sparse  #: shape (C, N)
     gap: Array  #: weighted gap [m^dim], shape (C,)
     normals: Array  #: shape (C, dim)

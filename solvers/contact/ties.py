@@ -1,13 +1,13 @@
-"""Mortar integrals of tied surfaces: computed once, where the bodies have no displacement.
+"""Tied surfaces: mortar integrals in the reference configuration, which are computed once.
 
-With W_jk = int Phi_j N_k over the slave and M_jl = int Phi_j N_l, both for the meshes as they were read, multiplier j
-requires
+With W_jk = int Phi_j N_k over the slave and M_jl = int Phi_j N_l, both for the meshes as they are read, the constraint
+of multiplier j is
 
     sum_k W_jk u_k - sum_l M_jl u_l = 0 .
 
-It is linear, and a common translation fulfils it. So does a common rotation if sum W X = sum M X, which holds where the
-surfaces are flat; where they are bent the nodes of the slave are moved there before the run (`relocated`), by a length
-that falls with the square of the facets. The integrals stay those of the meshes as they were.
+It is linear, and a common translation fulfils it. A common rotation fulfils it too if sum W X = sum M X, which holds
+for flat surfaces. On curved surfaces the slave nodes are moved before the run so that it holds (`relocated`), by a
+distance that decreases with the square of the facet size. The integrals are those before this.
 Source: Puso & Laursen, Comput. Methods Appl. Mech. Engng 193 (2004); Puso, Int. J. Numer. Meth. Engng 59 (2004), for
 the initial positions.
 """
@@ -33,15 +33,16 @@ from solvers.sparse import Sparse, nothing
 
 
 class Ties:
-    """Of some mortars; reference: positions [m] of all nodes, x: where they were before any were moved, (N, dim)."""
+    """The ties of some mortars."""
 
     def __init__(self, mortars: Sequence[Mortar], multipliers: Multipliers, reference: Array, x: Array):
+        """reference: positions [m] of all nodes; x: the same before nodes were relocated; both (N, dim)."""
         self.pieces: list[tuple[Mortar, MortarTerms]] = []
         N, C = len(x), len(multipliers.node)
         self._reference = reference
         self.D = np.zeros(C)  #: covered area [m^(dim-1)]
         self.difference = nothing((C, N))  #: (W, -M) over all nodes
-        self._shares: Sparse | None = None  # redistribution that the slopes are made with
+        self._shares: Sparse | None = None  # redistribution that the slopes were computed with
         self._slopes: tuple[Sparse, Sparse, NDArray[np.bool_]] | None = None
         normals = find_normals(multipliers, x) if mortars else None
         for mortar in mortars:
@@ -54,7 +55,7 @@ class Ties:
             self.difference = self.difference + renumber(W, rows, slave, (C, N)) - renumber(M, rows, master, (C, N))
 
     def slip(self, x: Array, shares: Sparse | None) -> Slip:
-        """Since the reference configuration, at the positions x [m] of all nodes; shares: of redistribution."""
+        """Slip since the reference configuration at the positions x [m] of all nodes; shares: of redistribution."""
         if self._slopes is None or self._shares is not shares:
             D = redistributed(self.D, shares)
             share = np.divide(1.0, D, out=np.zeros_like(D), where=D > 0.0)

@@ -1,1 +1,1 @@
-"""What surfaces in contact obey: one law a file."""
+"""Contact laws, one per file."""

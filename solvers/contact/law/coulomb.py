@@ -1,4 +1,4 @@
-"""Coulomb's friction: the traction along the surface is at most mu times the pressure."""
+"""Coulomb friction: the tangential traction is at most mu times the pressure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from solvers.contact.law.law import Point, Span
 
 @dataclass(frozen=True)
 class Coulomb:
-    """|z_t| <= mu p; p = z_n - c_n g is the trial pressure: z_n in the solution, and never negative in contact."""
+    """|z_t| <= mu p with the trial pressure p = z_n - c_n g, which is positive in contact and z_n in the solution."""
 
     mu: float  #: coefficient of friction
     span: ClassVar[Span] = "surface"

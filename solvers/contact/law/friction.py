@@ -1,12 +1,13 @@
-"""Friction: the traction along the surface is the projection of a trial one onto a disc.
+"""Friction laws: the tangential traction is the projection of a trial traction onto a disc.
 
-Per multiplier, with the slip u_t of the step along the surface, z_t = z - n (n.z), any c_t > 0, and the radius s of the
-disc (the bound of the traction), both stick and slip are the one equation
+Let u_t be the tangential slip of the step, z_t = z - n (n.z), c_t > 0, and s the radius of the disc, which is the bound
+of the traction. For each multiplier, stick and slip are one equation,
 
     z_t = P_s(q),   q = z_t + c_t u_t,   P_s(q) = q min(1, s / |q|).
 
-Inside the disc it says u_t = 0, on and outside z_t = s q / |q|: |z_t| <= s, and slip only at the bound, along the
-traction. It is C = max(s, |q|) z_t - s q = 0 over max(s, |q|). All derivatives are exact (semi-smooth Newton).
+Inside the disc it gives u_t = 0, on and outside of it z_t = s q / |q|. Hence |z_t| <= s, and slip occurs only at the
+bound, along the traction. The equation is C = max(s, |q|) z_t - s q = 0 divided by max(s, |q|). All derivatives are
+exact (semi-smooth Newton).
 Source: Alart & Curnier, Comput. Methods Appl. Mech. Engng 92 (1991); Gitterle, Popp, Gee & Wall, Int. J. Numer. Meth.
 Engng 84 (2010).
 """
@@ -22,20 +23,20 @@ from solvers.contact.blocks import components
 from solvers.contact.law.law import OPEN, SLIP, STICK, Point, Rows, Slopes, Statuses, along
 from solvers.sparse import Sparse, sparse, stack
 
-#: A trial traction on the rim of the disc, to this share of its radius, means slip. That of a node that slides is there
-#: at the beginning of the next step, but for the tolerance of Newton's method: it goes on sliding.
+#: Distance of a trial traction from the edge of the disc, relative to its radius, below which a node slips. A node that
+#: slips has its trial traction there at the beginning of the next step, up to the tolerance of Newton's method.
 EDGE = 1e-6
 
 
 class Bound(Protocol):
-    """The part in which laws of friction differ; the functions below are methods of such a law."""
+    """The bound of the tangential traction, in which friction laws differ. The functions below are their methods."""
 
     def radius(self, at: Point) -> Array:
-        """s, the largest traction along the surface [Pa], shape (m,)."""
+        """s, the largest tangential traction [Pa], shape (m,)."""
         ...
 
     def radius_slopes(self, at: Point) -> tuple[Array, Array, Array]:
-        """Its derivatives by z and by n, shapes (m, dim), and by the weighted gap, shape (m,)."""
+        """Derivatives of s by z and by n, shapes (m, dim), and by the weighted gap, shape (m,)."""
         ...
 
 
@@ -46,10 +47,10 @@ def trial_traction(at: Point) -> Array:
 
 
 def friction_status(law: Bound, at: Point) -> Statuses:
-    """In contact where the trial pressure is positive; sticking inside the disc.
+    """Status: contact where the trial pressure is positive, stick inside the disc.
 
-    Where the trial traction points against the present one the node sticks first: a slip that reverses in one
-    Newton step could reverse in every following one. In the solution they have the same direction.
+    A node whose trial traction is opposed to the present one sticks first. Otherwise its slip could reverse in every
+    Newton iteration. In the solution both have the same direction.
     """
     q, radius = trial_traction(at), law.radius(at)
     turned = np.einsum("nd,nd->n", q, at.z) < 0.0
@@ -58,7 +59,7 @@ def friction_status(law: Bound, at: Point) -> Statuses:
 
 
 def friction_residual(law: Bound, at: Point, status: Statuses, weight: float) -> Array:
-    """The closing gap along the normal and z_t - P_s(q) along the surface [N], shape (m, dim)."""
+    """Residual [N]: gap times stiffness along the normal, z_t - P_s(q) along the surface, shape (m, dim)."""
     z_t = at.z - at.pressure[:, None] * at.normals
     missed = z_t - _on_disc(trial_traction(at), status, law.radius(at))[0]
     return (at.stiffness * at.gap)[:, None] * at.normals + (weight * at.D)[:, None] * missed
@@ -95,7 +96,7 @@ def _in_displacements(by_gap: Array, by_normal: Array, by_slip: Array, slopes: S
 
 
 def _on_disc(q: Array, status: Statuses, radius: Array, *, derivatives: bool = False):
-    """(P_s(q), dP/dq, dP/ds): q itself inside, on the rim outside. The status says which."""
+    """(P_s(q), dP/dq, dP/ds), inside or on the edge of the disc according to the status."""
     size = np.linalg.norm(q, axis=1)
     stick = status == STICK
     unit = q / np.where(size > 0.0, size, 1.0)[:, None]

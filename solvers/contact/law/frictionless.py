@@ -1,4 +1,4 @@
-"""No friction: z_n >= 0, g >= 0, z_n g = 0, and no traction along the surface.
+"""Frictionless contact: z_n >= 0, g >= 0, z_n g = 0, and no tangential traction.
 
 Source: Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010), section 4.
 """
@@ -17,7 +17,7 @@ from solvers.contact.law.law import OPEN, SLIP, Point, Rows, Slopes, Span, Statu
 
 @dataclass(frozen=True)
 class Frictionless:
-    """In contact where z_n - c_n g > 0; there the gap closes."""
+    """Contact where z_n - c_n g > 0; there the gap is zero."""
 
     span: ClassVar[Span] = "normal"
     slips: ClassVar[bool] = False

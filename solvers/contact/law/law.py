@@ -1,4 +1,4 @@
-"""The interface of contact laws: their arguments, the status of multipliers, and the rows that these fulfil."""
+"""The interface `Law` of contact laws: arguments, status of multipliers, and linearised rows."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.sparse import Sparse
 
-#: Status of a multiplier: no contact; contact, free to slide; contact, no sliding
+#: Status of a multiplier: no contact; contact with slip; contact without slip.
 OPEN, SLIP, STICK = 0, 1, 2
 
 Statuses = NDArray[np.int8]
 
-#: Directions of a multiplier: along the normal, also along the surface, or any without regard to the surface
+#: Admissible directions of a multiplier: the normal; normal and tangential; all, whatever the normal.
 Span = Literal["normal", "surface", "space"]
 
 
 @dataclass(frozen=True)
 class Point:
-    """Multipliers of one law at an iterate, m of them. Everything a law may depend on."""
+    """The m multipliers of one law at an iterate: all arguments of the law."""
 
     z: Array  #: multipliers [Pa], the negative traction on the slave, shape (m, dim)
     normals: Array  #: outward unit normals of the slave, shape (m, dim)
     D: Array  #: covered area [m^(dim-1)], shape (m,)
     gap: Array  #: weighted gap [m^dim] that must not be negative, shape (m,)
-    covered: NDArray[np.bool_]  #: there is enough of a master for a constraint, shape (m,)
+    covered: NDArray[np.bool_]  #: mask of the multipliers that may have a constraint, shape (m,)
     stiffness: Array  #: of the bodies, per area [Pa/m], shape (m,)
-    slip: Array  #: [m], shape (m, dim); with friction that of the step, of which the part along the surface counts
-    slip_defined: NDArray[np.bool_]  #: the multiplier saw a master at the beginning of the step, shape (m,)
-    c_n: Array  #: complementarity parameter of the gap [Pa/m]: any positive one has the same solution, shape (m,)
-    c_t: Array  #: the same of the slip
-    touching: float  #: gap [m] that is rounding
+    slip: Array  #: [m], shape (m, dim); with friction that of the step, of which the tangential part is used
+    slip_defined: NDArray[np.bool_]  #: mask of those that a master covered at the beginning of the step, shape (m,)
+    c_n: Array  #: complementarity parameter of the gap [Pa/m], (m,); the solution does not depend on it
+    c_t: Array  #: complementarity parameter of the slip [Pa/m], (m,)
+    touching: float  #: gap [m] below which it is a rounding error
 
     @property
     def pressure(self) -> Array:
@@ -67,16 +67,16 @@ class Rows:
 
 
 class Law(Protocol):
-    """How normal and tangential traction follow from gap and slip."""
+    """A relation between traction, gap and slip."""
 
     @property
     def span(self) -> Span:
-        """Directions that its multipliers may have."""
+        """Admissible directions of its multipliers."""
         ...
 
     @property
     def slips(self) -> bool:
-        """It asks for the slip."""
+        """Whether it depends on the slip."""
         ...
 
     def status(self, at: Point) -> Statuses:
@@ -84,7 +84,7 @@ class Law(Protocol):
         ...
 
     def residual(self, at: Point, status: Statuses, weight: float) -> Array:
-        """Residual of multipliers in contact [N], shape (m, dim); weight: of their forces in the balance."""
+        """Residual of multipliers in contact [N], shape (m, dim); weight: that of their forces in the balance."""
         ...
 
     def rows(self, at: Point, slopes: Slopes, status: Statuses, weight: float) -> Rows:

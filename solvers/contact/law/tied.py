@@ -1,4 +1,4 @@
-"""Tied surfaces: no relative motion, for any traction.
+"""Tying: no relative motion, for any traction.
 
 Source: Puso & Laursen, Comput. Methods Appl. Mech. Engng 193 (2004), mesh tying with mortar elements.
 """
@@ -16,7 +16,7 @@ from solvers.contact.law.law import OPEN, STICK, Point, Rows, Slopes, Span, Stat
 
 @dataclass(frozen=True)
 class Tied:
-    """The slip, counted from the reference configuration and in all directions, is zero."""
+    """Zero slip since the reference configuration, in all directions."""
 
     span: ClassVar[Span] = "space"
     slips: ClassVar[bool] = False

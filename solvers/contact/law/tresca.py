@@ -1,4 +1,4 @@
-"""Tresca's friction: the traction along the surface is at most a given one, wherever the surfaces touch."""
+"""Tresca friction: the tangential traction is at most a given bound where surfaces touch."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from solvers.contact.law.law import Point, Span
 class Tresca:
     """|z_t| <= bound."""
 
-    bound: float  #: largest traction along the surface [Pa]
+    bound: float  #: largest tangential traction [Pa]
     span: ClassVar[Span] = "surface"
     slips: ClassVar[bool] = True
 
