@@ -1,4 +1,4 @@
-"""What the parts exchange: the dataclasses and protocols at the boundaries between fields, schemes and the driver."""
+"""Dataclasses and protocols that fields, schemes and the run loop share."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: Everything needed to continue: nested names, arrays in global (partition-independent) order on rank 0, numbers, text.
+#: A state to continue from: nested names, with arrays in an order that does not depend on the partition, numbers, text.
 State = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class StepInfo:
-    """What one accepted time step took."""
+    """Iterations, residuals and notes of one accepted time step."""
 
-    iterations: int  #: Newton steps or coupling iterations
-    residuals: tuple[float, ...]  #: residual norm seen by each iteration, first to last
-    numbers: Mapping[str, float] = field(default_factory=dict)  #: more columns for history.csv
-    notes: tuple[str, ...] = ()  #: what the user should know
+    iterations: int  #: iterations of Newton's method or of the coupling
+    residuals: tuple[float, ...]  #: residual norm of each iteration, first to last
+    numbers: Mapping[str, float] = field(default_factory=dict)  #: further columns for history.csv
+    notes: tuple[str, ...] = ()  #: notes to the user
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,10 @@ class Snapshot:
 
 
 class StepFailed(Exception):
-    """A time step has no solution: names the field, the reason, the iteration and the place, and keeps the history.
+    """A time step without a solution: field, reason, iteration, position and residuals.
 
-    `where` is a point [m] (worst residual, inverted element, ...) or None; `history` the residual norms so far.
+    where: a point [m], such as that of the largest residual or of an inverted element, or None; history: the residual
+    norms so far.
     """
 
     def __init__(
@@ -66,16 +67,13 @@ class StepFailed(Exception):
 
 
 class Stateful(Protocol):
-    """Has state that a checkpoint keeps; restore(save()) changes nothing, bit for bit. Collective calls."""
+    """An object with state for checkpoints; restore(save()) changes nothing, bit for bit. Calls are collective."""
 
     def save(self) -> State: ...
     def restore(self, state: State) -> None: ...
 
 
 class Scheme(Stateful, Protocol):
-    """Takes one time step from t to t + dt for everything the case contains; raises StepFailed.
-
-    A field alone is one.
-    """
+    """Takes one time step from t to t + dt for all fields of a case; raises StepFailed. A single field is a scheme."""
 
     def step(self, t: float, dt: float) -> StepInfo: ...

@@ -1,4 +1,4 @@
-"""Several distributed vectors and matrices as one: on each process the owned rows of block 0, then of block 1, ..."""
+"""Concatenation of distributed vectors and matrices: each process has its rows of block 0, then of block 1, ..."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from solvers.api import Array
 
 
 class Layout:
-    """Where the blocks stand in the concatenated owned dofs."""
+    """Offsets of the blocks in the concatenated owned dofs."""
 
     def __init__(self, comm: MPI.Comm, sizes: Sequence[int]):
         self.comm = comm
@@ -20,7 +20,7 @@ class Layout:
 
     @property
     def size(self) -> int:
-        """Owned dofs of all blocks."""
+        """Count of owned dofs of all blocks."""
         return int(self.offsets[-1])
 
     @property
@@ -38,9 +38,9 @@ class Layout:
 
 
 def block_diagonal(blocks: Sequence[PETSc.Mat], out: PETSc.Mat | None = None) -> PETSc.Mat:
-    """diag(blocks) as one AIJ matrix; `out` from an earlier call with the same sparsity is filled again.
+    """diag(blocks) as one AIJ matrix. A single block is returned without a copy.
 
-    One block is returned as it is, without a copy.
+    out: the result of an earlier call with the same sparsity pattern, to be overwritten.
     """
     if len(blocks) == 1:
         return blocks[0]

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 
 def connected_parts(first: NDArray, second: NDArray, n: int) -> NDArray[np.int64]:
-    """The smallest of all numbers that each of n is connected with, itself included; edges: first - second.
+    """For each of n nodes, the smallest number in its connected part, shape (n,); edges: first - second.
 
-    The smaller number goes along every edge, and everything takes over the part of its part, until nothing changes.
+    The smaller number is passed along every edge, and every node takes the number of its number, until nothing changes.
     """
     part = np.arange(n)
     across = first != second

@@ -11,7 +11,7 @@ from solvers.api import Array
 
 @cache
 def gauss(points: int) -> tuple[Array, Array]:
-    """(points, weights) on [0, 1], exact for polynomials of degree 2 points - 1; not to be written to."""
+    """(points, weights) on [0, 1], exact for polynomials of degree 2 points - 1; the arrays are read-only."""
     x, weights = np.polynomial.legendre.leggauss(points)
     found = 0.5 * x + 0.5, 0.5 * weights
     for array in found:

@@ -1,4 +1,4 @@
-"""Time integration of second-order systems."""
+"""The generalised-alpha method for second-order systems."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from solvers.api import Array
 
 @dataclass(frozen=True)
 class GeneralisedAlpha:
-    """Generalised-alpha method, forces averaged as (1 - alpha_f) f_{n+1} + alpha_f f_n.
+    """Generalised-alpha method, with forces averaged as (1 - alpha_f) f_{n+1} + alpha_f f_n.
 
     M a_{n+1-alpha_m} + C v_{n+1-alpha_f} + f_{n+1-alpha_f} = 0 with Newmark's relations between u, v and a.
     Source: Chung & Hulbert, J. Appl. Mech. 60 (1993) 371-375.

@@ -1,4 +1,4 @@
-"""Preconditioners and factors that serve for several matrices of a time step."""
+"""Lagged preconditioners and factors: those of one matrix are reused for later matrices of the time step."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from solvers import linear
 
 
 class Lagged:
-    """Solves with the preconditioner of an earlier matrix of the step, as long as that serves.
+    """Solves with the preconditioner of an earlier matrix of the step while it is good enough.
 
-    The first `fresh` matrices of a step get one of their own in any case, because those after them are far away. Then
-    the last one serves until a solve fails or takes `patience` times the iterations that it took with its own matrix.
-    Nothing is kept from step to step, so that resumed runs are the same.
+    The first `fresh` matrices of a step get their own preconditioners. The last of these is reused until a solve fails
+    or takes more than `patience` times the iterations that it took for its own matrix. Nothing is kept from step to
+    step, so that resumed runs give the same results.
     """
 
     def __init__(self, *, fresh: float = 1, patience: float = 2.0):
         self.fresh, self.patience = fresh, patience
-        self.made = 0  #: preconditioners of this step so far
+        self.made = 0  #: count of preconditioners in this step
         self._kept: tuple[PETSc.KSP, PETSc.Mat, int] | None = None  # with its matrix and iterations
 
     def begin_step(self) -> None:
-        """The next matrix is one of another step."""
+        """Discard the preconditioner of the last step."""
         self.made, self._kept = 0, None
 
     def solve_again(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> int | None:
-        """Solve matrix x = b; how many iterations that took, or None: it takes a solver for this matrix."""
+        """Solve matrix x = b with the kept preconditioner. Returns the iterations, or None: a new solver is needed."""
         kept, self._kept = self._kept, None
         if kept is None or self.made < self.fresh:
             return None
@@ -42,7 +42,7 @@ class Lagged:
         return iterations
 
     def solve(self, ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> int:
-        """The same with a solver for this matrix, which is kept. Raises LinearSolveFailed."""
+        """Solve matrix x = b with a solver for this matrix, which is kept; iterations. Raises LinearSolveFailed."""
         linear.solve(ksp, matrix, b, x)
         linear.keep_preconditioner(ksp)
         self.made += 1
@@ -52,22 +52,22 @@ class Lagged:
 
 
 class LaggedFactors:
-    """The same with LU factors by MUMPS (velocity and pressure need pivoting), which serve for 20 iterations."""
+    """Lagged LU factors by MUMPS, which pivots for velocity and pressure; reused for solves of up to 20 iterations."""
 
     def __init__(self, comm, *, fresh: float):
         self._lagged, self._ksp = Lagged(fresh=fresh, patience=math.inf), linear.factored_solver(comm, iterations=20)
 
     @property
     def factored(self) -> int:
-        """Matrices of this step so far."""
+        """Count of factorisations in this step."""
         return self._lagged.made
 
     def begin_step(self) -> None:
-        """The next matrix is one of another step."""
+        """Discard the factors of the last step."""
         self._lagged.begin_step()
 
     def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> int:
-        """Solve matrix x = b; how many iterations that took. Raises LinearSolveFailed."""
+        """Solve matrix x = b. Returns the count of iterations. Raises LinearSolveFailed."""
         iterations = self._lagged.solve_again(matrix, b, x)
         if iterations is not None:
             return iterations

@@ -1,4 +1,4 @@
-"""Where a distributed quantity is largest, for messages."""
+"""The position of the largest value of a distributed quantity, for messages."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from solvers.api import Array
 
 
 def position_of_largest(comm: MPI.Comm, sizes: Array, points: Array) -> tuple[float, ...]:
-    """Position [m] of the node with the largest size; what is not a number counts as infinite (collective).
+    """Position [m] of the node with the largest value; NaN counts as infinite (collective).
 
     sizes: at the nodes of this process, shape (n,); points: their positions, shape (n, dim).
     """

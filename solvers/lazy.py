@@ -1,4 +1,4 @@
-"""Names that a package offers and imports when they are first used, so that others of its modules load fast."""
+"""Lazy imports of the public names of a package, so that a program loads only the modules that it uses."""
 
 from __future__ import annotations
 

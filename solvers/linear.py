@@ -1,4 +1,4 @@
-"""Linear solvers: a direct one for small systems, a preconditioned Krylov method above."""
+"""Linear solvers: direct ones for small systems, preconditioned Krylov methods for large ones."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from solvers import unlocked
 
 Method = Literal["auto", "direct", "iterative", "ilu"]
 
-#: Unknowns above which the iterative solver is taken. Measured on one core (`make bench`): with hex8 it wins from 5,000
-#: (compact bodies) or 25,000 (slender ones) on, with second order and thin cells only from 50,000; direct never fails.
+#: Unknowns above which the iterative solver is used. Measured on one core (`make bench`): with hex8 it is faster from
+#: 5,000 (compact bodies) or 25,000 (slender ones) on, with second order and thin cells from 50,000 on.
 DIRECT_LIMIT = {2: 400_000, 3: 30_000}
 
 
-# Newer PETSc takes several dot products at once by BLAS, whose sums depend on where the vectors lie in memory. The same
-# run would then end with other last digits each time, and a resumed run with others than an uninterrupted one.
+# Newer PETSc computes several dot products at once by BLAS, whose sums depend on the alignment of vectors in memory.
+# Results would then differ in the last digits from run to run, and of resumed from uninterrupted runs.
 for _option in ("vec_mdot_use_gemv", "vec_maxpy_use_gemv"):
     PETSc.Options()[_option] = False
 
 
 class LinearSolveFailed(ArithmeticError):
-    """The linear system has no usable solution: the matrix is singular, or the Krylov method stalled."""
+    """The linear system has no solution: the matrix is singular, or the Krylov method stalled."""
 
     def __init__(self, message: str, *, singular: bool = False):
         super().__init__(message)
@@ -41,18 +41,19 @@ def choose(method: Method, dim: int, dofs: int) -> Literal["direct", "iterative"
 #: (communicator, task) -> solver
 Maker: TypeAlias = Callable[[Any, "Task"], PETSc.KSP]
 
-#: Unknowns of a plane problem below which PETSc's own factorisation is as fast as MUMPS or up to 6 times faster, on one
-#: process. Nested dissection: by bandwidth a slender body is 1.5 times faster, but a square one 5 times slower.
+#: Unknowns of a 2D problem below which PETSc's own factorisation is as fast as MUMPS or up to 6 times faster, on one
+#: process. It orders by nested dissection: bandwidth reduction is 1.5 times faster for slender bodies, but 5 times
+#: slower for square ones.
 SMALL_PLANE = 4_000
 
-#: Size of a pivot that PETSc takes for zero. Its own 2e-14 is one of numbers of size 1: in units where stiffness is
-#: 1e-21, regular matrices were refused. Bodies without supports are found by how far they fly (`flown_off`).
+#: Pivot below which PETSc takes a matrix for singular. Its default of 2e-14 assumes entries of size 1: in units where
+#: the stiffness is 1e-21, regular matrices were refused. `flown_off` detects bodies without supports.
 ZERO_PIVOT = 1e-300
 
 
 @dataclass(frozen=True)
 class Task:
-    """What a solver is for."""
+    """Properties of a linear system by which a solver is configured."""
 
     dim: int
     dofs: int  #: unknowns on all processes
@@ -61,7 +62,7 @@ class Task:
 
 
 def direct_solver(comm, task: Task) -> PETSc.KSP:
-    """LDL^T of a symmetric matrix, LU otherwise: by PETSc for small plane problems on one process, by MUMPS above."""
+    """LDL^T of a symmetric matrix, LU otherwise: by PETSc for small 2D problems on one process, else by MUMPS."""
     ksp = PETSc.KSP().create(comm)
     ksp.setType(PETSc.KSP.Type.PREONLY)
     preconditioner = ksp.getPC()
@@ -86,9 +87,9 @@ MULTIGRID = {
 
 
 def elastic_solver(comm, task: Task) -> PETSc.KSP:
-    """GMRES with algebraic multigrid until |b - A x| < tolerance |b|; the matrix carries the rigid-body modes.
+    """GMRES with algebraic multigrid until |b - A x| < tolerance |b|; the matrix has the rigid-body modes.
 
-    Not CG: an iterate of Newton's method that went too far may have an indefinite tangent.
+    GMRES instead of CG, because the tangent may be indefinite at an iterate far from the solution.
     """
     ksp = PETSc.KSP().create(comm)
     ksp.setOptionsPrefix("elastic_")
@@ -100,10 +101,10 @@ def elastic_solver(comm, task: Task) -> PETSc.KSP:
 
 
 def _multigrid(comm) -> PETSc.PC:
-    """A hierarchy for one matrix.
+    """A new multigrid hierarchy for one matrix.
 
-    An old one takes 3 times the iterations once bodies have turned (PETSc keeps the modes that it saw first), and a
-    resumed run does not have it.
+    A reused one would take 3 times the iterations after bodies have rotated, because PETSc keeps its first modes, and a
+    resumed run would not have it.
     """
     options = PETSc.Options("elastic_")
     for name, value in MULTIGRID.items():
@@ -114,16 +115,17 @@ def _multigrid(comm) -> PETSc.PC:
     return preconditioner
 
 
-#: A solver of flows.
+#: Linear solvers of flows.
 FlowMethod = Literal["multigrid", "ilu", "fill", "direct"]
 
 
 def choose_flow(
     method: Method, dim: int, dofs: int, *, degree: int, steady: bool, multigrid: bool = True
 ) -> tuple[FlowMethod, ...]:
-    """Solvers for a flow of this size from the usual one to the last resort, by the degree of its velocity.
+    """The sequence of solvers for a flow: each is used when those before it have failed.
 
-    More fill takes minutes for velocities of second degree. multigrid: all cells are those of one lattice.
+    degree: of the velocity; incomplete factors with more fill take minutes for second degree, and are left out.
+    multigrid: whether all cells are those of one lattice.
     """
     if method == "direct" or (method == "auto" and dofs <= FLOW_DIRECT_LIMIT[dim]):
         return ("direct",)
@@ -134,19 +136,19 @@ def choose_flow(
     return ("multigrid", "direct") if degree > 1 else ("multigrid", "fill", "direct")
 
 
-#: Unknowns of a flow above which the iterative solver is taken. Measured: in 3D it is 4 times faster at 8,000 already.
+#: Unknowns of a flow above which an iterative solver is used. In 3D it is 4 times faster at 8,000 unknowns.
 FLOW_DIRECT_LIMIT = {2: 400_000, 3: 4_000}
 
-#: Unknowns of a flow in time above which multigrid takes less time than incomplete factors, by degree. Measured per
-#: step, all included: `channel` takes as long with either at 98,000; q2q1 1.4 s instead of 2.8 s at 15,000, but 9.4 s
-#: instead of 5.6 s at 49,000; `torus_wall` (16,200, coupled) 0.95 s instead of 1.5 s.
+#: Unknowns of an unsteady flow above which multigrid is faster than incomplete factors, by degree. Measured times per
+#: step: `channel` (98,000 unknowns) is as fast with either; q2q1 with incomplete factors takes 1.4 s instead of 2.8 s
+#: at 15,000, but 9.4 s instead of 5.6 s at 49,000; `torus_wall` (16,200, coupled) 0.95 s instead of 1.5 s.
 FLOW_INCOMPLETE_LIMIT = {1: 100_000, 2: 25_000}
 
 
 def flow_solver(comm, *, tolerance: float, fill: bool = False) -> PETSc.KSP:
-    """GMRES with overlapping subdomains and incomplete factors, velocity and pressure of a node side by side.
+    """GMRES with incomplete factors on overlapping subdomains.
 
-    fill: more of both, for systems on which the usual ones stall.
+    fill: more fill and overlap, for systems on which GMRES stalls otherwise.
     """
     if fill:
         return _schwarz_solver(comm, "flow_fill_", tolerance, pc_asm_overlap=2, sub_pc_factor_levels=1)
@@ -163,15 +165,15 @@ def flexible_solver(comm, *, tolerance: float) -> PETSc.KSP:
 
 
 def incomplete_solver(comm, task: Task) -> PETSc.KSP:
-    """GMRES with overlapping subdomains and incomplete factors for solids: cheap, but stalls where multigrid does not.
+    """GMRES with incomplete factors on overlapping subdomains for solids: cheaper than multigrid, but less robust.
 
-    Measured with contact: 4 times faster than LU for bodies in motion and for compact ones (16 and 90 iterations), not
-    faster for thin bodies at rest. Numbered along the band, it takes 2/3 of the iterations of the mesh's numbering.
+    Measured with contact: 4 times faster than LU for dynamics and for compact bodies (16 and 90 iterations), not faster
+    for thin bodies in statics. Reordering by bandwidth (rcm) reduces the iterations by a third.
     """
     return _schwarz_solver(comm, "incomplete_", task.tolerance, sub_pc_factor_mat_ordering_type="rcm")
 
 
-#: Solvers for solids, by the names of methods; a field takes a function like these, too.
+#: Solvers for solids by the names of methods. A field also accepts a function of this type.
 SOLVERS: Mapping[str, Maker] = {"direct": direct_solver, "iterative": elastic_solver, "ilu": incomplete_solver}
 
 
@@ -190,7 +192,7 @@ def _schwarz_solver(comm, prefix: str, tolerance: float, **more: str | float) ->
 
 
 def _incomplete_factors(comm, **more: str | float) -> dict[str, str | float]:
-    """Options of overlapping subdomains; on one process without them, because the only one would copy the matrix."""
+    """Options of incomplete factors on overlapping subdomains; on one process without subdomains, to save a copy."""
     given: dict[str, str | float] = {"sub_pc_type": "ilu", "sub_pc_factor_levels": 0, **more}
     given["sub_pc_factor_zeropivot"] = ZERO_PIVOT
     if comm.size > 1:
@@ -199,10 +201,10 @@ def _incomplete_factors(comm, **more: str | float) -> dict[str, str | float]:
 
 
 def coupled_solver(comm, structure, flow, *, tolerance: float, fill: bool = False) -> PETSc.KSP:
-    """FGMRES for structure and flow together; `structure`, `flow`: their rows, as index sets.
+    """FGMRES for structure and flow together; structure, flow: index sets of their rows.
 
-    Preconditioner: block Gauss-Seidel, the structure by LU, then the flow by incomplete factors on overlapping parts
-    (`fill`: more of both), unless its part, the second one, is set up otherwise.
+    Preconditioner: block Gauss-Seidel with LU for the structure, then incomplete factors on overlapping subdomains for
+    the flow (fill: more fill and overlap), unless the caller replaces the preconditioner of the flow.
     Source: Gee, Kuttler, Wall, Int. J. Numer. Meth. Engng 85 (2011) 987-1016.
     """
     more = {"pc_asm_overlap": 2, "sub_pc_factor_levels": 1} if fill else {}
@@ -228,7 +230,7 @@ def coupled_solver(comm, structure, flow, *, tolerance: float, fill: bool = Fals
 
 
 def factored_solver(comm, *, iterations: int) -> PETSc.KSP:
-    """GMRES with LU factors by MUMPS, for their own matrix and for later ones."""
+    """GMRES preconditioned with LU factors by MUMPS, for the matrix of the factors and for later ones."""
     ksp = PETSc.KSP().create(comm)
     ksp.setType(PETSc.KSP.Type.GMRES)
     ksp.setPCSide(PETSc.PC.Side.RIGHT)
@@ -239,7 +241,7 @@ def factored_solver(comm, *, iterations: int) -> PETSc.KSP:
 
 
 def keep_preconditioner(ksp: PETSc.KSP) -> None:
-    """From now on a solver keeps its preconditioner although its matrix changes; a split one those of its blocks."""
+    """Let a solver keep its preconditioner, or those of its blocks, when the matrix changes."""
     own = ksp.getPC()
     split = own.getType() == PETSc.PC.Type.FIELDSPLIT
     for preconditioner in [part.getPC() for part in own.getFieldSplitSubKSP()] if split else [own]:
@@ -249,13 +251,13 @@ def keep_preconditioner(ksp: PETSc.KSP) -> None:
 def solve(
     ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, preconditioned_by: PETSc.Mat | None = None
 ) -> None:
-    """Solve matrix x = b with a freshly assembled matrix. Raises LinearSolveFailed.
+    """Solve matrix x = b (collective). Raises LinearSolveFailed.
 
-    `preconditioned_by`: the matrix of an earlier solve whose preconditioner is to serve again.
+    preconditioned_by: the matrix of an earlier solve whose preconditioner is reused; None: `matrix`.
     """
     if ksp.getOptionsPrefix() == "elastic_":
         ksp.setPC(_multigrid(ksp.comm))
-    # PETSc frees what Python has dropped only where all processes ask for it, per communicator
+    # PETSc frees objects that Python has deleted only in this collective call, for each communicator
     for comm in (ksp.comm, matrix.comm):
         PETSc.garbage_cleanup(comm)
     ksp.setOperators(matrix, preconditioned_by)

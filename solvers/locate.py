@@ -1,4 +1,4 @@
-"""Which cell of a mesh holds a point, and where in it: pure numpy, the same answer before a run and in it."""
+"""The cell of a mesh that contains a point, and the reference coordinates in it, without DOLFINx."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from solvers.api import Array
 from solvers.cell_types import CELL_TYPES, reference_nodes
 from solvers.mesh import Mesh
 
-#: Distance, as a share of the mesh's extent, up to which a point beside the mesh counts as a point of it: a formula
-#: for a point on the boundary is seldom exact.
+#: Distance from the mesh, relative to its extent, up to which a point counts as inside: formulas for points on the
+#: boundary are seldom exact.
 TOLERANCE = 1e-6
 
-#: A quadratic function exceeds the range of its nodal values by at most 1/8 in each direction; 1/2 is ample in 3D.
+#: Margin of the box of a cell, by degree. A quadratic function exceeds its nodal values by at most 1/8 per direction.
 BULGE = {1: 0.0, 2: 0.5}
 
 NEWTON_STEPS = 30
 
 
 def locate(mesh: Mesh, point: Array) -> tuple[int, Array] | None:
-    """(cell, reference coordinates) of the cell that a point [m] is in, or nearest to; None if it is beside the mesh.
+    """(cell, reference coordinates) of a point [m]; None if it is outside of the mesh.
 
-    Solves x(xi) = point by Newton's method in all cells whose box holds the point. All lengths are relative to the
+    Solves x(xi) = point by Newton's method in all cells whose box contains the point. Lengths are relative to the
     extent of the mesh.
     """
     extent = float(np.ptp(mesh.points, axis=0).max())
@@ -37,10 +37,10 @@ def locate(mesh: Mesh, point: Array) -> tuple[int, Array] | None:
 
 
 def _pull_back(cell_type: str, nodes: Array) -> tuple[Array, Array]:
-    """(reference coordinates of a point of each cell near the origin, its distance from the origin).
+    """(reference coordinates of the point of each cell near the origin, its distance from the origin).
 
-    Newton's iterates are clipped to the cell. They reach the origin if it is in the cell; else the distance that
-    remains is of the order of the cell's distance.
+    Newton's iterates are clipped to the cell. The distance vanishes if the origin is in the cell, else it is of the
+    order of the distance of the cell.
     """
     inside = _clip(cell_type, np.full((len(nodes), nodes.shape[2]), 1.0 / 3.0))
     for _ in range(NEWTON_STEPS):
@@ -58,7 +58,7 @@ def _pull_back(cell_type: str, nodes: Array) -> tuple[Array, Array]:
 
 
 def _clip(cell_type: str, reference: Array) -> Array:
-    """The points moved into the unit cell."""
+    """Points clipped to the reference cell."""
     clipped = np.clip(reference, 0.0, 1.0)
     if CELL_TYPES[cell_type].shape.simplex:
         clipped = clipped / np.maximum(clipped.sum(axis=1, keepdims=True), 1.0)
@@ -66,7 +66,7 @@ def _clip(cell_type: str, reference: Array) -> Array:
 
 
 def _exponents(cell_type: str) -> Array:
-    """Of the monomials that span the shape functions, shape (functions, dim)."""
+    """Exponents of the monomials that span the shape functions, shape (functions, dim)."""
     dim, degree = reference_nodes(cell_type).shape[1], CELL_TYPES[cell_type].degree
     powers = np.stack(np.meshgrid(*[np.arange(degree + 1)] * dim, indexing="ij"), axis=-1).reshape(-1, dim)
     simplex = CELL_TYPES[cell_type].shape.simplex

@@ -1,4 +1,4 @@
-"""Steps through time for scripts: one system, steps of one size."""
+"""Time stepping for scripts: equal steps of one system."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ class Marching(Protocol):
 
 
 def march(system: Marching, end: float = 1.0, steps: int = 1, start: float = 0.0) -> Iterator[tuple[float, StepInfo]]:
-    """Initialise, then yield (time [s], what the step took) after each of `steps` equal steps. Raises StepFailed.
+    """Initialise, then yield (time [s], StepInfo) after each of `steps` equal steps (collective). Raises StepFailed.
 
-    Steady and static problems take one step; a static load in parts takes several. Collective.
+    Steady and static problems take one step; several steps apply a static load in parts.
     """
     dt = (end - start) / steps
     system.initialise(start, dt)

@@ -1,4 +1,4 @@
-"""The mesh of one body as plain arrays: what shapes and mesh files become before any finite element sees them."""
+"""The mesh of one body as plain arrays, from shapes or mesh files."""
 
 from __future__ import annotations
 
@@ -27,4 +27,4 @@ class Mesh:
     )  #: in space: name -> nodes of lines, shape (lines, 2 or 3): both ends, then the middle
     nodes: dict[str, NDArray[np.int64]] = field(default_factory=dict)  #: name of points -> their nodes
     unmoved: NDArray[np.float64] | None = None  #: positions [m] before nodes of tied surfaces moved, (n, dim)
-    note: str = ""  #: what was changed when the mesh was read, for the user
+    note: str = ""  #: note to the user on changes when the mesh was read

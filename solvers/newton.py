@@ -1,4 +1,4 @@
-"""Newton's method as a generator of iterates, and the caller that judges them."""
+"""Newton's method as a generator of iterates, and `converge`, which applies tolerances to them."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ class System(Protocol):
     name: str
 
     def residual(self) -> float:
-        """Assemble the residual; its norm over the rows that are solved for."""
+        """Assemble the residual; returns its norm over the rows that are solved for."""
         ...
 
     def advance(self) -> float:
-        """Linearise, solve and update; the norm of the increment relative to the solution."""
+        """Linearise, solve and update; returns the norm of the increment relative to that of the solution."""
         ...
 
     def retreat(self, fraction: float) -> None:
@@ -28,15 +28,15 @@ class System(Protocol):
         ...
 
     def round_off(self) -> float:
-        """Norm below which the residual is only rounding error of the terms that it is the sum of."""
+        """Norm of the residual below which it consists of rounding errors."""
         ...
 
     def settled(self) -> bool:
-        """False while the iterate does not yet fulfil what is imposed on it (supports, active sets)."""
+        """Whether the iterate fulfils supports, and its active set has not changed."""
         ...
 
     def worst(self) -> tuple[float, ...] | None:
-        """Where the residual is largest [m], for messages."""
+        """Position [m] of the largest residual, for messages."""
         ...
 
 
@@ -44,7 +44,7 @@ class System(Protocol):
 class Iterate:
     """The state of the iteration."""
 
-    number: int  #: linear solves so far
+    number: int  #: count of linear solves
     residual: float
     increment: float  #: relative size of the last increment; infinite before the first
     settled: bool
@@ -52,7 +52,7 @@ class Iterate:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """When an iterate is accepted: the residual is small and, if asked for, the increment too."""
+    """Tolerances for an iterate: of the residual and, if it is finite, of the increment."""
 
     residual: float = 1e-8  #: relative to the largest residual of the step
     residual_absolute: float = 0.0  #: [N]
@@ -62,7 +62,7 @@ class Tolerance:
 
 
 def iterates(system: System, *, line_search: bool = False) -> Iterator[Iterate]:
-    """Newton iterates without end: the caller owns tolerance, limits and logging."""
+    """An endless sequence of Newton iterates; the caller applies tolerances and limits."""
     number, increment, residual = 0, math.inf, system.residual()
     while True:
         yield Iterate(number, residual, increment, system.settled())
@@ -76,7 +76,7 @@ def iterates(system: System, *, line_search: bool = False) -> Iterator[Iterate]:
 
 
 def _halve(system: System, before: float, increment: float, residual: float) -> tuple[float, float]:
-    """Halve the increment until the residual falls; after six halvings take what there is."""
+    """Line search: halve the increment until the residual decreases, at most six times."""
     remaining = 1.0
     for _ in range(6):
         if residual < before:
@@ -88,9 +88,9 @@ def _halve(system: System, before: float, increment: float, residual: float) -> 
 
 
 def converge(system: System, tolerance: Tolerance, unmoved: float = 0.0) -> StepInfo:
-    """Iterate until accepted. Raises StepFailed with the history of residuals and the worst place.
+    """Iterate to the tolerance. Raises StepFailed with the residuals and the position of the largest one.
 
-    `unmoved`: residual [N] before the predictor; a good predictor does not make the tolerance stricter.
+    unmoved: residual [N] before the predictor, with which the tolerance does not depend on the predictor.
     """
     history: list[float] = []
     for iterate in iterates(system, line_search=tolerance.line_search):

@@ -1,4 +1,4 @@
-"""Rounding error of a residual, from the sizes of the terms that it is the sum of."""
+"""Estimate of the rounding error of a residual, from the magnitudes of the terms of its sum."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from solvers.api import Array
 
 
 def rounding_error(matrix: PETSc.Mat, values: Array) -> Array:
-    """Rounding error by rows of the sums A x, shape (owned rows,), for owned values x (collective).
+    """Rounding error of the sums A x by rows, shape (owned rows,), for owned values x (collective).
 
-    Every product a_ij x_j is wrong by about eps |a_ij x_j| with a random sign, so that row i is wrong by about
-    eps (sum_j (a_ij x_j)^2)^(1/2). Row i of A times x with random signs has this size. The signs are always the same.
+    The product a_ij x_j has an error of about eps |a_ij x_j| with a random sign, so that the error of row i is about
+    eps (sum_j (a_ij x_j)^2)^(1/2). Row i of A times x with random signs has this magnitude. The random signs are the
+    same in every call.
     """
     x, y = matrix.createVecs()
     x.array[:] = _signs(matrix.comm.rank, len(values)) * values

@@ -1,4 +1,4 @@
-"""Rows of a distributed matrix on every process: read, replace or add to some of them."""
+"""Transformations of rows of a distributed linear system, with rows that all processes have."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from solvers.sparse import Sparse, sparse, sparse_from_entries, stack
 
 @dataclass(frozen=True)
 class RowTransformation:
-    """A change of a linear system J du = b in the rows of n dofs: [L (J + S) + A] du = L b + c; same on every process.
+    """A change of a linear system J du = b in the rows of n dofs, [L (J + S) + A] du = L b + c; the same everywhere.
 
     L differs from the identity in columns of replaced rows only.
     """
 
-    dofs: NDArray[np.int64]  #: global dof of each of the n, -1 where it is no unknown
+    dofs: NDArray[np.int64]  #: global dof of each of the n, -1 for those that are no unknowns
     rows: Sparse  #: L, shape (n, n)
     stiffness: Sparse  #: S, shape (n, n)
     added: Sparse  #: A, shape (n, n)
     right: Array  #: c, shape (n,)
-    replaced: NDArray[np.bool_]  #: whose rows are not what they were with something added, shape (n,)
+    replaced: NDArray[np.bool_]  #: mask of the rows that are replaced; others are only added to, shape (n,)
 
 
 @dataclass(frozen=True)
 class TakenRows:
-    """Rows of J and b as they were before the transformation, where they are needed again."""
+    """Replaced rows of J and b as they were before the transformation."""
 
-    at: NDArray[np.int64]  #: which of the n dofs
+    at: NDArray[np.int64]  #: indices into the n dofs
     rows: Sparse  #: columns are all unknowns
     right: Array
 
     def balance(self, du: Array, n: int) -> Array:
-        """J du - b at the n dofs, zero where the rows were not taken; du of all unknowns."""
+        """J du - b at the n dofs, zero in other rows; du: of all unknowns."""
         found = np.zeros(n)
         found[self.at] = self.rows @ du - self.right
         return found
@@ -45,7 +45,7 @@ class TakenRows:
 
 @dataclass(frozen=True)
 class RowChanges:
-    """Rows of a linear system to replace and to add to, the same on every process; columns are all unknowns."""
+    """Rows of a linear system to replace and to add to, the same on every process; columns: all unknowns."""
 
     replaced: NDArray[np.int64]  #: global rows to replace, each once
     replaced_rows: Sparse
@@ -58,9 +58,10 @@ class RowChanges:
 def transform_rows(
     matrix: PETSc.Mat, b: PETSc.Vec, change: RowTransformation, numbering: Numbering | None = None
 ) -> tuple[PETSc.Mat, TakenRows]:
-    """The changed matrix, and the old rows that it consists of; `b` changes in place, `matrix` is used up. Collective.
+    """Transform a linear system (collective). Returns the changed matrix and the replaced rows.
 
-    numbering: places the unknowns of a system of two blocks, of which the dofs belong to the first.
+    b changes in place; `matrix` must not be used again. numbering: of a system of two blocks; the dofs are those of the
+    first block.
     """
     comm, (start, end) = matrix.comm.tompi4py(), matrix.getOwnershipRange()
     unknowns, dofs = matrix.size[1], change.dofs
@@ -87,23 +88,23 @@ def transform_rows(
 
 
 def owned_rows(matrix: PETSc.Mat) -> Sparse:
-    """A copy of the rows of this process, columns in order: those of several blocks need not be."""
+    """A copy of the rows of this process with ordered columns."""
     indptr, indices, data = matrix.getValuesCSR()
     return sparse((data, indices, indptr), (len(indptr) - 1, matrix.size[1])).ordered()
 
 
 def _on_all(comm: MPI.Comm, own: Sparse, start: int, rows: NDArray[np.int64]) -> Sparse:
-    """Rows of a distributed matrix on every process, shape (len(rows), unknowns). Collective."""
+    """Rows of a distributed matrix on every process, shape (len(rows), unknowns) (collective)."""
     if comm.size == 1:
         return own[rows]
-    wanted = rows[(rows >= start) & (rows < start + own.shape[0])]
-    parts = comm.allgather((wanted, own[wanted - start]))
+    mine = rows[(rows >= start) & (rows < start + own.shape[0])]
+    parts = comm.allgather((mine, own[mine - start]))
     order = np.argsort(np.concatenate([numbers for numbers, _ in parts]))
     return stack([part for _, part in parts])[order][np.argsort(np.argsort(rows))]
 
 
 def change_rows(matrix: PETSc.Mat, own: Sparse, b: PETSc.Vec, changes: RowChanges) -> PETSc.Mat:
-    """The changed matrix; `own`: a copy of this process' rows, used up. b changes in place. Collective."""
+    """The changed matrix (collective). own: a copy of the rows of this process, which is overwritten; b changes too."""
     start, end = matrix.getOwnershipRange()
 
     def owned(rows: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -122,7 +123,7 @@ def change_rows(matrix: PETSc.Mat, own: Sparse, b: PETSc.Vec, changes: RowChange
 
 
 def distributed(own: Sparse, sizes, comm) -> PETSc.Mat:
-    """A matrix from the rows of each process; on one process it uses their arrays. Collective."""
+    """A matrix from the rows of each process (collective). On one process it uses their arrays without a copy."""
     indptr, indices = (part.astype(PETSc.IntType, copy=False) for part in (own.indptr, own.indices))
     if comm.size == 1:
         matrix = PETSc.Mat().createAIJWithArrays(sizes, (indptr, indices, own.data), comm=comm)
@@ -134,7 +135,7 @@ def distributed(own: Sparse, sizes, comm) -> PETSc.Mat:
 def from_entries(
     comm: MPI.Comm, owned: tuple[int, int], rows: NDArray[np.int64], columns: NDArray[np.int64], data: Array
 ) -> PETSc.Mat:
-    """A matrix with `owned` rows and columns from entries of any process, which add up. Collective."""
+    """A matrix from entries of any process, which add up; owned: counts of owned rows and columns (collective)."""
     end = comm.scan(owned[0])  # type: ignore[attr-defined]
     start = end - owned[0]
     if comm.size > 1:
@@ -150,13 +151,13 @@ def from_entries(
 
 
 class Numbering:
-    """The columns of a system of two blocks: on each process those of the first and then of the second.
+    """Numbering of a system of two blocks: each process has the columns of the first block, then of the second.
 
-    Outside, the unknowns are numbered as those of the first block alone, then those of the second.
+    Outside of the system, the unknowns are those of the first block on all processes, then those of the second.
     """
 
     def __init__(self, comm: MPI.Comm, first: int, second: int):
-        """Owned unknowns of the blocks (collective)."""
+        """first, second: counts of owned unknowns of the blocks (collective)."""
         sizes = np.array(comm.allgather((first, second)), dtype=np.int64)
         starts = np.concatenate([[0], np.cumsum(sizes.sum(axis=1))])[:-1]
         #: column in the system of each unknown
@@ -170,11 +171,11 @@ class Numbering:
         self.second = PETSc.IS().createStride(second, start + first, 1, comm=comm)
 
     def as_unknowns(self, rows: Sparse) -> Sparse:
-        """Rows of a matrix with these columns, columns in the order of the unknowns."""
+        """Rows of a matrix of the system, with columns numbered as unknowns."""
         return rows.with_columns(self._unknown, rows.shape[1])
 
     def place(self, changes: RowChanges) -> RowChanges:
-        """Changes by unknowns as changes of a matrix with these columns."""
+        """Changes with columns numbered as unknowns, renumbered for a matrix of the system."""
 
         def columns(rows: Sparse) -> Sparse:
             return rows.with_columns(self.placed, rows.shape[1])
@@ -182,7 +183,7 @@ class Numbering:
         return replace(changes, replaced_rows=columns(changes.replaced_rows), added_rows=columns(changes.added_rows))
 
     def split(self, matrix: PETSc.Mat) -> tuple[PETSc.Mat, PETSc.Mat]:
-        """The columns of the first block and those of the second (collective)."""
+        """(columns of the first block, columns of the second) of a matrix (collective)."""
         rows = PETSc.IS().createStride(matrix.getLocalSize()[0], matrix.getOwnershipRange()[0], 1, comm=matrix.comm)
         return matrix.createSubMatrix(rows, self.first), matrix.createSubMatrix(rows, self.second)
 
@@ -192,14 +193,14 @@ class Numbering:
 
 
 def gather(comm: MPI.Comm, owned: Array) -> Array:
-    """The whole of a distributed array on every process. Collective."""
+    """The whole of a distributed array on every process (collective)."""
     if comm.size == 1:
         return owned
     return np.concatenate(comm.allgather(owned))
 
 
 def gather_at(comm: MPI.Comm, owned: Array, start: int, dofs: NDArray[np.int64]) -> Array:
-    """Values at global dofs on every process, zero where the dof is -1; same shape as `dofs`. Collective."""
+    """Values at global dofs on every process, zero where the dof is -1; same shape as `dofs` (collective)."""
     if comm.size == 1:
         return np.where(dofs >= 0, owned[dofs], 0.0)
     local = dofs - start

@@ -1,4 +1,4 @@
-"""The boundary of a mesh in segments or triangles, and which of them a fluid touches."""
+"""The boundary of a mesh as segments or triangles, with marked wet facets."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from solvers.tessellation import tessellate
 
 @dataclass(frozen=True)
 class Skin:
-    """The boundary of a mesh in segments or triangles."""
+    """The boundary of a mesh as segments or triangles."""
 
     points: Array  #: reference positions [m] of its vertices, shape (n, dim)
     facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
     nodes: NDArray[np.int64]  #: numbers of the vertices in the mesh
-    wet: NDArray[np.bool_] | None = None  #: facets that the fluid touches; None: found by `find_wet`
+    wet: NDArray[np.bool_] | None = None  #: wet facets; None: found by `find_wet`
 
 
 def cut_out_skin(mesh: Mesh, names: Sequence[str] | None = None) -> Skin:
     """The whole boundary of a mesh; with names only these surfaces are wet.
 
-    Raises KeyError and ValueError for surfaces that are not there or not on the boundary.
+    Raises KeyError for surfaces that do not exist, ValueError for those that are not on the boundary.
     """
     facets, nodes = tessellate(mesh)
     wet = None

@@ -1,4 +1,4 @@
-"""How a field solves its equations."""
+"""Settings of the nonlinear and linear solvers of a field."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from solvers.newton import Tolerance
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """How the nonlinear and the linear systems are solved."""
+    """Tolerances of Newton's method, and the linear solver."""
 
     newton: Tolerance = Tolerance()
-    linear: Method | Maker = "auto"  #: a function makes a solver for solids
+    linear: Method | Maker = "auto"  #: name of a method, or a function that creates a solver for solids
     linear_tolerance: float = 1e-8

@@ -1,8 +1,8 @@
-"""Sparse matrices of an interface: compressed rows, and the few operations that contact and coupling need.
+"""Sparse matrices in compressed rows, with the operations that contact and coupling need.
 
-Sums and products are those of scipy's compiled routines. What scipy's own classes put around them (choice of index
-types, checks of every argument, a new check of every result) takes 20 to 100 microseconds per matrix, ten times what
-the numbers of a small interface take, and contact makes a hundred matrices in a Newton step.
+Sums and products are compiled routines of scipy, called without its classes. Their checks of arguments and results take
+20 to 100 microseconds per matrix, ten times the time of the operation on a small interface, and contact creates a
+hundred matrices in a Newton iteration.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from solvers.api import Array
 
 try:
-    from scipy.sparse import _sparsetools as compiled  # private, but the same since scipy 0.14
+    from scipy.sparse import _sparsetools as compiled  # private, but unchanged since scipy 0.14
 except ImportError:
     from solvers import sparse_public as compiled
 
@@ -24,9 +24,9 @@ Indices = NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class Sparse:
-    """Row i has the entries data[k] in the columns indices[k], k = indptr[i] ... indptr[i + 1] - 1, each column once.
+    """A matrix in compressed rows: row i has data[k] in the columns indices[k], k = indptr[i] ... indptr[i + 1] - 1.
 
-    Arrays are contiguous and never changed.
+    Each column occurs once per row. Arrays are contiguous and never changed in place.
     """
 
     data: Array
@@ -35,7 +35,7 @@ class Sparse:
     shape: tuple[int, int]
 
     def __matmul__(self, other):
-        """Product with a matrix, a vector or several vectors side by side."""
+        """Product with a matrix, a vector, or an array whose columns are vectors."""
         if not isinstance(other, Sparse):
             return self._times(other)
         (rows, inner), columns = self.shape, other.shape[1]
@@ -82,7 +82,7 @@ class Sparse:
         return Sparse(-self.data, self.indices, self.indptr, self.shape)
 
     def __getitem__(self, rows: NDArray) -> Sparse:
-        """Some rows, by number or by a mask."""
+        """Selected rows, by numbers or by a mask."""
         if rows.dtype == bool:
             rows = np.flatnonzero(rows)
         chosen = np.ascontiguousarray(rows, dtype=np.int32)
@@ -94,7 +94,7 @@ class Sparse:
 
     @property
     def T(self) -> Sparse:
-        """Transposed; the columns of its rows are in order."""
+        """The transposed matrix, with ordered columns."""
         rows, columns = self.shape
         data, indices, indptr = _empty(columns, len(self.data))
         compiled.csr_tocsc(rows, columns, self.indptr, self.indices, self.data, indptr, indices, data)
@@ -105,7 +105,7 @@ class Sparse:
         return np.repeat(np.arange(self.shape[0], dtype=np.int32), self.indptr[1:] - self.indptr[:-1])
 
     def with_columns(self, numbers: NDArray[np.int64], columns: int) -> Sparse:
-        """Column j becomes column numbers[j] of as many as said; where that is -1 it drops out."""
+        """Column j becomes column numbers[j] of `columns`, or is removed where that is -1."""
         target = numbers[self.indices]
         keep = target >= 0
         if keep.all():
@@ -115,24 +115,24 @@ class Sparse:
         return Sparse(self.data[keep], target[keep].astype(np.int32), before[self.indptr], (self.shape[0], columns))
 
     def columns(self, which: NDArray[np.int64]) -> Sparse:
-        """Some columns, each at most once."""
+        """Selected columns, each at most once."""
         numbers = np.full(self.shape[1], -1)
         numbers[which] = np.arange(len(which))
         return self.with_columns(numbers, len(which))
 
     def with_rows(self, numbers: NDArray[np.int64], rows: int) -> Sparse:
-        """Row i becomes row numbers[i] of as many as said, all others are empty; each number once."""
+        """Row i becomes row numbers[i] of `rows`; other rows are empty. Each number occurs once."""
         row = np.full(rows, -1, dtype=np.int64)
         row[numbers] = np.arange(self.shape[0])
         return _with_empty_row(self)[np.where(row < 0, self.shape[0], row)]
 
     def scaled_rows(self, factors: Array) -> Sparse:
-        """The rows times factors, shape (rows,)."""
+        """Rows multiplied by factors, shape (rows,)."""
         data = self.data * np.repeat(factors, self.indptr[1:] - self.indptr[:-1])
         return Sparse(data, self.indices, self.indptr, self.shape)
 
     def ordered(self) -> Sparse:
-        """The same with the columns of each row in order."""
+        """The matrix with ordered columns in each row."""
         if compiled.csr_has_sorted_indices(self.shape[0], self.indptr, self.indices):
             return self
         data, indices = self.data.copy(), self.indices.copy()
@@ -140,28 +140,28 @@ class Sparse:
         return Sparse(data, indices, self.indptr, self.shape)
 
     def without_small(self, limit: float) -> Sparse:
-        """Without entries of at most this size."""
+        """The matrix without entries of magnitude up to `limit`."""
         keep = np.abs(self.data) > limit
         before = np.zeros(len(keep) + 1, dtype=np.int32)
         np.cumsum(keep, out=before[1:])
         return Sparse(self.data[keep], self.indices[keep], before[self.indptr], self.shape)
 
     def toarray(self) -> Array:
-        """All entries, zeros included."""
+        """The matrix as a dense array."""
         out = np.zeros(self.shape)
         compiled.csr_todense(*self.shape, self.indptr, self.indices, self.data, out)
         return out
 
 
 def sparse(csr, shape: tuple[int, int]) -> Sparse:
-    """From (data, indices, indptr) of the kernels or a matrix of scipy."""
+    """A matrix from (data, indices, indptr) of the kernels, or from a matrix of scipy."""
     data, indices, indptr = csr if isinstance(csr, tuple) else (csr.data, csr.indices, csr.indptr)
     indices, indptr = (np.ascontiguousarray(part, dtype=np.int32) for part in (indices, indptr))
     return Sparse(np.ascontiguousarray(data, dtype=float), indices, indptr, shape)
 
 
 def sparse_from_entries(rows: NDArray, columns: NDArray, data: Array, shape: tuple[int, int]) -> Sparse:
-    """Entries of one row and column add up; the columns of each row are in order."""
+    """A matrix from entries, with ordered columns; entries of the same row and column add up."""
     rows, columns = (np.ascontiguousarray(part, dtype=np.int32) for part in (rows, columns))
     out, indices, indptr = _empty(shape[0], len(data))
     compiled.coo_tocsr(*shape, len(data), rows, columns, np.ascontiguousarray(data), indptr, indices, out)
@@ -171,7 +171,7 @@ def sparse_from_entries(rows: NDArray, columns: NDArray, data: Array, shape: tup
 
 
 def sparse_from_array(values: Array) -> Sparse:
-    """All entries of an array, zeros included."""
+    """A matrix with all entries of a dense array, zeros included."""
     rows, columns = values.shape
     indices = np.tile(np.arange(columns, dtype=np.int32), rows)
     indptr = np.arange(rows + 1, dtype=np.int32) * np.int32(columns)
@@ -184,13 +184,13 @@ def nothing(shape: tuple[int, int]) -> Sparse:
 
 
 def diagonal(values: Array) -> Sparse:
-    """The values on the diagonal of a square matrix."""
+    """A diagonal matrix."""
     n = len(values)
     return Sparse(values, np.arange(n, dtype=np.int32), np.arange(n + 1, dtype=np.int32), (n, n))
 
 
 def stack(parts: list[Sparse]) -> Sparse:
-    """Matrices one below the other."""
+    """Matrices stacked vertically."""
     if len(parts) == 1:
         return parts[0]
     starts = np.cumsum([0] + [len(part.data) for part in parts])
@@ -213,6 +213,6 @@ def _empty(rows: int, entries: int) -> tuple[Array, Indices, Indices]:
 
 
 def _trimmed(data: Array, indices: Indices, indptr: Indices, shape: tuple[int, int]) -> Sparse:
-    """The capacity that no entry has taken given back."""
+    """A matrix with arrays cut to the count of entries."""
     used = int(indptr[-1])
     return Sparse(data[:used], indices[:used], indptr, shape)

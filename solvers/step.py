@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Step:
-    """From t - dt to t."""
+    """The time step from t - dt to t."""
 
     t: float  #: its end [s]
     dt: float  #: its length [s]

@@ -1,4 +1,4 @@
-"""Where wall time goes, by name of the part."""
+"""Wall time by part of the program."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 @dataclass
 class Timer:
-    """Wall time [s] by name: `with timer("assembly"): ...`; a part inside another counts for both."""
+    """Wall time [s] by name: `with timer("assembly"): ...`. Time in nested parts counts for both."""
 
     seconds: dict[str, float] = field(default_factory=dict)
 

@@ -1,6 +1,6 @@
-"""PETSc's solve without Python's global lock: other threads run meanwhile, such as the one that handles signals.
+"""PETSc's solve without Python's global lock, so that other threads run, such as the one that handles signals.
 
-petsc4py keeps the lock. Through ctypes it is released; callbacks of petsc4py take it again.
+petsc4py keeps the lock. A call by ctypes releases it, and callbacks of petsc4py acquire it again.
 """
 
 from __future__ import annotations
@@ -20,5 +20,5 @@ def solve(ksp: PETSc.KSP, b: PETSc.Vec, x: PETSc.Vec) -> None:
 
 @cache
 def petsc_library() -> ctypes.CDLL:
-    """The library that petsc4py uses: what its module is linked to is found through it."""
+    """The PETSc library that the module of petsc4py is linked to."""
     return ctypes.CDLL(PETSc.__file__)

@@ -1,4 +1,4 @@
-"""Values that a user gives: numbers, or functions of position and time."""
+"""Values of settings: numbers, or functions of position and time."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ Value: TypeAlias = float | Callable[[Array, float], Array]
 
 
 def evaluate(value: Value, x: Array, t: float) -> Array:
-    """A value at points of shape (3, n) or (dim, n), shape (n,)."""
+    """A value at points x [m], (3, n) or (dim, n), and the time t [s], shape (n,)."""
     if callable(value):
         return value(x, t)
     return np.full(x.shape[1], float(value))
 
 
 def evaluate_components(values: Sequence[Value], x: Array, t: float) -> Array:
-    """A vector at points, shape (components, n)."""
+    """Components of a vector at points, shape (components, n)."""
     return np.stack([evaluate(value, x, t) for value in values])
 
 

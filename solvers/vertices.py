@@ -1,4 +1,4 @@
-"""The derivative of the vertices of surfaces by the unknowns of a solid."""
+"""The derivative of the positions of surface vertices by the unknowns of a solid."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from solvers.sparse import Sparse, sparse_from_entries
 
 @dataclass(frozen=True)
 class VertexJacobian:
-    """B: derivative of the vertices' displacements by the unknowns of a solid, k entries for each dof of a vertex.
+    """B, the derivative of vertex displacements by the unknowns of a solid, with k entries per dof of a vertex.
 
-    A vertex has the dofs number * dim + axis. Elastic bodies have one entry of 1, rigid ones the arms of their
-    rotations besides.
+    The dofs of a vertex are number * dim + axis. Elastic bodies have one entry of 1, rigid bodies also those of their
+    rotations.
     """
 
     columns: NDArray[np.int64]  #: global unknowns, shape (vertices * dim, k)
-    values: Array  #: of the same shape
+    values: Array  #: derivatives, shape (vertices * dim, k)
 
     def transposed(self, unknowns: int) -> Sparse:
-        """B^T, for as many unknowns on all processes."""
+        """B^T; unknowns: their count on all processes."""
         n, k = self.columns.shape
         dofs = np.repeat(np.arange(n), k)
         return sparse_from_entries(self.columns.ravel(), dofs, self.values.ravel(), (unknowns, n))

@@ -28,8 +28,8 @@ from solvers.values import Value, evaluate_components
 class Body:
     """Mass, internal forces, loads and tangent of one body at the displacement `u`.
 
-    `mesh` is that of the whole body; only process 0 needs it, others may pass None. Vectors have one entry per
-    dimension, each a number or a function of position and time.
+    mesh: that of the whole body on process 0; other processes may pass None. Vectors have one entry per dimension,
+    which is a number or a function of position and time.
     """
 
     def __init__(
@@ -80,20 +80,20 @@ class Body:
         for point in point_forces:
             self._dead.add_points(point)
         self.dead_load = np.zeros(self.size)
-        self._loads_at: float | None = None  #: time that the loads are evaluated for
+        self._loads_at: float | None = None  #: time [s] of the loads
         self._gravity = gravity
-        self._moved: PETSc.Mat | None = None  # mass that is elsewhere than the density says [kg]
+        self._moved: PETSc.Mat | None = None  # difference of the mass matrix from that of the density [kg]
         self.pressures = [FollowerPressure(domain, self.space, pressure) for pressure in pressures]
         self._spring_matrix = Springs(self) if springs else None
 
     @cached_property
     def _stress(self):
-        """Compiled only when a picture or file asks for it."""
+        """Compiled when it is first used, by a picture or file."""
         return fem.compile_expression(forms.cauchy_stress(self.u, self.element), fem.reference_nodes(self.domain))
 
     @cached_property
     def _scalars(self):
-        """Space of nodal averages. To make one takes longer than a step of a small body."""
+        """Space of nodal averages, created when it is first used: that takes longer than a step of a small body."""
         return fem.scalar_space(self.domain)
 
     @cached_property
@@ -103,7 +103,7 @@ class Body:
 
     @property
     def linear(self) -> bool:
-        """Small displacements: strain and loads belong to the reference configuration."""
+        """Whether displacements are small: strain and loads refer to the reference configuration."""
         return self.material.linear
 
     @property
@@ -116,7 +116,7 @@ class Body:
         return self.owned * self.dim
 
     def _parameter(self, value: Value):
-        """A UFL coefficient: one number, or one number per cell taken at its midpoint."""
+        """A UFL coefficient: a number, or a number per cell, evaluated at the midpoint."""
         if not callable(value):
             return fem.constant(self.domain, float(value))
         cellwise = fem.function(fem.cellwise_space(self.domain))
@@ -143,7 +143,7 @@ class Body:
     # ------------------------------------------------------------------------------------------------- state
 
     def nodal(self, value: Sequence[Value], t: float) -> Array:
-        """A vector field given by its components at all local nodes, shape (blocks, dim)."""
+        """Values of a vector field at all local nodes, shape (blocks, dim)."""
         return evaluate_components(value, self.points, t).T
 
     def set_displacement(self, owned: Array) -> None:
@@ -172,20 +172,20 @@ class Body:
         return self._summed()
 
     def _summed(self) -> Array:
-        """What all processes have put into `_force`, at owned dofs."""
+        """The sum of `_force` over all processes, at owned dofs."""
         fem.accumulate(self._force)
         return self._force.x.array[: self.size].copy()
 
     def internal_force(self) -> Array:
-        """int P : grad v dX, and the force on springs [N], shape (size,)."""
+        """int P : grad v dX plus the force on springs [N], shape (size,) (collective)."""
         return self._assemble([self._internal]) + self.spring_force()
 
     def spring_force(self) -> Array | float:
-        """What the body exerts on its springs [N], shape (size,); 0 without any (collective)."""
+        """Force of the body on its springs [N], shape (size,); 0 without springs (collective)."""
         return 0.0 if self._spring_matrix is None else self._spring_matrix.force(self.u.x.array[: self.size])
 
     def external_force(self, t: float) -> Array:
-        """Loads at a time and the present displacement [N], shape (size,) (collective)."""
+        """Loads [N] at the time t [s] and the present displacement, shape (size,) (collective)."""
         self._evaluate_loads(t)
         if not self.pressures:
             return self.dead_load.copy()
@@ -196,7 +196,7 @@ class Body:
 
     @property
     def _shape(self) -> Array:
-        """The displacement of the surface that pressures act on."""
+        """Displacement of the surface that pressures act on; zero for small displacements."""
         return np.zeros_like(self.u.x.array) if self.linear else self.u.x.array
 
     def mass(self) -> PETSc.Mat:
@@ -207,7 +207,7 @@ class Body:
         return matrix
 
     def move_mass(self, change: PETSc.Mat) -> None:
-        """Gravity acts on mass where the time scheme has it: `change` [kg] is its mass matrix minus `mass()`."""
+        """Let gravity act on the mass of the time scheme; change: its mass matrix minus `mass()` [kg]."""
         self._moved, self._loads_at = change, None
 
     def _moved_weight(self, t: float) -> Array | float:
@@ -223,7 +223,7 @@ class Body:
         return fem.create_matrix(self._tangent)
 
     def assemble_tangent(self, matrix: PETSc.Mat, t: float) -> None:
-        """d(internal - external force)/du [N/m] at a time (collective)."""
+        """d(internal - external force)/du [N/m] at the time t [s] (collective)."""
         self._evaluate_loads(t)
         self.element.linearise()
         matrix.zeroEntries()
@@ -238,7 +238,7 @@ class Body:
     def smallest_jacobian(self) -> tuple[float, str, tuple[float, ...]]:
         """(smallest det F at the cells' nodes, body name, reference position [m]) over all processes.
 
-        Infinite for small displacements: their energy does not know det F.
+        Infinite for small displacements, whose energy does not depend on det F.
         """
         if self.linear:
             return np.inf, self.name, ()
@@ -256,7 +256,7 @@ class Body:
         return fem.average_at_nodes(self.domain, self._scalars, self._stress, components=9)[: self.owned]
 
     def internal_energy(self) -> float:
-        """int W dX, and the energy of springs [J]."""
+        """int W dX plus the energy of springs [J] (collective)."""
         energy = fem.assemble_scalar(self._energy, self.domain.comm)
         if self._spring_matrix is not None:
             energy += self._spring_matrix.energy(self.u.x.array[: self.size], self.domain.comm)

@@ -1,4 +1,4 @@
-"""Deformations that cannot be solutions."""
+"""Checks of deformations: unbounded displacements and inverted elements."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mpi4py import MPI
 from solvers.api import Array
 from solvers.structure.body import Body
 
-#: Displacement, in sizes of the largest body, that only a singular system gives.
+#: Displacement, relative to the size of the largest body, above which the system was singular.
 FLOWN_OFF = 1e6
 
 
@@ -21,7 +21,7 @@ def largest_extent(comm: MPI.Comm, bodies: Sequence[Body]) -> float:
 
 
 def flown_off(comm: MPI.Comm, u: Array, extent: float) -> str | None:
-    """Why displacements u [m] are inadmissible, for bodies of this size [m]; None if they are not (collective)."""
+    """A reason to reject displacements u [m], None if there is none; extent: size of the bodies [m] (collective)."""
     farthest = comm.allreduce(float(np.abs(u).max(initial=0.0)), op=MPI.MAX)
     if farthest > FLOWN_OFF * extent:
         return f"a displacement of {farthest:.3g} m is far larger than the body: is a body not supported?"
@@ -29,7 +29,7 @@ def flown_off(comm: MPI.Comm, u: Array, extent: float) -> str | None:
 
 
 def inverted(bodies: Sequence[Body]) -> tuple[str, tuple[float, ...]] | None:
-    """(why the deformation is inadmissible, reference position [m]) if an element is inverted (collective)."""
+    """(reason, reference position [m]) if an element is inverted, else None (collective)."""
     volume_ratio, name, place = min((body.smallest_jacobian() for body in bodies), key=lambda jacobian: jacobian[0])
     if volume_ratio > 0.0:
         return None

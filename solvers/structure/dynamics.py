@@ -1,4 +1,4 @@
-"""Structures in motion: the generalised-alpha method, with damping, and surfaces in contact without mass."""
+"""The generalised-alpha method for structures, with Rayleigh damping and massless contact surfaces."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from solvers.structure.instant import Instant, Moving, times
 from solvers.structure.massless import massless_dofs
 from solvers.structure.time_scheme import Settling
 
-#: Time, in first steps, in which velocities and accelerations at the start are measured.
+#: Interval of the finite differences at the start, relative to the first step.
 SHORT = 1e-3
 
 
@@ -33,10 +33,11 @@ class Damping:
 class Dynamics:
     """Generalised-alpha: M a_{1-alpha_m} + C v_{1-alpha_f} + (1 - alpha_f) f_{n+1} + alpha_f f_n = 0.
 
-    The forces f = f_int - f_ext - f_contact are averaged, not evaluated in the middle.
+    The forces f = f_int - f_ext - f_contact are averaged over the ends of the step, not evaluated in between.
 
-    Contact surfaces have no mass. Their rows are static balances at n+1, times 1 - alpha_f: the old forces there are in
-    balance and drop out; otherwise they would oscillate without damping. Their velocity is (u_{n+1} - u_n) / dt.
+    Contact surfaces have no mass. Their rows are static balances at n+1, multiplied by 1 - alpha_f. The forces at n are
+    left out: they are in equilibrium, and with them contact forces would oscillate without damping. The velocity of
+    massless dofs is (u_{n+1} - u_n) / dt.
     """
 
     scheme: GeneralisedAlpha
@@ -64,10 +65,10 @@ class Dynamics:
         return damping
 
     def start(self, structure: Settling, t: float, dt: float) -> None:
-        """Places of nodes without mass, then M a_0 = -C v_0 - f_0; prescribed dofs follow their functions.
+        """Solve for the positions of massless nodes, then M a_0 = -C v_0 - f_0; prescribed dofs follow their functions.
 
-        A load on a node without mass acts on those with mass by internal forces alone. If these were not in balance
-        with it at t, the part of its impulse that belongs to the start of the first step would be lost.
+        A load on a massless node acts on the others by internal forces only. Without this equilibrium at t, part of the
+        impulse in the first step would be lost.
         """
         self._start_supports(structure, t, SHORT * dt)
         if structure.comm.allreduce(len(structure.massless)):
@@ -78,7 +79,7 @@ class Dynamics:
         self._solve_acceleration(structure)
 
     def _start_supports(self, structure: Moving, t: float, h: float) -> None:
-        """One-sided differences, so that a support that starts to move excites no oscillation."""
+        """Velocities and accelerations of supports by one-sided differences, so that they excite no oscillations."""
         held, now = structure.held, structure.now
         u = [held.displacement(t + k * h) for k in range(4)]
         now.v[:] = held.free_part(now.v) + (-3.0 * u[0] + 4.0 * u[1] - u[2]) / (2.0 * h)
@@ -99,7 +100,7 @@ class Dynamics:
         ksp.getPC().setType(PETSc.PC.Type.JACOBI)
         ksp.setTolerances(rtol=1e-15, atol=0.0, max_it=1000)
         ksp.solve(b, x)
-        if (reason := ksp.getConvergedReason()) < 0:  # x would be zero, or where the iterations stopped
+        if (reason := ksp.getConvergedReason()) < 0:
             finite = np.isfinite(b.norm())
             why = f"PETSc reason {reason}" if finite else "a force is not a number"
             raise StepFailed("structure", f"the acceleration at the start cannot be computed ({why})")
@@ -108,13 +109,13 @@ class Dynamics:
     # ------------------------------------------------------------------------------------------------- steps
 
     def guess(self, structure: Moving, dt: float) -> Array:
-        """Nothing, or on with the velocity."""
+        """Zero, or the velocity times dt."""
         if self.predictor == "constant_displacement":
             return np.zeros(structure.layout.size)
         return dt * structure.held.free_part(structure.now.v)
 
     def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
-        """Newmark's relations; without mass v = (u_{n+1} - u_n) / dt."""
+        """Newmark's relations; for massless dofs v = (u_{n+1} - u_n) / dt."""
         old, massless = structure.old, structure.massless
         du = structure.now.u - old.u
         a, v = (rule(du, old.v, old.a, dt) for rule in (self.scheme.acceleration, self.scheme.velocity))
@@ -140,7 +141,7 @@ class Dynamics:
         return external, _damping_force(structure, (1.0 - alpha) * now.v + alpha * old.v)
 
     def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat:
-        """mass_factor M + damping_factor C; columns without mass: (1 - alpha_f) / dt C."""
+        """mass_factor M + damping_factor C; in columns of massless dofs (1 - alpha_f) / dt C."""
         matrix = structure.mass.copy()
         matrix.scale(self.scheme.mass_factor(dt))
         if structure.damping is not None:
@@ -152,7 +153,7 @@ class Dynamics:
         return matrix
 
     def reaction(self, structure: Moving) -> Array:
-        """M a + C v + f_int - f_ext at the present time."""
+        """M a + C v + f_int - f_ext [N] at the present time."""
         now = structure.now
         dynamic = times(structure.mass, now.a) + _damping_force(structure, now.v)
         return dynamic + now.internal - now.external - now.constraint

@@ -1,7 +1,7 @@
-"""Elastic constants of isotropic material at small strains, from one another.
+"""Conversions between the elastic constants of isotropic materials.
 
-Arguments are numbers or arrays of one shape. Source: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element
-Analysis (2008), section 6.
+Arguments are numbers or arrays of the same shape. Source: Bonet & Wood, Nonlinear Continuum Mechanics for Finite
+Element Analysis (2008), section 6.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The protocol of elements: energy, stress and tangent of a body in its cells."""
+"""The interface `Element`: energy density, stress and tangent of a body in its cells."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from solvers.structure.materials import Material, Tensor
 
 
 class Element(Protocol):
-    """Energy and stress of a body in its cells."""
+    """An element formulation of one body."""
 
     material: Material
 
@@ -19,25 +19,25 @@ class Element(Protocol):
         ...
 
     def potential(self, F: Tensor) -> Tensor:
-        """The density [J/m^3] whose derivative in F, all else held fixed, is the stress P."""
+        """The density [J/m^3] whose derivative in F, with all other fields fixed, is the stress P."""
         ...
 
     def tangent_potential(self, F: Tensor) -> Tensor:
-        """The density [J/m^3] whose second derivative in F gives the tangent, but for `complete_tangent`."""
+        """The density [J/m^3] whose second derivative in F is the tangent without the term of `complete_tangent`."""
         ...
 
     def begin_step(self) -> None:
-        """Newton's method starts anew."""
+        """Discard the last iterate of the step before."""
         ...
 
     def update(self) -> None:
-        """The displacement has changed."""
+        """Update internal fields to the present displacement."""
         ...
 
     def linearise(self) -> None:
-        """A tangent at the present displacement is about to be assembled."""
+        """Update the fields of the tangent; called before each assembly."""
         ...
 
     def complete_tangent(self, matrix: PETSc.Mat) -> None:
-        """Add to the assembled tangent what fixed quantities contribute by their derivatives [N/m]."""
+        """Add the derivatives of eliminated fields to the assembled tangent [N/m]."""
         ...

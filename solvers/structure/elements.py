@@ -1,8 +1,8 @@
-"""Elements: the integrals of a body's energy over its cells.
+"""Elements: `Displacement` and `Mixed`, by which the energy of a body is integrated over cells.
 
-The plain element integrates W(F) as it is. Where the material hardly changes its volume, its cells are then too stiff
-("locking"): every quadrature point requires det F = 1, more conditions than the nodes of a cell can fulfil. The mixed
-element has fewer. The nodal displacements remain the only unknowns in both.
+The displacement element integrates W(F). It locks for nearly incompressible materials: each quadrature point then
+requires det F = 1, which are more conditions than the nodes of a cell can fulfil. The mixed element has fewer
+conditions. In both, the nodal displacements are the only unknowns.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Formulation = Literal["displacement", "mixed"]
 
 
 class Displacement:
-    """The plain element: energy W(F)."""
+    """The displacement element, with the energy W(F)."""
 
     def __init__(self, material: Material, parameters: dict[str, Tensor]):
         self.material, self.parameters = material, parameters
@@ -46,17 +46,17 @@ class Displacement:
 
 
 class Mixed:
-    """Volume ratio theta and pressure p with values of their own in each cell, eliminated cell by cell (Hu-Washizu).
+    """Mixed element with discontinuous volume ratio theta and pressure p, eliminated cell by cell (Hu-Washizu).
 
-    Stationary in u, theta and p is
+    The functional, stationary in u, theta and p, is
 
         int D(F) + U(theta) + p (J - theta) dX,   D(F) = W(F) - U(J).
 
-    U(J) is the energy of a pure change of volume. J is det F, or 1 + the trace of the strain in laws that have it: what
-    the bulk modulus multiplies, so that D is free of it.
+    U(J) is the energy of a pure change of volume. J is det F, or 1 + the trace of the strain in laws of small strain,
+    such that D does not depend on the bulk modulus.
 
     theta, p and their test functions q are constant in first-order cells (mean dilatation, B-bar for small strain) and
-    linear in second-order ones (Q2/P1). theta and p follow from u,
+    linear in second-order cells (Q2/P1). theta and p follow from u,
 
         int theta q dX = int J q dX,   int p q dX = int U'(theta) q dX,
 
@@ -65,9 +65,9 @@ class Mixed:
 
         B^T M^-1 C M^-1 B,   q^T B du = int q dJ/du . du dX,   M = int q r dX,   C = int U''(theta) q r dX.
 
-    Newton's method linearises the three fields: p in the tangent is that of the last iterate and its linear change.
-    With p = U'(theta) instead, an iterate could turn a cell by no more than about sqrt(mu/lambda): what a straight path
-    of the nodes adds to the volume is of second order, but its pressure is not small.
+    Newton's method linearises the three fields: p in the tangent is that of the last iterate plus its linear change.
+    With p = U'(theta) instead, an iterate could rotate a cell by no more than about sqrt(mu/lambda): straight paths of
+    the nodes change the volume by a term of second order, but its pressure is not small.
 
     Source: Simo, Taylor & Pister, Computer Methods in Applied Mechanics and Engineering 51 (1985) 177-208; Bonet &
     Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (2008), section 8.6.5 (mean dilatation).
@@ -120,7 +120,7 @@ class Mixed:
             function.x.scatter_forward()
 
     def _blocks(self, matrix: PETSc.Mat, form: Any) -> Array:
-        """A form of q and r by cells, shape (cells, n, n); `matrix` holds it, too."""
+        """A form of q and r by cells, shape (cells, n, n); it is assembled into `matrix`."""
         _assemble(matrix, form)
         return matrix.getValuesCSR()[2].reshape(-1, self._cells.shape[1])[self._cells]
 

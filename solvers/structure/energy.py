@@ -1,34 +1,34 @@
-"""Energies of the structure, and the balance that tells whether time integration and Newton were right."""
+"""The energy balance of a structure, which measures the errors of time integration and of Newton's method."""
 
 from __future__ import annotations
 
 from solvers.api import State
 
-#: Energy without external work, relative to the most that the bodies ever had, from which the user is warned.
+#: Gain of energy without external work, relative to the largest energy so far, above which there is a warning.
 GAIN = 0.1
 
 
 class EnergyBalance:
-    """kinetic + internal + damping + friction = initial energy + work of loads and supports, but for time steps [J]."""
+    """kinetic + internal + damping + friction = initial energy + work of loads and supports, up to time steps [J]."""
 
     def __init__(self) -> None:
         self.kinetic = self.internal = self.work = self.damping = self.friction = self.initial = 0.0
-        self.largest = 0.0  #: kinetic and internal energy together
+        self.largest = 0.0  #: largest sum of kinetic and internal energy so far
         self.warned = False
 
     def start(self, kinetic: float, internal: float, friction: float) -> None:
-        """The energies at the start [J]."""
+        """Set the energies at the start [J]."""
         self.kinetic, self.internal, self.friction = kinetic, internal, friction
         self.initial = kinetic + internal + friction
 
     def add_step(self, work: float, damping: float, kinetic: float, internal: float, friction: float) -> None:
-        """Work of loads and supports and loss by damping in an accepted step, and the energies at its end [J]."""
+        """Add an accepted step: work of loads and supports, loss by damping, and energies at its end [J]."""
         self.work += work
         self.damping += damping
         self.kinetic, self.internal, self.friction = kinetic, internal, friction
 
     def warning(self) -> str:
-        """A warning the first time that the energy of bodies in motion exceeds its bound; else nothing."""
+        """A warning when the energy of moving bodies exceeds its bound for the first time, else an empty text."""
         before, self.largest = self.largest, max(self.largest, self.kinetic + self.internal)
         if self.warned or self.kinetic == 0.0 or before == 0.0 or self.error <= GAIN * before:
             return ""

@@ -1,4 +1,4 @@
-"""The structure: bodies of finite deformation, static or in motion, as one nonlinear system."""
+"""The field `Structure`: elastic bodies of finite deformation, static or dynamic, as one nonlinear system."""
 
 from __future__ import annotations
 
@@ -31,12 +31,13 @@ from solvers.structure.instant import Instant
 from solvers.structure.massless import mass_matrices
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.supports import prescribe
+from solvers.structure.tangent import Tangent
 from solvers.structure.time_scheme import Statics, TimeScheme
 from solvers.timing import Timer
 
 
 class Structure:
-    """All bodies together. The balance f_int - f_ext (+ inertia and damping, by `time`) = 0 is solved by Newton."""
+    """All bodies. Newton's method solves f_int - f_ext = 0, with inertia and damping by the scheme `time`."""
 
     name = "structure"
 
@@ -56,16 +57,14 @@ class Structure:
         self.layout = Layout(comm, [body.size for body in bodies])
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
-        self.current = Step(0.0, 0.0)  #: the step that is computed now or was last
+        self.current = Step(0.0, 0.0)  #: the present step, or the last one
         self.energy = EnergyBalance()
-        self.residual_force = np.zeros(self.layout.size)  #: left-hand side of the balance, supports included [N]
+        self.residual_force = np.zeros(self.layout.size)  #: residual of the balance, at held dofs the reaction [N]
         self.target = np.zeros(self.layout.size)
         self.increment = np.zeros(self.layout.size)
-        self.rounding: Array | None = None  #: rounding error of `residual_force` [N], as far as this step knows
-        self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is there already
-        self._tangents = [body.create_tangent() for body in bodies]
-        self._combined: PETSc.Mat | None = None
-        self._dynamic: tuple[TimeScheme, float, PETSc.Mat | None] | None = None
+        self.rounding: Array | None = None  #: rounding error of `residual_force` [N]; None before this step linearises
+        self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is assembled already
+        self._assembled_tangent = Tangent(bodies)
         self._b, self._x = self.layout.vector(), self.layout.vector()
         method = settings.linear
         self._method = linear.choose(method, self.dim, self.dofs()) if isinstance(method, str) else method
@@ -107,30 +106,31 @@ class Structure:
     # ------------------------------------------------------------------------------------------------- steps
 
     def initialise(self, t: float, dt: float) -> None:
-        """Initial displacement and velocity, and the acceleration that is in balance with the loads at t."""
+        """Set initial displacement and velocity, and the acceleration by the loads at t [s]; dt [s]: the first step."""
         for body, u, v in zip(self.bodies, self.split(self.now.u), self.split(self.now.v), strict=True):
             for target, value in ((u, body.initial_displacement), (v, body.initial_velocity)):
                 if value is not None:
                     target[:] = body.nodal(value, t)[: body.owned].ravel()
         for body, (_, moved) in zip(self.bodies, self._masses, strict=True):
             if moved is not None:
-                body.move_mass(moved)  # gravity acts on it
+                body.move_mass(moved)  # gravity acts on the moved mass
         self.current = Step(t, dt)
         self._assemble_bodies()
         if self.constraint is not None:
-            self.constraint.start(self.at_constraint(self.now.u), self.at_constraint(self._stiffness()), t)
+            stiffness = self._assembled_tangent.diagonal(t)
+            self.constraint.start(self.at_constraint(self.now.u), self.at_constraint(stiffness), t)
         self.time.start(self, t, dt)
         self.energy.start(*self._energies())
 
     def _energies(self) -> tuple[float, float, float]:
-        """Kinetic and internal energy, and what friction has dissipated so far [J]."""
+        """Kinetic energy, internal energy, and energy that friction has dissipated [J]."""
         internal = sum(body.internal_energy() for body in self.bodies)
         friction = 0.0 if self.constraint is None else self.constraint.friction_work
         return self.time.kinetic_energy(self), internal, friction
 
     @contextmanager
     def by(self, time: TimeScheme, held: Held, t: float, dt: float) -> Iterator[None]:
-        """A step to the same t by another scheme and supports, for a first state; solved by who asks for it."""
+        """A step to the same time t by another scheme and other supports, for the start; the caller solves it."""
         own = self.time, self.held
         self.time, self.held = time, held
         try:
@@ -142,17 +142,11 @@ class Structure:
             self.constraint.end_step(time.force_weight)
 
     def take_start(self, u: Array) -> None:
-        """Start from other displacements [m] of owned dofs, with velocity, acceleration and load as they are."""
+        """Set the displacements [m] at owned dofs for the start; velocity, acceleration and load are kept."""
         self.now.u = self.held.free_part(u) + self.held.displacement(self.current.t)
         self._assemble_bodies()
         self._assemble_constraint()
         self.energy.start(*self._energies())
-
-    def _stiffness(self) -> Array:
-        """Diagonal of the static tangent [N/m]."""
-        for body, matrix in zip(self.bodies, self._tangents, strict=True):
-            body.assemble_tangent(matrix, self.current.t)
-        return np.concatenate([matrix.getDiagonal().array for matrix in self._tangents])
 
     def step(self, t: float, dt: float) -> StepInfo:
         """One step from t to t + dt. Raises StepFailed."""
@@ -163,7 +157,7 @@ class Structure:
         return replace(info, notes=(*info.notes, warning)) if warning else info
 
     def begin_step(self, t: float, dt: float) -> None:
-        """Remember the state at t and predict the one at t + dt."""
+        """Store the state at t [s] and predict that at t + dt."""
         self.old = self.now.copy()
         for body in self.bodies:
             body.element.begin_step()
@@ -175,11 +169,11 @@ class Structure:
         self.now.u += self.time.guess(self, dt)
 
     def load(self, force: Array) -> None:
-        """Take forces [N] at owned dofs that another field exerts at the end of the step, besides the loads."""
+        """Set the forces [N] of another field at the end of the step, at owned dofs."""
         self.now.surface[:] = force
 
     def solve(self) -> StepInfo:
-        """Newton to the tolerance. Raises StepFailed."""
+        """Newton's method to the tolerance. Raises StepFailed."""
         try:
             info = converge(self, self.settings.newton)
         except StepFailed as failure:
@@ -189,7 +183,7 @@ class Structure:
         return info if self.constraint is None else replace(info, numbers=self.constraint.numbers())
 
     def check_deformation(self, iteration: int, history: tuple[float, ...]) -> None:
-        """Raise StepFailed if a body without supports moves off, or is turned inside out anywhere."""
+        """Raise StepFailed if displacements are unbounded, as of bodies without supports, or an element is inverted."""
         reason, where = flown_off(self.comm, self.now.u, self._extent), None
         if reason is not None:
             where = self.worst()
@@ -208,7 +202,7 @@ class Structure:
         self.energy.add_step(work, self.dot(damping, du), *self._energies())
 
     def split(self, array: Array) -> list[Array]:
-        """Views of the bodies' parts of an array of owned dofs."""
+        """Views of the parts of an array of owned dofs, by body."""
         return self.layout.split(array)
 
     # ---------------------------------------------------------------------------- the system that Newton solves
@@ -234,12 +228,12 @@ class Structure:
         self.now.constraint[local[mine]] = force[mine]
 
     def at_constraint(self, owned: Array) -> Array:
-        """Values at the nodes of the constraint, shape (N, dim)."""
+        """Values at the nodes of the constraint, shape (N, dim), from those at owned dofs (collective)."""
         assert self.constraint is not None
         return gather_at(self.comm, owned, self.layout.start, self.constraint.dofs())
 
     def residual(self) -> float:
-        """Norm [N] of the balance over the free dofs, and of the residual of the constraint."""
+        """Norm [N] of the balance at the free dofs and of the residual of the constraint."""
         with self.timer("assembly"):
             self._assemble_bodies()
         with self.timer("contact"):
@@ -250,27 +244,11 @@ class Structure:
         return float(np.hypot(self.norm(self.held.free_part(self.residual_force)), missed))
 
     def tangent(self) -> PETSc.Mat:
-        """d(balance)/du, supports not yet imposed; the next call overwrites the matrix."""
-        for body, matrix in zip(self.bodies, self._tangents, strict=True):
-            body.assemble_tangent(matrix, self.current.t)
-        self._combined = block_diagonal(self._tangents, self._combined)
-        weight, added = self.time.force_weight, self._dynamic_stiffness()
-        if weight != 1.0:
-            self._combined.scale(weight)
-        if added is not None:
-            self._combined.axpy(1.0, added, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        return self._combined
-
-    def _dynamic_stiffness(self) -> PETSc.Mat | None:
-        """The same matrix as long as scheme and length of the step are."""
-        time, dt, _ = self._dynamic or (None, 0.0, None)
-        if time is not self.time or dt != self.current.dt:
-            self._dynamic = self.time, self.current.dt, self.time.dynamic_stiffness(self, self.current.dt)
-        assert self._dynamic is not None
-        return self._dynamic[2]
+        """d(balance)/du without supports; the next call overwrites the matrix."""
+        return self._assembled_tangent.assemble(self, self.time)
 
     def advance(self) -> float:
-        """One Newton step; returns |du| / |u|."""
+        """One iteration of Newton's method; returns |du| / |u|. Raises StepFailed."""
         matrix, self._tangent = self._tangent or self.linearise(), None
         self._b.array[:] = self.right_side()
         change, taken = self.row_transformation(), None
@@ -293,39 +271,39 @@ class Structure:
         return self.update(self._x.array)
 
     def linearise(self) -> PETSc.Mat:
-        """The tangent at the present iterate, supports not yet imposed; the next call overwrites it."""
+        """The tangent at the present iterate without supports, and the rounding error; the next call overwrites it."""
         with self.timer("assembly"):
             matrix = self.tangent()
-        # entries are sums over the 2^dim cells at a node, which may cancel
+        # an entry is a sum over the 2^dim cells at a node, whose terms may cancel
         self.rounding = 2.0**self.dim * rounding_error(matrix, self.rounded())
         return matrix
 
     def rounded(self) -> Array:
-        """What is rounded at owned dofs [m]: eps |u| in u, and eps in F = I + grad u, which is eps h in u."""
+        """Magnitudes whose rounding enters the balance, at owned dofs [m]: |u|, and h for that of I + grad u."""
         size = np.abs(self.now.u)
         for body, part in zip(self.bodies, self.split(size), strict=True):
             part += body.cell_size
         return size
 
     def missing_displacement(self) -> Array:
-        """Prescribed less present displacements at owned dofs [m], zero at free ones."""
+        """Prescribed minus present displacements at owned dofs [m], zero at free ones."""
         return self.target - self.held.part(self.now.u)
 
     def right_side(self) -> Array:
-        """Right-hand side for the increment [N], without the new contact force where contact may be."""
+        """Right-hand side for the increment [N]; near contact without the contact force at the end of the step."""
         if self.constraint is None or not self.constraint.near:
             return -self.residual_force
         return -(self.residual_force + self.time.force_weight * self.now.constraint)
 
     def row_transformation(self) -> RowTransformation | None:
-        """Elimination of contact multipliers from the rows of tangent and `right_side`; None if none are near."""
+        """Transformation that eliminates contact multipliers from tangent and `right_side`; None if none are near."""
         if self.constraint is None or not self.constraint.near:
             return None
         with self.timer("contact"):
             return self.constraint.condense(self.time.force_weight)
 
     def recover(self, taken: TakenRows, du: Array) -> None:
-        """The multipliers of contact, from rows as they were and the increment of all unknowns of the system."""
+        """Compute the multipliers from the rows before the transformation and the increment of all unknowns."""
         assert self.constraint is not None
         with self.timer("contact"):
             dofs = self.constraint.dofs().ravel()
@@ -345,18 +323,18 @@ class Structure:
         self.now.u -= fraction * self.increment
 
     def settled(self) -> bool:
-        """True once the prescribed displacements are reached and the active set stays as it is."""
+        """Whether the prescribed displacements are reached and the active set has not changed (collective)."""
         reached = self.held.reached(self.now.u, self.target, self._extent)
         reached = reached and (self.constraint is None or self.constraint.settled)
         return self.comm.allreduce(reached, op=MPI.LAND)
 
     def add_rounding(self, error: Array) -> None:
-        """Rounding errors that another field brings into the balance, after `linearise`, at owned dofs."""
+        """Add rounding errors at owned dofs that another field causes in the balance; call it after `linearise`."""
         assert self.rounding is not None
         self.rounding = self.rounding + error
 
     def round_off(self) -> float:
-        """Norm [N] of the rounding error of the balance where it was linearised last in this step."""
+        """Norm [N] of the rounding error of the balance, at the iterate that this step linearised last."""
         if self.rounding is None:
             self._tangent = self.linearise()
         assert self.rounding is not None
@@ -379,7 +357,7 @@ class Structure:
     # ---------------------------------------------------------------------------------------- save and restore
 
     def save(self) -> State:
-        """Everything a step starts from, per body."""
+        """The state that the next step starts from, by body."""
         state: State = {name: self.per_body(array) for name, array in vars(self.now).items()}
         state["energy"] = self.energy.save()
         if self.constraint is not None:
@@ -387,18 +365,18 @@ class Structure:
         return state
 
     def per_body(self, array: Array) -> State:
-        """Owned dofs as nodal values by body."""
+        """Nodal values by body, from an array of owned dofs."""
         return {
             body.name: Nodal(part.reshape(-1, self.dim).copy(), body.nodes[: body.owned])
             for body, part in zip(self.bodies, self.split(array), strict=True)
         }
 
     def from_bodies(self, state: State) -> Array:
-        """Owned dofs from nodal values by body."""
+        """An array of owned dofs, from nodal values by body."""
         return np.concatenate([state[body.name].values.ravel() for body in self.bodies])
 
     def restore(self, state: State) -> None:
-        """Go back to a saved state."""
+        """Restore a saved state."""
         for name, array in vars(self.now).items():
             array[:] = self.from_bodies(state[name])
         for body, u in zip(self.bodies, self.split(self.now.u), strict=True):

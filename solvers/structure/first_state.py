@@ -1,4 +1,4 @@
-"""The first state of a structure: of nodes without mass, and of loads that depend on the acceleration."""
+"""Schemes for the initial state: of massless nodes, and of loads that depend on the acceleration."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from solvers.structure.time_scheme import Statics
 
 
 class SmoothAcceleration(Statics):
-    """M (u - u_n) / dt^2 + C v + f_int(u) = f_ext(t); v is as it was."""
+    """M (u - u_n) / dt^2 + C v + f_int(u) = f_ext(t), with the velocity v before the step."""
 
     def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
         a = (structure.now.u - structure.old.u) / dt**2
@@ -30,10 +30,10 @@ class SmoothAcceleration(Statics):
 
 
 class FirstState(Statics):
-    """f_int(u) + C v = f_ext(t): nodes without mass move from u_0 in a short time dt.
+    """f_int(u) + C v = f_ext(t) for massless nodes, in a short step dt from u_0.
 
-    Without damping they are at once where the forces on them are in balance. With damping they are still where they
-    were, and v = (u - u_0) / dt is the velocity with which they start. v of the others is given.
+    Without damping their positions are those of equilibrium. With damping they hardly move, and v = (u - u_0) / dt is
+    their initial velocity. The velocity of other nodes is given.
     """
 
     def __init__(self, moving: NDArray[np.int64], damping: PETSc.Mat | None):

@@ -33,7 +33,7 @@ def internal_force(u: Tensor, element: Element, v: Tensor, dx: ufl.Measure) -> u
 
 
 def tangent(u: Tensor, element: Element, v: Tensor, du: Tensor, dx: ufl.Measure) -> ufl.Form:
-    """The derivative of `internal_force` in u, but for what the element adds to the assembled matrix."""
+    """Derivative of `internal_force` in u, except for the term that the element adds to the assembled matrix."""
     energy = element.tangent_potential(deformation_gradient(u)) * dx
     return ufl.derivative(ufl.derivative(energy, u, v), u, du)
 
@@ -50,9 +50,9 @@ def inertia(a: Tensor, v: Tensor, rho: Tensor, dx: ufl.Measure) -> ufl.Form:
 
 
 def cauchy_stress(u: Tensor, element: Element) -> Tensor:
-    """sigma = P F^T / J [Pa], 3x3 in 2D too: sigma_33 is zero in plane stress, else it follows from F_33 = 1.
+    """sigma = P F^T / J [Pa], shape (3, 3) also in 2D: sigma_33 is zero in plane stress, else that of F_33 = 1.
 
-    For small displacements P and sigma are the same.
+    For small displacements sigma = P.
     """
     material, F = element.material, deformation_gradient(u)
     F = ufl.variable(F if material.plane_stress else in_space(F))

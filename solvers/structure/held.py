@@ -1,4 +1,4 @@
-"""The dofs that supports prescribe, of all bodies: parts of arrays, and rows of linear systems."""
+"""Prescribed displacements in arrays and linear systems of all bodies."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from solvers.structure.supports import Prescribed
 
 
 class Held:
-    """The prescribed displacements of a structure: single dofs, and directions at nodes.
+    """The prescribed displacements of a structure: dofs along axes, and oblique directions at nodes.
 
-    With P the projection on what is held, a displacement is u = (1 - P) u + u_p, and a linear system K du = b with
+    Let P be the projection on the prescribed directions. Then u = (1 - P) u + u_p, and a linear system K du = b with
     P du = m becomes
 
         ((1 - P) K (1 - P) + d P) du = (1 - P) (b - K m) + d m.
@@ -35,26 +35,26 @@ class Held:
         self._stopped_at: Array | None = None
 
     def stopped(self, dofs: NDArray[np.int64], u: Array) -> Held:
-        """Prescribe these owned dofs too; all prescribed dofs keep the displacement u [m]."""
+        """A copy that prescribes these owned dofs too, with the displacement u [m] at all prescribed dofs."""
         held = copy(self)
         held.dofs = np.union1d(self.dofs, dofs)
         held._stopped_at = held.part(u)
         return held
 
     def part(self, array: Array) -> Array:
-        """P a, of owned dofs."""
+        """P a of an array of owned dofs."""
         held = self._along(array)
         held[self.dofs] = array[self.dofs]
         return held
 
     def free_part(self, array: Array) -> Array:
-        """a - P a; exactly zero at held dofs, whatever is there."""
+        """a - P a; exactly zero at held dofs, even if a is not finite there."""
         free = array - self._along(array) if self.oblique else array.copy()
         free[self.dofs] = 0.0
         return free
 
     def displacement(self, t: float) -> Array:
-        """u_p [m] of owned dofs, zero where nothing is held."""
+        """u_p [m] at owned dofs and the time t [s], zero at free ones."""
         if self._stopped_at is not None:
             return self._stopped_at
         whole = np.zeros(self._layout.size)
@@ -64,9 +64,9 @@ class Held:
         return whole
 
     def reached(self, u: Array, target: Array, size: float) -> bool:
-        """P u is the target: exactly at held dofs, as well as positions in a body of this size [m] are known elsewhere.
+        """Whether P u is the target on this process: exactly at held dofs, up to rounding along oblique directions.
 
-        Of this process.
+        size: of the largest body [m], for the rounding of positions.
         """
         if not np.array_equal(u[self.dofs], target[self.dofs]):
             return False
@@ -77,7 +77,7 @@ class Held:
         return bool(np.all(np.abs(missed) <= rounding))
 
     def impose(self, matrix: PETSc.Mat, x: PETSc.Vec, b: PETSc.Vec) -> PETSc.Mat:
-        """Make a symmetric system one for a solution with the held part of x; b changes, the matrix is used up."""
+        """Impose the held part of x on a symmetric system; b changes in place, and the matrix is overwritten."""
         if self.oblique:
             free, scale = self._free, _mean_diagonal(matrix)
             missing = x.duplicate()
@@ -90,7 +90,7 @@ class Held:
         return matrix
 
     def impose_rows(self, blocks: Sequence[PETSc.Mat], x: Array, b: Array) -> list[PETSc.Mat]:
-        """The same in rows only: the first of the blocks beside each other is the structure's own; x, b: owned dofs."""
+        """Impose the held part of x on rows only. blocks: a row of blocks, its own first; x, b: at owned dofs."""
         changed = list(blocks)
         if self.oblique:
             scale = _mean_diagonal(blocks[0])
@@ -108,7 +108,7 @@ class Held:
         return (self._layout.start + self.dofs).astype(PETSc.IntType)
 
     def _along(self, array: Array) -> Array:
-        """The part along oblique directions."""
+        """The part of an array along oblique directions."""
         part = np.zeros_like(array)
         if self.oblique:
             part[self._nodes] = np.einsum("kij,kj->ki", self._projections, array[self._nodes])
@@ -116,7 +116,7 @@ class Held:
 
     @cached_property
     def _free(self) -> PETSc.Mat:
-        """1 - P of the oblique directions, blocks of nodes; explicit ones elsewhere."""
+        """1 - P of the oblique directions, with explicit ones on the diagonal elsewhere."""
         matrix = PETSc.Mat().createAIJ([(self._layout.size, None)] * 2, nnz=(self._dim, 0), comm=self._layout.comm)
         others = np.ones(self._layout.size, dtype=bool)
         others[self._nodes] = False
@@ -137,6 +137,6 @@ class Held:
 
 
 def _mean_diagonal(matrix: PETSc.Mat) -> float:
-    """Mean size of the diagonal: what is imposed gets the scale of the rest."""
+    """Mean magnitude of the diagonal, the scale of imposed rows."""
     diagonal = matrix.getDiagonal()
     return float(diagonal.norm(PETSc.NormType.NORM_1) / max(diagonal.getSize(), 1))

@@ -1,4 +1,4 @@
-"""The structure at one time, and what time schemes see of it."""
+"""The state of a structure at one time, and the interface of structures for time schemes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from solvers.structure.held import Held
 
 @dataclass
 class Instant:
-    """The structure at one time: owned dofs of all bodies, one body after the other."""
+    """The state of a structure at one time; arrays over the owned dofs of all bodies, body by body."""
 
     u: Array  #: displacement [m]
     v: Array  #: velocity [m/s]
@@ -44,7 +44,7 @@ class Instant:
 
 
 class Moving(Protocol):
-    """Bodies with their state at both ends of a step."""
+    """A structure with its state at both ends of a step."""
 
     comm: MPI.Comm
     bodies: list[Body]
@@ -72,7 +72,7 @@ class Moving(Protocol):
 
 
 def times(matrix: PETSc.Mat, array: Array) -> Array:
-    """A matrix times an array of owned dofs."""
+    """Product of a matrix and an array of owned dofs (collective)."""
     x, y = matrix.createVecs()
     x.array[:] = array
     matrix.mult(x, y)

@@ -1,10 +1,10 @@
-"""External forces on a body, integrated with the values of the loads at quadrature points.
+"""External forces on a body, by the values of the loads at quadrature points.
 
     f_ext . v = int (b + rho g).v dX + int_G t.v dA - int_G p n.v da
 
-Gravity g, body force b and traction t belong to the reference configuration; the pressure p follows the deformed
-surface: n da is the cross product of the tangents of the deformed facet (in 2D the turned tangent), which is
-J F^-T N dA. Source: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (2008), section 8.5.
+Gravity g, body force b and traction t are dead loads, which refer to the reference configuration. The pressure p is a
+follower load: n da = J F^-T N dA is the cross product of the tangents of the deformed facet, in 2D the tangent rotated
+by 90 degrees. Source: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (2008), section 8.5.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from solvers import fem
 from solvers.api import Array
 from solvers.values import Value, evaluate, evaluate_components
 
-#: Loads of the third degree in x are integrated exactly over affine cells and facets, times the shape functions.
+#: Degree in x of loads that are integrated exactly, times the shape functions, over affine cells and facets.
 LOAD_DEGREE = 3
 
 
@@ -43,7 +43,7 @@ class Pressure:
 
 @dataclass(frozen=True)
 class PointForce:
-    """Dead load [N] at each of some nodes, by their numbers in the mesh."""
+    """Dead load [N] at each of some nodes, which are given by their numbers in the mesh."""
 
     nodes: NDArray[np.int64]
     value: Sequence[Value]
@@ -60,7 +60,7 @@ class LineForce:
 
 @dataclass(frozen=True)
 class _Part:
-    """Values of a load at points, and how they become forces at nodes."""
+    """One load at quadrature points, with the shape functions and weights that give its nodal forces."""
 
     value: Sequence[Value]
     blocks: NDArray[
@@ -68,11 +68,11 @@ class _Part:
     ]  #: dof blocks, shape (entities, nodes); nodes of other processes have the one after the last
     shape: Array  #: shape functions at the points, shape (points, nodes)
     positions: Array  #: [m], shape (3, entities * points)
-    weights: Array  #: measure of each point, times the density if there is one, shape (entities, points)
+    weights: Array  #: quadrature weights, for gravity times the density, shape (entities, points)
 
 
 class DeadLoads:
-    """Loads that do not depend on the deformation: they belong to the reference configuration."""
+    """Loads in the reference configuration, which do not depend on the deformation."""
 
     def __init__(self, domain: fem.Domain, space, owned: NDArray[np.int64]):
         """`owned`: numbers in the mesh of the owned nodes."""
@@ -84,7 +84,7 @@ class DeadLoads:
         self.force = np.zeros(self._blocks * domain.dim)  #: at the time of `update` [N]
 
     def add_volume(self, value: Sequence[Value], density: Value = 1.0) -> None:
-        """A force per mass, or per volume without the density [kg/m^3], which is that of the cell's midpoint."""
+        """Add a force per mass with the density [kg/m^3] of cell midpoints, or a force per volume without density."""
         for cells in fem.cell_quadrature(self._domain, self._space, self._degree):
             rho: Any = density
             if callable(rho):
@@ -92,12 +92,12 @@ class DeadLoads:
             self._parts.append(_Part(value, cells.blocks, cells.shape, cells.positions, cells.weights * rho))
 
     def add_surface(self, load: Traction) -> None:
-        """A force per area of a named surface."""
+        """Add a force per area of a named surface."""
         for facets in fem.facet_quadrature(self._domain, self._space, load.surface, self._degree):
             self._parts.append(_Part(load.value, facets.blocks, facets.shape, facets.positions, facets.weights))
 
     def add_lines(self, load: LineForce) -> None:
-        """A force per length. Every process integrates all lines and keeps what belongs to its nodes."""
+        """Add a force per length. Every process integrates all lines and keeps the forces on its nodes."""
         xi, rule = np.polynomial.legendre.leggauss(self._degree // 2 + 1)
         shape, slopes = _line_functions(xi, load.lines.shape[1])
         tangents = np.einsum("pa,eai->epi", slopes, load.points)
@@ -106,24 +106,24 @@ class DeadLoads:
         self._parts.append(_Part(load.value, self._local(load.lines), shape, _in_space(positions), weights))
 
     def add_points(self, load: PointForce) -> None:
-        """A force at nodes."""
+        """Add a force at nodes."""
         blocks = self._local(load.nodes)
         blocks = blocks[blocks < self._blocks][:, None]
         at = fem.block_points(self._space)[:, blocks[:, 0]]
         self._parts.append(_Part(load.value, blocks, np.ones((1, 1)), at, np.ones(blocks.shape)))
 
     def _local(self, nodes: NDArray[np.int64]) -> NDArray[np.int32]:
-        """Owned blocks of nodes of the mesh; the one after the last block for those of other processes."""
+        """Owned blocks of nodes of the mesh; for those of other processes one after the last block."""
         order = np.argsort(self._owned)
-        place = np.searchsorted(self._owned, nodes, sorter=order)
-        block = order[np.minimum(place, len(order) - 1)] if len(order) else np.zeros(nodes.shape, dtype=np.int64)
+        position = np.searchsorted(self._owned, nodes, sorter=order)
+        block = order[np.minimum(position, len(order) - 1)] if len(order) else np.zeros(nodes.shape, dtype=np.int64)
         mine = self._owned[block] == nodes if len(order) else np.zeros(nodes.shape, dtype=bool)
         return np.where(mine, block, self._blocks).astype(np.int32)
 
     def update(self, t: float) -> bool:
-        """Evaluate all loads at time t; False if none has changed.
+        """Evaluate all loads at the time t [s]; returns False if none has changed.
 
-        `force` [N] is at local dofs: those of other processes wait for `accumulate`.
+        `force` [N] is at local dofs; contributions to dofs of other processes are not added up.
         """
         values = [evaluate_components(part.value, part.positions, t) for part in self._parts]
         if self._values is not None and all(map(np.array_equal, values, self._values)):
@@ -138,7 +138,7 @@ class DeadLoads:
 
 
 def _line_functions(xi: Array, nodes: int) -> tuple[Array, Array]:
-    """Shape functions of a line from -1 to 1 (ends, then the middle if it has one) and derivatives, (points, nodes)."""
+    """Shape functions of a line on [-1, 1] (ends, then the middle) and their derivatives, shape (points, nodes)."""
     one = np.ones_like(xi)
     if nodes == 2:
         return np.stack([(1 - xi) / 2, (1 + xi) / 2], axis=1), np.stack([-one / 2, one / 2], axis=1)
@@ -151,12 +151,12 @@ def _in_space(points: Array) -> Array:
 
 
 def _add(out: Array, blocks: NDArray[np.int32], values: Array, shape: Array) -> None:
-    """Add sum_q values_q N_a(x_q) to the node a of each entity, values of shape (entities, points)."""
+    """Add sum_q values_q N_a(x_q) to each node a of each entity; values: (entities, points)."""
     out += np.bincount(blocks.ravel(), (values @ shape).ravel(), minlength=len(out))
 
 
 class FollowerPressure:
-    """A pressure on a named surface as it is deformed."""
+    """A pressure on a named surface in its deformed configuration."""
 
     def __init__(self, domain: fem.Domain, space, load: Pressure):
         self._dim, self._load = domain.dim, load
@@ -165,11 +165,11 @@ class FollowerPressure:
         self._values: list[Array] = []
 
     def set_time(self, t: float) -> None:
-        """Evaluate the pressure at time t."""
+        """Evaluate the pressure at the time t [s]."""
         self._values = [evaluate(self._load.value, f.positions, t).reshape(f.weights.shape) for f in self._facets]
 
     def add_force(self, u: Array, out: Array) -> None:
-        """Add -int p n.v da [N] at the displacement u to local dofs; both of the shape (local dofs,)."""
+        """Add -int p n.v da [N] at the displacement u [m] to local dofs; both have the shape (local dofs,)."""
         x = self._points + u.reshape(-1, self._dim)
         force = out.reshape(-1, self._dim)
         for facets, p in zip(self._facets, self._values, strict=True):
@@ -178,7 +178,7 @@ class FollowerPressure:
                 _add(force[:, axis], facets.blocks, -p * facets.rule * normal[:, :, axis], facets.shape)
 
     def add_tangent(self, u: Array, matrix: PETSc.Mat) -> None:
-        """Add d(int p n.v da)/du [N/m]; the matrix is not finished."""
+        """Add d(int p n.v da)/du [N/m]; the matrix is not assembled."""
         x = self._points + u.reshape(-1, self._dim)
         for facets, p in zip(self._facets, self._values, strict=True):
             normal_by_node = _turn(facets, facets.tangents(x))

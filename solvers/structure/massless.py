@@ -1,8 +1,8 @@
-"""Contact surfaces without mass: the rest of the body takes it over.
+"""Massless contact surfaces: their mass is moved to the rest of the body.
 
-A node with mass that hits an obstacle has to stop at once: it loses its kinetic energy, and the force that stops it
-oscillates from step to step, with an amplitude that grows as the step gets smaller. A surface without mass is in static
-balance with the body behind it: pressures are continuous in time, and impacts keep energy.
+A node with mass stops abruptly when it hits an obstacle. It loses its kinetic energy, and the contact force oscillates
+from step to step, with an amplitude that increases as the step decreases. A surface without mass is in static
+equilibrium with the body behind it: contact pressures are continuous in time, and impacts conserve energy.
 Source: Khenous, Laborde & Renard, Eur. J. Mech. A/Solids 27 (2008).
 """
 
@@ -16,12 +16,13 @@ from petsc4py import PETSc
 from solvers.api import Array
 from solvers.structure.instant import Moving
 
-#: Smallest factor of a density, relative to the mean one. For linear cells (F M + M F) / 2 is positive definite as long
-#: as the factors of neighbours differ by less than 7 + 4 sqrt(3); those of a body differ by about twice the inverse of
-#: this number at most. It matters only where a body has less than four layers of cells.
+#: Smallest factor of the density, relative to the mean one. For linear cells (F M + M F) / 2 is positive definite if
+#: the ratio of the factors of neighbours is below 7 + 4 sqrt(3). The largest ratio in a body is about twice the inverse
+#: of this number. It has an effect only on bodies with less than four layers of cells.
 LEAST_FACTOR = 0.25
 
-#: Mean square distance from the centre, over the square of the body's size, below which a body is a plane: rounding.
+#: Mean square distance from the centre, over the square of the body's size, below which the body has no extent in a
+#: direction: rounding errors.
 NO_EXTENT = 1e-12
 
 
@@ -34,9 +35,9 @@ class NoMassLeft(ValueError):
 
 
 def massless_dofs(structure: Moving) -> list[NDArray[np.bool_]]:
-    """Owned dofs of each body that have no mass: those of all contact surfaces, collective.
+    """Masks of the massless owned dofs of each body: those of all contact surfaces (collective).
 
-    If these are all nodes of a body, as those of a sheet of one cell between two others, its slave surfaces alone.
+    If these are all nodes of a body, such as a sheet of one cell between two others, only those of its slave surfaces.
     Raises NoMassLeft.
     """
     constraint = structure.constraint
@@ -53,7 +54,7 @@ def massless_dofs(structure: Moving) -> list[NDArray[np.bool_]]:
 
 
 def _owned(structure: Moving, dofs: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which owned dofs of the structure are among these global ones."""
+    """Mask of the owned dofs of the structure that are among these global ones."""
     local = dofs[dofs >= 0] - structure.layout.start
     among = np.zeros(structure.layout.size, dtype=bool)
     among[local[(local >= 0) & (local < structure.layout.size)]] = True
@@ -61,7 +62,7 @@ def _owned(structure: Moving, dofs: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def mass_matrices(structure: Moving) -> list[tuple[PETSc.Mat, PETSc.Mat | None]]:
-    """By body: its mass matrix [kg], and what of that is moved inwards; None where all has its mass (collective)."""
+    """(mass matrix [kg], its change by moved mass or None) of each body (collective)."""
     found: list[tuple[PETSc.Mat, PETSc.Mat | None]] = []
     marked = np.zeros(structure.layout.size, dtype=bool)
     marked[structure.massless] = True
@@ -76,15 +77,15 @@ def mass_matrices(structure: Moving) -> list[tuple[PETSc.Mat, PETSc.Mat | None]]
 
 
 def move_mass_inwards(mass: PETSc.Mat, massless: NDArray[np.bool_], points: Array) -> PETSc.Mat:
-    """The mass matrix [kg] of a body whose surface has none: (F M' + M' F) / 2, as sparse as M. Collective.
+    """The mass matrix [kg] of a body with massless surfaces, (F M' + M' F) / 2, with the pattern of M (collective).
 
-    M' is the consistent matrix M without rows and columns of the massless dofs, F the diagonal matrix of a factor f on
-    the density that is linear in space. It keeps the mass and the centre of mass:
+    M' is the consistent matrix M without rows and columns of the massless dofs, and F the diagonal matrix of a factor f
+    of the density that is linear in space. Mass and centre of mass are conserved:
 
         sum_ij p_i (F M' + M' F)_ij / 2 = sum_ij p_i M_ij    for p = 1, x, y, z.
 
-    Where a body has so few cells that the factor would be too small somewhere, the mean factor counts for more, and the
-    centre of mass moves inwards.
+    If a body has so few cells that the factor would be too small somewhere, the variation of the factor is reduced, and
+    the centre of mass moves inwards.
 
     massless: owned dofs without mass, shape (n * dim,); points: reference positions [m] of the owned nodes, shape
     (n, dim).
@@ -118,21 +119,21 @@ def move_mass_inwards(mass: PETSc.Mat, massless: NDArray[np.bool_], points: Arra
 
 
 def _positions(comm: MPI.Comm, points: Array) -> Array:
-    """Positions at the owned dofs over the size of the body, shape (owned dofs, dim)."""
+    """Positions at the owned dofs, divided by the size of the body, shape (owned dofs, dim)."""
     low = np.min(comm.allgather(points.min(axis=0, initial=np.inf)), axis=0)
     high = np.max(comm.allgather(points.max(axis=0, initial=-np.inf)), axis=0)
     return ((points - low) / (high - low).max()).repeat(points.shape[1], axis=0)
 
 
 def _solve(matrix: Array, right: Array) -> Array:
-    """Least solution of a symmetric system; nothing in directions in which no mass is left to be moved."""
+    """Minimum-norm solution of a symmetric system; zero in directions without extent of mass."""
     values, vectors = np.linalg.eigh(matrix)
     inverse = np.divide(1.0, values, out=np.zeros_like(values), where=values > NO_EXTENT)
     return vectors @ (inverse * (vectors.T @ right))
 
 
 def _bounded(comm: MPI.Comm, change: Array, mean: float) -> Array:
-    """The change of the factor, all of it reduced if mean + change would be too small anywhere."""
+    """The change of the factor, scaled down if mean + change would be too small anywhere."""
     lowest = comm.allreduce(change.min(initial=0.0), op=MPI.MIN)
     most = (1.0 - LEAST_FACTOR) * mean
     return change if lowest >= -most else change * (most / -lowest)

@@ -1,4 +1,4 @@
-"""What supports and springs need of a body."""
+"""The interface of bodies for supports and springs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from solvers.api import Array
 
 
 class Meshed(Protocol):
-    """Nodes with displacements, and named surfaces."""
+    """A body with nodes and named surfaces."""
 
     name: str
     domain: fem.Domain

@@ -1,6 +1,6 @@
-"""What can be measured on the structure: at points, on surfaces, of whole bodies.
+"""Probes of the structure: at points, on surfaces, of whole bodies.
 
-A probe is a function without arguments that every process calls; it returns the values by component.
+A probe is a function without arguments that every process calls. It returns values by component.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ class PointOutside(ValueError):
 
 
 def at_point(structure: Structure, body: Body, quantity: str, point: Sequence[float]) -> Probe:
-    """displacement [m], velocity [m/s] or acceleration [m/s^2] of a material point. Raises PointOutside. Collective."""
+    """Probe of the displacement [m], velocity [m/s] or acceleration [m/s^2] of a material point (collective).
+
+    point: reference position [m]. Raises PointOutside.
+    """
     comm = structure.comm
     found = fem.locate_point(body.domain, np.asarray(point, dtype=float))
     owner = comm.allreduce(comm.rank if found is not None else -1, op=MPI.MAX)
@@ -50,7 +53,7 @@ def at_point(structure: Structure, body: Body, quantity: str, point: Sequence[fl
 
 
 def on_surface(structure: Structure, body: Body, quantity: str, surface: str) -> Probe:
-    """Resultants and means over a named surface (reference area). Collective.
+    """Probe of a resultant or mean over a named surface, in the reference configuration (collective).
 
     reaction: force [N] of supports and springs; traction: int P N dA [N]; displacement: mean [m]; area [m^2].
     """
@@ -87,10 +90,10 @@ def _reaction(structure: Structure, body: Body, surface: str) -> Probe:
 
 
 def of_bodies(structure: Structure, bodies: Sequence[Body], quantity: str) -> Probe:
-    """Integrals over bodies. Collective.
+    """Probe of an integral over bodies (collective).
 
-    energy [J] of the whole structure: kinetic, internal, work (of loads and supports), total; mass [kg];
-    volume [m^3], present; centre [m] of mass; momentum [kg m/s]; angular_momentum [kg m^2/s] about the origin.
+    energy [J] of the whole structure: kinetic, internal, work (of loads and supports), total; mass [kg]; volume [m^3]
+    of the deformed bodies; centre of mass [m]; momentum [kg m/s]; angular_momentum [kg m^2/s] about the origin.
     """
     return {
         "energy": lambda: _energy(structure),
@@ -120,7 +123,7 @@ def _times_mass(structure: Structure, array: Array) -> Array:
 
 
 def _moments(structure: Structure, bodies: Sequence[Body], array: Array) -> Array:
-    """int rho f dX by component: shape functions sum to one, so the nodal values of M f do, too."""
+    """int rho f dX by component: the sum of the nodal values of M f, because shape functions add up to one."""
     parts = zip(structure.bodies, structure.split(_times_mass(structure, array)), strict=True)
     total = sum(part.reshape(-1, structure.dim).sum(axis=0) for body, part in parts if body in bodies)
     return structure.comm.allreduce(total)

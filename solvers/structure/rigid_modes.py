@@ -1,4 +1,4 @@
-"""Rigid-body modes: what multigrid must carry to its coarse grids exactly to converge fast on elasticity."""
+"""Rigid-body modes as near null space of tangents: algebraic multigrid represents them exactly on coarse grids."""
 
 from __future__ import annotations
 
@@ -12,12 +12,11 @@ from solvers.structure.body import Body
 
 
 def attach_rigid_modes(matrix: PETSc.Mat, bodies: Sequence[Body], u: Array) -> None:
-    """Tell a tangent of all bodies the near null space at the displacement u [m] (owned dofs). Collective.
+    """Set the near null space of a tangent at the displacement u [m] of owned dofs (collective).
 
-    Translations and rotations of all bodies as one: multigrid looks at them in small groups of nodes, where they span
-    the modes of each body. Positions are current ones: with modes of the reference configuration a beam turned
-    by 90 degrees took 50 iterations instead of 19. Bodies of small displacements
-    keep the modes of the reference configuration.
+    The modes are translations and rotations of all bodies together: on the small aggregates of multigrid they span the
+    modes of each body. They are those of the deformed bodies: with modes of the reference configuration, a beam rotated
+    by 90 degrees took 50 iterations instead of 19. For small displacements those of the reference configuration apply.
     """
     dim = bodies[0].dim
     reference = [body.points[:dim, : body.owned].T.ravel() for body in bodies]

@@ -1,4 +1,4 @@
-"""The structure as files and pictures show it: deformed bodies with nodal fields."""
+"""Snapshots of the structure for files and pictures: deformed bodies with nodal fields."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ PartFields = Mapping[str, Mapping[str, tuple[NDArray[np.int64], Array]]]
 
 
 def snapshots(structure: Structure, on_surfaces: PartFields | None = None) -> list[Snapshot]:
-    """One snapshot per body on rank 0, an empty list elsewhere (collective); zero where a surface field is not."""
+    """One snapshot per body on rank 0, an empty list on others (collective).
+
+    on_surfaces: further fields on surfaces, which are zero at other nodes.
+    """
     found = []
     now = structure.now
     for body, u, v in zip(structure.bodies, structure.split(now.u), structure.split(now.v), strict=True):

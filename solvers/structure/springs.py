@@ -1,7 +1,7 @@
-"""Elastic springs between a body and a place that does not move: int_G k d.u d.v dA, or k d.u d.v at nodes.
+"""Elastic springs between a body and fixed points: int_G k d.u d.v dA on surfaces, or k d.u d.v at nodes.
 
-They are linear in the displacement, whatever the body's material: force and stiffness belong to the reference
-configuration. Without a direction d a spring holds all components alike.
+They are linear in the displacement for every material: force and stiffness refer to the reference configuration.
+Without a direction d, a spring resists all components equally.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ class Spring:
 
     where: Where
     stiffness: Value
-    direction: Sequence[float] | None = None  #: the only one in which it acts
-    normal: bool = False  #: that direction is the normal of the surface
+    direction: Sequence[float] | None = None  #: direction d; None: all components
+    normal: bool = False  #: d is the normal of the surface
 
 
 class Springs:
@@ -43,7 +43,7 @@ class Springs:
         self._u, self._force = self.matrix.createVecs()
 
     def force(self, u: Array) -> Array:
-        """K u [N] of owned dofs: what the body exerts on the springs (collective)."""
+        """Force K u [N] of the body on the springs, at owned dofs (collective)."""
         self._u.array[:] = u
         self.matrix.mult(self._u, self._force)
         return self._force.array.copy()

@@ -1,8 +1,8 @@
-"""Supports of a body: which displacements are prescribed where, and to what.
+"""Supports of a body: prescribed displacement components.
 
-A support holds components along the axes (dofs), or along a direction that is not an axis. At a node with such a
-direction all conditions n_j.u = g_j are made orthonormal from the last support to the first (Gram-Schmidt): they hold
-P u with the projection P on the span of the n_j. Where supports contradict each other, the last one counts.
+A support prescribes components along axes (dofs), or along an oblique direction. At a node with an oblique direction
+all conditions n_j.u = g_j are made orthonormal from the last support to the first (Gram-Schmidt): they prescribe P u
+with the projection P on the span of the n_j. Where supports contradict each other, the last one applies.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from solvers.api import Array
 from solvers.structure.meshed import Meshed
 from solvers.values import Value, evaluate
 
-#: Where something acts: a named surface, or nodes by their numbers in the mesh.
+#: A named surface, or nodes by their numbers in the mesh.
 Where = str | NDArray[np.int64]
 
-#: Sine of the angle below which two directions at a node are the same one.
+#: Sine of the angle between two directions at a node below which they are parallel.
 PARALLEL = 1e-6
 
 
 @dataclass(frozen=True)
 class Support:
-    """Prescribed displacement components [m]; None leaves a component free. One number: all components."""
+    """Prescribed displacement components [m]; None leaves a component free. A single number applies to all."""
 
     where: Where
     displacement: float | Sequence[Value | None] = 0.0
@@ -54,7 +54,7 @@ class Roller:
 
 
 class SupportError(ValueError):
-    """A support cannot be applied; `where` is that of the support."""
+    """A support that cannot be applied; where: its surface or nodes."""
 
     def __init__(self, body: str, where: Where, message: str):
         place = f"surface '{where}'" if isinstance(where, str) else "nodes"
@@ -64,19 +64,19 @@ class SupportError(ValueError):
 
 @dataclass(frozen=True)
 class Share:
-    """What one support adds at oblique nodes: h.u = (g - along.targets) / size for a new direction h of the node."""
+    """Condition of one support at oblique nodes, h.u = (g - along.targets) / size, with a new direction h."""
 
     nodes: NDArray[np.int64]  #: numbers among the oblique nodes, shape (m,)
     slots: NDArray[np.int64]  #: number of the new direction at its node, shape (m,)
-    along: Array  #: components of the support's direction along those that the node has already, shape (m, dim)
-    sizes: Array  #: length of what is left of it, shape (m,)
+    along: Array  #: components of the support's direction along earlier directions of the node, shape (m, dim)
+    sizes: Array  #: length of its part orthogonal to these, shape (m,)
     value: Value  #: g [m]
-    points: Array  #: where it is asked for [m], shape (3, m)
+    points: Array  #: positions at which g is evaluated [m], shape (3, m)
 
 
 @dataclass(frozen=True)
 class Oblique:
-    """Owned nodes of a body with a condition along a direction that is not an axis."""
+    """Conditions at owned nodes of a body with an oblique direction."""
 
     blocks: NDArray[np.int32]  #: local, sorted, shape (k,)
     basis: Array  #: prescribed directions, orthonormal or zero, shape (k, dim, dim)
@@ -84,11 +84,11 @@ class Oblique:
 
     @property
     def projections(self) -> Array:
-        """P, on the prescribed directions, shape (k, dim, dim)."""
+        """P, projections on the prescribed directions, shape (k, dim, dim)."""
         return np.einsum("kij,kil->kjl", self.basis, self.basis)
 
     def displacement(self, t: float) -> Array:
-        """P u [m], shape (k, dim)."""
+        """P u [m] at the time t [s], shape (k, dim)."""
         targets = np.zeros(self.basis.shape[:2])
         for share in self.shares:
             already = np.einsum("md,md->m", share.along, targets[share.nodes])
@@ -98,14 +98,14 @@ class Oblique:
 
 @dataclass(frozen=True)
 class Prescribed:
-    """Displacements of a body's owned nodes that supports prescribe."""
+    """Prescribed displacements at the owned nodes of a body."""
 
-    dofs: NDArray[np.int32]  #: along axes: local, sorted, shape (n,)
-    entries: tuple[tuple[NDArray[np.int32], Value, Array], ...]  #: dofs, displacement [m] and their points (3, m)
+    dofs: NDArray[np.int32]  #: prescribed local dofs, sorted, shape (n,)
+    entries: tuple[tuple[NDArray[np.int32], Value, Array], ...]  #: dofs, displacement [m], points [m] (3, m)
     oblique: Oblique
 
     def displacement(self, t: float) -> Array:
-        """Values [m] at the dofs, shape (n,). Where supports overlap, the last one counts."""
+        """Values [m] of `dofs` at the time t [s], shape (n,). Where supports overlap, the last one applies."""
         values = np.zeros(len(self.dofs))
         for dofs, value, points in self.entries:
             values[np.searchsorted(self.dofs, dofs)] = evaluate(value, points, t)
@@ -117,7 +117,7 @@ class _Condition:
     """n.u = g at some owned nodes."""
 
     blocks: NDArray[np.int32]
-    axis: int | None  #: of n, if it is one
+    axis: int | None  #: number of the axis along n; None: n is oblique
     directions: Array  #: n, shape (m, dim)
     value: Value
 
@@ -137,7 +137,7 @@ def prescribe(body: Meshed) -> Prescribed:
 
 
 def symmetric_dofs(body: Meshed) -> NDArray[np.int32]:
-    """Owned dofs that planes of symmetry normal to an axis hold, local (collective). Raises SupportError."""
+    """Owned local dofs that are held by planes of symmetry normal to an axis (collective). Raises SupportError."""
     found = [np.empty(0, dtype=np.int32)]
     for support in body.supports:
         if isinstance(support, Symmetry):
@@ -149,7 +149,7 @@ def symmetric_dofs(body: Meshed) -> NDArray[np.int32]:
 
 
 def owned_blocks(body: Meshed, where: Where) -> NDArray[np.int32]:
-    """Owned dof blocks of a body on a named surface, or of nodes (collective)."""
+    """Owned dof blocks of a body on a named surface, or at given nodes (collective)."""
     if isinstance(where, str):
         blocks = fem.surface_blocks(body.domain, body.space, where)
         return np.unique(blocks[blocks < body.owned]).astype(np.int32)
@@ -185,7 +185,7 @@ def _conditions(body: Meshed, support: Support | Symmetry | Roller) -> list[_Con
 
 
 def _orthonormal(body: Meshed, conditions: list[_Condition], oblique: NDArray[np.int32]) -> Oblique:
-    """The conditions at nodes with an oblique one."""
+    """The conditions at nodes with an oblique direction, made orthonormal."""
     basis = np.zeros((len(oblique), body.dim, body.dim))
     found = np.zeros(len(oblique), dtype=np.int64)
     shares = []
@@ -205,7 +205,7 @@ def _orthonormal(body: Meshed, conditions: list[_Condition], oblique: NDArray[np
 
 
 def symmetry_normal(body: Meshed, support: Symmetry, blocks: NDArray[np.int32]) -> Array:
-    """Normal of the plane of symmetry, exactly an axis if it is one (collective). Raises SupportError if it is none."""
+    """Unit normal of a plane of symmetry, exact if it is an axis (collective). Raises SupportError for curved ones."""
     points = body.points[: body.dim, blocks]
     extent = _extent(body, points)
     axis = int(np.argmin(extent))
@@ -229,7 +229,7 @@ def _extent(body: Meshed, values: Array) -> Array:
 
 
 def _normals_by_node(body: Meshed, surface: str) -> list[tuple[NDArray[np.int32], Array]]:
-    """(blocks, int N^2 n dA) of facets of one number: squares, for the mean of a shape function may be zero or less."""
+    """Pairs (blocks, int N^2 n dA) by type of facet. N^2, because the mean of N may be zero or negative."""
     x = np.ascontiguousarray(body.points[: body.dim].T)
     found = []
     for facets in fem.facet_quadrature(body.domain, body.space, surface, 2 * body.domain.degree + 1):

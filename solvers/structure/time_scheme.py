@@ -1,4 +1,4 @@
-"""What a time scheme adds to the balance of a structure; statics, which adds nothing."""
+"""The interface `TimeScheme` of structures, and statics, the scheme without inertia."""
 
 from __future__ import annotations
 
@@ -15,43 +15,43 @@ from solvers.structure.instant import Moving
 
 
 class Settling(Moving, Protocol):
-    """A structure whose first state a scheme can have found."""
+    """A structure that can solve for its initial state."""
 
     def by(self, time: TimeScheme, held: Held, t: float, dt: float) -> AbstractContextManager[None]:
-        """A step to the same t by another scheme and with other supports."""
+        """A step to the same time t by another scheme and with other supports."""
         ...
 
     def solve(self) -> StepInfo:
-        """Raises StepFailed."""
+        """Solve the step. Raises StepFailed."""
         ...
 
 
 class TimeScheme(Protocol):
-    """It has no state: all results follow from the structure at both ends of the step, which only `start` changes."""
+    """A scheme without state of its own: results depend on the structure at both ends of the step only."""
 
     @property
     def force_weight(self) -> float:
-        """Weight of the forces at the end of the step in the balance; those at its start have the rest."""
+        """Weight w of the forces at the end of the step in the balance; those at its start have 1 - w."""
         ...
 
     def massless(self, structure: Moving) -> NDArray[np.int64]:
-        """Owned dofs that shall have no mass. Raises NoMassLeft."""
+        """Owned dofs without mass. Raises NoMassLeft."""
         ...
 
     def damping_matrix(self, structure: Moving) -> PETSc.Mat | None:
-        """C [N s/m], None without damping."""
+        """C [N s/m]; None without damping."""
         ...
 
     def start(self, structure: Settling, t: float, dt: float) -> None:
-        """Velocity and acceleration at the start."""
+        """Set velocity and acceleration at the start."""
         ...
 
     def guess(self, structure: Moving, dt: float) -> Array:
-        """Displacement [m] in a step of length dt of the first iterate, at owned dofs."""
+        """Predictor: increment [m] of the displacement in a step of length dt, at owned dofs."""
         ...
 
     def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
-        """(velocity [m/s], acceleration [m/s^2]) that go with the present displacement in a step of length dt."""
+        """(velocity [m/s], acceleration [m/s^2]) for the present displacement in a step of length dt."""
         ...
 
     def balance(self, structure: Moving) -> Array:
@@ -59,7 +59,7 @@ class TimeScheme(Protocol):
         ...
 
     def averaged_load(self, structure: Moving) -> Array:
-        """The balance [N] without loads by another field, all forces averaged over the step."""
+        """The balance [N] without loads of another field, with all forces averaged over the step."""
         ...
 
     def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat | None:
@@ -67,11 +67,11 @@ class TimeScheme(Protocol):
         ...
 
     def reaction(self, structure: Moving) -> Array:
-        """The out-of-balance force [N] at the present time: what the supports hold."""
+        """The out-of-balance force [N] at the present time, which supports carry."""
         ...
 
     def averaged_forces(self, structure: Moving) -> tuple[Array, Array]:
-        """(external, damping) force [N] of the step's balance."""
+        """(external, damping) force [N] in the balance of the step."""
         ...
 
     def kinetic_energy(self, structure: Moving) -> float:

@@ -1,4 +1,4 @@
-"""Hyperelastic materials, a law in a file each."""
+"""Hyperelastic materials, one law per file."""
 
 from solvers.structure.materials.coup_neo_hooke import CoupNeoHooke
 from solvers.structure.materials.linear_elastic import LinearElastic, PlaneStressLinearElastic

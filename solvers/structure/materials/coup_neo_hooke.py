@@ -1,4 +1,4 @@
-"""Neo-Hooke with a power of the volume ratio."""
+"""Compressible neo-Hooke law with a power of the volume ratio."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from solvers.structure.materials.material import Tensor, cube_root, in_space
 from solvers.structure.materials.neo_hooke import neo_hooke_distortion
 from solvers.values import Value
 
-#: Below this exponent `_inverse_power` is a series: what it leaves out is less than 1e-14 of it for J from 0.01 to 100.
+#: Exponent below which `_inverse_power` is a series, whose relative error is below 1e-14 for J from 0.01 to 100.
 _SMALL = 1e-3
 
 

@@ -1,4 +1,4 @@
-"""Linear elasticity: Hooke's law of the strain of small displacements, in space and in plane stress."""
+"""Linear elasticity: Hooke's law with the linear strain, in 3D, plane strain and plane stress."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from solvers.structure.materials.st_venant_kirchhoff import StVenantKirchhoff
 
 @dataclass(frozen=True)
 class LinearElastic(StVenantKirchhoff):
-    """The same energy of the strain e = sym(grad u) of small displacements (Hooke's law)."""
+    """W = lambda/2 (tr e)^2 + mu e:e with the linear strain e = sym(grad u)."""
 
     linear: ClassVar[bool] = True
 
@@ -23,6 +23,6 @@ class LinearElastic(StVenantKirchhoff):
 
 @dataclass(frozen=True)
 class PlaneStressLinearElastic(LinearElastic):
-    """The same energy in two dimensions with the lambda of `plane_stress_lambda`."""
+    """The energy of `LinearElastic` in 2D with the lambda of `plane_stress_lambda`."""
 
     plane_stress: ClassVar[bool] = True

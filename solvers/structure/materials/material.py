@@ -19,11 +19,11 @@ Tensor: TypeAlias = Any  #: a UFL expression
 
 
 class Material(Protocol):
-    """What a body is made of."""
+    """A hyperelastic material law."""
 
-    #: the energy is one of two dimensions with S_33 = 0
+    #: whether it is a law of plane stress, in 2D with S_33 = 0
     plane_stress: ClassVar[bool]
-    #: the energy is one of small displacements: a function of sym(F) - I that does not tell rotation from strain
+    #: whether it is a law of small displacements, a function of sym(F) - I, which is not objective
     linear: ClassVar[bool]
 
     @property
@@ -37,17 +37,17 @@ class Material(Protocol):
         ...
 
     def volume_ratio(self, F: Tensor) -> Tensor:
-        """J = det F, or the law's own measure of it: 1 + tr of its strain."""
+        """J = det F, or 1 + the trace of the strain in laws of small strain."""
         ...
 
     @property
     def volumetric(self) -> Callable[..., Tensor]:
-        """Its part of a pure change of volume: U(J, parameters by name) = W(F) where F = s I has this J."""
+        """Energy of a pure change of volume: U(J, parameters by name) = W(s I), where s I has the volume ratio J."""
         ...
 
     @property
     def distortional(self) -> Callable[..., Tensor]:
-        """The rest of it, W(F) - U(J)."""
+        """W(F) - U(J), with parameters by name."""
         ...
 
 
@@ -57,7 +57,7 @@ def parameters(material: Material) -> dict[str, Value]:
 
 
 def in_space(F: Tensor) -> Tensor:
-    """F in three dimensions: plane strain leaves the third direction undeformed."""
+    """F in 3D; in plane strain F_33 = 1."""
     if F.ufl_shape == (3, 3):
         return F
     return ufl.as_tensor([[F[0, 0], F[0, 1], 0], [F[1, 0], F[1, 1], 0], [0, 0, 1]])

@@ -1,4 +1,4 @@
-"""Mooney-Rivlin with a quadratic energy of volume."""
+"""Mooney-Rivlin law with a quadratic volumetric energy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Neo-Hooke with the logarithm of the volume ratio."""
+"""Compressible neo-Hooke law with the logarithm of the volume ratio."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""St. Venant-Kirchhoff: Hooke's law of the Green-Lagrange strain, in space and in plane stress."""
+"""St. Venant-Kirchhoff: Hooke's law with the Green-Lagrange strain, in 3D, plane strain and plane stress."""
 
 from __future__ import annotations
 
@@ -41,6 +41,6 @@ class StVenantKirchhoff:
 
 @dataclass(frozen=True)
 class PlaneStressStVenantKirchhoff(StVenantKirchhoff):
-    """The same energy in two dimensions with the lambda of `plane_stress_lambda`."""
+    """The energy of `StVenantKirchhoff` in 2D with the lambda of `plane_stress_lambda`."""
 
     plane_stress: ClassVar[bool] = True

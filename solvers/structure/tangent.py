@@ -1,0 +1,52 @@
+"""The tangent of a structure: the static tangents of its bodies, and the matrix that a time scheme adds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from petsc4py import PETSc
+
+from solvers.api import Array
+from solvers.blocks import block_diagonal
+from solvers.structure.body import Body
+from solvers.structure.instant import Moving
+from solvers.structure.time_scheme import TimeScheme
+
+
+class Tangent:
+    """Assembles d(balance)/du = w K + D: K the static tangent, w and D by the time scheme."""
+
+    def __init__(self, bodies: Sequence[Body]):
+        self._bodies = list(bodies)
+        self._matrices = [body.create_tangent() for body in bodies]
+        self._combined: PETSc.Mat | None = None
+        self._dynamic: tuple[TimeScheme, float, PETSc.Mat | None] | None = None  # D, with its scheme and step
+
+    def diagonal(self, t: float) -> Array:
+        """Diagonal of K [N/m] at owned dofs, at the time t [s] of the loads (collective)."""
+        self._assemble_bodies(t)
+        return np.concatenate([matrix.getDiagonal().array for matrix in self._matrices])
+
+    def assemble(self, structure: Moving, time: TimeScheme) -> PETSc.Mat:
+        """The tangent without supports; the next call overwrites the matrix (collective)."""
+        self._assemble_bodies(structure.current.t)
+        self._combined = block_diagonal(self._matrices, self._combined)
+        weight, added = time.force_weight, self._added(structure, time)
+        if weight != 1.0:
+            self._combined.scale(weight)
+        if added is not None:
+            self._combined.axpy(1.0, added, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        return self._combined
+
+    def _assemble_bodies(self, t: float) -> None:
+        for body, matrix in zip(self._bodies, self._matrices, strict=True):
+            body.assemble_tangent(matrix, t)
+
+    def _added(self, structure: Moving, time: TimeScheme) -> PETSc.Mat | None:
+        """D, computed again when the scheme or the length of the step changes."""
+        scheme, dt, _ = self._dynamic or (None, 0.0, None)
+        if scheme is not time or dt != structure.current.dt:
+            self._dynamic = time, structure.current.dt, time.dynamic_stiffness(structure, structure.current.dt)
+        assert self._dynamic is not None
+        return self._dynamic[2]
