@@ -35,6 +35,43 @@ def _grid_2d2(scale: float) -> dict[str, Any]:
     }
 
 
+def _grid_falling(cells: int) -> dict[str, Any]:
+    """Cells of falling_sphere with this many across the sphere; 10 on its own grid."""
+    near, outside = round(0.8 * cells), max(4, round(0.7 * cells))
+    counts = {"x": (near, outside), "y": (near, outside), "z": (outside, round(6.5 * cells), max(3, cells // 2))}
+    return {f"fluid.grid.{axis}.{i}.cells": n for axis, parts in counts.items() for i, n in enumerate(parts)}
+
+
+def _grid_nested(scale: int) -> dict[str, Any]:
+    """Large cells of cylinder_nested, this many times as many along each direction."""
+    return {
+        "fluid.grid.cells.1": 21 * scale,
+        **{f"fluid.grid.x.{i}.cells": scale * cells for i, cells in enumerate((25, 12))},
+    }
+
+
+def _refined(level: int, **more: str) -> dict[str, Any]:
+    """Cells around the cylinder halved this many times."""
+    refine = [{"around": "cylinder", "layers": 4, "level": level}] if level else []
+    return {"fluid.grid.refine": refine, **{f"fluid.{name}": value for name, value in more.items()}}
+
+
+def _torus(cells: int, around: int, step: float) -> dict[str, Any]:
+    """Cells across the channel and around the torus."""
+    return {
+        "fluid.grid.cells": [cells, cells, round(1.6 * cells)],
+        "structure.bodies.torus.mesh.cells": [2 * around, around],
+        "time.step": step,
+    }
+
+
+#: Run torus_wall_fine: 24 x 24 x 40 cells, steps of 0.0025 s. Times and forces from the first contact to 0.56 s.
+TORUS_VERIFY = [
+    {"value": "arrival", "reference": 0.4125, "relative": 1.0},
+    {"value": "contact.wall.z", "statistic": "max", "reference": 14.9, "relative": 1.0},
+]
+
+
 def _partitioned(accelerator: str, **wetted: list[str]) -> dict[str, Any]:
     return {"coupling": {"scheme": "partitioned", "accelerator": accelerator, "wetted": wetted}}
 
@@ -42,6 +79,8 @@ def _partitioned(accelerator: str, **wetted: list[str]) -> dict[str, Any]:
 def _steps(*steps: float) -> dict[str, dict[str, Any]]:
     return {f"{step:g} s": {"time.step": step} for step in steps}
 
+
+FALLS = ((5, 0.1), (8, 0.1), (8, 0.05))  #: cells across the sphere, steps [s]
 
 FLAG, BEAM, BAR_MESH = (f"structure.bodies.{name}.mesh" for name in ("flag", "beam", "bar"))
 
@@ -112,8 +151,28 @@ FAMILIES: dict[str, Family | Study] = {
     "falling_sphere": Family(
         "falling_sphere",
         "an elastic sphere falls in oil, experiment of ten Cate et al., Re 4.1",
-        {"bdf2": {"fluid.scheme": "bdf2"}, "backward_euler": {"fluid.scheme": "backward_euler"}},
-        _steps(0.1, 0.05),
+        {scheme: {"fluid.scheme": scheme} for scheme in ("bdf2", "backward_euler")},
+        {f"{n} cells across, {step:g} s": {**_grid_falling(n), "time.step": step} for n, step in FALLS},
+    ),
+    "torus_wall": Family(
+        "torus_wall",
+        "a flow drives an elastic torus to a wall: first contact, largest force",
+        {scheme: {"fluid.scheme": scheme} for scheme in ("bdf2", "backward_euler")},
+        {f"{n} x {n} x {round(1.6 * n)}, {step:g} s": _torus(n, n, step) for n, step in ((8, 0.01), (12, 0.005))},
+        all={"time.end": 0.56, "verify": TORUS_VERIFY},
+    ),
+    "nested": Family(
+        "cylinder_nested",
+        "Schaefer-Turek 2D-1, equal cells against cells halved around the cylinder",
+        {
+            "q2q1, equal": _refined(0),
+            "q2q1, halved": _refined(1),
+            "q2q1, halved twice": _refined(2),
+            "q1q1, equal": _refined(0, element="q1q1"),
+            "q1q1, halved twice": _refined(2, element="q1q1"),
+        },
+        {f"{5 * n} cells per diameter outside": _grid_nested(n) for n in (1, 2, 4)},
+        values=("drag", "dp"),
     ),
     "bar_impact": Family(
         BAR,
@@ -133,5 +192,6 @@ FAMILIES: dict[str, Family | Study] = {
     ),
     "hertz_front": Study("a ball pressed onto a plane: error of the pressure", hertz.measure),
     "film": Study("a cylinder that approaches a wall, gap of 0.02 radii: error of the drag", studies.film),
+    "sphere": Study("a sphere that approaches a wall, gap of 0.1 radii: error of the drag", studies.sphere),
     "beltrami": Study("Ethier and Steinman's flow around a cut sphere: error of the velocity", studies.beltrami),
 }

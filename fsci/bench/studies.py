@@ -27,6 +27,10 @@ from solvers.tessellation import tessellate
 GAP = 0.02
 FILM_CELLS = (0.2, 0.1, 0.05, 0.02, 0.01)
 
+#: The same of the sphere, and (element, cell) of its runs
+SPHERE_GAP = 0.1
+SPHERE_RUNS = (*(("q1q1", h) for h in (0.4, 0.2, 0.1)), *(("q2q1", h) for h in (0.4, 0.2)))
+
 
 def film() -> list[Row]:
     """Half a cylinder of radius 1 moves towards a wall: cells of 10 to 0.5 gaps, of the film and below the cylinder."""
@@ -48,16 +52,51 @@ def _approaching(element: str, h: float) -> Fluid:
     y = graded(0.0, 8.0, (0.0, max(4 * h, round((GAP + 0.3) / h) * h)), h, 1.15, 1.0)
     points = polygon((0.0, 1.0 + GAP), 1.0, 2000)
     count = np.arange(len(points))
-    down = np.zeros_like(points) - [0.0, 1.0]
-    body = rigid_body("cylinder", points, np.stack([count, np.roll(count, -1)], axis=1), lambda t: (points, down))
+    return _falling("cylinder", points, np.stack([count, np.roll(count, -1)], axis=1), (x, y), element)
+
+
+def sphere() -> list[Row]:
+    """A quarter of a sphere of radius 1 moves towards a wall: cells of 4 gaps to one."""
+    exact = 6.0 * np.pi * brenner(SPHERE_GAP)
+    rows: list[Row] = []
+    for element, h in SPHERE_RUNS:
+        begin = process_time()
+        x = graded(0.0, 8.0, (0.0, 1.2), h, 1.3, 2.0)
+        facets, nodes = tessellate(mesh := shapes.sphere(1.0, [32, 1]))
+        points = mesh.points[nodes] + [0.0, 0.0, 1.0 + SPHERE_GAP]
+        fluid = _falling("sphere", points, facets, (x, x, x), element)
+        force = 4.0 * fluid.force()["sphere"].sum(axis=0)[2]
+        found = {UNKNOWNS: fluid.dofs(), TIME: process_time() - begin, ERROR: 100.0 * abs(force / exact - 1.0)}
+        rows.append({"option": element, "resolution": f"gap of {SPHERE_GAP / h:g} cells", **found})
+    return rows
+
+
+def brenner(gap: float) -> float:
+    """F / (6 pi mu a V) of a sphere of radius a that approaches a wall; gap in radii.
+
+    Source: H. Brenner, Chem. Eng. Sci. 16 (1961) 242-251.
+    """
+    alpha = np.arccosh(1.0 + gap)
+    n = np.arange(1.0, 40.0 / alpha)
+    top = 2.0 * np.sinh((2 * n + 1) * alpha) + (2 * n + 1) * np.sinh(2 * alpha)
+    bottom = 4.0 * np.sinh((n + 0.5) * alpha) ** 2 - (2 * n + 1) ** 2 * np.sinh(alpha) ** 2
+    terms = n * (n + 1) / ((2 * n - 1) * (2 * n + 3)) * (top / bottom - 1.0)
+    return float(4.0 / 3.0 * np.sinh(alpha) * terms.sum())
+
+
+def _falling(name: str, points: Array, facets: Array, planes: tuple[Array, ...], element: str) -> Fluid:
+    """Creeping flow around a surface that moves down to the wall with velocity 1; the box is free, or symmetric at 0."""
+    dim = len(planes)
+    down = np.zeros_like(points) - np.eye(dim)[-1]
+    body = rigid_body(name, points, facets, lambda t: (points, down))
     patches = [
-        Patch("symmetry", ("x-",), "slip"),
-        Patch("free", ("x+", "y+"), "traction", (zero, zero)),
-        Patch("wall", ("y-",), "no_slip"),
+        Patch("symmetry", ("x-", "y-")[: dim - 1], "slip"),
+        Patch("free", ("x+", "y+", "z+")[:dim], "traction", (zero,) * dim),
+        Patch("wall", (f"{'xyz'[dim - 1]}-",), "no_slip"),
     ]
     flow = FlowSettings(1.0, 1.0, element=element, scheme="steady", convection=False)  # type: ignore[arg-type]
     settings = SolverSettings(Tolerance(1e-8), linear="direct")
-    fluid = Fluid(Grid((x, y)), flow, patches, [body], settings, comm=MPI.COMM_SELF)
+    fluid = Fluid(Grid(planes), flow, patches, [body], settings, comm=MPI.COMM_SELF)
     fluid.initialise(0.0, 1.0)
     fluid.begin_step(0.0, 1.0)
     fluid.solve()
