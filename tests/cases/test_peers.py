@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fsci.bench import hertz
-from fsci.bench.peers import hertz_files, install, rows, stokes
+from fsci.bench.peers import fsi1, fsi1_files, hertz_files, install, rows, stokes
 from fsci.bench.peers.__main__ import main
 
 
@@ -41,6 +41,39 @@ def test_files_of_the_ball(tmp_path):
     assert below.points[:, 2].max() == 0.0
 
 
+def test_files_of_the_flag(tmp_path):
+    """Triangles fill the channel without cylinder and flag; edges on the flag are those of the flag's own mesh."""
+    pytest.importorskip("gmsh")
+    mesh = fsi1_files.flag(10)
+    outline = fsi1_files.along(mesh)
+    assert np.abs(np.diff(mesh.points[outline], axis=0)).sum(axis=1).max() < 0.0176
+    fsi1_files.write_flag(tmp_path / "flag.mdpa", mesh)
+    assert (tmp_path / "flag.mdpa").read_text().count("\n") > len(mesh.points) + 2 * len(outline)
+    count = fsi1_files.write_fluid(tmp_path / "fluid.mdpa", mesh.points[outline], 0.05)
+    text = (tmp_path / "fluid.mdpa").read_text()
+
+    def numbers(block, columns):
+        lines = text.split(f"Begin {block}\n")[1].split("End")[0].splitlines()
+        return np.array([[float(word) for word in line.split()] for line in lines])[:, columns]
+
+    points, cells = numbers("Nodes", [1, 2]), numbers("Elements Element2D3N", [2, 3, 4]).astype(int) - 1
+    assert len(points) == count
+    (ax, ay), (bx, by) = (points[cells[:, i]].T - points[cells[:, 0]].T for i in (1, 2))
+    left = 0.05**2 * (np.pi - np.arcsin(0.2)) + 0.01 * (fsi1_files.ROOT - 0.2)  # of the disc without the flag's sector
+    flag = 0.02 * (0.6 - fsi1_files.ROOT)
+    assert 0.5 * np.abs(ax * by - ay * bx).sum() == pytest.approx(2.5 * 0.41 - left - flag, rel=2e-4)
+    wet = text.split("Begin SubModelPart wet\nBegin SubModelPartNodes\n")[1].split("End")[0].split()
+    found = points[np.array(wet, dtype=int) - 1]
+    assert np.abs(found[:, None] - mesh.points[outline][None]).sum(axis=2).min(axis=1).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_our_flag_has_the_published_displacement():
+    found = fsi1.solve(0.7)
+    assert abs(found["u_x error [%]"]) < 1.5
+    assert abs(found["drag error [%]"]) < 0.5
+
+
 def test_pressure_in_a_result_of_calculix(tmp_path):
     (tmp_path / "a.frd").write_text(
         " -1         1 1.00000E+00 2.00000E+00 3.00000E+00\n"
@@ -53,7 +86,7 @@ def test_pressure_in_a_result_of_calculix(tmp_path):
 
 def test_what_is_missing(tmp_path, monkeypatch, capsys):
     assert main([]) == main([str(tmp_path), "sotkes"]) == 2
-    assert capsys.readouterr().err.startswith("usage: python -m fsci.bench.peers FOLDER [stokes|cylinder|hertz ..]")
+    assert capsys.readouterr().err.startswith("usage: python -m fsci.bench.peers FOLDER [stokes|cylinder|hertz|fsi1 ..]")
     monkeypatch.setattr(install.shutil, "which", lambda name: None)
     monkeypatch.setattr(rows, "python_of", lambda name, folder: folder)
     assert main([str(tmp_path), "hertz"]) == 1

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from fsci import shapes
 from fsci.bench.hertz import CORE, NU, PRESS, E, graded, quarter_ball
+from fsci.bench.peers import mdpa
 from solvers.api import Array
 from solvers.mesh import Mesh
 from solvers.mesh_topology import surface_facets
@@ -68,26 +67,13 @@ def write_kratos(path: Path, per_radius: int, outer: int) -> None:
     ball, below, points, cells, sets = both(per_radius, outer)
     slave, master = surface_facets(ball, "bottom"), surface_facets(below, "top") + len(ball.points)
     facets, everything = np.vstack([slave, master]), range(len(points))
-    lines = ["Begin Properties 0", "End Properties", "Begin Properties 1", "End Properties"]
-    lines += ["Begin Nodes", *_numbered(points, " "), "End Nodes"]
-    solid = "Elements TotalLagrangianElement3D8N"
-    lines += [f"Begin {solid}", *(f"{i + 1} 1 {_row(cell + 1, ' ')}" for i, cell in enumerate(cells)), "End Elements"]
-    touching = (f"{i + 1} 1 {_row(facet + 1, ' ')}" for i, facet in enumerate(facets))
-    lines += ["Begin Conditions SurfaceCondition3D4N", *touching, "End Conditions"]
-    lines += _part("Solid", everything, cells=len(cells))
+    lines = [*mdpa.PROPERTIES, *mdpa.nodes(points), *mdpa.block("Elements TotalLagrangianElement3D8N", cells)]
+    lines += mdpa.block("Conditions SurfaceCondition3D4N", facets)
+    lines += mdpa.part("Solid", everything, cells=range(len(cells)))
     for name in ("left", "front", "top", "bottom", "plane"):
-        lines += _part(name, sets[name], facets=len(slave) if name == "bottom" else 0)
-    lines += _part("Contact_Part", np.unique(facets), facets=len(facets))
+        lines += mdpa.part(name, sets[name], facets=range(len(slave) if name == "bottom" else 0))
+    lines += mdpa.part("Contact_Part", np.unique(facets), facets=range(len(facets)))
     path.write_text("\n".join(lines) + "\n")
-
-
-def _part(name: str, nodes: Iterable[int], cells: int = 0, facets: int = 0) -> list[str]:
-    def block(kind: str, numbers: Iterable[int]) -> list[str]:
-        return [f"Begin SubModelPart{kind}", *(str(n) for n in numbers), f"End SubModelPart{kind}"]
-
-    parts = [block("Nodes", (n + 1 for n in nodes)), block("Elements", range(1, cells + 1))]
-    parts.append(block("Conditions", range(1, facets + 1)))
-    return [f"Begin SubModelPart {name}", *(line for part in parts for line in part), "End SubModelPart"]
 
 
 def _faces(mesh: Mesh, name: str, first: int) -> list[str]:
@@ -101,9 +87,5 @@ def _faces(mesh: Mesh, name: str, first: int) -> list[str]:
     ]
 
 
-def _numbered(rows: Array, between: str = ", ", first: int = 1) -> list[str]:
-    return [f"{i + first}{between}{_row(row, between)}" for i, row in enumerate(rows)]
-
-
-def _row(row: Any, between: str = ", ") -> str:
-    return between.join(repr(value) for value in row.tolist())
+def _numbered(rows: Array, first: int = 1) -> list[str]:
+    return [f"{i + first}, {mdpa.row(row, ', ')}" for i, row in enumerate(rows)]

@@ -15,6 +15,11 @@ PACKAGES = {
         "KratosStructuralMechanicsApplication==10.4.4",
         "KratosContactStructuralMechanicsApplication==10.4.4",
         "KratosLinearSolversApplication==10.4.4",
+        "KratosConstitutiveLawsApplication==10.4.4",
+        "KratosFluidDynamicsApplication==10.4.4",
+        "KratosMeshMovingApplication==10.4.4",
+        "KratosMappingApplication==10.4.4",
+        "KratosFSIApplication==10.4.4",
         "numpy",
     ),
 }

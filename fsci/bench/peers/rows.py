@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fsci.bench import fluid, hertz
-from fsci.bench.peers import hertz_files, stokes
+from fsci.bench.peers import fsi1, fsi1_files, hertz_files, stokes
 from fsci.bench.peers.install import calculix, python_of
 from fsci.bench.table import Row
 
@@ -72,7 +72,26 @@ def run_hertz(folder: Path) -> list[Row]:
     return rows
 
 
-ROWS: dict[str, Callable[[Path], list[Row]]] = {"stokes": run_stokes, "cylinder": run_cylinder, "hertz": run_hertz}
+def run_fsi1(folder: Path) -> list[Row]:
+    """Turek-Hron FSI1: largest error of the flag's tip, drag and lift."""
+    python = python_of("kratos", folder)
+    rows = [_row("fsci q2q1, IQN-ILS", _with_largest(fsi1.solve(scale))) for scale in (0.5, 0.7, 1.0)]
+    for cells, largest in ((20, 0.05), (35, 0.03), (70, 0.02), (100, 0.014)):
+        flag, mesh = folder / f"flag_{cells}.mdpa", fsi1_files.flag(cells)
+        fluid = folder / f"fluid_{cells}.mdpa"
+        fsi1_files.write_flag(flag, mesh)
+        fsi1_files.write_fluid(fluid, mesh.points[fsi1_files.along(mesh)], largest)
+        peer = _script(python, HERE / "kratos_fsi1.py", str(fluid), str(flag))
+        rows.append(_row("Kratos, fitted, MVQN", _with_largest(peer)))
+    return rows
+
+
+ROWS: dict[str, Callable[[Path], list[Row]]] = {
+    "stokes": run_stokes,
+    "cylinder": run_cylinder,
+    "hertz": run_hertz,
+    "fsi1": run_fsi1,
+}
 
 
 def _row(program: str, found: dict[str, Any]) -> Row:
