@@ -35,7 +35,7 @@ def plot_front(rows: Sequence[Row], title: str, path: Path) -> None:
             spent = [float(row[cost]) for row in rows]
             ratio = max(spent) / min(spent)
             subs = (1.0, 2.0, 5.0) if ratio < 10.0 else (1.0, 3.0)  # more labels would overlap
-            panel.xaxis.set_major_locator(MaxNLocator(4) if ratio < 3.0 else LogLocator(subs=subs))
+            panel.xaxis.set_major_locator(MaxNLocator(4) if ratio < 5.0 else LogLocator(subs=subs))
             panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         panels[0].set_ylabel("largest error of all values [%]")
         panels[0].legend()

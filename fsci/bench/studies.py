@@ -7,6 +7,7 @@ from time import process_time
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fsci import shapes
 from fsci.bench.family import ERROR, TIME, UNKNOWNS
@@ -84,8 +85,8 @@ def brenner(gap: float) -> float:
     return float(4.0 / 3.0 * np.sinh(alpha) * terms.sum())
 
 
-def _falling(name: str, points: Array, facets: Array, planes: tuple[Array, ...], element: str) -> Fluid:
-    """Creeping flow around a surface that moves down to the wall with velocity 1; the box is free, or symmetric at 0."""
+def _falling(name: str, points: Array, facets: NDArray[np.int64], planes: tuple[Array, ...], element: str) -> Fluid:
+    """Creeping flow around a surface that moves down to a wall with velocity 1; free outside, symmetric at 0."""
     dim = len(planes)
     down = np.zeros_like(points) - np.eye(dim)[-1]
     body = rigid_body(name, points, facets, lambda t: (points, down))

@@ -2,7 +2,9 @@
 
 import json
 import time
+from collections.abc import Mapping
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -11,9 +13,10 @@ from programs import fsci
 from fsci.bench import hertz, idle, linear, profile, small, studies
 from fsci.bench.compare import compare
 from fsci.bench.families import FAMILIES
-from fsci.bench.family import Study, front
+from fsci.bench.family import CASES, Family, Study, front
 from fsci.bench.front_plot import plot_front
 from fsci.bench.table import show, text
+from fsci.case import load_case
 from fsci.shapes import box
 
 
@@ -115,6 +118,34 @@ def test_studies_measure_what_they_say(monkeypatch):
     assert [row["option"] for row in rows] == ["q1q1", "q2q1"]
     assert rows[1]["error [%]"] < 3.0 < rows[0]["error [%]"]
     assert studies.decay("q1q1", "bdf2", 6)["error [%]"] < 5.0
+
+
+def test_the_drag_of_a_sphere_near_a_wall(monkeypatch):
+    """Brenner (1961), table 1: 9.2518 at cosh(0.5) - 1; on cells of four gaps it is within a tenth."""
+    assert studies.brenner(np.cosh(0.5) - 1.0) == pytest.approx(9.2518, abs=1e-4)
+    monkeypatch.setattr(studies, "SPHERE_RUNS", (("q2q1", 0.4),))
+    (row,) = studies.sphere()
+    assert row["error [%]"] < 10.0
+
+
+@pytest.mark.parametrize("name", [name for name, family in FAMILIES.items() if isinstance(family, Family)])
+def test_all_settings_of_a_family_are_those_of_its_case(name, tmp_path):
+    """Each run of it could begin."""
+    family = FAMILIES[name]
+    case = tmp_path if isinstance(family.case, Mapping) else CASES / family.case
+    (tmp_path / "case.yaml").write_text(json.dumps(family.case))
+    for option, resolution in product(family.options.values(), family.resolutions.values()):
+        settings = {**(family.all or {}), **option, **resolution}
+        load_case(case, [(key, json.dumps(value)) for key, value in settings.items()])
+
+
+def test_cells_halved_around_the_cylinder_cost_less():
+    """2D-1: a tenth of the error with twice the unknowns."""
+    nested = FAMILIES["nested"]
+    options = {name: nested.options[name] for name in ("q1q1, equal", "q1q1, halved twice")}
+    equal, halved = replace(nested, options=options, resolutions=dict([*nested.resolutions.items()][:1])).run()
+    assert halved["error [%]"] < 0.1 * equal["error [%]"]
+    assert halved["unknowns"] < 2 * equal["unknowns"]
 
 
 def test_ratios_to_earlier_results():

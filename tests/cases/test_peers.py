@@ -86,7 +86,9 @@ def test_pressure_in_a_result_of_calculix(tmp_path):
 
 def test_what_is_missing(tmp_path, monkeypatch, capsys):
     assert main([]) == main([str(tmp_path), "sotkes"]) == 2
-    assert capsys.readouterr().err.startswith("usage: python -m fsci.bench.peers FOLDER [stokes|cylinder|hertz|fsi1 ..]")
+    assert capsys.readouterr().err.startswith(
+        "usage: python -m fsci.bench.peers FOLDER [stokes|cylinder|hertz|fsi1 ..]"
+    )
     monkeypatch.setattr(install.shutil, "which", lambda name: None)
     monkeypatch.setattr(rows, "python_of", lambda name, folder: folder)
     assert main([str(tmp_path), "hertz"]) == 1

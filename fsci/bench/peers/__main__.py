@@ -1,4 +1,4 @@
-"""`python -m fsci.bench.peers FOLDER [stokes|cylinder|hertz|fsi1 ..]`: install what is missing there, run, print tables."""
+"""`python -m fsci.bench.peers FOLDER [stokes|cylinder|hertz|fsi1 ..]`: install what is missing, run, print tables."""
 
 from __future__ import annotations
 

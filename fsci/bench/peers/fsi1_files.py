@@ -1,7 +1,8 @@
-"""Turek and Hron's FSI1 on fitted meshes, as input of Kratos: triangles around cylinder and flag, bricks of the flag."""
+"""Turek and Hron's FSI1 on fitted meshes, as input of Kratos: triangles of the fluid, quadrilaterals of the flag."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ ROOT, TIP, LOW, HIGH = 0.248989795, 0.6, 0.19, 0.21
 
 
 def flag(cells: int) -> Mesh:
-    """Squares of second order nearly: `cells` along, two or more across."""
+    """Quadrilaterals of second order, nearly square: `cells` along, two or more across."""
     across = max(2, round(cells * (HIGH - LOW) / (TIP - ROOT)))
     return shapes.rectangle([TIP - ROOT, HIGH - LOW], [cells, across], order=2, origin=[ROOT, LOW])
 
@@ -85,7 +86,7 @@ def _geometry(outline: Array, size: float, largest: float) -> dict[str, list[int
     corners = [make.addPoint(x, y, 0.0) for x, y in ((0, 0), (LENGTH, 0), (LENGTH, HEIGHT), (0, HEIGHT))]
     box = [make.addLine(corners[i], corners[(i + 1) % 4]) for i in range(4)]
     wet = [make.addPoint(x, y, 0.0) for x, y in outline]
-    flag = [make.addLine(a, b) for a, b in zip(wet[:-1], wet[1:], strict=True)]
+    flag = [make.addLine(a, b) for a, b in pairwise(wet)]
     centre, back = make.addPoint(CENTRE, CENTRE, 0.0), make.addPoint(CENTRE - RADIUS, CENTRE, 0.0)
     cylinder = [make.addCircleArc(wet[-1], centre, back), make.addCircleArc(back, centre, wet[0])]
     loops = [make.addCurveLoop(box), make.addCurveLoop([*flag, *cylinder])]

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fsci import shapes
 from fsci.bench.hertz import CORE, NU, PRESS, E, graded, quarter_ball
@@ -29,7 +30,7 @@ def base(per_radius: int, outer: int) -> Mesh:
     return replace(unit, points=points)
 
 
-def both(per_radius: int, outer: int) -> tuple[Mesh, Mesh, Array, Array, dict[str, list[int]]]:
+def both(per_radius: int, outer: int) -> tuple[Mesh, Mesh, Array, NDArray[np.int64], dict[str, list[int]]]:
     """(ball, base, all points, all cells, node sets); all nodes of the base are in one set."""
     ball, below = quarter_ball(per_radius, outer), base(per_radius, outer)
     count = len(ball.points)

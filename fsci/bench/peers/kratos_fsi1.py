@@ -1,4 +1,4 @@
-"""Turek and Hron's FSI1 by Kratos on fitted meshes, Dirichlet-Neumann with its quasi-Newton scheme; a script of its Python.
+"""Turek and Hron's FSI1 by Kratos on fitted meshes, coupled by its quasi-Newton scheme; a script of its Python.
 
 python kratos_fsi1.py FLUID FLAG: meshes of `fsi1_files`. Prints a row as JSON. One step, long enough to be steady.
 After the tests of Kratos, MokBenchmarkTest.
@@ -49,7 +49,8 @@ def settings(fluid: Path, flag: Path) -> dict:
     direct = {"solver_type": "LinearSolversApplication.sparse_lu"}
     return {
         "problem_data": {
-            "problem_name": "fsi1", "parallel_type": "OpenMP", "start_time": 0.0, "end_time": 0.5 * STEP, "echo_level": 0,
+            "problem_name": "fsi1", "parallel_type": "OpenMP", "echo_level": 0,
+            "start_time": 0.0, "end_time": 0.5 * STEP,
         },
         "solver_settings": {
             "solver_type": "partitioned",

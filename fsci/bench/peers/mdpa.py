@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from solvers.api import Array
 
 PROPERTIES = ["Begin Properties 0", "End Properties", "Begin Properties 1", "End Properties"]
@@ -15,7 +18,7 @@ def nodes(points: Array) -> list[str]:
     return ["Begin Nodes", *(f"{i + 1} {row(x)}" for i, x in enumerate(points)), "End Nodes"]
 
 
-def block(kind: str, connected: Array) -> list[str]:
+def block(kind: str, connected: NDArray[np.int64]) -> list[str]:
     """Block of elements or conditions of one kind by the numbers of their nodes from 0 on; with properties 1."""
     lines = (f"{i + 1} 1 {row(found + 1)}" for i, found in enumerate(connected))
     return [f"Begin {kind}", *lines, f"End {kind.split()[0]}"]
