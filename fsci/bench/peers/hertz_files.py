@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,5 +89,5 @@ def _faces(mesh: Mesh, name: str, first: int) -> list[str]:
     ]
 
 
-def _numbered(rows: Array, first: int = 1) -> list[str]:
+def _numbered(rows: NDArray[Any], first: int = 1) -> list[str]:
     return [f"{i + first}, {mdpa.row(row, ', ')}" for i, row in enumerate(rows)]
