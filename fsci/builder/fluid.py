@@ -101,7 +101,7 @@ def _with_layer(case: Case, body: ImmersedBody) -> ImmersedBody:
         return body
     surface = replace(body.surface, slip_length=settings.slip_length)
     if name in case.bodies_in_contact:
-        surface = replace(surface, transmissivity=film.value, zone=film.zone)
+        surface = replace(surface, transmissivity=film.value, zone=film.closed)
     return replace(body, surface=surface)
 
 

@@ -127,7 +127,7 @@ def _contact(case: Case, contact: ContactSection) -> Iterator[Mistake]:
     if not contact.pairs and contact.bodies is None:
         missing: Keys = ("contact", "pairs") if "pairs" in contact.model_fields_set else ("contact",)
         yield missing, "'contact' needs 'pairs', or 'bodies: all' for automatic pairs"
-    if (contact.film.value or contact.film.zone != "dry") and case.fluid is None:
+    if (contact.film.value or contact.film.closed != "dry") and case.fluid is None:
         yield ("contact", "film"), "'film' describes the fluid between surfaces and needs the section 'fluid'"
     for setting in ("friction", "reach"):
         if setting in contact.model_fields_set and contact.bodies is None:

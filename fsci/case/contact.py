@@ -129,10 +129,10 @@ class FilmSection(Section):
         unit="m",
     )
 
-    zone: Literal["dry", "wetted", "seeping"] = setting(
-        "dry",
+    zone: Literal["dry", "wetted", "seeping"] | None = setting(
+        None,
         "where contact is closed: dry: no fluid; wetted: fluid with the pressure of the rim;"
-        " seeping: fluid passes through it, too, in the layer",
+        " seeping: fluid passes through it, too, in the layer; default: seeping with a layer, otherwise dry",
     )
 
     @model_validator(mode="after")
@@ -147,6 +147,11 @@ class FilmSection(Section):
     def value(self) -> float:
         """Transmissivity of a surface [m^3]."""
         return (self.roughness or 0.0) ** 3 / 12.0 if self.transmissivity is None else self.transmissivity
+
+    @property
+    def closed(self) -> Literal["dry", "wetted", "seeping"]:
+        """What fills closed contact."""
+        return self.zone or ("seeping" if self.value else "dry")
 
 
 class ContactSection(Section):

@@ -151,7 +151,7 @@ def verify_mistakes(case: Case) -> Iterator[Mistake]:
     if case.contact is not None:
         columns += [f"contact.{name}.{axis}" for name in case.contact.pairs for axis in "xyz"[: case.dimension or 3]]
         columns += CONTACT_COLUMNS
-        columns += [SEEPAGE_COLUMN] if case.contact.film.zone == "seeping" else []
+        columns += [SEEPAGE_COLUMN] if case.contact.film.closed == "seeping" else []
         if any(pair.friction.some for pair in case.contact.pairs.values()):
             columns += FRICTION_COLUMNS
     for i, check in enumerate(case.verify):
