@@ -62,7 +62,7 @@ COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
     "!=": np.not_equal,
 }
 KEYWORDS = ("and", "or", "not")
-RESERVED = frozenset((*VARIABLES, *CONSTANTS, *FUNCTIONS, *KEYWORDS))  #: what no function of the user can be called
+RESERVED = frozenset((*VARIABLES, *CONSTANTS, *FUNCTIONS, *KEYWORDS))  #: names that functions of the user cannot have
 TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
     r"|(?P<name>[A-Za-z_][A-Za-z_0-9]*)"

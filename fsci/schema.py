@@ -67,7 +67,7 @@ def _sections(path: str, model: dict[str, Any], models: dict[str, Any]) -> Itera
 
 
 def _references(schema: dict[str, Any]) -> list[tuple[str, str]]:
-    """The models a setting can be, each with what stands between: .NAME for a mapping, [..] for a list."""
+    """The models that a setting may have, each with the path between: .NAME for a mapping, [..] for a list."""
     if "$ref" in schema:
         return [("", schema["$ref"].rsplit("/", 1)[1])]
     found: dict[str, str] = {}

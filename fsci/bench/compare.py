@@ -1,4 +1,4 @@
-"""Two files of benchmark results: what got faster or more accurate, and what did not."""
+"""Comparison of two files of benchmark results: ratios of times, memory and errors."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from fsci.bench.table import Row
 
-#: Units of the columns that are compared: the less, the better.
+#: Units of the columns that are compared; smaller is better.
 COSTS = ("[s]", "[ms]", "[us]", "[MB]", "[%]")
 
 

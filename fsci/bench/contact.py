@@ -1,4 +1,4 @@
-"""Contact: mortar kernel, search, and two tori from beginning to end."""
+"""Benchmarks of contact: mortar kernel, search, and the whole run of two tori."""
 
 from __future__ import annotations
 

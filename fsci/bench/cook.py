@@ -1,4 +1,4 @@
-"""Cook's membrane, nearly incompressible: what accuracy costs with each element."""
+"""Benchmark of Cook's membrane, nearly incompressible: error against time by element."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def run() -> list[Row]:
     finest, _ = solve(membrane("quad", 2, FINEST), "mixed")
     rows: list[Row] = []
     for cell, order, element, numbers in MESHES:
-        solve(membrane(cell, order, 2), element)  # compiles the forms, which is not what is measured
+        solve(membrane(cell, order, 2), element)  # compiles the forms, which is not measured
         for cells in numbers:
             mesh = membrane(cell, order, cells)
             rise, seconds = solve(mesh, element)

@@ -1,4 +1,4 @@
-"""What a time step costs by kind of problem and size: the numbers that `fsci check` estimates from."""
+"""Time of a step and memory by type and size of the problem, from which `fsci check` estimates the cost."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which cases show what accuracy costs, with which options, on which grids and steps."""
+"""The families of runs of error against time: cases with their options, grids and steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Run time against error: a case at several resolutions and with several options, measured by its own `verify`."""
+"""Error against time: a case at several resolutions and with several options, with errors by its `verify`."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class Family:
 
     case: str | Mapping[str, Any]  #: folder in `cases/`, or the content of a case
     words: str
-    options: Mapping[str, Settings]  #: what is compared: elements, schemes
+    options: Mapping[str, Settings]  #: compared options: elements, schemes
     resolutions: Mapping[str, Settings]  #: coarse to fine
-    values: tuple[str, ...] = ()  #: columns whose errors count; default: all that `verify` has
+    values: tuple[str, ...] = ()  #: columns whose errors are used; default: all of `verify`
     all: Settings | None = None
 
     def run(self) -> list[Row]:
-        """A row for each option and resolution; those on the front have a star."""
+        """A row for each option and resolution; those on the Pareto front have a star."""
         with TemporaryDirectory() as name:
             folder = Path(name)
             case = folder if isinstance(self.case, Mapping) else CASES / self.case
@@ -79,7 +79,7 @@ class Study:
     measure: Callable[[], list[Row]]
 
     def run(self) -> list[Row]:
-        """Those on the front have a star."""
+        """All rows; those on the Pareto front have a star."""
         return starred(self.measure())
 
 

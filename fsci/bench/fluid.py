@@ -1,4 +1,4 @@
-"""Flow around bodies in a fixed grid: error against time, direct solver by size, a step in 3D by part."""
+"""Benchmarks of the flow: error against time of 2D-1, the direct solver by size, and a step in 3D by part."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hertz in 3D: a quarter of an elastic ball is pressed onto a rigid plane, in one load step.
+"""Benchmark of Hertz contact in 3D: a quarter of an elastic ball is pressed onto a rigid plane in one load step.
 
 Radius 100, E = 1000, nu = 0.3, contact radius 1 on a block of 16 x 16 x 16: small deformation, finite-deformation code.
 Source of the solution: K. L. Johnson, Contact Mechanics (1985), chapter 4.
@@ -40,7 +40,7 @@ PRESS = 0.00965
 
 @dataclass(frozen=True)
 class Found:
-    """A solution, and what Hertz says to the force it has."""
+    """A solution, and Hertz' values for the force that it has."""
 
     structure: Structure
     contact: Contact

@@ -1,4 +1,4 @@
-"""What a part costs that a scene does not need: time steps with it and without it, by turns."""
+"""Cost of parts of the program that a case does not use: alternating time steps with and without the part."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ contact:
     roof: {slave: {body: post, on: top}, master: {obstacle: roof}}
 """
 
-#: what -> (scene, the part that it does not need)
+#: name -> (scene, the part that it does not use)
 SCENES = {
     "block, a pair that never meets": (BLOCK.replace("0.001", "50"), "contact"),
     "cube, a pair that never meets": (CUBE, "contact"),

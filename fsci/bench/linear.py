@@ -1,4 +1,4 @@
-"""Where the iterative linear solver beats the direct one."""
+"""Time of the direct and the iterative linear solver by size and shape of the body."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Moments of a torus in the cells of a box: what a cut costs."""
+"""Benchmark of the cut: moments of a torus in the cells of a box."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs of the program in a process of their own, so that memory and time are theirs; their summary tells the rest."""
+"""Runs of the program in separate processes, with time, memory and results from their summary."""
 
 from __future__ import annotations
 

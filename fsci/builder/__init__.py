@@ -1,1 +1,1 @@
-"""From a case to the objects that compute it: these modules alone know every class."""
+"""Construction of the objects of a run from a case. Only these modules import all classes of the solvers."""

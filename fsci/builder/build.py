@@ -1,4 +1,4 @@
-"""From a case to the objects that compute it: the modules of this folder are all that knows every class.
+"""Construction of the objects of a run from a case. Only the modules of this folder import all classes.
 
 A part that the case does not mention is not imported.
 """
@@ -33,12 +33,12 @@ class Simulation:
     probes: Callable[[], Numbers]  #: column -> value
     balances: Callable[[], Numbers]  #: column -> value
     dofs: dict[str, int]
-    notes: list[str] = field(default_factory=list)  #: on rank 0: what was changed when meshes were read
+    notes: list[str] = field(default_factory=list)  #: notes to the user on changes of meshes, on rank 0
     imbalance: Callable[[], Numbers] = dict  #: of contact work, with facets dealt out evenly and as it was
 
 
 def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
-    """All objects of a case. Raises CaseError for what only the meshes can tell (collective)."""
+    """All objects of a case (collective). Raises CaseError for mistakes that only the meshes show."""
     if case.contact is not None:
         from fsci.builder.automatic_pairs import with_pairs
 

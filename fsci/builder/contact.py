@@ -75,7 +75,7 @@ def _rigid_mesh(case: Case, name: str) -> tuple[Array, NDArray[np.int64], str]:
 
 
 def _motion(case: Case, name: str, points: Array) -> Callable[[float], Array] | None:
-    """Positions [m] of the points at a time; None if they stay where they are."""
+    """A function: time [s] -> positions of the points [m]; None if they are at rest."""
     assert case.contact is not None
     if name in case.contact.obstacles:
         displacement = case.contact.obstacles[name].motion

@@ -22,7 +22,7 @@ Facets = NDArray[np.int64]
 
 
 class DrySideError(ValueError):
-    """The line does not close the solid; the message says why."""
+    """A line that does not close the solid; the message gives the reason."""
 
 
 def find_ends(facets: Facets) -> tuple[int, int]:

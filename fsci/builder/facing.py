@@ -1,4 +1,4 @@
-"""Which named surfaces of bodies can meet: those that face each other and are near enough."""
+"""Named surfaces of bodies that may come into contact: those that face each other and are near."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def faces(mesh: Mesh) -> list[Face]:
 
 
 def meeting(first: Sequence[Face], second: Sequence[Face], reach: float) -> list[tuple[Face, Face]]:
-    """Surfaces of two bodies that can meet. Inside of a cavity nothing but the cavity can be met."""
+    """Surfaces of two bodies that may touch. A surface within a cavity may touch that cavity only."""
     hulls = [_hull(first), _hull(second)]
     sides = []
     for own, other in ((first, hulls[1]), (second, hulls[0])):

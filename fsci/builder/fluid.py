@@ -111,7 +111,7 @@ def read_surface(case: Case, name: str, comm: MPI.Comm) -> tuple[Array, NDArray[
 
 
 def on_first(comm: MPI.Comm, read: Callable[[], Any]) -> Any:
-    """What the first process reads, or the exception that it meets, on every process (collective)."""
+    """The result of reading on the first process, or its exception, on every process (collective)."""
     found: Any = None
     if comm.rank == 0:
         try:

@@ -1,4 +1,4 @@
-"""From supports, springs and loads of a body in a case to those of the solver, each at its place in the mesh."""
+"""Supports, springs and loads of a body from a case, with their surfaces and nodes in the mesh."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From the `solver` section of a case to what every field takes."""
+"""Solver settings of the fields from the section `solver` of a case."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def _body(case: Case, name: str, comm: MPI.Comm, mesh: Mesh | None, locations: L
 
 
 def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Locations]]:
-    """The meshes of the bodies on rank 0, with all surfaces that the case names; on all processes where loads act."""
+    """The meshes of the bodies on rank 0, with all surfaces that the case names; on all processes the loaded parts."""
     error, meshes, locations = None, {}, {}
     if comm.rank == 0:
         try:

@@ -1,4 +1,4 @@
-"""Tied surfaces before the run: where they are bent, nodes of the slave move onto the surface of the master."""
+"""Tied surfaces before the run: on curved surfaces, slave nodes are moved onto the master surface."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ROUNDING = 1e-13
 
 
 def join_tied(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
-    """Meshes of elastic bodies, with the slaves of tied pairs where the constraint has them. Raises CaseError.
+    """Meshes of elastic bodies, with the slave nodes of tied pairs moved as the constraint requires. Raises CaseError.
 
     A tie between bent surfaces would otherwise resist a common rotation: its offset would keep its direction in space.
     """

@@ -58,7 +58,7 @@ class Case(Section):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What looks implausible, with its place."""
+        """Warnings about implausible settings, with their positions."""
         return self._warnings
 
     @property
@@ -82,7 +82,7 @@ class Case(Section):
 
     @property
     def dimension(self) -> int | None:
-        """2 or 3 if the fluid's grid or a built-in mesh tells, else None: mesh files are not read here."""
+        """2 or 3 by the grid of the fluid or a built-in mesh, else None: mesh files are not read here."""
         if self.fluid is not None:
             return self.fluid.grid.dimension
         meshes: list[Any] = [body.mesh for body in self.elastic_bodies.values()]
@@ -96,7 +96,7 @@ class Case(Section):
         return str(self.place(*keys))
 
     def error(self, keys: tuple[str | int, ...], message: str) -> CaseError:
-        """An error to raise about a setting, with its place and line."""
+        """An error about a setting, with its position and line."""
         return CaseError([self._document.problem(self.place(*keys), message)])
 
     def dump(self, changes: Iterable[tuple[str, str]] = ()) -> str:

@@ -1,4 +1,4 @@
-"""Mistakes in the section `coupling` that show only beside the other sections."""
+"""Checks of the section `coupling` against the other sections."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ class Curve(Section):
             return np.asarray(np.interp(t, times, values))
         from scipy.interpolate import PchipInterpolator
 
-        # one more point on both sides, so that the ends are level like what goes on from them
+        # one more point on both sides, so that slopes vanish at the ends, as in the constant continuation
         times, values = np.pad(times, 1, mode="reflect", reflect_type="odd"), np.pad(values, 1, mode="edge")
         return np.asarray(PchipInterpolator(times, values)(np.clip(t, times[1], times[-2])))
 
@@ -116,7 +116,7 @@ CurveName = Annotated[Name, BeforeValidator(lambda name: _callable(name) if isin
 
 
 def functions(data: Any, folder: Path) -> dict[str, Callable[[ArrayLike], Array]]:
-    """The curves of a case's data by name. One that is wrong is zero here: the case reports it where it stands."""
+    """The curves of a case by name. Invalid ones are zero here; the case reports them at their positions."""
     found: dict[str, Callable[[ArrayLike], Array]] = {}
     for name, value in data.items() if isinstance(data, dict) else ():
         try:

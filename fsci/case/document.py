@@ -1,4 +1,4 @@
-"""A case file as plain data, with overrides, that knows where every setting stands."""
+"""A case file as plain data with overrides, and the position of every setting."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Document:
         return self.parsed.data
 
     def place(self, keys: Keys) -> Place:
-        """Where a setting stands: its value if that is on the line of its key, else its key, else what contains it."""
+        """Position of a setting: its value if that is on the line of its key, else its key, else that of its parent."""
         while keys and keys not in self.parsed.values:
             keys = keys[:-1]
         value = self.parsed.values.get(keys, Place(str(self.path), 1, 1))
@@ -34,11 +34,11 @@ class Document:
         return value if (value.source, value.line) == (key.source, key.line) else key
 
     def key_place(self, keys: Keys) -> Place:
-        """Where the name of a setting stands; for a list's entry or the whole file, where it begins."""
+        """Position of the name of a setting; for the entry of a list or the whole file, its beginning."""
         return self.parsed.keys.get(keys) or self.place(keys)
 
     def text_place(self, keys: Keys, column: int) -> Place:
-        """The column-th character (from 1) of a text if it can be seen in the file, else the text."""
+        """Position of the column-th character (from 1) of a text, or of the text if the file writes it otherwise."""
         first = self.parsed.texts.get(keys)
         if first is None or not first.line:
             return self.place(keys)
@@ -110,7 +110,7 @@ def override(document: Document, dotted: str, text: str) -> Document:
     parsed = Parsed(data)
     for name in ("keys", "values", "texts"):
         old_places, new_places = getattr(document.parsed, name), getattr(new, name)
-        # sections that the override creates stand where it does
+        # sections that the override creates have its position
         places = dict.fromkeys((keys[:n] for n in range(1, len(keys) + 1)), here) if name != "texts" else {}
         places |= {path: place for path, place in old_places.items() if path[: len(keys)] != keys}
         places |= {keys + path: here for path in new_places}

@@ -1,4 +1,4 @@
-"""Problems in a case file, each with the place it stands at."""
+"""Problems in a case file, each with its line and column."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Problem:
 
 
 class CaseError(Exception):
-    """The case cannot be run; its text names every problem with its place, sorted by line."""
+    """A case that cannot be run; the text has all problems with their positions, sorted by line."""
 
     def __init__(self, problems: Iterable[Problem]):
         self.problems = tuple(sorted(problems, key=lambda p: (p.place.line, p.place.column)))
@@ -53,7 +53,7 @@ class CaseError(Exception):
 
 
 def did_you_mean(word: str, options: Iterable[str]) -> str:
-    """The end of a message about an unknown word: the nearest option, or what there is."""
+    """The end of a message about an unknown word: the most similar option, or all options."""
     names = list(dict.fromkeys(options))
     lower = {name.lower(): name for name in names}
     if close := get_close_matches(word.lower(), lower, n=1):

@@ -1,4 +1,4 @@
-"""Section `fluid`: the flow, its grid, what happens on the boundary of the box, and rigid bodies in it."""
+"""Section `fluid`: the flow, its grid, conditions on the boundary of the box, and rigid bodies."""
 
 from __future__ import annotations
 

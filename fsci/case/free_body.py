@@ -20,7 +20,7 @@ HELD = {
 
 
 class PointSpringSection(Section):
-    """Between a point of the body and the place where that is at the start."""
+    """A spring between a point of the body and the position of this point at the start."""
 
     at: NumberVector = setting(..., "the point", unit="m")
     stiffness: Annotated[tuple[NotNegative, ...], EntryCount(2, 3)] = setting(

@@ -35,7 +35,7 @@ Stretches = Annotated[tuple[Stretch, ...], EntryCount(1, None)]
 
 
 class Refinement(Section):
-    """Where cells are halved: in a box, or around the surface of a body where it is at the start."""
+    """A region in which cells are halved: a box, or cells near the surface of a body at its initial position."""
 
     box: Annotated[tuple[NumberVector, ...], EntryCount(2, 2)] | None = setting(
         None, "lowest and highest corner of a box", unit="m"
@@ -84,7 +84,7 @@ class GridSection(Section):
 
     @property
     def graded(self) -> tuple[tuple[Stretch, ...] | None, ...]:
-        """The stretches of each direction, None where there are none."""
+        """The stretches of each direction; None for directions without."""
         return (self.x, self.y, self.z)[: self.dimension]
 
     @property

@@ -1,4 +1,4 @@
-"""Mistakes about meshes that show only beside the rest of the case: files, dimensions, names of surfaces."""
+"""Checks of meshes against the rest of the case: files, dimensions, names of surfaces."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Mistake = tuple[Keys, str]  #: path of the setting, message
 def mesh_mistakes(
     mesh: Mesh, dimension: int | None, folder: Path, keys: Keys, other: str = "another body"
 ) -> Iterator[Mistake]:
-    """Of the mesh of a body; `other` is what has the dimension."""
+    """Mistakes in the dimension of the mesh of a body; other: the part of the case that has the right one."""
     if isinstance(mesh, Shape):
         if mesh.dimension != dimension:
             yield (*keys, "shape"), f"this shape is {mesh.dimension}D, but {other} is {dimension}D"
@@ -39,7 +39,7 @@ def axis_mistakes(axis: tuple[float, ...] | None, dimension: int | None, keys: K
 
 
 def surface_mistakes(mesh: Mesh, name: str, keys: Keys) -> Iterator[Mistake]:
-    """The surfaces of built-in shapes are known."""
+    """Mistakes in the names of surfaces of built-in shapes."""
     if isinstance(mesh, Shape) and name not in mesh.surfaces:
         there = ", ".join(mesh.surfaces)
         hint = did_you_mean(name, mesh.surfaces)

@@ -43,7 +43,7 @@ def _problem(item: dict[str, Any], document: Document) -> Problem:
 
 
 def _wanted(item: dict[str, Any]) -> str:
-    """What is asked of a value, and what was found."""
+    """The message that a value violates a condition, with the value."""
     value = item["input"]
     if value is None:
         return EMPTY

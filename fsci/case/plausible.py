@@ -61,7 +61,7 @@ def _material(case: Case, material: Material, keys: Keys) -> Iterator[tuple[Keys
     constants = _constants(material)
     if constants is None:
         return
-    # Rounded as it is printed: the way through Lame's constants leaves rounding errors.
+    # Rounded as it is printed: the conversion through Lame's constants has rounding errors.
     E = float(f"{young(*constants) * units.stress:.3g}")
     if not STIFFNESSES[0] <= E <= STIFFNESSES[1]:
         key = "E" if getattr(material, "E", None) is not None else "law"

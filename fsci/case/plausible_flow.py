@@ -14,7 +14,7 @@ from fsci.case.shapes import Shape
 from fsci.case.yaml_text import Keys
 from solvers.fluid.fast_bodies import MOST_CELLS
 
-MOST_CELLS_PER_STEP = 10.0  #: that a flow or a body may cross in a time step without being asked about it
+MOST_CELLS_PER_STEP = 10.0  #: above which `check` warns: cells that a flow or a body crosses in a time step
 #: Cells across a body that both of its sides need to share no unknowns: with fewer, fluid passes through the body.
 CELLS_ACROSS_AT_REST, CELLS_ACROSS_IF_MOVING = 2.0, 4.0
 CELLS_ALONG = 6.0  #: of a thin body at rest in 2D, from which on each side has unknowns of its own

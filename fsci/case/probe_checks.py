@@ -1,4 +1,4 @@
-"""Mistakes in `probes` and `verify` that show only beside the rest of the case."""
+"""Checks of `probes` and `verify` against the rest of the case."""
 
 from __future__ import annotations
 

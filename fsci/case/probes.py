@@ -75,17 +75,17 @@ column NAME. In 2D everything is per unit of depth.
 
     @property
     def place(self) -> str:
-        """The setting that says where: pair, at, on, through or none."""
+        """The setting of the location: pair, at, on, through or none."""
         return next((name for name in LOCATIONS if getattr(self, name) is not None), "")
 
     @property
     def fields(self) -> list[str]:
-        """The fields in which there is such a quantity at such a place."""
+        """The fields that have this quantity at this kind of location."""
         return [field for field in FIELDS if self.place in self.measured.locations(field)]
 
     @property
     def measured(self) -> Quantity:
-        """What is known of its quantity."""
+        """The record of its quantity."""
         return QUANTITIES[self.quantity]
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""What probes can measure: each quantity with its places, unit, columns and needs."""
+"""The quantities of probes, each with its locations, unit, columns and requirements."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Literal
 Field = Literal["structure", "fluid", "rigid"]
 FIELDS: tuple[Field, ...] = ("structure", "fluid", "rigid")
 
-#: the setting that says where -> how messages name it
+#: Setting of a location -> its name in messages.
 LOCATIONS = {"pair": "'pair: PAIR'", "at": "'at: [..]'", "on": "'on: SURFACE'", "through": "'through: PATCH'"}
 WHOLE = ""  #: none of them: a body, or all fluid
 
@@ -27,14 +27,14 @@ class Quantity:
     name: str
     powers: tuple[int, int, int]  #: of length, mass and time in its unit; in 2D per unit of thickness
     parts: Literal["one", "vector", "axis", "energies"]
-    structure: tuple[str, ...] = ()  #: settings that say where in a structure
-    fluid: tuple[str, ...] = ()  #: settings that say where in a fluid
+    structure: tuple[str, ...] = ()  #: settings of locations in a structure
+    fluid: tuple[str, ...] = ()  #: settings of locations in a fluid
     needs: tuple[str, ...] = ()  #: of a structure dynamics or density; of a fluid body or reference
-    meaning: str = ""  #: what the name does not tell
-    rigid: tuple[str, ...] = ()  #: settings that say where on a rigid body that the flow moves
+    meaning: str = ""  #: explanation for the input reference
+    rigid: tuple[str, ...] = ()  #: settings of locations on a rigid body that the flow moves
 
     def locations(self, field: Field) -> tuple[str, ...]:
-        """The settings that say where in a field it can be measured."""
+        """The settings of its locations in a field."""
         return {"structure": self.structure, "fluid": self.fluid, "rigid": self.rigid}[field]
 
     def columns(self, name: str, dimension: int) -> tuple[str, ...]:
@@ -81,7 +81,7 @@ QUANTITIES = {quantity.name: quantity for quantity in _ALL}
 
 
 def described(field: Field) -> str:
-    """A list with an entry for each place of a field: what can be measured there."""
+    """A list with an entry for each kind of location of a field: its quantities."""
     return "\n".join(_lines(field))
 
 

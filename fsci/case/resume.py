@@ -1,4 +1,4 @@
-"""The case of a run that goes on: which settings may change then."""
+"""The case of a resumed run: which settings may change."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def integrated(formula: Expression, start: float, dt: float) -> Course:
 
     Exact for polynomials up to degree 15 in each step, so also for lines with kinks at the ends of steps.
     """
-    sums = np.zeros(1)  # at the ends of the steps up to the latest time asked for
+    sums = np.zeros(1)  # at the ends of the steps up to the latest time of a call
 
     def course(t: float) -> tuple[float, float]:
         nonlocal sums

@@ -1,4 +1,4 @@
-"""What all sections of a case file share: strict settings, and errors that say in plain words what is wrong."""
+"""The base class of all sections of a case file: unknown settings are errors, with messages in plain words."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Section(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _prepare(cls, data: Any) -> Any:
-        """An empty list or section is what it would be if absent; unknown names learn the known ones."""
+        """Treat an empty list or section as absent; errors about unknown names list the known ones."""
         if not isinstance(data, dict):
             return data
         fields = {field.alias or name: field for name, field in cls.model_fields.items()}

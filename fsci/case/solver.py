@@ -9,7 +9,7 @@ from fsci.case.values import Count, NotNegative, Positive, Switch
 
 
 class Newton(Section):
-    """When a time step is solved: the residual is small, and the increment too if that is asked for."""
+    """Tolerances of the residual and, if it is given, of the increment."""
 
     residual: Positive = setting(1e-8, "tolerance of the residual, relative to the largest one of the step", unit="1")
     residual_absolute: NotNegative = setting(0.0, "absolute tolerance of the residual", unit="N")

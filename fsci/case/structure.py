@@ -51,7 +51,7 @@ class DynamicsSection(Section):
     @model_validator(mode="before")
     @classmethod
     def _one_form(cls, data: Any) -> Any:
-        """rho_inf or all four parameters; rho_inf = 1 if there is neither."""
+        """Check that either rho_inf or all four parameters are given; rho_inf = 1 without any."""
         if not isinstance(data, dict):
             return data
         given = [name for name in ALPHAS if name in data]

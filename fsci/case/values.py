@@ -1,4 +1,4 @@
-"""Kinds of values that settings take; each reader says in plain words what it does not accept."""
+"""Types of values of settings; each reader explains in plain words why it rejects a value."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def spoken(value: Any) -> str:
 
 
 def value_of(expression: Expression) -> Value:
-    """A number where the expression is one, else the expression itself: a function of position and time."""
+    """A number if the expression is constant, else the expression, a function of position and time."""
     return expression if expression.constant is None else float(expression.constant)
 
 

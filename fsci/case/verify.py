@@ -29,7 +29,7 @@ FRICTION_COLUMNS = ("contact.sticking", "contact.friction")
 
 
 class Check(Section):
-    """A result that the run must reach; exactly one of `relative` and `absolute` says how closely.
+    """A reference value for a result of the run; exactly one of `relative` and `absolute` is its tolerance.
 
     With the largest and smallest value M and m in the window, mean is (M + m)/2 and amplitude (M - m)/2. All values in
     the window must be finite, for `final` only the last one: the time of the first contact is nan before.

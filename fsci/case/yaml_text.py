@@ -1,4 +1,4 @@
-"""YAML 1.2 text as plain data, with the place of every key and value."""
+"""YAML 1.2 text as plain data, with the position of every key and value."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Keys = tuple[str | int, ...]  #: path of a setting, such as ("structure", "bodie
 #: any limit does the same, refuse what is not meant to be a case.
 MOST_VALUES = 20_000
 
-#: what the YAML reader says -> what the author of a case file can use; the first that fits counts
+#: Message of the YAML reader -> message for the author of a case file; the first match applies.
 PLAIN_WORDS = {
     "found character '\\t'": "a tab cannot stand here; indent with spaces",
     "mapping values are not allowed here": "unexpected ':'; check the indentation, and quote a text with ': ' in it",
@@ -39,7 +39,7 @@ PLAIN_WORDS = {
     "that cannot start any token": "a value cannot begin with this character; put it in quotes",
     "found undefined alias": "there is no section marked with '&' and this name",
 }
-#: the same for what is opened and not closed: the place is where it is opened
+#: The same for brackets and quotes that are not closed; the position is that of the opening one.
 UNCLOSED = {
     "expected ',' or ']'": "this list needs ',' or ']'",
     "expected ',' or '}'": "this section needs ',' or '}'",
@@ -58,7 +58,7 @@ class Parsed:
 
 
 def parse_yaml(text: str, source: str) -> Parsed:
-    """Read a text; raises CaseError with places in `source`."""
+    """Read a text. Raises CaseError with positions in `source`."""
     reader = _Reader(text, source)
     try:
         node = YAML(typ="safe", pure=True).compose(text)
@@ -86,7 +86,7 @@ def _plain(problem: str) -> tuple[str, bool]:
 
 
 class _Reader:
-    """Turns YAML nodes into data and notes their places."""
+    """Converts YAML nodes to data and stores their positions."""
 
     def __init__(self, text: str, source: str):
         self.text, self.source = text, source

@@ -1,1 +1,1 @@
-"""What `fsci check` says of a case."""
+"""The command `fsci check`: mistakes, warnings and cost of a case."""

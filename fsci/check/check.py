@@ -1,4 +1,4 @@
-"""What `fsci check` says about a good case."""
+"""The text of `fsci check` for a valid case."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _structure(case: Case, structure: StructureSection, meshes: Mapping[str, Bod
 
 
 def structure_dofs(structure: StructureSection, meshes: Mapping[str, BodyMesh]) -> int | None:
-    """Unknowns of all elastic bodies; None if a mesh is not known."""
+    """Unknowns of all elastic bodies; None if a mesh file cannot be read."""
     total = 0
     for name, body in structure.bodies.items():
         if isinstance(body.mesh, Shape):

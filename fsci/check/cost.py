@@ -58,7 +58,7 @@ def estimate(case: Case, structure: int | None, table: Table, dimension: int | N
 
 
 def in_words(case: Case, meshes: Mapping[str, Mesh]) -> str:
-    """One line about a case, nothing if its size is not known."""
+    """One line on the cost of a case; empty if its size is unknown."""
     structure = None if case.structure is None else structure_dofs(case.structure, meshes)
     dimension = next((mesh.points.shape[1] for mesh in meshes.values()), None)
     cost = estimate(case, structure, costs(), dimension)
@@ -95,7 +95,7 @@ def _memory(points: Sequence[Point], dofs: float) -> float:
 
 
 def _power(points: Sequence[tuple[float, float]], at: float) -> float:
-    """Straight between points in logarithms; the last piece goes on above, and below the first value stays."""
+    """Logarithmic interpolation; extrapolated above by the last interval, constant below."""
     if at <= points[0][0]:
         return points[0][1]
     last = next((i for i in range(1, len(points)) if at <= points[i][0]), len(points) - 1)

@@ -56,7 +56,7 @@ class Findings:
         self.problems += case.error(keys, message).problems
 
     def note(self, case: Case, keys: Keys, mesh: Mesh) -> None:
-        """Keep what was changed when the mesh of a body was read."""
+        """Store the note on changes when the mesh of a body was read."""
         if mesh.note:
             self.notes.append(f"{case.place(*keys, 'mesh')}: {mesh.note}")
 

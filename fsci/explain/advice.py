@@ -1,4 +1,4 @@
-"""What to try: from the reason of a failure and the course of its residuals, or from where the time of a run went."""
+"""Advice by the reason of a failure and its residuals, or by the parts that take most of the time of a run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from fsci.case import Case
 from fsci.explain.residuals import Course
 
-#: part of a reason -> what to try
+#: Part of a reason -> advice.
 REASONS = {
     "inverted": (
         "a smaller time.step: the load or the motion of a step is too large for the elements",
@@ -32,7 +32,7 @@ REASONS = {
     "linear solver": ("solver.linear.method=direct", "solver.linear.tolerance=1e-6"),
 }
 
-#: course of the residuals -> what it means, what to try
+#: Course of the residuals -> meaning and advice.
 COURSES = {
     "not finite": ("the residual is not a number: it cannot be evaluated at the last iterate", ()),
     "diverges": ("the residuals grow", ("a smaller time.step", "loads that grow from zero: ramp(t, 0, 0.5)")),

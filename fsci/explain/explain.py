@@ -1,4 +1,4 @@
-"""The text of `fsci explain`: of a failed run where and how the step failed, of others where the time went."""
+"""The text of `fsci explain`: for a failed run how and where the step failed, for others the time by part."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SLOWEST = 3  #: steps that are named
 
 
 def explain(out: Path, replay: Path | None = None) -> str:
-    """Why the run in folder `out` failed, or where its time went; `replay`: a folder to make for the failed step.
+    """The reason why the run in folder `out` failed, or its time by part; replay: a folder for the failed step.
 
     Raises FileNotFoundError if no run has ended there, ValueError for a replay of a run that did not fail.
     """
@@ -61,7 +61,7 @@ def _steps(summary: Mapping[str, Any], out: Path) -> Iterator[str]:
 
 
 def _failure(folder: Path, what: Mapping[str, Any], case: Case) -> Iterator[str]:
-    """Field, reason, place, residuals, and what to try."""
+    """Field, reason, position, residuals and advice."""
     residuals = tuple(float("nan") if r is None else float(r) for r in what["residuals"])
     yield f"failed step    {what['step']}, from time {what['time']:.6g} with dt {what['dt']:.3g}"
     yield f"field          {what['field']}"

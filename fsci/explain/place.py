@@ -1,4 +1,4 @@
-"""What is at the place of a failure: body, node, cell, its fields, and the contact pairs of that body."""
+"""The position of a failure: body, node, cell, values of fields, and contact pairs of the body."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fsci.case import Case
 
 @dataclass(frozen=True)
 class Nearest:
-    """The node of the written fields nearest to a place."""
+    """The node of the written fields nearest to a position."""
 
     part: str  #: body, or fluid
     node: int
@@ -50,7 +50,7 @@ def pairs_of(case: Case, body: str) -> list[str]:
 
 
 def describe(near: Nearest, case: Case) -> list[str]:
-    """Lines that say what is there."""
+    """Lines of text on body, node, cell and fields at the position."""
     lines = [f"nearest node   {near.node} of {near.part}, in its cell {near.cell}, {near.distance:.3g} m away"]
     for name, value in near.values.items():
         numbers = ", ".join(f"{component:.4g}" for component in np.atleast_1d(value))

@@ -33,7 +33,7 @@ SCRIPTS = (".geo", ".geo_unrolled")
 
 
 class MeshError(Exception):
-    """A mesh that cannot be built as asked; the message says why, for the user."""
+    """A mesh that cannot be built; the message gives the user the reason."""
 
 
 def unknown(kind: str, name: str, names: Iterable[str]) -> MeshError:
@@ -126,7 +126,7 @@ def _mesh(content: Content) -> Mesh:
 
 
 def _completed(content: Content) -> tuple[Content, str]:
-    """Cells of 8 and 20 nodes become those of 9 and 27, and a note for the user says so."""
+    """Convert cells of 8 and 20 nodes to those of 9 and 27, with a note to the user."""
     types = sorted({(-block.dim, block.cell_type) for block in content.blocks if block.cell_type in FULL})
     if not types:
         return content, ""
@@ -137,7 +137,7 @@ def _completed(content: Content) -> tuple[Content, str]:
 
 
 def _once(cells: Indices) -> tuple[Indices, Indices]:
-    """The cells, and where each went: some formats repeat a cell for every group it belongs to."""
+    """(distinct cells, index of each given cell among them): some formats repeat a cell for each of its groups."""
     _, first, same = np.unique(np.sort(cells, axis=1), axis=0, return_index=True, return_inverse=True)
     kept = np.sort(first)
     return cells[kept], np.searchsorted(kept, first[same])
@@ -160,7 +160,7 @@ def _positive(mesh: Mesh) -> Indices:
 
 
 def _regions(content: Content, dim: int, place: Indices) -> dict[str, Indices]:
-    """Groups of cells; `place` takes the file's cells to the mesh's."""
+    """Groups of cells; place: index in the mesh of each cell of the file."""
     sizes = [len(block.nodes) if block.dim == dim else 0 for block in content.blocks]
     start = np.cumsum([0, *sizes])
     parts: dict[str, list[Indices]] = {}
@@ -275,7 +275,7 @@ def _check_parameters(path: Path, parameters: Mapping[str, float]) -> None:
 
 
 def _gmsh_content() -> Content:
-    """The current model: its physical groups, and all of the highest dimension if there is no group of it."""
+    """The current model of gmsh: its physical groups, or all cells of the highest dimension if it has none."""
     import gmsh
 
     tags, coordinates, _ = gmsh.model.mesh.getNodes()

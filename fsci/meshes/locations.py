@@ -1,4 +1,4 @@
-"""Where supports and loads act: what a case says of it, found in the mesh of a body."""
+"""The surfaces and nodes in the mesh of a body on which supports and loads of a case act."""
 
 from __future__ import annotations
 

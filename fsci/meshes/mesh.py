@@ -1,4 +1,4 @@
-"""The mesh a case asks for: a built-in shape or a file, put in its place, its parts found by name."""
+"""The mesh of a body in a case: from a built-in shape or a file, transformed, with its named parts."""
 
 from __future__ import annotations
 

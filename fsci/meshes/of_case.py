@@ -1,4 +1,4 @@
-"""The meshes of a case with what the case names in them: the mistakes that only they show, for `check` and a run.
+"""The meshes of a case, with checks of the surfaces and regions that the case names, for `check` and a run.
 
 Nothing here needs a finite element.
 """
@@ -83,7 +83,7 @@ _NO_MASS_LEFT = (
 
 
 def _named_surfaces(case: Case, name: str) -> Iterator[tuple[Keys, str]]:
-    """(where, surface name) of every surface that contact and probes of a body name."""
+    """(setting, name) of every surface that contact and probes of a body name."""
     for pair_name, pair in ({} if case.contact is None else case.contact.pairs).items():
         for role, side in dict(pair.sides).items():
             for surface in side.on or () if side.body == name else ():
@@ -94,7 +94,7 @@ def _named_surfaces(case: Case, name: str) -> Iterator[tuple[Keys, str]]:
 
 
 def _check_lengths(case: Case, name: str, dim: int) -> None:
-    """Vectors have as many entries as the mesh has dimensions; for files only the mesh tells."""
+    """Check that vectors have one entry per dimension of the mesh, which is known for files only after reading."""
     body = case.elastic_bodies[name]
     base = ("structure", "bodies", name)
     vectors: list[tuple[Keys, Any]] = [((*base, key), getattr(body, key)) for key in VECTORS]

@@ -1,4 +1,4 @@
-"""Gmsh scripts of a case must not run programs or write files: what could do so is refused before gmsh reads it.
+"""Gmsh scripts of a case must not run programs or write files: commands that could are rejected before gmsh reads them.
 
 Gmsh takes any file that is not of a known format for a script, whatever its name, and with FILE it reads FILE.opt.
 The grammar is that of Gmsh.l and Gmsh.y in Gmsh's sources (4.15).

@@ -1,4 +1,4 @@
-"""Cells with 8 and 20 nodes get the middle nodes that cells with 9 and 27 have; their shape stays what it was.
+"""Conversion of cells with 8 and 20 nodes to cells with 9 and 27: middle nodes are added, the geometry is unchanged.
 
 Quadrilaterals of 8 nodes have -1/4 of the corners and 1/2 of the mid nodes in the middle, hexahedra of 20 nodes -1/4
 and 1/4, their serendipity functions there. Displacements are full quadratic then: more accurate, not the same.

@@ -12,7 +12,7 @@ from fsci.case.quantities import QUANTITIES
 from fsci.run.history import COLUMNS, History
 
 SIZE = (8.0, 5.0)  #: of a picture in inches; 1600 x 1000 pixels
-PANEL = 2.2  #: inches of height of each panel where there are several
+PANEL = 2.2  #: height of each of several panels [inch]
 DOTS = 200  #: per inch
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  #: told apart by colour-blind readers
 STYLE: Any = {
@@ -43,7 +43,7 @@ POWERS = {
     "contact_gap": (1, 0, 0),
 }
 
-#: balances in the history -> what they are; all would be zero without errors of solvers and time steps
+#: Balances in the history -> their titles; all vanish without errors of solvers and time steps.
 BALANCES = {
     "structure.energy": ("error of the structure's energy", "energy"),
     "fluid.mass": ("error of the fluid's volume", "flow_rate"),
@@ -54,7 +54,7 @@ BALANCES = {
     "interface.force": ("relative error of the forces at the interface", ""),
 }
 NODES = "contact nodes"  #: a panel
-CONTACT = "contact."  #: what columns of contact begin with
+CONTACT = "contact."  #: prefix of the columns of contact
 NEGLIGIBLE, SMALL = (
     1e-3,
     0.05,
@@ -70,7 +70,7 @@ DERIVED = {
 
 
 def label(text: str, quantity: str, units: Mapping[str, str]) -> str:
-    """A text with the unit of a quantity in brackets; without them if the quantity is not known."""
+    """A text with the unit of a quantity in brackets, or without a unit for unknown quantities."""
     text = text.replace("von_mises", "von Mises stress").replace("_", " ")
     powers = POWERS.get(quantity, (0, 0, 0))
     if not any(powers):
@@ -167,7 +167,7 @@ def plot_panels(
 
 
 def add_legend(axes: Any) -> None:
-    """Names of curves above the right end of a panel, where no power of ten and no title is."""
+    """Names of curves above the right end of a panel, which is free of titles and powers of ten."""
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, borderaxespad=0.2)
 
 

@@ -1,4 +1,4 @@
-"""Pictures of a run, finished or not, drawn from what it left in its folder."""
+"""Pictures of a run, finished or not, from the files in its results folder."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from fsci.run.history import read_history
 from fsci.run.output import Series, read_collection
 from fsci.run.results_folder import list_pictures
 
-STRUCTURE_FIELDS = ("displacement",)  #: what is drawn if nothing is asked for
+STRUCTURE_FIELDS = ("displacement",)  #: default field of structures
 FLUID_FIELDS = ("velocity", "pressure")
 PRESSURE = "contact_pressure"
-OBLIQUE = 0.8  #: how far from the side a contact surface is seen
+OBLIQUE = 0.8  #: sideways component of the view of a contact surface, relative to its normal
 CROP = 1.0  #: percent of the points of a flow in space whose values may lie above the colour bar
 
 Moment = tuple[tuple[float, Path], ...]  #: (time, VTU file) of each part at one output time
@@ -30,11 +30,11 @@ Moment = tuple[tuple[float, Path], ...]  #: (time, VTU file) of each part at one
 
 @dataclass(frozen=True)
 class Labels:
-    """What the case file of a run says about the texts in its pictures."""
+    """Texts in the pictures of a run, from its case file."""
 
     title: str
     units: Mapping[str, str] = field(default_factory=lambda: {"length": "m", "mass": "kg", "time": "s"})
-    quantities: Mapping[str, str] = field(default_factory=dict)  #: probe -> what it measures
+    quantities: Mapping[str, str] = field(default_factory=dict)  #: probe -> its quantity
 
 
 def plot_run(out: Path, *, movie: bool = False, field: str | None = None, times: Sequence[float] = ()) -> list[Path]:
@@ -121,7 +121,7 @@ def plot_mesh(path: Path, moment: Moment, labels: Labels) -> Path:
 
 
 def plot_pressure(path: Path, moment: Moment, labels: Labels) -> Path:
-    """Draws the contact pressure on the bodies that have some, seen from the side where it acts."""
+    """Draw the contact pressure on the bodies that have one, viewed from the side on which it acts."""
     loaded = [load_body(file, PRESSURE) for time, file in moment if has_contact(((time, file),))]
     # between the nodes of second-order cells the interpolated pressure may be negative
     bodies = [replace(body, values=np.maximum(body.values, 0.0)) for body in loaded if body.values is not None]
@@ -133,7 +133,7 @@ def plot_pressure(path: Path, moment: Moment, labels: Labels) -> Path:
 
 
 def look_at(normal: Array) -> Array:
-    """The direction from which a surface with this outward normal is seen, a little from the side."""
+    """The direction of view onto a surface with this outward normal, slightly from the side."""
     length = np.linalg.norm(normal)
     if length == 0.0:
         return ISOMETRIC

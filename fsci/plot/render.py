@@ -52,7 +52,7 @@ class View:
 
 @cache
 def import_pyvista() -> Any:
-    """pyvista, told to render without a display: by OSMesa where it is installed, else by EGL."""
+    """pyvista, set to render without a display: by OSMesa if it is installed, else by EGL."""
     if ctypes.util.find_library("OSMesa"):
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
     elif ctypes.util.find_library("EGL"):
@@ -168,7 +168,7 @@ def render(
 
 
 def photograph(plotter: Any, view: View, away: Array, size: tuple[int, int]) -> Any:
-    """The scene of a plotter as an image, seen along `away` onto the centre of the view; closes the plotter."""
+    """The scene of a plotter as an image, viewed along `away` to the centre of the view; closes the plotter."""
     from PIL import Image
 
     distance = 10 * np.hypot(view.half_width, view.half_height)

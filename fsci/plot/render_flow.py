@@ -42,7 +42,7 @@ def load_state(files: Sequence[Path], field: str) -> list[DrawnBody]:
         parts = [replace(part, values=None) for part in parts]
     if is_flat(flow):
         return [plane_flow(flow, field), *parts]
-    # The edges of elements would hide how the flow goes round a body.
+    # The edges of elements would hide the flow around a body.
     return _spatial_flow(flow, field, meshes[1:]) + [replace(part, edges=NO_LINES) for part in parts]
 
 
@@ -89,7 +89,7 @@ def is_flat(mesh: Any) -> bool:
 
 
 def plane_flow(mesh: Any, field: str) -> DrawnBody:
-    """A flow in the plane (x, y), with streamlines if its velocity is asked for."""
+    """A 2D flow, with streamlines if the field is its velocity."""
     surface = mesh.extract_surface(algorithm="dataset_surface")
     lines = _plane_streamlines(mesh) if field.partition(".")[0] == STREAMLINES else NO_LINES
     return DrawnBody(surface, lines, NO_LINES, field_values(surface.point_data, field), line_colour="white")

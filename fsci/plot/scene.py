@@ -14,7 +14,7 @@ from fsci.plot.render import ISOMETRIC, Array, DrawnBody, Pixels, View, axes_of_
 
 Rectangle = tuple[float, float, float, float]  #: left, bottom, width, height in parts of the figure
 
-#: where the picture and its colour bar are, beside each other
+#: Rectangles of the picture and of its colour bar in the figure.
 UPRIGHT = ((0.125, 0.12, 0.70, 0.785), (0.85, 0.16, 0.018, 0.70))
 SPATIAL = ((0.02, 0.05, 0.80, 0.855), (0.85, 0.16, 0.018, 0.70))
 TALL = ((0.02, 0.04, 0.76, 0.87), (0.82, 0.16, 0.024, 0.66))
@@ -29,13 +29,13 @@ class Scene:
     """What the states of a run have in common when they are drawn."""
 
     view: View
-    flat: bool  #: bodies in the plane: seen from the front, with coordinates at the axes
+    flat: bool  #: 2D bodies, viewed from the front, with coordinates at the axes
     limits: tuple[float, float]  #: values at the ends of the colour bar
     colours: str  #: name of the colour map
     title: str
-    label: str  #: of the colour bar; without colours there is none
+    label: str  #: label of the colour bar; empty without colours
     units: Mapping[str, str]  #: of length, mass and time
-    extend: str  #: where values lie beyond the colour bar: neither, max or both
+    extend: str  #: ends of the colour bar that values exceed: neither, max or both
     layout: tuple[Rectangle, Rectangle]  #: of the picture and of the colour bar
     size: tuple[float, float]  #: of the figure, in inches
 
@@ -125,7 +125,7 @@ def draw(scene: Scene, bodies: list[DrawnBody], time: float, *, dots: int) -> An
 
 
 def animate(scene: Scene, states: Iterable[tuple[float, list[DrawnBody]]], *, dots: int) -> Iterator[Pixels]:
-    """The pictures of many states (time, bodies), shape (height, width, 3); what stays is drawn only once."""
+    """Pictures of many states (time, bodies), shape (height, width, 3); fixed parts are drawn once."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     figure, image, title = lay_out(scene, dots)
@@ -173,7 +173,7 @@ def lay_out(scene: Scene, dots: int) -> tuple[Any, Any, Any]:
 def draw_colour_bar(
     figure: Any, place: Rectangle, limits: tuple[float, float], colours: str, label: str, *, extend: str = "neither"
 ) -> None:
-    """The colours and what they mean, in a rectangle of the figure; with arrows where values lie beyond, `extend`."""
+    """Draw the colour bar in a rectangle of the figure; extend: ends with arrows."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 

@@ -92,7 +92,7 @@ def arrange(count: int, width: float, height: float) -> tuple[int, int]:
     def shape(columns: int) -> float:
         return columns * width / (-(-count // columns) * height)
 
-    full = [columns for columns in range(1, count + 1) if -count % columns <= count // 5]  # few empty places
+    full = [columns for columns in range(1, count + 1) if -count % columns <= count // 5]  # few empty panels
     columns = min(full, key=lambda columns: abs(np.log(shape(columns) / SHAPE)))
     return columns, -(-count // columns)
 
@@ -112,7 +112,7 @@ def plane_state(files: Sequence[Path]) -> tuple[list[DrawnBody], Axes, str]:
 
 
 def cut(meshes: Sequence[Any], normal: str, origin: Array) -> Iterator[DrawnBody]:
-    """What an upright plane cuts of a box in space and of the bodies in it, seen from the front."""
+    """The section of a 3D flow and its bodies with a vertical plane, viewed from the front."""
     order = [1, 2, 0] if normal == "x" else [0, 2, 1]
     for mesh in meshes:
         section = mesh.slice(normal=normal, origin=origin)

@@ -33,7 +33,7 @@ def heading(text: str) -> str:
 
 
 def section(title: str, *content: str) -> str:
-    """A heading with what is below it; nothing if there is nothing."""
+    """A heading with its content; empty without content."""
     inner = "\n".join(text for text in content if text)
     return f"<h2>{escape(title)}</h2>\n{inner}" if inner else ""
 
@@ -71,7 +71,7 @@ def bars(parts: Mapping[str, float], unit: str) -> str:
 
 
 def pictures(files: Iterable[Path]) -> str:
-    """PNG and GIF files with their names, two beside each other where the window is wide."""
+    """PNG and GIF files with their names, in two columns in wide windows."""
     figures = []
     for file in files:
         data = b64encode(file.read_bytes()).decode("ascii")
@@ -82,10 +82,10 @@ def pictures(files: Iterable[Path]) -> str:
 
 
 def preformatted(text: str) -> str:
-    """A text with its lines and spaces as they are."""
+    """Preformatted text."""
     return f"<pre>{escape(text)}</pre>" if text else ""
 
 
 def folded(title: str, text: str) -> str:
-    """A long text that opens when asked for."""
+    """A long text that the reader can expand."""
     return f"<details><summary>{escape(title)}</summary>{preformatted(text)}</details>" if text else ""

@@ -1,4 +1,4 @@
-"""One page of a run: what it was, whether it can be trusted, how it looks, where its time went."""
+"""The HTML report of a run: settings, checks and balances, pictures, and time by part."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _run(summary: Mapping[str, Any]) -> str:
 
 
 def _failure(out: Path, summary: Mapping[str, Any]) -> str:
-    """What `fsci explain` says of a failed run."""
+    """The text of `fsci explain` for a failed run."""
     if summary["status"] != "failed":
         return ""
     from fsci.explain.explain import explain

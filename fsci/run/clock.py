@@ -1,4 +1,4 @@
-"""Time of a run: steps of the case's size, halved where they fail, on a grid that rounding cannot leave."""
+"""The clock of a run: steps of the case, halved where they fail, at integer multiples that rounding does not shift."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Clock:
         return count | {"time": self.time}
 
     def restore(self, state: State) -> None:
-        """Go on where a clock was saved; with another step size than it had, from its time on."""
+        """Restore a saved clock; with another step size, it continues from the saved time."""
         self.tick, self.level = state["tick"], min(state["level"], self.halvings)
         self.accepted, self.step = state["accepted"], state["step"]
         if self.time != state["time"]:

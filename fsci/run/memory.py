@@ -1,4 +1,4 @@
-"""Whether a case fits into the memory there is: asked before anything is allocated."""
+"""Check whether a case fits into memory, before anything is allocated."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_UNKNOWNS = 2**31 - 1
 
 
 def unknowns(case: Case) -> dict[Keys, int]:
-    """Setting that decides how many -> unknowns, where they are known without reading a mesh file."""
+    """Setting that determines the count -> unknowns, as far as no mesh file is needed."""
     found: dict[Keys, int] = {}
     for name, body in case.elastic_bodies.items():
         if isinstance(body.mesh, Shape):

@@ -26,7 +26,7 @@ COLUMNS = {
 
 
 class Monitor:
-    """Shows the progress of a run on `stream` and in a log file; says nothing unless `enabled` (rank 0).
+    """Shows the progress of a run on `stream` and in a log file; silent unless `enabled` (rank 0).
 
     `live` allows colours and a progress bar on a terminal; mpirun gives its processes one that is none.
     """
@@ -105,7 +105,7 @@ class Monitor:
         self.warn(f"{failure}; repeated with dt = {dt:.3g}")
 
     def warn(self, text: str) -> None:
-        """Something the user should know."""
+        """A note to the user."""
         self.say(f"warning: {text}", style="yellow")
 
     def finish(self, text: str, *, ok: bool = True) -> None:
@@ -166,7 +166,7 @@ def start_progress(stream: TextIO) -> Any:
 
 
 def console(progress: Any, stream: TextIO) -> Any:
-    """Where rich writes: above the bar while there is one."""
+    """The stream of rich, above the progress bar if there is one."""
     from rich.console import Console
 
     return progress.console if progress else Console(file=stream)

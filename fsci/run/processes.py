@@ -31,7 +31,7 @@ def ending_together(comm: Any, *shared: type[Exception]) -> Iterator[None]:
 
 
 def describe(error: BaseException) -> str:
-    """What the user has to know: the message of a failing disk or of too little memory, else all of the traceback."""
+    """The message for the user: that of a disk or memory error, else the traceback."""
     if isinstance(error, MemoryError):
         return "there is not enough memory"
     if isinstance(error, KeyboardInterrupt):

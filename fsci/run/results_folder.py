@@ -14,7 +14,7 @@ from fsci.case import Case, CaseError
 from fsci.case.errors import Place, Problem
 from fsci.run.output import write_text
 
-#: A folder with this file was made by a run; a later run may replace what runs write there.
+#: A folder with this file was created by a run; a later run may replace the files of runs in it.
 MARKER = ".fsci-run"
 MARKER_TEXT = "The results of a run of fsci. Another run into this folder replaces the files that runs write.\n"
 
@@ -60,7 +60,7 @@ def keep_case(case: Case, folder: Path) -> None:
 
 
 def list_pictures(folder: Path, drawn: list[Path]) -> None:
-    """Note the pictures in a folder, so that the next run knows which of its files are pictures of the last."""
+    """Write a list of the pictures in a folder, so that the next run can tell them from files of the user."""
     listed = folder / PICTURE_LIST
     names = set(listed.read_text(encoding="utf-8").splitlines()) if listed.exists() else set()
     write_text(listed, "".join(f"{name}\n" for name in sorted(names | {path.name for path in drawn})))
@@ -71,7 +71,7 @@ def _refused(out: Path, message: str) -> CaseError:
 
 
 def _copy(source: Path, target: Path) -> None:
-    """Replace `target` whole or not at all; a link is replaced, not what it points to."""
+    """Replace `target` atomically; a link itself is replaced, not its target."""
     if source.resolve() == target.resolve():
         return
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -112,14 +112,14 @@ def _named_files(case: Case) -> Iterator[tuple[str, str, str | None]]:
 
 
 def _copies(case: Case, out: Path) -> Iterator[Path]:
-    """Where copies of meshes and curves will stand, unless the file there is the one that is copied."""
+    """Paths of the copies of meshes and curves, except those that are the originals themselves."""
     for _, given, kept in _files(case):
         if (case.folder / given).resolve() != (out / kept).resolve():
             yield out / kept
 
 
 def _set_aside(path: Path) -> None:
-    """Rename what stands at `path`, if anything: NAME.old, NAME.old2, ..."""
+    """Rename an existing file or folder: NAME.old, NAME.old2, ..."""
     if path.exists() or path.is_symlink():
         names = (path.with_name(f"{path.name}.old{number or ''}") for number in (0, *range(2, 1000)))
         path.rename(next(free for free in names if not free.exists()))

@@ -1,4 +1,4 @@
-"""A run: steps through time with retries, checkpoints, output; stops cleanly when asked to; resumes."""
+"""The run loop: time steps with retries, checkpoints and output; clean stop and resumption."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Run:
     def __post_init__(self) -> None:
         time = self.case.time
         self.root = self.comm.rank == 0
-        # a steady flow does not know the size of the step: half of it is the same problem again, with bodies or without
+        # a steady flow does not depend on the step: half of it is the same problem again, with bodies or without
         steady = self.case.fluid is not None and self.case.fluid.scheme == "steady"
         halvings = 0 if steady else time.retry.halvings
         self.clock = Clock(time.start, time.end, time.step, halvings, time.retry.recover_after)
@@ -124,7 +124,7 @@ class Run:
             return self._watched_loop()
 
     def _initialise(self, simulation: Simulation) -> None:
-        """The state at the first time. Raises CaseError if there is none: a smaller step would not help."""
+        """Set the state at the first time. Raises CaseError if it cannot be computed: a smaller step would not help."""
         try:
             with self.record.timer("start"):
                 simulation.initialise(self.case.time.start, self.case.time.step)
@@ -152,7 +152,7 @@ class Run:
 
     @contextmanager
     def _shown(self) -> Iterator[None]:
-        """What happens is shown, and said in the log."""
+        """Show messages to the user and write them to the log."""
         from solvers import fem
 
         self.monitor = Monitor(enabled=self.root, live=self.comm.size == 1, log=self.out / "log.txt")
@@ -181,7 +181,7 @@ class Run:
                 raise OSError(error.errno, f"{describe(error)}. {self._rescue()}") from error
 
     def _rescue(self) -> str:
-        """Write the state of the last accepted step where that is still possible: other files cannot be written."""
+        """Try to write the state of the last accepted step after other files could not be written."""
         if not self.root:
             return "The last good state is on process 0."
         step, own = self.good_at["step"], self.out / "checkpoint"
@@ -195,7 +195,7 @@ class Run:
         return f"The state after step {step} could not be written either."
 
     def _asked_to_stop(self) -> bool:
-        """Any process got a signal, or there is a file STOP in the results folder."""
+        """Whether any process got a signal, or the results folder has a file STOP (collective)."""
         asked = self.stop.asked or (self.root and (self.out / "STOP").exists())
         return bool(self.comm.allreduce(int(asked)))
 
@@ -240,7 +240,7 @@ class Run:
             self._keep()
 
     def _keep(self) -> None:
-        """Keep the state of the last accepted step: a step that fails is taken back, a checkpoint may be asked for."""
+        """Store the state of the last accepted step, for retries and checkpoints."""
         from solvers.distributed import gather
 
         with self.record.timer("checkpoint"):
@@ -278,7 +278,7 @@ class Run:
                 write_checkpoint(self.out / "checkpoint", state, self.good_at)
 
     def _keep_failure(self, failure: StepFailed) -> None:
-        """Folder `failure`: the case, where it failed, and the fields of the iterate that failed."""
+        """Write the folder `failure`: the case, the position of the failure, and the fields of the last iterate."""
         snapshots = self.simulation.snapshots()
         if not self.root:
             return
@@ -321,7 +321,7 @@ class Run:
         return self.comm.bcast(code, root=0)
 
     def _give_up(self) -> None:
-        """End all processes within a step, on a signal: what counts is the last accepted one."""
+        """End all processes within a step after a signal; results end with the last accepted step."""
         code = FAILED
         try:
             self._write_checkpoint()

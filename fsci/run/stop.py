@@ -52,7 +52,7 @@ class StopWatch:
         os.close(self._write)
 
     def ended(self) -> None:
-        """The loop writes by itself what is to be kept."""
+        """Nothing to do: the run loop writes its own state."""
         self._ended.set()
 
     def _on_signal(self, number: int, frame: Any) -> None:

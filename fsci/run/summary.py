@@ -1,4 +1,4 @@
-"""summary.json: what a run was, what it took and what came out."""
+"""summary.json: settings, cost and results of a run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from solvers.timing import Timer
 
 @dataclass
 class RunRecord:
-    """What the history does not keep: retries, Newton residuals of the steps asked for, where time goes."""
+    """Data of a run that the history does not have: retries, residuals of recorded steps, time by part."""
 
     residual_steps: Collection[int] = ()  #: steps whose residuals summary.json keeps
     residuals: dict[int, list[float]] = field(default_factory=dict)  #: step -> residual norms, first to last
@@ -149,7 +149,7 @@ def memory_mb() -> float:
 
 
 def versions() -> dict[str, str]:
-    """Of the program and what its results depend on."""
+    """Versions of the program and of the libraries that affect its results."""
     from importlib import metadata
 
     from petsc4py import PETSc

@@ -1,6 +1,6 @@
 """Structured lattices of nodes: lines, discs, spheres, their products, and the cells picked from them.
 
-Nodes are identified by integers, never by distance: seams are joined exactly, wherever the points move.
+Nodes are identified by integers, not by distance, so that seams are joined exactly for any coordinates.
 """
 
 from __future__ import annotations
@@ -172,7 +172,7 @@ def _simplices(nodes: Indices, cell_type: str, order: int) -> Indices:
     inside_out = np.linalg.det(corners[:, :, 1:] - corners[:, :, :1]) < 0
     corners[inside_out] = corners[inside_out][:, [0, 2, 1, *range(3, directions + 1)]]
 
-    # the sum of two corners (0 or 1) is the middle between them, counted in half cells
+    # the sum of two corners (0 or 1) is their midpoint in half cells
     groups = [(group[0], group[-1]) for group in CELL_TYPES[cell_type].nodes]
     position = np.stack([corners[:, :, a] + corners[:, :, b] for a, b in groups], axis=2) * order // 2
     cell = np.arange(count)[:, None, None]

@@ -1,4 +1,4 @@
-"""Built-in shapes of two dimensions."""
+"""Built-in shapes in 2D."""
 
 from __future__ import annotations
 

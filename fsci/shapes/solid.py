@@ -1,4 +1,4 @@
-"""Built-in shapes of three dimensions: plane sections led along a line or around a circle, and the sphere."""
+"""Built-in shapes in 3D: plane sections extruded along a line or a circle, and spheres."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Draws of hard cases, each against its twin: `fsci stress`."""
+"""Randomised tests, `fsci stress`: random cases, each compared with an equivalent twin."""

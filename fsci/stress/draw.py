@@ -1,4 +1,4 @@
-"""A draw: a scene, and its twin - the same thing done otherwise, with a result that must be the same."""
+"""A draw: a random case and its twin, an equivalent case whose results must be the same."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ TWINS: tuple[Twin, ...] = ("rotated", "shifted", "rescaled", "parallel", "resume
 
 @dataclass(frozen=True)
 class Draw:
-    """What one number makes."""
+    """The case and twin of one random seed."""
 
     seed: int
     scene: StressScene
@@ -58,7 +58,7 @@ class Draw:
         }[self.twin]
 
     def case(self, frame: Frame) -> dict[str, Any]:
-        """The case file's content as the scene is seen in a frame."""
+        """The content of the case file in a frame."""
         return {
             "title": f"{self.scene.name} {self.seed}",
             **self.scene.case(frame),
@@ -69,7 +69,7 @@ class Draw:
 
 
 def draw(seed: int) -> Draw:
-    """The same for the same number, whatever was drawn before."""
+    """The draw of a number, which does not depend on earlier draws."""
     chance = random.Random(seed)
     kinds = SPACE_SCENES if seed >= SPACE else SCENES
     scene = kinds[chance.choice(sorted(kinds))](chance)

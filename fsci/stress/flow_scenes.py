@@ -1,4 +1,4 @@
-"""Scenes with a flow: bodies that are moved, elastic ones, and such that fall to the floor."""
+"""Scenes with a flow: prescribed motion, elastic bodies, and bodies that fall to the floor."""
 
 from __future__ import annotations
 

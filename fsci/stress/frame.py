@@ -1,4 +1,4 @@
-"""The same scene seen otherwise: rotated, shifted, in other units. What comes out is brought back and must agree."""
+"""Frames: a scene rotated, shifted or in other units. Results are transformed back and must agree."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a draw was: right, refused with a message, or wrong."""
+"""Verdict on a draw: right, rejected with a message, or wrong."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from solvers.structure.energy import GAIN
 #: edge: rounding decides, as where a surface lies in a plane of the grid; the results on both sides are near
 Verdict = Literal["right", "edge", "refused", "wrong"]
 
-#: Of the largest value of a probe: by how much twins may differ. Newton's method stops at 1e-10 of the first residual.
+#: Difference of twins, relative to the largest value of a probe. Newton's method stops at 1e-10 of the first residual.
 AGREEMENT = 1e-6
-#: Of the largest flow or force: what a balance that only the solver disturbs may miss.
+#: Error of a balance by the tolerance of the solver, relative to the largest flow or force.
 BALANCE = 1e-6
-#: The same on either side of an edge: what another cut changes on these coarse grids.
+#: Difference of twins at an edge: the effect of another cut on these coarse grids.
 NEAR = 0.05
 #: Shifts [m] that change nothing but rounding: twins that differ although these agree are wrong.
 ROUNDING = ((1.3e-9, 0.7e-9), (-1.1e-9, 2.3e-9), (1 / 3, 1 / 7), (-0.1, 0.7))
 
 
 def ended_badly(run: Ended) -> str:
-    """What no run may do, whatever the case: hang, die, or end without a word."""
+    """Outcomes that are errors for every case: the run hangs, crashes, or ends without a message."""
     if run.code not in (0, 1, 2):
         return f"exit code {run.code}: {run.message[-300:]}"
     if "Traceback" in run.words:
@@ -37,7 +37,7 @@ def ended_badly(run: Ended) -> str:
 
 
 def without_a_word(draw: Draw, run: Ended) -> str:
-    """A danger that the run should have warned of."""
+    """A danger for which the run should have a warning."""
     missing = [words for words in draw.scene.must_warn if words not in run.words]
     return f"no warning that has '{missing[0]}'" if missing else ""
 
@@ -83,7 +83,7 @@ def _largest(history: Mapping[str, Any], name: str) -> float:
 
 
 def other_bits(run: Ended, twin: Ended) -> str:
-    """Where a resumed run has another number than one that was not killed."""
+    """The first difference between a resumed run and an uninterrupted one."""
     for name, values in run.history.items():
         if name != "wall" and not np.array_equal(twin.history.get(name, values[:0]), values):
             return f"{name} has other bits"

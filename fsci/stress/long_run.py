@@ -1,4 +1,4 @@
-"""Many steps of a small case of fluid, structure and contact: do balances, memory or speed drift?"""
+"""Long runs: many steps of a small case of fluid, structure and contact, for drifts of balances, memory and speed."""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ VALUES: list[Any] = [
 ]  # fmt: skip
 #: of numbers
 FACTORS = (-1, 0, 2, 3, 5, 0.5, 0.3, 0.1, 0.01, 10, 100, 1e4, 1e-6)
-#: Cells in one direction above which a case takes longer than it tells.
+#: Cells in one direction above which a case takes too long.
 MOST_CELLS = 40
 
 

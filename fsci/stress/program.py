@@ -1,4 +1,4 @@
-"""Runs of the program as users start them, to their end, to a signal, or to the end of patience."""
+"""Runs of the program as users start them, to their end, a signal, or a time limit."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ class Ended:
     """How a run ended."""
 
     code: int
-    words: str  #: all that it said
+    words: str  #: its output
     history: History
     summary: Mapping[str, Any]
 
     @property
     def message(self) -> str:
-        """Why it did not end well: what it said last, or the first problem of its case."""
+        """The reason of a failure: its last message, or the first problem of its case."""
         if self.code == NEVER_ENDED:
             return "it did not end"
         if message := self.summary.get("message"):
@@ -53,7 +53,7 @@ def run(folder: Path, case: Mapping[str, Any], *, processes: int = 1, patience: 
 
 
 def run_text(folder: Path, text: str, *arguments: str, patience: float = 120.0) -> Ended:
-    """Compute a case file, whatever is in it."""
+    """Compute a case file with any content."""
     (folder / "case.yaml").write_text(text)
     return _ended(folder, command("run", str(folder), "-o", str(folder / "out"), *arguments), patience)
 
@@ -86,7 +86,7 @@ def steps_done(folder: Path) -> int:
 
 
 def command(*arguments: str, processes: int = 1) -> list[str]:
-    """What starts the program."""
+    """The command that starts the program."""
     launcher = ["mpirun", "-n", str(processes)] if processes > 1 else []
     return [*launcher, sys.executable, "-m", "fsci", *arguments]
 

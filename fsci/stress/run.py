@@ -1,4 +1,4 @@
-"""Draw cases, run them and their twins, count what they were: the command `fsci stress`."""
+"""The command `fsci stress`: draws cases, runs them and their twins, and counts the verdicts."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MUTANT = 5  #: every so many draws is a mutated case file
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a draw."""
+    """The verdict on a draw, with its reason."""
 
     seed: int
     scene: str
@@ -45,7 +45,7 @@ class Outcome:
 
 
 def stress(seeds: Sequence[int], say: Callable[[str], None], keep: Path | None = None) -> list[Outcome]:
-    """All draws, one after the other; what is wrong is said at once, and its cases go to the folder `keep`."""
+    """Run all draws. Wrong ones are reported at once, and their cases are written to the folder `keep`."""
     outcomes = []
     for seed in seeds:
         outcome = judge(seed, keep)
@@ -121,7 +121,7 @@ def _keep(folder: Path, to: Path) -> None:
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
-    """Counts by scene, and what refusals said."""
+    """Counts of verdicts by scene, and messages of rejections."""
     names = [name for name in (*SCENES, *SPACE_SCENES, "mutant") if any(o.scene == name for o in outcomes)]
     counts = Counter((o.scene, o.verdict) for o in outcomes)
     lines = [f"{'scene':10}{'draws':>8}" + "".join(f"{verdict:>10}" for verdict in VERDICTS)]

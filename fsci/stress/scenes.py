@@ -1,7 +1,7 @@
-"""What is drawn: scenes of few cells whose numbers are far from those of a textbook.
+"""Scenes of random cases: few cells, and parameters far from those of textbooks.
 
-A scene takes a source of chance and gives its parameters and a function: the case as it is seen in a frame. Scenes are
-made in units of their own, about 1 large; `over_time` is in those, too.
+A scene is a function of a random generator. It returns its parameters and a function of a `Frame` that gives the case.
+Lengths, times and masses of a scene are of the order of 1; the frame converts them, and functions of time too.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ class StressScene:
     probes: dict[str, dict[str, Any]]  #: their settings
     any_angle: bool = False  #: no grid: it may be turned by any angle
     dim: int = 2
-    must_warn: tuple[str, ...] = field(default=())  #: words that a run that ends well has to say
+    must_warn: tuple[str, ...] = field(default=())  #: texts that the output of a successful run must contain
 
 
 def spread(chance: random.Random, low: float, high: float) -> float:
-    """A number whose logarithm is equally likely everywhere between two bounds; three digits."""
+    """A number with log-uniform distribution between two bounds, rounded to three digits."""
     return float(f"{low * (high / low) ** chance.random():.3g}")
 
 

@@ -1,4 +1,4 @@
-"""Scenes in space: contact of blocks turned about any axis, a body moved through a flow, an elastic post in one."""
+"""Scenes in 3D: contact of rotated blocks, a body moved through a flow, an elastic post in a flow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the scripts for ngsxfem share: a disc cut out of a mesh, unknowns, measures and ghost penalties of the fluid.
+"""Common parts of the scripts for ngsxfem: a disc cut out of a mesh, unknowns, measures and ghost penalties.
 
 The scripts are run as files, so that this module is found in their folder.
 """

@@ -47,7 +47,7 @@ def solve(order: int, cells: int) -> dict[str, float]:
     found = ng.GridFunction(W)
     velocity, pressure = found.components
     free = W.FreeDofs()
-    free.Clear(V.ndof)  # the level of the pressure, which nothing determines
+    free.Clear(V.ndof)  # the level of the pressure, which is not determined
     velocity.Set(exact, definedon=mesh.Boundaries(".*"))
     f.vec.data -= a.mat * found.vec
     found.vec.data += a.mat.Inverse(free, inverse="pardiso") * f.vec

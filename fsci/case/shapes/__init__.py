@@ -1,4 +1,4 @@
-"""Built-in meshes in the case file: every shape there is."""
+"""Built-in meshes in the case file, by shape."""
 
 from fsci.case.shapes.built_in import PlacedMesh
 from fsci.case.shapes.plane import PlaneShape
