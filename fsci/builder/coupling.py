@@ -77,7 +77,7 @@ def _scheme(case: Case, coupled: Coupled) -> Monolithic | Partitioned:
 def start(case: Case, scheme: Monolithic | Partitioned, fluid: Fluid, t: float, dt: float) -> None:
     """Both fields at the first time. Raises CaseError (collective)."""
     scheme.initialise(t, dt)
-    if fluid.level_unknown:
+    if fluid.levels.unknown:
         where, why = closed_in(case)
         raise case.error(where, f"bodies enclose a part of the fluid, and {why}")
 

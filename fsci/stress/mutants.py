@@ -122,19 +122,19 @@ FACTORS = (-1, 0, 2, 3, 5, 0.5, 0.3, 0.1, 0.01, 10, 100, 1e4, 1e-6)
 MOST_CELLS = 40
 
 
-def places(data, found=None):
+def settings_of(data, found=None):
     """Every (container, key) in the data."""
     found = [] if found is None else found
     for key, value in data.items() if isinstance(data, dict) else enumerate(data):
         found.append((data, key))
         if isinstance(value, dict | list):
-            places(value, found)
+            settings_of(value, found)
     return found
 
 
 def mutate(data, chance: random.Random) -> None:
     """Change one setting: mostly the size of a number, else replace, delete or copy it."""
-    kind, everything = chance.random(), places(data)
+    kind, everything = chance.random(), settings_of(data)
     numbers = [(where, key) for where, key in everything if type(where[key]) in (int, float)]
     container, key = chance.choice(numbers if kind < 0.7 and numbers else everything)
     if kind < 0.7 and numbers:
@@ -145,7 +145,7 @@ def mutate(data, chance: random.Random) -> None:
     elif kind < 0.9:
         del container[key]
     else:
-        other, name = chance.choice(places(data))
+        other, name = chance.choice(settings_of(data))
         container[key] = copy.deepcopy(other[name])
 
 
@@ -155,7 +155,7 @@ def mutant(seed: int) -> str | None:
     data = YAML(typ="safe", pure=True).load(chance.choice(CASES))
     for _ in range(chance.choice([1, 1, 1, 2, 3])):
         mutate(data, chance)
-    for container, key in places(data):
+    for container, key in settings_of(data):
         cells = container[key] if key == "cells" else ()
         if any(isinstance(n, int | float) and n > MOST_CELLS for n in (cells if isinstance(cells, list) else [cells])):
             return None

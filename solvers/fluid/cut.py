@@ -35,7 +35,7 @@ class Cut:
     contact_cells: Cells  #: solid cells where surfaces touch each other or the box's boundary
     reach: NDArray[np.bool_]  #: local cells that the surfaces may cut or uncover in the next steps
     #: active cells of the whole mesh, for the cells that this process cuts: its own and those near
-    alive: NDArray[np.bool_]
+    is_active: NDArray[np.bool_]
     share: Array  #: share of fluid in these cells of the mesh, zero elsewhere and in the strip
     depth: int  #: layers of cells in the strip
     fluid: Array  #: int_fluid L_q dx / (w_q |K|) on cut cells, shape (cut, points)
@@ -124,8 +124,8 @@ class Cutter:
         self._special |= is_cut | strip
         touching = solid & (self._facing(moments, counts, normal) | self._covered(motion.x[facets[~off]]))
         local_cut, local_strip = is_cut[grid.numbers], strip[grid.numbers]
-        alive = (~solid | strip) & np.isfinite(moments.fraction)
-        active = alive[grid.numbers]
+        is_active = (~solid | strip) & np.isfinite(moments.fraction)
+        active = is_active[grid.numbers]
         faces, sides = grid.interior_faces
         special = self._special[grid.numbers][sides].any(axis=1) & active[sides].all(axis=1)
         cut = np.flatnonzero(local_cut).astype(np.int32)
@@ -145,8 +145,8 @@ class Cutter:
             ghost_faces=faces[special],
             contact_cells=np.flatnonzero(touching[grid.numbers]).astype(np.int32),
             reach=self._reach(box.as_box(self._special), layers),
-            alive=alive,
-            share=np.where(alive & ~strip, np.clip(1.0 - moments.fraction, 0.0, 1.0), 0.0),
+            is_active=is_active,
+            share=np.where(is_active & ~strip, np.clip(1.0 - moments.fraction, 0.0, 1.0), 0.0),
             depth=self._depth,
             fluid=fluid,
             fraction=1.0 - moments.fraction[grid.numbers],

@@ -26,10 +26,10 @@ from solvers.fluid.history import History
 from solvers.fluid.immersed import ImmersedBody, sheets_of
 from solvers.fluid.krylov import FlowSolver, SolverSequence
 from solvers.fluid.patches import Boundary, Patch, periodic_axes
-from solvers.fluid.pressure_level import Hold, hold_pressure, keep_levels, spread_excess
+from solvers.fluid.pressure_level import PressureLevels
 from solvers.fluid.reach import require_finest, require_history, require_within_period, strip_layers
 from solvers.fluid.space import Unknowns, set_velocity
-from solvers.fluid.surface import Motion, by_facets, may_close, offsets, seeping, together, wetness
+from solvers.fluid.surface import Motion, by_facets, may_close, seeping, together, vertex_ranges, wetness
 from solvers.fluid.system import FlowSystem
 from solvers.fluid.time_scheme import STEADY, FlowStep
 from solvers.fluid.zone_entries import with_zone
@@ -98,7 +98,7 @@ class Fluid:
         self.started = False  #: a step was accepted, hence forces exist
         self.smallest_cell = min(float(np.diff(edge).min()) for edge in grid.edges)
         self.motions: list[Motion] = []
-        self._wet = wetness([body.surface for body in self.bodies])
+        self._wet, self._vertices = wetness(surfaces), vertex_ranges(surfaces)
         self._fast_bodies = FastBodies(grid)
         self.notes: list[str] = []  #: notes to the user on this step
         self.sequence = SolverSequence(comm, methods, self.dofs(), self.notes.append)
@@ -108,7 +108,7 @@ class Fluid:
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is assembled already
         owned = self.unknowns.owned
         self.held = np.zeros(owned, dtype=bool)  #: owned dofs with rows of the identity
-        self._holds: list[Hold] = []
+        self.levels = PressureLevels(self.system, self.bodies)
         self.residual_rows, self._increment, self._diagonal = (np.zeros(owned) for _ in range(3))
         self._size = self._largest = 0.0  #: norm of the residual: now, and its largest of the step
 
@@ -203,7 +203,7 @@ class Fluid:
             if self.unknowns.hanging is not None:
                 self.unknowns.share(self.system.flow)
             self.held = self.system.held()
-            self._hold_pressure(set_by_solids=with_solid and not self.settings.steady)
+            self.levels.hold(self.held, set_by_solids=with_solid and not self.settings.steady)
 
     def _layers(self, motion: Motion) -> int:
         """Number of cell layers behind the surface that the next steps may uncover."""
@@ -212,24 +212,11 @@ class Fluid:
         times = self.settings.time.times
         return strip_layers(self.grid, motion, times * self.current.dt, self.smallest_cell)
 
-    def _hold_pressure(self, *, set_by_solids: bool) -> None:
-        elastic = np.concatenate([np.full(b.surface.vertices, b.deforms) for b in self.bodies] + [[]]) > 0.0
-        self._holds = hold_pressure(self.system, elastic, set_by_solids=set_by_solids)
-        for hold in self._holds:
-            self.held[hold.dofs] = True
-            if not hold.keeps_level:
-                self.flow[hold.dofs] = 0.0
-
-    @property
-    def level_unknown(self) -> bool:
-        """True where a pressure level is held that an elastic body could determine."""
-        return any(hold.elastic for hold in self._holds)
-
     def solve(self) -> StepInfo:
         """Newton's method to the tolerance. Raises StepFailed."""
         self._largest = 0.0
         info = converge(self, self.solver.newton)
-        keep_levels(self.comm, self._holds, self.flow[: self.unknowns.owned])
+        self.levels.keep(self.flow[: self.unknowns.owned])
         self.unknowns.share(self.system.flow)
         if not self._coupled:
             self._note_fast_bodies()
@@ -256,7 +243,7 @@ class Fluid:
             if self.settings.steady and self._size >= SCALES_UNTIL * self._largest:
                 self.system.set_scales(self.velocity())
             self.residual_rows = self.system.residual()
-        spread_excess(self.comm, self._holds, self.residual_rows)
+        self.levels.spread_excess(self.residual_rows)
         self.residual_rows[self.held] = 0.0
         self._size = self._norm(self.residual_rows)
         self._largest = max(self._largest, self._size)
@@ -352,20 +339,15 @@ class Fluid:
 
     # ---------------------------------------------------------------------------------------------- reactions
 
-    def _vertices(self) -> dict[str, slice]:
-        """Range of each body's vertices among those of all bodies."""
-        starts = offsets([body.surface for body in self.bodies])
-        return {body.surface.name: slice(a, b) for body, a, b in zip(self.bodies, starts, starts[1:], strict=False)}
-
     def vertices_of(self, names: Sequence[str]) -> NDArray[np.int64]:
         """Numbers of the vertices of some bodies among those of all, in the order of the names."""
-        part = self._vertices()
-        return np.concatenate([np.arange(part[name].start, part[name].stop, dtype=np.int64) for name in names])
+        parts = [self._vertices[name] for name in names]
+        return np.concatenate([np.arange(part.start, part.stop, dtype=np.int64) for part in parts])
 
     def force(self) -> dict[str, Array]:
         """Force [N] (per depth in 2D) of the fluid on the vertices of each body, shape (n, dim) (collective)."""
         total = self.system.surface_force()
-        return {name: total[part] for name, part in self._vertices().items()}
+        return {name: total[part] for name, part in self._vertices.items()}
 
     def interface_entries(self, surfaces: Sequence[str]) -> InterfaceEntries:
         """Derivatives of rows and force by the motion of some bodies (collective)."""

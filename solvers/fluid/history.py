@@ -72,7 +72,7 @@ class History:
         found = np.stack([past.found for past in self.past], axis=1)[nodes.dofs[:, 0]]
         return {
             "velocity": {str(k): unknowns.to_nodes(past.velocity, nodes) for k, past in enumerate(self.past)},
-            "found": Nodal(found[: nodes.owned].astype(float), nodes.places[: nodes.owned]),
+            "found": Nodal(found[: nodes.owned].astype(float), nodes.consecutive[: nodes.owned]),
             "steps": list(self.steps),
         }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from solvers import fem
 from solvers.api import Array
+from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.pockets import Pocket, find_pockets
 from solvers.fluid.system import FlowSystem
 
@@ -27,6 +29,46 @@ class Hold:
     shares_before: Array  #: the same for nodes that had a pressure before; their sum is one or zero
     level: float  #: mean pressure at these nodes [Pa]
     elastic: bool  #: bounded by a surface that another field moves
+
+
+class PressureLevels:
+    """The pockets of the present cut whose pressure level is held; calls are collective."""
+
+    def __init__(self, system: FlowSystem, bodies: Sequence[ImmersedBody]):
+        self._system, self._comm = system, system.grid.comm
+        self._elastic = np.concatenate([np.full(b.surface.vertices, b.deforms) for b in bodies] + [[]]) > 0.0
+        self._holds: list[Hold] = []
+
+    @property
+    def unknown(self) -> bool:
+        """Whether a level is held that an elastic body could determine."""
+        return any(hold.elastic for hold in self._holds)
+
+    def hold(self, held: Mask, *, set_by_solids: bool) -> None:
+        """Find the pockets of a new cut and add their nodes to the held owned dofs; see `hold_pressure`."""
+        self._holds = hold_pressure(self._system, self._elastic, set_by_solids=set_by_solids)
+        for hold in self._holds:
+            held[hold.dofs] = True
+            if not hold.keeps_level:
+                self._system.flow.x.array[hold.dofs] = 0.0
+
+    def keep(self, flow: Array) -> None:
+        """Shift the pressure, at owned dofs, of each pocket that keeps its level, so that its mean is kept.
+
+        The linear system fixes it at one node. The result must not depend on the choice of this node.
+        """
+        for hold in self._holds:
+            if hold.keeps_level and self._comm.allreduce(float(hold.shares_before.sum())) > 0.0:
+                flow[hold.inside] += hold.level - self._comm.allreduce(float(hold.shares_before @ flow))
+
+    def spread_excess(self, rows: Array) -> None:
+        """Balance the net flux into each held pocket, in owned rows, by a uniform source in its fluid.
+
+        Otherwise the fixed node would be a point source, which causes an error of the pressure that does not converge.
+        """
+        for hold in self._holds:
+            excess = self._comm.allreduce(float(rows[hold.inside].sum()))
+            rows -= excess * hold.shares
 
 
 def hold_pressure(system: FlowSystem, elastic: Mask, *, set_by_solids: bool) -> list[Hold]:
@@ -87,23 +129,3 @@ def _hold(system: FlowSystem, pocket: Pocket, sizes: Array, *, keep_level: bool)
 def _shares(comm: MPI.Comm, sizes: Array) -> Array:
     total = comm.allreduce(float(sizes.sum()))
     return sizes / total if total > 0.0 else sizes
-
-
-def keep_levels(comm: MPI.Comm, holds: list[Hold], flow: Array) -> None:
-    """Shift the pressure of each pocket that keeps its level, so that its mean is kept (collective).
-
-    The linear system fixes it at one node. The result must not depend on the choice of this node.
-    """
-    for hold in holds:
-        if hold.keeps_level and comm.allreduce(float(hold.shares_before.sum())) > 0.0:
-            flow[hold.inside] += hold.level - comm.allreduce(float(hold.shares_before @ flow))
-
-
-def spread_excess(comm: MPI.Comm, holds: list[Hold], rows: Array) -> None:
-    """Balance the net flux into each held pocket by a uniform source in its fluid (collective).
-
-    Otherwise the fixed node would be a point source, which causes an error of the pressure that does not converge.
-    """
-    for hold in holds:
-        excess = comm.allreduce(float(rows[hold.inside].sum()))
-        rows -= excess * hold.shares

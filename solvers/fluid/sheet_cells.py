@@ -36,8 +36,10 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any) -> Any:
     fluid = np.where(rows[:, None] < 0, 1.0, cut.fluid[rows])
     fraction = np.where(empty, 0.0, cut.fraction)
     weights = _tensor(gauss(len(points))[1])
-    share, alive = (np.concatenate([some, np.zeros(len(sheets.cells), some.dtype)]) for some in (cut.share, cut.alive))
-    share[sheets.left], alive[sheets.left], alive[box : box + sheets.singles] = 0.0, False, True
+    share, is_active = (
+        np.concatenate([some, np.zeros(len(sheets.cells), some.dtype)]) for some in (cut.share, cut.is_active)
+    )
+    share[sheets.left], is_active[sheets.left], is_active[box : box + sheets.singles] = 0.0, False, True
     for number, of_cell in sheets.shares.items():
         share[number] = of_cell.fraction
     place = np.full(len(original), -1)
@@ -60,7 +62,7 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any) -> Any:
         strip=cut.strip[original[cut.strip] < box],
         ghost_faces=cut.ghost_faces[_passable(grid, cut.ghost_faces, empty, for_faces)],
         contact_cells=cut.contact_cells[original[cut.contact_cells] < box],
-        alive=alive,
+        is_active=is_active,
         share=share,
         fluid=fluid,
         fraction=fraction,

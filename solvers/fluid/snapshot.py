@@ -23,7 +23,7 @@ def _flow(fluid: Fluid) -> Snapshot | None:
     """
     unknowns, grid = fluid.unknowns, fluid.grid
     velocity, pressure = (
-        gather_nodal(fluid.comm, Nodal(fluid.flow[nodes.dofs[: nodes.owned]], nodes.places[: nodes.owned]))
+        gather_nodal(fluid.comm, Nodal(fluid.flow[nodes.dofs[: nodes.owned]], nodes.consecutive[: nodes.owned]))
         for nodes in (unknowns.velocity, unknowns.pressure)
     )
     share = np.zeros(len(grid.numbers))

@@ -31,7 +31,7 @@ class FlowNodes:
     numbers: NDArray[np.int64]  #: number in the box's lattice, the same for every distribution
     sizes: Array  #: mean edge lengths [m] of the cells around each, of the finest lattice, shape (nodes, dim)
     owned: int
-    places: NDArray[np.int64]  #: consecutive numbers from 0, in the order of `numbers`, which has gaps on nested cells
+    consecutive: NDArray[np.int64]  #: numbers from 0 in the order of `numbers`, which have gaps on nested cells
 
 
 class Unknowns:
@@ -99,8 +99,8 @@ class Unknowns:
         dofs, points = nodes.dofs[keep], nodes.points[keep]
         owned = int(np.count_nonzero(dofs[:, 0] < self.owned))
         numbers, nested = nodes.numbers[keep], self.grid.nested
-        places = numbers if nested is None else np.searchsorted(nested.all_nodes(degree), numbers)
-        return FlowNodes(dofs, points, numbers, self._sizes(points, degree), owned, places)
+        consecutive = numbers if nested is None else np.searchsorted(nested.all_nodes(degree), numbers)
+        return FlowNodes(dofs, points, numbers, self._sizes(points, degree), owned, consecutive)
 
     def _hanging(self) -> Hanging:
         assert self.grid.nested is not None
@@ -166,7 +166,7 @@ class Unknowns:
 
     def to_nodes(self, values: Array, nodes: FlowNodes) -> Nodal:
         """The values of owned nodes, from those at local dofs."""
-        return Nodal(values[nodes.dofs[: nodes.owned]].astype(float), nodes.places[: nodes.owned])
+        return Nodal(values[nodes.dofs[: nodes.owned]].astype(float), nodes.consecutive[: nodes.owned])
 
     def from_nodes(self, values: Array, nodes: FlowNodes) -> Array:
         """The values at local dofs, from those of owned nodes; zero at other dofs (collective)."""

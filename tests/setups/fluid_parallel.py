@@ -61,7 +61,7 @@ def scene(dim, element, comm, box="channel"):
 def everything(fluid):
     """Velocity and pressure by the numbers of nodes, on rank 0."""
     nodes = (fluid.unknowns.velocity, fluid.unknowns.pressure)
-    return [gather_nodal(fluid.comm, Nodal(fluid.flow[n.dofs[: n.owned]], n.places[: n.owned])) for n in nodes]
+    return [gather_nodal(fluid.comm, Nodal(fluid.flow[n.dofs[: n.owned]], n.consecutive[: n.owned])) for n in nodes]
 
 
 def main(dim, element, box, out):
