@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from fsci.case.section import fault, setting
 from fsci.case.shapes import PlacedMesh, Shape
-from fsci.case.values import Name, Number, Order, Text, chosen, spoken
+from fsci.case.values import Name, Number, Order, Text, chosen, describe_value
 
 
 class FileMesh(PlacedMesh):
@@ -29,7 +29,7 @@ SHAPES = [name for shape in get_args(Shape) for name in get_args(shape.model_fie
 
 def _file_or_shape(value: Any) -> Any:
     if not isinstance(value, dict):
-        raise fault(f"must be a section with 'file' or 'shape', not {spoken(value)}")
+        raise fault(f"must be a section with 'file' or 'shape', not {describe_value(value)}")
     if "file" in value and "shape" in value:
         raise fault("give either 'file' or 'shape', not both", "shape")
     if "file" not in value and "shape" not in value:

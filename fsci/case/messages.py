@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from fsci.case.document import Document
 from fsci.case.errors import Problem, did_you_mean, listed
-from fsci.case.values import spoken
+from fsci.case.values import describe_value
 from fsci.case.yaml_text import Keys
 
 EMPTY = "is empty: give it a value"
@@ -49,25 +49,25 @@ def _wanted(item: dict[str, Any]) -> str:
         return EMPTY
     match item["type"]:
         case "model_type" | "model_attributes_type":
-            return f"must be a section of settings, not {spoken(value)}"
+            return f"must be a section of settings, not {describe_value(value)}"
         case "dict_type":
-            return f"must be a section of names, not {spoken(value)}"
+            return f"must be a section of names, not {describe_value(value)}"
         case "tuple_type" | "list_type":
             hint = ": begin each entry with '- '" if isinstance(value, dict) else ""
-            return f"must be a list, not {spoken(value)}{hint}"
+            return f"must be a list, not {describe_value(value)}{hint}"
         case "literal_error":
             expected = item["ctx"]["expected"]
             if names := re.findall(r"'([^']*)'", expected):
                 hint = did_you_mean(value, names) if isinstance(value, str) else ""
-                return f"must be {listed(names)}, not {spoken(value)}" + (hint if hint.startswith(";") else "")
-            return f"must be {expected}, not {spoken(value)}"
-    return f"cannot be {spoken(value)}"
+                return f"must be {listed(names)}, not {describe_value(value)}" + (hint if hint.startswith(";") else "")
+            return f"must be {expected}, not {describe_value(value)}"
+    return f"cannot be {describe_value(value)}"
 
 
 def _root(value: Any) -> str:
     if value is None:
         return "the case is empty"
-    return f"the case must be a section of settings such as 'time:' and 'structure:', not {spoken(value)}"
+    return f"the case must be a section of settings such as 'time:' and 'structure:', not {describe_value(value)}"
 
 
 def _unknown(keys: Keys, names: list[str]) -> str:

@@ -29,7 +29,7 @@ from solvers.values import Value
 LARGEST = 1e100
 
 
-def spoken(value: Any) -> str:
+def describe_value(value: Any) -> str:
     """A value as an error message names it."""
     match value:
         case None:
@@ -55,7 +55,7 @@ def value_of(expression: Expression) -> Value:
 def _expression(value: Any, wanted: str, variables: str, functions: Mapping[str, Any] | None = None) -> Expression:
     """An expression of the given variables and the user's functions, from a number or text."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise fault(f"must be {wanted}, not {spoken(value)}")
+        raise fault(f"must be {wanted}, not {describe_value(value)}")
     if isinstance(value, int | float) and not abs(value) < math.inf:
         raise fault("must be a finite number")
     try:
@@ -75,9 +75,9 @@ def _number(allowed: Callable[[float], bool], words: str) -> BeforeValidator:
         number = _expression(value, "a number", "").constant
         assert number is not None, "an expression without variables is constant"
         if not allowed(number):
-            raise fault(f"must be {words}, not {spoken(float(number))}")
+            raise fault(f"must be {words}, not {describe_value(float(number))}")
         if abs(number) > LARGEST:
-            raise fault(f"must be at most {LARGEST:g} in size, not {spoken(float(number))}")
+            raise fault(f"must be at most {LARGEST:g} in size, not {describe_value(float(number))}")
         return float(number)
 
     return BeforeValidator(read)
@@ -90,9 +90,9 @@ def _whole(least: int) -> BeforeValidator:
         number = _expression(value, "a whole number", "").constant
         assert number is not None, "an expression without variables is constant"
         if number != round(number) or abs(number) > 2**53:
-            raise fault(f"must be a whole number, not {spoken(value)}")
+            raise fault(f"must be a whole number, not {describe_value(value)}")
         if number < least:
-            raise fault(f"must be at least {least}, not {spoken(int(number))}")
+            raise fault(f"must be at least {least}, not {describe_value(int(number))}")
         return int(number)
 
     return BeforeValidator(read)
@@ -106,7 +106,7 @@ def _formula(variables: str, allowed: Callable[[float], bool] = lambda _: True, 
         functions = (info.context or {}).get("functions")
         expression = value if isinstance(value, Expression) else _expression(value, wanted, variables, functions)
         if expression.constant is not None and not allowed(expression.constant):
-            raise fault(f"must be {words}, not {spoken(float(expression.constant))}")
+            raise fault(f"must be {words}, not {describe_value(float(expression.constant))}")
         return expression
 
     return PlainValidator(read)
@@ -158,7 +158,7 @@ class EntryCount:
     def __call__(self, value: Any) -> Any:
         words = f"{self.fewest}" if self.fewest == self.most else f"{self.fewest} or {self.most or 'more'}"
         if not isinstance(value, list | tuple):
-            raise fault(f"must be a list of {words} entries, not {spoken(value)}")
+            raise fault(f"must be a list of {words} entries, not {describe_value(value)}")
         if len(value) < self.fewest or (self.most is not None and len(value) > self.most):
             raise fault(f"must have {words} entries, not {len(value)}")
         return value
@@ -192,7 +192,7 @@ NumberVector = Annotated[tuple[Number, ...], EntryCount(2, 3)]
 def _text(value: Any) -> str:
     if not isinstance(value, str):
         hint = " (put it in quotes)" if isinstance(value, int | float) else ""
-        raise fault(f"must be a text, not {spoken(value)}{hint}")
+        raise fault(f"must be a text, not {describe_value(value)}{hint}")
     if not value.strip():
         raise fault("must be a text, not an empty one")
     return value
@@ -201,13 +201,15 @@ def _text(value: Any) -> str:
 def _name(value: Any) -> str:
     name = _text(value)
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_-]*", name):
-        raise fault(f"must be a name of letters, digits, '_' and '-' that begins with a letter, not {spoken(name)}")
+        raise fault(
+            f"must be a name of letters, digits, '_' and '-' that begins with a letter, not {describe_value(name)}"
+        )
     return name
 
 
 def _switch(value: Any) -> bool:
     if not isinstance(value, bool):
-        raise fault(f"must be true or false, not {spoken(value)}")
+        raise fault(f"must be true or false, not {describe_value(value)}")
     return value
 
 
@@ -222,12 +224,12 @@ def chosen(key: str, names: Sequence[str]) -> BeforeValidator:
 
     def check(value: Any) -> Any:
         if not isinstance(value, dict):
-            raise fault(f"must be a section with '{key}', not {spoken(value)}")
+            raise fault(f"must be a section with '{key}', not {describe_value(value)}")
         if key not in value:
             raise fault(f"needs the setting '{key}' (available: {', '.join(names)})")
         word = value[key]
         if not isinstance(word, str):
-            raise fault(f"must be {listed(names)}, not {spoken(word)}", key)
+            raise fault(f"must be {listed(names)}, not {describe_value(word)}", key)
         if word not in names:
             raise fault(f"unknown {key} '{word}'{did_you_mean(word, names)}", key)
         return value

@@ -62,7 +62,7 @@ def in_words(case: Case, meshes: Mapping[str, Mesh]) -> str:
     structure = None if case.structure is None else structure_dofs(case.structure, meshes)
     dimension = next((mesh.points.shape[1] for mesh in meshes.values()), None)
     cost = estimate(case, structure, costs(), dimension)
-    return "" if cost is None else spoken(cost, number_of_steps(case))
+    return "" if cost is None else describe_cost(cost, number_of_steps(case))
 
 
 def costs() -> Table:
@@ -77,7 +77,7 @@ def costs() -> Table:
     return own if own.keys() >= MEASURED.keys() else MEASURED
 
 
-def spoken(cost: Cost, steps: int) -> str:
+def describe_cost(cost: Cost, steps: int) -> str:
     """One line."""
     whole = f", {_time(cost.step * steps)} for all" if steps > 1 else ""
     return (

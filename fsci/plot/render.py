@@ -35,7 +35,7 @@ class DrawnBody:
     outline: Array  #: polylines of the edges that only one face has
     values: Array | None  #: colour of each surface point; None: the body does not have the field
     line_colour: str = "black"  #: of the edges
-    lit: bool = True  #: in space: shaded; else its colours are exactly those of the colour bar
+    shaded: bool = True  #: in 3D with shading; else its colours are exactly those of the colour bar
     opacity: float = 1.0  #: of the surface
 
 
@@ -150,7 +150,7 @@ def render(
     lift = 0.005 * view.half_height * away  # keeps edges clear of the surface they lie in
     for index, body in enumerate(bodies):
         surface = body.surface.copy(deep=False)
-        shading = {**(ROUND if body.lit and not flat else FLAT), "opacity": body.opacity}
+        shading = {**(ROUND if body.shaded and not flat else FLAT), "opacity": body.opacity}
         if flat:  # a later body covers an earlier one
             surface = surface.translate(2 * index * lift, inplace=False)
         if body.values is None:

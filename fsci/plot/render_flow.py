@@ -19,7 +19,7 @@ SHORTEST = 8  #: streamlines in the plane that extend over fewer of these points
 SEEDS = 5  #: streamlines in space start from so many points along each edge of the middle cross-section,
 BODY_SEEDS = 6  #: and from so many along each edge of a rectangle
 AROUND = 1.2  #: that is so many times as large as a body
-VEIL, PANE = 0.3, 0.8  #: opacity of the slice through a flow in space, with stream tubes and without
+SLICE_WITH_TUBES, SLICE = 0.3, 0.8  #: opacity of the slice through a flow in space, with stream tubes and without
 TUBES = 0.0025  #: their radius, as part of the box's diagonal
 LINE, TRIANGLE = 3, 5  #: VTK's numbers of cell types
 
@@ -143,7 +143,9 @@ def _spatial_flow(mesh: Any, field: str, bodies: Sequence[Any]) -> list[DrawnBod
     middle = mesh.slice(normal=normal, origin=origin)
     if middle.n_points:
         values = field_values(middle.point_data, field)
-        parts.append(DrawnBody(middle, NO_LINES, NO_LINES, values, lit=False, opacity=VEIL if moving else PANE))
+        parts.append(
+            DrawnBody(middle, NO_LINES, NO_LINES, values, shaded=False, opacity=SLICE_WITH_TUBES if moving else SLICE)
+        )
     box = mesh.outline()
     parts.append(DrawnBody(box, segments(box), NO_LINES, None))
     if moving and np.any(mesh.point_data[STREAMLINES]):

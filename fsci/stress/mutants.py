@@ -123,7 +123,7 @@ MOST_CELLS = 40
 
 
 def settings_of(data, found=None):
-    """Every (container, key) in the data."""
+    """All settings in the data, as pairs (container, key)."""
     found = [] if found is None else found
     for key, value in data.items() if isinstance(data, dict) else enumerate(data):
         found.append((data, key))

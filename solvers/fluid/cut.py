@@ -107,8 +107,8 @@ class Cutter:
     def _cut(self, facets: NDArray[np.int64], motion: Motion, layers: int, wet: NDArray[np.bool_] | None) -> Cut:
         grid, box = self.grid, self.grid.grid
         self._depth = max(self._depth, layers)
-        wanted = _grow(self._own, self._depth + MARGIN)
-        moments = kernels.moments(box.edges, self.points, motion.x, facets, wanted.ravel(order="F"))
+        nearby = _grow(self._own, self._depth + MARGIN)
+        moments = kernels.moments(box.edges, self.points, motion.x, facets, nearby.ravel(order="F"))
         normal = -unit_normals(motion.x[facets])
         off = off_boundary(box, motion.x[facets])
         counts = off if wet is None else off & wet

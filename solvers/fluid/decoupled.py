@@ -27,11 +27,11 @@ def _at_columns(matrix: PETSc.Mat, component: NDArray[np.int64], columns: NDArra
     """Components of unknowns by their global numbers (collective)."""
     if matrix.comm.size == 1:
         return component[columns]
-    wanted, place = np.unique(columns, return_inverse=True)
+    numbers, position = np.unique(columns, return_inverse=True)
     everywhere = matrix.createVecRight()
     everywhere.array[:] = component
-    here = PETSc.Vec().createSeq(len(wanted))
-    some = PETSc.IS().createGeneral(wanted.astype(PETSc.IntType))
+    here = PETSc.Vec().createSeq(len(numbers))
+    some = PETSc.IS().createGeneral(numbers.astype(PETSc.IntType))
     scatter = PETSc.Scatter().create(everywhere, some, here, None)
     scatter.scatter(everywhere, here)
-    return here.array.astype(np.int64)[place]
+    return here.array.astype(np.int64)[position]

@@ -1,7 +1,7 @@
 """Discrete extension of the flow to poorly cut nodes: which nodes depend on others, and by which weights.
 
 The share of fluid of a node is that of the best of its cells, k = max |K in fluid| / |K|, relative to the best cell
-nearby. Nodes with k >= WELL are free. The others are dependent: each has a root, a well-cut cell nearby, and the
+nearby. Nodes with k >= FREE are free. The others are dependent: each has a root, a well-cut cell nearby, and the
 extension
 
     E u(x_i) = sum_b N_b(x_i) u_b,     N_b: shape functions of the root, continued outside of it.
@@ -25,9 +25,9 @@ from solvers.fluid.grid import Grid
 from solvers.fluid.sheet_windows import SheetWindows
 from solvers.fluid.sheets import Sheets
 
-#: Shares of fluid, relative to the best cell nearby. From WELL on a cell may be a root and its nodes are free. Up to
-#: LITTLE the penalty on the distance to the extension has its full weight.
-WELL, LITTLE = 0.6, 0.2
+#: Shares of fluid, relative to the best cell nearby. From FREE on a cell may be a root and its nodes are free. Up to
+#: PENALISED the penalty on the distance to the extension has its full weight.
+FREE, PENALISED = 0.6, 0.2
 
 #: Layers of cells around those of a node that count as nearby.
 NEAR = 2
@@ -84,9 +84,9 @@ class Extension:
 
         share: fluid in each cell of the mesh; active: cells with unknowns; reach: largest distance of a root [cells].
         """
-        nodes = self._nodes_of(np.flatnonzero(active & (share < WELL)))
+        nodes = self._nodes_of(np.flatnonzero(active & (share < FREE)))
         largest, best = (self._largest(nodes, share, layers) for layers in (0, NEAR))
-        poor = (largest < WELL * best) | (largest == 0.0)
+        poor = (largest < FREE * best) | (largest == 0.0)
         nodes = nodes[poor]
         relative = np.divide(largest, best, out=np.zeros(len(largest)), where=best > 0.0)[poor]
         self._find_roots(nodes[self._row_of[nodes] < 0], share, reach)
@@ -148,7 +148,7 @@ class Extension:
         cells, inside = self._cells_around(nodes, layers)
         fluid = np.where(inside, share[cells], 0.0)
         best = fluid.max(axis=1, initial=0.0)[:, None]
-        cost = np.where((fluid >= WELL * best) & (fluid > 0.0), cost, np.inf)
+        cost = np.where((fluid >= FREE * best) & (fluid > 0.0), cost, np.inf)
         least = cost.min(axis=1, initial=np.inf)[:, None]
         at, chosen = np.nonzero((cost <= (1.0 + 1e-9) * least) & np.isfinite(cost))
         columns, weights = self._entries(nodes[at], layers, chosen, cost[at, chosen] > LARGEST)
@@ -206,8 +206,8 @@ def _lagrange(s: Array, degree: int) -> Array:
 
 
 def _weight(relative: Array) -> Array:
-    """Weight of the penalty: a cubic from 1 at LITTLE to 0 at WELL with zero slope at both."""
-    s = np.clip((WELL - relative) / (WELL - LITTLE), 0.0, 1.0)
+    """Weight of the penalty: a cubic from 1 at PENALISED to 0 at FREE with zero slope at both."""
+    s = np.clip((FREE - relative) / (FREE - PENALISED), 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 

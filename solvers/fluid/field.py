@@ -74,10 +74,10 @@ class Fluid:
         self.boundary = Boundary(self.grid, self.unknowns, patches)
         self.steady, self.scheme = settings.steady, settings.time  #: steps are steady states; the time scheme
         self.linear_tolerance = solver.linear_tolerance
-        wanted = solver.linear if isinstance(solver.linear, str) else "auto"
-        wanted = wanted if sheets is None else "direct"  # the others need nodes on a lattice
+        method = solver.linear if isinstance(solver.linear, str) else "auto"
+        method = method if sheets is None else "direct"  # the others need nodes on a lattice
         size, degree, equal = self.dofs(), settings.degree, self.grid.nested is None
-        methods = linear.choose_flow(wanted, self.dim, size, degree=degree, steady=self.steady, multigrid=equal)
+        methods = linear.choose_flow(method, self.dim, size, degree=degree, steady=self.steady, multigrid=equal)
         self.system = FlowSystem(
             self.grid,
             settings,

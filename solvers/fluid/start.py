@@ -62,7 +62,7 @@ class FlowStart:
         """
         fluid, short = self.fluid, SHARE * dt
         bodies, rate = fluid.bodies, short / dt**2
-        fluid.bodies = [b if b.motion is None else _hurried(b, b.motion, short) for b in bodies]
+        fluid.bodies = [b if b.motion is None else _with_later_velocity(b, b.motion, short) for b in bodies]
         try:
             fluid.begin_step(t - short, short)
             fluid.flow[fluid.boundary.dofs] = fluid.boundary.velocity(t + short)
@@ -81,6 +81,6 @@ class FlowStart:
         fluid.current = FlowStep(fluid.current.t, dt, fluid.history.difference(dt))
 
 
-def _hurried(body: ImmersedBody, motion: Callable[[float], Motion], dt: float) -> ImmersedBody:
+def _with_later_velocity(body: ImmersedBody, motion: Callable[[float], Motion], dt: float) -> ImmersedBody:
     """The body with the velocity that it has dt [s] later."""
     return replace(body, motion=lambda t: Motion(motion(t).x, motion(t + dt).v))

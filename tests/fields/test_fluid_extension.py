@@ -7,7 +7,7 @@ import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, step, turned, wall
 
 from fsci.bench import fluid as bench
-from solvers.fluid.extension import WELL, Extension
+from solvers.fluid.extension import FREE, Extension
 from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.forms import Penalties
 from solvers.fluid.grid import Grid, uniform
@@ -90,7 +90,7 @@ def test_nodes_of_well_cut_cells_are_free():
         np.maximum.at(largest, unknowns.cell_velocity[cells], share[cells, None, None])
     dofs = unknowns.velocity.dofs
     asked = fluid.system.active_dofs[dofs] & ~np.isin(dofs, fluid.boundary.dofs)
-    assert np.array_equal((ghost.dependent | ghost.outside)[dofs][asked], (largest[dofs] < WELL)[asked])
+    assert np.array_equal((ghost.dependent | ghost.outside)[dofs][asked], (largest[dofs] < FREE)[asked])
     assert np.array_equal(ghost.outside[dofs][asked], (largest[dofs] == 0.0)[asked])
     assert ghost.outside.sum() > 20
 

@@ -9,7 +9,7 @@ from ruamel.yaml import YAML
 
 from fsci.case import CaseError, load_case
 from fsci.check.check import summary
-from fsci.stress.mutants import places
+from fsci.stress.mutants import settings_of
 
 CASES = [
     """\
@@ -109,10 +109,10 @@ LIMITS = settings(max_examples=120, deadline=None, suppress_health_check=[Health
 
 def mutate(data, kind, where, value):
     """Delete, rename, replace, wrap or copy one setting."""
-    all_places = places(data)
-    if not all_places:
+    all_settings = settings_of(data)
+    if not all_settings:
         return
-    container, key = all_places[where % len(all_places)]
+    container, key = all_settings[where % len(all_settings)]
     if kind == "delete":
         del container[key]
     elif kind == "rename" and isinstance(container, dict):
@@ -120,7 +120,7 @@ def mutate(data, kind, where, value):
     elif kind == "wrap":
         container[key] = [container[key]]
     elif kind == "copy":
-        other, name = all_places[(where // 7) % len(all_places)]
+        other, name = all_settings[(where // 7) % len(all_settings)]
         if not isinstance(other[name], dict | list):
             container[key] = other[name]
     else:

@@ -11,7 +11,7 @@ from small_cases import PLATE
 from fsci.bench.small import BLOCK
 from fsci.case import load_case
 from fsci.check import cost
-from fsci.check.cost import MEASURED, Cost, estimate, spoken
+from fsci.check.cost import MEASURED, Cost, estimate, describe_cost
 
 #: kind -> two sizes; every factor ten in unknowns takes ten times as long, and contact twice, coupling three times
 TABLE = {
@@ -47,11 +47,11 @@ def test_contact_and_coupling_are_factors(tmp_path):
 
 
 def test_words():
-    assert spoken(Cost(12_345, 0.0042, 218.0), 1) == (
+    assert describe_cost(Cost(12_345, 0.0042, 218.0), 1) == (
         "about 12,345 unknowns, 4.2 ms per step, 220 MB, on one process (accurate to a factor of about three)"
     )
-    assert "12 s per step, 33 h for all, 2.4 GB" in spoken(Cost(1, 12.0, 2400.0), 10_000)
-    assert "0.5 s per step, 4 min for all" in spoken(Cost(1, 0.5, 100.0), 500)
+    assert "12 s per step, 33 h for all, 2.4 GB" in describe_cost(Cost(1, 12.0, 2400.0), 10_000)
+    assert "0.5 s per step, 4 min for all" in describe_cost(Cost(1, 0.5, 100.0), 500)
 
 
 def test_check_says_it(tmp_path):

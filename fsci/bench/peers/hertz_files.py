@@ -23,11 +23,11 @@ FACES = {(0, 1, 2, 3): 1, (4, 5, 6, 7): 2, (0, 1, 4, 5): 3, (1, 2, 5, 6): 4, (2,
 def base(per_radius: int, outer: int) -> Mesh:
     """A layer below the ball, its cells a tenth larger than the ball's: programs search for pairs of like size."""
     across = graded(round(CORE * per_radius), outer)
-    places = 1.1 * np.concatenate([[-across[1]], across])
-    count = len(places) - 1
+    coordinates = 1.1 * np.concatenate([[-across[1]], across])
+    count = len(coordinates) - 1
     unit = shapes.box([1, 1, 1], [count, count, 1])
     index = np.rint(unit.points * [count, count, 1]).astype(int)
-    points = np.column_stack([places[index[:, 0]], places[index[:, 1]], index[:, 2] - 1.0])
+    points = np.column_stack([coordinates[index[:, 0]], coordinates[index[:, 1]], index[:, 2] - 1.0])
     return replace(unit, points=points)
 
 

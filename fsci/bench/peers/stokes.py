@@ -1,4 +1,4 @@
-"""Stokes flow around a cut disc with an exact solution: errors at places of the fluid, the same ones as for ngsxfem."""
+"""Stokes flow around a cut disc with an exact solution: errors at sample points in the fluid, those of ngsxfem too."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def solve(element: str, cells: int) -> Row:
     fluid.solve()
     seconds = process_time() - begin
 
-    x = places()
+    x = sample_points()
     unknowns = fluid.unknowns
     u = [w @ fluid.flow[d] for d, w in (interpolation(fluid, unknowns.velocity, unknowns.degree, at) for at in x)]
     p = [(w @ fluid.flow[d])[0] for d, w in (interpolation(fluid, unknowns.pressure, 1, at) for at in x)]
@@ -60,7 +60,7 @@ def solve(element: str, cells: int) -> Row:
     }
 
 
-def places() -> Array:
+def sample_points() -> Array:
     """A lattice of points that no grid has, without those in the disc or very near to it."""
     side = np.linspace(0.0, 1.0, 103)[1:-1]
     x = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
