@@ -45,7 +45,7 @@ VERSION_TESTS  := fem versions lagged linear moments_kernel mortar_kernel mortar
   contact_patch contact_system contact_run contact_friction coupling_bar coupling_blocks coupled_run
 INSTALL        := $(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation
 
-.PHONY: setup demo test test-slow test-versions test-debian13 coverage lint bench docs clean FORCE
+.PHONY: setup demo test test-slow test-versions test-debian13 coverage lint bench docs links clean FORCE
 
 setup: $(PROJECT_STAMP)
 
@@ -114,6 +114,13 @@ docs: $(DOCS_STAMP)
 	$(BIN)/python docs/make_api.py > docs/reference/api.md
 	$(BIN)/python -m sphinx -W --keep-going -b html docs docs/_build/html
 	@echo "Open docs/_build/html/index.html"
+
+# External links of the pages and of the README. Internal ones are checked by a test.
+links: docs
+	@if $(BIN)/python -c 'import socket; socket.create_connection(("github.com", 443), 10)' 2>/dev/null; then \
+	  printf -- '---\norphan: true\n---\n\n```{include} ../../README.md\n:relative-docs: docs/\n```\n' > docs/reference/readme.md; \
+	  $(BIN)/python -m sphinx -b linkcheck docs docs/_build/links; status=$$?; rm docs/reference/readme.md; exit $$status; \
+	else echo "links: no connection to github.com, external links are not checked"; fi
 
 # Back to a fresh clone, except for results/: they may have taken days.
 clean:

@@ -33,12 +33,12 @@ class WettedSurface:
     dofs: NDArray[np.int64]  #: their global dofs in the structure, shape (n, dim)
     facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
     wet: NDArray[np.bool_] | None = None  #: wet facets; None: found by `find_wet`
-    may_part: NDArray[np.bool_] | None = None  #: facets that take part in contact
+    in_contact: NDArray[np.bool_] | None = None  #: facets that take part in contact
 
     @property
     def at_start(self) -> tuple[ImmersedSurface, Array]:
         """(the surface in the flow, reference positions of its vertices [m])."""
-        return ImmersedSurface(self.name, self.facets, len(self.points), self.wet, self.may_part), self.points
+        return ImmersedSurface(self.name, self.facets, len(self.points), self.wet, self.in_contact), self.points
 
 
 def wetted_surface(structure: Structure, index: int, skin: Skin) -> WettedSurface:
@@ -48,8 +48,8 @@ def wetted_surface(structure: Structure, index: int, skin: Skin) -> WettedSurfac
     layout = Layout(body.domain.comm, [other.size for other in bodies])
     dofs = global_dofs(layout, index, body, skin.nodes)
     touching = np.empty(0, dtype=np.int64) if constraint is None else constraint.touching_dofs()
-    may_part = np.isin(dofs[:, 0], touching)[skin.facets].all(axis=1)
-    return WettedSurface(body.name, skin.points, dofs, skin.facets, skin.wet, may_part)
+    in_contact = np.isin(dofs[:, 0], touching)[skin.facets].all(axis=1)
+    return WettedSurface(body.name, skin.points, dofs, skin.facets, skin.wet, in_contact)
 
 
 def immerse(
@@ -84,8 +84,8 @@ def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]], box: tuple[Array
             middles = x[surface.facets].mean(axis=1)
             distance = np.abs(np.concatenate([middles - low, middles - high], axis=1)).min(axis=1)
             wet = distance > ON_BOX * (high - low).max()
-            if surface.may_part is not None:
-                wet |= surface.may_part
+            if surface.in_contact is not None:
+                wet |= surface.in_contact
             for other, (body, at) in enumerate(surfaces):
                 if other == index:
                     continue

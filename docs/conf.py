@@ -12,5 +12,9 @@ extensions = ["myst_parser", "sphinx.ext.mathjax"]
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build"]
+# Anchors on pages of code hosts are made by scripts; a server that is busy gets a second chance.
+linkcheck_anchors = False
+linkcheck_retries = 2
+linkcheck_timeout = 20
 html_theme = "alabaster"
 html_theme_options = {"description": _project["description"], "page_width": "1080px"}

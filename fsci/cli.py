@@ -52,6 +52,9 @@ def _parser() -> argparse.ArgumentParser:
             "--set", dest="overrides", metavar="NAME=VALUE", action="append", default=[], type=_override, help=words
         )
 
+    def results(one: argparse.ArgumentParser) -> None:
+        one.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
+
     new = command(_new, "write a small case that runs into a new folder")
     new.add_argument("name", metavar="NAME", type=Path, help="folder to make")
     new.add_argument(
@@ -62,7 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     for function, words in (
-        (_check, "say what is wrong with a case, or what it is"),
+        (_check, "check a case: mistakes, warnings, size and cost"),
         (_run, "compute a case"),
     ):
         one = command(function, words)
@@ -79,13 +82,13 @@ def _parser() -> argparse.ArgumentParser:
             )
 
     resume = command(_resume, "continue a run from its last checkpoint")
-    resume.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
+    results(resume)
     settings(
         resume, "change a setting that a run can go on with: --set time.end=2 --set solver.newton.max_iterations=50"
     )
 
     plot = command(_plot, "draw the results of a run")
-    plot.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
+    results(plot)
     plot.add_argument(
         "--field", metavar="FIELD", help="field to colour by (default: displacement; of a flow velocity and pressure)"
     )
@@ -101,10 +104,10 @@ def _parser() -> argparse.ArgumentParser:
     plot.add_argument("--movie", action="store_true", help="make an animation too")
 
     report = command(_report, "write one page of a run: pictures, curves, balances, verification, time")
-    report.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
+    results(report)
 
-    explain = command(_explain, "say why a step failed, or where the time of a run went")
-    explain.add_argument("out", metavar="OUT", type=Path, help="folder with the results of a run")
+    explain = command(_explain, "explain why a step failed, or which parts of a run took the time")
+    results(explain)
     explain.add_argument(
         "--replay",
         metavar="FOLDER",

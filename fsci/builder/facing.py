@@ -74,10 +74,10 @@ def meeting(first: Sequence[Face], second: Sequence[Face], reach: float) -> list
     for own, other in ((first, hulls[1]), (second, hulls[0])):
         around = [face for face in own if face.cavity and _contains(face.box, other)]
         sides.append(around or [face for face in own if not face.cavity])
-    return [(a, b) for a in sides[0] for b in sides[1] if see_each_other(a, b, reach)]
+    return [(a, b) for a in sides[0] for b in sides[1] if face_each_other(a, b, reach)]
 
 
-def see_each_other(a: Face, b: Face, reach: float) -> bool:
+def face_each_other(a: Face, b: Face, reach: float) -> bool:
     """Some of their facets face each other, at most so far [m] apart, each in front of the other."""
     behind = CROSSING * min(a.size, b.size)
     for start in range(0, len(a.middles), CHUNK):

@@ -196,8 +196,8 @@ class Run:
 
     def _asked_to_stop(self) -> bool:
         """Whether any process got a signal, or the results folder has a file STOP (collective)."""
-        asked = self.stop.asked or (self.root and (self.out / "STOP").exists())
-        return bool(self.comm.allreduce(int(asked)))
+        requested = self.stop.requested or (self.root and (self.out / "STOP").exists())
+        return bool(self.comm.allreduce(int(requested)))
 
     def _loop(self) -> int:
         every = self.case.output.checkpoint_every

@@ -17,18 +17,18 @@ GRACE = 0.3
 
 
 class StopWatch:
-    """Catches signals while it is entered.
+    """Handles signals while it is entered.
 
-    The loop looks at `asked` between steps. If it does not say `ended()` within GRACE, a thread calls `give_up`, which
-    writes what is to be kept and ends the process. Python calls a handler of signals only between two of its own
-    operations. The thread is woken through a pipe, also from within a long call that releases Python's lock.
+    The run loop tests `requested` between steps. If it does not call `ended()` within GRACE, a thread calls `give_up`,
+    which writes the last state and ends the process. Python calls signal handlers only between two of its own
+    operations. Hence a pipe wakes the thread, also during a long call that releases Python's lock.
 
-    `files` is held by whoever changes files or the state that they keep.
+    `files` is a lock for all changes of files and of the state that they contain.
     """
 
     def __init__(self, give_up: Callable[[], None] | None):
         """`give_up` is None on processes that write no files."""
-        self.asked = False
+        self.requested = False
         self.files = threading.RLock()
         self._give_up, self._ended = give_up, threading.Event()
 
@@ -52,11 +52,11 @@ class StopWatch:
         os.close(self._write)
 
     def ended(self) -> None:
-        """Nothing to do: the run loop writes its own state."""
+        """Tell the thread that the run loop writes the last state itself."""
         self._ended.set()
 
     def _on_signal(self, number: int, frame: Any) -> None:
-        self.asked = True
+        self.requested = True
 
     def _watch(self) -> None:
         while True:
@@ -64,7 +64,7 @@ class StopWatch:
             if byte == 0:
                 return
             if byte in SIGNALS:
-                self.asked = True
+                self.requested = True
                 break
         if self._ended.wait(GRACE) or self._give_up is None:
             return

@@ -25,7 +25,7 @@ NEAR = 0.05
 ROUNDING = ((1.3e-9, 0.7e-9), (-1.1e-9, 2.3e-9), (1 / 3, 1 / 7), (-0.1, 0.7))
 
 
-def ended_badly(run: Ended) -> str:
+def failure_of(run: Ended) -> str:
     """Outcomes that are errors for every case: the run hangs, crashes, or ends without a message."""
     if run.code not in (0, 1, 2):
         return f"exit code {run.code}: {run.message[-300:]}"
@@ -36,7 +36,7 @@ def ended_badly(run: Ended) -> str:
     return ""
 
 
-def without_a_word(draw: Draw, run: Ended) -> str:
+def missing_warning(draw: Draw, run: Ended) -> str:
     """A danger for which the run should have a warning."""
     missing = [words for words in draw.scene.must_warn if words not in run.words]
     return f"no warning that has '{missing[0]}'" if missing else ""

@@ -19,10 +19,10 @@ from fsci.stress.judge import (
     ROUNDING,
     Verdict,
     distance,
-    ended_badly,
+    failure_of,
+    missing_warning,
     other_bits,
     out_of_balance,
-    without_a_word,
 )
 from fsci.stress.mutants import run_mutant
 from fsci.stress.program import Ended, run, run_killed
@@ -61,7 +61,7 @@ def judge(seed: int, keep: Path | None = None) -> Outcome:
     with TemporaryDirectory() as folder:
         if seed % MUTANT == MUTANT - 1:
             ended = run_mutant(seed, Path(folder))
-            words = ended_badly(ended)
+            words = failure_of(ended)
             verdict: Verdict = "wrong" if words else "refused" if ended.code else "right"
             found = Outcome(seed, "mutant", "none", {}, verdict, words or (ended.message if ended.code else ""), 0.0)
         else:
@@ -74,14 +74,14 @@ def judge(seed: int, keep: Path | None = None) -> Outcome:
 
 def _judge(one: Draw, folder: Path) -> tuple[Verdict, str]:
     first = run(folder / "run", one.case(Frame()))
-    if words := ended_badly(first):
+    if words := failure_of(first):
         return "wrong", words
     if first.code:
         return "refused", first.message
-    if words := without_a_word(one, first) or out_of_balance(one, first):
+    if words := missing_warning(one, first) or out_of_balance(one, first):
         return "wrong", words
     twin = _twin(one, folder / "twin", float(first.history["wall"].mean()))
-    if words := ended_badly(twin):
+    if words := failure_of(twin):
         return "wrong", f"twin: {words}"
     if twin.code:
         return "refused", f"twin: {twin.message}"

@@ -19,9 +19,9 @@ def find_blocked(interface: ContactInterface, x: Array) -> NDArray[np.bool_]:
         return np.zeros(len(node), dtype=bool)
     normals = find_normals(multipliers, x).values
     own = np.arange(len(node))  # treat every multiplier as the only one of its node
-    feels = np.abs(free_normals(normals, own, held[node])).max(axis=1) > 0.0
+    is_free = np.abs(free_normals(normals, own, held[node])).max(axis=1) > 0.0
     whole = slaves & (interface.spans == "space")
     first = np.zeros(len(node), dtype=bool)
     first[np.flatnonzero(whole)[np.unique(node[whole], return_index=True)[1]]] = True
-    blocked = slaves & (interface.nodes.fixed[node] | (~whole & ~feels))
+    blocked = slaves & (interface.nodes.fixed[node] | (~whole & ~is_free))
     return blocked | (slaves & np.isin(node, node[whole]) & ~first)

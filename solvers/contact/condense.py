@@ -45,7 +45,7 @@ class Linearised:
     dforce: Sparse  #: derivative of the contact force at fixed z, shape (n, n)
     basis: Sparse  #: P, shape (dim * m, K)
     turning: Sparse  #: Z, shape (dim * m, n)
-    felt: Sparse  #: Q, shape (n, K)
+    node_basis: Sparse  #: Q, shape (n, K)
     by_multiplier: Sparse  #: G, shape (K, K)
     by_displacement: Sparse  #: H, shape (K, n)
     residual: Array  #: r, shape (K,)
@@ -65,7 +65,7 @@ class Condensed:
 
 def condense(terms: Linearised) -> Condensed:
     """Eliminate the multipliers from the linearised balance."""
-    Q, back, FP, to_basis = terms.felt, terms.felt.T, terms.force @ terms.basis, terms.transformation
+    Q, back, FP, to_basis = terms.node_basis, terms.node_basis.T, terms.force @ terms.basis, terms.transformation
     if to_basis is not None:
         FP = to_basis.T @ FP
     inverted = inverse(back @ FP) @ back

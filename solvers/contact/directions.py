@@ -27,7 +27,7 @@ class Directions:
     """Directions of m multipliers with K degrees of freedom zeta: z = P zeta + Z du, acting on nodes along Q."""
 
     basis: Sparse  #: P, shape (dim * m, K)
-    felt: Sparse  #: Q, orthonormal, shape (dim * N, K)
+    node_basis: Sparse  #: Q, orthonormal, shape (dim * N, K)
     turning: Sparse  #: Z = turning @ (derivatives of the normals), shape (dim * m, dim * m)
 
 
@@ -100,7 +100,7 @@ def find_directions(
 
     return Directions(
         basis=columns(P, np.arange(m), dim * m),
-        felt=columns(Q, node, dim * len(held)),
+        node_basis=columns(Q, node, dim * len(held)),
         turning=block_diagonal(turn),
     )
 

@@ -57,7 +57,7 @@ def linearise(
         dforce=dforce,
         basis=P,
         turning=turning,
-        felt=directions.felt,
+        node_basis=directions.node_basis,
         by_multiplier=across @ by_z @ P,
         by_displacement=across @ (by_u + by_z @ turning),
         residual=across @ (residual - by_z @ z.ravel()),

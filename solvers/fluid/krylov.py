@@ -31,8 +31,8 @@ FACTORS = 1_100.0
 class SolverSequence:
     """A sequence of solvers: if the current one fails, the next one replaces it. `position` is part of the state."""
 
-    def __init__(self, comm: MPI.Comm, methods: Sequence[linear.FlowMethod], dofs: int, say: Callable[[str], None]):
-        self.comm, self.methods, self._dofs, self._say = comm, methods, dofs, say
+    def __init__(self, comm: MPI.Comm, methods: Sequence[linear.FlowMethod], dofs: int, note: Callable[[str], None]):
+        self.comm, self.methods, self._dofs, self._note = comm, methods, dofs, note
         self.position = 0
 
     @property
@@ -52,7 +52,7 @@ class SolverSequence:
             ) from failure
         before = WORDS[self.current]
         self.position += 1
-        self._say(f"{failure} with {before}: {WORDS[self.current]} from here on ('solver.linear.method' chooses)")
+        self._note(f"{failure} with {before}: {WORDS[self.current]} from here on ('solver.linear.method' chooses)")
 
 
 def free_memory(comm: MPI.Comm) -> float:

@@ -21,9 +21,9 @@ from solvers import kernels
 from solvers.api import Array
 from solvers.connected import connected_parts
 from solvers.fluid.box import Grid
-from solvers.fluid.regions import lagrange
 from solvers.fluid.sheets import CORNER_STEPS
 from solvers.gauss import gauss
+from solvers.lagrange import lagrange
 from solvers.mesh import Mesh
 
 #: Layers of cells of the finest level around cut cells. The roots of poorly cut nodes are up to two layers away

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.fluid.box import Grid
+from solvers.lagrange import lagrange
 
 #: Distance from a plane of the grid, in cells, up to which a piece lies in it.
 FLUSH = 1e-6
@@ -57,12 +58,7 @@ def put_where_fluid_is(
             flush = (square <= FLUSH**2 * area) & (next_index >= 0) & (next_index < grid.shape[axis])
             stride = int(np.prod(grid.shape[:axis]))
             behind[at[flush]] = cell[at[flush]] + (stride if side else -stride)
-            moved = np.moveaxis(np.multiply.outer(_values(points, 1.0 - side), across), 1, 0)
+            moved = np.moveaxis(np.multiply.outer(lagrange(points, np.array(1.0 - side)), across), 1, 0)
             found[at] = np.moveaxis(moved, 1, dim - axis).reshape(len(at), -1, dim)
     behind[behind >= 0] = np.where(full[behind[behind >= 0]], -1, behind[behind >= 0])
     return np.where(full[cell], behind, cell), found
-
-
-def _values(points: Array, x: float) -> Array:
-    """The Lagrange polynomials on some points at x."""
-    return np.linalg.solve(np.vander(points, increasing=True).T, x ** np.arange(len(points)))

@@ -19,8 +19,8 @@ from solvers.fluid.covered_faces import CoveredFaces, covered_faces
 from solvers.fluid.field import Fluid
 from solvers.fluid.inside import INSIDE, require_outside, winding
 from solvers.fluid.nested import Nested
-from solvers.fluid.regions import lagrange
 from solvers.fluid.space import FlowNodes
+from solvers.lagrange import lagrange
 
 Probe = Callable[[], dict[str, float]]
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.fluid.box import Grid
 from solvers.gauss import gauss
+from solvers.lagrange import lagrange
 
 #: Length and area, relative to a cell, below which two points coincide and two areas are equal.
 SAME = 1e-9
@@ -164,8 +165,3 @@ def _wet(s: float, to: float) -> list[tuple[tuple[int, int], float, float]]:
 def _area(polygon: Array) -> float:
     x, y = polygon.T
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-
-
-def lagrange(points: Array, x: Array) -> Array:
-    """Lagrange polynomials on some points, evaluated at x, along one more axis."""
-    return np.stack([np.prod([(x - p) / (q - p) for p in points if p != q], axis=0) for q in points], axis=-1)

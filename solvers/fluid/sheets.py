@@ -28,8 +28,9 @@ from solvers.api import Array
 from solvers.connected import connected_parts
 from solvers.fluid.box import Grid
 from solvers.fluid.pieces import NOTHING
-from solvers.fluid.regions import SAME, WHOLE, Region, chords_of, lagrange, regions_in_cell
+from solvers.fluid.regions import SAME, WHOLE, Region, chords_of, regions_in_cell
 from solvers.gauss import gauss
+from solvers.lagrange import lagrange
 from solvers.mesh import Mesh
 
 Indices = NDArray[np.int64]

@@ -23,7 +23,7 @@ class ImmersedSurface:
     facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
     vertices: int
     wet: NDArray[np.bool_] | None = None  #: facets that the fluid acts on; the others only close the solid; None: all
-    may_part: NDArray[np.bool_] | None = None  #: facets that take part in contact
+    in_contact: NDArray[np.bool_] | None = None  #: facets that take part in contact
     slip_length: float = 0.0  #: b [m]: the shear stress is mu / b times the tangential velocity; 0: no slip
     transmissivity: float = 0.0  #: kappa [m^3]: the flux of a layer along it is kappa / mu grad p; 0: no layer
     zone: Zone = "dry"  #: fluid in closed contact
@@ -59,7 +59,8 @@ def may_close(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_] | None:
     if all(surface.zone == "dry" for surface in surfaces):
         return None
     parts = [
-        np.zeros(len(s.facets), dtype=bool) if s.zone == "dry" or s.may_part is None else s.may_part for s in surfaces
+        np.zeros(len(s.facets), dtype=bool) if s.zone == "dry" or s.in_contact is None else s.in_contact
+        for s in surfaces
     ]
     return np.concatenate(parts) & wetness(surfaces)
 

@@ -17,6 +17,7 @@ from solvers.fluid.grid import Grid
 from solvers.fluid.pieces import FLUSH
 from solvers.fluid.surface import Motion
 from solvers.gauss import gauss
+from solvers.lagrange import lagrange
 
 Facets = NDArray[np.int64]
 
@@ -73,8 +74,7 @@ def _line(edge: Array, points: Array, at: Array, begins: Array) -> tuple[Array, 
     start = np.clip((at[:, None] - edge[:-1]) / np.diff(edge), 0.0, 1.0)  # of the solid in each cell, if it begins
     nodes, weights = gauss(len(points))
     t = start[:, :, None] + (1.0 - start[:, :, None]) * nodes
-    basis = [np.prod([(t - p) / (q - p) for p in points if p != q], axis=0) @ weights for q in points]
-    solid = np.einsum("c,cjq->jq", begins, np.stack(basis, axis=2) * (1.0 - start[:, :, None]))
+    solid = np.einsum("c,cjnq,n,cj->jq", begins, lagrange(points, t), weights, 1.0 - start)
     fraction = begins @ (1.0 - start)
     return solid, np.where(np.abs(fraction) < 1e-14, 0.0, fraction)
 

@@ -10,7 +10,7 @@ from programs import fsci
 from fsci.stress import long_run, program, run
 from fsci.stress.draw import SCENES, SPACE, SPACE_SCENES, Draw, draw
 from fsci.stress.frame import Frame
-from fsci.stress.judge import distance, ended_badly, other_bits, out_of_balance, without_a_word
+from fsci.stress.judge import distance, failure_of, missing_warning, other_bits, out_of_balance
 from fsci.stress.program import NEVER_ENDED, Ended
 from fsci.stress.scenes import StressScene
 
@@ -103,17 +103,17 @@ def changed(name, values):
 
 
 def test_what_no_run_may_do():
-    assert ended_badly(GOOD) == ""
-    assert ended_badly(Ended(NEVER_ENDED, "", {}, {})) == "exit code -1000: it did not end"
-    assert ended_badly(Ended(-11, "Segmentation fault", {}, {})) == "exit code -11: Segmentation fault"
-    assert ended_badly(Ended(1, "Traceback\nKeyError", {}, {})) == "a traceback: KeyError"
-    assert ended_badly(Ended(1, "", {}, {})) == "it failed without a word"
-    assert ended_badly(Ended(1, "the step failed", {}, {})) == ""
+    assert failure_of(GOOD) == ""
+    assert failure_of(Ended(NEVER_ENDED, "", {}, {})) == "exit code -1000: it did not end"
+    assert failure_of(Ended(-11, "Segmentation fault", {}, {})) == "exit code -11: Segmentation fault"
+    assert failure_of(Ended(1, "Traceback\nKeyError", {}, {})) == "a traceback: KeyError"
+    assert failure_of(Ended(1, "", {}, {})) == "it failed without a word"
+    assert failure_of(Ended(1, "the step failed", {}, {})) == ""
 
 
 def test_dangers_have_to_be_named():
-    assert without_a_word(DRAW, GOOD) == ""
-    assert without_a_word(DRAW, replace(GOOD, words="")) == "no warning that has 'lock'"
+    assert missing_warning(DRAW, GOOD) == ""
+    assert missing_warning(DRAW, replace(GOOD, words="")) == "no warning that has 'lock'"
 
 
 def test_balances():

@@ -4,6 +4,8 @@ NUMBERS were computed with DOLFINx 0.5.2, PETSc 3.18 and Open MPI 4.1. Newton's 
 """
 
 import pytest
+from case_text import with_section
+from contact_cases import PLATE
 from coupled_case import post
 from programs import fsci
 
@@ -28,28 +30,13 @@ probes:
 solver: {newton: {residual: 1.0e-12}}
 """
 
-PRESSED = """\
-title: a rigid plate presses and slides on a block, with friction
-time: {step: 0.125, end: 0.375}
-structure:
-  bodies:
-    block:
-      mesh: {shape: box, size: [1, 1, 1], cells: [3, 3, 3]}
-      material: {law: neo_hooke, E: 1000, nu: 0.3, density: 1}
-      supports: [{on: bottom, displacement: [0, 0, 0]}]
-contact:
-  obstacles:
-    plate:
-      mesh: {shape: box, size: [3, 3, 1], cells: [1, 1, 1], translate: [-1, -1, 1.01]}
-      on: bottom
-      motion: ["0.05*t", "0.1*t", "-0.2*sin(2*pi*t)^2"]
+FRICTION = """\
   pairs:
     press: {slave: {body: block, on: top}, master: {obstacle: plate}, friction: {coefficient: 0.2}}
-probes:
-  foot: {quantity: reaction, on: bottom}
-  top: {quantity: displacement, at: [0.4, 0.5, 1]}
-solver: {newton: {residual: 1.0e-12}}
 """
+
+#: A rigid plate presses and slides on a block, with friction.
+PRESSED = with_section(with_section(PLATE, "time: {step: 0.125, end: 0.375}\n", "time"), FRICTION, "contact", "pairs")
 
 FLOW = """\
 title: a disc moves through a channel

@@ -26,7 +26,7 @@ PRESSURE = 7.0
 
 def closing(immersed: ImmersedBody, kind: str, which, transmissivity: float = 0.0) -> ImmersedBody:
     """The body with facets that may be in contact."""
-    surface = replace(immersed.surface, may_part=which, zone=kind, transmissivity=transmissivity)
+    surface = replace(immersed.surface, in_contact=which, zone=kind, transmissivity=transmissivity)
     return replace(immersed, surface=surface)
 
 

@@ -6,22 +6,17 @@ import ffcx.codegeneration.jit
 import pytest
 
 import fsci.run.run
+from fsci.bench.small import BEAM
 from fsci.case import load_case
 
-CASE = """\
-time: {step: 0.05, end: 5.0}
-structure:
-  dynamics: {rho_inf: 0.9}
-  bodies:
-    beam:
-      mesh: {shape: rectangle, size: [2, 0.5], cells: [22, 2]}
-      material: {law: neo_hooke, E: 100, nu: 0.3, density: 1.0}
-      supports: [{on: left, displacement: [0, 0]}]
-      gravity: [0, "-3*sin(3*t)"]
+CASE = (
+    BEAM
+    + """\
 probes:
   tip: {quantity: displacement, at: [2, 0.25]}
   energy: {quantity: energy}
 """
+)
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from small_cases import PLATE
 from fsci.bench.small import BLOCK
 from fsci.case import load_case
 from fsci.check import cost
-from fsci.check.cost import MEASURED, Cost, estimate, describe_cost
+from fsci.check.cost import MEASURED, Cost, describe_cost, estimate
 
 #: kind -> two sizes; every factor ten in unknowns takes ten times as long, and contact twice, coupling three times
 TABLE = {
