@@ -97,7 +97,7 @@ def _chapter(title: str, name: str, model: dict[str, Any], models: dict[str, Any
 
 
 def _type(schema: dict[str, Any]) -> str:
-    """What a setting can be, in words."""
+    """The type of a setting in words."""
     if "$comment" in schema:
         return str(schema["$comment"])
     if "$ref" in schema:

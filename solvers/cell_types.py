@@ -18,7 +18,7 @@ Group = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Shape:
-    """What cells of one shape have in common, whatever their order."""
+    """Properties of cells of one shape that do not depend on their order."""
 
     name: str  #: in UFL and basix
     corners: tuple[tuple[float, ...], ...]  #: of the unit cell, edges from 0 to 1
@@ -47,7 +47,7 @@ class CellType:
 
     @property
     def degree(self) -> int:
-        """Of its shape functions."""
+        """Degree of its shape functions."""
         return 1 if self.name == self.first_order else 2
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Arrays over the nodes of a distributed mesh, and their partition-independent form for files."""
+"""Arrays over the nodes of a distributed mesh, and their form for files, which does not depend on the partition."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Nodal:
     """Values at the owned nodes of this process: a leaf of a State that `gather` turns into one array."""
 
     values: Array  #: shape (owned, components)
-    nodes: NDArray[np.int64]  #: number in the mesh file of each owned node
+    nodes: NDArray[np.int64]  #: number of each owned node in the mesh file or a lattice, without gaps
 
 
 def gather_nodal(comm: MPI.Comm, nodal: Nodal) -> Array | None:

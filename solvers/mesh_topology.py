@@ -1,4 +1,4 @@
-"""Which facets a mesh has, and which of them make its boundary and its named surfaces."""
+"""The facets of a mesh: all, those of its boundary, and those of its named surfaces."""
 
 from __future__ import annotations
 

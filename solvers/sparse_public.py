@@ -1,4 +1,4 @@
-"""What `solvers.sparse` takes from scipy's compiled routines, by scipy's public classes: for a scipy without them.
+"""The routines of `solvers.sparse` by scipy's public classes, for a scipy without the private ones.
 
 Arguments are those of the routines of the same name: a matrix is (indptr, indices, data); the last arrays are filled.
 The numbers are the same, the cost per call is ten times as much.
@@ -51,7 +51,7 @@ def csr_row_index(count: int, chosen, p, j, x, indices, data) -> None:
 
 
 def csr_tocsc(rows: int, columns: int, p, j, x, indptr, indices, data) -> None:
-    """The same by columns."""
+    """The matrix in compressed columns."""
     _put(_matrix(rows, columns, p, j, x).tocsc(), indptr, indices, data)
 
 

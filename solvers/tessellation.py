@@ -48,7 +48,7 @@ def unit_normals(corners: Array) -> Array:
 
 
 def is_closed(simplices: Indices) -> bool:
-    """Whether they enclose something: every end or edge belongs to as many simplices one way as the other."""
+    """Whether simplices form a closed surface: each end or edge has as many simplices of either orientation."""
     if simplices.shape[1] == 2:
         count = int(simplices.max(initial=-1)) + 1
         ends = np.bincount(simplices[:, 1], minlength=count) - np.bincount(simplices[:, 0], minlength=count)

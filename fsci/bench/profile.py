@@ -156,7 +156,7 @@ def case(name: str, steps: int) -> list[Row]:
 
 
 def rows(what: str, flow: Fluid, step: Callable[[int], int], steps: int) -> list[Row]:
-    """What the steps after the first take, and below it what moving the matrix alone would."""
+    """Rows of the time of steps after the first, and of the time to read and write the matrix by memory bandwidth."""
     step(0)
     with measured() as parts:
         newton = sum(step(number) for number in range(1, steps + 1))

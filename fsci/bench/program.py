@@ -35,6 +35,6 @@ def run_timed(case: Path, out: Path, settings: Mapping[str, Any]) -> tuple[dict[
 
 
 def _seconds() -> float:
-    """Of the processor, taken by all processes that have ended."""
+    """Processor seconds of all processes that have ended."""
     used = getrusage(RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime

@@ -42,7 +42,7 @@ BENCHMARKS: dict[str, tuple[str, Callable[[], list[Row]]]] = {
 
 
 class BenchmarkError(Exception):
-    """What was asked for cannot be measured."""
+    """A benchmark that cannot be run."""
 
 
 def describe() -> str:
@@ -91,7 +91,7 @@ def commit() -> str:
 
 
 def processor() -> str:
-    """What Linux calls the processor."""
+    """The name of the processor by Linux."""
     path = Path("/proc/cpuinfo")
     lines = path.read_text().splitlines() if path.exists() else []
     return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")

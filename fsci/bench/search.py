@@ -1,4 +1,4 @@
-"""What the search for contact costs."""
+"""Benchmark of the search for contact."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from solvers.kernels import KdopTree3
 
 
 def measure_search(facets: int) -> dict[str, float]:
-    """What the search costs for two wavy sheets of about so many quads each, a tenth of an edge apart.
+    """Time of the search for two wavy sheets of about so many quads each, a tenth of an edge apart.
 
     Seconds for `build` and `refit` (one tree), `query` and `box` (both surfaces), best of three; numbers of
     `facets`, `pairs` and k-DOP `tests`.

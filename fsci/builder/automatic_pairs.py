@@ -139,7 +139,7 @@ def _extent(mesh: Mesh) -> float:
 
 
 def _holds(support: SupportSection, face: Face) -> bool:
-    """It prescribes the displacement across this surface."""
+    """Whether a support prescribes the displacement normal to a surface."""
     if face.name not in (support.on or ()):
         return False
     if support.symmetry or support.normal:

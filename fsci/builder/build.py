@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Simulation:
-    """What the run loop needs; every function is collective."""
+    """The objects that the run loop uses; every function is collective."""
 
     scheme: Scheme
     initialise: Callable[[float, float], None]  #: state at the first time, for a given step size

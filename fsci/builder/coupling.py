@@ -55,7 +55,7 @@ def build_coupled(
 def build_coupled_rigid(
     case: Case, comm: MPI.Comm, bodies: RigidBodies, timer: Timer
 ) -> tuple[Monolithic | Partitioned, Fluid]:
-    """The same for rigid bodies that the flow moves. Raises CaseError (collective)."""
+    """The coupled system of a flow and the rigid bodies that it moves. Raises CaseError (collective)."""
     assert case.fluid is not None
     moved = [(ImmersedSurface(body.name, body.facets, len(body.points)), body.points) for body in bodies.bodies]
     box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)

@@ -61,7 +61,7 @@ def close(points: Array, facets: Facets, inside: Array, corners: Array, box: tup
 
 
 def outlines(fluid: Fluid, dry_sides: Sequence[DrySide]) -> list[Snapshot]:
-    """What lies behind surfaces with one wet side, as closed lines that do not leave the box, on rank 0."""
+    """The lines that close the solid behind surfaces with one wet side, within the box, on rank 0."""
     if fluid.comm.rank != 0:
         return []
     surfaces = {body.surface.name: body.surface for body in fluid.bodies}
@@ -89,7 +89,7 @@ def _loop(points: Array, facets: Facets, line: Array) -> tuple[Array, Facets]:
 
 
 def _area(points: Array, facets: Facets, line: Array) -> float:
-    """What the loop encloses, positive if counterclockwise [m^2]."""
+    """Area enclosed by a loop, positive if it is counterclockwise [m^2]."""
     x, segments = _loop(points, facets, line)
     a, b = x[segments[:, 0]], x[segments[:, 1]]
     return float(0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())

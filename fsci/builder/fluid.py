@@ -140,7 +140,7 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> ImmersedBody:
 
 
 def build_probes(case: Case, fluid: Fluid) -> Callable[[], Numbers]:
-    """What is measured on the fluid. Raises CaseError (collective)."""
+    """The probes of the fluid. Raises CaseError (collective)."""
     forces = probes.Forces(fluid)
     found: dict[str, probes.Probe] = {}
     for name, settings in case.probes.items():

@@ -52,7 +52,7 @@ def _not_at_all(t: float) -> float:
 
 
 def build_probes(case: Case, bodies: RigidBodies) -> Callable[[], Numbers]:
-    """What is measured on them."""
+    """The probes of rigid bodies."""
     numbers = {body.name: index for index, body in enumerate(bodies.bodies)}
     found: dict[str, probes.Probe] = {}
     for name, settings in case.probes.items():

@@ -117,7 +117,7 @@ def _material(body: BodySection, plane: str) -> Material:
 
 
 def build_probes(case: Case, structure: Structure) -> Callable[[], Numbers]:
-    """What is measured on the structure. Raises CaseError (collective)."""
+    """The probes of the structure. Raises CaseError (collective)."""
     by_name = {body.name: body for body in structure.bodies}
     found: dict[str, probes.Probe] = {}
     for name, settings in _probes(case):

@@ -53,7 +53,7 @@ class Case(Section):
 
     @property
     def folder(self) -> Path:
-        """Where paths in the case file start."""
+        """The folder that paths in the case file are relative to."""
         return self._document.path.parent
 
     @property
@@ -92,7 +92,7 @@ class Case(Section):
         return self._document.place(keys)
 
     def locate(self, *keys: str | int) -> str:
-        """Where a setting stands, as case.yaml:12:5; the nearest section around it if it is not in the file."""
+        """Position of a setting, as case.yaml:12:5; that of the nearest section around it if it is not in the file."""
         return str(self.place(*keys))
 
     def error(self, keys: tuple[str | int, ...], message: str) -> CaseError:

@@ -150,7 +150,7 @@ class FilmSection(Section):
 
     @property
     def closed(self) -> Literal["dry", "wetted", "seeping"]:
-        """What fills closed contact."""
+        """The fluid in closed contact."""
         return self.zone or ("seeping" if self.value else "dry")
 
 

@@ -23,7 +23,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake."""
+    """A mistake in a case file: position, message and lines."""
 
     place: Place
     message: str

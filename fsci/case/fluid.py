@@ -85,18 +85,18 @@ class PatchSection(Section):
 
     @property
     def kind(self) -> str:
-        """Which condition it is, of `PATCH_KINDS`."""
+        """The name of its condition in `PATCH_KINDS`."""
         return next(kind for kind in KINDS if getattr(self, kind) not in (None, False))
 
     @property
     def value(self) -> tuple[Any, ...] | None:
-        """What it is given, by components."""
+        """The given value, by components."""
         value = getattr(self, self.kind) if PATCH_KINDS[self.kind].value else None
         return value if value is None or isinstance(value, tuple) else (value,)
 
     @property
     def open(self) -> bool:
-        """It determines the level of the pressure."""
+        """Whether it determines the pressure level."""
         return PATCH_KINDS[self.kind].open
 
 

@@ -84,7 +84,7 @@ def _refinements(case: Case, fluid: FluidSection) -> Iterator[Mistake]:
 
 
 def _periods(fluid: FluidSection, name: str) -> Iterator[Mistake]:
-    """Nothing else is on the faces of a period."""
+    """Mistakes: other patches on the faces of a period."""
     for i, face in enumerate(fluid.patches[name].on):
         for other, patch in fluid.patches.items():
             if patch.periodic and other != name and face in patch.on:

@@ -89,7 +89,7 @@ class GridSection(Section):
 
     @property
     def levels(self) -> int:
-        """How often the finest cells are halved."""
+        """The level of the finest cells."""
         return max((refinement.level for refinement in self.refine), default=0)
 
     @property

@@ -17,7 +17,7 @@ PAIRS = ({"E", "nu"}, {"lambda", "mu"}, {"mu", "nu"})
 
 
 def _values(*settings: Expression | None) -> list[Value]:
-    """Of those settings that are given."""
+    """Mistakes in the given settings."""
     return [value_of(setting) for setting in settings if setting is not None]
 
 
@@ -98,7 +98,7 @@ class MooneyRivlinSection(Section):
 
 
 def has_mass(material: ElasticSection | MooneyRivlinSection) -> bool:
-    """It has a density, and not 0 everywhere."""
+    """Whether it has a density that is not zero everywhere."""
     return material.density is not None and material.density.constant != 0.0
 
 

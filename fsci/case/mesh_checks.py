@@ -48,7 +48,7 @@ def surface_mistakes(mesh: Mesh, name: str, keys: Keys) -> Iterator[Mistake]:
 
 
 def surfaces_mistakes(mesh: Mesh, names: Sequence[str], keys: Keys) -> Iterator[Mistake]:
-    """The same of a list of names."""
+    """Mistakes in a list of names of surfaces."""
     for i, name in enumerate(names):
         yield from surface_mistakes(mesh, name, (*keys, i))
 

@@ -16,7 +16,7 @@ EMPTY = "is empty: give it a value"
 
 
 def problems(error: ValidationError, document: Document) -> list[Problem]:
-    """One located problem for each error."""
+    """A problem with position and message for each error."""
     return [_problem(dict(item), document) for item in error.errors(include_url=False)]
 
 
@@ -82,7 +82,7 @@ def _with_subject(message: str, keys: Keys) -> str:
 
 
 def subject(keys: Keys) -> str:
-    """How messages call a setting: its name, or its number (from 1) in a list."""
+    """The name of a setting in messages: its key, or its number (from 1) in a list."""
     if not keys:
         return "the case"
     if isinstance(keys[-1], int):

@@ -7,7 +7,7 @@ from fsci.case.values import Count, CountOrZero
 
 
 class Output(Section):
-    """What a run writes, and how often."""
+    """Intervals of the output of fields and checkpoints."""
 
     fields_every: CountOrZero = setting(
         1, "steps between two states written for ParaView; 0 writes only the first and the last"

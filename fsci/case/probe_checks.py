@@ -38,7 +38,7 @@ def field_of(case: Case, probe: Probe) -> str | None:
 
 
 def probe_mistakes(case: Case) -> Iterator[Mistake]:
-    """Of all probes."""
+    """Mistakes in all probes."""
     for name, probe in case.probes.items():
         keys: Keys = ("probes", name)
         if set(probe.columns(name, 3)) & set(RESERVED):
@@ -140,7 +140,7 @@ def _reference(reference: Reference, dimension: int, keys: Keys) -> Iterator[Mis
 
 
 def verify_mistakes(case: Case) -> Iterator[Mistake]:
-    """Of all checks: columns that the run will not have, times outside of the run."""
+    """Mistakes in all checks: columns that the run does not have, times outside of the run."""
     columns = [column for name, probe in case.probes.items() for column in probe.columns(name, case.dimension or 3)]
     columns += RUN_COLUMNS
     columns += [column for field, column in FIELD_COLUMNS.items() if getattr(case, field) is not None]

@@ -20,7 +20,7 @@ else:
 
 
 class Reference(Section):
-    """What coefficients of drag and lift refer to: c = F . e / (1/2 density velocity^2 length), in 3D with the area."""
+    """Reference of drag and lift coefficients, c = F . e / (1/2 density velocity^2 length), in 3D with the area."""
 
     density: Positive | None = setting(None, "mass per volume; default: that of the fluid", unit="kg/m^3")
     velocity: Positive = setting(..., "speed", unit="m/s")

@@ -46,7 +46,7 @@ def end_error(case: Case, changes: Sequence[tuple[str, str]], reached: float) ->
 
 
 def place(change: tuple[str, str]) -> Place:
-    """Where a change of the command line stands."""
+    """Position of a change on the command line."""
     return Place(f"--set {change[0]}={change[1]}")
 
 

@@ -21,7 +21,7 @@ class Newton(Section):
 
 
 class Linear(Section):
-    """How linear systems are solved."""
+    """The linear solver: method and tolerance."""
 
     method: Literal["auto", "direct", "iterative", "ilu"] = setting(
         "auto",
@@ -31,7 +31,7 @@ class Linear(Section):
 
 
 class Solver(Section):
-    """How the equations of a step are solved."""
+    """The nonlinear and linear solvers of a step."""
 
     newton: Newton = setting(Newton, "nonlinear iteration")
     linear: Linear = setting(Linear, "linear solver")

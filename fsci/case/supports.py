@@ -22,7 +22,7 @@ Displacement = Annotated[
 
 
 class Located(Section):
-    """What acts at a named part of the mesh, or at a node."""
+    """The location of a support or spring: a named part of the mesh, or a node."""
 
     @model_validator(mode="after")
     def _somewhere(self) -> Any:

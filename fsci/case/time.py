@@ -11,7 +11,7 @@ from fsci.case.values import Count, CountOrZero, Number, Positive
 
 
 class Retry(Section):
-    """What happens when a step has no solution: it is repeated as two half steps."""
+    """The repetition of a failed step as two half steps."""
 
     halvings: CountOrZero = setting(4, "how many times a step may be halved before the run ends")
     recover_after: Count = setting(5, "accepted steps after which a halved step is doubled again")

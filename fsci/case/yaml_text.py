@@ -49,7 +49,7 @@ UNCLOSED = {
 
 @dataclass
 class Parsed:
-    """What a text contains."""
+    """The data of a text with the positions of its keys and values."""
 
     data: Any = None  #: nested dict (keys are always text), list, str, int, float, bool, None
     keys: dict[Keys, Place] = field(default_factory=dict)  #: names of settings

@@ -1,4 +1,4 @@
-"""What a case will cost, before it is run: an estimate from steps that were measured.
+"""The cost of a case before it is run, estimated from measured steps.
 
 Each kind of problem has a few sizes, with the processor's time for a step and the memory of the run; in between, and
 beyond, both go by powers of the number of unknowns. Contact and coupling are factors on that.
@@ -66,7 +66,7 @@ def in_words(case: Case, meshes: Mapping[str, Mesh]) -> str:
 
 
 def costs() -> Table:
-    """Those of this machine if they were measured, else those of the machine that the program was made on."""
+    """Measured costs of this machine, or if there are none those of the machine of the developers."""
     try:
         rows = json.loads(OWN.read_text())["results"]["cost"]
         own: dict[str, list[Point]] = {}
@@ -78,7 +78,7 @@ def costs() -> Table:
 
 
 def describe_cost(cost: Cost, steps: int) -> str:
-    """One line."""
+    """Unknowns, time and memory in one line."""
     whole = f", {_time(cost.step * steps)} for all" if steps > 1 else ""
     return (
         f"about {cost.unknowns:,} unknowns, {_time(cost.step)} per step{whole}, {_memory_words(cost.memory)}, "
@@ -105,7 +105,7 @@ def _power(points: Sequence[tuple[float, float]], at: float) -> float:
 
 
 def _factor(points: Sequence[Point], plain: Sequence[Point], dofs: float) -> float:
-    """Of a step's time, at the nearest size that was measured."""
+    """Share of the time of a step at the nearest measured size."""
     at = min(max(dofs, points[0][0]), points[-1][0])
     return max(1.0, _seconds(points, at) / _seconds(plain, at))
 

@@ -1,4 +1,4 @@
-"""What `fsci check` finds by reading the meshes of a case: mistakes that would stop a run, and warnings.
+"""The checks of `fsci check` that read the meshes of a case: mistakes that would stop a run, and warnings.
 
 Meshes are read only where they can tell something: files always, built-in shapes where points or bodies depend on them.
 """
@@ -36,7 +36,7 @@ T = TypeVar("T")
 
 @dataclass
 class Findings:
-    """What the meshes of a case tell."""
+    """Sizes, mistakes and warnings from the meshes of a case."""
 
     problems: list[Problem] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -139,7 +139,7 @@ def _is_flat(mesh: Mesh, surface: str) -> bool:
 
 
 def _wet(case: Case, found: Findings, keys: Keys, mesh: Mesh) -> None:
-    """What an elastic body in a flow needs besides."""
+    """Further checks of an elastic body in a flow."""
     name = str(keys[-1])
     skin = found.attempt(partial(find_skin, case, name, mesh))
     if skin is not None:

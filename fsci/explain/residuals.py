@@ -1,4 +1,4 @@
-"""How an iteration went, from its residuals: kind, rate and a curve in text."""
+"""The convergence of an iteration from its residuals: kind, rate and a curve in text."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Course:
 
 
 def course(residuals: Sequence[float]) -> Course:
-    """What the last iterations did."""
+    """The kind and rate of convergence of the last iterations."""
     if len(residuals) < 2:
         return Course("none")
     if not all(math.isfinite(r) for r in residuals):

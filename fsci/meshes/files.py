@@ -61,7 +61,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Content:
-    """What a file holds, before the cells of the highest dimension become the mesh."""
+    """The content of a mesh file, before the cells of the highest dimension are extracted."""
 
     points: NDArray[np.float64]
     blocks: list[Block]

@@ -27,7 +27,7 @@ KINDS = {"supports": ("surface", "line", "points"), "springs": ("surface", "poin
 
 
 def find_locations(case: Case, name: str, mesh: Mesh) -> Locations:
-    """Where supports, springs and loads of a body act. Raises CaseError."""
+    """Surfaces and nodes on which supports, springs and loads of a body act. Raises CaseError."""
     body, locations = case.elastic_bodies[name], {}
     for section in (*KINDS, "tractions", "pressures", "line_forces"):
         for index, entry in enumerate(getattr(body, section)):

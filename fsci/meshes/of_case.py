@@ -59,7 +59,7 @@ def _require_dimension(case: Case, name: str, mesh: Mesh) -> None:
 
 
 def slave_surfaces(case: Case, name: str) -> list[str]:
-    """Those of a body that are not tied."""
+    """The pairs of a body that are not tied."""
     pairs = () if case.contact is None else case.contact.pairs.values()
     slaves = [pair.sides[0][1] for pair in pairs if not pair.tied]
     return [surface for side in slaves if side.body == name for surface in side.on or ()]

@@ -82,7 +82,7 @@ def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float]) -> 
 
 
 def plot_more(folder: Path, moments: Sequence[Moment], labels: Labels, *, flow: bool) -> list[Path]:
-    """What helps to understand a run: its mesh, the flow over time, the state before contact, and contact pressure."""
+    """Further pictures of a run: mesh, flow over time, the state before contact, and contact pressure."""
     drawn = [plot_mesh(folder / "mesh.png", moments[0], labels)]
     touching = [index for index, moment in enumerate(moments) if has_contact(moment[flow:])]
     if flow and len(moments[0]) > 1:

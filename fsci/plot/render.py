@@ -28,7 +28,7 @@ ROUND: Any = {"smooth_shading": True, "split_sharp_edges": True, "feature_angle"
 
 @dataclass(frozen=True)
 class DrawnBody:
-    """What is drawn of one body."""
+    """The drawn parts of one body."""
 
     surface: Any  #: pyvista surface, curved cells subdivided, with the point data
     edges: Array  #: polylines, shape (edges, points per edge, 3)

@@ -32,7 +32,7 @@ def is_flow(path: Path) -> bool:
 
 
 def load_state(files: Sequence[Path], field: str) -> list[DrawnBody]:
-    """What is drawn of the VTU files of one time, flow first; bodies in a flow that has the field are grey."""
+    """The drawn parts of the VTU files of one time, flow first; bodies in a flow that has the field are grey."""
     meshes = [import_pyvista().read(path) for path in files]
     flow = meshes[0] if "fluid_fraction" in meshes[0].cell_data else None
     parts = [part for mesh in meshes if mesh is not flow for part in _load_body(mesh, field)]
@@ -66,7 +66,7 @@ def load_meshes(files: Sequence[Path]) -> list[DrawnBody]:
 
 
 def _on_back(faces: Any) -> NDArray[np.int64]:
-    """Which faces lie in one of the three sides of the box that are turned away from the camera."""
+    """Mask of the faces on the three sides of the box that face away from the camera."""
     centres = np.asarray(faces.cell_centers().points)
     bounds, margin = np.array(faces.bounds), 1e-6 * faces.length
     back = np.where(ISOMETRIC > 0, bounds[::2], bounds[1::2])
@@ -202,7 +202,7 @@ def _tubes(mesh: Any, bodies: Sequence[Any]) -> Any:
 
 
 def _inside(points: Array, surface: Any) -> NDArray[np.bool_]:
-    """Which points a closed surface encloses."""
+    """Mask of the points inside of a closed surface."""
     from vtkmodules.vtkFiltersModeling import vtkSelectEnclosedPoints
 
     pyvista = import_pyvista()

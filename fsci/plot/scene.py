@@ -26,7 +26,7 @@ LOPSIDED = 0.2  #: values on one side of zero, in parts of those on the other, b
 
 @dataclass(frozen=True)
 class Scene:
-    """What the states of a run have in common when they are drawn."""
+    """The common view, colours and layout of the pictures of a run."""
 
     view: View
     flat: bool  #: 2D bodies, viewed from the front, with coordinates at the axes
@@ -205,7 +205,7 @@ def headline(scene: Scene, time: float) -> str:
 
 
 def field_label(field: str, bodies: list[DrawnBody], units: Mapping[str, str]) -> str:
-    """What the colours are: |displacement| [m], displacement x [m], stress_xx [Pa]."""
+    """Label of the colours: |displacement| [m], displacement x [m], stress_xx [Pa]."""
     for body in bodies:
         data = body.surface.point_data
         if field in data:

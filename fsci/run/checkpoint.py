@@ -95,7 +95,7 @@ def step_of(path: Path) -> int:
 
 
 def checksum(path: Path) -> bytes:
-    """What the user block of a checkpoint must say: size and CRC-32 of everything behind it."""
+    """The user block of a checkpoint: size and CRC-32 of the rest of the file."""
     size, code = 0, 0
     with path.open("rb") as raw:
         raw.seek(USER_BLOCK)

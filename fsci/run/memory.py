@@ -45,5 +45,5 @@ def require_memory(case: Case, comm: Any) -> None:
 
 
 def _physical_memory() -> int:
-    """Of this machine [bytes]."""
+    """Physical memory of this machine [bytes]."""
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

@@ -1,4 +1,4 @@
-"""What a run shows: one line per step, on a terminal a progress bar below, and the same lines in a log."""
+"""The output of a run: one line per step, on a terminal with a progress bar, and the same lines in a log."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ class Monitor:
             self.progress = None
 
     def say(self, text: str, *, style: str = "") -> None:
-        """One line, coloured on a terminal."""
+        """Write one line, coloured on a terminal."""
         if not self.enabled:
             return
         if self.live:

@@ -214,7 +214,7 @@ class Run:
         return self._end("finished", "")
 
     def take_step(self) -> None:
-        """One accepted step. Raises StepFailed if halving does not help."""
+        """Take one accepted step. Raises StepFailed if it fails after all halvings."""
         before, clock = self.record.wall(), self.clock
         while True:
             try:
@@ -250,7 +250,7 @@ class Run:
             self.good_at = {"step": clock.step, "time": clock.time, "title": self.case.title}
 
     def _note(self, dt: float, info: StepInfo, before: float) -> None:
-        """One line in the history and on the screen."""
+        """Write one line to the history and to the screen."""
         with self.record.timer("probes"):
             self.probes, self.balances = self.simulation.probes(), self.simulation.balances()
         wall = self.record.wall() - before

@@ -44,7 +44,7 @@ class RunRecord:
         return self.earlier + time.perf_counter() - self.begin
 
     def save(self) -> State:
-        """What a checkpoint keeps, so that the summary of a resumed run covers all of it."""
+        """The record in a checkpoint, so that the summary of a resumed run covers the whole run."""
         return {
             "retried": self.retried,
             "residuals": {str(step): norms for step, norms in self.residuals.items()},
@@ -117,7 +117,7 @@ def summarize(
 
 
 def shares(total: float, parts: Mapping[str, float]) -> str:
-    """Where the time of a run went: "solve 40 %, assembly 35 %, other 25 %", the largest first, from 1 % on."""
+    """Time of a run by part: "solve 40 %, assembly 35 %, other 25 %", the largest first, from 1 % on."""
     percent = {name: round(100 * seconds / total) for name, seconds in parts.items()} if total else {}
     percent = {name: share for name, share in sorted(percent.items(), key=lambda part: -part[1]) if share}
     rest = max(100 - sum(percent.values()), 0)

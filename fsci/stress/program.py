@@ -28,7 +28,7 @@ NEVER_ENDED = -1000  #: code of a run that was given up
 
 @dataclass(frozen=True)
 class Ended:
-    """How a run ended."""
+    """The end of a run: exit code, output and results."""
 
     code: int
     words: str  #: its output

@@ -56,7 +56,7 @@ def stress(seeds: Sequence[int], say: Callable[[str], None], keep: Path | None =
 
 
 def judge(seed: int, keep: Path | None = None) -> Outcome:
-    """One draw."""
+    """Run one draw and its twin, and judge them."""
     begin = time.perf_counter()
     with TemporaryDirectory() as folder:
         if seed % MUTANT == MUTANT - 1:

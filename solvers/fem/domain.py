@@ -1,4 +1,4 @@
-"""Distributed meshes: their cells, facets and named surfaces, and the way back to the numbers in the mesh file."""
+"""Distributed meshes: cells, facets, named surfaces, and their numbers in the mesh file."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def input_cells(domain: Domain) -> NDArray[np.int64]:
 
 
 def owned_cells(domain: Domain) -> int:
-    """How many of the local cells this process owns; they come first."""
+    """Count of the local cells that this process owns; they come first."""
     return int(domain.mesh.topology.index_map(domain.dim).size_local)
 
 

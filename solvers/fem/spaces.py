@@ -1,4 +1,4 @@
-"""Finite element spaces and what their dofs belong to."""
+"""Finite element spaces, and the nodes and cells of their dofs."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ def scalar_space(domain: Domain) -> Any:
 
 
 def cellwise_space(domain: Domain) -> Any:
-    """One number per cell."""
+    """Space of piecewise constants: one number per cell."""
     with compiling("an element"):
         return calls.function_space(domain.mesh, calls.discontinuous_element(cell_of(domain), 0))
 
 
 def pressure_space(domain: Domain) -> Any:
-    """Scalars that jump from cell to cell: constant in first-order cells, linear in those of second order."""
+    """Discontinuous scalars: constant in first-order cells, linear in second-order cells."""
     with compiling("an element"):
         element = calls.discontinuous_element(cell_of(domain), domain.degree - 1)
         return calls.function_space(domain.mesh, element)

@@ -1,4 +1,4 @@
-"""What the sections of built-in meshes have in common: names of surfaces, counts of cells and nodes, extents."""
+"""Common parts of the sections of built-in meshes: names of surfaces, counts of cells and nodes, extents."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ Counts = tuple[int, int]  #: cells, nodes
 
 
 def along(cells: int, order: int, *, closed: bool = False) -> Counts:
-    """Of a line, or of a circle."""
+    """Counts of a line or a circle."""
     return cells, order * cells + (not closed)
 
 
 def across_disc(around: int, radial: int, order: int) -> Counts:
-    """Of a square core with a quarter of the cells around on each side, in a shell of layers."""
+    """Counts of a square core, with a quarter of the cells around on each side, in a shell of layers."""
     quarter = around // 4
     return quarter**2 + around * radial, (order * quarter + 1) ** 2 + order * around * order * radial
 
 
 def product(*parts: Counts) -> Counts:
-    """Of every cell and node of one part with every one of the others."""
+    """Counts of the product of parts: every cell and node of one with every one of the others."""
     return prod(cells for cells, _ in parts), prod(nodes for _, nodes in parts)
 
 
