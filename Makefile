@@ -119,7 +119,7 @@ docs: $(DOCS_STAMP)
 links: docs
 	@if $(BIN)/python -c 'import socket; socket.create_connection(("github.com", 443), 10)' 2>/dev/null; then \
 	  printf -- '---\norphan: true\n---\n\n```{include} ../../README.md\n:relative-docs: docs/\n```\n' > docs/reference/readme.md; \
-	  $(BIN)/python -m sphinx -b linkcheck docs docs/_build/links; status=$$?; rm docs/reference/readme.md; exit $$status; \
+	  $(BIN)/python -m sphinx -q -b linkcheck -D suppress_warnings=myst.xref_missing,image.not_readable docs docs/_build/links; status=$$?; rm docs/reference/readme.md; exit $$status; \
 	else echo "links: no connection to github.com, external links are not checked"; fi
 
 # Back to a fresh clone, except for results/: they may have taken days.

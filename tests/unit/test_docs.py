@@ -80,6 +80,7 @@ def test_links_lead_to_headings(page):
         if target in ("reference/case.md", "reference/api.md"):
             continue
         assert file.exists(), target
+        assert page.parent.name != "docs" or file.resolve().is_relative_to(ROOT / "docs"), f"{target}: not in the site"
         assert not anchor or anchor in anchors(file), f"{target}#{anchor}"
 
 
