@@ -36,18 +36,23 @@ class Monolithic:
 
     def __init__(self, coupled: Coupled, tolerance: Tolerance = Tolerance()):
         self.coupled, self.tolerance = coupled, tolerance
-        solid, flow = coupled.solid, coupled.flow
-        self.comm = solid.comm
-        self._numbering = Numbering(self.comm, solid.size, flow.size)
-        # unsteady: the factors of the first iterate do not precondition the later ones well enough
-        self._direct = LaggedFactors(self.comm, fresh=math.inf if flow.steady else 2)
+        flow = coupled.flow
+        self.comm = coupled.solid.comm
+        self._number_unknowns()
         self._farther: Part = flow
-        self._krylov = Lagged()
         self._linear_iterations = 0  #: of this step
         #: rounding errors of the residuals of solid and flow [N]; None before this step linearises
         self._noise: Array | None = None
         self._found, self.largest = np.zeros(2), np.zeros(2)  #: residuals of solid and flow: now, largest of the step
         self._prepared: Blocks | None = None  #: the matrix at the present iterate, if it is assembled already
+
+    def _number_unknowns(self) -> None:
+        """Numbering of the unknowns of both parts, and solvers for it."""
+        solid, flow = self.coupled.solid, self.coupled.flow
+        self._numbering, self._numbered = Numbering(self.comm, solid.size, flow.size), flow.renewals
+        # unsteady: the factors of the first iterate do not precondition the later ones well enough
+        self._direct = LaggedFactors(self.comm, fresh=math.inf if flow.steady else 2)
+        self._krylov = Lagged()
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -88,6 +93,9 @@ class Monolithic:
         """Residual [N]: the larger relative residual of the parts, times the sum of their largest in this step."""
         flow, solid, interface = self.coupled.flow, self.coupled.solid, self.coupled.interface
         flow.move(interface.move(interface.displacement()), with_solid=True)
+        if flow.renewals > self._numbered:
+            self._number_unknowns()
+            self._prepared = None
         of_flow = flow.residual()
         solid.load(self.coupled.force())
         found = np.array([solid.residual(), of_flow])

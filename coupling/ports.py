@@ -162,6 +162,7 @@ class Flow(Part, Protocol):
     @property
     def steady(self) -> bool: ...
 
+    renewals: int  #: how often its unknowns have become others, because thin bodies went to other cells
     timer: Timer
     notes: list[str]  #: notes to the user on this step
 

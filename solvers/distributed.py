@@ -42,6 +42,11 @@ def gather(comm: MPI.Comm, state: State) -> State:
     return out
 
 
+def everywhere(comm: MPI.Comm, state: State) -> State:
+    """The state with every Nodal leaf replaced by the whole array on all processes. Collective."""
+    return dict(comm.bcast(gather(comm, state), root=0))
+
+
 def scatter(comm: MPI.Comm, state: State, like: State) -> State:
     """The inverse of `gather`: distribute rank 0's arrays as the Nodal leaves of `like`. Collective."""
     out: State = {}

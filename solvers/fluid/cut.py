@@ -106,6 +106,8 @@ class Cutter:
 
     def _cut(self, facets: NDArray[np.int64], motion: Motion, layers: int, wet: NDArray[np.bool_] | None) -> Cut:
         grid, box = self.grid, self.grid.grid
+        if grid.sheets is not None:
+            self._special[:] = False  # a cell behind a thin body is one of its other side
         self._depth = max(self._depth, layers)
         nearby = _grow(self._own, self._depth + MARGIN)
         moments = kernels.moments(box.edges, self.points, motion.x, facets, nearby.ravel(order="F"))

@@ -75,6 +75,11 @@ class Extension:
         #: row of E of each node in this step, -1: none yet
         self._row_of, self._rows = np.full(len(numbers), -1), sparse.csr_matrix((0, self.size))
 
+    def follow(self, sheets: Sheets | None) -> None:
+        """Take sheets with the same cells, of which some have more fluid now and others less."""
+        if self._sheets is not None and sheets is not None:
+            self._sheets.follow(sheets)
+
     def begin_step(self) -> None:
         """Discard the roots of the last step."""
         self._row_of[:], self._rows = -1, self._rows[:0]
@@ -173,7 +178,7 @@ class Extension:
     def _amplification(self, axis: int, nodes: Numbers, layers: int) -> Array:
         """Sum of the absolute values of the 1D shape functions, continued to any distance, shape (nodes, cells)."""
         s = self._coordinates(axis, nodes, layers)
-        return np.abs(_lagrange(s, self.degree)).sum(axis=2)
+        return np.abs(lagrange(s, self.degree)).sum(axis=2)
 
     def _entries(self, nodes: Numbers, layers: int, chosen: Numbers, steep: NDArray[np.bool_]) -> tuple[Numbers, Array]:
         """(lattice nodes, weights) of chosen cells of the windows, shape (chosen, functions)."""
@@ -186,19 +191,19 @@ class Extension:
             first = self.degree * np.take_along_axis(index, column, axis=1)
             lattice = (first + np.arange(self.degree + 1)) % self.shape[axis] * self._strides[axis]
             s = np.take_along_axis(self._coordinates(axis, nodes, layers), column, axis=1)[:, 0]
-            columns, weights = _outer_sum(columns, lattice), _outer_product(weights, _continued(s, self.degree, steep))
+            columns, weights = _outer_sum(columns, lattice), _outer_product(weights, continued(s, self.degree, steep))
         return columns, weights
 
 
-def _continued(s: Array, degree: int, steep: NDArray[np.bool_]) -> Array:
+def continued(s: Array, degree: int, steep: NDArray[np.bool_]) -> Array:
     """1D shape functions at s, shape (points, functions); outside of the cell those of a line where steep or far."""
     outside = np.maximum(-s, s - 1.0)
     straight = (outside > FAR) | steep & (outside > 0.0)
     line = np.stack([1.0 - s, *[0.0 * s] * (degree - 1), s], axis=1)
-    return np.where(straight[:, None], line, _lagrange(s, degree))
+    return np.where(straight[:, None], line, lagrange(s, degree))
 
 
-def _lagrange(s: Array, degree: int) -> Array:
+def lagrange(s: Array, degree: int) -> Array:
     """1D shape functions at s, along one more axis."""
     if degree == 1:
         return np.stack([1.0 - s, s], axis=-1)

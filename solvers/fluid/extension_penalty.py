@@ -99,6 +99,7 @@ class ExtensionPenalty:
         self, cut: Cut, free: NDArray[np.bool_], nodes: FlowNodes, extension: Extension, directory: Directory
     ) -> Entries:
         """Entries of E of one quantity, velocity or pressure."""
+        extension.follow(self.unknowns.grid.sheets)
         found = extension(cut.share, cut.is_active, cut.depth + NEAR)
         entries, dofs = found.rows.tocoo(), nodes.dofs[found.nodes]
         dry = free[dofs] & found.dry[:, None]

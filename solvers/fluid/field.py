@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
@@ -14,23 +13,24 @@ from petsc4py import PETSc
 
 from solvers import fem, linear
 from solvers.api import Array, State, StepFailed, StepInfo
-from solvers.distributed import Nodal
+from solvers.distributed import Nodal, everywhere, scatter
 from solvers.fluid.balances import Balances
 from solvers.fluid.coupling_entries import InterfaceEntries, interface_entries
-from solvers.fluid.cut import Cut, Cutter
+from solvers.fluid.cut import Cut
+from solvers.fluid.discretisation import discretise
 from solvers.fluid.fast_bodies import FastBodies
-from solvers.fluid.film import films_of
 from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.grid import DistributedGrid, Grid
+from solvers.fluid.grid import Grid
 from solvers.fluid.history import History
 from solvers.fluid.immersed import ImmersedBody, sheets_of
 from solvers.fluid.krylov import FlowSolver, SolverSequence
-from solvers.fluid.patches import Boundary, Patch, periodic_axes
+from solvers.fluid.patches import Patch, periodic_axes
 from solvers.fluid.pressure_level import PressureLevels
 from solvers.fluid.reach import require_finest, require_history, require_within_period, strip_layers
-from solvers.fluid.space import Unknowns, set_velocity
-from solvers.fluid.surface import Motion, by_facets, may_close, seeping, together, vertex_ranges, wetness
-from solvers.fluid.system import FlowSystem
+from solvers.fluid.sheets import Sheets
+from solvers.fluid.space import set_velocity
+from solvers.fluid.surface import Motion, together, vertex_ranges, wetness
+from solvers.fluid.thin_bodies import Began, ThinBodies, carry
 from solvers.fluid.time_scheme import STEADY, FlowStep
 from solvers.fluid.zone_entries import with_zone
 from solvers.largest import position_of_largest
@@ -66,51 +66,44 @@ class Fluid:
         comm: MPI.Comm = MPI.COMM_WORLD,
     ):
         self.comm, self.settings, self.solver, self.timer = comm, settings, solver, timer or Timer()
-        self.bodies, self.dim, periodic = list(bodies), grid.dim, periodic_axes(patches)
+        self.bodies, self.dim, self._box, self._patches = list(bodies), grid.dim, grid, patches
+        periodic = bool(periodic_axes(patches))
         sheets = None if periodic else sheets_of(grid, self.bodies)
-        self.grid = DistributedGrid(comm, grid, sheets)
-        self.unknowns = Unknowns(self.grid, settings.degree, periodic)
-        self.size = self.unknowns.owned  #: unknowns that this process owns
-        self.boundary = Boundary(self.grid, self.unknowns, patches)
+        self._thin = ThinBodies(grid, self.bodies, periodic, sheets)
         self.steady, self.scheme = settings.steady, settings.time  #: steps are steady states; the time scheme
         self.linear_tolerance = solver.linear_tolerance
-        method = solver.linear if isinstance(solver.linear, str) else "auto"
-        method = method if sheets is None else "direct"  # the others need nodes on a lattice
-        size, degree, equal = self.dofs(), settings.degree, self.grid.nested is None
-        methods = linear.choose_flow(method, self.dim, size, degree=degree, steady=self.steady, multigrid=equal)
-        self.system = FlowSystem(
-            self.grid,
-            settings,
-            self.boundary,
-            self.unknowns,
-            with_bodies=bool(self.bodies),
-            # incomplete factors of dense blocks are two times as fast
-            blocked=methods[0] != "direct" and self.unknowns.block_size > 1,
-        )
-        surfaces = [body.surface for body in self.bodies]
-        self.system.slip_length = by_facets(surfaces, [surface.slip_length for surface in surfaces])
-        self.system.transmissivity = by_facets(surfaces, [surface.transmissivity for surface in surfaces])
-        self.system.may_close, self.system.seeping = may_close(surfaces), seeping(surfaces)
-        films = films_of(patches, settings.penalties) if settings.films else None
-        self.cutter = Cutter(self.grid, self.system.weights.points, films)
+        self.notes: list[str] = []  #: notes to the user on this step
+        self.renewals = 0  #: how often the unknowns have been made: once, and where thin bodies go to other cells
+        self._discretise(sheets)
         self.history = History(settings.time, self.unknowns.local)
         self.current = FlowStep(0.0, 0.0, STEADY)  #: the step that is computed now or was last
+        self._began: Began | None = None  #: what the step that is computed now began with
         self.started = False  #: a step was accepted, hence forces exist
         self.smallest_cell = min(float(np.diff(edge).min()) for edge in grid.edges)
         self.motions: list[Motion] = []
+        surfaces = [body.surface for body in self.bodies]
         self._wet, self._vertices = wetness(surfaces), vertex_ranges(surfaces)
         self._fast_bodies = FastBodies(grid)
-        self.notes: list[str] = []  #: notes to the user on this step
-        self.sequence = SolverSequence(comm, methods, self.dofs(), self.notes.append)
-        self.linear_solver = FlowSolver(self.unknowns, self.sequence, solver.linear_tolerance, steady=settings.steady)
         self.linear_iterations = 0  #: of the last linear system
+        self._size = self._largest = 0.0  #: norm of the residual: now, and its largest of the step
+
+    def _discretise(self, sheets: Sheets | None) -> None:
+        """Grid, unknowns and equations, with cells of its own for the fluid on each side of thin bodies."""
+        settings = self.settings
+        parts = discretise(self.comm, self._box, sheets, settings, self._patches, self.bodies, self.solver)
+        self.grid, self.unknowns, self.boundary = parts.grid, parts.unknowns, parts.boundary
+        self.system, self.cutter = parts.system, parts.cutter
+        self.size = owned = self.unknowns.owned  #: unknowns that this process owns
+        if not self.renewals or parts.methods != self.sequence.methods:
+            self.sequence: SolverSequence = SolverSequence(self.comm, parts.methods, self.dofs(), self.notes.append)
+        self.linear_solver = FlowSolver(self.unknowns, self.sequence, self.linear_tolerance, steady=settings.steady)
         self.rounding: Array | None = None  #: rounding error of `residual_rows`; None before this step linearises
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is assembled already
-        owned = self.unknowns.owned
         self.held = np.zeros(owned, dtype=bool)  #: owned dofs with rows of the identity
         self.levels = PressureLevels(self.system, self.bodies)
         self.residual_rows, self._increment, self._diagonal = (np.zeros(owned) for _ in range(3))
-        self._size = self._largest = 0.0  #: norm of the residual: now, and its largest of the step
+        self._balances: Balances | None = None
+        self.renewals += 1
 
     # ------------------------------------------------------------------------------------------------- the state
 
@@ -158,11 +151,10 @@ class Fluid:
 
     def begin_step(self, t: float, dt: float) -> None:
         """Store the state at t; set boundary values, loads and moving bodies at t + dt. Times in [s]."""
-        difference, last = self.history.difference(dt), self.history.past[0].velocity
-        self.current = FlowStep(t + dt, dt, difference)
+        self.current = FlowStep(t + dt, dt, self.history.difference(dt))
+        self._began = Began(self.unknowns, self.grid.sheets, tuple(self.history.past), tuple(self.motions))
         self.cutter.begin_step()
-        self.system.begin_step(self.current, self.history.rate(difference), self.history.missing(difference), last)
-        self.flow[self.boundary.dofs] = self.boundary.velocity(t + dt)
+        self._begin_system()
         self._largest = 0.0
         self.rounding = self._tangent = None  # not part of the saved state: a resumed run must start alike
         self.linear_solver.begin_step()
@@ -170,6 +162,12 @@ class Fluid:
         if not self._coupled:
             self.predict()
             self.move({})
+
+    def _begin_system(self) -> None:
+        """Set loads and boundary values at the end of the step."""
+        difference, last = self.current.difference, self.history.past[0].velocity
+        self.system.begin_step(self.current, self.history.rate(difference), self.history.missing(difference), last)
+        self.flow[self.boundary.dofs] = self.boundary.velocity(self.current.t)
 
     def predict(self) -> None:
         """Predictor: extrapolate the velocity linearly from the last two steps, where both have one."""
@@ -193,6 +191,7 @@ class Fluid:
         self.motions = motions
         with self.timer("cut"):
             facets, motion = together([body.surface for body in self.bodies], motions, self.dim)
+            self._follow(self._thin.sheets(facets, motion), facets, motion)
             cut = self.cutter(facets, motion, self._layers(motion), self._wet)
             require_finest(self.cutter, self.comm)
         with self.timer("weights"):
@@ -205,9 +204,31 @@ class Fluid:
             self.held = self.system.held()
             self.levels.hold(self.held, set_by_solids=with_solid and not self.settings.steady)
 
+    def _follow(self, sheets: Sheets | None, facets: NDArray[np.int64], motion: Motion) -> None:
+        """Take the sheets of the fluid around thin bodies at their present positions."""
+        if sheets is self.grid.sheets:
+            return
+        assert sheets is not None
+        began = self._began
+        if began is not None:
+            began.require_near(self.smallest_cell, motion.x)
+        now, old, flow, increment = self.grid.sheets, self.unknowns, self.flow, self._increment
+        if now is not None and now.same_unknowns(sheets):
+            self.grid.sheets = sheets
+            return
+        self._discretise(sheets)
+        carrier = carry(old, now, self.unknowns, len(facets))
+        self.flow[:] = carrier.flow(flow)
+        self._increment = carrier.flow(np.pad(increment, (0, old.local - old.owned)))[: self.unknowns.owned]
+        if began is not None and began.unknowns is not old:
+            carrier = carry(began.unknowns, began.sheets, self.unknowns, len(facets))
+        self.history.past = [carrier.past(past) for past in (self.history.past if began is None else began.past)]
+        if began is not None:
+            self._begin_system()
+
     def _layers(self, motion: Motion) -> int:
-        """Number of cell layers behind the surface that the next steps may uncover."""
-        if self.settings.steady or all(body.rests for body in self.bodies):
+        """Number of cell layers behind the surface that the next steps may uncover; none around thin bodies."""
+        if self._thin.follows or self.settings.steady or all(body.rests for body in self.bodies):
             return 0
         times = self.settings.time.times
         return strip_layers(self.grid, motion, times * self.current.dt, self.smallest_cell)
@@ -233,7 +254,12 @@ class Fluid:
         self.system.settle()
         found = self.system.active_dofs | self.system.dofs_of(self.cut.contact_cells)
         self.history.end_step(self.current.dt, self.velocity(), found)
+        self.forget_step()
         self.started = True
+
+    def forget_step(self) -> None:
+        """What comes next starts from the history as it is now."""
+        self._began = None
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
@@ -358,26 +384,36 @@ class Fluid:
 
     def balances(self) -> tuple[Array, float]:
         """(force [N] on all bodies by the balance of momentum, (dim,); power [W] lost by the method) (collective)."""
+        self._balances = self._balances or Balances(self.system)
         return self._balances(self.held)
-
-    @cached_property
-    def _balances(self) -> Balances:
-        return Balances(self.system)
 
     # ---------------------------------------------------------------------------------------- save and restore
 
     def save(self) -> State:
-        """The state that the next step starts from."""
+        """The state that the next step starts from; whole arrays where thin bodies may go to other cells."""
+        return everywhere(self.comm, self._state()) if self._thin.may_follow else self._state()
+
+    def _state(self) -> State:
         return self.history.save(self.unknowns) | {
             "pressure": self.unknowns.to_nodes(self.flow, self.unknowns.pressure),
             "pattern": Nodal(self.system.pattern_state(), self.grid.original[: self.grid.owned]),
             "time": self.current.t,
+            "thin": self._thin.follows,
             "linear_solver": self.sequence.position,
             "motion": {body.surface.name: {"x": m.x, "v": m.v} for body, m in self.moved()},
         }
 
     def restore(self, state: State) -> None:
         """Restore a saved state."""
+        motions = {name: Motion(m["x"], m["v"]) for name, m in state["motion"].items()}
+        self._began = None
+        self._thin.restore(state["thin"])
+        facets, motion = together([body.surface for body in self.bodies], list(motions.values()), self.dim)
+        if (sheets := self._thin.sheets(facets, motion)) is not self.grid.sheets:
+            self._discretise(sheets)
+            self.history = History(self.settings.time, self.unknowns.local)
+        if self._thin.may_follow:
+            state = scatter(self.comm, state, self._state())
         self.history.restore(self.unknowns, state)
         self.flow[:] = self.history.past[0].velocity
         self.flow[:] += self.unknowns.from_nodes(state["pressure"].values, self.unknowns.pressure)
@@ -386,7 +422,7 @@ class Fluid:
         self.system.restore_pattern(state["pattern"].values)
         self.cutter.begin_step()
         kept = self.flow.copy()
-        self.move({name: Motion(m["x"], m["v"]) for name, m in state["motion"].items()})
+        self.move(motions)
         self.flow[:] = kept
 
     def moved(self) -> Iterator[tuple[ImmersedBody, Motion]]:

@@ -7,6 +7,7 @@ all extensive quantities are per depth.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import numpy as np
 import ufl
@@ -23,8 +24,22 @@ from solvers.fluid.space import FlowNodes
 from solvers.lagrange import lagrange
 
 Probe = Callable[[], dict[str, float]]
+T = TypeVar("T")
 
 AXES = ("x", "y", "z")
+
+
+def renewed(fluid: Fluid, make: Callable[[], T]) -> Callable[[], T]:
+    """What is made of the flow, again where thin bodies have gone to other cells."""
+    found, made_of = make(), fluid.grid
+
+    def latest() -> T:
+        nonlocal found, made_of
+        if fluid.grid is not made_of:
+            found, made_of = make(), fluid.grid
+        return found
+
+    return latest
 
 
 # ---------------------------------------------------------------------------------------------------------- points
@@ -39,12 +54,17 @@ def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> P
     given = [body for body in fluid.bodies if body.motion is not None]
     motions = [body.motion(t) for body in given if body.motion is not None]
     require_outside(x, [body.surface for body in given], motions)
-    unknowns = fluid.unknowns
-    nodes, degree = (unknowns.velocity, unknowns.degree) if quantity == "velocity" else (unknowns.pressure, 1)
-    dofs, weights = interpolation(fluid, nodes, degree, x)
     may_be_covered = not all(body.rests for body in fluid.bodies)
 
+    def shape_functions() -> tuple[np.ndarray, Array]:
+        unknowns = fluid.unknowns
+        nodes, degree = (unknowns.velocity, unknowns.degree) if quantity == "velocity" else (unknowns.pressure, 1)
+        return interpolation(fluid, nodes, degree, x)
+
+    found = shape_functions()
+
     def probe() -> dict[str, float]:
+        dofs, weights = shape_functions() if may_be_covered and fluid.grid.sheets is not None else found
         value = fluid.comm.allreduce(weights @ fluid.flow[dofs])
         if may_be_covered and winding(x, fluid.cut.motion, fluid.cut.facets) > INSIDE:
             value = np.full_like(value, np.nan)
@@ -117,16 +137,20 @@ def on_patch(fluid: Fluid, quantity: str, patch: str) -> Probe:
     if quantity == "flow_rate":
         rate = flow_rate(fluid)
         return lambda: {"": rate([patch])}
-    domain, p = fluid.grid.domain, fluid.unknowns.parts(fluid.system.flow)[1]
-    ds = fem.measure(domain, "ds", 1)
-    force, area = (fem.Integral(domain, f * ds) for f in (p, fem.constant(domain, 1.0)))
+
+    def integrals() -> tuple[fem.Integral, fem.Integral]:
+        domain, p = fluid.grid.domain, fluid.unknowns.parts(fluid.system.flow)[1]
+        ds = fem.measure(domain, "ds", 1)
+        return fem.Integral(domain, p * ds), fem.Integral(domain, fem.constant(domain, 1.0) * ds)
+
+    latest = renewed(fluid, integrals)
 
     def pressure(part: CoveredFaces) -> Array:
         return part.pressure(fluid.flow)
 
     def probe() -> dict[str, float]:
         facets, covered = _facets(fluid, [patch])
-        total, size = (fem.assemble_scalar(f.on(exterior_facet=facets), fluid.comm) for f in (force, area))
+        total, size = (fem.assemble_scalar(f.on(exterior_facet=facets), fluid.comm) for f in latest())
         total += fluid.comm.allreduce(sum(float((p.weights * pressure(p)).sum()) for p in covered))
         size += fluid.comm.allreduce(sum(float(p.weights.sum()) for p in covered))
         return {"": total / size if size else float("nan")}
@@ -136,17 +160,20 @@ def on_patch(fluid: Fluid, quantity: str, patch: str) -> Probe:
 
 def flow_rate(fluid: Fluid) -> Callable[[Sequence[str]], float]:
     """A function: names of patches -> flow rate [m^3/s] out of the box through them (collective)."""
-    domain, u = fluid.grid.domain, fluid.unknowns.parts(fluid.system.flow)[0]
-    form = fem.Integral(
-        domain, ufl.dot(u, ufl.FacetNormal(domain.mesh)) * fem.measure(domain, "ds", fluid.unknowns.degree)
-    )
+
+    def integral() -> fem.Integral:
+        domain, u = fluid.grid.domain, fluid.unknowns.parts(fluid.system.flow)[0]
+        outward = ufl.dot(u, ufl.FacetNormal(domain.mesh))
+        return fem.Integral(domain, outward * fem.measure(domain, "ds", fluid.unknowns.degree))
+
+    latest = renewed(fluid, integral)
 
     def outflow(part: CoveredFaces) -> Array:
         return part.outward(part.velocity(fluid.flow))
 
     def rate(patches: Sequence[str]) -> float:
         facets, covered = _facets(fluid, patches)
-        whole = fem.assemble_scalar(form.on(exterior_facet=facets), fluid.comm)
+        whole = fem.assemble_scalar(latest().on(exterior_facet=facets), fluid.comm)
         return whole + fluid.comm.allreduce(sum(float((p.weights * outflow(p)).sum()) for p in covered))
 
     return rate
@@ -248,22 +275,26 @@ def of_fluid(fluid: Fluid, quantity: str) -> Probe:
             return {"": fluid.comm.allreduce(float(size))}
 
         return volume
-    settings, domain, degree = fluid.settings, fluid.grid.domain, fluid.unknowns.degree
-    u = fluid.unknowns.parts(fluid.system.flow)[0]
-    density, viscosity = fem.constant(domain, settings.density), fem.constant(domain, settings.viscosity)
-    density_of = {
-        "kinetic_energy": 0.5 * density * ufl.dot(u, u),
-        "dissipation": 2.0 * viscosity * ufl.inner(forms.eps(u), forms.eps(u)),
-    }[quantity]
-    whole = fem.Integral(domain, density_of * fem.measure(domain, "dx", 2 * degree))
-    weights = fluid.system.weights
-    parts = [whole]
-    if fluid.bodies:
-        parts.append(fem.Integral(domain, weights.fluid * density_of * fem.measure(domain, "dx", weights.degree)))
+
+    def integrals() -> list[fem.Integral]:
+        settings, domain, degree = fluid.settings, fluid.grid.domain, fluid.unknowns.degree
+        u, weights = fluid.unknowns.parts(fluid.system.flow)[0], fluid.system.weights
+        density, viscosity = fem.constant(domain, settings.density), fem.constant(domain, settings.viscosity)
+        density_of = {
+            "kinetic_energy": 0.5 * density * ufl.dot(u, u),
+            "dissipation": 2.0 * viscosity * ufl.inner(forms.eps(u), forms.eps(u)),
+        }[quantity]
+        parts = [fem.Integral(domain, density_of * fem.measure(domain, "dx", 2 * degree))]
+        if fluid.bodies:
+            on_cut = weights.fluid * density_of * fem.measure(domain, "dx", weights.degree)
+            parts.append(fem.Integral(domain, on_cut))
+        return parts
+
+    latest = renewed(fluid, integrals)
 
     def probe() -> dict[str, float]:
         cells = [some[some < fluid.grid.owned] for some in (fluid.cut.uncut, fluid.cut.cut)]
-        forms_there = [part.on(cell=some) for part, some in zip(parts, cells, strict=False)]
+        forms_there = [part.on(cell=some) for part, some in zip(latest(), cells, strict=False)]
         return {"": sum(fem.assemble_scalar(form, fluid.comm) for form in forms_there)}
 
     return probe

@@ -16,6 +16,8 @@ from solvers.fluid.pieces import NOTHING
 from solvers.fluid.space import Unknowns
 from solvers.fluid.surface import Motion
 
+TOO_FAR = "a body moved farther in one step than the velocity is extrapolated into it: take a smaller time step"
+
 
 def strip_layers(grid: DistributedGrid, motion: Motion, time: float, smallest: float) -> int:
     """Layers of cells that surfaces may uncover within some time [s]; smallest: shortest edge of a cell [m]."""
@@ -33,8 +35,7 @@ def require_history(unknowns: Unknowns, cut: Cut, missing: NDArray[np.bool_]) ->
     blocks[unknowns.cell_blocks[np.concatenate([cut.uncut, cut.cut])]] = True
     used = unknowns.expand(blocks) & unknowns.velocity_mask
     if unknowns.grid.comm.allreduce(bool((used & missing).any()), op=MPI.LOR):
-        reason = "a body moved farther in one step than the velocity is extrapolated into it: take a smaller time step"
-        raise StepFailed("fluid", reason)
+        raise StepFailed("fluid", TOO_FAR)
 
 
 def require_finest(cutter: Cutter, comm: MPI.Comm) -> None:

@@ -27,10 +27,8 @@ class SheetWindows:
         self._steps = np.array(list(product(range(degree + 1), repeat=grid.dim)))
         place = sheets.place(np.arange(sheets.size))
         self._index = np.stack(np.unravel_index(place, grid.shape, order="F"), axis=1)
-        self._neighbours = _neighbours(sheets)
-        self._fluid = np.ones(sheets.size)  #: share of fluid of cells that are copies of one cell of the box
-        for cell, share in sheets.shares.items():
-            self._fluid[cell] = share.fraction
+        self._neighbours = neighbours_of(sheets)
+        self._fluid = sheets.fluid
         fluid = np.zeros(sheets.size, dtype=bool)  # pairs of cells for faces have no fluid
         fluid[: grid.size] = ~sheets.around
         fluid[sheets.links] = True
@@ -43,6 +41,12 @@ class SheetWindows:
         #: cells with fluid of each node
         self._own = sparse.csr_matrix((np.ones(len(entries[0])), entries), shape=(len(numbers), sheets.size))
         self._tables: dict[int, Indices] = {}  #: cells of the windows by layers, -1: none, -2: not computed yet
+
+    def follow(self, sheets: Sheets) -> None:
+        """Take sheets with the same cells, of which some have more fluid now and others less."""
+        if sheets is not self._sheets:
+            self._sheets, self._fluid = sheets, sheets.fluid
+            self._tables.clear()
 
     def nodes(self, cells: Indices) -> Indices:
         """Numbers of the nodes of cells of the mesh, the first direction slowest, shape (cells, nodes)."""
@@ -81,7 +85,7 @@ class SheetWindows:
         return found
 
 
-def _neighbours(sheets: Sheets) -> sparse.csr_matrix:
+def neighbours_of(sheets: Sheets) -> sparse.csr_matrix:
     """Adjacency of cells of the mesh by faces with fluid on both sides; away from surfaces by all faces of the box."""
     grid = sheets.grid
     number = grid.as_box(np.arange(grid.size))

@@ -37,7 +37,8 @@ Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 THIN = 2  #: largest distance [cells] across a body at which a node or the ghost penalty couples the fluid on two sides
-AROUND = 3  #: distance [cells] within which parts that are linked around the end of a body belong together
+THIN_IF_MOVING = 3  #: the same [cells] of bodies that move, with a strip of cells behind each side
+AROUND = 3  #: layers of cells around surfaces in which parts and links are found
 OPPOSED = -0.7  #: product of unit normals below which two surfaces face opposite directions: corners below 45 degrees
 
 #: Steps from the first corner of a cell to each corner, in the order of `Grid.mesh`.
@@ -92,6 +93,14 @@ class Sheets:
     copies: Indices
     around: Mask  #: cells of the box near surfaces, where only `links` are neighbours
     links: Indices  #: cells of the mesh with fluid on both sides of the face between them, shape (n, 2)
+    fluid: Array  #: share of fluid in each cell of the mesh
+    bounds: Indices  #: (cell of the mesh, facet that bounds its fluid), shape (n, 2)
+
+    def same_unknowns(self, other: Sheets) -> bool:
+        """The mesh and what is linked in it are the same, wherever the surface is in the cells."""
+        tables = ("left", "cells", "copies", "around", "links")
+        alike = all(np.array_equal(getattr(self, name), getattr(other, name)) for name in tables)
+        return alike and self.pairs == other.pairs and self.parted == other.parted
 
     @property
     def singles(self) -> int:
@@ -189,19 +198,21 @@ def _in_cell(steps: Indices, degree: int) -> Indices:
     return (steps * (2 // degree)) @ 3 ** np.arange(steps.shape[1])
 
 
-def find_sheets(grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_]) -> Sheets | None:
-    """Sheets of the fluid around surfaces with vertices at x [m]; None in 3D and if no body is thin.
+def find_sheets(
+    grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_], *, thin: int = THIN, always: bool = False
+) -> Sheets | None:
+    """Sheets of the fluid around surfaces with vertices at x [m]; None in 3D, and if no body is thin, unless `always`.
 
-    bounds: facets that are not on the boundary of the box.
+    bounds: facets that are not on the boundary of the box. thin: cells apart, at most, of the fluid on both sides.
     """
     if grid.dim != 2 or not len(facets):
         return None
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
     parts, special = _parts(grid, moments, facets, x, bounds)
     links = _links(grid, parts)
-    cells = np.array([part.cell for part in parts])
-    facing = _facing(parts, x[facets])
-    if not _is_thin(grid, parts, links, facing, np.flatnonzero(_grown(grid, special, 1)[cells])):
+    cells = np.array([part.cell for part in parts], dtype=np.int64)
+    close = np.flatnonzero(_grown(grid, special, 1)[cells])
+    if not (always or _is_thin(grid, parts, links, _facing(parts, x[facets]), close, thin)):
         return None
     copies = _copies(grid, parts, links, special)
     moved = (copies > 0).any(axis=1)
@@ -224,6 +235,11 @@ def find_sheets(grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_]
     passing = {(parts[a].cell, parts[b].cell) for a, b, _ in links if not moved[a] and not moved[b]}
     touching = _neighbours(grid, [cell for cell, kept in staying.items() if kept])
     at_faces = [(a, b) for a, b, _ in links if (moved[a] or moved[b]) and special[[parts[a].cell, parts[b].cell]].any()]
+    fluid = np.concatenate([np.clip(1.0 - moments.fraction, 0.0, 1.0), np.zeros(len(new) + 2 * len(at_faces))])
+    fluid[[cell for cell, kept in staying.items() if len(kept) < len(by_cell[cell])]] = 0.0
+    for number, share in shares.items():
+        fluid[number] = share.fraction
+    bounding = [(cell_of[n], facet) for n, part in enumerate(parts) if cell_of[n] >= 0 for facet in part.facets or ()]
     cells = np.concatenate([new, np.array(at_faces, dtype=np.int64).ravel()])
     return Sheets(
         grid,
@@ -235,16 +251,19 @@ def find_sheets(grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_]
         copies[cells],
         _grown(grid, special, AROUND),
         np.unique(linked_cells[(linked_cells >= 0).all(axis=1)], axis=0),
+        fluid,
+        np.array(bounding, dtype=np.int64).reshape(-1, 2),
     )
 
 
 def _is_thin(
-    grid: Grid, parts: Sequence[Region], links: Sequence[tuple[int, int, int]], facing: Array, close: Indices
+    grid: Grid, parts: Sequence[Region], links: Sequence[tuple[int, int, int]], facing: Array, close: Indices, thin: int
 ) -> bool:
-    """Whether a thin body is between two parts: they face opposite directions at THIN cells, and are not linked nearby.
+    """Whether a thin body is between two parts: they face opposite directions and are not linked nearby.
 
     Parts around a corner of a thick body do not face opposite directions, or are linked around it.
-    facing: mean normal of the surface in each part, nan where there is none; close: parts to test.
+    facing: mean normal of the surface in each part, nan where there is none; close: parts to test; thin: their largest
+    distance [cells].
     """
     index = np.stack(np.unravel_index([part.cell for part in parts], grid.shape, order="F"), axis=1)
     ends = np.array(links, dtype=np.int64).reshape(-1, 3)[:, :2]
@@ -253,12 +272,12 @@ def _is_thin(
     number = np.full(len(parts), -1)
     for part in close[linked[close]]:
         apart = np.abs(index - index[part]).max(axis=1)
-        near = np.flatnonzero(apart <= AROUND)
+        near = np.flatnonzero(apart <= thin + 1)
         number[near] = np.arange(len(near))
-        first, second = number[ends[(apart[ends] <= AROUND).all(axis=1)]].T
+        first, second = number[ends[(apart[ends] <= thin + 1).all(axis=1)]].T
         group = connected_parts(first, second, len(near))
         opposed = ~(facing[near] @ facing[part] > OPPOSED)
-        if (group != group[number[part]])[linked[near] & opposed & (apart[near] <= THIN)].any():
+        if (group != group[number[part]])[linked[near] & opposed & (apart[near] <= thin)].any():
             return True
     return False
 

@@ -79,6 +79,7 @@ class FlowStart:
         moving = fluid.unknowns.velocity_mask
         fluid.flow[moving] = start[moving]
         fluid.current = FlowStep(fluid.current.t, dt, fluid.history.difference(dt))
+        fluid.forget_step()
 
 
 def _with_later_velocity(body: ImmersedBody, motion: Callable[[float], Motion], dt: float) -> ImmersedBody:

@@ -184,7 +184,8 @@ class FlowSystem:
 
     def pattern_state(self) -> Array:
         """Sparsity pattern of the matrix per owned cell: whether it has couplings in the cell, and across its faces."""
-        assert self._pattern is not None
+        if self._pattern is None:
+            return np.zeros((self.grid.owned, 2))
         return np.stack([self._pattern.cells, self._pattern.reach], axis=1)[: self.grid.owned].astype(float)
 
     def restore_pattern(self, state: Array) -> None:

@@ -36,7 +36,9 @@ def history_of(tmp_path, thickness, motion=""):
     return code, read_history(tmp_path / "out" / "history.csv")
 
 
-@pytest.mark.parametrize(("thickness", "motion", "rate"), [(0.25, "", 0.0), (0.02, "", 0.0), (0.4, MOVED, 0.05)])
+@pytest.mark.parametrize(
+    ("thickness", "motion", "rate"), [(0.25, "", 0.0), (0.02, "", 0.0), (0.02, MOVED, 0.05), (0.4, MOVED, 0.05)]
+)
 def test_a_plate_is_tight(tmp_path, thickness, motion, rate):
     code, history = history_of(tmp_path, thickness, motion)
     assert code == 0, "verify holds"
@@ -44,8 +46,8 @@ def test_a_plate_is_tight(tmp_path, thickness, motion, rate):
 
 
 def test_leak_through_a_thin_plate_is_measured(tmp_path):
-    """It hardly moves. Both of its faces see at least the flow that leaves the channel."""
-    code, history = history_of(tmp_path, 0.02, MOVED.replace("0.05", "1e-9"))
+    """It hardly moves, with 3.5 cells across. Both of its faces see at least the flow that leaves the channel."""
+    code, history = history_of(tmp_path, 0.35, MOVED.replace("0.05", "1e-9"))
     assert code == 1, "verify is missed"
     assert history["flow"][-1] > 0.01
     assert np.all(history["fluid.leak"] > history["flow"])
@@ -55,8 +57,13 @@ def test_leak_through_a_thin_plate_is_measured(tmp_path):
     ("thickness", "motion", "words"),
     [
         (0.15, "", None),
-        (0.3, MOVED, "the body is 0.3 thick, 3 of the smallest cells: where it has fluid on both sides, fluid passes"),
-        (0.3, MOVED, "fluid passes through a body that moves with less than 4 cells across"),
+        (0.3, MOVED, None),
+        (
+            0.35,
+            MOVED,
+            "the body is 0.35 thick, 3.5 of the smallest cells: where it has fluid on both sides, fluid passes",
+        ),
+        (0.35, MOVED, "fluid passes through a body that moves with less than 4 cells across"),
         (0.41, MOVED, None),
     ],
 )
@@ -67,10 +74,19 @@ def test_check_warns(tmp_path, thickness, motion, words):
     assert not words or words in warnings[0]
 
 
-def test_check_warns_of_elastic_bodies(tmp_path):
+@pytest.mark.parametrize(
+    ("thickness", "more", "warns"),
+    [
+        (0.35, "", True),
+        (0.2, "", False),
+        (0.2, "contact: {pairs: {a: {slave: {body: plate, on: top}, master: {body: plate, on: bottom}}}}", True),
+    ],
+)
+def test_check_warns_of_elastic_bodies(tmp_path, thickness, more, warns):
+    """Of thin ones where surfaces may touch."""
     text = CASE.format(thickness=1, motion="")
-    body = "structure: {dynamics: {}, bodies: {plate: {mesh: {shape: rectangle, size: [0.2, 1], cells: [1, 4]}, \
-material: {law: neo_hooke, E: 1, nu: 0, density: 1}}}}\ncoupling: {}\n"
+    body = f"structure: {{dynamics: {{}}, bodies: {{plate: {{mesh: {{shape: rectangle, size: [{thickness}, 1], \
+cells: [1, 4]}}, material: {{law: neo_hooke, E: 1, nu: 0, density: 1}}}}}}}}\ncoupling: {{}}\n{more}\n"
     text = without(text, "fluid", "bodies") + body
     (tmp_path / "case.yaml").write_text(text)
-    assert any("2 of the smallest cells: where" in str(warning) for warning in load_case(tmp_path).warnings)
+    assert any("of the smallest cells: where" in str(warning) for warning in load_case(tmp_path).warnings) == warns

@@ -1,0 +1,68 @@
+"""The grid of a flow, its unknowns and its equations: all that changes where thin bodies go to other cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mpi4py import MPI
+
+from solvers import linear
+from solvers.fluid.cut import Cutter
+from solvers.fluid.film import films_of
+from solvers.fluid.flow_settings import FlowSettings
+from solvers.fluid.grid import DistributedGrid, Grid
+from solvers.fluid.immersed import ImmersedBody
+from solvers.fluid.patches import Boundary, Patch, periodic_axes
+from solvers.fluid.sheets import Sheets
+from solvers.fluid.space import Unknowns
+from solvers.fluid.surface import by_facets, may_close, seeping
+from solvers.fluid.system import FlowSystem
+from solvers.solver_settings import SolverSettings
+
+
+@dataclass(frozen=True)
+class Discretisation:
+    """A distributed grid with unknowns, conditions on its boundary, the cutter, and the system of equations."""
+
+    grid: DistributedGrid
+    unknowns: Unknowns
+    boundary: Boundary
+    system: FlowSystem
+    cutter: Cutter
+    methods: tuple[linear.FlowMethod, ...]  #: linear solvers, the usual one first
+
+
+def discretise(
+    comm: MPI.Comm,
+    grid: Grid,
+    sheets: Sheets | None,
+    settings: FlowSettings,
+    patches: Sequence[Patch],
+    bodies: Sequence[ImmersedBody],
+    solver: SolverSettings,
+) -> Discretisation:
+    """That of a flow around bodies (collective)."""
+    distributed = DistributedGrid(comm, grid, sheets)
+    unknowns = Unknowns(distributed, settings.degree, periodic_axes(patches))
+    boundary = Boundary(distributed, unknowns, patches)
+    wanted = solver.linear if isinstance(solver.linear, str) else "auto"
+    wanted = wanted if sheets is None else "direct"  # the others need the nodes of a lattice
+    size, degree, equal = unknowns.counted(), settings.degree, distributed.nested is None
+    methods = linear.choose_flow(wanted, grid.dim, size, degree=degree, steady=settings.steady, multigrid=equal)
+    system = FlowSystem(
+        distributed,
+        settings,
+        boundary,
+        unknowns,
+        with_bodies=bool(bodies),
+        # incomplete factors of dense blocks are two times as fast
+        blocked=methods[0] != "direct" and unknowns.block_size > 1,
+    )
+    surfaces = [body.surface for body in bodies]
+    system.slip_length = by_facets(surfaces, [surface.slip_length for surface in surfaces])
+    system.transmissivity = by_facets(surfaces, [surface.transmissivity for surface in surfaces])
+    system.may_close, system.seeping = may_close(surfaces), seeping(surfaces)
+    films = films_of(patches, settings.penalties) if settings.films else None
+    cutter = Cutter(distributed, system.weights.points, films)
+    return Discretisation(distributed, unknowns, boundary, system, cutter, methods)

@@ -1,0 +1,165 @@
+"""Thin bodies that move: when the flow needs other cells, and how its values come to the new nodes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.spatial import cKDTree
+
+from solvers.api import Array, StepFailed
+from solvers.fluid.box import Grid
+from solvers.fluid.cut import off_boundary
+from solvers.fluid.history import Past
+from solvers.fluid.immersed import ImmersedBody
+from solvers.fluid.nested import Nested
+from solvers.fluid.reach import TOO_FAR
+from solvers.fluid.sheet_transfer import transfer
+from solvers.fluid.sheets import AROUND, OPPOSED, THIN_IF_MOVING, Sheets, find_sheets
+from solvers.fluid.space import FlowNodes, Unknowns
+from solvers.fluid.surface import Motion, wetness
+
+#: Thickness in cells up to which bodies that move have cells for each side. They have a strip of cells behind each side
+#: otherwise, and fluid passes where both strips meet.
+THICK = 3.05
+
+
+class ThinBodies:
+    """Finds the sheets of the fluid for each place of the bodies, once one of these has been thin."""
+
+    def __init__(self, grid: Grid, bodies: Sequence[ImmersedBody], periodic: bool, sheets: Sheets | None):
+        self._grid, self.follows, self._sheets = grid, False, sheets
+        self._wet = wetness([body.surface for body in bodies])
+        moving = bool(bodies) and not all(body.rests for body in bodies)
+        # where surfaces touch, fluid between them comes and goes within Newton's iteration, and it does not settle
+        touching = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
+        plain = grid.dim == 2 and not periodic and not isinstance(grid, Nested)
+        self._possible: bool | None = None if moving and plain and not touching else False
+        self._x: Array | None = None
+
+    @property
+    def may_follow(self) -> bool:
+        """There may be other cells at another time."""
+        return self._possible is not False
+
+    def sheets(self, facets: NDArray[np.int64], motion: Motion) -> Sheets | None:
+        """Those of the fluid around surfaces at this place; None if no body has been thin yet."""
+        if self._possible is None:
+            self._possible = may_be_thin(self._grid, facets[self._wet], motion.x)
+        if not self._possible:
+            return self._sheets
+        if self._x is None or not np.array_equal(self._x, motion.x):
+            off = off_boundary(self._grid, motion.x[facets])
+            self._sheets = find_sheets(self._grid, facets, motion.x, off, thin=THIN_IF_MOVING, always=self.follows)
+            self._x = motion.x
+            self.follows = self._sheets is not None
+        return self._sheets
+
+    def restore(self, follows: bool) -> None:
+        """Back to a state in which some body had been thin, or none."""
+        self.follows = follows
+        if self._possible is not False:
+            self._x = self._sheets = None
+
+
+def may_be_thin(grid: Grid, facets: NDArray[np.int64], x: Array) -> bool:
+    """Somewhere two parts of the surface face opposite ways with less than THICK cells of solid between them."""
+    if not len(facets):
+        return False
+    a, b = x[facets[:, 0]], x[facets[:, 1]]
+    length = np.linalg.norm(b - a, axis=1)
+    cell = max(float(_sizes(edge, x[:, axis]).max()) for axis, edge in enumerate(grid.edges))
+    count = np.maximum(1, np.ceil(length / cell)).astype(int)
+    of = np.repeat(np.arange(len(facets)), count)
+    part = (np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[of]
+    points = a[of] + part[:, None] * (b - a)[of]
+    along = (b - a) / np.where(length > 0.0, length, 1.0)[:, None]
+    normal = np.stack([along[:, 1], -along[:, 0]], axis=1)[of]
+    pairs = cKDTree(points).query_pairs(THICK * cell, output_type="ndarray")
+    first, second = pairs.T
+    opposed = np.einsum("pi,pi->p", normal[first], normal[second]) < OPPOSED
+    way = points[second] - points[first]
+    behind = np.einsum("pi,pi->p", way, normal[first]) <= 0.0
+    sizes = np.stack([_sizes(edge, points[:, axis]) for axis, edge in enumerate(grid.edges)], axis=1)
+    size = 1.0 / np.linalg.norm(normal / sizes, axis=1)
+    close = np.linalg.norm(way, axis=1) <= THICK * np.maximum(size[first], size[second])
+    return bool((opposed & behind & close).any())
+
+
+def _sizes(edge: Array, x: Array) -> Array:
+    """Of the cells at coordinates."""
+    return np.diff(edge)[np.clip(np.searchsorted(edge, x) - 1, 0, len(edge) - 2)]
+
+
+@dataclass(frozen=True)
+class Began:
+    """What a step begins with: unknowns, sheets, the velocities behind it there, and where the bodies are [m]."""
+
+    unknowns: Unknowns
+    sheets: Sheets | None
+    past: tuple[Past, ...]
+    motions: tuple[Motion, ...]
+
+    def require_near(self, smallest: float, x: Array) -> None:
+        """Raise StepFailed if some vertex has moved so far that its side was not near its new place."""
+        if self.motions:
+            way = np.abs(x - np.concatenate([motion.x for motion in self.motions])).max(initial=0.0)
+            if way > AROUND * smallest:
+                raise StepFailed("fluid", TOO_FAR)
+
+
+@dataclass(frozen=True)
+class Carrier:
+    """From the unknowns around bodies at one place to those at another one (collective)."""
+
+    old: Unknowns
+    new: Unknowns
+    velocity: sparse.csr_matrix  #: of all nodes of the velocity by their numbers, shape (new, old)
+    pressure: sparse.csr_matrix
+
+    def velocities(self, values: Array) -> Array:
+        """Values at local dofs of the velocity."""
+        out = np.zeros(self.new.local)
+        return _carry(self.velocity, self.old.velocity, self.new.velocity, values, out, self.new)
+
+    def flow(self, values: Array) -> Array:
+        """Values at local dofs of velocity and pressure."""
+        out = self.velocities(values)
+        return _carry(self.pressure, self.old.pressure, self.new.pressure, values, out, self.new)
+
+    def past(self, past: Past) -> Past:
+        """Velocities of a time behind; found where all are from which one follows."""
+        unknown = (~past.found & self.old.velocity_mask).astype(float)
+        known = np.diff(self.velocity.indptr) > 0
+        lost, nodes = np.zeros(self.new.local), self.new.velocity
+        found = _carry(abs(self.velocity), self.old.velocity, nodes, unknown, lost, self.new) == 0.0
+        found[nodes.dofs] &= known[nodes.numbers][:, None]
+        return Past(self.velocities(past.velocity), found)
+
+
+def carry(old: Unknowns, before: Sheets | None, new: Unknowns, facets: int) -> Carrier:
+    """before: sheets of the old unknowns where the bodies were; None: nodes of the box, which both sides share."""
+    after = new.grid.sheets
+    assert after is not None
+    matrices = []
+    for degree in (new.degree, 1):
+        if before is not None:
+            matrices.append(transfer(before, after, degree, facets))
+            continue
+        count = after.node_count(degree)
+        entries = (np.ones(count), (np.arange(count), after.on_lattice(np.arange(count), degree)))
+        matrices.append(sparse.csr_matrix(entries, shape=(count, after.lattice_size(degree))))
+    return Carrier(old, new, *matrices)
+
+
+def _carry(
+    matrix: sparse.csr_matrix, old: FlowNodes, new: FlowNodes, values: Array, out: Array, unknowns: Unknowns
+) -> Array:
+    everything = np.zeros((matrix.shape[1], old.dofs.shape[1]))
+    everything[old.numbers[: old.owned]] = values[old.dofs[: old.owned]]
+    everything = unknowns.grid.comm.allreduce(everything)
+    out[new.dofs] = (matrix @ everything)[new.numbers]
+    return out

@@ -1,0 +1,214 @@
+"""Thin bodies that move: the unknowns of each side follow the body, and nothing goes from one side to the other."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from fluid_setup import block, body, field, make_fluid, step, turned
+from programs import fsci
+
+from fsci.run.history import read_history
+from solvers.api import StepFailed
+from solvers.distributed import gather, scatter
+from solvers.fluid.cut import off_boundary
+from solvers.fluid.grid import uniform
+from solvers.fluid.patches import Patch
+from solvers.fluid.sheet_transfer import transfer
+from solvers.fluid.sheets import find_sheets
+from solvers.fluid.thin_bodies import may_be_thin
+
+THICKNESS = [1e-3, 0.2, 1.0, 1.5, 3.0]  # in cells
+DRAWS = (range(1), pytest.param(range(1, 20), marks=pytest.mark.slow))
+H = 0.1
+
+
+def pushed(thickness, element, draw, cells_per_step=1.0, number=4):
+    """A plate at a random place and angle that seals a channel and moves along it: largest errors of all steps."""
+    rng = np.random.default_rng(draw)
+    angle, dt, pressures = rng.uniform(-0.6, 0.6), 0.1, (1.0, 0.7)
+    plate, facets = block([-thickness * H / 2, -0.9], [thickness * H / 2, 0.9])
+    plate = turned(plate, angle) + np.array([1.2, 0.5]) + rng.uniform(-0.1, 0.1, 2)
+    along, speed = np.array([1.0, 0.0]), cells_per_step * H / dt
+    patches = [
+        Patch("in", ("x-",), "traction", field(pressures[0], 0.0)),
+        Patch("out", ("x+",), "traction", field(-pressures[1], 0.0)),
+        Patch("w", ("y-", "y+"), "slip"),
+    ]
+    fluid = make_fluid(
+        uniform([0, 0], [3, 1], [30, 10]), patches,
+        [body("plate", plate, facets, motion=lambda x, t: (x + speed * t * along, 0.0 * x + speed * along))],
+        element=element, mu=0.05, dt=dt, initial_velocity=field(speed, 0.0),
+    )  # fmt: skip
+    force = (pressures[0] - pressures[1]) / np.cos(angle) * np.array([np.cos(angle), np.sin(angle)])
+    off = np.zeros(2)
+    for count in range(number):
+        step(fluid, count * dt, dt)
+        nodes = fluid.unknowns.velocity.dofs
+        velocity = fluid.flow[nodes][fluid.system.active_dofs[nodes[:, 0]]]
+        error = np.abs(velocity - speed * along).max(), np.abs(fluid.force()["plate"].sum(axis=0) - force).max()
+        off = np.maximum(off, error)
+    assert fluid.grid.sheets is not None
+    return off
+
+
+@pytest.mark.parametrize("draws", DRAWS, ids=str)
+@pytest.mark.parametrize("thickness", THICKNESS)
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_plate_that_moves_along_a_channel(element, thickness, draws):
+    """Nothing passes it, and it carries the difference of the pressures in each step, also where it enters cells."""
+    for draw in draws:
+        assert (pushed(thickness, element, draw) < 1e-10).all(), draw
+
+
+def test_plate_that_moves_too_far():
+    """By eight cells in a step: no side has been near."""
+    with pytest.raises(StepFailed, match="a body moved farther in one step"):
+        pushed(0.2, "q1q1", 0, cells_per_step=8.0, number=2)
+
+
+def sheets_at(grid, facets, x):
+    return find_sheets(grid, facets, x, off_boundary(grid, x[facets]), always=True)
+
+
+def sides(sheets, degree, plate):
+    """(numbers of the nodes with fluid, on which side of the plate each is: its cells are all on one)."""
+    fluid = np.zeros(sheets.size, dtype=bool)
+    fluid[: sheets.grid.size] = ~sheets.around
+    fluid[sheets.links] = True
+    along, middle = plate[2] - plate[1], plate.mean(axis=0)
+    steps = np.array(list(product(range(degree + 1), repeat=2)))
+    found = {}
+    for cell in np.flatnonzero(fluid):
+        wetted = set(sheets.bounds[sheets.bounds[:, 0] == cell, 1].tolist())
+        index = np.array(np.unravel_index(sheets.place(np.array([cell]))[0], sheets.grid.shape, order="F"))
+        across = ((index + 0.5) * H - middle) @ [along[1], -along[0]]
+        side = 1 if (1 in wetted if wetted else across > 0) else -1
+        for node in sheets.nodes(np.array([cell]), degree, steps)[0].tolist():
+            assert found.setdefault(node, side) == side
+    return np.array(sorted(found)), np.array([found[node] for node in sorted(found)])
+
+
+def polynomial(sheets, degree, nodes, side):
+    """Another linear function on each side."""
+    shape = [degree * n + 1 for n in sheets.grid.shape]
+    x, y = np.stack(np.unravel_index(sheets.on_lattice(nodes, degree), shape, order="F")) * H / degree
+    return np.where(side > 0, 1.0 + x - 2.0 * y, -3.0 * x + y + 5.0)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_each_side_keeps_its_values(degree):
+    """Plates that turn and move by up to 1.4 cells in a step: linear functions on both sides stay what they are."""
+    grid = uniform([0, 0], [1, 1], [10, 10])
+    for draw in range(15):
+        rng = np.random.default_rng(draw)
+        thickness = rng.choice(THICKNESS) * H
+        plate, facets = block([-thickness / 2, -1.0], [thickness / 2, 1.0])
+        plate, middle = turned(plate, rng.uniform(0.0, 3.0)), 0.5 + rng.uniform(-0.1, 0.1, 2)
+        first = plate + middle
+        second = turned(plate, rng.uniform(-0.1, 0.1)) + middle + rng.uniform(-1.0, 1.0, 2) * H * rng.choice([0.3, 1.4])
+        old, new = (sheets_at(grid, facets, x) for x in (first, second))
+        values = np.full(old.node_count(degree), np.nan)
+        nodes, side = sides(old, degree, first)
+        values[nodes] = polynomial(old, degree, nodes, side)
+        known = ~np.isnan(values)
+        matrix = transfer(old, new, degree, len(facets))
+        nodes, side = sides(new, degree, second)
+        assert not abs(matrix)[nodes][:, ~known].sum()
+        found = (matrix @ np.where(known, values, 0.0))[nodes]
+        assert np.abs(found - polynomial(new, degree, nodes, side)).max() < 1e-10, draw
+
+
+@pytest.mark.parametrize(("size", "thin"), [((3.0, 50.0), True), ((3.2, 50.0), False), ((8.0, 8.0), False)])
+def test_which_bodies_are_looked_at(size, thin):
+    plate, facets = block([10.3, 10.3], 10.3 + np.array(size))
+    assert may_be_thin(uniform([0, 0], [70, 70], [70, 70]), facets, plate) == thin
+
+
+@pytest.mark.parametrize("radius", [1.5, 2.0, 4.0])
+def test_round_bodies_that_move_have_no_extra_cells(radius):
+    """A disc of three cells and more, across several cells."""
+    angles = 2.0 * np.pi * np.arange(24) / 24
+    disc = 10.0 + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    facets = np.stack([np.arange(24), (np.arange(24) + 1) % 24], axis=1)
+    disc = body("disc", disc, facets, motion=lambda x, t: (x + 0.37 * t, 0.0 * x + 0.37))
+    patches = [Patch("box", ("x-", "x+", "y-", "y+"), "no_slip")]
+    fluid = make_fluid(uniform([0, 0], [20, 20], [20, 20]), patches, [disc])
+    for count in range(6):
+        step(fluid, count, 1.0)
+    assert fluid.renewals == 1
+    assert fluid.grid.sheets is None
+
+
+def leaf(element):
+    """A slanted plate, thinner than a cell, that moves along a channel with one of its ends in the flow."""
+    plate, facets = block([-0.01, -0.4], [0.01, 0.57])
+    plate = turned(plate, 0.1) + np.array([0.5, 0.0])
+    patches = [
+        Patch("in", ("x-",), "traction", field(0.0, 0.0)),
+        Patch("out", ("x+",), "outflow"),
+        Patch("w", ("y-", "y+"), "slip"),
+    ]
+    way = np.array([0.7, 0.0])
+    motion = lambda x, t: (x + way * t**2, 0.0 * x + 2.0 * way * t)  # noqa: E731
+    return make_fluid(
+        uniform([0, 0], [1.5, 1], [15, 10]), patches, [body("leaf", plate, facets, motion=motion)], mu=0.05,
+        element=element, dt=0.1,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_resumed(element):
+    """The cells of each side follow from where the bodies are: steps after a saved state are the same bit for bit."""
+    fluid, again = (leaf(element) for _ in range(2))
+    for number in range(3):
+        step(fluid, 0.1 * number, 0.1)
+    again.restore(scatter(fluid.comm, gather(fluid.comm, fluid.save()), again.save()))
+    for number in (3, 4):
+        for one in (fluid, again):
+            step(one, 0.1 * number, 0.1)
+    assert np.array_equal(fluid.flow, again.flow)
+    assert fluid.renewals > 3
+
+
+CASE = """\
+time: {{step: 0.05, end: 0.1}}
+fluid:
+  density: 1
+  viscosity: 0.02
+  element: {element}
+  grid: {{from: [0, 0], to: [1.5, 1], cells: [15, 10]}}
+  patches:
+    inlet: {{on: x-, traction: [0, 0]}}
+    outlet: {{on: x+, outflow: true}}
+    walls: {{on: [y-, y+], no_slip: true}}
+  bodies:
+    leaf:
+      mesh: {{shape: rectangle, size: [0.02, 0.7], cells: [1, 7], origin: [0.61, 0.21], rotate: {{angle: 10}}}}
+      motion: {{displacement: ["t^2", "0.3*t^2"]}}
+probes:
+  force: {{quantity: force, body: leaf}}
+  before: {{quantity: pressure, at: [0.8, 0.57]}}
+  behind: {{quantity: pressure, at: [0.4, 0.57]}}
+  rate: {{quantity: flow_rate, through: outlet}}
+  energy: {{quantity: kinetic_energy}}
+  volume: {{quantity: volume}}
+"""
+COLUMNS = ("force.x", "force.y", "before", "behind", "rate", "energy", "volume", "fluid.mass")
+
+
+@pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=pytest.mark.slow)])
+def test_two_processes(tmp_path, element):
+    """A plate with both ends in the flow, and a run that goes on with other processes; all probes follow it."""
+    (tmp_path / "case.yaml").write_text(CASE.format(element=element))
+    found = []
+    for processes in (1, 2):
+        out = tmp_path / str(processes)
+        done = fsci("run", tmp_path, "-o", out, processes=processes)
+        assert done.returncode == 0, done.stdout + done.stderr
+        done = fsci("resume", out, "--set", "time.end=0.2", processes=3 - processes)
+        assert done.returncode == 0, done.stdout + done.stderr
+        history = read_history(out / "history.csv")
+        assert len(history["before"]) == 4
+        found.append([history[name][-1] for name in COLUMNS])
+    assert np.allclose(found[1], found[0], rtol=1e-8, atol=1e-10)
+    assert abs(found[0][-1]) < 1e-12
