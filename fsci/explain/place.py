@@ -53,7 +53,7 @@ def describe(near: Nearest, case: Case) -> list[str]:
     """Lines of text on body, node, cell and fields at the position."""
     lines = [f"nearest node   {near.node} of {near.part}, in its cell {near.cell}, {near.distance:.3g} m away"]
     for name, value in near.values.items():
-        numbers = ", ".join(f"{component:.4g}" for component in np.atleast_1d(value))
+        numbers = ", ".join(f"{component + 0.0:.4g}" for component in np.atleast_1d(value))
         lines.append(f"  {name:17s} {numbers}")
     if pairs := pairs_of(case, near.part):
         lines.append(f"contact pairs  {', '.join(pairs)}")

@@ -41,10 +41,10 @@ def course(residuals: Sequence[float]) -> Course:
     ratios = [after / before for before, after in pairwise(last) if before > 0]
     rate = median(ratios) if ratios else 0.0
     turns = sum((a > 1) != (b > 1) for a, b in pairwise(ratios))
+    if len(ratios) > 2 and turns >= len(ratios) - 2 and max(ratios) > 1 and residuals[-1] < max(residuals):
+        return Course("oscillates", rate)
     if residuals[-1] > GROWTH * min(residuals):
         return Course("diverges", rate)
-    if len(ratios) > 2 and turns >= len(ratios) - 2 and max(ratios) > 1:
-        return Course("oscillates", rate)
     return Course("stagnates" if rate > STILL else "converges", rate)
 
 

@@ -41,6 +41,7 @@ POWERS = {
     "contact_pressure": (-1, 1, -2),
     "contact_traction": (-1, 1, -2),
     "contact_gap": (1, 0, 0),
+    "power": (2, 1, -3),
 }
 
 #: Balances in the history -> their titles; all vanish without errors of solvers and time steps.
@@ -53,6 +54,12 @@ BALANCES = {
     "interface.work": ("error of the work at the interface", "energy"),
     "interface.force": ("relative error of the forces at the interface", ""),
 }
+#: other columns of the program's own -> what they are
+OWN = {
+    "interface.power": ("power of the fluid on the bodies", "power"),
+    "coupling.linear": ("linear iterations in a step", ""),
+    "coupling.newton": ("Newton iterations of the fields in a step", ""),
+}
 NODES = "contact nodes"  #: a panel
 CONTACT = "contact."  #: prefix of the columns of contact
 NEGLIGIBLE, SMALL = (
@@ -60,12 +67,12 @@ NEGLIGIBLE, SMALL = (
     0.05,
 )  #: ranges of components in parts of the largest one that get no axis, an axis of their own
 
-#: (length, mass, time) -> the names of the units of force, energy and stress
+#: (length, mass, time) -> the names of the units of force, energy, stress and power
 DERIVED = {
-    ("m", "kg", "s"): ("N", "J", "Pa"),
-    ("mm", "t", "s"): ("N", "mJ", "MPa"),
-    ("mm", "g", "ms"): ("N", "mJ", "MPa"),
-    ("mm", "kg", "ms"): ("kN", "J", "GPa"),
+    ("m", "kg", "s"): ("N", "J", "Pa", "W"),
+    ("mm", "t", "s"): ("N", "mJ", "MPa", "mW"),
+    ("mm", "g", "ms"): ("N", "mJ", "MPa", "W"),
+    ("mm", "kg", "ms"): ("kN", "J", "GPa", "kW"),
 }
 
 
@@ -76,7 +83,7 @@ def label(text: str, quantity: str, units: Mapping[str, str]) -> str:
     if not any(powers):
         return text
     base = (units["length"], units["mass"], units["time"])
-    for named, derived in zip(((1, 1, -2), (2, 1, -2), (-1, 1, -2)), DERIVED.get(base, ()), strict=False):
+    for named, derived in zip(((1, 1, -2), (2, 1, -2), (-1, 1, -2), (2, 1, -3)), DERIVED.get(base, ()), strict=False):
         if powers == named:
             return f"{text} [{derived}]"
     factors = [(base[1], powers[1]), (base[0], powers[0]), (base[2], powers[2])]
@@ -97,6 +104,8 @@ def plot_history(folder: Path, history: History, quantities: Mapping[str, str], 
     """
     families: dict[str, list[str]] = {}
     for name in history:
+        if name in OWN and not np.any(history[name]):  # no count of what the solver of this run has not
+            continue
         if name not in (*COLUMNS, *BALANCES, "residual") and not name.startswith(CONTACT):
             families.setdefault(name.rpartition(".")[0] or name, []).append(name)
     time, below = history["time"], label("time", "time", units)
@@ -105,7 +114,7 @@ def plot_history(folder: Path, history: History, quantities: Mapping[str, str], 
         quantity = quantities.get(family, family)
         text = quantity if quantity == family else f"{quantity} of {family}"
         if len(columns) == 1 and family not in quantities:
-            text = columns[0].replace(".", " ")
+            text, quantity = OWN.get(columns[0], (columns[0].replace(".", " "), quantity))
         curves = {name.rpartition(".")[2]: history[name] for name in columns}
         drawn.append(plot_curves(folder / f"history_{family}.png", time, curves, below, label(text, quantity, units)))
     if any(name.startswith(CONTACT) for name in history):

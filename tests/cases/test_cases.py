@@ -18,8 +18,14 @@ SMALLER = {
         "fluid.grid.x=[{to: 0.14, cells: 8, ratio: 0.1}, {to: 0.26, cells: 20}, {to: 2.2, cells: 24, ratio: 25}]",
         "fluid.grid.y=[{to: 0.14, cells: 10, ratio: 0.25}, {to: 0.26, cells: 20}, {to: 0.41, cells: 10, ratio: 4}]",
     ],
-    "fsi1": ["fluid.element=q1q1"],
-    "fsi3": ["fluid.element=q1q1"],
+    **{
+        name: [
+            "fluid.element=q1q1",
+            "fluid.grid.x=[{to: 0.14, cells: 5, ratio: 0.4}, {to: 0.64, cells: 36}, {to: 2.5, cells: 14, ratio: 15}]",
+            "fluid.grid.y=[{to: 0.13, cells: 5, ratio: 0.45}, {to: 0.2725, cells: 14}, {to: 0.41, cells: 5, ratio: 2}]",
+        ]
+        for name in ("fsi1", "fsi3")
+    },
     "falling_sphere": [
         f"fluid.grid.{axis}=[{{to: {near}, cells: {cells}}}, {{to: {far}, cells: 3, ratio: 4}}]"
         for axis, near, cells, far in (("x", 0.012, 3, 0.05), ("y", 0.012, 3, 0.05), ("z", 0.14, 12, 0.16))

@@ -87,6 +87,8 @@ def test_a_run_that_did_not_fail(tmp_path):
         ((1.0, 0.5, 2.0, 40.0), "diverges"),
         ((1.0, 1e-3, 9.9e-4, 9.8e-4, 9.9e-4, 9.85e-4, 9.84e-4), "stagnates"),
         ((1.0, 0.5, 1.1, 0.4, 1.2, 0.5, 1.0), "oscillates"),
+        ((20.0, 0.04, 0.01, 0.06, 0.01, 0.005, 0.2), "oscillates"),  # far below what it began with
+        ((1.0, 10.0, 5.0, 100.0, 20.0, 1000.0), "diverges"),
     ],
 )
 def test_courses(residuals, kind):

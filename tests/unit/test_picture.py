@@ -183,6 +183,16 @@ def test_a_broken_off_run_without_fields_or_summary_is_drawn(tmp_path):
     assert [path.name for path in plot_run(tmp_path)] == ["history_A.png"]
 
 
+def test_columns_of_the_program_have_terms_and_units(tmp_path, monkeypatch):
+    """A count that is zero in all steps has no picture."""
+    texts = []
+    monkeypatch.setattr("fsci.plot.curves.plot_curves", lambda path, *rest: texts.append(rest[-1]) or path)
+    history = {"time": np.arange(3.0), "interface.power": np.ones(3), "coupling.linear": np.zeros(3)}
+    assert [path.name for path in plot_history(tmp_path, history, {}, SI)] == ["history_interface.png"]
+    plot_history(tmp_path, history | {"coupling.linear": np.arange(3.0)}, {}, SI)
+    assert texts == ["power of the fluid on the bodies [W]"] * 2 + ["linear iterations in a step"]
+
+
 def test_components_of_very_different_range_get_their_own_axis(tmp_path):
     from PIL import Image
 
