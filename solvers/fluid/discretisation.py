@@ -1,4 +1,4 @@
-"""The grid of a flow, its unknowns and its equations: all that changes where thin bodies go to other cells."""
+"""The discretisation of a flow: grid, unknowns and equations, which change when thin bodies move to other cells."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ def discretise(
     bodies: Sequence[ImmersedBody],
     solver: SolverSettings,
 ) -> Discretisation:
-    """That of a flow around bodies (collective)."""
+    """The discretisation of a flow around bodies (collective)."""
     distributed = DistributedGrid(comm, grid, sheets)
     unknowns = Unknowns(distributed, settings.degree, periodic_axes(patches))
     boundary = Boundary(distributed, unknowns, patches)
-    wanted = solver.linear if isinstance(solver.linear, str) else "auto"
-    wanted = wanted if sheets is None else "direct"  # the others need the nodes of a lattice
+    method = solver.linear if isinstance(solver.linear, str) else "auto"
+    method = method if sheets is None else "direct"  # the others need nodes on a lattice
     size, degree, equal = unknowns.counted(), settings.degree, distributed.nested is None
-    methods = linear.choose_flow(wanted, grid.dim, size, degree=degree, steady=settings.steady, multigrid=equal)
+    methods = linear.choose_flow(method, grid.dim, size, degree=degree, steady=settings.steady, multigrid=equal)
     system = FlowSystem(
         distributed,
         settings,

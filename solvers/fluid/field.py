@@ -73,11 +73,11 @@ class Fluid:
         self.steady, self.scheme = settings.steady, settings.time  #: steps are steady states; the time scheme
         self.linear_tolerance = solver.linear_tolerance
         self.notes: list[str] = []  #: notes to the user on this step
-        self.renewals = 0  #: how often the unknowns have been made: once, and where thin bodies go to other cells
+        self.renewals = 0  #: count of discretisations: one, and one for each change of cells by thin bodies
         self._discretise(sheets)
         self.history = History(settings.time, self.unknowns.local)
         self.current = FlowStep(0.0, 0.0, STEADY)  #: the step that is computed now or was last
-        self._began: Began | None = None  #: what the step that is computed now began with
+        self._began: Began | None = None  #: state at the beginning of the present step
         self.started = False  #: a step was accepted, hence forces exist
         self.smallest_cell = min(float(np.diff(edge).min()) for edge in grid.edges)
         self.motions: list[Motion] = []
@@ -88,7 +88,7 @@ class Fluid:
         self._size = self._largest = 0.0  #: norm of the residual: now, and its largest of the step
 
     def _discretise(self, sheets: Sheets | None) -> None:
-        """Grid, unknowns and equations, with cells of its own for the fluid on each side of thin bodies."""
+        """Create grid, unknowns and equations, with separate cells for the fluid on each side of thin bodies."""
         settings = self.settings
         parts = discretise(self.comm, self._box, sheets, settings, self._patches, self.bodies, self.solver)
         self.grid, self.unknowns, self.boundary = parts.grid, parts.unknowns, parts.boundary
@@ -205,7 +205,7 @@ class Fluid:
             self.levels.hold(self.held, set_by_solids=with_solid and not self.settings.steady)
 
     def _follow(self, sheets: Sheets | None, facets: NDArray[np.int64], motion: Motion) -> None:
-        """Take the sheets of the fluid around thin bodies at their present positions."""
+        """Update the sheets of the fluid around thin bodies to their present positions."""
         if sheets is self.grid.sheets:
             return
         assert sheets is not None
@@ -258,7 +258,7 @@ class Fluid:
         self.started = True
 
     def forget_step(self) -> None:
-        """What comes next starts from the history as it is now."""
+        """Let the next step start from the present history."""
         self._began = None
 
     # ---------------------------------------------------------------------------- the system that Newton solves

@@ -1,4 +1,4 @@
-"""Thin bodies that move: when the flow needs other cells, and how its values come to the new nodes."""
+"""Moving thin bodies: detection of changes of the sheets, and transfer of the flow to the nodes of new sheets."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from solvers.fluid.sheets import AROUND, OPPOSED, THIN_IF_MOVING, Sheets, find_s
 from solvers.fluid.space import FlowNodes, Unknowns
 from solvers.fluid.surface import Motion, wetness
 
-#: Thickness in cells up to which bodies that move have cells for each side. They have a strip of cells behind each side
-#: otherwise, and fluid passes where both strips meet.
+#: Thickness in cells up to which moving bodies have separate cells for each side. Thicker bodies have a strip of cells
+#: behind each side instead; fluid would pass where both strips overlap.
 THICK = 3.05
 
 
 class ThinBodies:
-    """Finds the sheets of the fluid for each place of the bodies, once one of these has been thin."""
+    """Finds the sheets of the fluid for each position of the bodies, after one of these has been thin."""
 
     def __init__(self, grid: Grid, bodies: Sequence[ImmersedBody], periodic: bool, sheets: Sheets | None):
         self._grid, self.follows, self._sheets = grid, False, sheets
         self._wet = wetness([body.surface for body in bodies])
         moving = bool(bodies) and not all(body.rests for body in bodies)
-        # where surfaces touch, fluid between them comes and goes within Newton's iteration, and it does not settle
+        # between touching surfaces fluid appears and disappears during Newton's iteration, which would not converge
         touching = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
         plain = grid.dim == 2 and not periodic and not isinstance(grid, Nested)
         self._possible: bool | None = None if moving and plain and not touching else False
@@ -42,11 +42,11 @@ class ThinBodies:
 
     @property
     def may_follow(self) -> bool:
-        """There may be other cells at another time."""
+        """Whether the cells may change during the run."""
         return self._possible is not False
 
     def sheets(self, facets: NDArray[np.int64], motion: Motion) -> Sheets | None:
-        """Those of the fluid around surfaces at this place; None if no body has been thin yet."""
+        """Sheets of the fluid around surfaces at their present positions; None if no body has been thin yet."""
         if self._possible is None:
             self._possible = may_be_thin(self._grid, facets[self._wet], motion.x)
         if not self._possible:
@@ -59,14 +59,14 @@ class ThinBodies:
         return self._sheets
 
     def restore(self, follows: bool) -> None:
-        """Back to a state in which some body had been thin, or none."""
+        """Restore a saved state; follows: whether a body has been thin."""
         self.follows = follows
         if self._possible is not False:
             self._x = self._sheets = None
 
 
 def may_be_thin(grid: Grid, facets: NDArray[np.int64], x: Array) -> bool:
-    """Somewhere two parts of the surface face opposite ways with less than THICK cells of solid between them."""
+    """Whether two parts of the surface face opposite directions with less than THICK cells of solid between them."""
     if not len(facets):
         return False
     a, b = x[facets[:, 0]], x[facets[:, 1]]
@@ -90,13 +90,13 @@ def may_be_thin(grid: Grid, facets: NDArray[np.int64], x: Array) -> bool:
 
 
 def _sizes(edge: Array, x: Array) -> Array:
-    """Of the cells at coordinates."""
+    """Edge lengths [m] of the cells at coordinates x [m]."""
     return np.diff(edge)[np.clip(np.searchsorted(edge, x) - 1, 0, len(edge) - 2)]
 
 
 @dataclass(frozen=True)
 class Began:
-    """What a step begins with: unknowns, sheets, the velocities behind it there, and where the bodies are [m]."""
+    """The state at the beginning of a step: unknowns, sheets, earlier velocities, and positions of the bodies [m]."""
 
     unknowns: Unknowns
     sheets: Sheets | None
@@ -104,7 +104,7 @@ class Began:
     motions: tuple[Motion, ...]
 
     def require_near(self, smallest: float, x: Array) -> None:
-        """Raise StepFailed if some vertex has moved so far that its side was not near its new place."""
+        """Raise StepFailed if a vertex has moved farther than the cells in which sheets are followed."""
         if self.motions:
             way = np.abs(x - np.concatenate([motion.x for motion in self.motions])).max(initial=0.0)
             if way > AROUND * smallest:
@@ -113,7 +113,7 @@ class Began:
 
 @dataclass(frozen=True)
 class Carrier:
-    """From the unknowns around bodies at one place to those at another one (collective)."""
+    """Transfers values from old unknowns to those after bodies have moved (collective)."""
 
     old: Unknowns
     new: Unknowns
@@ -121,17 +121,17 @@ class Carrier:
     pressure: sparse.csr_matrix
 
     def velocities(self, values: Array) -> Array:
-        """Values at local dofs of the velocity."""
+        """Transferred values at local velocity dofs."""
         out = np.zeros(self.new.local)
         return _carry(self.velocity, self.old.velocity, self.new.velocity, values, out, self.new)
 
     def flow(self, values: Array) -> Array:
-        """Values at local dofs of velocity and pressure."""
+        """Transferred values at local dofs of velocity and pressure."""
         out = self.velocities(values)
         return _carry(self.pressure, self.old.pressure, self.new.pressure, values, out, self.new)
 
     def past(self, past: Past) -> Past:
-        """Velocities of a time behind; found where all are from which one follows."""
+        """Transferred velocities of an earlier time; found where all velocities exist that a value depends on."""
         unknown = (~past.found & self.old.velocity_mask).astype(float)
         known = np.diff(self.velocity.indptr) > 0
         lost, nodes = np.zeros(self.new.local), self.new.velocity
@@ -141,7 +141,7 @@ class Carrier:
 
 
 def carry(old: Unknowns, before: Sheets | None, new: Unknowns, facets: int) -> Carrier:
-    """before: sheets of the old unknowns where the bodies were; None: nodes of the box, which both sides share."""
+    """The transfer from old to new unknowns; before: sheets of the old ones, None: nodes of the box."""
     after = new.grid.sheets
     assert after is not None
     matrices = []
