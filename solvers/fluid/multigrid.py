@@ -18,6 +18,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from solvers.api import Array
+from solvers.fluid.coarse_matrix import CoarseMatrix
 from solvers.fluid.decoupled import decoupled
 from solvers.fluid.space import Unknowns
 from solvers.linear import ZERO_PIVOT
@@ -179,11 +180,10 @@ class Multigrid:
         self.comm, self._second = comm, unknowns.degree > 1
         self.levels = [finest(unknowns)]
         self._interpolations: list[PETSc.Mat] = []
-        #: the finest matrix of the last preconditioner, its conversion to AIJ, and for each level the interpolation and
-        #: the coarse matrix; these are reused while the matrix, and thus its pattern, is the same
+        #: the finest matrix of the last preconditioner, and the coarse ones, reused while it, and thus its pattern,
+        #: is the same
         self._last: PETSc.Mat | None = None
-        self._converted: PETSc.Mat | None = None
-        self._kept: list[tuple[PETSc.Mat, PETSc.Mat]] = []
+        self._coarse: list[CoarseMatrix] = []
         while comm.allreduce(self.levels[-1].owned) > COARSEST:
             lattices = [component.lattice for component in self.levels[-1].components]
             if lattices[-1].smallest:
@@ -244,24 +244,10 @@ class Multigrid:
         """Matrices and interpolations, finest first (collective)."""
         matrices, interpolations, free = [matrix], [], (~held).astype(float)
         if self._last is None or self._last.handle != matrix.handle:
-            self._last, self._converted, self._kept = matrix, None, []
-        product = matrix
-        if "baij" in matrix.getType():
-            product = self._converted = matrix.convert(PETSc.Mat.Type.AIJ, self._converted or PETSc.Mat())
-        for number, level in enumerate(self._interpolations):
-            P, earlier = self._kept[number] if number < len(self._kept) else (level.copy(), None)
-            level.copy(P, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-            coarse, fine = P.createVecs()
-            fine.array[:] = free
-            P.diagonalScale(fine, None)
-            P.multTranspose(fine, coarse)
-            free = (coarse.array > 0.0).astype(float)
-            product = product.ptap(P, result=earlier)
-            if earlier is None:
-                self._kept.append((P, product))
-            coarse.array[:] = 1.0 - free  # coarse unknowns without free fine ones get rows of the identity
-            product.setDiagonal(coarse, addv=PETSc.InsertMode.ADD_VALUES)
-            product.assemble()
-            matrices.append(product)
-            interpolations.append(P)
+            self._last = matrix
+            self._coarse = [CoarseMatrix(level) for level in self._interpolations]
+        for coarse in self._coarse:
+            interpolations.append(coarse.mark(free))
+            matrices.append(coarse.update(matrices[-1], free))
+            free = coarse.free
         return matrices, interpolations

@@ -6,6 +6,8 @@ from ._kernels import (
     Moments,
     MortarResult,
     basis_transformation,
+    coarse_pattern,
+    coarse_product,
     moments,
     mortar,
     nodal_normals,
