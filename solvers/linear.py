@@ -120,18 +120,29 @@ FlowMethod = Literal["multigrid", "ilu", "fill", "direct"]
 
 
 def choose_flow(
-    method: Method, dim: int, dofs: int, *, degree: int, steady: bool, multigrid: bool = True
+    method: Method,
+    dim: int,
+    dofs: int,
+    *,
+    degree: int,
+    steady: bool,
+    nested: bool = False,
+    with_solids: bool = False,
 ) -> tuple[FlowMethod, ...]:
     """The sequence of solvers for a flow: each is used when those before it have failed.
 
     degree: of the velocity; incomplete factors with more fill take minutes for second degree, and are left out.
-    multigrid: whether all cells are those of one lattice.
+    nested: on nested cells, where multigrid stalls for second degree, and for steady flows of 25,000 and 50,000
+    unknowns takes 2.5 times as long as incomplete factors. with_solids: equations of solids may belong to the system.
     """
     if method == "direct" or (method == "auto" and dofs <= FLOW_DIRECT_LIMIT[dim]):
         return ("direct",)
-    if not multigrid:
-        return ("ilu", "direct") if degree > 1 else ("ilu", "fill", "direct")
-    if method == "ilu" or (method == "auto" and not steady and dofs <= FLOW_INCOMPLETE_LIMIT[degree]):
+    if nested and degree > 1:
+        return ("ilu", "direct")
+    if nested and steady and method == "auto":
+        return ("ilu", "multigrid", "direct")
+    limit = (FLOW_WITH_SOLIDS_LIMIT if with_solids else FLOW_INCOMPLETE_LIMIT)[degree]
+    if method == "ilu" or (method == "auto" and not steady and dofs <= limit):
         return ("ilu", "multigrid", "direct")
     return ("multigrid", "direct") if degree > 1 else ("multigrid", "fill", "direct")
 
@@ -140,9 +151,12 @@ def choose_flow(
 FLOW_DIRECT_LIMIT = {2: 400_000, 3: 4_000}
 
 #: Unknowns of an unsteady flow above which multigrid is faster than incomplete factors, by degree. Measured times per
-#: step: `channel` (98,000 unknowns) is as fast with either; q2q1 with incomplete factors takes 1.4 s instead of 2.8 s
-#: at 15,000, but 9.4 s instead of 5.6 s at 49,000; `torus_wall` (16,200, coupled) 0.95 s instead of 1.5 s.
-FLOW_INCOMPLETE_LIMIT = {1: 100_000, 2: 25_000}
+#: step: `channel` takes 7 % less at 20,000 and 22 % less at 62,000; q2q1 with incomplete factors takes 1.4 s instead of
+#: 2.8 s at 15,000, but 9.4 s instead of 5.6 s at 49,000.
+FLOW_INCOMPLETE_LIMIT = {1: 20_000, 2: 25_000}
+#: The same with solids: `torus_wall` (14,200) takes 17 us per unknown and Newton step with incomplete factors, 22 with
+#: multigrid.
+FLOW_WITH_SOLIDS_LIMIT = {1: 100_000, 2: 25_000}
 
 
 def flow_solver(comm, *, tolerance: float, fill: bool = False) -> PETSc.KSP:

@@ -48,8 +48,15 @@ def discretise(
     boundary = Boundary(distributed, unknowns, patches)
     method = solver.linear if isinstance(solver.linear, str) else "auto"
     method = method if sheets is None else "direct"  # the others need nodes on a lattice
-    size, degree, equal = unknowns.counted(), settings.degree, distributed.nested is None
-    methods = linear.choose_flow(method, grid.dim, size, degree=degree, steady=settings.steady, multigrid=equal)
+    methods = linear.choose_flow(
+        method,
+        grid.dim,
+        unknowns.counted(),
+        degree=settings.degree,
+        steady=settings.steady,
+        nested=distributed.nested is not None,
+        with_solids=any(body.motion is None for body in bodies),
+    )
     system = FlowSystem(
         distributed,
         settings,

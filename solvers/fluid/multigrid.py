@@ -1,8 +1,8 @@
-"""Geometric multigrid for the flow: each level has a subset of the planes of the next finer one.
+"""Geometric multigrid for the flow: each level has a subset of the nodes of the next finer one (`level_grid`).
 
-The nodes of velocity and pressure are lattices, products of planes. A coarse lattice has some of the planes. P is the
-multilinear interpolation to the others, and coarse matrices are P^T A P. Held unknowns, which include those without
-fluid, get no correction. The first coarse lattice of a velocity of second degree is that of the vertices.
+P is the multilinear interpolation to the others, and coarse matrices are P^T A P. Held unknowns, which include those
+without fluid and hanging nodes, get no correction. The first coarse level of a velocity of second degree has the
+vertices.
 Source: Trottenberg, Oosterlee, Schuller, Multigrid (2001), sections 2.4, 5.1 and 8.7.
 """
 
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
-from solvers.api import Array
 from solvers.fluid.coarse_matrix import CoarseMatrix
 from solvers.fluid.decoupled import decoupled
+from solvers.fluid.level_grid import LevelGrid
 from solvers.fluid.space import Unknowns
 from solvers.linear import ZERO_PIVOT
 
@@ -27,46 +27,6 @@ Indices = NDArray[np.int64]
 
 #: Unknowns below which a level is solved directly, in less time than the levels above take to smooth.
 COARSEST = 2_000
-#: A level has at most this share of the nodes of the next finer one.
-THINNER = 0.6
-
-
-@dataclass(frozen=True)
-class LevelGrid:
-    """Planes [m] per direction; along a periodic axis the last plane is the first."""
-
-    planes: tuple[Array, ...]
-    periodic: tuple[int, ...]
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return tuple(len(some) - (axis in self.periodic) for axis, some in enumerate(self.planes))
-
-    def coarser(self) -> LevelGrid:
-        """The next coarser lattice: pairs of the smallest neighbouring cells are merged.
-
-        A pair is merged if the new cell is no wider than H, which is the same for all directions. Hence stretched cells
-        are merged across their short edges first. H is doubled until at most the share THINNER of the nodes remains.
-        """
-        width = 2.0 * min(float(np.diff(some).min()) for some in self.planes)
-        while True:
-            found = LevelGrid(tuple(_join(some, width * (1.0 + 1e-6)) for some in self.planes), self.periodic)
-            if found.smallest or np.prod(found.shape) <= THINNER * np.prod(self.shape):
-                return found
-            width *= 2.0
-
-    @property
-    def smallest(self) -> bool:
-        """Whether it is a single cell."""
-        return all(len(some) == 2 for some in self.planes)
-
-
-def _join(planes: Array, width: float) -> Array:
-    kept, i = [0], 0
-    while i < len(planes) - 1:
-        i += 2 if i + 2 < len(planes) and planes[i + 2] - planes[i] <= width else 1
-        kept.append(i)
-    return planes[kept]
 
 
 @dataclass(frozen=True)
@@ -79,7 +39,7 @@ class Component:
 
     @property
     def numbers(self) -> Indices:
-        return np.ravel_multi_index(tuple(self.nodes.T), self.lattice.shape, order="F").astype(np.int64)
+        return self.lattice.numbers(self.nodes)
 
 
 @dataclass(frozen=True)
@@ -106,7 +66,7 @@ def finest(unknowns: Unknowns) -> Level:
             np.interp(np.arange(degree * (len(edge) - 1) + 1) / degree, np.arange(len(edge)), edge)
             for edge in unknowns.grid.grid.edges
         )
-        lattice = LevelGrid(planes, unknowns.periodic)
+        lattice = LevelGrid(planes, unknowns.periodic, unknowns.grid.nested if degree == 1 else None)
         index = np.stack(np.unravel_index(nodes.numbers[: nodes.owned], lattice.shape, order="F"), axis=1)
         found += [Component(lattice, index, unknowns.global_dofs[dofs]) for dofs in nodes.dofs[: nodes.owned].T]
     return Level(found, int(unknowns.index_map.local_range[0]) * unknowns.block_size, unknowns.owned)
@@ -125,8 +85,9 @@ def coarsen(comm: MPI.Comm, fine: Level, lattices: Sequence[LevelGrid]) -> Level
             coordinate = every[component.nodes[:, axis]]
             nodes[:, axis] = np.searchsorted(some, coordinate)
             own &= some[nodes[:, axis]] == coordinate
+        own[own] = lattice.has(nodes[own])
         kept.append(nodes[own])
-        points.append(np.stack([some[i] for some, i in zip(lattice.planes, nodes[own].T, strict=True)], axis=1))
+        points.append(lattice.points(nodes[own]))
     every = np.concatenate(points)
     number = np.empty(len(every), dtype=np.int64)
     number[np.lexsort(every.T)] = np.arange(len(every))
@@ -141,18 +102,10 @@ def interpolation(comm: MPI.Comm, fine: Level, coarse: Level) -> PETSc.Mat:
     rows, columns, data = [], [], []
     for here, there in zip(fine.components, coarse.components, strict=True):
         unknown = _everywhere(comm, there)
-        pairs = [_weights(a, b) for a, b in zip(here.lattice.planes, there.lattice.planes, strict=True)]
-        shape = there.lattice.shape
-        for corner in np.ndindex(*(2,) * len(pairs)):
-            parents = [
-                (first[i] + c) % n for (first, _), i, c, n in zip(pairs, here.nodes.T, corner, shape, strict=True)
-            ]
-            parts = [weight[i, c] for (_, weight), i, c in zip(pairs, here.nodes.T, corner, strict=True)]
-            weight = np.prod(parts, axis=0)
-            used = weight > 0.0
-            rows.append(here.dofs[used] - fine.start)
-            columns.append(unknown[np.ravel_multi_index(parents, shape, order="F")[used]])
-            data.append(weight[used])
+        nodes, parents, weights = there.lattice.interpolation(here.lattice.points(here.nodes))
+        rows.append(here.dofs[nodes] - fine.start)
+        columns.append(unknown[parents])
+        data.append(weights)
     entries = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
     local = sparse.csr_matrix(entries, shape=(fine.owned, comm.allreduce(coarse.owned)))
     csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
@@ -164,13 +117,6 @@ def _everywhere(comm: MPI.Comm, component: Component) -> Indices:
     found = np.zeros(int(np.prod(component.lattice.shape)), dtype=np.int64)
     found[component.numbers] = component.dofs
     return found if comm.size == 1 else comm.allreduce(found)
-
-
-def _weights(fine: Array, coarse: Array) -> tuple[Indices, Array]:
-    """(index of the coarse plane before each fine plane, weights of it and of the next one, shape (planes, 2))."""
-    first = np.clip(np.searchsorted(coarse, fine, side="right") - 1, 0, len(coarse) - 2)
-    second = (fine - coarse[first]) / (coarse[first + 1] - coarse[first])
-    return first, np.stack([1.0 - second, second], axis=1)
 
 
 class Multigrid:

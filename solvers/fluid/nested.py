@@ -66,6 +66,14 @@ class Nested(Grid):
         """Mask of the cells of the lattice that are not of the finest level in the mesh."""
         return np.asarray(self.width[self.cell_of] > 1)
 
+    def coarser(self) -> Grid:
+        """The grid without its finest level: the cells of that are merged, 2^dim of them to one."""
+        edges, low = tuple(edge[::2] for edge in self.edges), self._lowest(np.arange(len(self.first))) // 2
+        numbers = np.ravel_multi_index(tuple(low.T), [n // 2 for n in self.shape], order="F")
+        first, one = np.unique(numbers, return_index=True)
+        width = np.maximum(self.width[one] // 2, 1)
+        return Grid(edges) if (width == 1).all() else Nested(edges, first, width)
+
     def bounds(self, cells: Indices) -> tuple[Array, Array]:
         """Lowest and highest corners [m] of cells of the mesh, shape (cells, dim) each."""
         index = self._lowest(cells)

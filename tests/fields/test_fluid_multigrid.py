@@ -14,7 +14,9 @@ from solvers import linear
 from solvers.fluid import krylov
 from solvers.fluid.grid import Grid, uniform
 from solvers.fluid.krylov import SolverSequence
-from solvers.fluid.multigrid import LevelGrid, coarsen, finest, interpolation
+from solvers.fluid.level_grid import LevelGrid
+from solvers.fluid.multigrid import coarsen, finest, interpolation
+from solvers.fluid.nested import RefinedBox, refined
 from solvers.linear import LinearSolveFailed
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
@@ -97,6 +99,40 @@ def test_iterations_do_not_grow():
     assert counts[1] <= counts[0] + 2
 
 
+def test_interpolation_across_levels_of_nested_cells_is_exact():
+    """Of linear fields, from the coarsest cells to all nodes; hanging nodes are unknowns of no coarse level."""
+    region = RefinedBox([0.2, 0.2, 0.2], [0.6, 0.5, 0.4], 2)
+    grid = refined(Grid(tuple(np.cumsum([0.0, *np.geomspace(1.0, r, 8)]) / 8.0 for r in (1.0, 1.3, 2.0))), [region])
+    fluid = make_fluid(
+        grid, [wall(field(1, 0, 0))], solver=SolverSettings(linear="iterative"), scheme="steady", convection=False
+    )
+    levels = [finest(fluid.unknowns)]
+    for _ in range(3):
+        levels.append(coarsen(MPI.COMM_SELF, levels[-1], [levels[-1].components[-1].lattice.coarser()] * 4))
+    assert [level.components[0].lattice.nested is None for level in levels] == [False, False, True, True]
+    assert levels[2].owned == 4 * 9**3
+    for fine, coarse in itertools.pairwise(levels):
+        P = interpolation(MPI.COMM_SELF, fine, coarse)
+        x, y = P.createVecs()
+        x.array[:], expected = linear_field(coarse), linear_field(fine)
+        P.mult(x, y)
+        assert np.abs(y.array - expected).max() < 1e-12 * np.abs(expected).max()
+
+
+def test_nested_cells_take_few_iterations():
+    """Of two levels around the ball, to 1e-8; incomplete factors take five times as many."""
+    regions = [RefinedBox([-2.2] * 3, [2.3] * 3, 2)]
+    counts = []
+    for cells in (4, 6):
+        grid = refined(uniform([-4.0] * 3, [4.0] * 3, [cells] * 3), regions)
+        flow, iterations = around_a_ball(grid, "iterative")
+        counts.append(iterations)
+        if cells == 4:
+            exact, _ = around_a_ball(grid, "direct")
+            assert np.abs(flow - exact).max() < 1e-5 * np.abs(exact).max()
+    assert max(counts) <= 10
+
+
 @pytest.mark.slow
 def test_second_degree_on_stretched_cells():
     """The case on which incomplete factors stalled (76,542 unknowns), here with 29,000."""
@@ -126,6 +162,11 @@ def test_what_stalls_is_followed_by_what_does_not(monkeypatch):
 def test_method_is_chosen_by_size():
     """Incomplete factors where they are cheaper: in time steps of small flows."""
     assert linear.choose_flow("auto", 3, 20_000, degree=1, steady=False) == ("ilu", "multigrid", "direct")
+    assert linear.choose_flow("auto", 3, 21_000, degree=1, steady=False) == ("multigrid", "fill", "direct")
+    with_solids = linear.choose_flow("auto", 3, 21_000, degree=1, steady=False, with_solids=True)
+    assert with_solids == ("ilu", "multigrid", "direct")
+    assert linear.choose_flow("iterative", 3, 10**6, degree=2, steady=True, nested=True) == ("ilu", "direct")
+    assert linear.choose_flow("auto", 3, 10**5, degree=1, steady=True, nested=True) == ("ilu", "multigrid", "direct")
     assert linear.choose_flow("auto", 3, 200_000, degree=1, steady=False) == ("multigrid", "fill", "direct")
     assert linear.choose_flow("auto", 3, 20_000, degree=2, steady=True) == ("multigrid", "direct")
     assert linear.choose_flow("auto", 2, 20_000, degree=2, steady=True) == ("direct",)
