@@ -18,6 +18,7 @@ from petsc4py import PETSc
 
 from coupling.blocks import Blocks
 from coupling.coupled import Coupled
+from coupling.divided import lengths, step_in_parts
 from coupling.ports import Part
 from coupling.start import start_together
 from solvers import linear
@@ -73,6 +74,10 @@ class Monolithic:
         converge(self, self.tolerance)
 
     def step(self, t: float, dt: float) -> StepInfo:
+        """Take one, in parts if it is much longer than the last. Raises StepFailed."""
+        return step_in_parts(self._take, t, lengths(dt, self.coupled.flow.history.longest_step))
+
+    def _take(self, t: float, dt: float) -> StepInfo:
         coupled = self.coupled
         coupled.begin_step(t, dt)
         self._begin_system()

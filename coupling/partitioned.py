@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from coupling.accelerate import Accelerator, QuasiNewton
 from coupling.coupled import Coupled
+from coupling.divided import lengths, step_in_parts
 from coupling.start import start_together
 from solvers.api import Array, State, StepFailed, StepInfo
 
@@ -45,6 +46,10 @@ class Partitioned:
         self.accelerator.forget()
 
     def step(self, t: float, dt: float) -> StepInfo:
+        """Take one, in parts if it is much longer than the last. Raises StepFailed."""
+        return step_in_parts(self._take, t, lengths(dt, self.coupled.flow.history.longest_step))
+
+    def _take(self, t: float, dt: float) -> StepInfo:
         coupled, interface = self.coupled, self.coupled.interface
         coupled.begin_step(t, dt)
         if not coupled.flow.steady:

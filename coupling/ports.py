@@ -18,6 +18,7 @@ from petsc4py import PETSc
 
 from solvers.api import Array, Stateful, StepInfo
 from solvers.fluid.coupling_entries import InterfaceEntries
+from solvers.fluid.history import History
 from solvers.fluid.krylov import SolverSequence
 from solvers.fluid.surface import Motion
 from solvers.fluid.time_scheme import FlowStep, FlowTimeScheme
@@ -171,6 +172,7 @@ class Flow(Part, Protocol):
         """The time scheme."""
         ...
 
+    history: History  #: velocities and lengths of earlier steps
     current: FlowStep  #: the present step, with its difference formula
 
     def predict(self) -> None:

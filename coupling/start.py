@@ -14,13 +14,19 @@ starts with
     u_0 + sum_k (du_k - du_n),   a = du_n / h^2,   the force of the last step,
 
 which changes slow motions by a term of order h^4, and rigid motions not at all.
+
+The grid is cut at the first position of the bodies during the start, so that they must not move by a cell there:
+n h^2 a < the shortest edge, with the acceleration a of the solid alone. Where h = dt is too long for that, h = dt / 2^m
+is the first part of the first step (`coupling.divided`).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from coupling.coupled import Coupled
+from coupling.divided import lengths
 from solvers.api import StepFailed
 
 #: Note for the user.
@@ -37,8 +43,8 @@ def start_together(
 
     solve: solves a step of both fields that has begun; with_solid: as one system.
     The initial state is kept in these cases: the flow starts impulsively and has no acceleration; the solid has no
-    inertia; the flow uses backward Euler, whose velocities are those of the middle of a step; the start would move
-    bodies by a cell or more; a start step does not converge, with a note to the user.
+    inertia; the flow uses backward Euler, whose velocities are those of the middle of a step; a start step does not
+    converge, with a note to the user.
     """
     if coupled.start is None:
         return
@@ -46,8 +52,9 @@ def start_together(
     velocity = start.solid.velocity()
     if start.flow.at_once(interface.at_start(velocity)):
         return
-    if start.solid.steps * dt**2 * start.solid.acceleration() >= start.flow.smallest_cell:
-        return
+    moved = start.solid.steps * dt**2 * start.solid.acceleration()
+    if moved > start.flow.smallest_cell:
+        dt = lengths(dt, dt * math.sqrt(start.flow.smallest_cell / moved))[0]
     initial = coupled.save()
     try:
         for _ in range(start.solid.steps):

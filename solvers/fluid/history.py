@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,10 @@ from solvers.fluid.space import Unknowns
 from solvers.fluid.time_scheme import Difference, FlowTimeScheme
 
 Mask = NDArray[np.bool_]
+
+#: Largest length of a step over that of the last one. BDF2 with variable steps is stable up to 1 + sqrt(2): R. D.
+#: Grigorieff, Numer. Math. 42 (1983) 359-377.
+GROWTH = 2.0
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,12 @@ class History:
         self.scheme = scheme
         self.past = [Past(np.zeros(size), np.ones(size, dtype=bool)) for _ in range(max(1, scheme.times))]
         self.steps: tuple[float, ...] = ()  #: lengths [s]
+
+    @property
+    def longest_step(self) -> float:
+        """[s]; longer ones would be too much longer than the last one for the rule."""
+        asks = self.scheme.times > 1 and len(self.steps) == self.scheme.times
+        return GROWTH * self.steps[0] if asks else math.inf
 
     def difference(self, dt: float) -> Difference:
         """The difference formula of a next step of length dt [s]."""

@@ -72,10 +72,13 @@ def test_both_schemes_start_alike(tmp_path):
 
 
 def test_order_of_the_start():
-    """A bar with ten times its density of fluid at its end, let go in its first mode: the exact way, of order 2."""
+    """A bar with ten times its density of fluid at its end, let go in its first mode: the exact way, of order 2.
+
+    With 20 steps in a period the first one is divided; that is as good as second order from 40 steps.
+    """
     period = 2.0 * np.pi / BAR_MODES[0.1]
     errors = []
-    for steps in (20, 40):
+    for steps in (20, 40, 80):
         scheme, dt = Monolithic(bar_and_column(0.1), TIGHT), period / steps
         scheme.initialise(0.0, dt)
         interface = scheme.coupled.interface
@@ -86,7 +89,8 @@ def test_order_of_the_start():
             found.append(interface.now[end, 0])
         exact = 1e-3 * np.cos(2.0 * np.pi * np.arange(len(found)) / steps)
         errors.append(np.abs(np.array(found) - exact).max())
-    assert errors[0] > 4.0 * errors[1]
+    assert errors[0] < 4.0 * errors[1]
+    assert errors[1] > 4.0 * errors[2]
     assert errors[1] < 0.02 * 1e-3
 
 
@@ -134,20 +138,24 @@ def test_a_start_without_balance_is_told():
     assert scheme.step(0.01, 0.01).notes == ()
 
 
-def test_bodies_that_the_start_would_move_by_a_cell_keep_the_initial_state():
-    """Its six steps move a body by 6 h^2 a; nothing is solved."""
-
-    def fail():
-        raise AssertionError("solved")
-
+@pytest.mark.parametrize(("cells_moved", "first"), [(0.99, 0.01), (1.01, 0.005), (15.9, 0.0025), (16.1, 0.00125)])
+def test_first_steps_that_move_a_body_by_a_cell_are_divided(cells_moved, first):
+    """Six steps of the start with the first part h of the step move it by 6 h^2 a, less than a cell."""
     coupled = post_in_flow(growth=lambda t: t / 0.1)
     coupled.initialise(0.0, 0.01)
     assert coupled.start is not None
     cell = coupled.start.flow.smallest_cell
-    coupled.solid.structure.now.a[:] = -1.01 * cell / (6.0 * 0.01**2)
-    start_together(coupled, 0.0, 0.01, fail)
-    assert coupled.flow.history.steps == ()
-    assert coupled.notes == []
-    coupled.solid.structure.now.a[:] *= 0.98
-    with pytest.raises(AssertionError, match="solved"):
-        start_together(coupled, 0.0, 0.01, fail)
+    coupled.solid.structure.now.a[:] = -cells_moved * cell / (6.0 * 0.01**2)
+    start_together(coupled, 0.0, 0.01, lambda: None)
+    assert coupled.flow.history.steps == pytest.approx((first, first))
+
+
+@pytest.mark.parametrize("solid", [ELASTIC, RIGID])
+def test_the_length_of_the_first_step_does_not_matter(solid, tmp_path):
+    """A disc falls for 0.4 s, in one step, which is divided (6 h^2 a is ten cells), or in eight."""
+    momentum = []
+    for steps in (1, 8):
+        (tmp_path / str(steps)).mkdir()
+        step = 0.4 / steps
+        momentum.append(step * rates(tmp_path / str(steps), step=step, steps=steps, solid=solid).sum())
+    assert momentum[0] == pytest.approx(momentum[1], rel=0.03)
