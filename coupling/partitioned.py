@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coupling.accelerate import Accelerator, QuasiNewton
+from coupling.bracket import CouplingIterate, brackets, halved
 from coupling.coupled import Coupled
 from coupling.divided import lengths, step_in_parts
 from coupling.start import start_together
@@ -67,7 +67,8 @@ class Partitioned:
         d = interface.displacement()
         history: list[float] = []
         newton = 0
-        contact: NDArray[np.bool_] | None = None
+        ends: tuple[CouplingIterate, CouplingIterate] | None = None
+        last: CouplingIterate | None = None
         while True:
             coupled.flow.move(interface.move(d))
             newton += coupled.flow.solve().iterations
@@ -83,11 +84,22 @@ class Partitioned:
                     f"the coupling iteration did not converge in {len(history)} iterations (residual {residual:.3g} m)"
                 )
                 raise StepFailed("coupling", reason, iteration=len(history), history=tuple(history))
-            touching = coupled.solid.touching()
-            if contact is not None and touching is not None and not np.array_equal(contact, touching):
-                self.accelerator.forget()
-            contact = touching
-            d = self.accelerator.next(d, found)
+            now = CouplingIterate(d, found, coupled.solid.touching())
+            if ends is not None:
+                ends = halved(*ends, now)
+            elif last is not None and brackets(last, now):
+                ends = last, now
+            if ends is not None and not ends[0].same_contact(ends[1]):
+                d = 0.5 * (ends[0].d + ends[1].d)
+            else:
+                if ends is not None:
+                    self.accelerator.forget()
+                    self.accelerator.next(ends[0].d, ends[0].found)
+                elif last is not None and not last.same_contact(now):
+                    self.accelerator.forget()
+                ends = None
+                d = self.accelerator.next(d, found)
+            last = now
 
     def _small(self, found: Array) -> float:
         """Tolerance [m], at least a few rounding errors of positions: bodies may move by less in a step."""

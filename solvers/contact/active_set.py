@@ -37,8 +37,12 @@ class ActiveSet:
 
     def begin_step(self) -> None:
         """Discard the earlier sets of the last step; the present set is kept."""
-        self.changed, self.changes, self.damping = False, 0, 1.0
-        self._earlier, self._recurrences = [self.status.tobytes()], 0
+        self.changed, self.changes = False, 0
+        self.begin_solve()
+
+    def begin_solve(self) -> None:
+        """Discard the earlier sets, which other loads may have chosen."""
+        self.damping, self._earlier, self._recurrences = 1.0, [self.status.tobytes()], 0
 
     def choose(self, status: Statuses) -> None:
         """Set the statuses of this iterate. Raises StepFailed if the set cycles."""

@@ -123,6 +123,10 @@ class Contact:
         self._sliding.begin_step(self.x, self._travel)
         self.slip = None
 
+    def begin_solve(self) -> None:
+        """New loads: sets that the old ones chose are no sign of a cycle."""
+        self.active_set.begin_solve()
+
     def end_step(self, weight: float) -> None:
         """Accept the step; weight: that of the contact force at its end in the balance."""
         if self._sliding.mortars or self._ties.pieces:

@@ -171,6 +171,8 @@ class Structure:
     def load(self, force: Array) -> None:
         """Set the forces [N] of another field at the end of the step, at owned dofs."""
         self.now.surface[:] = force
+        if self.constraint is not None:
+            self.constraint.begin_solve()
 
     def solve(self) -> StepInfo:
         """Newton's method to the tolerance. Raises StepFailed."""

@@ -178,25 +178,29 @@ def started(**more: str):
     return simulation.scheme
 
 
-def test_both_schemes_agree():
-    """Each step from the same state: pressed, less pressed, open (the monolithic one alone), closed again.
+@pytest.mark.parametrize("layer", [0.0, 1e-6])
+def test_both_schemes_agree(layer):
+    """Each step from the same state: pressed, less pressed, pulled off, closed again.
 
-    The partitioned scheme finds no solution while the film under the flat block is thinner than 1e-3 cells, dry or
-    wetted: see docs/stress.md.
+    In the step that closes contact again there are two solutions without a layer: the monolithic scheme finds the open
+    one, the partitioned scheme the closed one.
     """
-    one = started()
-    two = started(coupling__scheme="partitioned", coupling__accelerator="iqn", coupling__tolerance="1e-9")
+    film = {"contact__film__transmissivity": str(layer), "contact__film__zone": "seeping"} if layer else {}
+    one = started(**film)
+    two = started(coupling__scheme="partitioned", coupling__accelerator="iqn", coupling__tolerance="1e-7", **film)
     contact = one.coupled.solid.structure.constraint
-    closed = []
+    other = two.coupled.solid.structure.constraint
+    closed, differ = [], []
     for step in range(24):
         before = one.coupled.save()
-        info = one.step(step * 0.05, 0.05)
-        assert info.iterations <= 5
+        assert one.step(step * 0.05, 0.05).iterations <= 5
+        two.coupled.restore(before)
+        two.step(step * 0.05, 0.05)
         closed.append(bool(contact.active().any()))
-        if closed[-1]:
-            two.coupled.restore(before)
-            two.step(step * 0.05, 0.05)
-            assert np.abs(one.coupled.interface.now - two.coupled.interface.now).max() < 1e-12
-            other = two.coupled.solid.structure.constraint
-            assert other.resultant(0) == pytest.approx(contact.resultant(0), rel=1e-8, abs=1e-8)
+        if other.active().any() != closed[-1]:
+            differ.append(step)
+            continue
+        assert np.abs(one.coupled.interface.now - two.coupled.interface.now).max() < 1e-10
+        assert other.resultant(0) == pytest.approx(contact.resultant(0), rel=1e-6, abs=1e-6)
     assert closed == [True] * 12 + [False] * 6 + [True] * 6
+    assert differ == ([] if layer else [17])

@@ -184,3 +184,15 @@ def test_a_return_makes_c_n_smaller_for_the_step():
     assert update(active_set, [1, 1, 0], [0, 0.5, 0], c=ten) == [True, True, False]
     active_set.begin_step()
     assert update(active_set, [1, 1, 0], [0, 0.5, 0], c=ten) == [True, False, False]
+
+
+def test_sets_of_other_loads_are_no_cycle():
+    """A partitioned step solves for the contact of many loads, which may choose two sets by turns."""
+    active_set = ActiveSet(1)
+    active_set.begin_step()
+    for _ in range(3 * MAX_RECURRENCES):
+        active_set.begin_solve()
+        assert update(active_set, [1], [0], ALL[:1], ONE[:1]) == [True]
+        active_set.begin_solve()
+        assert update(active_set, [-1], [0], ALL[:1], ONE[:1]) == [False]
+    assert active_set.changes == 6 * MAX_RECURRENCES
