@@ -127,6 +127,7 @@ def choose_flow(
     degree: int,
     steady: bool,
     nested: bool = False,
+    processes: int = 1,
     with_solids: bool = False,
 ) -> tuple[FlowMethod, ...]:
     """The sequence of solvers for a flow: each is used when those before it have failed.
@@ -139,6 +140,8 @@ def choose_flow(
         return ("direct",)
     if nested and degree > 1:
         return ("ilu", "direct")
+    if nested and processes > 1:  # a solve by multigrid did not end on two processes; the cause is not known
+        return ("ilu", "fill", "direct")
     if nested and steady and method == "auto":
         return ("ilu", "multigrid", "direct")
     limit = (FLOW_WITH_SOLIDS_LIMIT if with_solids else FLOW_INCOMPLETE_LIMIT)[degree]

@@ -55,6 +55,7 @@ def discretise(
         degree=settings.degree,
         steady=settings.steady,
         nested=distributed.nested is not None,
+        processes=comm.size,
         with_solids=any(body.motion is None for body in bodies),
     )
     system = FlowSystem(
