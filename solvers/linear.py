@@ -144,7 +144,7 @@ def choose_flow(
         return ("ilu", "fill", "direct")
     if nested and steady and method == "auto":
         return ("ilu", "multigrid", "direct")
-    limit = (FLOW_WITH_SOLIDS_LIMIT if with_solids else FLOW_INCOMPLETE_LIMIT)[degree]
+    limit = (FLOW_WITH_SOLIDS_LIMIT if with_solids or processes > 1 else FLOW_INCOMPLETE_LIMIT)[degree]
     if method == "ilu" or (method == "auto" and not steady and dofs <= limit):
         return ("ilu", "multigrid", "direct")
     return ("multigrid", "direct") if degree > 1 else ("multigrid", "fill", "direct")
@@ -157,8 +157,8 @@ FLOW_DIRECT_LIMIT = {2: 400_000, 3: 4_000}
 #: step: `channel` takes 7 % less at 20,000 and 22 % less at 62,000; q2q1 with incomplete factors takes 1.4 s instead of
 #: 2.8 s at 15,000, but 9.4 s instead of 5.6 s at 49,000.
 FLOW_INCOMPLETE_LIMIT = {1: 20_000, 2: 25_000}
-#: The same with solids: `torus_wall` (14,200) takes 17 us per unknown and Newton step with incomplete factors, 22 with
-#: multigrid.
+#: The same with solids, and on several processes (not measured). `torus_wall` (14,200) takes 17 us per unknown and
+#: Newton step with incomplete factors, 22 with multigrid.
 FLOW_WITH_SOLIDS_LIMIT = {1: 100_000, 2: 25_000}
 
 
