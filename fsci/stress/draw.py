@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from fsci.stress import flow_scenes, scenes, space_scenes
+from fsci.stress import flow_scenes, further_scenes, scenes, space_scenes
 from fsci.stress.frame import Frame
 from fsci.stress.scenes import StressScene
 
@@ -28,6 +28,13 @@ SPACE_SCENES: dict[str, Callable[[random.Random], StressScene]] = {
     "post 3D": space_scenes.post,
 }
 SPACE = 100_000  #: from this number on draws are in space
+
+FURTHER_SCENES: dict[str, Callable[[random.Random], StressScene]] = {
+    "free": further_scenes.free,
+    "nested": further_scenes.nested,
+    "rough": further_scenes.rough,
+}
+FURTHER = 200_000  #: from this number on they are of these scenes, so that those before stay what they are
 
 Twin = Literal["rotated", "shifted", "rescaled", "parallel", "resumed"]
 TWINS: tuple[Twin, ...] = ("rotated", "shifted", "rescaled", "parallel", "resumed")
@@ -71,7 +78,7 @@ class Draw:
 def draw(seed: int) -> Draw:
     """The draw of a number, which does not depend on earlier draws."""
     chance = random.Random(seed)
-    kinds = SPACE_SCENES if seed >= SPACE else SCENES
+    kinds = FURTHER_SCENES if seed >= FURTHER else SPACE_SCENES if seed >= SPACE else SCENES
     scene = kinds[chance.choice(sorted(kinds))](chance)
     twin = chance.choice(TWINS)
     frame, processes, kill_after, delay = Frame(), 1, 0, 0.0

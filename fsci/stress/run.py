@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from fsci.stress.draw import SCENES, SPACE_SCENES, Draw, draw
+from fsci.stress.draw import FURTHER_SCENES, SCENES, SPACE_SCENES, Draw, draw
 from fsci.stress.frame import Frame
 from fsci.stress.judge import (
     AGREEMENT,
@@ -122,7 +122,8 @@ def _keep(folder: Path, to: Path) -> None:
 
 def table(outcomes: Sequence[Outcome]) -> str:
     """Counts of verdicts by scene, and messages of rejections."""
-    names = [name for name in (*SCENES, *SPACE_SCENES, "mutant") if any(o.scene == name for o in outcomes)]
+    kinds = (*SCENES, *SPACE_SCENES, *FURTHER_SCENES, "mutant")
+    names = [name for name in kinds if any(o.scene == name for o in outcomes)]
     counts = Counter((o.scene, o.verdict) for o in outcomes)
     lines = [f"{'scene':10}{'draws':>8}" + "".join(f"{verdict:>10}" for verdict in VERDICTS)]
     for name in (*names, "all"):
