@@ -50,12 +50,8 @@ def free(chance: random.Random) -> StressScene:
             "coupling": {"scheme": "monolithic"},
         }
 
-    probes = {
-        "force": {"quantity": "force", "body": "body"},
-        "centre": {"quantity": "centre", "body": "body"},
-        "out": OUT,
-    }
-    return StressScene("free", p, case, probes)
+    of_body = {name: {"quantity": name, "body": "body"} for name in ("force", "centre")}
+    return StressScene("free", p, case, {**of_body, "out": OUT})
 
 
 def nested(chance: random.Random) -> StressScene:

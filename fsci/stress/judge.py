@@ -61,7 +61,8 @@ def _balances(draw: Draw, run: Ended) -> Iterator[tuple[str, float, float]]:
         flow = max(_largest(history, "out"), _swept(draw))
         yield "fluid.mass", _largest(history, "fluid.mass"), BALANCE * flow
     if "interface.momentum" in history:
-        force = max(_largest(history, f"force.{i}") for i in "xyz")
+        flux = draw.scene.parameters.get("density", 0.0)  # of momentum, with unit velocity and width
+        force = max(_largest(history, f"force.{i}") for i in "xyz") or flux  # no force: the body has left the box
         yield "interface.momentum", _largest(history, "interface.momentum"), BALANCE * force
     if draw.scene.name.startswith("press"):
         axes = "xyz"[: draw.scene.dim]
