@@ -7,6 +7,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from fluid_setup import body, circle, field, loop, make_fluid, solve_steady
 from mpi4py import MPI
 
 import solvers.fluid.cut
@@ -16,6 +17,8 @@ from fsci.case import load_case
 from fsci.run.run import FINISHED, Run, run_case
 from solvers.contact.mortar import Mortar
 from solvers.contact.search import Search
+from solvers.fluid.grid import uniform
+from solvers.fluid.patches import Patch
 from solvers.fluid.system import FlowSystem
 from solvers.structure.body import Body
 from solvers.structure.field import Structure
@@ -125,6 +128,17 @@ def test_bodies_at_rest_are_cut_once(tmp_path, monkeypatch):
     assert calls["moments"] > 4
 
 
+def test_a_body_outside_of_the_box_changes_nothing(tmp_path):
+    """A disc at rest there: the same flow, bit for bit."""
+    found = []
+    for text in (FLOW, FLOW + RESTING.replace("0.78, 0.51", "5, 5")):
+        simulation = build(written(tmp_path, text, 0.1), MPI.COMM_WORLD, Timer())
+        simulation.initialise(0.0, 0.02)
+        iterations = [simulation.scheme.step(n * 0.02, 0.02).iterations for n in range(3)]
+        found.append((iterations, simulation.dofs, simulation.scheme.flow.tobytes()))
+    assert found[0] == found[1]
+
+
 def test_no_tangent_where_only_a_residual_is_needed(tmp_path, monkeypatch):
     """A Newton step needs one tangent, convergence none."""
     calls = counted(monkeypatch, flow__tangent=FlowSystem, flow__residual=FlowSystem)
@@ -194,6 +208,29 @@ def test_rigid_bodies_have_no_unknowns(tmp_path):
         return build(written(tmp_path, text, 0.1), MPI.COMM_WORLD, Timer()).dofs
 
     assert unknowns(FLOW + RESTING) == unknowns(FLOW)
+
+
+def test_cells_in_a_body_have_no_integrals_and_no_equations(monkeypatch):
+    """Cells are those that have fluid; rows of other unknowns hold a single one, which is their diagonal."""
+    tangents, original = [], FlowSystem.tangent
+
+    def kept(system, *arguments, **keywords):
+        tangents.append(original(system, *arguments, **keywords))
+        return tangents[-1]
+
+    monkeypatch.setattr(FlowSystem, "tangent", kept)
+    disc = body("disc", circle([0.5, 0.5], 0.3, 200), loop(200))
+    box = Patch("box", ("x-", "x+", "y-", "y+"), "velocity", field(1, 0))
+    fluid = make_fluid(uniform([0, 0], [1, 1], [16, 16]), [box], [disc], scheme="steady", convection=False)
+    solve_steady(fluid)
+    assert sum(map(len, fluid.system.cells)) == len(fluid.cut.active) < len(fluid.grid.numbers) - 40
+    inside = ~fluid.system.active_dofs
+    assert inside.sum() > 100
+    assert fluid.held[inside].all()
+    starts, _, values = tangents[-1].getValuesCSR()
+    assert (np.diff(starts)[inside] == 1).all()
+    assert (values[starts[:-1][inside]] != 0.0).all()
+    assert np.diff(starts)[~inside].min() > 1
 
 
 def test_slow_flow_has_no_convection(tmp_path):
