@@ -209,7 +209,7 @@ def find_sheets(
         return None
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
     parts, special = _parts(grid, moments, facets, x, bounds)
-    if not parts:  # all surfaces are outside of the box
+    if not parts and not always:  # all surfaces are outside of the box
         return None
     links = _links(grid, parts)
     cells = np.array([part.cell for part in parts], dtype=np.int64)
