@@ -15,6 +15,7 @@ from solvers import fem, linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.distributed import Nodal, everywhere, scatter
 from solvers.fluid.balances import Balances
+from solvers.fluid.behind import BehindWalls
 from solvers.fluid.coupling_entries import InterfaceEntries, interface_entries
 from solvers.fluid.cut import Cut
 from solvers.fluid.discretisation import discretise
@@ -101,6 +102,9 @@ class Fluid:
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is assembled already
         self.held = np.zeros(owned, dtype=bool)  #: owned dofs with rows of the identity
         self.levels = PressureLevels(self.system, self.bodies)
+        moved = not settings.steady and not all(body.rests for body in self.bodies)
+        bounds = moved and settings.degree == 2 and sheets is None
+        self._behind: BehindWalls | None = BehindWalls(self.unknowns) if bounds else None
         self.residual_rows, self._increment, self._diagonal = (np.zeros(owned) for _ in range(3))
         self._balances: Balances | None = None
         self.renewals += 1
@@ -152,6 +156,9 @@ class Fluid:
     def begin_step(self, t: float, dt: float) -> None:
         """Store the state at t; set boundary values, loads and moving bodies at t + dt. Times in [s]."""
         self.current = FlowStep(t + dt, dt, self.history.difference(dt))
+        if self._behind is not None:
+            mask = self.unknowns.velocity_mask
+            self.flow[mask] = self.history.past[0].velocity[mask]
         self._began = Began(self.unknowns, self.grid.sheets, tuple(self.history.past), tuple(self.motions))
         self.cutter.begin_step()
         self._begin_system()
@@ -253,7 +260,10 @@ class Fluid:
             self._note_fast_bodies()
         self.system.settle()
         found = self.system.active_dofs | self.system.dofs_of(self.cut.contact_cells)
-        self.history.end_step(self.current.dt, self.velocity(), found)
+        velocity = self.velocity()
+        if self._behind is not None:
+            velocity = self._behind.bounded(velocity, self.cut, self._wet)
+        self.history.end_step(self.current.dt, velocity, found)
         self.forget_step()
         self.started = True
 
@@ -395,6 +405,7 @@ class Fluid:
 
     def _state(self) -> State:
         return self.history.save(self.unknowns) | {
+            "flow": self.unknowns.to_nodes(self.flow, self.unknowns.velocity),
             "pressure": self.unknowns.to_nodes(self.flow, self.unknowns.pressure),
             "pattern": Nodal(self.system.pattern_state(), self.grid.original[: self.grid.owned]),
             "time": self.current.t,
@@ -415,7 +426,7 @@ class Fluid:
         if self._thin.may_follow:
             state = scatter(self.comm, state, self._state())
         self.history.restore(self.unknowns, state)
-        self.flow[:] = self.history.past[0].velocity
+        self.flow[:] = self.unknowns.from_nodes(state["flow"].values, self.unknowns.velocity)
         self.flow[:] += self.unknowns.from_nodes(state["pressure"].values, self.unknowns.pressure)
         self.current = FlowStep(state["time"], 0.0, STEADY)
         self.sequence.position = state["linear_solver"]
