@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from solvers import fem, linear
 from solvers.api import Array, State, StepFailed, StepInfo
-from solvers.distributed import Nodal, everywhere, scatter
+from solvers.fluid import saved
 from solvers.fluid.balances import Balances
 from solvers.fluid.behind import BehindWalls
 from solvers.fluid.coupling_entries import InterfaceEntries, interface_entries
@@ -30,6 +30,7 @@ from solvers.fluid.pressure_level import PressureLevels
 from solvers.fluid.reach import require_finest, require_history, require_within_period, strip_layers
 from solvers.fluid.sheets import Sheets
 from solvers.fluid.space import set_velocity
+from solvers.fluid.steady_iteration import SteadyIteration
 from solvers.fluid.surface import Motion, together, vertex_ranges, wetness
 from solvers.fluid.thin_bodies import Began, ThinBodies, carry
 from solvers.fluid.time_scheme import STEADY, FlowStep
@@ -39,15 +40,6 @@ from solvers.newton import converge
 from solvers.rounding import rounding_error
 from solvers.solver_settings import SolverSettings
 from solvers.timing import Timer
-
-#: Share of the largest residual of a steady flow below which Newton's method takes over from Picard's.
-NEWTON_FROM = 0.02
-
-#: Share of the largest residual of a steady flow below which the velocity that scales stabilisation stays as it is.
-#: The tangent has no derivative by this velocity. While it follows the iterate, Newton's method converges linearly, or
-#: not at all. Between 1e-5 and 1e-2 drag and pressure difference of 2D-1 differ by 5e-6, its lift (0.2 % of the drag)
-#: by 2e-4.
-SCALES_UNTIL = 1e-3
 
 
 class Fluid:
@@ -70,12 +62,12 @@ class Fluid:
         self.bodies, self.dim, self._box, self._patches = list(bodies), grid.dim, grid, patches
         periodic = bool(periodic_axes(patches))
         sheets = None if periodic else sheets_of(grid, self.bodies)
-        self._thin = ThinBodies(grid, self.bodies, periodic, sheets)
+        self.thin = ThinBodies(grid, self.bodies, periodic, sheets)
         self.steady, self.scheme = settings.steady, settings.time  #: steps are steady states; the time scheme
         self.linear_tolerance = solver.linear_tolerance
         self.notes: list[str] = []  #: notes to the user on this step
         self.renewals = 0  #: count of discretisations: one, and one for each change of cells by thin bodies
-        self._discretise(sheets)
+        self.discretise(sheets)
         self.history = History(settings.time, self.unknowns.local)
         self.current = FlowStep(0.0, 0.0, STEADY)  #: the step that is computed now or was last
         self._began: Began | None = None  #: state at the beginning of the present step
@@ -86,9 +78,9 @@ class Fluid:
         self._wet, self._vertices = wetness(surfaces), vertex_ranges(surfaces)
         self._fast_bodies = FastBodies(grid)
         self.linear_iterations = 0  #: of the last linear system
-        self._size = self._largest = 0.0  #: norm of the residual: now, and its largest of the step
+        self._steady_iteration = SteadyIteration()
 
-    def _discretise(self, sheets: Sheets | None) -> None:
+    def discretise(self, sheets: Sheets | None) -> None:
         """Create grid, unknowns and equations, with separate cells for the fluid on each side of thin bodies."""
         settings = self.settings
         parts = discretise(self.comm, self._box, sheets, settings, self._patches, self.bodies, self.solver)
@@ -162,7 +154,7 @@ class Fluid:
         self._began = Began(self.unknowns, self.grid.sheets, tuple(self.history.past), tuple(self.motions))
         self.cutter.begin_step()
         self._begin_system()
-        self._largest = 0.0
+        self._steady_iteration.begin()
         self.rounding = self._tangent = None  # not part of the saved state: a resumed run must start alike
         self.linear_solver.begin_step()
         self.notes.clear()
@@ -198,7 +190,7 @@ class Fluid:
         self.motions = motions
         with self.timer("cut"):
             facets, motion = together([body.surface for body in self.bodies], motions, self.dim)
-            self._follow(self._thin.sheets(facets, motion), facets, motion)
+            self._follow(self.thin.sheets(facets, motion), facets, motion)
             cut = self.cutter(facets, motion, self._layers(motion), self._wet)
             require_finest(self.cutter, self.comm)
         with self.timer("weights"):
@@ -223,7 +215,7 @@ class Fluid:
         if now is not None and now.same_unknowns(sheets):
             self.grid.sheets = sheets
             return
-        self._discretise(sheets)
+        self.discretise(sheets)
         carrier = carry(old, now, self.unknowns, len(facets))
         self.flow[:] = carrier.flow(flow)
         self._increment = carrier.flow(np.pad(increment, (0, old.local - old.owned)))[: self.unknowns.owned]
@@ -235,14 +227,14 @@ class Fluid:
 
     def _layers(self, motion: Motion) -> int:
         """Number of cell layers behind the surface that the next steps may uncover; none around thin bodies."""
-        if self._thin.follows or self.settings.steady or all(body.rests for body in self.bodies):
+        if self.thin.follows or self.settings.steady or all(body.rests for body in self.bodies):
             return 0
         times = self.settings.time.times
         return strip_layers(self.grid, motion, times * self.current.dt, self.smallest_cell)
 
     def solve(self) -> StepInfo:
         """Newton's method to the tolerance. Raises StepFailed."""
-        self._largest = 0.0
+        self._steady_iteration.begin()
         info = converge(self, self.solver.newton)
         self.levels.keep(self.flow[: self.unknowns.owned])
         self.unknowns.share(self.system.flow)
@@ -276,20 +268,18 @@ class Fluid:
     def residual(self) -> float:
         """Norm [N] of the momentum rows and of the continuity rows times the impedance of a cell."""
         with self.timer("assembly"):
-            if self.settings.steady and self._size >= SCALES_UNTIL * self._largest:
+            if self.settings.steady and self._steady_iteration.scales_follow:
                 self.system.set_scales(self.velocity())
             self.residual_rows = self.system.residual()
         self.levels.spread_excess(self.residual_rows)
         self.residual_rows[self.held] = 0.0
-        self._size = self._norm(self.residual_rows)
-        self._largest = max(self._largest, self._size)
-        return self._size
+        size = self._norm(self.residual_rows)
+        self._steady_iteration.record(size)
+        return size
 
     def _norm(self, rows: Array) -> float:
-        settings, h = self.settings, self.smallest_cell
-        impedance = settings.viscosity / h + settings.density * (
-            self.system.fastest + h * self.current.difference.alpha
-        )
+        settings, h, alpha = self.settings, self.smallest_cell, self.current.difference.alpha
+        impedance = settings.viscosity / h + settings.density * (self.system.fastest + h * alpha)
         scaled = np.where(self.unknowns.velocity_mask[: len(rows)], rows, impedance * rows)
         return math.sqrt(self.comm.allreduce(float(scaled @ scaled)))
 
@@ -308,7 +298,8 @@ class Fluid:
     def linearise(self) -> PETSc.Mat:
         """The tangent at the present iterate; held rows are those of the identity. The next call overwrites it."""
         with self.timer("assembly"):
-            matrix = self.system.tangent(self.held, picard=self._far())
+            picard = self.settings.steady and self.settings.convection and self._steady_iteration.far
+            matrix = self.system.tangent(self.held, picard=picard)
         self._diagonal = np.abs(matrix.getDiagonal().array)
         # an entry is a sum over the 2^dim cells at a node, whose terms may cancel
         self.rounding = 2.0**self.dim * rounding_error(matrix, self.rounded())
@@ -328,10 +319,6 @@ class Fluid:
         self._add(self._increment)
         size = self._norm(self._diagonal * self.flow[: self.unknowns.owned])
         return self._norm(self._diagonal * self._increment) / size if size > 0.0 else 0.0
-
-    def _far(self) -> bool:
-        """The iterate of a steady flow is too far from the solution for Newton's method: Picard's is used."""
-        return self.settings.steady and self.settings.convection and self._size > NEWTON_FROM * self._largest
 
     def set_up_multigrid(self, preconditioner: PETSc.PC, matrix: PETSc.Mat) -> None:
         """Set a preconditioner up as a multigrid cycle for the tangent (collective)."""
@@ -369,8 +356,7 @@ class Fluid:
 
     def held_everywhere(self) -> NDArray[np.bool_]:
         """`held` for all local dofs, ghosts too (collective)."""
-        mark = np.zeros(self.unknowns.local)
-        mark[: self.unknowns.owned] = self.held
+        mark = np.pad(self.held.astype(float), (0, self.unknowns.local - self.unknowns.owned))
         return fem.share_owned(self.unknowns.space, mark) > 0.5
 
     # ---------------------------------------------------------------------------------------------- reactions
@@ -400,41 +386,12 @@ class Fluid:
     # ---------------------------------------------------------------------------------------- save and restore
 
     def save(self) -> State:
-        """The state that the next step starts from; whole arrays where thin bodies may go to other cells."""
-        return everywhere(self.comm, self._state()) if self._thin.may_follow else self._state()
-
-    def _state(self) -> State:
-        return self.history.save(self.unknowns) | {
-            "flow": self.unknowns.to_nodes(self.flow, self.unknowns.velocity),
-            "pressure": self.unknowns.to_nodes(self.flow, self.unknowns.pressure),
-            "pattern": Nodal(self.system.pattern_state(), self.grid.original[: self.grid.owned]),
-            "time": self.current.t,
-            "thin": self._thin.follows,
-            "linear_solver": self.sequence.position,
-            "motion": {body.surface.name: {"x": m.x, "v": m.v} for body, m in self.moved()},
-        }
+        """The state that the next step starts from (collective)."""
+        return saved.save(self)
 
     def restore(self, state: State) -> None:
-        """Restore a saved state."""
-        motions = {name: Motion(m["x"], m["v"]) for name, m in state["motion"].items()}
-        self._began = None
-        self._thin.restore(state["thin"])
-        facets, motion = together([body.surface for body in self.bodies], list(motions.values()), self.dim)
-        if (sheets := self._thin.sheets(facets, motion)) is not self.grid.sheets:
-            self._discretise(sheets)
-            self.history = History(self.settings.time, self.unknowns.local)
-        if self._thin.may_follow:
-            state = scatter(self.comm, state, self._state())
-        self.history.restore(self.unknowns, state)
-        self.flow[:] = self.unknowns.from_nodes(state["flow"].values, self.unknowns.velocity)
-        self.flow[:] += self.unknowns.from_nodes(state["pressure"].values, self.unknowns.pressure)
-        self.current = FlowStep(state["time"], 0.0, STEADY)
-        self.sequence.position = state["linear_solver"]
-        self.system.restore_pattern(state["pattern"].values)
-        self.cutter.begin_step()
-        kept = self.flow.copy()
-        self.move(motions)
-        self.flow[:] = kept
+        """Restore a saved state (collective)."""
+        saved.restore(self, state)
 
     def moved(self) -> Iterator[tuple[ImmersedBody, Motion]]:
         """Pairs of each body and its present motion."""

@@ -1,12 +1,10 @@
 """Bodies and grids with fewer cells than there are processes, and a process without any part of a surface."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from programs import PARALLEL, fsci
+from programs import fsci, on_processes
 
 from fsci.run.history import read_history
 
@@ -132,9 +130,7 @@ def test_process_without_a_surface(tmp_path):
     program, found = Path(__file__).parents[1] / "setups" / "inner_cell.py", []
     for processes in (1, 2):
         out = tmp_path / f"{processes}.npz"
-        command = ["mpirun", "-n", str(processes), sys.executable, program, out]
-        done = subprocess.run(command, env=PARALLEL, capture_output=True, text=True, timeout=100)
-        assert done.returncode == 0, done.stderr
+        on_processes(processes, program, out)
         found.append(np.load(out))
     for name, values in found[0].items():
         assert found[1][name] == pytest.approx(values, rel=1e-9, abs=1e-12), name

@@ -1,17 +1,11 @@
 """The matrix for incomplete factors of second-order flows: couplings of different velocity components are left out."""
 
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
-from programs import PARALLEL
+from programs import on_processes
 
 from solvers.fluid.decoupled import decoupled
-
-SETUPS = Path(__file__).parents[1] / "setups"
 
 
 def check(comm):
@@ -39,9 +33,7 @@ def test_what_is_left_out():
 
 def test_the_same_on_two_processes():
     """Columns of the other process have their components from there."""
-    command, environment = ["mpirun", "-n", "2", sys.executable, __file__], {**PARALLEL, "PYTHONPATH": str(SETUPS)}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100)
-    assert done.returncode == 0, done.stderr
+    on_processes(2, __file__)
 
 
 if __name__ == "__main__":

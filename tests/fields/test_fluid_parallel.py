@@ -1,7 +1,5 @@
 """Any number of processes computes the same, and a resumed run is the same bit for bit."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +7,7 @@ import pytest
 from fluid_parallel import everything, scene
 from fluid_setup import step
 from mpi4py import MPI
-from programs import PARALLEL
+from programs import on_processes
 
 from solvers.fluid.probes import mass_balance
 
@@ -34,9 +32,7 @@ def test_processes_agree(tmp_path, dim, element, box):
     found = []
     for processes in (1, 2, 3):
         out = tmp_path / f"{processes}.npz"
-        command = ["mpirun", "-n", str(processes), sys.executable, PROGRAM, str(dim), element, box, out]
-        done = subprocess.run(command, env=PARALLEL, capture_output=True, text=True, timeout=200)
-        assert done.returncode == 0, done.stderr
+        on_processes(processes, PROGRAM, dim, element, box, out)
         found.append(np.load(out))
     for name in ("velocity", "pressure", "disc", "brick"):
         one = found[0][name]

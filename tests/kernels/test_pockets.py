@@ -1,21 +1,17 @@
 """Closed parts of the fluid, on any number of processes, against a flood fill cell by cell."""
 
 import itertools
-import subprocess
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
-from programs import PARALLEL
+from programs import on_processes
 
 from solvers.fluid.cut import cells_between
 from solvers.fluid.grid import DistributedGrid, Grid, uniform
 from solvers.fluid.pockets import find_pockets
 
-SETUPS = Path(__file__).parents[1] / "setups"
 SHAPES = [((9, 8), ()), ((9, 8), (0,)), ((6, 5, 4), ()), ((6, 5, 4), (1, 2))]
 
 
@@ -71,9 +67,7 @@ def test_pockets_are_the_closed_parts():
 
 
 def test_pockets_on_three_processes():
-    command, environment = ["mpirun", "-n", "3", sys.executable, __file__], {**PARALLEL, "PYTHONPATH": str(SETUPS)}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100)
-    assert done.returncode == 0, done.stderr
+    on_processes(3, __file__)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 ENVIRONMENT = {
     **os.environ,
@@ -32,6 +33,14 @@ def fsci(*arguments, processes: int = 1, timeout: float = 120.0) -> subprocess.C
     return subprocess.run(
         command(*arguments, processes=processes), capture_output=True, text=True, env=environment, timeout=timeout
     )
+
+
+def on_processes(processes: int, *program, timeout: float = 200.0) -> None:
+    """Run a Python program of the tests by mpirun; an exception in one process ends all, instead of a wait."""
+    command = ["mpirun", "-n", str(processes), sys.executable, "-m", "mpi4py", *map(str, program)]
+    environment = {**PARALLEL, "PYTHONPATH": str(Path(__file__).parent)}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=timeout)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def start_fsci(*arguments) -> subprocess.Popen[str]:
