@@ -71,6 +71,7 @@ class Fluid:
         self.history = History(settings.time, self.unknowns.local)
         self.current = FlowStep(0.0, 0.0, STEADY)  #: the step that is computed now or was last
         self._began: Began | None = None  #: state at the beginning of the present step
+        self._prescribed_at = 0.0  #: time [s] of the velocities of the boundary
         self.started = False  #: a step was accepted, hence forces exist
         self.smallest_cell = min(float(np.diff(edge).min()) for edge in grid.edges)
         self.motions: list[Motion] = []
@@ -151,9 +152,11 @@ class Fluid:
         if self._behind is not None:
             mask = self.unknowns.velocity_mask
             self.flow[mask] = self.history.past[0].velocity[mask]
-        self._began = Began(self.unknowns, self.grid.sheets, tuple(self.history.past), tuple(self.motions))
+        history = tuple(self.history.past)
+        self._began = Began(self.unknowns, self.grid.sheets, self.current, history, tuple(self.motions))
         self.cutter.begin_step()
-        self._begin_system()
+        self._begin_system(self.current)
+        self.prescribe(self.current.t)
         self._steady_iteration.begin()
         self.rounding = self._tangent = None  # not part of the saved state: a resumed run must start alike
         self.linear_solver.begin_step()
@@ -162,11 +165,15 @@ class Fluid:
             self.predict()
             self.move({})
 
-    def _begin_system(self) -> None:
-        """Set loads and boundary values at the end of the step."""
-        difference, last = self.current.difference, self.history.past[0].velocity
-        self.system.begin_step(self.current, self.history.rate(difference), self.history.missing(difference), last)
-        self.flow[self.boundary.dofs] = self.boundary.velocity(self.current.t)
+    def _begin_system(self, step: FlowStep) -> None:
+        """Set loads and history terms of the step."""
+        difference, last = step.difference, self.history.past[0].velocity
+        self.system.begin_step(step, self.history.rate(difference), self.history.missing(difference), last)
+
+    def prescribe(self, t: float) -> None:
+        """Set the velocities of the boundary to those at time t [s], until the next step begins."""
+        self._prescribed_at = t
+        self.flow[self.boundary.dofs] = self.boundary.velocity(t)
 
     def predict(self) -> None:
         """Predictor: extrapolate the velocity linearly from the last two steps, where both have one."""
@@ -223,7 +230,8 @@ class Fluid:
             carrier = carry(began.unknowns, began.sheets, self.unknowns, len(facets))
         self.history.past = [carrier.past(past) for past in (self.history.past if began is None else began.past)]
         if began is not None:
-            self._begin_system()
+            self._begin_system(began.step)
+            self.prescribe(self._prescribed_at)
 
     def _layers(self, motion: Motion) -> int:
         """Number of cell layers behind the surface that the next steps may uncover; none around thin bodies."""
@@ -354,11 +362,6 @@ class Fluid:
         size = np.abs(np.nan_to_num(self.residual_rows[nodes.dofs[: nodes.owned]], nan=np.inf)).max(axis=1)
         return position_of_largest(self.comm, size, nodes.points)
 
-    def held_everywhere(self) -> NDArray[np.bool_]:
-        """`held` for all local dofs, ghosts too (collective)."""
-        mark = np.pad(self.held.astype(float), (0, self.unknowns.local - self.unknowns.owned))
-        return fem.share_owned(self.unknowns.space, mark) > 0.5
-
     # ---------------------------------------------------------------------------------------------- reactions
 
     def vertices_of(self, names: Sequence[str]) -> NDArray[np.int64]:
@@ -373,7 +376,9 @@ class Fluid:
 
     def interface_entries(self, surfaces: Sequence[str]) -> InterfaceEntries:
         """Derivatives of rows and force by the motion of some bodies (collective)."""
-        operator, held, vertices = self.system.interface, self.held_everywhere(), self.vertices_of(surfaces)
+        mark = np.pad(self.held.astype(float), (0, self.unknowns.local - self.unknowns.owned))
+        held = fem.share_owned(self.unknowns.space, mark) > 0.5  # of ghosts too
+        operator, vertices = self.system.interface, self.vertices_of(surfaces)
         found = interface_entries(operator, self.unknowns, self.flow, self.current.difference.alpha, held, vertices)
         zone = self.system.zone
         return found if zone is None else with_zone(found, zone, self.unknowns, self.flow, vertices)

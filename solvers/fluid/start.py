@@ -65,7 +65,7 @@ class FlowStart:
         fluid.bodies = [b if b.motion is None else _with_later_velocity(b, b.motion, short) for b in bodies]
         try:
             fluid.begin_step(t - short, short)
-            fluid.flow[fluid.boundary.dofs] = fluid.boundary.velocity(t + short)
+            fluid.prescribe(t + short)
             fluid.current = FlowStep(t, short, Difference(rate, (rate,)))
             yield
         finally:

@@ -21,6 +21,7 @@ from solvers.fluid.sheet_transfer import transfer
 from solvers.fluid.sheets import AROUND, OPPOSED, THIN_IF_MOVING, Sheets, find_sheets
 from solvers.fluid.space import FlowNodes, Unknowns
 from solvers.fluid.surface import Motion, wetness
+from solvers.fluid.time_scheme import FlowStep
 
 #: Thickness in cells up to which moving bodies have separate cells for each side. Thicker bodies have a strip of cells
 #: behind each side instead; fluid would pass where both strips overlap.
@@ -100,6 +101,7 @@ class Began:
 
     unknowns: Unknowns
     sheets: Sheets | None
+    step: FlowStep  #: that the system has the terms of
     past: tuple[Past, ...]
     motions: tuple[Motion, ...]
 

@@ -96,6 +96,6 @@ def test_law_and_direction_of_a_node_on_a_plane_belong_together():
         held = np.broadcast_to(np.diag(np.eye(3)[axis]), (20, 3, 3))
         spans = np.full(20, "surface", dtype="<U7")
         found = find_directions(rng.normal(size=(20, 3)), normals, np.arange(20), held, spans)
-        block = (found.felt.T @ found.basis).toarray()
+        block = (found.node_basis.T @ found.basis).toarray()
         assert np.diag(block).min() > 0.9
         assert np.abs(block - np.diag(np.diag(block))).max() < 1e-12
