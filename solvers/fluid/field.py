@@ -198,6 +198,10 @@ class Fluid:
         with self.timer("cut"):
             facets, motion = together([body.surface for body in self.bodies], motions, self.dim)
             self._follow(self.thin.sheets(facets, motion), facets, motion)
+            if self.settings.steady and self._steady_iteration.scales_follow:
+                # roots belong to the final position of the bodies, not to the initial one
+                self.cutter.begin_step()
+                self.system.forget_roots()
             cut = self.cutter(facets, motion, self._layers(motion), self._wet)
             require_finest(self.cutter, self.comm)
         with self.timer("weights"):

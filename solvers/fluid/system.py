@@ -106,6 +106,11 @@ class FlowSystem:
 
     # ------------------------------------------------------------------------------------------------- a new step
 
+    def forget_roots(self) -> None:
+        """Let the extension of the next cut choose its roots anew."""
+        if self.ghost is not None:
+            self.ghost.begin_step(np.zeros(self.unknowns.local, dtype=bool))
+
     def begin_step(self, step: FlowStep, rate: Array, missing: NDArray[np.bool_], velocity: Array) -> None:
         """Set the time derivative, the loads at the end of a step, and the scales (collective).
 

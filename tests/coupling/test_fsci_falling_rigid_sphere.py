@@ -31,6 +31,7 @@ def test_rigid_and_elastic(tmp_path):
     rigid = run("falling_rigid_sphere", f"fluid.bodies.sphere.free.density={density!r}")
     assert rigid["mass"] == pytest.approx(elastic["mass"], rel=1e-6)
     late = elastic["time"] > 0.19
-    assert rigid["sphere.z"][late] == pytest.approx(elastic["sphere.z"][late], rel=2e-3)
+    # their first steps are divided into different parts, which leaves 0.26 %
+    assert rigid["sphere.z"][late] == pytest.approx(elastic["sphere.z"][late], rel=4e-3)
     assert rigid["interface.force"].max() < 0.01
     assert np.all(rigid["iterations"] <= elastic["iterations"])
