@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from solvers import fem, linear
 from solvers.api import Array, State, StepFailed, StepInfo
-from solvers.fluid import saved
+from solvers.distributed import everywhere, scatter
 from solvers.fluid.balances import Balances
 from solvers.fluid.behind import BehindWalls
 from solvers.fluid.coupling_entries import InterfaceEntries, interface_entries
@@ -28,6 +28,7 @@ from solvers.fluid.krylov import FlowSolver, SolverSequence
 from solvers.fluid.patches import Patch, periodic_axes
 from solvers.fluid.pressure_level import PressureLevels
 from solvers.fluid.reach import require_finest, require_history, require_within_period, strip_layers
+from solvers.fluid.saved import nodal_state, set_nodal_state
 from solvers.fluid.sheets import Sheets
 from solvers.fluid.space import set_velocity
 from solvers.fluid.steady_iteration import SteadyIteration
@@ -395,12 +396,35 @@ class Fluid:
     # ---------------------------------------------------------------------------------------- save and restore
 
     def save(self) -> State:
-        """The state that the next step starts from (collective)."""
-        return saved.save(self)
+        """The state that the next step starts from; whole arrays where thin bodies may change cells (collective)."""
+        return everywhere(self.comm, self._by_process()) if self.thin.may_follow else self._by_process()
+
+    def _by_process(self) -> State:
+        return nodal_state(self.unknowns, self.grid, self.history, self.system) | {
+            "time": self.current.t,
+            "thin": self.thin.follows,
+            "linear_solver": self.sequence.position,
+            "motion": {body.surface.name: {"x": motion.x, "v": motion.v} for body, motion in self.moved()},
+        }
 
     def restore(self, state: State) -> None:
         """Restore a saved state (collective)."""
-        saved.restore(self, state)
+        motions = {name: Motion(m["x"], m["v"]) for name, m in state["motion"].items()}
+        self.forget_step()
+        self.thin.restore(state["thin"])
+        facets, motion = together([body.surface for body in self.bodies], list(motions.values()), self.dim)
+        if (sheets := self.thin.sheets(facets, motion)) is not self.grid.sheets:
+            self.discretise(sheets)
+            self.history = History(self.settings.time, self.unknowns.local)
+        if self.thin.may_follow:
+            state = scatter(self.comm, state, self._by_process())
+        set_nodal_state(state, self.unknowns, self.history, self.system)
+        self.current = FlowStep(state["time"], 0.0, STEADY)
+        self.sequence.position = state["linear_solver"]
+        self.cutter.begin_step()
+        flow = self.flow.copy()
+        self.move(motions)
+        self.flow[:] = flow
 
     def moved(self) -> Iterator[tuple[ImmersedBody, Motion]]:
         """Pairs of each body and its present motion."""
