@@ -228,11 +228,11 @@ class Fluid:
             self.grid.sheets = sheets
             return
         self.discretise(sheets)
-        carrier = carry(old, now, self.unknowns, len(facets))
+        carrier = carry(old, now, self.unknowns, facets, motion.x)
         self.flow[:] = carrier.flow(flow)
         self._increment = carrier.flow(np.pad(increment, (0, old.local - old.owned)))[: self.unknowns.owned]
         if began is not None and began.unknowns is not old:
-            carrier = carry(began.unknowns, began.sheets, self.unknowns, len(facets))
+            carrier = carry(began.unknowns, began.sheets, self.unknowns, facets, motion.x)
         self.history.past = [carrier.past(past) for past in (self.history.past if began is None else began.past)]
         if began is not None:
             self._begin_system(began.step)

@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.csgraph import dijkstra
 
 from solvers.api import Array
 from solvers.fluid.extension import FREE, LARGEST, continued, lagrange
@@ -47,12 +48,23 @@ class _Sides:
         return found
 
 
-def transfer(old: Sheets, new: Sheets, degree: int, facets: int) -> sparse.csr_matrix:
+def along_surface(facets: Indices, x: Array, distance: float) -> sparse.csr_matrix:
+    """1 for facets with at most this distance [m] along the surface between their middles, shape (facets, facets)."""
+    length = np.linalg.norm(x[facets[:, 1]] - x[facets[:, 0]], axis=1)
+    ends = sparse.csr_matrix(
+        (np.ones(facets.size), (np.repeat(np.arange(len(facets)), 2), facets.ravel())), shape=(len(facets), len(x))
+    )
+    one, other = sparse.triu(ends @ ends.T, 1).nonzero()
+    graph = sparse.csr_matrix((0.5 * (length[one] + length[other]), (one, other)), shape=(len(facets), len(facets)))
+    return sparse.csr_matrix(dijkstra(graph, directed=False, limit=distance) < np.inf, dtype=float)
+
+
+def transfer(old: Sheets, new: Sheets, degree: int, along: sparse.csr_matrix) -> sparse.csr_matrix:
     """Values at the nodes of new sheets are this matrix times those of the old ones; rows without entries: unknown.
 
-    Nodes of one degree, by their numbers in the sheets; facets: how many the surfaces have.
+    Nodes of one degree, by their numbers in the sheets; along: `along_surface` with the length of a cell.
     """
-    before, after = (_sides(sheets, degree, facets) for sheets in (old, new))
+    before, after = (_sides(sheets, degree, along) for sheets in (old, new))
     numbers = np.flatnonzero(after.wet)
     places = new.on_lattice(numbers, degree)
     near = _near(old, degree) | _near(new, degree)
@@ -76,7 +88,7 @@ def transfer(old: Sheets, new: Sheets, degree: int, facets: int) -> sparse.csr_m
     return (direct + _continued_to(before, after.of_nodes[numbers[rest]], numbers[rest], places[rest], width)).tocsr()
 
 
-def _sides(sheets: Sheets, degree: int, facets: int) -> _Sides:
+def _sides(sheets: Sheets, degree: int, along: sparse.csr_matrix) -> _Sides:
     steps = np.array(list(product(range(degree + 1), repeat=sheets.grid.dim)))
     adjacent = neighbours_of(sheets)
     fluid = np.zeros(sheets.size, dtype=bool)
@@ -85,8 +97,11 @@ def _sides(sheets: Sheets, degree: int, facets: int) -> _Sides:
     cells = np.flatnonzero(fluid)
     nodes = sheets.nodes(cells, degree, steps)
     ones = np.ones(len(sheets.bounds))
-    reached = sparse.csr_matrix((ones, tuple(sheets.bounds.T)), shape=(sheets.size, facets)).sign()
+    reached = sparse.csr_matrix((ones, tuple(sheets.bounds.T)), shape=(sheets.size, along.shape[0])).sign()
     seen = reached
+    # a place three cells away may see one facet before a step and the next one after it
+    reached = (reached @ along).sign()
+    seen = NEARER * seen + reached
     for _ in range(AROUND):
         reached = (reached + adjacent @ reached).sign()
         seen = NEARER * seen + reached

@@ -17,7 +17,7 @@ from solvers.fluid.history import Past
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.nested import Nested
 from solvers.fluid.reach import TOO_FAR
-from solvers.fluid.sheet_transfer import transfer
+from solvers.fluid.sheet_transfer import along_surface, transfer
 from solvers.fluid.sheets import AROUND, OPPOSED, THIN_IF_MOVING, Sheets, find_sheets
 from solvers.fluid.space import FlowNodes, Unknowns
 from solvers.fluid.surface import Motion, wetness
@@ -142,14 +142,18 @@ class Carrier:
         return Past(self.velocities(past.velocity), found)
 
 
-def carry(old: Unknowns, before: Sheets | None, new: Unknowns, facets: int) -> Carrier:
-    """The transfer from old to new unknowns; before: sheets of the old ones, None: nodes of the box."""
+def carry(old: Unknowns, before: Sheets | None, new: Unknowns, facets: NDArray[np.int64], x: Array) -> Carrier:
+    """The transfer from old to new unknowns around facets with vertices now at x [m].
+
+    before: sheets of the old ones, None: nodes of the box.
+    """
     after = new.grid.sheets
     assert after is not None
-    matrices = []
+    cell = max(float(_sizes(edge, x[:, axis]).max()) for axis, edge in enumerate(after.grid.edges))
+    along, matrices = along_surface(facets, x, cell), []
     for degree in (new.degree, 1):
         if before is not None:
-            matrices.append(transfer(before, after, degree, facets))
+            matrices.append(transfer(before, after, degree, along))
             continue
         count = after.node_count(degree)
         entries = (np.ones(count), (np.arange(count), after.on_lattice(np.arange(count), degree)))

@@ -76,6 +76,7 @@ def test_first_steps(folder, tmp_path):
             "ring_added_mass",
             "fsi1",
             "flap",
+            "thin_flag",
             "cavity_flexible_bottom",
         )
     ],

@@ -13,7 +13,7 @@ from solvers.distributed import gather, scatter
 from solvers.fluid.cut import off_boundary
 from solvers.fluid.grid import uniform
 from solvers.fluid.patches import Patch
-from solvers.fluid.sheet_transfer import transfer
+from solvers.fluid.sheet_transfer import along_surface, transfer
 from solvers.fluid.sheets import find_sheets
 from solvers.fluid.thin_bodies import may_be_thin
 
@@ -111,11 +111,29 @@ def test_each_side_keeps_its_values(degree):
         nodes, side = sides(old, degree, first)
         values[nodes] = polynomial(old, degree, nodes, side)
         known = ~np.isnan(values)
-        matrix = transfer(old, new, degree, len(facets))
+        matrix = transfer(old, new, degree, along_surface(facets, second, H))
         nodes, side = sides(new, degree, second)
         assert not abs(matrix)[nodes][:, ~known].sum()
         found = (matrix @ np.where(known, values, 0.0))[nodes]
         assert np.abs(found - polynomial(new, degree, nodes, side)).max() < 1e-10, draw
+
+
+def test_tip_that_goes_to_another_cell():
+    """Nodes two cells from the plate keep their values, whichever of the facets near its end they see."""
+    grid = uniform([0, 0], [2, 1], [20, 10])
+    corners, facets = block([0.2, -0.015], [0.83, 0.015])
+    part = np.linspace(0.0, 1.0, 40, endpoint=False)[:, None]
+    plate = np.concatenate([a + part * (b - a) for a, b in corners[facets]])
+    facets = np.stack([np.arange(len(plate)), np.roll(np.arange(len(plate)), -1)], axis=1)
+    points = np.stack(np.unravel_index(np.arange(21 * 11), (21, 11), order="F"), axis=1) * H
+    for draw in range(20):
+        rng = np.random.default_rng(draw)
+        first = turned(plate, rng.uniform(-0.2, 0.2)) + np.array([0.0, 0.52])
+        second = first + rng.uniform(-0.05, 0.05, 2)
+        old, new = (sheets_at(grid, facets, x) for x in (first, second))
+        matrix = transfer(old, new, 1, along_surface(facets, second, H)).tocsr()
+        far = np.flatnonzero(np.linalg.norm(points[:, None] - first, axis=2).min(axis=1) > 2.0 * H)
+        assert np.array_equal(matrix[far].indices, far), draw
 
 
 @pytest.mark.parametrize(("size", "thin"), [((3.0, 50.0), True), ((3.2, 50.0), False), ((8.0, 8.0), False)])
