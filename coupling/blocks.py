@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from petsc4py import PETSc
 
 from coupling.ports import Solid
+from solvers.gauss_seidel import TwoFields, matrix_of
 from solvers.rows import Numbering, RowTransformation, TakenRows, transform_rows
 
 
@@ -43,11 +44,14 @@ class Blocks:
         beside = [self.solid, self.into_solid]
         self.solid, self.into_solid = part.impose_rows(beside, x.array[:own], b.array[:own])
 
-    def nested(self) -> PETSc.Mat:
-        """The matrix as a nested matrix of the blocks."""
-        blocks = [[self.solid, self.into_solid], [self.into_flow, self.flow]]
-        return PETSc.Mat().createNest(blocks, comm=self.flow.comm)
+    def product(self, numbering: Numbering) -> PETSc.Mat:
+        """The matrix as its product with vectors."""
+        blocks = (self.solid, self.into_solid), (self.into_flow, self.flow)
+        return matrix_of(TwoFields(blocks, numbering.first, numbering.second))
 
     def assembled(self) -> PETSc.Mat:
         """The matrix as one sparse matrix."""
-        return self.nested().convert(PETSc.Mat.Type.AIJ, PETSc.Mat())
+        nested = PETSc.Mat().createNest(
+            [[self.solid, self.into_solid], [self.into_flow, self.flow]], comm=self.flow.comm
+        )
+        return nested.convert(PETSc.Mat.Type.AIJ, PETSc.Mat())

@@ -135,24 +135,24 @@ class Monolithic:
         sequence = self.coupled.flow.sequence
         while sequence.current != "direct":
             try:
-                matrix = blocks.nested()
+                matrix = blocks.product(self._numbering)
                 iterations = self._krylov.solve_again(matrix, b, x)
                 if iterations is None:
-                    iterations = self._krylov.solve(self._krylov_solver(matrix, blocks), matrix, b, x)
+                    iterations = self._krylov.solve(self._krylov_solver(blocks), matrix, b, x)
                 self._linear_iterations += iterations
                 return
             except linear.LinearSolveFailed as failure:
                 sequence.advance(failure)
         self._direct.solve(blocks.assembled(), b, x)
 
-    def _krylov_solver(self, matrix: PETSc.Mat, blocks: Blocks) -> PETSc.KSP:
-        flow, parts = self.coupled.flow, (self._numbering.first, self._numbering.second)
-        method, tolerance = flow.sequence.current, flow.linear_tolerance
-        krylov = linear.coupled_solver(self.comm, *parts, tolerance=tolerance, fill=method == "fill")
+    def _krylov_solver(self, blocks: Blocks) -> PETSc.KSP:
+        flow = self.coupled.flow
+        method = flow.sequence.current
+        krylov = linear.coupled_solver(self.comm, tolerance=flow.linear_tolerance, fill=method == "fill")
         if method == "multigrid":
-            krylov.setOperators(matrix)
-            krylov.getPC().setUp()
-            flow.set_up_multigrid(krylov.getPC().getFieldSplitSubKSP()[1].getPC(), blocks.flow)
+            preconditioner = krylov.getPC().getPythonContext().second
+            preconditioner.setOperators(blocks.flow)
+            flow.set_up_multigrid(preconditioner, blocks.flow)
         return krylov
 
     def blocks(self) -> Blocks:

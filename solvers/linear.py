@@ -9,6 +9,7 @@ from typing import Any, Literal, TypeAlias
 from petsc4py import PETSc
 
 from solvers import unlocked
+from solvers.gauss_seidel import GaussSeidel
 
 Method = Literal["auto", "direct", "iterative", "ilu"]
 
@@ -140,8 +141,6 @@ def choose_flow(
         return ("direct",)
     if nested and degree > 1:
         return ("ilu", "direct")
-    if nested and processes > 1:  # a solve by multigrid did not end on two processes; the cause is not known
-        return ("ilu", "fill", "direct")
     if nested and steady and method == "auto":
         return ("ilu", "multigrid", "direct")
     limit = (FLOW_WITH_SOLIDS_LIMIT if with_solids or processes > 1 else FLOW_INCOMPLETE_LIMIT)[degree]
@@ -157,19 +156,25 @@ FLOW_DIRECT_LIMIT = {2: 400_000, 3: 4_000}
 #: step: `channel` takes 7 % less at 20,000 and 22 % less at 62,000; q2q1 with incomplete factors takes 1.4 s instead of
 #: 2.8 s at 15,000, but 9.4 s instead of 5.6 s at 49,000.
 FLOW_INCOMPLETE_LIMIT = {1: 20_000, 2: 25_000}
-#: The same with solids, and on several processes (not measured). `torus_wall` (14,200) takes 17 us per unknown and
-#: Newton step with incomplete factors, 22 with multigrid.
+#: The same with solids, and on several processes (not measured). `torus_wall` (14,200) takes 15 us per unknown and
+#: Newton step with incomplete factors, 18 with multigrid.
 FLOW_WITH_SOLIDS_LIMIT = {1: 100_000, 2: 25_000}
 
 
-def flow_solver(comm, *, tolerance: float, fill: bool = False) -> PETSc.KSP:
-    """GMRES with incomplete factors on overlapping subdomains.
+#: Options of incomplete factors: of dense blocks, and with more fill and overlap.
+BLOCKS: dict[str, str | float] = {"sub_pc_type": "python", "sub_pc_python_type": "solvers.incomplete.Incomplete"}
+FILL: dict[str, str | float] = {"pc_asm_overlap": 2, "sub_pc_factor_levels": 1}
 
-    fill: more fill and overlap, for systems on which GMRES stalls otherwise.
+
+def flow_solver(comm, *, tolerance: float, fill: bool = False) -> PETSc.KSP:
+    """FGMRES with incomplete factors on overlapping subdomains.
+
+    fill: more fill and overlap, for systems on which FGMRES stalls otherwise.
     """
-    if fill:
-        return _schwarz_solver(comm, "flow_fill_", tolerance, pc_asm_overlap=2, sub_pc_factor_levels=1)
-    return _schwarz_solver(comm, "flow_", tolerance)
+    ksp = _schwarz_solver(comm, "flow_fill_" if fill else "flow_", tolerance, **(FILL if fill else BLOCKS))
+    # keeps the preconditioned vectors: factors in single precision round each product with them otherwise
+    ksp.setType(PETSc.KSP.Type.FGMRES)
+    return ksp
 
 
 def flexible_solver(comm, *, tolerance: float) -> PETSc.KSP:
@@ -217,32 +222,24 @@ def _incomplete_factors(comm, **more: str | float) -> dict[str, str | float]:
     return {name.removeprefix("sub_"): value for name, value in given.items() if name.startswith("sub_")}
 
 
-def coupled_solver(comm, structure, flow, *, tolerance: float, fill: bool = False) -> PETSc.KSP:
-    """FGMRES for structure and flow together; structure, flow: index sets of their rows.
+def coupled_solver(comm, *, tolerance: float, fill: bool = False) -> PETSc.KSP:
+    """FGMRES for structure and flow together, a matrix of `TwoFields`, with block Gauss-Seidel as preconditioner.
 
-    Preconditioner: block Gauss-Seidel with LU for the structure, then incomplete factors on overlapping subdomains for
-    the flow (fill: more fill and overlap), unless the caller replaces the preconditioner of the flow.
-    Source: Gee, Kuttler, Wall, Int. J. Numer. Meth. Engng 85 (2011) 987-1016.
+    That of the flow are incomplete factors on overlapping subdomains (fill: more fill and overlap), unless the caller
+    sets it up otherwise.
     """
-    more = {"pc_asm_overlap": 2, "sub_pc_factor_levels": 1} if fill else {}
-    options = PETSc.Options("coupled_")
-    for name, value in {
-        "pc_fieldsplit_type": "multiplicative",
-        "fieldsplit_structure_ksp_type": "preonly",
-        "fieldsplit_structure_pc_type": "lu",
-        "fieldsplit_structure_pc_factor_mat_solver_type": "mumps",
-        "fieldsplit_flow_ksp_type": "preonly",
-        **{f"fieldsplit_flow_{name}": value for name, value in _incomplete_factors(comm, **more).items()},
-    }.items():
+    options = PETSc.Options("coupled_flow_")
+    for name, value in _incomplete_factors(comm, **(FILL if fill else BLOCKS)).items():
         options[name] = value
+    flow = PETSc.PC().create(comm)
+    flow.setOptionsPrefix("coupled_flow_")
+    flow.setFromOptions()
     ksp = PETSc.KSP().create(comm)
-    ksp.setOptionsPrefix("coupled_")
     ksp.setType(PETSc.KSP.Type.FGMRES)
     ksp.setGMRESRestart(150)
     ksp.setTolerances(rtol=tolerance, max_it=600)
-    ksp.getPC().setType(PETSc.PC.Type.FIELDSPLIT)
-    ksp.getPC().setFieldSplitIS(("structure", structure), ("flow", flow))
-    ksp.setFromOptions()
+    ksp.getPC().setType(PETSc.PC.Type.PYTHON)
+    ksp.getPC().setPythonContext(GaussSeidel(flow))
     return ksp
 
 
@@ -258,11 +255,8 @@ def factored_solver(comm, *, iterations: int) -> PETSc.KSP:
 
 
 def keep_preconditioner(ksp: PETSc.KSP) -> None:
-    """Let a solver keep its preconditioner, or those of its blocks, when the matrix changes."""
-    own = ksp.getPC()
-    split = own.getType() == PETSc.PC.Type.FIELDSPLIT
-    for preconditioner in [part.getPC() for part in own.getFieldSplitSubKSP()] if split else [own]:
-        preconditioner.setReusePreconditioner(True)
+    """Let a solver keep its preconditioner when the matrix changes."""
+    ksp.getPC().setReusePreconditioner(True)
 
 
 def solve(

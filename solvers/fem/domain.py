@@ -36,6 +36,7 @@ class Domain:
     nodes: int  #: nodes of the whole mesh
     surfaces: dict[str, NDArray[np.int32]] = field(default_factory=dict)  #: name -> local exterior facets, sorted
     source: Mesh | None = None  #: rank 0 only: the whole mesh
+    axis_aligned: bool = False  #: edges of cells lie along the axes; a form may then be compiled for such cells
 
     @property
     def comm(self) -> MPI.Comm:
@@ -46,8 +47,8 @@ class Domain:
         return self.mesh.geometry.dim
 
 
-def distribute(comm: MPI.Comm, mesh: Mesh | None) -> Domain:
-    """Distribute a mesh that rank 0 holds (other ranks pass None)."""
+def distribute(comm: MPI.Comm, mesh: Mesh | None, *, axis_aligned: bool = False) -> Domain:
+    """Distribute a mesh that rank 0 holds (other ranks pass None); axis_aligned: edges of its cells are."""
     header = comm.bcast(None if mesh is None else (mesh.cell_type, mesh.points.shape, mesh.surfaces), root=0)
     cell_type, (nodes, dim), named = header
     record = CELL_TYPES[cell_type]
@@ -57,7 +58,7 @@ def distribute(comm: MPI.Comm, mesh: Mesh | None) -> Domain:
     else:
         cells, points = np.empty((0, len(vtk)), dtype=np.int64), np.empty((0, dim))
     distributed = calls.create_mesh(comm, cells, points, record.shape.name, record.degree)
-    domain = Domain(distributed, cell_type, record.degree, nodes, source=mesh)
+    domain = Domain(distributed, cell_type, record.degree, nodes, source=mesh, axis_aligned=axis_aligned)
     return Domain(**{**vars(domain), "surfaces": _find_surfaces(domain, named)})
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array
+from solvers.fem.axis_aligned import axis_aligned
 from solvers.fem.calls import calls
 from solvers.fem.compiling import compiling
 from solvers.fem.domain import Domain
@@ -23,6 +24,9 @@ from solvers.fem.domain import Domain
 COMPILE_OPTIONS = {
     "cffi_extra_compile_args": ["-O3", "-march=native", "-fassociative-math", "-fno-signed-zeros", "-fno-trapping-math"]
 }
+
+#: They differ by a name that the compiler ignores, and the cache does not.
+AXIS_ALIGNED_OPTIONS = {key: [*given, "-DAXIS_ALIGNED"] for key, given in COMPILE_OPTIONS.items()}
 
 
 def compile_form(form: ufl.Form, what: str = "a form") -> Any:
@@ -55,7 +59,11 @@ class Integral:
         """Compile it if it is not yet (collective); `what` it is, for messages."""
         if self.compiled is None:
             with compiling(what):
-                self.compiled = calls.Compiled(self._domain.mesh, self._form, COMPILE_OPTIONS)
+                if self._domain.axis_aligned:
+                    with axis_aligned():
+                        self.compiled = calls.Compiled(self._domain.mesh, self._form, AXIS_ALIGNED_OPTIONS)
+                else:
+                    self.compiled = calls.Compiled(self._domain.mesh, self._form, COMPILE_OPTIONS)
 
     def on(self, **entities: NDArray[np.int32]) -> Any:
         """The form over sorted local entities; measures must carry the subdomain number 1."""

@@ -29,7 +29,7 @@ class DistributedGrid:
         self.comm, self.grid, self.sheets = comm, grid, sheets
         self.nested = grid if isinstance(grid, Nested) else None
         mesh = (grid if sheets is None else sheets).mesh() if comm.rank == 0 else None
-        self.domain = fem.distribute(comm, mesh)
+        self.domain = fem.distribute(comm, mesh, axis_aligned=True)
         #: number of each local cell in the mesh, ghosts last
         self.original: Indices = fem.input_cells(self.domain)
         #: number in the box of each local cell; of a coarser cell that of its lowest one. Only with `sheets` several

@@ -21,7 +21,7 @@ from solvers.fluid.coarse_matrix import CoarseMatrix
 from solvers.fluid.decoupled import decoupled
 from solvers.fluid.level_grid import LevelGrid
 from solvers.fluid.space import Unknowns
-from solvers.linear import ZERO_PIVOT
+from solvers.linear import BLOCKS, ZERO_PIVOT
 
 Indices = NDArray[np.int64]
 
@@ -171,18 +171,23 @@ class Multigrid:
     def _smooth(self, smoother: PETSc.KSP, matrix: PETSc.Mat, level: Level) -> None:
         """Smoother: incomplete factors on each process with one layer of overlap, which halves the time."""
         prefix = "flow_second_" if self._second else "flow_first_"
-        PETSc.Options(prefix)["sub_pc_type"] = "ilu"
-        PETSc.Options(prefix)["sub_pc_factor_zeropivot"] = ZERO_PIVOT
         smoother.setOptionsPrefix(prefix)
         if self._second:
             # a single step diverges on stretched cells; without reordering there are 20 iterations instead of 13
-            PETSc.Options(prefix)["sub_pc_factor_mat_ordering_type"] = "rcm"
+            options: dict[str, str | float] = {
+                "sub_pc_type": "ilu",
+                "sub_pc_factor_mat_ordering_type": "rcm",
+                "sub_pc_factor_zeropivot": ZERO_PIVOT,
+            }
             smoother.setType(PETSc.KSP.Type.GMRES)
             smoother.setTolerances(max_it=2)
             smoother.setOperators(matrix, decoupled(matrix, level.component_of()))
         else:
+            options = dict(BLOCKS)
             smoother.setType(PETSc.KSP.Type.RICHARDSON)
             smoother.setTolerances(max_it=1)
+        for name, value in options.items():
+            PETSc.Options(prefix)[name] = value
         smoother.getPC().setType(PETSc.PC.Type.ASM if self.comm.size > 1 else PETSc.PC.Type.BJACOBI)
         smoother.getPC().setFromOptions()
 

@@ -1,6 +1,7 @@
 """Compiled kernels: numpy arrays in, numpy arrays out."""
 
 from ._kernels import (
+    BlockFactors,
     KdopTree2,
     KdopTree3,
     Moments,

@@ -136,6 +136,37 @@ def test_coefficients_that_derivatives_do_not_have(square):
     assert sums.sum() == pytest.approx(2.0 * (5.0 + 2.0 * 7.0 * 3.0))
 
 
+@pytest.mark.parametrize(("shape", "element"), [("rectangle", "quad"), ("box", "hex")])
+def test_forms_over_cells_along_the_axes(shape, element):
+    """Compiled for diagonal Jacobians they have the same values, in cells and across facets; for others they do not."""
+    dim = 2 if shape == "rectangle" else 3
+    make = getattr(shapes, shape)
+    plain, sheared = (make(size=(2.0, 0.3, 5.0)[:dim], cells=(2, 3, 2)[:dim], cell=element) for _ in range(2))
+    sheared.points[:, 0] += 0.2 * sheared.points[:, 1]
+
+    def entries(mesh, *, axis_aligned):
+        domain = fem.distribute(MPI.COMM_SELF, mesh, axis_aligned=axis_aligned)
+        space = fem.vector_space(domain)
+        f = fem.function(space)
+        f.x.array[:] = np.random.default_rng(5).standard_normal(len(f.x.array))
+        u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+        n = ufl.FacetNormal(domain.mesh)
+        dx, dS = (fem.measure(domain, kind, 3) for kind in ("dx", "dS"))
+        across = ufl.dot(ufl.avg(ufl.grad(u)) * n("+"), ufl.jump(v)) * dS
+        form = ufl.inner(ufl.grad(u) * f, ufl.grad(v) * f + v) * dx + ufl.div(u) * ufl.div(v) * dx + across
+        every = np.arange(fem.owned_cells(domain), dtype=np.int32)
+        integral = fem.Integral(domain, form).on(cell=every, interior_facet=fem.interior_facets(domain)[0])
+        matrix = fem.create_matrix(integral)
+        fem.assemble_matrix(matrix, integral)
+        matrix.assemble()
+        return matrix.getValuesCSR()[2]
+
+    expected = entries(plain, axis_aligned=False)
+    assert np.abs(entries(plain, axis_aligned=True) - expected).max() < 1e-13 * np.abs(expected).max()
+    expected = entries(sheared, axis_aligned=False)
+    assert np.abs(entries(sheared, axis_aligned=True) - expected).max() > 1e-3 * np.abs(expected).max()
+
+
 def test_weights_at_quadrature_points(square):
     """A coefficient at the points of a rule turns an integral into a weighted sum of the points."""
     weight = fem.function(fem.quadrature_space(square, 4))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
-from programs import fsci
+from programs import fsci, on_processes
 from structure_setup import constant, load_step, make_structure, vector
 
 from fsci import shapes
@@ -12,6 +12,7 @@ from fsci.case import load_case
 from fsci.run.history import read_history
 from fsci.run.run import FINISHED, run_case
 from solvers import linear
+from solvers.gauss_seidel import TwoFields, matrix_of
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body, Pressure, Support, Traction
@@ -247,3 +248,61 @@ def test_resume_is_bitwise(tmp_path):
     one, two = (read_history(folder / "history.csv") for folder in (straight, broken))
     for column in one.keys() - {"wall"}:
         assert np.array_equal(one[column], two[column]), column
+
+
+def two_fields():
+    """(context of a matrix with blocks of 5 and 8 rows, the same as an array)."""
+    rng = np.random.default_rng(4)
+    whole = rng.standard_normal((13, 13)) + 8.0 * np.eye(13)
+    parts = np.split(np.arange(13), [5])
+    blocks = tuple(tuple(dense(whole[np.ix_(rows, columns)]) for columns in parts) for rows in parts)
+    first, second = (PETSc.IS().createStride(len(part), part[0], 1, comm=PETSc.COMM_SELF) for part in parts)
+    return TwoFields(blocks, first, second), whole
+
+
+def dense(values):
+    rows, columns = values.shape
+    indices = np.tile(np.arange(columns, dtype=np.int32), rows)
+    start = np.arange(0, rows * columns + 1, columns, dtype=np.int32)
+    return PETSc.Mat().createAIJ(values.shape, csr=(start, indices, values.ravel()), comm=PETSc.COMM_SELF)
+
+
+def test_system_of_two_fields():
+    """Products and solutions are those of the whole matrix; one step of Gauss-Seidel is that of its definition."""
+    fields, whole = two_fields()
+    matrix = matrix_of(fields)
+    b, x = matrix.createVecs()
+    b.array[:] = np.arange(13.0)
+    assert np.abs((matrix * b).array - whole @ b.array).max() < 1e-13 * np.abs(whole @ b.array).max()
+    ksp = linear.coupled_solver(PETSc.COMM_SELF, tolerance=1e-12)
+    linear.solve(ksp, matrix, b, x)
+    assert np.abs(whole @ x.array - b.array).max() < 1e-10
+    ksp.getPC().apply(b, x)  # the factors without fill of a full matrix are complete
+    y1 = np.linalg.solve(whole[:5, :5], b.array[:5])
+    y2 = np.linalg.solve(whole[5:, 5:], b.array[5:] - whole[5:, :5] @ y1)
+    assert np.abs(x.array - np.concatenate([y1, y2])).max() < 1e-12
+
+
+def test_singular_first_field_stops_the_solver():
+    fields, _ = two_fields()
+    fields.blocks[0][0].zeroEntries()
+    matrix = matrix_of(fields)
+    b, x = matrix.createVecs()
+    b.set(1.0)
+    with pytest.raises(linear.LinearSolveFailed):
+        linear.solve(linear.coupled_solver(PETSc.COMM_SELF, tolerance=1e-12), matrix, b, x)
+
+
+def test_functions_in_python_end_before_python():
+    """Programs that keep such a matrix to their end leave no message, on two processes too."""
+    program = (
+        "from mpi4py import MPI\nfrom petsc4py import PETSc\nfrom solvers import linear\n"
+        "A = PETSc.Mat().createBAIJ((8, 8), 4, nnz=1, comm=MPI.COMM_WORLD)\nfor i in range(*A.getOwnershipRange()):\n"
+        "    A.setValue(i, i, 2.0)\nA.assemble()\n"
+        "ksp = linear.flow_solver(MPI.COMM_WORLD, tolerance=1e-8)\nb, x = A.createVecs()\nb.set(1.0)\n"
+        "linear.solve(ksp, A, b, x)\nassert abs(x.array - 0.5).max() < 1e-6\nMPI.kept = ksp\n"
+    )
+    for processes in (1, 2):
+        done = on_processes(processes, "-c", program)
+        assert "rror" not in done.stdout + done.stderr
+        assert "leaked" not in done.stdout + done.stderr
