@@ -1,15 +1,17 @@
 """Every case in cases/: the first steps on 1 and 2 processes, and whole runs of those with published numbers."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from programs import fsci
+from programs import fsci, on_processes
 
 from fsci.case import load_case
 from fsci.case.verify import FIELD_COLUMNS
 from fsci.run.history import read_history
 
+RUN_CASES = Path(__file__).parents[1] / "setups" / "run_cases.py"
 CASES = sorted(path.parent for path in Path("cases").glob("*/case.yaml"))
 LONG = ("torus_wall_fine",)
 #: what makes the first steps quick without changing what they are about
@@ -36,33 +38,52 @@ SMALLER = {
 SMALLER["falling_rigid_sphere"] = SMALLER["falling_sphere"]
 
 
+#: cases that share the processes they run on, whose start takes longer than three steps of most cases
+BATCH = 4
+QUICK = [f for f in CASES if f.name not in LONG]
+BATCHES = [[f] for f in CASES if f.name in LONG]
+BATCHES += [QUICK[i : i + BATCH] for i in range(0, len(QUICK), BATCH)]
+
+
 @pytest.mark.parametrize(
-    "folder",
-    [pytest.param(f, id=f.name, marks=[pytest.mark.slow] if f.name in LONG else []) for f in CASES],
+    "folders",
+    [
+        pytest.param(some, id="-".join(f.name for f in some), marks=[pytest.mark.slow] * (some[0].name in LONG))
+        for some in BATCHES
+    ],
 )
-def test_first_steps(folder, tmp_path):
+def test_first_steps(folders, tmp_path):
     """Three steps; probes, forces and balances of 1 and 2 processes agree."""
+    for processes in (1, 2):
+        commands = tmp_path / f"{processes}.json"
+        commands.write_text(json.dumps([first_steps(folder, tmp_path / str(processes)) for folder in folders]))
+        on_processes(processes, RUN_CASES, commands, timeout=600)
+    for folder in folders:
+        assert_same(folder, *(read_history(tmp_path / str(n) / folder.name / "history.csv") for n in (1, 2)))
+
+
+def first_steps(folder, out):
+    """Arguments of `fsci` for three steps."""
     time = load_case(folder / "case.yaml").time
     end = min(time.end, time.start + 3 * time.step)
     # iterative solvers are as exact as they can be, so that what they leave over does not tell processes apart
-    short = ["--set", f"time.end={end!r}", "--set", "verify=[]", "--set", "solver.linear.tolerance=1e-12"]
-    short += [word for change in SMALLER.get(folder.name, []) for word in ("--set", change)]
-    histories = []
-    for processes in (1, 2):
-        out = tmp_path / str(processes)
-        run = fsci("run", folder, "-o", out, *short, processes=processes, timeout=600)
-        assert run.returncode == 0, run.stdout + run.stderr
-        histories.append(read_history(out / "history.csv"))
-    one, two = ({name: np.nan_to_num(values) for name, values in history.items()} for history in histories)
-    assert all(np.array_equal(np.isnan(histories[0][name]), np.isnan(histories[1][name])) for name in one)
-    assert len(one["step"]) == min(3, round((time.end - time.start) / time.step))
+    settings = [f"time.end={end!r}", "verify=[]", "solver.linear.tolerance=1e-12", *SMALLER.get(folder.name, [])]
+    return ["run", str(folder), "-o", str(out / folder.name), *(w for setting in settings for w in ("--set", setting))]
+
+
+def assert_same(folder, first, second):
+    """Histories of 1 and 2 processes agree."""
+    one, two = ({name: np.nan_to_num(values) for name, values in history.items()} for history in (first, second))
+    assert all(np.array_equal(np.isnan(first[name]), np.isnan(second[name])) for name in one), folder.name
+    time = load_case(folder / "case.yaml").time
+    assert len(one["step"]) == min(3, round((time.end - time.start) / time.step)), folder.name
     sizes = {name: np.abs(values).max() for name, values in one.items()}
     counts = {"iterations", "coupling.linear", "coupling.newton"}
     errors = {"residual", "interface.force", "interface.momentum", "fluid.loss", *FIELD_COLUMNS.values()}
     for name in one.keys() - {"wall", *counts, *errors}:
         # components of one vector are measured against the largest of them
         size = max(s for other, s in sizes.items() if other.partition(".")[0] == name.partition(".")[0])
-        assert np.abs(one[name] - two[name]).max() <= 1e-8 * size + 1e-12, name
+        assert np.abs(one[name] - two[name]).max() <= 1e-8 * size + 1e-12, (folder.name, name)
 
 
 @pytest.mark.parametrize(

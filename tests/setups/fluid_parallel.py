@@ -76,4 +76,5 @@ def main(dim, element, box, out):
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), sys.argv[2], sys.argv[3], Path(sys.argv[4]))
+    for box in sys.argv[4:]:
+        main(int(sys.argv[1]), sys.argv[2], box, Path(sys.argv[3]) / f"{box}.npz")

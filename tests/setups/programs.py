@@ -37,8 +37,9 @@ def fsci(*arguments, processes: int = 1, timeout: float = 120.0) -> subprocess.C
 
 def on_processes(processes: int, *program, timeout: float = 200.0) -> subprocess.CompletedProcess[str]:
     """Run a Python program of the tests by mpirun; an exception in one process ends all, instead of a wait."""
-    command = ["mpirun", "-n", str(processes), sys.executable, "-m", "mpi4py", *map(str, program)]
-    environment = {**PARALLEL, "PYTHONPATH": str(Path(__file__).parent)}
+    launcher = ["mpirun", "-n", str(processes)] if processes > 1 else []
+    command = [*launcher, sys.executable, "-m", "mpi4py", *map(str, program)]
+    environment = {**(PARALLEL if processes > 1 else ENVIRONMENT), "PYTHONPATH": str(Path(__file__).parent)}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=timeout)
     assert done.returncode == 0, done.stdout + done.stderr
     return done
