@@ -5,7 +5,8 @@
 
 C, S and M are those of solvers.fluid.interface, with g = alpha d - ...
 The shape derivatives of solvers.fluid.shape are added to alpha C and M. In steady flows, where alpha = 0, they are the
-whole dependence of the flow on du. In unsteady flows they halve the number of Newton iterations.
+whole dependence of the flow on du, and coupling.secant corrects what they lack. In unsteady flows they halve the number
+of Newton iterations.
 Source: Schott, Ager, Wall, Int. J. Numer. Meth. Engng 119 (2019) 757-796.
 """
 
@@ -20,13 +21,14 @@ from coupling.blocks import Blocks
 from coupling.coupled import Coupled
 from coupling.divided import lengths, step_in_parts
 from coupling.ports import Part
+from coupling.secant import Secant
 from coupling.start import start_together
 from solvers import linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.lagged import Lagged, LaggedFactors
 from solvers.newton import Tolerance, converge
 from solvers.rounding import rounding_error
-from solvers.rows import Numbering, distributed, from_entries
+from solvers.rows import Numbering, distributed, from_entries, gather
 from solvers.sparse import Sparse
 
 
@@ -40,6 +42,7 @@ class Monolithic:
         flow = coupled.flow
         self.comm = coupled.solid.comm
         self._number_unknowns()
+        self._secant = Secant()
         self._farther: Part = flow
         self._linear_iterations = 0  #: of this step
         #: rounding errors of the residuals of solid and flow [N]; None before this step linearises
@@ -68,6 +71,7 @@ class Monolithic:
         self._noise = self._prepared = None
         self._krylov.begin_step()
         self._direct.begin_step()
+        self._secant.forget()
 
     def _solve_unpredicted(self) -> None:
         self._begin_system()
@@ -129,7 +133,16 @@ class Monolithic:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         if taken is not None:
             solid.recover(taken, self._numbering.gather(self.comm, x.array))
-        return max(solid.update(x.array[:own]), flow.update(x.array[own:]))
+        increment = self._corrected(x.array) if taken is None else x.array
+        return max(solid.update(increment[:own]), flow.update(increment[own:]))
+
+    def _corrected(self, increment: Array) -> Array:
+        """The increment of both parts, corrected by a secant once the stabilisation of a steady flow stays as it is."""
+        solid, flow = self.coupled.solid, self.coupled.flow
+        if not flow.steady or flow.steady_iteration.scales_follow:
+            return increment
+        moved = solid.jacobian() @ gather(self.comm, increment[: solid.size])
+        return self._secant.corrected(increment, moved)
 
     def _solve(self, blocks: Blocks, b: PETSc.Vec, x: PETSc.Vec) -> None:
         sequence = self.coupled.flow.sequence

@@ -20,6 +20,7 @@ from solvers.api import Array, Stateful, StepInfo
 from solvers.fluid.coupling_entries import InterfaceEntries
 from solvers.fluid.history import History
 from solvers.fluid.krylov import SolverSequence
+from solvers.fluid.steady_iteration import SteadyIteration
 from solvers.fluid.surface import Motion
 from solvers.fluid.time_scheme import FlowStep, FlowTimeScheme
 from solvers.newton import System
@@ -174,6 +175,7 @@ class Flow(Part, Protocol):
 
     history: History  #: velocities and lengths of earlier steps
     current: FlowStep  #: the present step, with its difference formula
+    steady_iteration: SteadyIteration  #: how far the iteration to a steady flow is
 
     def predict(self) -> None:
         """Set the predictor for the end of the step."""

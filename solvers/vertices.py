@@ -22,6 +22,10 @@ class VertexJacobian:
     columns: NDArray[np.int64]  #: global unknowns, shape (vertices * dim, k)
     values: Array  #: derivatives, shape (vertices * dim, k)
 
+    def __matmul__(self, unknowns: Array) -> Array:
+        """Displacements of the vertices, (vertices * dim,), by a change of the unknowns of all processes."""
+        return (self.values * unknowns[self.columns]).sum(axis=1)
+
     def transposed(self, unknowns: int) -> Sparse:
         """B^T; unknowns: their count on all processes."""
         n, k = self.columns.shape

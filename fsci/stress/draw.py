@@ -75,11 +75,12 @@ class Draw:
         }
 
 
-def draw(seed: int) -> Draw:
-    """The draw of a number, which does not depend on earlier draws."""
+def draw(seed: int, by: float = 0.0) -> Draw:
+    """The draw of a number, which does not depend on earlier draws; by [m]: shift of the body against the grid."""
     chance = random.Random(seed)
     kinds = FURTHER_SCENES if seed >= FURTHER else SPACE_SCENES if seed >= SPACE else SCENES
     scene = kinds[chance.choice(sorted(kinds))](chance)
+    scene.move_against_grid(by)
     twin = chance.choice(TWINS)
     frame, processes, kill_after, delay = Frame(), 1, 0, 0.0
     if twin == "rotated":

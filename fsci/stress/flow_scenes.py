@@ -35,9 +35,9 @@ def flow(frame: Frame, p: dict[str, Any], *, speed: float, inlet: float) -> Case
     }
 
 
-def common(chance: random.Random) -> dict[str, Any]:
-    """Parameters of all flows; `dt` in times that the flow takes for a cell."""
-    step = spread(chance, 0.01, 100)
+def common(chance: random.Random, longest: float = 100.0) -> dict[str, Any]:
+    """Parameters of all flows; steps from 0.01 to `longest` times that in which the flow passes a cell."""
+    step = spread(chance, 0.01, longest)
     return {
         "Re": spread(chance, 0.01, 2000),
         "density": spread(chance, 1e-3, 1e3),

@@ -15,7 +15,7 @@ LONG = ((20, 10), (40, 5), (80, 2))
 
 def free(chance: random.Random) -> StressScene:
     """A free rigid body in a flow, lighter or heavier than it, held in part or not at all, with slip, on long cells."""
-    p = common(chance) | {
+    p = common(chance, longest=10.0) | {
         "body density": spread(chance, 1e-3, 1e3),
         "slip": chance.choice([0.0, 0.0, 1e-3, 0.1, 10.0]),
         "held": chance.choice([[], [], ["rotation"], ["x"]]),
@@ -55,14 +55,16 @@ def free(chance: random.Random) -> StressScene:
 
 
 def nested(chance: random.Random) -> StressScene:
-    """A rigid body moved through nested cells, not always far enough from coarse ones."""
+    """A rigid body moved through nested cells: far from coarse ones, or near to them where a box has fine ones."""
     p = common(chance) | {
         "level": chance.choice([1, 1, 2]),
-        "layers": chance.choice([1, 4]),
+        "layers": 4,
         "slant": chance.choice([0.0, 1e-6, 30.0, 45.0]),
         "cells per step": chance.choice([0.0, 0.3, 1.0]),
-        "box": chance.choice([True, True, False]),
     }
+    p["box"] = p["cells per step"] > 0.0 or chance.choice([True, False])
+    if p["box"]:
+        p["layers"] = chance.choice([1, 4])
     steps, size = 5, (0.45, 0.37)
     speed = p["cells per step"] / CELLS / 2 ** p["level"] / p["dt"]
 

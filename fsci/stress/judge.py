@@ -19,10 +19,15 @@ Verdict = Literal["right", "edge", "refused", "wrong"]
 AGREEMENT = 1e-6
 #: Error of a balance by the tolerance of the solver, relative to the largest flow or force.
 BALANCE = 1e-6
+#: Rounding error of the volume [m^3/s] that flows in a scene at rest, where it would be of the order of 1 if it moved.
+AT_REST = 1e-13
 #: Difference of twins at an edge: the effect of another cut on these coarse grids.
 NEAR = 0.05
-#: Shifts [m] that change nothing but rounding: twins that differ although these agree are wrong.
+#: Shifts [m] of the whole scene that change nothing but rounding: twins that differ although these agree are wrong.
 ROUNDING = ((1.3e-9, 0.7e-9), (-1.1e-9, 2.3e-9), (1 / 3, 1 / 7), (-0.1, 0.7))
+
+#: Shifts [m] of a body against the grid by rounding, for surfaces in planes of the grid.
+AGAINST_GRID = (1e-12, -1e-12)
 
 
 def failure_of(run: Ended) -> str:
@@ -59,7 +64,7 @@ def _balances(draw: Draw, run: Ended) -> Iterator[tuple[str, float, float]]:
     history = run.history
     if "fluid.mass" in history:
         flow = max(_largest(history, "out"), _swept(draw))
-        yield "fluid.mass", _largest(history, "fluid.mass"), BALANCE * flow
+        yield "fluid.mass", _largest(history, "fluid.mass"), max(BALANCE * flow, AT_REST)
     if "interface.momentum" in history:
         flux = draw.scene.parameters.get("density", 0.0)  # of momentum, with unit velocity and width
         force = max(_largest(history, f"force.{i}") for i in "xyz") or flux  # no force: the body has left the box

@@ -14,6 +14,7 @@ from typing import Any
 from fsci.stress.draw import FURTHER_SCENES, SCENES, SPACE_SCENES, Draw, draw
 from fsci.stress.frame import Frame
 from fsci.stress.judge import (
+    AGAINST_GRID,
     AGREEMENT,
     NEAR,
     ROUNDING,
@@ -97,9 +98,10 @@ def _judge(one: Draw, folder: Path) -> tuple[Verdict, str]:
 
 def _rounding_decides(one: Draw, first: Ended, folder: Path) -> bool:
     """Whether the results jump when only rounding is different."""
-    for number, shift in enumerate(ROUNDING):
-        frame = Frame(shift=(*shift, shift[0] - shift[1]))
-        other = run(folder / f"rounding{number}", one.case(frame))
+    frames = [Frame(shift=(*shift, shift[0] - shift[1])) for shift in ROUNDING]
+    others = [(one, frame) for frame in frames] + [(draw(one.seed, by), Frame()) for by in AGAINST_GRID]
+    for number, (same, frame) in enumerate(others):
+        other = run(folder / f"rounding{number}", same.case(frame))
         if other.code == 0 and AGREEMENT < distance(one, first, other, frame)[0] <= NEAR:
             return True
     return False

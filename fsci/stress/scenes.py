@@ -28,6 +28,11 @@ class StressScene:
     dim: int = 2
     must_warn: tuple[str, ...] = field(default=())  #: texts that the output of a successful run must contain
 
+    def move_against_grid(self, by: float) -> None:
+        """Shift the body by [m] along every axis of the grid; nothing without a grid."""
+        offset = self.parameters.get("offset", [])
+        offset[:] = [start + by for start in offset]
+
 
 def spread(chance: random.Random, low: float, high: float) -> float:
     """A number with log-uniform distribution between two bounds, rounded to three digits."""

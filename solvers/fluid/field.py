@@ -80,7 +80,7 @@ class Fluid:
         self._wet, self._vertices = wetness(surfaces), vertex_ranges(surfaces)
         self._fast_bodies = FastBodies(grid)
         self.linear_iterations = 0  #: of the last linear system
-        self._steady_iteration = SteadyIteration()
+        self.steady_iteration = SteadyIteration()
 
     def discretise(self, sheets: Sheets | None) -> None:
         """Create grid, unknowns and equations, with separate cells for the fluid on each side of thin bodies."""
@@ -158,7 +158,7 @@ class Fluid:
         self.cutter.begin_step()
         self._begin_system(self.current)
         self.prescribe(self.current.t)
-        self._steady_iteration.begin()
+        self.steady_iteration.begin()
         self.rounding = self._tangent = None  # not part of the saved state: a resumed run must start alike
         self.linear_solver.begin_step()
         self.notes.clear()
@@ -199,7 +199,7 @@ class Fluid:
         with self.timer("cut"):
             facets, motion = together([body.surface for body in self.bodies], motions, self.dim)
             self._follow(self.thin.sheets(facets, motion), facets, motion)
-            if self.settings.steady and self._steady_iteration.scales_follow:
+            if self.settings.steady and self.steady_iteration.scales_follow:
                 # roots belong to the final position of the bodies, not to the initial one
                 self.cutter.begin_step()
                 self.system.forget_roots()
@@ -247,7 +247,7 @@ class Fluid:
 
     def solve(self) -> StepInfo:
         """Newton's method to the tolerance. Raises StepFailed."""
-        self._steady_iteration.begin()
+        self.steady_iteration.begin()
         info = converge(self, self.solver.newton)
         self.levels.keep(self.flow[: self.unknowns.owned])
         self.unknowns.share(self.system.flow)
@@ -281,13 +281,13 @@ class Fluid:
     def residual(self) -> float:
         """Norm [N] of the momentum rows and of the continuity rows times the impedance of a cell."""
         with self.timer("assembly"):
-            if self.settings.steady and self._steady_iteration.scales_follow:
+            if self.settings.steady and self.steady_iteration.scales_follow:
                 self.system.set_scales(self.velocity())
             self.residual_rows = self.system.residual()
         self.levels.spread_excess(self.residual_rows)
         self.residual_rows[self.held] = 0.0
         size = self._norm(self.residual_rows)
-        self._steady_iteration.record(size)
+        self.steady_iteration.record(size)
         return size
 
     def _norm(self, rows: Array) -> float:
@@ -311,7 +311,7 @@ class Fluid:
     def linearise(self) -> PETSc.Mat:
         """The tangent at the present iterate; held rows are those of the identity. The next call overwrites it."""
         with self.timer("assembly"):
-            picard = self.settings.steady and self.settings.convection and self._steady_iteration.far
+            picard = self.settings.steady and self.settings.convection and self.steady_iteration.far
             matrix = self.system.tangent(self.held, picard=picard)
         self._diagonal = np.abs(matrix.getDiagonal().array)
         # an entry is a sum over the 2^dim cells at a node, whose terms may cancel

@@ -173,8 +173,7 @@ class RigidBodies:
 
     def displacement(self) -> Array:
         """Displacements [m] of all vertices, shape (n, dim)."""
-        moved = zip(self.bodies, surface.positions(self.bodies, self.now), strict=True)
-        return np.concatenate([x - body.points for body, x in moved])
+        return surface.displacements(self.bodies, self.now)
 
     def jacobian(self) -> VertexJacobian:
         return surface.jacobian(self.bodies, self.now, self.components)

@@ -19,6 +19,19 @@ def positions(bodies: Sequence[RigidBody], instants: Sequence[RigidInstant]) -> 
     return [body.inertia.centre + (now.shift + body.arms(now.R, body.points))[:, : body.dim] for body, now in pairs]
 
 
+def displacements(bodies: Sequence[RigidBody], instants: Sequence[RigidInstant]) -> Array:
+    """Displacements [m] of all vertices since the start, shape (n, dim).
+
+    They are not differences of positions, whose rounding errors grow with the distance from the origin: a flow
+    divides displacements by the time step.
+    """
+    at_start = np.eye(3)
+    pairs = zip(bodies, instants, strict=True)
+    return np.concatenate(
+        [(now.shift + body.arms(now.R - at_start, body.points))[:, : body.dim] for body, now in pairs]
+    )
+
+
 def jacobian(
     bodies: Sequence[RigidBody], instants: Sequence[RigidInstant], components: NDArray[np.int64]
 ) -> VertexJacobian:

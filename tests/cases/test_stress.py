@@ -120,6 +120,20 @@ def test_draws_are_the_same_every_time():
         assert again.scene.parameters == one.scene.parameters
 
 
+def test_a_body_is_moved_against_the_grid():
+    one, other = draw(310), draw(310, 1e-12)
+    starts = [d.case(Frame())["fluid"]["bodies"]["body"]["mesh"]["translate"] for d in (one, other)]
+    assert np.subtract(*starts) == pytest.approx([-1e-12, -1e-12], rel=1e-3)
+    assert one.case(Frame())["fluid"]["grid"] == other.case(Frame())["fluid"]["grid"]
+    assert one.frame == other.frame
+
+
+@pytest.mark.slow
+def test_a_side_that_comes_to_lie_in_a_plane_of_the_grid_is_an_edge():
+    """A shift of body and grid leaves it in the plane; one of the body alone gives the difference of the twin."""
+    assert run.judge(310).verdict in ("edge", "right")
+
+
 SCENE = StressScene("beam", {}, lambda frame: {}, {"tip": {"quantity": "displacement"}}, must_warn=("lock",))
 DRAW = Draw(0, SCENE, "shifted", Frame())
 HISTORY = {"time": np.array([1.0, 2.0]), "wall": np.ones(2), "tip.x": np.array([1.0, 2.0]), "tip.y": np.zeros(2)}
@@ -149,6 +163,8 @@ def test_balances():
     assert out_of_balance(DRAW, changed("tip.x", [1.0, np.nan])) == "tip.x is not finite"
     leaking = replace(GOOD, history={**HISTORY, "fluid.mass": np.array([0.0, 1e-3]), "out": np.ones(2)})
     assert out_of_balance(DRAW, leaking) == "fluid.mass misses 0.001, more than 1e-06"
+    resting = replace(GOOD, history={**HISTORY, "fluid.mass": np.array([1e-15, 1e-14]), "out": np.full(2, 1e-16)})
+    assert out_of_balance(DRAW, resting) == ""
     pushing = {"interface.momentum": np.array([1.0, 0.0]), "force.x": np.ones(2), "force.y": np.ones(2)}
     found = out_of_balance(DRAW, replace(GOOD, history={**HISTORY, **pushing}))
     assert found == "interface.momentum misses 1, more than 1e-06"

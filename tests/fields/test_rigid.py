@@ -9,7 +9,7 @@ from solvers.api import StepFailed
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.march import march
 from solvers.newton import Tolerance
-from solvers.rigid import motion
+from solvers.rigid import motion, surface
 from solvers.rigid.body import PointSpring, RigidBody
 from solvers.rigid.contact import Obstacle, RigidContact, RigidPair, gaps
 from solvers.rigid.field import RigidBodies
@@ -52,6 +52,21 @@ def test_inertia_of_a_box_and_of_a_rectangle():
     assert flat.mass == pytest.approx(12.0, rel=1e-14)
     assert flat.centre == pytest.approx([4.0, 5.0], rel=1e-14)
     assert flat.tensor[2, 2] == pytest.approx(12.0 * 8.0 / 12.0, rel=1e-13)
+
+
+# ---------------------------------------------------------------------------------------------------------- surface
+
+
+def test_displacements_far_from_the_origin_have_no_larger_rounding_errors():
+    """They are divided by time steps: at a distance of 1e6 differences of positions would err by 1e-10."""
+    turned = motion.RigidInstant.at_rest()
+    turned.shift[:], turned.R[:] = (1e-9, 2e-9, 0.0), rotation(np.array([0.0, 0.0, 1e-9]))
+    near, far = (surface.displacements([square(at=at)], [turned]) for at in ((0.0, 0.0), (2.0**20, 2.0**20)))
+    exact = np.array([1e-9, 2e-9]) + 1e-9 * np.array([[0.5, -0.5], [0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5]])
+    assert near == pytest.approx(exact, abs=1e-17)
+    assert far == pytest.approx(exact, abs=1e-17)
+    moved = surface.positions([square()], [turned])[0] - square().points
+    assert near == pytest.approx(moved, abs=1e-15)
 
 
 # ------------------------------------------------------------------------------------------------------- rotations

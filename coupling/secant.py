@@ -1,0 +1,40 @@
+"""Secant correction of Newton increments whose tangent is not exact, for steady coupled flow.
+
+The tangent of the coupled system has the derivative by the shape of the fluid domain for a flow that fulfils its
+equations pointwise (`solvers.fluid.shape`). That of the discrete flow differs by a few per cent, because errors of the
+discretisation depend on where the surface cuts the grid. Newton's method then converges linearly. The difference
+matters for few displacements, in FSI1 for the deflection of the flag, so that the last iterate corrects it:
+
+    s = r - c (s' + r - r'),   c = argmin |d - c (d - d')|
+
+r: increment by the tangent; s: the one that is added; d: displacement of the interface by r; prime: the iterate before.
+This is Anderson's method of depth one for the map x -> x + r. The order of convergence is that of secants, 1.6 for one
+such displacement. Source: Anderson, J. ACM 12 (1965) 547-560.
+"""
+
+from __future__ import annotations
+
+from solvers.api import Array
+
+
+class Secant:
+    """Corrects increments by the one before."""
+
+    def __init__(self) -> None:
+        self._before: tuple[Array, Array, Array] | None = None  #: r', d', s'
+
+    def forget(self) -> None:
+        """Discard the iterate before: the map has changed."""
+        self._before = None
+
+    def corrected(self, increment: Array, displacement: Array) -> Array:
+        """s from r, at owned unknowns; displacement [m]: d, the same on every process."""
+        corrected = increment
+        if self._before is not None:
+            r, d, s = self._before
+            change = displacement - d
+            size = float(change @ change)
+            if size > 0.0:
+                corrected = increment - float(displacement @ change) / size * (s + increment - r)
+        self._before = increment.copy(), displacement.copy(), corrected.copy()
+        return corrected
