@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupling.ports import Solid
 from solvers.api import Array, State
@@ -15,18 +16,22 @@ from solvers.fluid.time_scheme import STEADY, Difference
 
 @dataclass(frozen=True)
 class DrySide:
-    """The line that closes the solid behind a wetted surface with two ends, in 2D.
+    """The surface that closes the solid behind a wetted surface.
 
-    It leads from the end of the surface along fixed corners to its start.
+    In 2D it leads from the end of a wetted line along fixed corners to its start. Around a closed wetted surface it is
+    closed, too, and all of its corners are fixed.
     """
 
     name: str  #: name of this surface in the fluid
     behind: str  #: name of the wetted surface
-    ends: tuple[int, int]  #: vertices of the wetted surface at its end and at its start
+    ends: tuple[int, int] | None  #: vertices of the wetted surface at its end and at its start; None: it is closed
     corners: Array  #: positions [m], shape (n, dim)
+    facets: NDArray[np.int64]  #: numbers of its vertices: end, corners, start; of a closed surface the corners
 
     def motion(self, wetted: Motion) -> Motion:
-        """Motion of its vertices; the first and the last are the ends of the wetted surface."""
+        """Motion of its vertices; the first and the last are the ends of the wetted surface, if it has some."""
+        if self.ends is None:
+            return Motion(self.corners, np.zeros_like(self.corners))
         end, start = self.ends
         x = np.concatenate([wetted.x[[end]], self.corners, wetted.x[[start]]])
         v = np.concatenate([wetted.v[[end]], np.zeros_like(self.corners), wetted.v[[start]]])

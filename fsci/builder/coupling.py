@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from coupling.accelerate import ACCELERATORS
 from coupling.coupled import Coupled
@@ -19,7 +18,7 @@ from coupling.parts import coupled_bodies, coupled_elastic
 from coupling.wetted import WettedSurface, immerse, wetted_surface
 from fsci.builder.dry_side import find_ends
 from fsci.builder.fluid import build_fluid, build_rigid_bodies
-from fsci.builder.skin import find_skin
+from fsci.builder.skin import Closing, find_skin
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.coupling_checks import closed_in
@@ -33,8 +32,6 @@ from solvers.structure.body import Body
 from solvers.structure.field import Structure
 from solvers.timing import Timer
 
-Array = NDArray[np.float64]
-
 
 def build_coupled(
     case: Case, comm: MPI.Comm, bodies: Sequence[Body], structure: Structure, timer: Timer
@@ -47,7 +44,7 @@ def build_coupled(
     box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
     immersed = immerse([surface.at_start for surface in surfaces], build_rigid_bodies(case, comm), box, case.time.start)
     dry_sides = [_dry_side(s, c) for s, (_, c) in zip(surfaces, skins, strict=True) if c is not None]
-    immersed += [ImmersedBody(_dry_line(side), None, deforms=True) for side in dry_sides]
+    immersed += [ImmersedBody(_dry_surface(side), None, deforms=True) for side in dry_sides]
     fluid = build_fluid(case, comm, timer, immersed)
     return _scheme(case, coupled_elastic(fluid, Elastic(structure, surfaces), dry_sides)), fluid
 
@@ -82,7 +79,7 @@ def start(case: Case, scheme: Monolithic | Partitioned, fluid: Fluid, t: float, 
         raise case.error(where, f"bodies enclose a part of the fluid, and {why}")
 
 
-def _skin(case: Case, comm: MPI.Comm, body: Body) -> tuple[Skin, Array | None]:
+def _skin(case: Case, comm: MPI.Comm, body: Body) -> tuple[Skin, Closing | None]:
     found: Any = None
     if comm.rank == 0:
         try:
@@ -97,12 +94,15 @@ def _skin(case: Case, comm: MPI.Comm, body: Body) -> tuple[Skin, Array | None]:
     return found
 
 
-def _dry_side(surface: WettedSurface, corners: Array) -> DrySide:
-    return DrySide(f"{surface.name}.dry_side", surface.name, find_ends(surface.facets), corners)
+def _dry_side(surface: WettedSurface, closing: Closing) -> DrySide:
+    corners, facets = closing
+    name, behind = f"{surface.name}.dry_side", surface.name
+    if facets is not None:
+        return DrySide(name, behind, None, corners, facets)
+    vertices = np.arange(len(corners) + 2)
+    return DrySide(name, behind, find_ends(surface.facets), corners, np.stack([vertices[:-1], vertices[1:]], axis=1))
 
 
-def _dry_line(side: DrySide) -> ImmersedSurface:
-    """Its segments, which fluid never touches."""
-    vertices = np.arange(len(side.corners) + 2)
-    segments = np.stack([vertices[:-1], vertices[1:]], axis=1)
-    return ImmersedSurface(side.name, segments, len(vertices), np.zeros(len(segments), dtype=bool))
+def _dry_surface(side: DrySide) -> ImmersedSurface:
+    """Its facets, which fluid never touches."""
+    return ImmersedSurface(side.name, side.facets, int(side.facets.max()) + 1, np.zeros(len(side.facets), dtype=bool))

@@ -1,4 +1,4 @@
-"""Surfaces with fluid on one side only, 2D: the line behind them that closes the solid."""
+"""Surfaces with fluid on one side only: the line behind them that closes the solid, in 2D, or a box around them."""
 
 from __future__ import annotations
 
@@ -60,8 +60,45 @@ def close(points: Array, facets: Facets, inside: Array, corners: Array, box: tup
     return way
 
 
+def surround(points: Array, facets: Facets, box: tuple[Array, Array]) -> tuple[Array, Facets]:
+    """(corners, facets) of a box around the fluid's, for a closed wetted surface with the fluid inside.
+
+    Raises DrySideError.
+    """
+    low, high = box
+    dim = facets.shape[1]
+    if dim == 2:
+        closed = np.array_equal(np.sort(facets[:, 0]), np.sort(facets[:, 1]))
+    else:
+        edges = np.concatenate([facets[:, [k, (k + 1) % 3]] for k in range(3)])
+        closed = set(map(tuple, edges.tolist())) == set(map(tuple, edges[:, ::-1].tolist()))
+    if not closed:
+        raise DrySideError("'outside' needs a wetted surface that is closed")
+    used = points[np.unique(facets)]
+    if (used.min(axis=0) < low).any() or (used.max(axis=0) > high).any():
+        raise DrySideError("'outside' needs a wetted surface within the box")
+    corners = points[facets] - used.mean(axis=0)
+    if np.linalg.det(corners).sum() > 0.0:
+        raise DrySideError("'outside' needs a wetted surface with the body around it")
+    unit, around = _UNIT_BOX[dim]
+    margin: Array = 0.1 * (high - low)
+    fixed: Array = low - margin + np.array(unit, dtype=np.float64) * (high - low + 2.0 * margin)
+    return fixed, np.array(around, dtype=np.int64)
+
+
+#: Corners and facets of the unit square and cube, with the solid inside.
+_UNIT_BOX = {
+    2: ([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1], [1, 2], [2, 3], [3, 0]]),
+    3: (
+        [[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))],
+        [[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]]
+        + [triangle for a, b in ((0, 1), (1, 2), (2, 3), (3, 0)) for triangle in ([a, b, b + 4], [a, b + 4, a + 4])],
+    ),
+}
+
+
 def outlines(fluid: Fluid, dry_sides: Sequence[DrySide]) -> list[Snapshot]:
-    """The lines that close the solid behind surfaces with one wet side, within the box, on rank 0."""
+    """The lines that close the solid behind surfaces with one wet side, within the box, on rank 0; none in 3D."""
     if fluid.comm.rank != 0:
         return []
     surfaces = {body.surface.name: body.surface for body in fluid.bodies}
@@ -69,10 +106,12 @@ def outlines(fluid: Fluid, dry_sides: Sequence[DrySide]) -> list[Snapshot]:
     low, high = (np.array([edge[at] for edge in edges]) for at in (0, -1))
     found = []
     for side in dry_sides:
+        if len(edges) == 3:
+            continue
         wet = fluid.cut.motion.x[fluid.vertices_of([side.behind])]
-        end, start = side.ends
-        way = np.concatenate([[end], len(wet) + np.arange(len(side.corners)), [start]])
-        lines = np.concatenate([surfaces[side.behind].facets, np.stack([way[:-1], way[1:]], axis=1)])
+        numbers = len(wet) + np.arange(len(side.corners))
+        way = numbers if side.ends is None else np.concatenate([side.ends[:1], numbers, side.ends[1:]])
+        lines = np.concatenate([surfaces[side.behind].facets, way[side.facets]])
         points = np.concatenate([wet, np.clip(side.corners, low, high)])
         found.append(Snapshot(side.name, np.pad(points, ((0, 0), (0, 1))), lines, "line", {}))
     return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.builder.dry_side import DrySideError, close
+from fsci.builder.dry_side import DrySideError, close, surround
 from fsci.case import Case
 from fsci.meshes.mesh import MeshError, require_surface
 from solvers.mesh import Mesh
@@ -13,12 +13,14 @@ from solvers.skin import Skin, cut_out_skin
 from solvers.tessellation import tessellate
 
 Array = NDArray[np.float64]
+Closing = tuple[Array, NDArray[np.int64] | None]
 
 
-def find_skin(case: Case, name: str, mesh: Mesh) -> tuple[Skin, Array | None]:
-    """The skin of a body from its mesh, and corners of the line that closes the solid behind it. Raises CaseError.
+def find_skin(case: Case, name: str, mesh: Mesh) -> tuple[Skin, Closing | None]:
+    """The skin of a body from its mesh, and for bodies with a dry side what closes the solid behind it.
 
-    The corners [m] of shape (n, dim) are there for bodies with a dry side, None for others.
+    That is (corners [m], shape (n, dim), and facets between them if they are not a line from end to end).
+    Raises CaseError.
     """
     try:
         return _find(case, name, mesh)
@@ -28,7 +30,7 @@ def find_skin(case: Case, name: str, mesh: Mesh) -> tuple[Skin, Array | None]:
         raise case.error(("coupling", "wetted", name), str(error)) from None
 
 
-def _find(case: Case, body: str, mesh: Mesh) -> tuple[Skin, Array | None]:
+def _find(case: Case, body: str, mesh: Mesh) -> tuple[Skin, Closing | None]:
     assert case.coupling is not None
     names = case.coupling.wetted.get(body)
     for name in names or ():
@@ -37,8 +39,9 @@ def _find(case: Case, body: str, mesh: Mesh) -> tuple[Skin, Array | None]:
         return cut_out_skin(mesh, names), None
     assert case.fluid is not None
     facets, nodes = tessellate(mesh, names)
-    given, box = case.coupling.dry_side[body], (case.fluid.grid.start, case.fluid.grid.to)
-    middles = mesh.points[mesh.cells].mean(axis=1)
-    low, high = (np.array(corner) for corner in box)
-    corners = close(mesh.points[nodes], facets, middles, np.array(given), (low, high))
-    return Skin(mesh.points[nodes], facets, nodes, np.ones(len(facets), dtype=bool)), corners
+    given, points = case.coupling.dry_side[body], mesh.points[nodes]
+    box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
+    skin = Skin(points, facets, nodes, np.ones(len(facets), dtype=bool))
+    if given == "outside":
+        return skin, surround(points, facets, box)
+    return skin, (close(points, facets, mesh.points[mesh.cells].mean(axis=1), np.array(given), box), None)

@@ -23,10 +23,11 @@ class Coupling(Section):
         "surfaces that the fluid touches, by body; default: all surfaces except those inside of other bodies and, "
         "without contact, those on the boundary of the box at the start",
     )
-    dry_side: dict[Name, Annotated[tuple[NumberVector, ...], EntryCount(1, None)]] = setting(
+    dry_side: dict[Name, Literal["outside"] | Annotated[tuple[NumberVector, ...], EntryCount(1, None)]] = setting(
         dict,
-        "for walls and membranes with fluid on one side, 2D only: corners of a polygon outside of the box that leads "
-        "from one end of a body's wetted surface to the other end; there is no fluid between surface and polygon",
+        "for walls and membranes with fluid on one side: 'outside' of a closed wetted surface there is no fluid. In 2D "
+        "corners of a polygon outside of the box that leads from one end of a body's wetted surface to the other end; "
+        "there is no fluid between surface and polygon",
         unit="m",
     )
     accelerator: Literal["iqn", "aitken", "constant"] = setting(

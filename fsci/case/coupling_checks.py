@@ -63,10 +63,10 @@ def _dry_side_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
         keys: Keys = ("coupling", "dry_side", name)
         if name not in bodies:
             yield keys, f"unknown body '{name}'{did_you_mean(name, bodies)}"
-        elif case.dimension == 3:
-            yield keys, "'dry_side' is for 2D only; in 3D name the wet surfaces with 'wetted'"
+        elif case.dimension == 3 and corners != "outside":
+            yield keys, "'dry_side' with corners is for 2D only; in 3D a closed surface may have 'outside'"
         elif name not in coupling.wetted:
             yield keys, f"say which surface is wet: 'wetted: {{{name}: [..]}}'"
-        for i, corner in enumerate(corners):
+        for i, corner in enumerate(corners if corners != "outside" else ()):
             if len(corner) != 2 and case.dimension == 2:
                 yield (*keys, i), f"a corner has 2 entries in 2D, not {len(corner)}"

@@ -98,6 +98,7 @@ def assert_same(folder, first, second):
             "fsi1",
             "flap",
             "thin_flag",
+            "balloon",
             "cavity_flexible_bottom",
         )
     ],

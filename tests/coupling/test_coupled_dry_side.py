@@ -141,11 +141,83 @@ def test_message(old, new, message, in_new_folder, tmp_path):
     assert any(line.startswith(f"case.yaml:{message}") for line in first_lines(error)), first_lines(error)
 
 
+#: a closed wall of 0.2 cells with fluid inside only, which swings slowly
+BALLOON = """\
+title: a balloon
+time: {step: 0.02, end: 0.06}
+fluid:
+  density: 1
+  viscosity: 0.01
+  grid: GRID
+  patches: {outside: {on: [SIDES], no_slip: true}}
+structure:
+  dynamics: {rho_inf: 0.8}
+  bodies:
+    wall:
+      mesh: MESH
+      material: {law: neo_hooke, E: 1e4, nu: 0.3, density: 10}
+      initial_velocity: VELOCITY
+coupling:
+  wetted: {wall: inner}
+  dry_side: {wall: outside}
+probes:
+  volume: {field: fluid, quantity: volume}
+"""
+FLAT = {
+    "GRID": "{from: [-0.5, -0.5], to: [0.5, 0.5], cells: [10, 10]}",
+    "SIDES": "x-, x+, y-, y+",
+    "MESH": "{shape: ring, inner_radius: 0.37, outer_radius: 0.39, cells: [32, 1]}",
+    "VELOCITY": "[1e-3*x, -1e-3*y]",
+}
+SOLID = {
+    "GRID": "{from: [-0.5, -0.5, -0.5], to: [0.5, 0.5, 0.5], cells: [8, 8, 8]}",
+    "SIDES": "x-, x+, y-, y+, z-, z+",
+    "MESH": "{shape: hollow_sphere, inner_radius: 0.37, outer_radius: 0.39, cells: [4, 1]}",
+    "VELOCITY": "[1e-3*x, 1e-3*y, -2e-3*z]",
+}
+
+
+def balloon(parts: dict[str, str]) -> str:
+    text = BALLOON
+    for name, value in parts.items():
+        text = text.replace(name, value)
+    return text
+
+
+@pytest.mark.parametrize(("parts", "ball"), [(FLAT, np.pi * 0.37**2), (SOLID, 4 / 3 * np.pi * 0.37**3)])
+def test_closed_wall(parts, ball, tmp_path):
+    """The fluid is what is inside, and it keeps its volume up to second order in the motion."""
+    history = run(balloon(parts), tmp_path)
+    assert 0.85 * ball < history["volume"][0] < ball
+    assert history["volume"] == pytest.approx(history["volume"][0], rel=1e-8)
+    assert np.abs(history["fluid.mass"]).max() < 1e-12
+    assert np.abs(history["interface.momentum"]).max() < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("wall: inner", "wall: [inner, outer]", "'outside' needs a wetted surface with the body around it"),
+        ("wall: inner", "wall: outer", "'outside' needs a wetted surface with the body around it"),
+        ("cells: [32, 1]}", "cells: [32, 1], angle: 90}", "'outside' needs a wetted surface that is closed"),
+        ("from: [-0.5, -0.5]", "from: [-0.3, -0.5]", "'outside' needs a wetted surface within the box"),
+    ],
+)
+def test_what_is_not_closed(old, new, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = balloon(FLAT)
+    assert old in text
+    error = refused(text.replace(old, new), lambda case: run_case(case, tmp_path / "out"))
+    assert any(line == f"case.yaml:17:20: {message}" for line in first_lines(error)), first_lines(error)
+
+
 def test_3d_has_no_dry_side(tmp_path):
     text = COLUMN.replace("[0, -10]", "[0, -10, 0]").replace("[5, 11]", "[5, 11, 5]")
     text = text.replace("from: [0, 0], to: [1, 1]", "from: [0, 0, 0], to: [1, 1, 1]")
     (tmp_path / "case.yaml").write_text(text)
-    with pytest.raises(CaseError, match="'dry_side' is for 2D only; in 3D name the wet surfaces with 'wetted'"):
+    with pytest.raises(
+        CaseError, match="'dry_side' with corners is for 2D only; in 3D a closed surface may have 'outside'"
+    ):
         load_case(tmp_path / "case.yaml")
 
 
