@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from programs import fsci
 
-from fsci.bench import hertz, idle, linear, profile, small, studies
+from fsci.bench import hertz, idle, linear, processes, profile, small, studies
 from fsci.bench.compare import compare
 from fsci.bench.families import FAMILIES
 from fsci.bench.family import CASES, Family, Study, front
@@ -199,3 +199,18 @@ def test_profile():
     assert found["total"] * 1e-6 * found["unknowns"] * found["newton"] * 2 < seconds
     assert 0.0 < least["Krylov"] < found["Krylov"]
     assert found["krylov"] >= 1
+
+
+def test_counts_by_process():
+    """Two processes share the cells of one, with each other as neighbours."""
+    one, two = (processes.row(count, 8) for count in (1, 2))
+    assert one["unknowns"] == two["unknowns"] == 4 * 9**3
+    assert (one["neighbours"], two["neighbours"]) == ("0-0", "1-1")
+    assert (one["halo [kB]"], one["work"]) == ("0-0", 1.0)
+    least, most = map(int, two["halo [kB]"].split("-"))
+    assert 8 * 4 * 9**2 // 1000 <= least <= most < 8 * one["unknowns"] / 1000  # a layer of nodes, but not all
+    for cells in ("uncut cells", "cut cells"):
+        whole = int(one[cells].split("-")[0])
+        least, most = map(int, two[cells].split("-"))
+        assert 2 * least <= whole <= 2 * most
+    assert 1.0 <= two["work"] < 1.5
