@@ -27,6 +27,7 @@ REASONS = {
         "coupling.scheme=monolithic",
         "coupling.accelerator=iqn, or a larger coupling.max_iterations",
     ),
+    "not finite": ("a smaller time.step", "loads and inflow that grow from zero, such as ramp(t, 0, 0.5)"),
     "not a number": ("a smaller time.step", "loads and inflow that grow from zero, such as ramp(t, 0, 0.5)"),
     "singular": ("supports or weak springs: a static body without them has no unique solution",),
     "linear solver": ("solver.linear.method=direct", "solver.linear.tolerance=1e-6"),
@@ -46,6 +47,9 @@ COURSES = {
     ),
 }
 
+#: Iterations more that are worth trying: as many as the default of `solver.newton.max_iterations`.
+MOST_MORE = 25
+
 
 def of_failure(reason: str, course: Course, residuals: tuple[float, ...], case: Case) -> Iterator[str]:
     """Suggestions for a failed step."""
@@ -56,7 +60,7 @@ def of_failure(reason: str, course: Course, residuals: tuple[float, ...], case: 
         yield from COURSES[course.kind][1]
     goal = case.solver.newton.residual * max(residuals, default=0.0)
     more = course.remaining(residuals[-1], goal) if residuals else None
-    if more is not None:
+    if more is not None and more <= MOST_MORE:
         most = case.solver.newton.max_iterations + more
         yield f"solver.newton.max_iterations={most}: at this rate it takes {more} iterations more"
 

@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 
 from fsci.case import Case
 
+#: What is written as zero: a distance relative to the extent of the body, a component relative to the largest one.
+#: Single precision has a rounding error of 1e-7, double precision one of 1e-16; nodes are further apart than either.
+ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class Nearest:
@@ -20,6 +24,7 @@ class Nearest:
     node: int
     cell: int
     distance: float  #: [m]
+    extent: float  #: largest edge of the box around the part [m]
     values: dict[str, NDArray[np.float64]]  #: point fields there
 
 
@@ -39,7 +44,8 @@ def nearest_node(fields: Path, where: Sequence[float]) -> Nearest | None:
         cells = [row for block in mesh.cells for row in block.data]
         cell = next((number for number, nodes in enumerate(cells) if node in nodes), -1)
         values = {name: np.asarray(data[node], dtype=float) for name, data in mesh.point_data.items()}
-        found.append(Nearest(path.stem.rpartition("_")[0], node, cell, float(distances[node]), values))
+        extent = float(np.ptp(mesh.points, axis=0).max())
+        found.append(Nearest(path.stem.rpartition("_")[0], node, cell, float(distances[node]), extent, values))
     return min(found, key=lambda one: one.distance, default=None)
 
 
@@ -51,9 +57,12 @@ def pairs_of(case: Case, body: str) -> list[str]:
 
 def describe(near: Nearest, case: Case) -> list[str]:
     """Lines of text on body, node, cell and fields at the position."""
-    lines = [f"nearest node   {near.node} of {near.part}, in its cell {near.cell}, {near.distance:.3g} m away"]
+    away = "at this place" if near.distance <= ROUNDING * near.extent else f"{near.distance:.3g} m away"
+    lines = [f"nearest node   {near.node} of {near.part}, in its cell {near.cell}, {away}"]
     for name, value in near.values.items():
-        numbers = ", ".join(f"{component + 0.0:.4g}" for component in np.atleast_1d(value))
+        components = np.atleast_1d(value)
+        rounding = ROUNDING * np.abs(components).max(initial=0.0)
+        numbers = ", ".join(f"{0.0 if abs(each) <= rounding else each:.4g}" for each in components)
         lines.append(f"  {name:17s} {numbers}")
     if pairs := pairs_of(case, near.part):
         lines.append(f"contact pairs  {', '.join(pairs)}")

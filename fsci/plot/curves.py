@@ -102,6 +102,8 @@ def plot_history(folder: Path, history: History, quantities: Mapping[str, str], 
 
     `quantities` maps probes to what they measure, `units` are those of length, mass and time.
     """
+    if not len(history.get("time", ())):  # no step was accepted
+        return []
     families: dict[str, list[str]] = {}
     for name in history:
         if name in OWN and not np.any(history[name]):  # no count of what the solver of this run has not

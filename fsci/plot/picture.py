@@ -67,7 +67,9 @@ def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float]) -> 
         ]
     drawn = []
     if moments:
-        drawn += [plot_state(folder / f"final_{name}.png", moments[-1], name, labels) for name in names]
+        failed = [] if field else plot_failed(out, folder, names, labels)
+        shown = [name for name in names if not (failed and at_rest(moments[-1], name))]
+        drawn += [plot_state(folder / f"final_{name}.png", moments[-1], name, labels) for name in shown] + failed
         if not field:
             drawn += plot_more(folder, moments, labels, flow=flow)
         if movie:
@@ -95,6 +97,23 @@ def plot_more(folder: Path, moments: Sequence[Moment], labels: Labels, *, flow: 
         name = "final" if touching[-1] == len(moments) - 1 else "last"
         drawn.append(plot_pressure(folder / f"{name}_contact_pressure.png", moments[touching[-1]], labels))
     return drawn
+
+
+def plot_failed(out: Path, folder: Path, names: Sequence[str], labels: Labels) -> list[Path]:
+    """Pictures of the iterate that failed, of a run that ended with a failed step."""
+    series = read_series(out / "failure" / "fields")
+    if not series:
+        return []
+    moment = tuple(part[-1] for part in series)
+    labels = replace(labels, title=f"{labels.title}: iterate that failed")
+    shown = [name for name in names if not at_rest(moment, name)]
+    return [plot_state(folder / f"failed_{name}.png", moment, name, labels) for name in shown]
+
+
+def at_rest(moment: Moment, name: str) -> bool:
+    """Whether a field is zero everywhere, or not a number: its colours would show nothing."""
+    values = [body.values for body in load_state([file for _, file in moment], name) if body.values is not None]
+    return not any(np.nan_to_num(each).any() for each in values)
 
 
 def read_series(folder: Path) -> list[Series]:

@@ -56,7 +56,9 @@ class ActiveSet:
             if self._recurrences > MAX_RECURRENCES:
                 alternating = int(np.sum(status != self.status))
                 raise StepFailed(
-                    "contact", f"the active set cycles: {alternating} nodes change their status again and again"
+                    "contact",
+                    f"the active set cycles: {alternating} nodes change their status again and again; "
+                    "take a smaller time step",
                 )
             self._earlier.append(chosen)
         self.status = status.copy()

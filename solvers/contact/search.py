@@ -52,7 +52,7 @@ class Search:
         """
         path_s, path_m = _path(xs, xs_previous), _path(xm, xm_previous)
         if not all(np.isfinite(x).all() for x in path_s + path_m):
-            raise StepFailed("contact", "surface positions are not finite")
+            raise StepFailed("contact", "positions of contact surfaces are not finite: take a smaller time step")
         radii = np.ascontiguousarray(np.broadcast_to(np.asarray(inflation, float), len(self._slave_facets)))
         if self.trees is None:
             kdop_tree = KdopTree2 if np.shape(xs)[1] == 2 else KdopTree3

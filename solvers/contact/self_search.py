@@ -60,7 +60,7 @@ class SelfSearch:
 
     def _own_pairs(self, xs: Array, inflation: float, xs_previous: Array | None) -> NDArray[np.int32]:
         if not np.isfinite(xs).all():
-            raise StepFailed("contact", "surface positions are not finite")
+            raise StepFailed("contact", "positions of contact surfaces are not finite: take a smaller time step")
         found = self.tree.pairs(xs, inflation, xs_previous)
         found = found[~self._through_the_wall(found, xs)]
         k = self._count

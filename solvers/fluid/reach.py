@@ -16,7 +16,9 @@ from solvers.fluid.pieces import NOTHING
 from solvers.fluid.space import Unknowns
 from solvers.fluid.surface import Motion
 
-TOO_FAR = "a body moved farther in one step than the velocity is extrapolated into it: take a smaller time step"
+TOO_FAR = (
+    "a body moved farther in one step than velocities are extrapolated behind its surface: take a smaller time step"
+)
 
 
 def strip_layers(grid: DistributedGrid, motion: Motion, time: float, smallest: float) -> int:
@@ -60,4 +62,5 @@ def require_within_period(unknowns: Unknowns, cut: Cut) -> None:
     for axis in unknowns.periodic:
         at_end = np.isin(indices[axis], [0, grid.grid.shape[axis] - 1]).any()
         if grid.comm.allreduce(bool(at_end), op=MPI.LOR):
-            raise StepFailed("fluid", f"a body reaches the periodic faces {'xyz'[axis]}- and {'xyz'[axis]}+")
+            faces = f"{'xyz'[axis]}- and {'xyz'[axis]}+"
+            raise StepFailed("fluid", f"a body reaches the periodic faces {faces}: take a longer box, or end earlier")

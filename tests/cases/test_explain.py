@@ -6,13 +6,16 @@ import json
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from programs import fsci
 from small_cases import PLATE
 
 from fsci.case import load_case
 from fsci.explain import advice
+from fsci.explain.place import Nearest, describe
 from fsci.explain.residuals import course, curve
+from fsci.plot.picture import plot_run
 from fsci.report.report import read_summary, report
 
 #: steps that have a solution until half the time is over, and one whose load turns elements inside out
@@ -115,6 +118,8 @@ def test_what_to_try(tmp_path):
     slow = (1.0, 0.5, 0.25, 0.125)
     words = list(advice.of_failure("Newton did not converge in 25 iterations", course(slow), slow, case))
     assert words == ["solver.newton.max_iterations=49: at this rate it takes 24 iterations more"]
+    hopeless = (1.0, 0.8)
+    assert list(advice.of_failure("Newton did not converge in 1 iterations", course(hopeless), hopeless, case)) == []
     for reason, remedies in advice.REASONS.items():
         assert list(advice.of_failure(f"so {reason} it is", course(()), (), case)) == list(remedies)
     run = {
@@ -129,6 +134,31 @@ def test_what_to_try(tmp_path):
         "output.fields_every=10",
         "mpirun -n 2",
     ]
+
+
+def test_rounding_errors_are_zero(tmp_path):
+    (tmp_path / "case.yaml").write_text("title: a plate\n" + PLATE)
+    case = load_case(tmp_path)
+    values = {"velocity": np.array([0.5, -3e-18, 1e-6])}
+    there = describe(Nearest("plate", 7, 3, 3.42e-18, 1.0, values), case)
+    assert there[:2] == ["nearest node   7 of plate, in its cell 3, at this place", "  velocity          0.5, 0, 1e-06"]
+    beside = describe(Nearest("plate", 7, 3, 3.42e-3, 1.0, values), case)
+    assert beside[0] == "nearest node   7 of plate, in its cell 3, 0.00342 m away"
+
+
+def test_the_iterate_that_failed_is_drawn(failed):
+    drawn = [path.name for path in plot_run(failed)]
+    assert "failed_displacement.png" in drawn
+    assert "final_displacement.png" in drawn
+
+
+def test_a_run_without_an_accepted_step_is_drawn(tmp_path):
+    """It has no curves, and no picture of a displacement that is zero everywhere."""
+    (tmp_path / "case.yaml").write_text("title: a plate\n" + PLATE)
+    settings = ("solver.newton.max_iterations=1", "time.retry.halvings=0")
+    done = fsci("run", tmp_path, "-o", tmp_path / "out", *(word for text in settings for word in ("--set", text)))
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert [path.name for path in plot_run(tmp_path / "out")] == ["failed_displacement.png", "mesh.png"]
 
 
 def test_reasons_are_those_of_the_program():
