@@ -74,6 +74,7 @@ class Extension:
         ]
         #: row of E of each node in this step, -1: none yet
         self._row_of, self._rows = np.full(len(numbers), -1), sparse.csr_matrix((0, self.size))
+        self._roots: Numbers = np.zeros((2, 0), dtype=np.int64)  #: (row of E, cell) of each root
 
     def follow(self, sheets: Sheets | None) -> None:
         """Take sheets with the same cells, of which some have more fluid now and others less."""
@@ -83,6 +84,7 @@ class Extension:
     def begin_step(self) -> None:
         """Discard the roots of the last step."""
         self._row_of[:], self._rows = -1, self._rows[:0]
+        self._roots = self._roots[:, :0]
 
     def __call__(self, share: Array, active: NDArray[np.bool_], reach: int) -> Dependent:
         """Dependent nodes and their extension.
@@ -94,6 +96,7 @@ class Extension:
         poor = (largest < FREE * best) | (largest == 0.0)
         nodes = nodes[poor]
         relative = np.divide(largest, best, out=np.zeros(len(largest)), where=best > 0.0)[poor]
+        self._forget_covered(nodes, share)
         self._find_roots(nodes[self._row_of[nodes] < 0], share, reach)
         rooted = self._row_of[nodes] >= 0
         rows = self._rows[self._row_of[nodes[rooted]]]
@@ -138,17 +141,30 @@ class Extension:
             found.append(np.where(inside, share[cells], 0.0).max(axis=1, initial=0.0))
         return np.concatenate(found)
 
+    def _forget_covered(self, nodes: Numbers, share: Array) -> None:
+        """Discard the rows of nodes with a root that a body has covered since: its own nodes have no equation."""
+        rows, cells = self._roots
+        covered = np.zeros(self._rows.shape[0], dtype=bool)
+        covered[rows[share[cells] == 0.0]] = True
+        rooted = nodes[self._row_of[nodes] >= 0]
+        self._row_of[rooted[covered[self._row_of[rooted]]]] = -1
+
     def _find_roots(self, nodes: Numbers, share: Array, reach: int) -> None:
         """Add rows of E for nodes that have none, where a root exists: first among cells nearby, then up to `reach`."""
         for layers in dict.fromkeys([min(NEAR, reach), reach]):
-            parts = [self._search(part, share, layers) for part in _chunks(nodes)]
-            found = np.concatenate([part for part, _ in parts])
-            self._row_of[found] = self._rows.shape[0] + np.arange(len(found))
-            self._rows = sparse.vstack([self._rows, *(rows for _, rows in parts)], format="csr")
+            for part in _chunks(nodes):
+                found, rows, roots = self._search(part, share, layers)
+                first = self._rows.shape[0]
+                self._row_of[found] = first + np.arange(len(found))
+                self._rows = sparse.vstack([self._rows, rows], format="csr")
+                self._roots = np.concatenate([self._roots, roots + np.array([[first], [0]])], axis=1)
             nodes = nodes[self._row_of[nodes] < 0]
 
-    def _search(self, nodes: Numbers, share: Array, layers: int) -> tuple[Numbers, sparse.csr_matrix]:
-        """(nodes with a root, their rows of E). The row is the mean over roots that amplify equally."""
+    def _search(self, nodes: Numbers, share: Array, layers: int) -> tuple[Numbers, sparse.csr_matrix, Numbers]:
+        """(nodes with a root, their rows of E, (row, cell) of each root, shape (2, roots)).
+
+        A row is the mean over roots that amplify equally.
+        """
         cost = reduce(_outer_product, (self._amplification(axis, nodes, layers) for axis in range(self.grid.dim)))
         cells, inside = self._cells_around(nodes, layers)
         fluid = np.where(inside, share[cells], 0.0)
@@ -164,7 +180,8 @@ class Extension:
         rows = np.broadcast_to(np.searchsorted(found, at)[:, None], columns.shape)
         kept = np.abs(weights) > 0.0
         entries = (weights[kept], (rows[kept], columns[kept]))
-        return nodes[found], sparse.csr_matrix(entries, shape=(len(found), self.size))
+        roots = np.stack([np.searchsorted(found, at), cells[at, chosen]])
+        return nodes[found], sparse.csr_matrix(entries, shape=(len(found), self.size)), roots
 
     def _coordinates(self, axis: int, nodes: Numbers, layers: int) -> Array:
         """Reference coordinates of nodes in the cells of `_window`: from 0 to 1 inside, shape (nodes, cells)."""

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from solvers import fem
 from solvers.api import Array
+from solvers.fluid.cut import Cut
+from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.pockets import Pocket, find_pockets
 from solvers.fluid.system import FlowSystem
@@ -82,11 +84,18 @@ def hold_pressure(system: FlowSystem, elastic: Mask, *, set_by_solids: bool) -> 
     if not (closed or system.with_bodies):
         return []
     assert system.cut is not None
+    if not closed and not _in_fluid(system.grid, system.cut):
+        return []
     open_cells, periodic = system.boundary.open_cells(), system.unknowns.periodic
     pockets = find_pockets(system.grid, system.cut, open_cells, elastic, periodic)
     pockets = [pocket for pocket in pockets if not (pocket.elastic and set_by_solids)]
     sizes = _pressure_sizes(system) if pockets else np.empty(0)
     return [_hold(system, pocket, sizes, keep_level=not (closed and pocket.largest)) for pocket in pockets]
+
+
+def _in_fluid(grid: DistributedGrid, cut: Cut) -> bool:
+    """Whether bodies cut or cover any cell: those outside of the box close no pockets (collective)."""
+    return bool(grid.comm.allreduce(len(cut.uncut) < len(grid.sizes), op=MPI.LOR))
 
 
 def _pressure_sizes(system: FlowSystem) -> Array:

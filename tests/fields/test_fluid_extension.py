@@ -71,6 +71,23 @@ def test_rounding_is_not_amplified_far_from_the_fluid():
     np.testing.assert_allclose(found.rows @ line, line[found.nodes], rtol=1e-11)
 
 
+def test_a_root_that_a_body_covers_within_the_step_is_replaced():
+    """Columns of cells: fluid up to the third, then only up to the second, which the iterate before had as roots."""
+    grid, every = uniform([0, 0], [1, 1], [6, 4]), np.ones(24, dtype=bool)
+    extension = Extension(grid, 2, (13, 9), np.arange(13 * 9))
+    x, y = np.unravel_index(np.arange(13 * 9), (13, 9), order="F")
+    polynomial = x**2 - x * y + 3.0 * y
+    for columns in (3, 2):
+        share = np.zeros((6, 4))
+        share[:columns] = 1.0
+        found = extension(share.ravel(order="F"), every, 6)
+        assert x[found.rows.indices].max() == 2 * columns
+        assert len(found.undetermined) == 0
+        near = x[found.nodes] <= 2 * (columns + 2)  # farther away lines are continued
+        extended = found.rows @ polynomial
+        assert extended[near] == pytest.approx(polynomial[found.nodes[near]], abs=1e-9)
+
+
 def test_penalty_loses_no_force_and_no_volume():
     """A constant has no distance: the sum of all equations is that without the penalty."""
     fluid = around_a_disc("bdf2")
