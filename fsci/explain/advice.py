@@ -58,6 +58,8 @@ def of_failure(reason: str, course: Course, residuals: tuple[float, ...], case: 
             yield from words
     if course.kind in COURSES and "did not converge" in reason:
         yield from COURSES[course.kind][1]
+    if course.kind == "none" and "Newton did not converge" in reason:
+        yield f"solver.newton.max_iterations={MOST_MORE}: a step of a nonlinear problem takes several iterations"
     goal = case.solver.newton.residual * max(residuals, default=0.0)
     more = course.remaining(residuals[-1], goal) if residuals else None
     if more is not None and more <= MOST_MORE:

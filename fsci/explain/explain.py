@@ -71,7 +71,10 @@ def _failure(folder: Path, what: Mapping[str, Any], case: Case) -> Iterator[str]
         near = nearest_node(folder / "fields", what["where"])
         yield from () if near is None else describe(near, case)
     found = course(residuals)
-    if residuals:
+    if residuals and found.kind == "none":
+        yield "residuals      too few to tell whether they fall"
+        yield from curve(residuals)
+    elif residuals:
         words = advice.COURSES.get(found.kind, (f"the residuals fall by a factor of {found.rate:.2g}",))[0]
         yield f"residuals      {words if found.kind in (*advice.COURSES, 'converges') else found.kind}"
         yield from curve(residuals)

@@ -45,6 +45,8 @@ def course(residuals: Sequence[float]) -> Course:
         return Course("oscillates", rate)
     if residuals[-1] > GROWTH * min(residuals):
         return Course("diverges", rate)
+    if len(ratios) < 2 and rate > STILL:  # one iteration does not show that the next ones do not help
+        return Course("none")
     return Course("stagnates" if rate > STILL else "converges", rate)
 
 
