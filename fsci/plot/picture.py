@@ -87,7 +87,7 @@ def plot_more(folder: Path, moments: Sequence[Moment], labels: Labels, *, flow: 
     """Further pictures of a run: mesh, flow over time, the state before contact, and contact pressure."""
     drawn = [plot_mesh(folder / "mesh.png", moments[0], labels)]
     touching = [index for index, moment in enumerate(moments) if has_contact(moment[flow:])]
-    if flow and len(moments[0]) > 1:
+    if flow and len(moments[0]) > 1 and len(moments) > 2:  # start and end of a steady flow are no story
         shown = [moments[index] for index in choose(len(moments), touching[:1])]
         drawn.append(plot_story(folder / "story_velocity.png", shown, labels.title, labels.units))
         if touching and touching[0] > 0:
