@@ -84,7 +84,7 @@ def transform_rows(
         added_rows=(total + stiffness)[others],
         added_right=right[others],
     )
-    return change_rows(matrix, own, b, changes if numbering is None else numbering.place(changes)), taken
+    return change_rows(matrix, own, b, changes if numbering is None else numbering.renumbered(changes)), taken
 
 
 def owned_rows(matrix: PETSc.Mat) -> Sparse:
@@ -174,7 +174,7 @@ class Numbering:
         """Rows of a matrix of the system, with columns numbered as unknowns."""
         return rows.with_columns(self._unknown, rows.shape[1])
 
-    def place(self, changes: RowChanges) -> RowChanges:
+    def renumbered(self, changes: RowChanges) -> RowChanges:
         """Changes with columns numbered as unknowns, renumbered for a matrix of the system."""
 
         def columns(rows: Sparse) -> Sparse:

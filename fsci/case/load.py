@@ -13,7 +13,7 @@ from fsci.case.curve import functions
 from fsci.case.document import override, read_document
 from fsci.case.errors import CaseError
 from fsci.case.messages import problems
-from fsci.case.plausible import doubts
+from fsci.case.plausible import warnings
 from fsci.case.probe_checks import field_of
 
 
@@ -36,7 +36,7 @@ def load_case(path: str | Path, overrides: Iterable[tuple[str, str]] = ()) -> Ca
     found = [document.problem(document.place(keys), message) for keys, message in mistakes(case)]
     if found:
         raise CaseError(found)
-    case._warnings = tuple(f"{document.place(keys)}: {message}" for keys, message in doubts(case))
+    case._warnings = tuple(f"{document.place(keys)}: {message}" for keys, message in warnings(case))
     return _with_defaults(case)
 
 

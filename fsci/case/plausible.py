@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from fsci.case.case import Case
 from fsci.case.material import Material
 from fsci.case.mesh import FileMesh
-from fsci.case.plausible_flow import flow_doubts
+from fsci.case.plausible_flow import flow_warnings
 from fsci.case.shapes import Shape
 from fsci.case.structure import BodySection
 from fsci.case.yaml_text import Keys
@@ -20,7 +20,7 @@ STIFFNESSES = (1.0, 2e12)  #: [Pa] Young's modulus from the softest gel to diamo
 LOCKING = 0.45
 
 
-def doubts(case: Case) -> Iterator[tuple[Keys, str]]:
+def warnings(case: Case) -> Iterator[tuple[Keys, str]]:
     """Paths of settings with a warning about each."""
     span = case.time.end - case.time.start
     if case.time.step > span * (1 + 1e-12):
@@ -32,7 +32,7 @@ def doubts(case: Case) -> Iterator[tuple[Keys, str]]:
         if isinstance(body.mesh, Shape) and (ratio := body.mesh.aspect) > 50:
             yield (*keys, "mesh", "cells"), f"the cells are {ratio:.0f} times longer than wide"
     if case.fluid is not None:
-        yield from flow_doubts(case, case.fluid)
+        yield from flow_warnings(case, case.fluid)
 
 
 def _locking(body: BodySection, keys: Keys) -> Iterator[tuple[Keys, str]]:

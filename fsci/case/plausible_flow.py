@@ -22,7 +22,7 @@ CELLS_OF_THIN = 3.0  #: across a body, up to which they have, in flows in which 
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
 
 
-def flow_doubts(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
+def flow_warnings(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
     """Paths of settings with a warning about each."""
     density = fluid.density * case.units.density
     if not DENSITIES[0] <= density <= DENSITIES[1]:
@@ -46,8 +46,8 @@ def _fast_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
     """Bodies that cross too many cells in a step; rotating ones need the mesh."""
     for name, body in fluid.bodies.items():
         if body.motion is not None and body.motion.rotation is None:
-            if doubt := fast_body(case, fluid, body.motion, np.zeros((1, fluid.grid.dimension))):
-                yield ("fluid", "bodies", name, "motion"), doubt
+            if warning := fast_body(case, fluid, body.motion, np.zeros((1, fluid.grid.dimension))):
+                yield ("fluid", "bodies", name, "motion"), warning
 
 
 def fast_body(case: Case, fluid: FluidSection, motion: Movement, points: NDArray[np.float64]) -> str | None:
@@ -77,8 +77,8 @@ def _thin_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
         if not isinstance(mesh, Shape) or name in one_sided:
             continue
         length = max(mesh.extents) if fluid.grid.dimension == 2 else 0.0
-        if doubt := thin_body(case, fluid, mesh.thickness, length, moves=moves):
-            yield (section, kind, name, "mesh"), doubt
+        if warning := thin_body(case, fluid, mesh.thickness, length, moves=moves):
+            yield (section, kind, name, "mesh"), warning
 
 
 def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, moves: bool) -> str | None:

@@ -12,7 +12,7 @@ from fsci.expression import Expression
 from fsci.rotation import rotation_matrix
 
 Array = NDArray[np.float64]
-Course = Callable[[float], tuple[float, float]]  #: t -> (value, its rate)
+ValueAndRate = Callable[[float], tuple[float, float]]  #: t -> (value, its rate)
 
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
@@ -29,7 +29,7 @@ def rigid_motion(points: Array, movement: Movement, start: float, dt: float) -> 
     angle = None if turn is None else _angle(turn, start, dt)
 
     def motion(t: float) -> tuple[Array, Array]:
-        displaced, velocity = np.array([course(t) for course in shift]).T if shift else np.zeros((2, dim))
+        displaced, velocity = np.array([component(t) for component in shift]).T if shift else np.zeros((2, dim))
         if turn is None or angle is None:
             return points + displaced, np.broadcast_to(velocity, points.shape).copy()
         turned, rate = angle(t)
@@ -42,37 +42,37 @@ def rigid_motion(points: Array, movement: Movement, start: float, dt: float) -> 
     return motion
 
 
-def _angle(turn: Turn, start: float, dt: float) -> Course:
+def _angle(turn: Turn, start: float, dt: float) -> ValueAndRate:
     if turn.angular_velocity is not None:
         return integrated(turn.angular_velocity, start, dt)
     assert turn.angle is not None
     return differentiated(turn.angle, dt)
 
 
-def differentiated(formula: Expression, dt: float) -> Course:
+def differentiated(formula: Expression, dt: float) -> ValueAndRate:
     """The formula and its rate, by the central difference of fourth order over a hundredth of the time step.
 
     For motions that such steps resolve, the rate is exact to about ten digits.
     """
     h = 0.01 * dt
 
-    def course(t: float) -> tuple[float, float]:
+    def value_and_rate(t: float) -> tuple[float, float]:
         if formula.constant is not None:
             return float(formula.constant), 0.0
         back2, back, here, on, on2 = formula.at_times(t + h * np.arange(-2, 3))
         return float(here), float((8.0 * (on - back) - (on2 - back2)) / (12.0 * h))
 
-    return course
+    return value_and_rate
 
 
-def integrated(formula: Expression, start: float, dt: float) -> Course:
+def integrated(formula: Expression, start: float, dt: float) -> ValueAndRate:
     """The integral of the formula from `start` on, and the formula: Gauss's rule with eight points in each time step.
 
     Exact for polynomials up to degree 15 in each step, so also for lines with kinks at the ends of steps.
     """
     sums = np.zeros(1)  # at the ends of the steps up to the latest time of a call
 
-    def course(t: float) -> tuple[float, float]:
+    def value_and_rate(t: float) -> tuple[float, float]:
         nonlocal sums
         steps = max(int((t - start) / dt), 0)
         if steps >= len(sums):
@@ -81,7 +81,7 @@ def integrated(formula: Expression, start: float, dt: float) -> Course:
         rest = _gauss(formula, np.array([start + dt * steps]), np.array([t]))[0]
         return float(sums[steps] + rest), float(formula.at_times(t))
 
-    return course
+    return value_and_rate
 
 
 def _gauss(formula: Expression, begin: Array, end: Array) -> Array:

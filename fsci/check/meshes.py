@@ -175,8 +175,8 @@ def _rigid(case: Case, found: Findings) -> None:
         keys: Keys = ("fluid", "bodies", name)
         found.note(case, keys, mesh)
         if body.motion is not None:
-            if turns and case.fluid.scheme != "steady" and (doubt := fast_body(case, case.fluid, body.motion, x)):
-                found.warnings.append(f"{case.place(*keys, 'motion')}: {doubt}")
+            if turns and case.fluid.scheme != "steady" and (warning := fast_body(case, case.fluid, body.motion, x)):
+                found.warnings.append(f"{case.place(*keys, 'motion')}: {warning}")
             x = rigid_motion(x, body.motion, case.time.start, case.time.step)(case.time.start)[0]
         found.attempt(partial(require_inside_period, case, keys, x))
         if isinstance(body.mesh, FileMesh):
@@ -209,8 +209,8 @@ def _against_grid(case: Case, found: Findings, keys: Keys, mesh: Mesh, *, moves:
     if keys[-1] in (case.coupling.dry_side if case.coupling is not None else ()):
         return
     length = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
-    if doubt := thin_body(case, case.fluid, thickness(mesh), length, moves=moves):
-        found.warnings.append(f"{case.place(*keys, 'mesh')}: {doubt}")
+    if warning := thin_body(case, case.fluid, thickness(mesh), length, moves=moves):
+        found.warnings.append(f"{case.place(*keys, 'mesh')}: {warning}")
 
 
 def thickness(mesh: Mesh) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fsci.case import Case
-from fsci.explain.residuals import Course
+from fsci.explain.residuals import Convergence
 
 #: Part of a reason -> advice.
 REASONS = {
@@ -33,8 +33,8 @@ REASONS = {
     "linear solver": ("solver.linear.method=direct", "solver.linear.tolerance=1e-6"),
 }
 
-#: Course of the residuals -> meaning and advice.
-COURSES = {
+#: Convergence of the residuals -> meaning and advice.
+OF_CONVERGENCE = {
     "not finite": ("the residual is not a number: it cannot be evaluated at the last iterate", ()),
     "diverges": ("the residuals grow", ("a smaller time.step", "loads that grow from zero: ramp(t, 0, 0.5)")),
     "oscillates": (
@@ -51,17 +51,17 @@ COURSES = {
 MOST_MORE = 25
 
 
-def of_failure(reason: str, course: Course, residuals: tuple[float, ...], case: Case) -> Iterator[str]:
+def of_failure(reason: str, convergence: Convergence, residuals: tuple[float, ...], case: Case) -> Iterator[str]:
     """Suggestions for a failed step."""
     for part, words in REASONS.items():
         if part in reason:
             yield from words
-    if course.kind in COURSES and "did not converge" in reason:
-        yield from COURSES[course.kind][1]
-    if course.kind == "none" and "Newton did not converge" in reason:
+    if convergence.kind in OF_CONVERGENCE and "did not converge" in reason:
+        yield from OF_CONVERGENCE[convergence.kind][1]
+    if convergence.kind == "none" and "Newton did not converge" in reason:
         yield f"solver.newton.max_iterations={MOST_MORE}: a step of a nonlinear problem takes several iterations"
     goal = case.solver.newton.residual * max(residuals, default=0.0)
-    more = course.remaining(residuals[-1], goal) if residuals else None
+    more = convergence.remaining(residuals[-1], goal) if residuals else None
     if more is not None and more <= MOST_MORE:
         most = case.solver.newton.max_iterations + more
         yield f"solver.newton.max_iterations={most}: at this rate it takes {more} iterations more"

@@ -13,7 +13,7 @@ from fsci.case import Case, load_case
 from fsci.explain import advice
 from fsci.explain.place import describe, nearest_node
 from fsci.explain.replay import write_replay
-from fsci.explain.residuals import course, curve
+from fsci.explain.residuals import convergence_of, curve
 from fsci.run.history import read_history
 from fsci.run.summary import shares
 
@@ -70,13 +70,13 @@ def _failure(folder: Path, what: Mapping[str, Any], case: Case) -> Iterator[str]
         yield f"place          ({', '.join(f'{x:.6g}' for x in what['where'])})"
         near = nearest_node(folder / "fields", what["where"])
         yield from () if near is None else describe(near, case)
-    found = course(residuals)
+    found = convergence_of(residuals)
     if residuals and found.kind == "none":
         yield "residuals      too few to tell whether they fall"
         yield from curve(residuals)
     elif residuals:
-        words = advice.COURSES.get(found.kind, (f"the residuals fall by a factor of {found.rate:.2g}",))[0]
-        yield f"residuals      {words if found.kind in (*advice.COURSES, 'converges') else found.kind}"
+        words = advice.OF_CONVERGENCE.get(found.kind, (f"the residuals fall by a factor of {found.rate:.2g}",))[0]
+        yield f"residuals      {words if found.kind in (*advice.OF_CONVERGENCE, 'converges') else found.kind}"
         yield from curve(residuals)
     yield from _suggestions(advice.of_failure(what["reason"], found, residuals, case))
 

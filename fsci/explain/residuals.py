@@ -18,8 +18,8 @@ WIDTH = 40  #: characters of the largest bar
 
 
 @dataclass(frozen=True)
-class Course:
-    """The course of an iteration."""
+class Convergence:
+    """How an iteration converges, or fails to."""
 
     kind: Kind
     rate: float = math.nan  #: median of r_(k+1) / r_k over the last iterations
@@ -31,23 +31,23 @@ class Course:
         return math.ceil(math.log(goal / residual) / math.log(self.rate))
 
 
-def course(residuals: Sequence[float]) -> Course:
+def convergence_of(residuals: Sequence[float]) -> Convergence:
     """The kind and rate of convergence of the last iterations."""
     if len(residuals) < 2:
-        return Course("none")
+        return Convergence("none")
     if not all(math.isfinite(r) for r in residuals):
-        return Course("not finite")
+        return Convergence("not finite")
     last = residuals[-WINDOW:]
     ratios = [after / before for before, after in pairwise(last) if before > 0]
     rate = median(ratios) if ratios else 0.0
     turns = sum((a > 1) != (b > 1) for a, b in pairwise(ratios))
     if len(ratios) > 2 and turns >= len(ratios) - 2 and max(ratios) > 1 and residuals[-1] < max(residuals):
-        return Course("oscillates", rate)
+        return Convergence("oscillates", rate)
     if residuals[-1] > GROWTH * min(residuals):
-        return Course("diverges", rate)
+        return Convergence("diverges", rate)
     if len(ratios) < 2 and rate > STILL:  # one iteration does not show that the next ones do not help
-        return Course("none")
-    return Course("stagnates" if rate > STILL else "converges", rate)
+        return Convergence("none")
+    return Convergence("stagnates" if rate > STILL else "converges", rate)
 
 
 def curve(residuals: Sequence[float]) -> list[str]:

@@ -34,7 +34,7 @@ class DistributedGrid:
         self.original: Indices = fem.input_cells(self.domain)
         #: number in the box of each local cell; of a coarser cell that of its lowest one. Only with `sheets` several
         #: cells have the same number
-        self.numbers: Indices = self.original if sheets is None else sheets.place(self.original)
+        self.numbers: Indices = self.original if sheets is None else sheets.box_cells(self.original)
         if self.nested is not None:
             self.numbers = self.nested.first[self.original]
         self.owned = fem.owned_cells(self.domain)

@@ -154,7 +154,7 @@ def _continued_to(
     inside = ((cells >= 0) & (cells < grid.shape)).all(axis=2)
     at, which = np.nonzero(inside)
     box = np.ravel_multi_index(tuple(cells[at, which].T), grid.shape, order="F")
-    pair, cell = _join(box, sides.cells, sheets.place(sides.cells))
+    pair, cell = _join(box, sides.cells, sheets.box_cells(sides.cells))
     at = at[pair]
     alike = _dot(seen[at], sides.of_cells[cell])
     best = np.zeros(len(numbers))
@@ -165,7 +165,7 @@ def _continued_to(
     np.maximum.at(fullest, at, sheets.fluid[cell])
     well = (sheets.fluid[cell] >= FREE * fullest[at]) & (sheets.fluid[cell] > 0.0)
     at, cell = at[well], cell[well]
-    of_box = np.stack(np.unravel_index(sheets.place(cell), grid.shape, order="F"), axis=1)
+    of_box = np.stack(np.unravel_index(sheets.box_cells(cell), grid.shape, order="F"), axis=1)
     local = np.empty((len(at), grid.dim))
     for axis, edge in enumerate(grid.edges):
         x = np.interp(index[at, axis] / degree, np.arange(len(edge)), edge)

@@ -25,7 +25,7 @@ class SheetWindows:
         self._sheets, self._degree, self._count = sheets, degree, len(numbers)
         #: first direction slowest
         self._steps = np.array(list(product(range(degree + 1), repeat=grid.dim)))
-        place = sheets.place(np.arange(sheets.size))
+        place = sheets.box_cells(np.arange(sheets.size))
         self._index = np.stack(np.unravel_index(place, grid.shape, order="F"), axis=1)
         self._neighbours = neighbours_of(sheets)
         self._fluid = sheets.fluid

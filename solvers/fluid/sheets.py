@@ -117,7 +117,7 @@ class Sheets:
         """Cells of the mesh that have the fluid of a cell of the box, for those that share or lose it."""
         found: dict[int, list[int]] = {int(cell): [] for cell in self.left}
         for cell in self.shares:
-            found.setdefault(int(self.place(np.array([cell]))[0]), []).append(cell)
+            found.setdefault(int(self.box_cells(np.array([cell]))[0]), []).append(cell)
         return found
 
     def cell_at(self, cell: int, x: Array) -> int:
@@ -141,7 +141,7 @@ class Sheets:
             count += len(corners)
         return Mesh(np.concatenate([box.points, *points]), np.concatenate([box.cells, *cells]), box.cell_type)
 
-    def place(self, original: Indices) -> Indices:
+    def box_cells(self, original: Indices) -> Indices:
         """Number in the box of each cell of the mesh; new cells have that of the cell they are a copy of."""
         return np.concatenate([np.arange(self.grid.size), self.cells])[original]
 
@@ -150,7 +150,10 @@ class Sheets:
 
         steps: from the first node of a cell to each in the lattice of this degree, shape (nodes, dim).
         """
-        number, copy = self._lattice(self.place(original), degree, steps), np.zeros((len(original), len(steps)), int)
+        number, copy = (
+            self._lattice(self.box_cells(original), degree, steps),
+            np.zeros((len(original), len(steps)), int),
+        )
         new = original >= self.grid.size
         copy[new] = self.copies[original[new] - self.grid.size][:, _in_cell(steps, degree)]
         size = self.lattice_size(degree)

@@ -33,7 +33,7 @@ def _flow(fluid: Fluid) -> Snapshot | None:
     if velocity is None or pressure is None or shares is None:
         return None
     mesh = grid.grid.mesh() if grid.nested is None else grid.nested.picture()
-    place = np.arange(len(shares)) if grid.sheets is None else grid.sheets.place(np.arange(len(shares)))
+    place = np.arange(len(shares)) if grid.sheets is None else grid.sheets.box_cells(np.arange(len(shares)))
     fraction = np.bincount(place, shares[:, 0])[:, None]
     active = fraction[:, 0] > 0.0
     nodes, cells = np.unique(mesh.cells[active], return_inverse=True)

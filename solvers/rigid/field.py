@@ -110,15 +110,15 @@ class RigidBodies:
         for index, (u, body) in enumerate(zip(self._held_u, self.bodies, strict=True)):
             prescribed = body.held_at(t + dt) - body.held_at(t) if held is None else held[index, body.held_components]
             u[body.held_components] = prescribed
-        self.place(self._held_u)
+        self.set_increments(self._held_u)
 
     def predict(self, t: float) -> None:
         """Predictor: free components keep their velocity."""
         u, path = self._held_u.copy(), self.current.dt * self._velocity(self.old)
         u[:, self.components] += np.where(self._free, path, 0.0).reshape(len(u), -1)
-        self.place(u)
+        self.set_increments(u)
 
-    def place(self, u: Array) -> None:
+    def set_increments(self, u: Array) -> None:
         """Set the increments u since the start of the step, shape (bodies, 6)."""
         self._u = u
         self.now = [
@@ -289,7 +289,7 @@ class RigidBodies:
         for part, u in zip(added, self._u, strict=True):
             part[3:] = vector_rate(u[3:]) @ part[3:]
         self._last = added
-        self.place(self._u + added)
+        self.set_increments(self._u + added)
         size = np.linalg.norm(self._scaled(self._u))
         return float(np.linalg.norm(self._scaled(added)) / size) if size > 0.0 else 0.0
 
@@ -299,7 +299,7 @@ class RigidBodies:
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""
-        self.place(self._u - fraction * self._last)
+        self.set_increments(self._u - fraction * self._last)
 
     def settled(self) -> bool:
         """True: the residual includes the contact conditions."""

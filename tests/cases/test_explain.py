@@ -14,7 +14,7 @@ from small_cases import PLATE
 from fsci.case import load_case
 from fsci.explain import advice
 from fsci.explain.place import Nearest, describe
-from fsci.explain.residuals import course, curve
+from fsci.explain.residuals import convergence_of, curve
 from fsci.plot.picture import plot_run
 from fsci.report.report import read_summary, report
 
@@ -95,15 +95,15 @@ def test_a_run_that_did_not_fail(tmp_path):
     ],
 )
 def test_courses(residuals, kind):
-    assert course(residuals).kind == kind
+    assert convergence_of(residuals).kind == kind
 
 
 def test_iterations_that_are_missing():
     """Residuals 1, 1/2, 1/4, 1/8 need 10 more iterations to 1e-4: 2^-13 is the first below."""
-    found = course((1.0, 0.5, 0.25, 0.125))
+    found = convergence_of((1.0, 0.5, 0.25, 0.125))
     assert found.rate == pytest.approx(0.5)
     assert found.remaining(0.125, 1.1e-4) == math.ceil(math.log(1.1e-4 / 0.125) / math.log(0.5)) == 11
-    assert course((1.0, 30.0)).remaining(30.0, 1.0) is None
+    assert convergence_of((1.0, 30.0)).remaining(30.0, 1.0) is None
 
 
 def test_the_curve_is_logarithmic():
@@ -116,16 +116,19 @@ def test_what_to_try(tmp_path):
     (tmp_path / "case.yaml").write_text("title: a plate\n" + PLATE)
     case = load_case(tmp_path)
     slow = (1.0, 0.5, 0.25, 0.125)
-    words = list(advice.of_failure("Newton did not converge in 25 iterations", course(slow), slow, case))
+    words = list(advice.of_failure("Newton did not converge in 25 iterations", convergence_of(slow), slow, case))
     assert words == ["solver.newton.max_iterations=49: at this rate it takes 24 iterations more"]
     hopeless = (1.0, 0.8)
-    assert list(advice.of_failure("Newton did not converge in 1 iterations", course(hopeless), hopeless, case)) == []
+    assert (
+        list(advice.of_failure("Newton did not converge in 1 iterations", convergence_of(hopeless), hopeless, case))
+        == []
+    )
     single = (5.53e-7, 5.57e-7)
-    assert list(advice.of_failure("Newton did not converge in 1 iterations", course(single), single, case)) == [
+    assert list(advice.of_failure("Newton did not converge in 1 iterations", convergence_of(single), single, case)) == [
         "solver.newton.max_iterations=25: a step of a nonlinear problem takes several iterations"
     ]
     for reason, remedies in advice.REASONS.items():
-        assert list(advice.of_failure(f"so {reason} it is", course(()), (), case)) == list(remedies)
+        assert list(advice.of_failure(f"so {reason} it is", convergence_of(()), (), case)) == list(remedies)
     run = {
         "steps": {"accepted": 10, "retried": 3},
         "newton": {"total": 100},

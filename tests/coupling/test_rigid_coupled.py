@@ -75,14 +75,14 @@ def test_blocks_against_finite_differences(monkeypatch):
     rng = np.random.default_rng(0)
     start = np.zeros((1, 6))
     start[:, bodies.components] = 1e-3 * rng.standard_normal(3)
-    bodies.place(start)
+    bodies.set_increments(start)
     fluid.move(interface.move(interface.displacement()))
     free = np.flatnonzero(~fluid.held)
     fluid.flow[free] += 0.1 * rng.standard_normal(len(free))
     scheme.residual()
 
     def rows(increment):
-        bodies.place(start)
+        bodies.set_increments(start)
         bodies.update(increment)
         fluid.cut.motion.v[:] = interface.velocity(interface.displacement())
         fluid.residual()

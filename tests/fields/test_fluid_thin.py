@@ -131,7 +131,7 @@ def test_nodes_depend_on_their_own_side():
         index = np.stack(np.unravel_index(sheets.on_lattice(nodes, 1), (11, 11), order="F"), axis=1)
         found, exists = SheetWindows(sheets, 1, nodes).cells_around(np.arange(4), index, 2)
         seen = set(found[exists].tolist())
-        column, row = np.unravel_index(sheets.place(np.array(sorted(seen))), (10, 10), order="F")
+        column, row = np.unravel_index(sheets.box_cells(np.array(sorted(seen))), (10, 10), order="F")
         assert (side * (row - 5) >= 0)[column >= 5].all()
         assert seen >= {cell, 57 + 10 * side, 56 + 20 * side}
     tip = np.array([6 + 11 * 6])  # above the plate, a cell behind its tip

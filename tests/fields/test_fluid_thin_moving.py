@@ -80,7 +80,7 @@ def sides(sheets, degree, plate):
     found = {}
     for cell in np.flatnonzero(fluid):
         wetted = set(sheets.bounds[sheets.bounds[:, 0] == cell, 1].tolist())
-        index = np.array(np.unravel_index(sheets.place(np.array([cell]))[0], sheets.grid.shape, order="F"))
+        index = np.array(np.unravel_index(sheets.box_cells(np.array([cell]))[0], sheets.grid.shape, order="F"))
         across = ((index + 0.5) * H - middle) @ [along[1], -along[0]]
         side = 1 if (1 in wetted if wetted else across > 0) else -1
         for node in sheets.nodes(np.array([cell]), degree, steps)[0].tolist():

@@ -184,11 +184,11 @@ def test_tangent_and_jacobian_against_finite_differences(make):
     bodies.begin_step(0.1, 0.1)
     start = np.zeros((1, 6))
     start[:, bodies.components] = 0.3 * rng.standard_normal(len(bodies.components))
-    bodies.place(start)
+    bodies.set_increments(start)
     force = rng.standard_normal((len(bodies.bodies[0].points), dim))
 
     def rows(increment):
-        bodies.place(start)
+        bodies.set_increments(start)
         bodies.update(increment)
         bodies.load(force)
         bodies.residual()

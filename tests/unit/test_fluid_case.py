@@ -1,4 +1,4 @@
-"""The section `fluid` of a case: each mistake with its message, the text it points at, doubts, what grids become."""
+"""The section `fluid` of a case: each mistake with its message, the text it points at, warnings, what grids become."""
 
 import re
 import subprocess
@@ -327,7 +327,7 @@ def test_the_case_without_mistakes_loads():
         ("density: 1.2", "density: 1e6", "4:12: implausible density: 1e+06 kg/m^3 is 1e+06 kg/m^3; check 'units'"),
     ],
 )
-def test_doubts(old, new, warning):
+def test_warnings(old, new, warning):
     found = load(CASE.replace(old, new)).warnings
     assert found == (f"case.yaml:{warning}",)
 
