@@ -17,6 +17,7 @@ from coupling.coupled import Coupled
 from coupling.divided import lengths, step_in_parts
 from coupling.start import start_together
 from solvers.api import Array, State, StepFailed, StepInfo
+from solvers.counted import counted
 
 
 @dataclass(frozen=True)
@@ -80,9 +81,8 @@ class Partitioned:
             if residual <= self._small(found):
                 return history, newton
             if not math.isfinite(residual) or len(history) == self.tolerance.max_iterations:
-                reason = (
-                    f"the coupling iteration did not converge in {len(history)} iterations (residual {residual:.3g} m)"
-                )
+                taken = counted(len(history), "iteration")
+                reason = f"the coupling iteration did not converge in {taken} (residual {residual:.3g} m)"
                 raise StepFailed("coupling", reason, iteration=len(history), history=tuple(history))
             now = CouplingIterate(d, found, coupled.solid.touching())
             if ends is not None:

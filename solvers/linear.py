@@ -9,6 +9,7 @@ from typing import Any, Literal, TypeAlias
 from petsc4py import PETSc
 
 from solvers import unlocked
+from solvers.counted import counted
 from solvers.gauss_seidel import GaussSeidel
 
 Method = Literal["auto", "direct", "iterative", "ilu"]
@@ -22,6 +23,18 @@ DIRECT_LIMIT = {2: 400_000, 3: 30_000}
 # Results would then differ in the last digits from run to run, and of resumed from uninterrupted runs.
 for _option in ("vec_mdot_use_gemv", "vec_maxpy_use_gemv"):
     PETSc.Options()[_option] = False
+
+
+_REASONS = PETSc.KSP.ConvergedReason
+#: What PETSc reports of a Krylov method that stopped without a solution.
+WHY_STALLED = {
+    _REASONS.DIVERGED_MAX_IT: "it reached its limit of iterations",
+    _REASONS.DIVERGED_DTOL: "its residual grew",
+    _REASONS.DIVERGED_BREAKDOWN: "its directions became dependent",
+    _REASONS.DIVERGED_INDEFINITE_PC: "the preconditioner is not positive definite",
+    _REASONS.DIVERGED_INDEFINITE_MAT: "the matrix is not positive definite",
+    _REASONS.DIVERGED_NANORINF: "a number is not finite",
+}
 
 
 class LinearSolveFailed(ArithmeticError):
@@ -279,5 +292,11 @@ def solve(
         if ksp.getType() == PETSc.KSP.Type.PREONLY or reason == failed:
             raise LinearSolveFailed("the linear system is singular: is a body not supported?", singular=True)
         raise LinearSolveFailed(
-            f"the linear solver stalled after {ksp.getIterationNumber()} iterations (PETSc reason {reason})"
+            f"the linear solver stalled after {counted(ksp.getIterationNumber(), 'iteration')} ({reason_of(ksp)})"
         )
+
+
+def reason_of(ksp: PETSc.KSP) -> str:
+    """Why a linear solver stopped without a solution."""
+    reason = ksp.getConvergedReason()
+    return WHY_STALLED.get(reason, f"PETSc gives the reason {reason}")

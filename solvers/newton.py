@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from solvers.api import StepFailed, StepInfo
+from solvers.counted import counted
 
 
 class System(Protocol):
@@ -100,7 +101,7 @@ def converge(system: System, tolerance: Tolerance, unmoved: float = 0.0) -> Step
         elif iterate.settled and _accepted(iterate, max(unmoved, *history), system.round_off(), tolerance):
             return StepInfo(iterate.number, tuple(history))
         elif iterate.number == tolerance.max_iterations:
-            reason = f"Newton did not converge in {iterate.number} iterations (residual {history[-1]:.3g} N)"
+            reason = f"Newton did not converge in {counted(iterate.number, 'iteration')} (residual {history[-1]:.3g} N)"
         else:
             continue
         raise StepFailed(system.name, reason, iteration=iterate.number, where=system.worst(), history=tuple(history))

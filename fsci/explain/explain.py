@@ -16,6 +16,7 @@ from fsci.explain.replay import write_replay
 from fsci.explain.residuals import convergence_of, curve
 from fsci.run.history import read_history
 from fsci.run.summary import shares
+from solvers.counted import counted
 
 SLOWEST = 3  #: steps that are named
 
@@ -57,7 +58,8 @@ def _steps(summary: Mapping[str, Any], out: Path) -> Iterator[str]:
         step, time, dt, iterations, seconds = (
             history[name][row] for name in ("step", "time", "dt", "iterations", "wall")
         )
-        yield f"slow step      {step:.0f} to time {time:.6g}, dt {dt:.3g}: {iterations:.0f} iterations, {seconds:.3g} s"
+        taken = counted(int(iterations), "iteration")
+        yield f"slow step      {step:.0f} to time {time:.6g}, dt {dt:.3g}: {taken}, {seconds:.3g} s"
 
 
 def _failure(folder: Path, what: Mapping[str, Any], case: Case) -> Iterator[str]:

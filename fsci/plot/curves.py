@@ -102,7 +102,7 @@ def plot_history(folder: Path, history: History, quantities: Mapping[str, str], 
 
     `quantities` maps probes to what they measure, `units` are those of length, mass and time.
     """
-    if not len(history.get("time", ())):  # no step was accepted
+    if len(history.get("time", ())) < 2:  # no curve: no step was accepted, or the run is one steady state
         return []
     families: dict[str, list[str]] = {}
     for name in history:

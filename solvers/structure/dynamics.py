@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from solvers.api import Array, StepFailed
 from solvers.blocks import block_diagonal
 from solvers.generalised_alpha import GeneralisedAlpha
+from solvers.linear import reason_of
 from solvers.structure.first_state import FirstState
 from solvers.structure.instant import Instant, Moving, times
 from solvers.structure.massless import massless_dofs
@@ -100,9 +101,9 @@ class Dynamics:
         ksp.getPC().setType(PETSc.PC.Type.JACOBI)
         ksp.setTolerances(rtol=1e-15, atol=0.0, max_it=1000)
         ksp.solve(b, x)
-        if (reason := ksp.getConvergedReason()) < 0:
+        if ksp.getConvergedReason() < 0:
             finite = np.isfinite(b.norm())
-            why = f"PETSc reason {reason}" if finite else "a force is not a number"
+            why = reason_of(ksp) if finite else "a force is not a number"
             raise StepFailed("structure", f"the acceleration at the start cannot be computed ({why})")
         now.a[:] = x.array
 

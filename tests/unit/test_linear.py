@@ -306,3 +306,24 @@ def test_functions_in_python_end_before_python():
         done = on_processes(processes, "-c", program)
         assert "rror" not in done.stdout + done.stderr
         assert "leaked" not in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    ("most", "matrix", "why"),
+    [
+        (1, np.diag([1.0, 2.0, 3.0]), "after 1 iteration (it reached its limit of iterations)"),
+        (9, np.diag([1.0, -2.0, 3.0]), "after 2 iterations (the matrix is not positive definite)"),
+        (9, np.diag([1.0, np.nan, 3.0]), "after 1 iteration (a number is not finite)"),
+    ],
+)
+def test_a_solver_that_stalls_says_why(most, matrix, why):
+    A = PETSc.Mat().createDense(matrix.shape, array=matrix, comm=MPI.COMM_SELF)
+    ksp = PETSc.KSP().create(MPI.COMM_SELF)
+    ksp.setType(PETSc.KSP.Type.CG)
+    ksp.getPC().setType(PETSc.PC.Type.NONE)
+    ksp.setTolerances(rtol=1e-12, max_it=most)
+    x, b = A.createVecs()
+    b.set(1.0)
+    with pytest.raises(linear.LinearSolveFailed) as failed:
+        linear.solve(ksp, A, b, x)
+    assert str(failed.value) == f"the linear solver stalled {why}"

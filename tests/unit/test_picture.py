@@ -179,8 +179,15 @@ def test_balances_and_contact_are_a_picture_each(tmp_path):
 
 
 def test_a_broken_off_run_without_fields_or_summary_is_drawn(tmp_path):
-    HistoryWriter(tmp_path / "history.csv").write(1, 0.1, 0.1, 3, 0.0, {"A": 1.0})
+    writer = HistoryWriter(tmp_path / "history.csv")
+    for step in (1, 2):
+        writer.write(step, 0.1 * step, 0.1, 3, 0.0, {"A": 1.0})
     assert [path.name for path in plot_run(tmp_path)] == ["history_A.png"]
+
+
+def test_one_step_is_no_curve(tmp_path):
+    """Steady runs have a value, not a history."""
+    assert plot_history(tmp_path, {"time": np.ones(1), "A.x": np.ones(1)}, {}, SI) == []
 
 
 def test_columns_of_the_program_have_terms_and_units(tmp_path, monkeypatch):
