@@ -106,6 +106,19 @@ def flying_block(height, speed):
     return make_contact([body], [(("block", "bottom"), plane)], time=time)
 
 
+@pytest.mark.parametrize("length", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize(("gap", "near"), [(0.29, True), (0.31, False)])
+def test_facets_take_part_up_to_a_share_of_an_edge(length, gap, near):
+    """0.3 edges, in any unit: gaps of farther facets are not computed."""
+    mesh = block("quad", 2)
+    edge = 0.5 * length
+    body = make_body("block", replace(mesh, points=length * mesh.points + [0.0, gap * edge]))
+    floor = Surface("floor", length * np.array([[-1.0, 0.0], [2.0, 0.0]]), np.array([[1, 0]]), "line", None)
+    _, contact = make_contact([body], [(("block", "bottom"), floor)])
+    contact.evaluate(np.zeros_like(contact.nodes.points), 0.0)
+    assert contact.near == near
+
+
 @pytest.mark.parametrize("height", [0.0, 1e-9])
 def test_grazing(height):
     """Flying along a plane and touching it with no force: nothing happens, in one Newton step as without the plane."""

@@ -6,10 +6,10 @@ from fluid_setup import block, body, circle, field, loop, make_fluid, nodal_erro
 
 from solvers.api import StepFailed
 from solvers.fluid.grid import uniform
-from solvers.fluid.history import Past
+from solvers.fluid.history import History, Past
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.surface import ImmersedSurface, Motion
-from solvers.fluid.time_scheme import FlowStep
+from solvers.fluid.time_scheme import SCHEMES, FlowStep
 
 VELOCITY, DT = field(2.0, 0.0), 0.01
 
@@ -36,6 +36,18 @@ def advance(fluid, points, number, x, *, hasty=False):
     place(fluid, points, x)
     fluid.solve()
     fluid.end_step()
+
+
+def test_velocities_before_the_start_follow_the_rate():
+    """u(-k dt) = u(0) - k dt du/dt: BDF2 finds this rate in the first step."""
+    history, dt = History(SCHEMES["bdf2"], 2), 0.25
+    rate = np.array([3.0, -2.0])
+    history.start(np.array([1.0, 5.0]))
+    history.continue_back(dt, rate, np.array([True, False]))
+    assert history.past[1].velocity == pytest.approx([0.25, 5.5])
+    assert list(history.past[1].found) == [True, False]
+    difference = history.difference(dt)
+    assert difference.alpha * (history.past[0].velocity + dt * rate) - history.rate(difference) == pytest.approx(rate)
 
 
 def test_restart_knows_all_that_the_steps_knew():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import ufl
 from structure_setup import block, constant, distort, make_structure, vector
 
 from solvers.generalised_alpha import GeneralisedAlpha
@@ -111,6 +112,16 @@ def test_coup_neo_hooke_for_small_nu(lmbda):
     assert body.stress()[0].reshape(3, 3)[:2, :2] == pytest.approx(P @ F.T / J, rel=1e-11)
     volumetric = -2.0 * np.log(J) if lmbda == 0.0 else np.expm1(-2.0 * beta * np.log(J)) / beta
     assert body.internal_energy() == pytest.approx(mu / 2.0 * (volumetric + I1 - 3.0), rel=1e-11)
+
+
+@pytest.mark.parametrize("ratio", [1e-6, 9.99e-4, 1.001e-3])
+@pytest.mark.parametrize("J", [0.01, 0.5, 100.0])
+def test_energy_of_coup_neo_hooke_for_small_nu_and_large_changes_of_volume(J, ratio):
+    """mu ((J^-n - 1)/n + (I_1 - 3)/2) with n = lambda/mu, below and above the limit of the series."""
+    stretch, n = J ** (1.0 / 3.0), ratio
+    energy = CoupNeoHooke(1.0, n).energy(stretch * ufl.Identity(3), ufl.as_ufl(1.0), ufl.as_ufl(n))(())
+    exact = np.expm1(-n * np.log(J)) / n + 1.5 * (stretch**2 - 1.0)
+    assert energy == pytest.approx(exact, rel=1e-12, abs=1e-12)
 
 
 def test_coup_neo_hooke_without_lateral_contraction():
