@@ -155,6 +155,7 @@ class Fluid:
             self.flow[mask] = self.history.past[0].velocity[mask]
         history = tuple(self.history.past)
         self._began = Began(self.unknowns, self.grid.sheets, self.current, history, tuple(self.motions))
+        self.thin.begin_step()
         self.cutter.begin_step()
         self._begin_system(self.current)
         self.prescribe(self.current.t)
@@ -402,7 +403,7 @@ class Fluid:
     def _by_process(self) -> State:
         return nodal_state(self.unknowns, self.grid, self.history, self.system) | {
             "time": self.current.t,
-            "thin": self.thin.follows,
+            "thin": self.thin.save(),
             "linear_solver": self.sequence.position,
             "motion": {body.surface.name: {"x": motion.x, "v": motion.v} for body, motion in self.moved()},
         }

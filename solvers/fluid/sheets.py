@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ from solvers.connected import connected_parts
 from solvers.fluid.box import Grid
 from solvers.fluid.pieces import NOTHING
 from solvers.fluid.regions import SAME, WHOLE, Region, chords_of, regions_in_cell
+from solvers.fluid.sheet_nodes import Joined, node_copies, same_nodes
 from solvers.gauss import gauss
 from solvers.lagrange import lagrange
 from solvers.mesh import Mesh
@@ -202,11 +204,19 @@ def _in_cell(steps: Indices, degree: int) -> Indices:
 
 
 def find_sheets(
-    grid: Grid, facets: Indices, x: Array, bounds: NDArray[np.bool_], *, thin: int = THIN, always: bool = False
+    grid: Grid,
+    facets: Indices,
+    x: Array,
+    bounds: NDArray[np.bool_],
+    *,
+    thin: int = THIN,
+    always: bool = False,
+    joined: Joined = MappingProxyType({}),
 ) -> Sheets | None:
     """Sheets of the fluid around surfaces with vertices at x [m]; None in 3D, and if no body is thin, unless `always`.
 
     bounds: facets that are not on the boundary of the box. thin: cells apart, at most, of the fluid on both sides.
+    joined: parts of fluid in these cells at these facets share their nodes.
     """
     if grid.dim != 2 or not len(facets):
         return None
@@ -219,7 +229,7 @@ def find_sheets(
     close = np.flatnonzero(_grown(grid, special, 1)[cells])
     if not (always or _is_thin(grid, parts, links, _facing(parts, x[facets]), close, thin)):
         return None
-    copies = _copies(grid, parts, links, special)
+    copies = node_copies(grid, parts, links, same_nodes(parts, joined), special)
     moved = (copies > 0).any(axis=1)
     linked = np.zeros(len(parts), dtype=bool)
     linked[[n for a, b, _ in links for n in (a, b)]] = True
@@ -339,37 +349,6 @@ def _links(grid: Grid, parts: Sequence[Region]) -> list[tuple[int, int, int]]:
         for one, a, b in below:
             found += [(one, other, axis) for other, c, d in above if min(b, d) - max(a, c) > SAME]
     return sorted(set(found))
-
-
-def _copies(grid: Grid, parts: Sequence[Region], links: Sequence[tuple[int, int, int]], special: Mask) -> Indices:
-    """Number of the copy that each node of a part's cell is, in the lattice of second degree, shape (parts, nodes).
-
-    Among the parts around a node, those with the most fluid keep the node of the box, copy 0.
-    """
-    steps = np.array(list(product(range(3), repeat=grid.dim)))[:, ::-1]  # the first direction fastest
-    size = len(steps)
-    ends = np.array(links, dtype=np.int64).reshape(-1, 3)
-    first, second = [], []
-    for axis in range(grid.dim):
-        a, b, _ = ends[ends[:, 2] == axis].T
-        upper, lower = (np.flatnonzero(steps[:, axis] == at) for at in (2, 0))
-        first.append((a[:, None] * size + upper).ravel())
-        second.append((b[:, None] * size + lower).ravel())
-    group = connected_parts(np.concatenate(first), np.concatenate(second), len(parts) * size)
-    cells = np.array([part.cell for part in parts])
-    index = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1)
-    counts = [2 * n + 1 for n in grid.shape]
-    node = np.ravel_multi_index(tuple(np.moveaxis(2 * index[:, None] + steps, 2, 0)), counts, order="F").ravel()
-    fluid = np.bincount(group, np.repeat([part.share for part in parts], size), len(group))
-    groups = np.unique(group)
-    order = groups[np.lexsort((groups, -fluid[groups], node[groups]))]
-    starts = np.flatnonzero(np.diff(node[order], prepend=-1))
-    rank = np.zeros(len(group), dtype=np.int64)
-    rank[order] = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
-    around = np.zeros(int(np.prod(counts)), dtype=bool)  # all cells around these nodes are among the parts
-    near = np.stack(np.unravel_index(np.flatnonzero(special), grid.shape, order="F"), axis=1)
-    around[np.ravel_multi_index(tuple(np.moveaxis(2 * near[:, None] + steps, 2, 0)), counts, order="F")] = True
-    return np.where(around[node], rank[group], 0).reshape(-1, size)
 
 
 def _neighbours(grid: Grid, cells: Sequence[int]) -> set[tuple[int, int]]:

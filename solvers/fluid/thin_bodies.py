@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from solvers.api import Array, StepFailed
+from solvers.api import Array, State, StepFailed
 from solvers.fluid.box import Grid
 from solvers.fluid.cut import off_boundary
 from solvers.fluid.history import Past
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.nested import Nested
 from solvers.fluid.reach import TOO_FAR
+from solvers.fluid.sheet_cycles import joined_in, recurring
 from solvers.fluid.sheet_transfer import along_surface, transfer
 from solvers.fluid.sheets import AROUND, OPPOSED, THIN_IF_MOVING, Sheets, find_sheets
 from solvers.fluid.space import FlowNodes, Unknowns
@@ -40,6 +41,8 @@ class ThinBodies:
         plain = grid.dim == 2 and not periodic and not isinstance(grid, Nested)
         self._possible: bool | None = None if moving and plain and not touching else False
         self._x: Array | None = None
+        self._tried: list[Sheets] = []  #: sheets of this step, in their order
+        self._joined: dict[int, frozenset[int]] = {}  #: parts that stay joined in this step
 
     @property
     def may_follow(self) -> bool:
@@ -53,15 +56,42 @@ class ThinBodies:
         if not self._possible:
             return self._sheets
         if self._x is None or not np.array_equal(self._x, motion.x):
-            off = off_boundary(self._grid, motion.x[facets])
-            self._sheets = find_sheets(self._grid, facets, motion.x, off, thin=THIN_IF_MOVING, always=self.follows)
-            self._x = motion.x
-            self.follows = self._sheets is not None
+            found = self._find(facets, motion.x)
+            if found is not None and self._join(joined_in(recurring(self._tried, found))):
+                found = self._find(facets, motion.x)
+            if found is not None and not (self._tried and self._tried[-1].same_unknowns(found)):
+                self._tried.append(found)
+            self._sheets, self._x, self.follows = found, motion.x, found is not None
         return self._sheets
 
-    def restore(self, follows: bool) -> None:
-        """Restore a saved state; follows: whether a body has been thin."""
-        self.follows = follows
+    def _find(self, facets: NDArray[np.int64], x: Array) -> Sheets | None:
+        off = off_boundary(self._grid, x[facets])
+        thin, always = THIN_IF_MOVING, self.follows
+        return find_sheets(self._grid, facets, x, off, thin=thin, always=always, joined=self._joined)
+
+    def _join(self, parts: dict[int, frozenset[int]]) -> bool:
+        """Keep parts joined until the step ends; returns whether some are new."""
+        before = self._joined
+        self._joined = before | {cell: before.get(cell, frozenset()) | some for cell, some in parts.items()}
+        return self._joined != before
+
+    def begin_step(self) -> None:
+        """Forget the sheets of the last step."""
+        self._tried = []
+        if self._joined:
+            self._joined, self._x = {}, None
+
+    def save(self) -> State:
+        """The state: whether a body has been thin, and (cell, facet) of joined parts."""
+        pairs = [(cell, facet) for cell, some in sorted(self._joined.items()) for facet in sorted(some)]
+        return {"follows": self.follows, "joined": np.array(pairs, dtype=np.int64).reshape(-1, 2)}
+
+    def restore(self, state: State) -> None:
+        """Restore a saved state."""
+        self.begin_step()
+        self.follows = bool(state["follows"])
+        for cell, facet in np.asarray(state["joined"]).tolist():
+            self._joined[cell] = self._joined.get(cell, frozenset()) | {facet}
         if self._possible is not False:
             self._x = self._sheets = None
 

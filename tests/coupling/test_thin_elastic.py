@@ -1,5 +1,8 @@
 """Elastic walls thinner than a cell: nothing passes, and they carry the difference of the pressures."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 from programs import fsci
@@ -8,6 +11,7 @@ from fsci.case import load_case
 from fsci.run.history import read_history
 from fsci.run.run import run_case
 
+CASES = Path(__file__).parents[2] / "cases"
 CASE = """\
 time: {{step: 0.05, end: {end}}}
 fluid:
@@ -85,3 +89,10 @@ def test_resumed_and_on_two_processes(tmp_path):
         whole = found["whole"][column]
         assert np.array_equal(found["resumed"][column], whole)
         assert np.allclose(found["two"][column], whole, rtol=1e-8, atol=1e-8 * np.abs(whole).max())
+
+
+@pytest.mark.slow
+def test_end_of_a_flag_in_a_plane_of_the_grid(tmp_path):
+    """Twice the end crosses a plane in one iterate and not in the next: no step is repeated."""
+    assert run_case(load_case(CASES / "thin_flag"), tmp_path) == 0
+    assert json.loads((tmp_path / "summary.json").read_text())["steps"] == {"accepted": 100, "retried": 0}

@@ -15,7 +15,8 @@ from solvers.fluid.grid import uniform
 from solvers.fluid.patches import Patch
 from solvers.fluid.sheet_transfer import along_surface, transfer
 from solvers.fluid.sheets import find_sheets
-from solvers.fluid.thin_bodies import may_be_thin
+from solvers.fluid.surface import Motion
+from solvers.fluid.thin_bodies import ThinBodies, may_be_thin
 
 THICKNESS = [1e-3, 0.2, 1.0, 1.5, 3.0]  # in cells
 DRAWS = (range(1), pytest.param(range(1, 20), marks=pytest.mark.slow))
@@ -134,6 +135,24 @@ def test_tip_that_goes_to_another_cell():
         matrix = transfer(old, new, 1, along_surface(facets, second, H)).tocsr()
         far = np.flatnonzero(np.linalg.norm(points[:, None] - first, axis=2).min(axis=1) > 2.0 * H)
         assert np.array_equal(matrix[far].indices, far), draw
+
+
+def test_tip_that_crosses_a_plane_to_and_fro():
+    """Within a step: its sides share nodes from the second time on that it is across, and a new step forgets that."""
+    grid = uniform([0, 0], [2, 1], [20, 10])
+    plate, facets = block([0.23, 0.51], [1.3, 0.54])
+    short, far = (Motion(plate + np.array([way, 0.0]), 0.0 * plate) for way in (-1e-5, 1e-5))
+    bodies = [body("plate", plate, facets, motion=lambda x, t: (x, 0.0 * x))]
+    thin, again = (ThinBodies(grid, bodies, False, None) for _ in range(2))
+    before = [thin.sheets(facets, motion).node_count(1) for motion in (short, far)]
+    assert before[1] > before[0]
+    after = [thin.sheets(facets, motion).node_count(1) for motion in (short, far, short, far)]
+    assert after == [before[0]] * 4
+    again.restore(thin.save())
+    assert again.sheets(facets, far).same_unknowns(thin.sheets(facets, far))
+    for one in (thin, again):
+        one.begin_step()
+        assert one.sheets(facets, far).node_count(1) == before[1]
 
 
 @pytest.mark.parametrize(("size", "thin"), [((3.0, 50.0), True), ((3.2, 50.0), False), ((8.0, 8.0), False)])
