@@ -187,8 +187,17 @@ def test_a_case_that_fails_at_once_says_so_and_keeps_a_checkpoint(tmp_path):
     assert fsci("resume", tmp_path / "out").returncode == 0
 
 
-@pytest.mark.parametrize("scheme", ["monolithic", "iqn"])
-@pytest.mark.parametrize("text", [POST, BLOCK, MEETING], ids=["post", "block", "contact"])
+@pytest.mark.parametrize(
+    ("text", "scheme"),
+    [
+        pytest.param(POST, "monolithic", id="post-monolithic"),
+        pytest.param(POST, "iqn", id="post-iqn", marks=pytest.mark.slow),
+        pytest.param(BLOCK, "monolithic", id="block-monolithic"),
+        pytest.param(BLOCK, "iqn", id="block-iqn", marks=pytest.mark.slow),
+        pytest.param(MEETING, "monolithic", id="contact-monolithic"),
+        pytest.param(MEETING, "iqn", id="contact-iqn"),
+    ],
+)
 def test_two_processes(text, scheme, tmp_path):
     text = text.replace(SCHEMES["monolithic"], SCHEMES[scheme])
     one = run(text, tmp_path, ("verify", "[]"))

@@ -178,7 +178,7 @@ def started(**more: str):
     return simulation.scheme
 
 
-@pytest.mark.parametrize("layer", [0.0, 1e-6])
+@pytest.mark.parametrize("layer", [pytest.param(0.0, marks=pytest.mark.slow), 1e-6])
 def test_both_schemes_agree(layer):
     """Each step from the same state: pressed, less pressed, pulled off, closed again.
 

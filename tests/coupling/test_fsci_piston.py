@@ -17,6 +17,7 @@ EXACT = {
 IMPACT, VELOCITY, IMPULSE, HEIGHT = 0.6350681354, 0.3123785017, 0.6559948536, 0.2
 
 
+@pytest.mark.slow
 def test_piston_with_impact(tmp_path):
     run = fsci("run", "cases/piston_impact", "-o", tmp_path, "--set", "output.fields_every=0", timeout=400)
     assert run.returncode == 0, run.stdout[-2000:]

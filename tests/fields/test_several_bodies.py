@@ -37,7 +37,13 @@ def history(folder, bodies, *, dynamics, processes=1):
     return read_history(out / "history.csv")
 
 
-@pytest.mark.parametrize("dynamics", ["# static", "dynamics: {rho_inf: 0.8}"], ids=["static", "dynamic"])
+@pytest.mark.parametrize(
+    "dynamics",
+    [
+        pytest.param("# static", id="static", marks=pytest.mark.slow),
+        pytest.param("dynamics: {rho_inf: 0.8}", id="dynamic"),
+    ],
+)
 def test_bodies_do_not_influence_each_other(dynamics, tmp_path):
     alone = {name: history(tmp_path, [name], dynamics=dynamics) for name in BODIES}
     for processes in (1, 2):
