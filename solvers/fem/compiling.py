@@ -26,6 +26,9 @@ INTERVAL = 0.2
 
 _listeners: list[Callable[[str], None]] = []
 
+#: What modules gave, by their names and objects: to import one again lists all of the cache, which may be large.
+_loaded: dict[tuple[str, str, tuple[str, ...]], tuple[Any, Any]] = {}
+
 
 @contextmanager
 def listening(say: Callable[[str], None]) -> Iterator[None]:
@@ -52,12 +55,18 @@ def compiling(what: str) -> Iterator[None]:
     locks: list[IO[bytes]] = []
 
     def get_cached_module(name: str, objects: list[str], cache_dir: Path, timeout: int) -> tuple[Any, Any]:
+        key = (str(cache_dir), name, tuple(objects))
+        if key in _loaded:
+            return _loaded[key]
         source = Path(cache_dir) / f"{name}.c"
         lock = None if _ready(source) else _take(source, what)
         if lock is None:
             if not source.exists():  # DOLFINx looks for it first
                 source.touch()
-            return original(name, objects, cache_dir, timeout)
+            found = original(name, objects, cache_dir, timeout)
+            if found[1] is not None:
+                _loaded[key] = found
+            return found
         locks.append(lock)
         _say(f"compiling {what}")
         source.write_bytes(b"")

@@ -30,23 +30,22 @@ def same_nodes(parts: Sequence[Region], joined: Joined) -> list[tuple[int, int]]
 def node_copies(
     grid: Grid,
     parts: Sequence[Region],
-    links: Sequence[tuple[int, int, int]],
+    links: Indices,
     same: Sequence[tuple[int, int]],
     special: Mask,
 ) -> Indices:
     """Number of the copy that each node of a part's cell is, in the lattice of second degree, shape (parts, nodes).
 
-    same: pairs of parts of a cell with the same nodes.
+    links: (part, part of the next cell, axis); same: pairs of parts of a cell with the same nodes.
     Among the parts around a node, those with the most fluid keep the node of the box, copy 0.
     """
     steps = np.array(list(product(range(3), repeat=grid.dim)))[:, ::-1]  # the first direction fastest
     size = len(steps)
-    ends = np.array(links, dtype=np.int64).reshape(-1, 3)
     one, other = np.array(same, dtype=np.int64).reshape(-1, 2).T
     nodes = np.arange(size)
     first, second = [(one[:, None] * size + nodes).ravel()], [(other[:, None] * size + nodes).ravel()]
     for axis in range(grid.dim):
-        a, b, _ = ends[ends[:, 2] == axis].T
+        a, b, _ = links[links[:, 2] == axis].T
         upper, lower = (np.flatnonzero(steps[:, axis] == at) for at in (2, 0))
         first.append((a[:, None] * size + upper).ravel())
         second.append((b[:, None] * size + lower).ravel())

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import dijkstra
 from solvers.api import Array
 from solvers.fluid.extension import FREE, LARGEST, continued, lagrange
 from solvers.fluid.sheet_windows import neighbours_of
-from solvers.fluid.sheets import AROUND, Sheets
+from solvers.fluid.sheets import AROUND, Sheets, join
 
 Indices = NDArray[np.int64]
 
@@ -73,7 +73,7 @@ def transfer(old: Sheets, new: Sheets, degree: int, along: sparse.csr_matrix) ->
     numbers, places = numbers[near[places]], places[near[places]]
     # nodes of the old sheets in the same places
     wet = np.flatnonzero(before.wet)
-    at, candidate = _join(places, wet, old.on_lattice(wet, degree))
+    at, candidate = join(places, wet, old.on_lattice(wet, degree))
     seen = np.diff(after.of_nodes.indptr)[numbers] > 0
     was_seen = np.diff(before.of_nodes.indptr)[candidate] > 0
     alike = _dot(after.of_nodes[numbers[at]], before.of_nodes[candidate])
@@ -127,15 +127,6 @@ def _near(sheets: Sheets, degree: int) -> NDArray[np.bool_]:
     return found
 
 
-def _join(wanted: Indices, values: Indices, keys: Indices) -> tuple[Indices, Indices]:
-    """All pairs (position in `wanted`, value with this key)."""
-    order = np.argsort(keys, kind="stable")
-    low, high = (np.searchsorted(keys[order], wanted, side=side) for side in ("left", "right"))
-    count = high - low
-    at = np.repeat(np.arange(len(wanted)), count)
-    return at, values[order[np.arange(len(at)) + np.repeat(low - (np.cumsum(count) - count), count)]]
-
-
 def _dot(a: sparse.csr_matrix, b: sparse.csr_matrix) -> Array:
     return np.asarray(a.multiply(b).sum(axis=1)).ravel()
 
@@ -154,7 +145,7 @@ def _continued_to(
     inside = ((cells >= 0) & (cells < grid.shape)).all(axis=2)
     at, which = np.nonzero(inside)
     box = np.ravel_multi_index(tuple(cells[at, which].T), grid.shape, order="F")
-    pair, cell = _join(box, sides.cells, sheets.box_cells(sides.cells))
+    pair, cell = join(box, sides.cells, sheets.box_cells(sides.cells))
     at = at[pair]
     alike = _dot(seen[at], sides.of_cells[cell])
     best = np.zeros(len(numbers))

@@ -232,7 +232,7 @@ def find_sheets(
     copies = node_copies(grid, parts, links, same_nodes(parts, joined), special)
     moved = (copies > 0).any(axis=1)
     linked = np.zeros(len(parts), dtype=bool)
-    linked[[n for a, b, _ in links for n in (a, b)]] = True
+    linked[links[:, :2]] = True
     new = np.flatnonzero(moved & linked)  # fluid that is enclosed within one cell counts as solid
     by_cell: dict[int, list[int]] = {}
     for number, part in enumerate(parts):
@@ -246,24 +246,25 @@ def find_sheets(
     }
     cell_of = np.where(moved, -1, cells)
     cell_of[new] = grid.size + np.arange(len(new))
-    linked_cells = cell_of[np.array(links, dtype=np.int64).reshape(-1, 3)[:, :2]]
-    passing = {(parts[a].cell, parts[b].cell) for a, b, _ in links if not moved[a] and not moved[b]}
+    ends = links[:, :2]
+    linked_cells, changed = cell_of[ends], moved[ends].any(axis=1)
+    passing = set(map(tuple, cells[ends[~changed]].tolist()))
     touching = _neighbours(grid, [cell for cell, kept in staying.items() if kept])
-    at_faces = [(a, b) for a, b, _ in links if (moved[a] or moved[b]) and special[[parts[a].cell, parts[b].cell]].any()]
+    at_faces = ends[changed & special[cells[ends]].any(axis=1)]
     fluid = np.concatenate([np.clip(1.0 - moments.fraction, 0.0, 1.0), np.zeros(len(new) + 2 * len(at_faces))])
     fluid[[cell for cell, kept in staying.items() if len(kept) < len(by_cell[cell])]] = 0.0
     for number, share in shares.items():
         fluid[number] = share.fraction
     bounding = [(cell_of[n], facet) for n, part in enumerate(parts) if cell_of[n] >= 0 for facet in part.facets or ()]
-    cells = np.concatenate([new, np.array(at_faces, dtype=np.int64).ravel()])
+    members = np.concatenate([new, at_faces.ravel()])
     return Sheets(
         grid,
         shares,
         np.array(sorted(cell for cell, kept in staying.items() if not kept), dtype=np.int64),
         frozenset(touching - passing),
-        np.array([parts[n].cell for n in cells], dtype=np.int64),
+        cells[members],
         len(at_faces),
-        copies[cells],
+        copies[members],
         _grown(grid, special, AROUND),
         np.unique(linked_cells[(linked_cells >= 0).all(axis=1)], axis=0),
         fluid,
@@ -271,9 +272,7 @@ def find_sheets(
     )
 
 
-def _is_thin(
-    grid: Grid, parts: Sequence[Region], links: Sequence[tuple[int, int, int]], facing: Array, close: Indices, thin: int
-) -> bool:
+def _is_thin(grid: Grid, parts: Sequence[Region], links: Indices, facing: Array, close: Indices, thin: int) -> bool:
     """Whether a thin body is between two parts: they face opposite directions and are not linked nearby.
 
     Parts around a corner of a thick body do not face opposite directions, or are linked around it.
@@ -281,7 +280,7 @@ def _is_thin(
     distance [cells].
     """
     index = np.stack(np.unravel_index([part.cell for part in parts], grid.shape, order="F"), axis=1)
-    ends = np.array(links, dtype=np.int64).reshape(-1, 3)[:, :2]
+    ends = links[:, :2]
     linked = np.zeros(len(parts), dtype=bool)
     linked[ends.ravel()] = True
     number = np.full(len(parts), -1)
@@ -334,21 +333,32 @@ def _grown(grid: Grid, cells: Mask, layers: int) -> Mask:
     return ndimage.binary_dilation(grid.as_box(cells), shape, iterations=layers).ravel(order="F")
 
 
-def _links(grid: Grid, parts: Sequence[Region]) -> list[tuple[int, int, int]]:
-    """(part, part of the next cell, axis) for parts whose wet pieces of the common face overlap."""
-    at: dict[tuple[int, int, int], list[tuple[int, float, float]]] = {}
-    for number, part in enumerate(parts):
-        for (axis, side), a, b in part.faces:
-            at.setdefault((part.cell, axis, side), []).append((number, a, b))
+def _links(grid: Grid, parts: Sequence[Region]) -> Indices:
+    """(part, part of the next cell, axis), sorted, for parts whose wet pieces of the common face overlap."""
+    cells = np.array([part.cell for part in parts], dtype=np.int64)
+    wet = np.array([(*face, a, b) for part in parts for face, a, b in part.faces]).reshape(-1, 4)
+    owner = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
     found = []
-    for (cell, axis, side), below in at.items():
-        stride, count = int(np.prod(grid.shape[:axis])), grid.shape[axis]
-        if not side or cell // stride % count == count - 1:
-            continue
-        above = at.get((cell + stride, axis, 0), [])
-        for one, a, b in below:
-            found += [(one, other, axis) for other, c, d in above if min(b, d) - max(a, c) > SAME]
-    return sorted(set(found))
+    for axis, count in enumerate(grid.shape):
+        stride = int(np.prod(grid.shape[:axis]))
+        low, high = (np.flatnonzero((wet[:, 0] == axis) & (wet[:, 1] == side)) for side in (1, 0))
+        low = low[cells[owner[low]] // stride % count < count - 1]
+        at, above = join(cells[owner[low]] + stride, high, cells[owner[high]])
+        below = low[at]
+        overlap = np.minimum(wet[below, 3], wet[above, 3]) - np.maximum(wet[below, 2], wet[above, 2])
+        linked = overlap > SAME
+        pairs = owner[below[linked]], owner[above[linked]]
+        found.append(np.stack([*pairs, np.full(len(pairs[0]), axis)], axis=1))
+    return np.unique(np.concatenate(found), axis=0)
+
+
+def join(wanted: Indices, values: Indices, keys: Indices) -> tuple[Indices, Indices]:
+    """All pairs (position in `wanted`, value with this key)."""
+    order = np.argsort(keys, kind="stable")
+    low, high = (np.searchsorted(keys[order], wanted, side=side) for side in ("left", "right"))
+    count = high - low
+    at = np.repeat(np.arange(len(wanted)), count)
+    return at, values[order[np.arange(len(at)) + np.repeat(low - (np.cumsum(count) - count), count)]]
 
 
 def _neighbours(grid: Grid, cells: Sequence[int]) -> set[tuple[int, int]]:

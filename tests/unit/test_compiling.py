@@ -7,7 +7,12 @@ import sys
 import time
 
 import pytest
+from ffcx.codegeneration import jit
+from mpi4py import MPI
 from programs import ENVIRONMENT
+
+from fsci import shapes
+from solvers import fem
 
 PROGRAM = """\
 import sys
@@ -99,3 +104,16 @@ def test_process_killed_while_it_compiles(tmp_path):
     done = compile_in(tmp_path)
     assert "the process that was compiling it has been killed; compiling it again" in done.stdout
     assert done.stdout.endswith("[2.0, 9.0]\n")
+
+
+def test_a_compiled_form_is_imported_once(monkeypatch):
+    """Another form that is the same finds the module in memory: importing lists the whole cache."""
+    domain = fem.distribute(MPI.COMM_SELF, shapes.rectangle([1, 1], [1, 1]))
+    imported, original = [], jit.get_cached_module
+    monkeypatch.setattr(jit, "get_cached_module", lambda name, *given: imported.append(name) or original(name, *given))
+    for value in (2.0, 3.0):
+        form = fem.compile_form(fem.constant(domain, value) * fem.volume_measure(domain, 1))
+        assert fem.assemble_scalar(form, MPI.COMM_SELF) == value
+        if value == 2.0:
+            imported.clear()
+    assert imported == []
