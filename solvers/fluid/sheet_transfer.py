@@ -1,8 +1,8 @@
 """Values at the nodes around thin bodies, after these have moved, from those before: each side from its own.
 
-A side is known by the facets that it wets, which move with the body. A node takes its own value if it was on the same
-side before. If the body has passed it, or its side had no node in this place, it takes the polynomial of a well-cut
-cell of its side nearby. So nothing goes from one side to the other, whatever the thickness of the body.
+A side is identified by the facets that it wets. They move with the body. A node takes its own value if it was on the
+same side before. If the body has passed it, or its side had no node in this place, it takes the polynomial of a well-
+cut cell of its side nearby. So nothing goes from one side to the other, whatever the thickness of the body.
 """
 
 from __future__ import annotations

@@ -120,11 +120,11 @@ def test_what_to_try(tmp_path):
     assert words == ["solver.newton.max_iterations=49: at this rate it takes 24 iterations more"]
     hopeless = (1.0, 0.8)
     assert (
-        list(advice.of_failure("Newton did not converge in 1 iterations", convergence_of(hopeless), hopeless, case))
+        list(advice.of_failure("Newton did not converge in 1 iteration", convergence_of(hopeless), hopeless, case))
         == []
     )
     single = (5.53e-7, 5.57e-7)
-    assert list(advice.of_failure("Newton did not converge in 1 iterations", convergence_of(single), single, case)) == [
+    assert list(advice.of_failure("Newton did not converge in 1 iteration", convergence_of(single), single, case)) == [
         "solver.newton.max_iterations=25: a step of a nonlinear problem takes several iterations"
     ]
     for reason, remedies in advice.REASONS.items():
