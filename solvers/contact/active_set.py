@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import StepFailed
+from solvers.api import Array, StepFailed
 from solvers.contact.law.law import OPEN, Statuses
 
 #: Largest count of recurrences of earlier active sets in a step.
@@ -44,8 +44,11 @@ class ActiveSet:
         """Discard the earlier sets, which other loads may have chosen."""
         self.damping, self._earlier, self._recurrences = 1.0, [self.status.tobytes()], 0
 
-    def choose(self, status: Statuses) -> None:
-        """Set the statuses of this iterate. Raises StepFailed if the set cycles."""
+    def choose(self, status: Statuses, x: Array) -> None:
+        """Set the statuses of this iterate. Raises StepFailed if the set cycles, with the place of the first node.
+
+        x: positions [m] of the nodes of all multipliers, shape (C, dim).
+        """
         self.changed = bool(np.any(status != self.status))
         self.changes += self.changed
         if self.changed:
@@ -54,11 +57,13 @@ class ActiveSet:
                 self._recurrences += 1
                 self.damping *= ON_RECURRENCE
             if self._recurrences > MAX_RECURRENCES:
-                alternating = int(np.sum(status != self.status))
+                alternating = np.flatnonzero(status != self.status)
+                change = "node changes its" if len(alternating) == 1 else "nodes change their"
                 raise StepFailed(
                     "contact",
-                    f"the active set cycles: {alternating} nodes change their status again and again; "
+                    f"the active set cycles: {len(alternating)} {change} status again and again; "
                     "take a smaller time step",
+                    where=tuple(float(c) for c in x[alternating[0]]),
                 )
             self._earlier.append(chosen)
         self.status = status.copy()

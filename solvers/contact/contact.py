@@ -163,7 +163,7 @@ class Contact:
             for law, which in self.interface.laws:
                 status[which] = law.status(self.point(which))
             self._drop_dependent(status)
-        self.active_set.choose(status)
+        self.active_set.choose(status, x[self.multipliers.node])
         self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
         self._idle = self.terms is None
 

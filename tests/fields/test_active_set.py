@@ -38,7 +38,7 @@ def update(active_set, pressure, gap, covered=ALL, c=ONE):
         slip=0.0 * z,
         slip_defined=covered,
     )
-    active_set.choose(Frictionless().status(point))
+    active_set.choose(Frictionless().status(point), np.arange(2.0 * size).reshape(size, 2))
     return active_set.active.tolist()
 
 
@@ -83,6 +83,7 @@ def test_going_in_circles_is_reported():
         flip(active_set, 100)
     assert "contact: the active set cycles: 2 nodes change their status again and again" in str(caught.value)
     assert caught.value.field == "contact"
+    assert caught.value.where == (2.0, 3.0), "the first of the two"
 
 
 def test_a_new_step_forgets_the_circles():
@@ -96,7 +97,7 @@ def test_growing_is_no_circle():
     active_set = ActiveSet(100)
     active_set.begin_step()
     for n in range(100):
-        active_set.choose((np.arange(100) <= n).astype(np.int8))
+        active_set.choose((np.arange(100) <= n).astype(np.int8), np.zeros((100, 2)))
     assert active_set.changes == 100
 
 
