@@ -19,8 +19,10 @@ Verdict = Literal["right", "edge", "refused", "wrong"]
 AGREEMENT = 1e-6
 #: Error of a balance by the tolerance of the solver, relative to the largest flow or force.
 BALANCE = 1e-6
-#: Rounding error of the volume [m^3/s] that flows in a scene at rest, where it would be of the order of 1 if it moved.
-AT_REST = 1e-13
+#: Rounding errors in a scene at rest, relative to the volume and the momentum that would pass per time if it moved with
+#: unit velocity: there are no larger flow rates and forces to compare them with. Some 5,000 units of rounding, for sums
+#: over as many terms.
+AT_REST = 1e-12
 #: Difference of twins at an edge: the effect of another cut on these coarse grids.
 NEAR = 0.05
 #: Shifts [m] of the whole scene that change nothing but rounding: twins that differ although these agree are wrong.
@@ -68,7 +70,7 @@ def _balances(draw: Draw, run: Ended) -> Iterator[tuple[str, float, float]]:
     if "interface.momentum" in history:
         flux = draw.scene.parameters.get("density", 0.0)  # of momentum, with unit velocity and width
         force = max(_largest(history, f"force.{i}") for i in "xyz") or flux  # no force: the body has left the box
-        yield "interface.momentum", _largest(history, "interface.momentum"), BALANCE * force
+        yield "interface.momentum", _largest(history, "interface.momentum"), max(BALANCE * force, AT_REST * flux)
     if draw.scene.name.startswith("press"):
         axes = "xyz"[: draw.scene.dim]
         sums = [history[f"top.{i}"] + history[f"bottom.{i}"] for i in axes]
@@ -97,7 +99,10 @@ def other_bits(run: Ended, twin: Ended) -> str:
 
 
 def distance(draw: Draw, run: Ended, twin: Ended, frame: Frame) -> tuple[float, str]:
-    """By how much of its largest value a probe differs, and which one; infinite if the runs end at other times."""
+    """By how much of its largest value a probe differs, and which one; infinite if the runs end at other times.
+
+    Values below AT_REST / AGREEMENT count as this: their differences may be rounding errors.
+    """
     quantities = {name: probe["quantity"] for name, probe in draw.scene.probes.items()}
     dim = draw.scene.dim
     ours, theirs = Frame().back(run.history, quantities, dim), frame.back(twin.history, quantities, dim)
@@ -108,8 +113,8 @@ def distance(draw: Draw, run: Ended, twin: Ended, frame: Frame) -> tuple[float, 
     for name in quantities:
         columns = [column for column in ours if column == name or column.startswith(f"{name}.")]
         difference = max(float(np.abs(ours[c][rows] - theirs[c][others]).max()) for c in columns)
-        size = max(float(np.abs(ours[c]).max()) for c in columns)
-        if size > 0.0 and difference / size > worst:
+        size = max(AT_REST / AGREEMENT, *(float(np.abs(ours[c]).max()) for c in columns))
+        if difference / size > worst:
             worst, where = difference / size, name
     return worst, where
 

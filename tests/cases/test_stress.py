@@ -101,6 +101,15 @@ def test_a_further_draw_of_each_scene(scene):
     assert "right" in verdicts
 
 
+def test_a_scene_at_rest_has_rounding_errors():
+    """They are larger than a millionth of its forces, which are rounding errors themselves."""
+    heavy = replace(DRAW, scene=replace(SCENE, name="fall", parameters={"density": 0.1}))
+    rests = {"force.x": np.zeros(2), "force.y": np.full(2, 1e-14), "interface.momentum": np.full(2, 1.4e-14)}
+    assert out_of_balance(heavy, replace(GOOD, history={**HISTORY, **rests})) == ""
+    rests["interface.momentum"][1] = 1e-12
+    assert out_of_balance(heavy, replace(GOOD, history={**HISTORY, **rests})).startswith("interface.momentum misses")
+
+
 def test_a_free_body_that_has_left_the_box_has_no_force():
     """Round-off of the momentum is compared with that of the flow then."""
     free = replace(DRAW, scene=replace(SCENE, name="free", parameters={"density": 2.0}))
