@@ -68,6 +68,7 @@ class Cutter:
         self._slivers = NOTHING * sizes.prod(axis=1) / sizes.max(axis=1)  # areas of surface that are neglected
         self._first: _First | None = None
         self._of_step: Cut | None = None
+        self._whole: Cut | None = None  #: without surfaces
 
     def on_coarse_cells(self, layers: int) -> bool:
         """Whether a coarser cell is within some layers of those with ghost penalty, among the cells of this process."""
@@ -91,7 +92,8 @@ class Cutter:
         wet: facets that the flow acts on. The others, and those on the boundary of the box, only close the solid.
         """
         if not len(facets):
-            return self._whole(facets, motion)
+            self._whole = self._whole or self._without_surfaces(facets, motion)
+            return self._whole
         first, begins = self._first, not self._special.any()
         if first is not None and (begins or np.array_equal(self._special, first.special)):
             if (same := first.where(facets, motion, layers)) is not None:
@@ -159,7 +161,7 @@ class Cutter:
         )
         return found if grid.sheets is None else on_sheets(grid, self.points, found)
 
-    def _whole(self, facets: NDArray[np.int64], motion: Motion) -> Cut:
+    def _without_surfaces(self, facets: NDArray[np.int64], motion: Motion) -> Cut:
         """The cut without surfaces."""
         dim, points = self.grid.dim, len(self.points) ** self.grid.dim
         none, nothing = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.int64)

@@ -64,9 +64,11 @@ class FacePenalty:
 
     def assemble(self, matrix: PETSc.Mat, history: Array) -> None:
         self.stale = False
+        history[:] = 0.0
+        if not len(self._faces):
+            return
         fem.assemble_matrix(matrix, self._form.on(interior_facet=self._faces))
         if self._history is not None:
-            history[:] = 0.0
             fem.assemble_vector(self._history.on(interior_facet=self._faces), history)
 
     def settle(self, values: Array) -> Array:

@@ -79,6 +79,7 @@ class FlowSystem:
         self.transmissivity: Array | None = None  #: of the layer on these facets [m^3]; None: no layer
         self.may_close: NDArray[np.bool_] | None = None  #: facets with fluid pressure in closed contact; None: none
         self._interface: InterfaceTerms | None = None
+        self._touched = True  #: surfaces cut cells, on any process; terms of surfaces that do not are zero
         self.seeping: Array | None = None  #: transmissivity of facets in closed contact [m^3]; None: no seepage
         self._zone: ClosedZone | None = None
         self._seepage: ZoneSeepage | None = None
@@ -147,6 +148,10 @@ class FlowSystem:
         self.cut, self._current, grid = cut, False, self.grid
         active = np.zeros(len(grid.numbers), dtype=bool)
         active[cut.active] = True
+        if self.with_bodies:
+            before, self._touched = self._touched, grid.comm.allreduce(len(cut.pieces.cell) > 0, op=MPI.LOR)
+            if before or self._touched:
+                self._interface = None
         self.active_dofs = self.dofs_of(cut.active)
         pattern_changed = False
         if self.ghost is not None:
@@ -257,7 +262,7 @@ class FlowSystem:
             return
         assert self.cut is not None
         cut = self.cut
-        if self.with_bodies:
+        if self.with_bodies and (self._touched or self._interface is None):
             penalty = self._interface_penalties(cut.pieces, cut)
             self.weights.set(cut, penalty)
             self._interface = InterfaceTerms(
@@ -317,7 +322,7 @@ class FlowSystem:
         np.negative(self._ghost_history, out=self._out)
         for form in [*self._residuals, *self._outer_on_cut.residuals]:
             fem.assemble_vector(form, self._out)
-        if self.with_bodies:
+        if self.with_bodies and self._touched:
             self._out += self.interface.velocity_terms(self.cut.motion.v)
             for terms in self.interface.cell_blocks:
                 self._out += terms.rows(self.flow.x.array)

@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 import solvers.fluid.cut
 import solvers.fluid.pressure_level
+import solvers.fluid.system
 from fsci.bench.small import BEAM, BLOCK, FLOW, POST
 from fsci.builder.build import build
 from fsci.case import load_case
@@ -139,6 +140,44 @@ def test_a_body_outside_of_the_box_changes_nothing(tmp_path, monkeypatch):
         iterations = [simulation.scheme.step(n * 0.02, 0.02).iterations for n in range(3)]
         found.append((iterations, simulation.dofs, simulation.scheme.flow.tobytes()))
     assert found[0] == found[1]
+
+
+@pytest.mark.parametrize(
+    ("where", "motion", "count"),
+    [("5, 5", "", 1), ("5, 5", ', motion: {displacement: ["0.1*t", 0]}', 1), ("0.78, 0.51", "", 4)],
+    ids=["outside", "moved outside", "inside"],
+)
+def test_surfaces_that_cut_no_cell_have_no_terms(where, motion, count, tmp_path, monkeypatch):
+    """The first step finds that all of them are zero; those of surfaces in the flow follow its scales in each step."""
+    made, terms = [], solvers.fluid.system.InterfaceTerms
+    monkeypatch.setattr(solvers.fluid.system, "InterfaceTerms", lambda *a: made.append(terms(*a)) or made[-1])
+    text = FLOW + DISC.replace("0.78, 0.51", where).replace("MOTION", motion)
+    iterations_of(written(tmp_path, text, 0.1), 4)
+    assert len(made) == count
+
+
+def test_the_cells_of_a_flow_without_bodies_are_chosen_once(tmp_path):
+    simulation = build(written(tmp_path, FLOW, 0.1), MPI.COMM_WORLD, Timer())
+    simulation.initialise(0.0, 0.02)
+    cuts = []
+    for n in range(3):
+        simulation.scheme.step(n * 0.02, 0.02)
+        cuts.append(simulation.scheme.cut)
+    assert cuts[0] is cuts[1] is cuts[2]
+
+
+def test_a_body_that_enters_the_box_has_terms_again(tmp_path):
+    """Outside at first, then in the flow: it displaces volume, which leaves the box."""
+    motion = ', motion: {displacement: ["-2*t", 0]}'
+    text = FLOW + DISC.replace("0.78, 0.51", "2.24, 0.51").replace("MOTION", motion)
+    simulation = build(written(tmp_path, text, 0.2), MPI.COMM_WORLD, Timer())
+    simulation.initialise(0.0, 0.02)
+    forces = []
+    for n in range(5):
+        simulation.scheme.step(n * 0.02, 0.02)
+        forces.append(np.abs(simulation.scheme.force()["disc"]).sum())
+    assert forces[0] == 0.0
+    assert forces[-1] > 0.0
 
 
 def test_no_tangent_where_only_a_residual_is_needed(tmp_path, monkeypatch):
