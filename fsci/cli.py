@@ -84,7 +84,7 @@ def _parser() -> argparse.ArgumentParser:
     resume = command(_resume, "continue a run from its last checkpoint")
     results(resume)
     settings(
-        resume, "change a setting that a run can go on with: --set time.end=2 --set solver.newton.max_iterations=50"
+        resume, "change a setting with which a run may continue: --set time.end=2 --set solver.newton.max_iterations=50"
     )
 
     plot = command(_plot, "draw the results of a run")

@@ -50,7 +50,7 @@ def compose(
     colours: str | None = None,
     crop: float = 0.0,
 ) -> Scene:
-    """The scene that has room and colours for all the given states, of which there must be one.
+    """The scene whose size and colours fit all the given states, of which there must be one.
 
     Bodies in space are seen from the direction `away`. Without a field nothing has colours. `crop`: percent of the
     points whose values may lie above the colour bar, and of those with negative ones below it. Raises ValueError if no

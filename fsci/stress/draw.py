@@ -50,7 +50,7 @@ class Draw:
     frame: Frame  #: of the twin
     processes: int = 1  #: of the twin
     kill_after: int = 0  #: steps after which the twin is killed and resumed
-    kill_delay: float = 0.0  #: part of a step that it goes on then
+    kill_delay: float = 0.0  #: part of a step that it continues for then
 
     @property
     def how(self) -> str:
