@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import inspect
+from itertools import count
 from typing import Any
 
 import basix.ufl
@@ -21,6 +22,10 @@ from petsc4py import PETSc
 from solvers.api import Array
 
 Indices = NDArray[np.int32]
+
+# UFL sorts the constants of a form by their numbers as text, 10 before 9: where a digit is added the same form would be
+# another one, and would be compiled once more. From here on all numbers have seven digits.
+ufl.Constant._counter = count(1_000_000)
 
 # ------------------------------------------------------------------------------------------------------------ elements
 
