@@ -68,7 +68,11 @@ def immerse(
     at_start = [(body.surface, body.motion(t).x) for body in given if body.motion is not None]
     wet = find_wet([*at_start, *moved], box)
     found = [replace(body, surface=surface) for body, surface in zip(given, wet, strict=False)]
-    return found + [ImmersedBody(surface, None, deforms=deform) for surface in wet[len(given) :]]
+    starts = [points for _, points in moved]
+    return found + [
+        ImmersedBody(surface, None, deforms=deform, start=start)
+        for surface, start in zip(wet[len(given) :], starts, strict=True)
+    ]
 
 
 def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]], box: tuple[Array, Array]) -> list[ImmersedSurface]:

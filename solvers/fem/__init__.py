@@ -8,6 +8,7 @@ import mpi4py.MPI  # DOLFINx from PyPI finds its MPI only after this
 
 from solvers.fem.compiling import listening
 from solvers.fem.domain import (
+    Destinations,
     Domain,
     boundary_facets,
     distribute,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import basix
 import numpy as np
@@ -14,6 +15,9 @@ from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
 from solvers.fem.calls import calls
 from solvers.mesh import Mesh
+
+#: (processes, offsets of the first one of each cell); on rank 0, empty on others.
+Destinations: TypeAlias = tuple[NDArray[np.int32], NDArray[np.int32]]
 
 
 def vtk_from_basix(cell_type: str) -> NDArray[np.int64]:
@@ -47,8 +51,14 @@ class Domain:
         return self.mesh.geometry.dim
 
 
-def distribute(comm: MPI.Comm, mesh: Mesh | None, *, axis_aligned: bool = False) -> Domain:
-    """Distribute a mesh that rank 0 holds (other ranks pass None); axis_aligned: edges of its cells are."""
+def distribute(
+    comm: MPI.Comm, mesh: Mesh | None, *, axis_aligned: bool = False, destinations: Destinations | None = None
+) -> Domain:
+    """Distribute a mesh that rank 0 holds (other ranks pass None).
+
+    axis_aligned: edges of its cells lie along the axes. destinations: processes of each cell, its owner first, and
+    offsets; by the graph of cells if None.
+    """
     header = comm.bcast(None if mesh is None else (mesh.cell_type, mesh.points.shape, mesh.surfaces), root=0)
     cell_type, (nodes, dim), named = header
     record = CELL_TYPES[cell_type]
@@ -57,7 +67,7 @@ def distribute(comm: MPI.Comm, mesh: Mesh | None, *, axis_aligned: bool = False)
         cells, points = np.ascontiguousarray(mesh.cells[:, np.argsort(vtk)], dtype=np.int64), mesh.points
     else:
         cells, points = np.empty((0, len(vtk)), dtype=np.int64), np.empty((0, dim))
-    distributed = calls.create_mesh(comm, cells, points, record.shape.name, record.degree)
+    distributed = calls.create_mesh(comm, cells, points, record.shape.name, record.degree, destinations)
     domain = Domain(distributed, cell_type, record.degree, nodes, source=mesh, axis_aligned=axis_aligned)
     return Domain(**{**vars(domain), "surfaces": _find_surfaces(domain, named)})
 

@@ -55,17 +55,36 @@ def quadrature_element(cell: str, degree: int, shape: tuple[int, ...] = ()) -> A
 # -------------------------------------------------------------------------------------------------------------- meshes
 
 
-def create_mesh(comm: MPI.Comm, cells: NDArray[np.int64], points: Array, cell: str, degree: int) -> dolfinx_mesh.Mesh:
-    """A distributed mesh; processes know the cells behind the facets between them."""
+def create_mesh(
+    comm: MPI.Comm,
+    cells: NDArray[np.int64],
+    points: Array,
+    cell: str,
+    degree: int,
+    destinations: tuple[Indices, Indices] | None = None,
+) -> dolfinx_mesh.Mesh:
+    """A distributed mesh; processes know the cells behind the facets between them.
+
+    destinations: processes of each cell of this process, its owner first, and offsets; None: by the graph of cells.
+    """
     element = lagrange_element(cell, degree, (points.shape[1],))
     most = {"max_facet_to_cell_links": 2}
     known = inspect.signature(dolfinx_mesh.create_mesh).parameters
-    try:
-        partitioner = cpp.mesh.create_cell_partitioner(dolfinx_mesh.GhostMode.shared_facet, 2)
-    except TypeError:
-        partitioner = cpp.mesh.create_cell_partitioner(dolfinx_mesh.GhostMode.shared_facet)
+    partitioner = _by_graph() if destinations is None else _given(destinations)
     more = {name: value for name, value in most.items() if name in known}
     return dolfinx_mesh.create_mesh(comm, cells=cells, x=points, e=ufl.Mesh(element), partitioner=partitioner, **more)
+
+
+def _by_graph() -> Any:
+    try:
+        return cpp.mesh.create_cell_partitioner(dolfinx_mesh.GhostMode.shared_facet, 2)
+    except TypeError:
+        return cpp.mesh.create_cell_partitioner(dolfinx_mesh.GhostMode.shared_facet)
+
+
+def _given(destinations: tuple[Indices, Indices]) -> Any:
+    """A partitioner that returns these; its arguments differ between versions."""
+    return lambda *arguments: cpp.graph.AdjacencyList_int32(*destinations)
 
 
 def geometry_nodes(mesh: dolfinx_mesh.Mesh) -> Indices:

@@ -54,13 +54,27 @@ def quadrature_element(cell: str, degree: int, shape: tuple[int, ...] = ()) -> A
 # -------------------------------------------------------------------------------------------------------------- meshes
 
 
-def create_mesh(comm: MPI.Comm, cells: NDArray[np.int64], points: Array, cell: str, degree: int) -> dolfinx_mesh.Mesh:
-    """A distributed mesh; processes know the cells behind the facets between them."""
+def create_mesh(
+    comm: MPI.Comm,
+    cells: NDArray[np.int64],
+    points: Array,
+    cell: str,
+    degree: int,
+    destinations: tuple[Indices, Indices] | None = None,
+) -> dolfinx_mesh.Mesh:
+    """A distributed mesh; processes know the cells behind the facets between them.
+
+    destinations: processes of each cell of this process, its owner first, and offsets; None: by the graph of cells.
+    """
     # FFCx writes the variant into this element when it compiles the first form. The signatures of later ones, by which
     # the cache finds them, would depend on whether the first was in the cache.
     kind = ufl.Cell(cell, geometric_dimension=points.shape[1])
     element = ufl.VectorElement("Lagrange", kind, degree, variant="equispaced")
-    return dolfinx_mesh.create_mesh(comm, cells, points, ufl.Mesh(element))
+    if destinations is None:
+        return dolfinx_mesh.create_mesh(comm, cells, points, ufl.Mesh(element))
+    return dolfinx_mesh.create_mesh(
+        comm, cells, points, ufl.Mesh(element), partitioner=lambda *_: cpp.graph.AdjacencyList_int32(*destinations)
+    )
 
 
 def geometry_nodes(mesh: dolfinx_mesh.Mesh) -> Indices:

@@ -13,6 +13,8 @@ from solvers.fluid.film import films_of
 from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.immersed import ImmersedBody
+from solvers.fluid.nested import Nested
+from solvers.fluid.partition import partition
 from solvers.fluid.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.sheets import Sheets
 from solvers.fluid.space import Unknowns
@@ -43,7 +45,10 @@ def discretise(
     solver: SolverSettings,
 ) -> Discretisation:
     """The discretisation of a flow around bodies (collective)."""
-    distributed = DistributedGrid(comm, grid, sheets)
+    destinations = None
+    if comm.size > 1 and sheets is None and not isinstance(grid, Nested):
+        destinations = partition(comm, grid, bodies)
+    distributed = DistributedGrid(comm, grid, sheets, destinations)
     unknowns = Unknowns(distributed, settings.degree, periodic_axes(patches))
     boundary = Boundary(distributed, unknowns, patches)
     method = solver.linear if isinstance(solver.linear, str) else "auto"

@@ -25,11 +25,14 @@ Indices = NDArray[np.int64]
 class DistributedGrid:
     """The part of the grid that this process holds: its cells, one layer of ghost cells, and their faces."""
 
-    def __init__(self, comm: MPI.Comm, grid: Grid, sheets: Sheets | None = None):
+    def __init__(
+        self, comm: MPI.Comm, grid: Grid, sheets: Sheets | None = None, destinations: fem.Destinations | None = None
+    ):
+        """destinations: processes of the cells of a box; None: by their graph (collective)."""
         self.comm, self.grid, self.sheets = comm, grid, sheets
         self.nested = grid if isinstance(grid, Nested) else None
         mesh = (grid if sheets is None else sheets).mesh() if comm.rank == 0 else None
-        self.domain = fem.distribute(comm, mesh, axis_aligned=True)
+        self.domain = fem.distribute(comm, mesh, axis_aligned=True, destinations=destinations)
         #: number of each local cell in the mesh, ghosts last
         self.original: Indices = fem.input_cells(self.domain)
         #: number in the box of each local cell; of a coarser cell that of its lowest one. Only with `sheets` several

@@ -24,6 +24,12 @@ class ImmersedBody:
     motion: Callable[[float], Motion] | None
     rests: bool = False  #: it never moves
     deforms: bool = False  #: its volume may change
+    start: Array | None = None  #: positions of its vertices [m] at the start, if another field moves it
+
+    @property
+    def at_start(self) -> Array | None:
+        """Positions of its vertices [m] at the time 0, or where another field starts to move it; None if unknown."""
+        return self.start if self.motion is None else self.motion(0.0).x
 
 
 def rigid_body(
