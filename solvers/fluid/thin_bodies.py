@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,16 +25,20 @@ from solvers.fluid.space import FlowNodes, Unknowns
 from solvers.fluid.surface import Motion, wetness
 from solvers.fluid.time_scheme import FlowStep
 
-#: Thickness in cells up to which moving bodies have separate cells for each side. Thicker bodies have a strip of cells
-#: behind each side instead; fluid would pass where both strips overlap.
-THICK = 3.05
+#: Thickness in cells up to which moving bodies have separate cells for each side. Thicker ones have a strip of cells
+#: behind each side instead, and fluid would pass where both strips share nodes. With first-order velocities, whose
+#: strips have ghost penalties, that is where cut cells are THIN_IF_MOVING apart or less, in any direction.
+THICK = {1: math.sqrt(2.0) * (THIN_IF_MOVING + 1), 2: THIN_IF_MOVING + 0.05}
 
 
 class ThinBodies:
     """Finds the sheets of the fluid for each position of the bodies, after one of these has been thin."""
 
-    def __init__(self, grid: Grid, bodies: Sequence[ImmersedBody], periodic: bool, sheets: Sheets | None):
-        self._grid, self.follows, self._sheets = grid, False, sheets
+    def __init__(
+        self, grid: Grid, bodies: Sequence[ImmersedBody], periodic: bool, sheets: Sheets | None, degree: int = 1
+    ):
+        """degree: of the velocity."""
+        self._grid, self.follows, self._sheets, self._thick = grid, False, sheets, THICK[degree]
         self._wet = wetness([body.surface for body in bodies])
         moving = bool(bodies) and not all(body.rests for body in bodies)
         # between touching surfaces fluid appears and disappears during Newton's iteration, which would not converge
@@ -52,7 +57,7 @@ class ThinBodies:
     def sheets(self, facets: NDArray[np.int64], motion: Motion) -> Sheets | None:
         """Sheets of the fluid around surfaces at their present positions; None if no body has been thin yet."""
         if self._possible is None:
-            self._possible = may_be_thin(self._grid, facets[self._wet], motion.x)
+            self._possible = may_be_thin(self._grid, facets[self._wet], motion.x, self._thick)
         if not self._possible:
             return self._sheets
         if self._x is None or not np.array_equal(self._x, motion.x):
@@ -96,8 +101,8 @@ class ThinBodies:
             self._x = self._sheets = None
 
 
-def may_be_thin(grid: Grid, facets: NDArray[np.int64], x: Array) -> bool:
-    """Whether two parts of the surface face opposite directions with less than THICK cells of solid between them."""
+def may_be_thin(grid: Grid, facets: NDArray[np.int64], x: Array, thick: float) -> bool:
+    """Whether two parts of the surface face opposite directions with less than `thick` cells of solid between them."""
     if not len(facets):
         return False
     a, b = x[facets[:, 0]], x[facets[:, 1]]
@@ -109,14 +114,14 @@ def may_be_thin(grid: Grid, facets: NDArray[np.int64], x: Array) -> bool:
     points = a[of] + part[:, None] * (b - a)[of]
     along = (b - a) / np.where(length > 0.0, length, 1.0)[:, None]
     normal = np.stack([along[:, 1], -along[:, 0]], axis=1)[of]
-    pairs = cKDTree(points).query_pairs(THICK * cell, output_type="ndarray")
+    pairs = cKDTree(points).query_pairs(thick * cell, output_type="ndarray")
     first, second = pairs.T
     opposed = np.einsum("pi,pi->p", normal[first], normal[second]) < OPPOSED
     way = points[second] - points[first]
     behind = np.einsum("pi,pi->p", way, normal[first]) <= 0.0
     sizes = np.stack([_sizes(edge, points[:, axis]) for axis, edge in enumerate(grid.edges)], axis=1)
     size = 1.0 / np.linalg.norm(normal / sizes, axis=1)
-    close = np.linalg.norm(way, axis=1) <= THICK * np.maximum(size[first], size[second])
+    close = np.linalg.norm(way, axis=1) <= thick * np.maximum(size[first], size[second])
     return bool((opposed & behind & close).any())
 
 
