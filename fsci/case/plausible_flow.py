@@ -18,7 +18,6 @@ MOST_CELLS_PER_STEP = 10.0  #: above which `check` warns: cells that a flow or a
 #: Cells across a body that both of its sides need to share no unknowns: with fewer, fluid passes through the body.
 CELLS_ACROSS_AT_REST, CELLS_ACROSS_IF_MOVING = 2.0, 4.0
 CELLS_ALONG = 6.0  #: of a thin body in 2D, from which on each side has unknowns of its own
-CELLS_OF_THIN = 3.0  #: across a body, up to which they have, in flows in which something moves
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
 
 
@@ -86,8 +85,8 @@ def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, 
     smallest = float(fluid.grid.smallest.min())
     rests = not case.elastic_bodies and not any(body.motion or body.free for body in fluid.bodies.values())
     plane = fluid.grid.dimension == 2 and not any(patch.periodic for patch in fluid.patches.values())
-    thin = extent <= CELLS_OF_THIN * smallest * (1.0 + 1e-9) and case.contact is None
-    if (rests or thin) and plane and not fluid.grid.refine and length >= CELLS_ALONG * smallest:
+    apart = rests or case.contact is None
+    if apart and plane and not fluid.grid.refine and length >= CELLS_ALONG * smallest:
         return None  # each side has unknowns of its own
     least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
     if extent >= least * smallest:
