@@ -37,13 +37,20 @@ def error(scheme, element, steps, moving=True):
     return errors(fluid, u, gradient, p, END)[[0, 2]]
 
 
-@pytest.mark.parametrize(("scheme", "order"), [("backward_euler", 1), ("bdf2", 2)])
+@pytest.mark.parametrize(("scheme", "order"), [("backward_euler", 1), ("bdf2", 2), ("bdf2_optimized", 2)])
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_order_in_time(element, scheme, order):
     found = np.array([error(scheme, element, steps) for steps in (16, 32, 64)])
     rates = np.log2(found[:-1] / found[1:])
     assert rates[-1, 0] > order - 0.15, (found, rates)
     assert rates[-1, 1] > order - 0.15, (found, rates)
+
+
+@pytest.mark.slow
+def test_error_of_the_optimized_scheme():
+    """About half of that of BDF2."""
+    two, both = (error(scheme, "q2q1", 64)[0] for scheme in ("bdf2", "bdf2_optimized"))
+    assert both < 0.65 * two
 
 
 @pytest.mark.parametrize("scheme", ["backward_euler", "bdf2"])
