@@ -18,7 +18,7 @@ from solvers.fluid.box import Grid
 from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.surface import Motion, together
 
-#: Work of a cut cell in that of an uncut one: assembly by more points, ghost penalty or extension, terms of surfaces.
+#: Work of a cut cell in that of an uncut one: tangents take 20 and 6.8 us.
 #: Cells within bodies have none.
 CUT = 3.0
 
