@@ -1,42 +1,58 @@
-"""Sparse matrices from sums of small dense blocks; several matrices share the search for blocks that coincide."""
+"""Sparse matrices from sums of small dense blocks that are combinations of given ones, added up where they coincide.
+
+One sparse product computes all sums: rows are the positions of blocks, columns the given blocks.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.sparse import Sparse, compiled
+from solvers.sparse import Indices, Sparse, counted_order
 
 
 class OverlappingBlocks:
-    """Positions of blocks of r rows and c columns: block i is in row block rows[i] and column block columns[i].
+    """Blocks of r rows and c columns: block i is the sum over f of weights[i, f] times the given block (sources[i], f).
 
-    Row block a has the rows a r ... a r + r - 1. The columns of column block b are numbers[i] of any i with
-    columns[i] = b. Blocks at the same position add up.
+    Block i is in row block rows[i] and column block columns[i]. Row block a has the rows a r ... a r + r - 1. The
+    columns of column block b are numbers[i] of any i with columns[i] = b. Blocks at the same position add up.
     """
 
-    def __init__(self, rows: NDArray, columns: NDArray, numbers: NDArray, shape: tuple[int, int], scalars: int):
-        """rows, columns: shape (n,); numbers: (n, c); shape: counts of row and column blocks; scalars: columns."""
-        self._rows, self._columns = shape[0], scalars
-        key = rows.astype(np.int64) * shape[1] + columns
-        order = np.argsort(key, kind="stable")
-        new = np.ones(len(key), dtype=bool)
-        new[1:] = np.diff(key[order]) > 0
-        starts = np.flatnonzero(new)
-        first = order[starts]
-        self._order, self._starts = order.astype(np.int32), np.append(starts, len(key)).astype(np.int32)
-        #: row block of each position, and the first position of each row block
-        self._row, self._begins = rows[first], np.searchsorted(rows[first], np.arange(shape[0] + 1))
-        self._numbers = numbers[first].astype(np.int32)
+    def __init__(
+        self,
+        rows: Indices,
+        columns: Indices,
+        numbers: Indices,
+        weights: Array,
+        sources: Indices,
+        shape: tuple[int, int],
+        scalars: int,
+    ):
+        """rows, columns, sources: shape (n,); numbers: (n, c); weights: (n, factors).
 
-    def matrix(self, values: Array) -> Sparse:
-        """The sum of blocks with values (n, r, c); columns of each row are in the order of the column blocks."""
-        n, r, c = values.shape
-        count = len(self._starts) - 1
-        summed = np.zeros((count, r, c))
-        entries = self._starts, self._order, np.ones(n)
-        compiled.csr_matvecs(count, n, r * c, *entries, np.ascontiguousarray(values).ravel(), summed.ravel())
+        shape: counts of row and column blocks; scalars: columns.
+        """
+        self._rows, self._columns = shape[0], scalars
+        order = counted_order(columns, shape[1])
+        order = order[counted_order(rows[order], shape[0])]
+        row, column = rows[order], columns[order]
+        new = np.ones(len(order), dtype=bool)
+        new[1:] = (row[1:] != row[:-1]) | (column[1:] != column[:-1])
+        starts = np.flatnonzero(new)
+        #: row block of each position, and the first position of each row block
+        self._row, self._begins = row[starts], np.searchsorted(row[starts], np.arange(shape[0] + 1))
+        self._numbers = numbers[order[starts]]
+        factors = weights.shape[1]
+        given = sources[order, None] * np.int32(factors) + np.arange(factors, dtype=np.int32)
+        ends = (np.append(starts, len(order)) * factors).astype(np.int32)
+        size = (int(sources.max(initial=-1)) + 1) * factors
+        self._combination = Sparse(weights[order].ravel(), given.ravel(), ends, (len(starts), size))
+
+    def matrix(self, given: Array) -> Sparse:
+        """The sum of all blocks, each row in the order of column blocks; given: (sources, factors, r, c)."""
+        *_, r, c = given.shape
+        count, size = self._combination.shape
+        summed = (self._combination @ given.reshape(-1, r * c)[:size]).reshape(count, r, c)
         width, row = np.diff(self._begins), self._row
         # row i of the k-th of m blocks of a row block whose first position is s has the line s r + i m + k
         line = (np.arange(count) + (r - 1) * self._begins[row])[:, None] + width[row][:, None] * np.arange(r)

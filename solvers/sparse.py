@@ -170,6 +170,13 @@ def sparse_from_entries(rows: NDArray, columns: NDArray, data: Array, shape: tup
     return _trimmed(out, indices, indptr, shape)
 
 
+def counted_order(keys: Indices, below: int) -> Indices:
+    """The stable order of keys, 0 <= key < below, by counting."""
+    n, (unused, order, starts) = len(keys), _empty(below, len(keys))
+    compiled.coo_tocsr(below, n, n, keys, np.arange(n, dtype=np.int32), np.empty(n), starts, order, unused)
+    return order
+
+
 def sparse_from_array(values: Array) -> Sparse:
     """A matrix with all entries of a dense array, zeros included."""
     rows, columns = values.shape

@@ -61,35 +61,40 @@ class _Sums:
     """Assembles matrices from blocks of pieces; rows are the dofs of some of the vertices."""
 
     def __init__(self, operator: InterfaceTerms, unknowns: Unknowns, vertices: NDArray[np.int64]):
-        self._operator, self._dim, number = operator, operator.dim, np.full(operator.vertices, -1)
+        self._dim, number = operator.dim, np.full(operator.vertices, -1, dtype=np.int32)
         number[vertices] = np.arange(len(vertices))
         corner = number[operator.corners]
         self._ours = corner[:, 0] >= 0  # all vertices of a facet are of the same body
         self._corner = corner[self._ours]
         self._shape = (len(vertices), unknowns.local)
-        self._velocity = self._beside(operator.u)
-        self._pressure = self._beside(operator.p[:, :, None])
+        self._velocity = self._beside(operator.u, operator.fields)
+        self._pressure = self._beside(operator.p[:, :, None], operator.psi[..., None])
 
-    def _beside(self, dofs: NDArray[np.int32]) -> OverlappingBlocks:
-        """Couplings of the vertices of each piece with functions of its cell, dofs (pieces, functions, components)."""
-        dofs, vertices = dofs[self._ours], self._corner.shape[1]
-        numbers = np.repeat(dofs, vertices, axis=1).reshape(-1, dofs.shape[2])
-        rows = np.repeat(self._corner[:, None], dofs.shape[1], axis=1).ravel()
-        return OverlappingBlocks(rows, numbers[:, 0], numbers, self._shape, self._shape[1])
+    def _beside(self, dofs: NDArray[np.int32], weights: Array) -> OverlappingBlocks:
+        """Couplings of the vertices of each piece with functions of its cell.
+
+        dofs: (pieces, functions, components); weights: of the coefficients, (pieces, functions, vertices, fields).
+        """
+        dofs, weights, shape = dofs[self._ours], weights[self._ours], (*dofs.shape[1:2], self._corner.shape[1])
+        numbers = np.repeat(dofs.reshape(-1, dofs.shape[2]), shape[1], axis=0)
+        rows = np.repeat(self._corner[:, None], shape[0], axis=1).ravel()
+        pieces = np.repeat(np.arange(len(dofs), dtype=np.int32), shape[0] * shape[1])
+        weights = weights.reshape(len(rows), weights.shape[3])
+        columns = np.ascontiguousarray(numbers[:, 0])
+        return OverlappingBlocks(rows, columns, numbers, weights, pieces, self._shape, self._shape[1])
 
     def with_flow(self, coefficients: MotionOperator) -> Sparse:
         """The transposed matrix of an operator; columns are local dofs of the flow."""
-        at, dim, ours = self._operator, self._dim, self._ours
-        fields = at.fields[ours]
-        turned = np.swapaxes(coefficients.fields[ours], 2, 3).reshape(len(fields), fields.shape[3], dim * dim)
-        velocity = (fields @ turned[:, None]).reshape(-1, dim, dim)
-        pressure = (at.psi[ours][..., None] * coefficients.psi[ours][:, None, None]).reshape(-1, dim, 1)
+        velocity = np.swapaxes(coefficients.fields[self._ours], 2, 3)
+        pressure = coefficients.psi[self._ours][:, None, :, None]
         return (self._velocity.matrix(velocity) + self._pressure.matrix(pressure)).ordered()
 
     def with_surface(self, blocks: Array) -> Sparse:
         """The matrix of blocks (pieces, vertices, vertices, dim, dim); columns are dofs of the vertices."""
         dim, n, corner = self._dim, self._shape[0], self._corner
         rows, columns = (np.repeat(corner, corner.shape[1], axis=1).ravel(), np.tile(corner, corner.shape[1]).ravel())
-        numbers = columns[:, None] * dim + np.arange(dim)
-        at = OverlappingBlocks(rows, columns, numbers, (n, n), n * dim)
-        return at.matrix(blocks[self._ours].reshape(-1, dim, dim))
+        numbers = columns[:, None] * np.int32(dim) + np.arange(dim, dtype=np.int32)
+        count = len(rows)
+        each = np.ones((count, 1)), np.arange(count, dtype=np.int32)
+        at = OverlappingBlocks(rows, columns, numbers, *each, (n, n), n * dim)
+        return at.matrix(blocks[self._ours].reshape(count, 1, dim, dim))

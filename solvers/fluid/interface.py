@@ -39,7 +39,9 @@ class MotionOperator:
 
     def of(self, by_motion: Array) -> MotionOperator:
         """The operator applied after a map of the motion, shape (pieces, dim, dim)."""
-        return MotionOperator(self.fields @ by_motion[:, None], np.einsum("pi,pij->pj", self.psi, by_motion))
+        pieces, fields, dim, _ = self.fields.shape
+        by_field = self.fields.reshape(pieces, fields * dim, dim) @ by_motion
+        return MotionOperator(by_field.reshape(self.fields.shape), np.einsum("pi,pij->pj", self.psi, by_motion))
 
 
 class InterfaceTerms:

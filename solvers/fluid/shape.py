@@ -22,17 +22,21 @@ def shape_derivatives(interface: InterfaceTerms, flow: Array) -> tuple[MotionOpe
     """(dr/dd, df/dd) by pieces, of the form of `InterfaceTerms.coupling` and `mass_blocks`; flow at local dofs."""
     at, n, mu = interface, interface.n, interface.mu
     u, p = flow[at.u], flow[at.p]
-    area = at.psi.sum(axis=(1, 2))
+    area_of_vertices = at.psi.sum(axis=1)
+    area = area_of_vertices.sum(axis=1)
     share = np.where(area > 0.0, 1.0 / np.where(area > 0.0, area, 1.0), 0.0)
-    grad_u = np.einsum("pai,paj,p->pij", u, at.fields[..., 1:].sum(axis=2), share, optimize=True)
+    pieces, functions, vertices, fields = at.fields.shape
+    of_u = np.swapaxes(u, 1, 2) @ at.fields.reshape(pieces, functions, vertices * fields)
+    grad_u = share[:, None, None] * of_u.reshape(pieces, at.dim, vertices, fields).sum(axis=2)[..., 1:]
     pressure = np.einsum("pa,pa,p->p", p, at.psi.sum(axis=2), share)
     grad_p = np.einsum("pa,paj,p->pj", p, at.pressure_slope, share)
 
     field = n[:, :, None] * grad_p[:, None, :] + at.penalty @ grad_u
     stress = pressure[:, None, None] * np.eye(at.dim) - mu * (grad_u + np.swapaxes(grad_u, 1, 2))
-    turned = np.einsum("pil,plvj->pivj", stress, normal_derivative(at.x, n))
+    slope = normal_derivative(at.x, n)
+    turned = (stress @ slope.reshape(pieces, at.dim, vertices * at.dim)).reshape(slope.shape)
     load = at.mass_of_pieces[:, :, :, None, None] * field[:, None, None]
-    load += np.einsum("pb,pivj->pbvij", at.psi.sum(axis=1), turned)
+    load += np.einsum("pb,pivj->pbvij", area_of_vertices, turned)
     return at.coupling.of(-grad_u), load
 
 

@@ -20,6 +20,7 @@ from solvers.fluid.cut import Cut
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.pieces import Pieces
 from solvers.gauss import gauss
+from solvers.sparse import Sparse
 
 
 class Weights:
@@ -55,19 +56,24 @@ class Weights:
 
     def set(self, cut: Cut, penalty: Array) -> None:
         """Set the coefficients to those of a cut; penalty: tensors of its pieces [Pa s/m], (pieces, dim, dim)."""
-        pieces, cells = cut.pieces, cut.cut
-        size, area = len(cells), pieces.moments.sum(axis=2)
+        pieces, cells, dim = cut.pieces, cut.cut, self.grid.dim
         self._fill(self.fluid, cells, cut.fluid[:, self.order])
-        self._fill(self.n, cells, self._sum(np.einsum("pq,pi->pqi", area, pieces.normal), pieces, size))
-        self._fill(self.penalty, cells, self._sum(np.einsum("pq,pij->pqij", area, penalty), pieces, size))
+        both = np.concatenate([pieces.normal, penalty.reshape(len(penalty), dim * dim)], axis=1)
+        total = self._integrate(pieces, both, len(cells))
+        self._fill(self.n, cells, total[..., :dim])
+        self._fill(self.penalty, cells, total[..., dim:].reshape(*total.shape[:2], dim, dim))
 
-    def _sum(self, values: Array, pieces: Pieces, size: int) -> Array:
-        """Sums over the pieces of each cut cell, points in the order of the rule, divided by the rule's weights."""
-        total = np.zeros((size, *values.shape[1:]))
-        if len(values):
-            cells, starts = np.unique(pieces.cell, return_index=True)
-            total[cells] = np.add.reduceat(values, starts, axis=0)
-        return total[:, self.order]
+    def _integrate(self, pieces: Pieces, values: Array, size: int) -> Array:
+        """int L_q c ds of values c of pieces, (pieces, n), in cut cells; shape (size, points, n)."""
+        count = len(self.order)
+        place = np.argsort(self.order)  # in the rule, of the points of the kernel
+        area = Sparse(
+            pieces.moments.sum(axis=2).ravel(),
+            (count * pieces.cell[:, None] + place).astype(np.int32).ravel(),
+            count * np.arange(len(values) + 1, dtype=np.int32),
+            (len(values), size * count),
+        )
+        return (area.T @ values).reshape(size, count, values.shape[1])
 
     def _fill(self, function, cells: NDArray[np.int32], values: Array) -> None:
         """Values at the points of cut cells, zero elsewhere; shape (cells, points, ...)."""

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from solvers import sparse as module
 from solvers import sparse_public
-from solvers.sparse import diagonal, nothing, sparse, sparse_from_array, sparse_from_entries, stack
+from solvers.sparse import counted_order, diagonal, nothing, sparse, sparse_from_array, sparse_from_entries, stack
 
 NUMBERS = np.random.default_rng(3)
 
@@ -124,3 +124,10 @@ def test_without_the_compiled_routines_the_public_classes_serve():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.strip() == "solvers.sparse_public", done.stderr
+
+
+def test_counted_order():
+    """Equal keys stay in their order."""
+    keys = NUMBERS.integers(0, 6, 50).astype(np.int32)
+    np.testing.assert_array_equal(counted_order(keys, 9), np.argsort(keys, kind="stable"))
+    assert len(counted_order(np.empty(0, dtype=np.int32), 9)) == 0
