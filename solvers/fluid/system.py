@@ -362,6 +362,8 @@ class FlowSystem:
         if self._seepage is not None:
             matrix = self._seepage.added_to(matrix, self.unknowns)
         start = matrix.getOwnershipRange()[0]
+        # multigrid converts the matrix; on several processes PETSc then drops the option for columns of other processes
+        matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)
         matrix.zeroRows((start + np.flatnonzero(identity)).astype(PETSc.IntType), 1.0)
         return matrix
 

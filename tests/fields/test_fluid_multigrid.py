@@ -2,11 +2,13 @@
 
 import itertools
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 from fluid_setup import body, field, make_fluid, sphere, wall
 from mpi4py import MPI
+from programs import on_processes
 
 from fsci.case import load_case
 from fsci.run.run import FAILED, run_case
@@ -20,6 +22,8 @@ from solvers.fluid.nested import RefinedBox, refined
 from solvers.linear import LinearSolveFailed
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
+
+PROGRAM = Path(__file__).parents[1] / "setups" / "fluid_pattern.py"
 
 
 def test_short_cells_are_joined_first():
@@ -235,3 +239,8 @@ solver: {newton: {max_iterations: 1, residual: 1.0e-12}}
     )
     assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") == FAILED
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["steps"] == {"accepted": 0, "retried": 0}
+
+
+def test_rows_of_the_identity_keep_their_entries_on_several_processes():
+    """The conversion of the matrix for multigrid makes PETSc forget to; the next tangent did not fit then."""
+    on_processes(2, PROGRAM)
