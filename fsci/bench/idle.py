@@ -36,6 +36,9 @@ contact:
     floor: {slave: {body: block, on: bottom}, master: {obstacle: floor}}
 """
 
+#: More than five cells wide: the flow around thinner ones has unknowns of each side, unless they may touch.
+WIDE_POST = POST.replace("size: [0.23,", "size: [0.63,")
+
 ROOF = """\
 contact:
   obstacles:
@@ -53,7 +56,7 @@ OUTSIDE = """\
 SCENES = {
     "block, a pair that never meets": (BLOCK.replace("0.001", "50"), "contact"),
     "cube, a pair that never meets": (CUBE, "contact"),
-    "post in a flow, a pair that never meets": (FLOW + POST + ROOF, "contact"),
+    "post in a flow, a pair that never meets": (FLOW + WIDE_POST + ROOF, "contact"),
     "flow, a body outside of the box": (FLOW + OUTSIDE, "  bodies"),
 }
 

@@ -24,6 +24,7 @@ ENVIRONMENT = {
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
 }
 NEVER_ENDED = -1000  #: code of a run that was given up
+PATIENCE = 600.0  #: [s] until then; draws take seconds alone on a core, but a busy machine must not look like a hang
 
 
 @dataclass(frozen=True)
@@ -46,19 +47,19 @@ class Ended:
         return (lines[0] if self.code == 2 else lines[-1]) if lines else ""
 
 
-def run(folder: Path, case: Mapping[str, Any], *, processes: int = 1, patience: float = 120.0) -> Ended:
+def run(folder: Path, case: Mapping[str, Any], *, processes: int = 1, patience: float = PATIENCE) -> Ended:
     """Write a case into a folder and compute it; results in its folder out."""
     write(folder, case)
     return _ended(folder, command("run", str(folder), "-o", str(folder / "out"), processes=processes), patience)
 
 
-def run_text(folder: Path, text: str, *arguments: str, patience: float = 120.0) -> Ended:
+def run_text(folder: Path, text: str, *arguments: str, patience: float = PATIENCE) -> Ended:
     """Compute a case file with any content."""
     (folder / "case.yaml").write_text(text)
     return _ended(folder, command("run", str(folder), "-o", str(folder / "out"), *arguments), patience)
 
 
-def run_killed(folder: Path, case: Mapping[str, Any], *, steps: int, delay: float, patience: float = 120.0) -> Ended:
+def run_killed(folder: Path, case: Mapping[str, Any], *, steps: int, delay: float, patience: float = PATIENCE) -> Ended:
     """Compute a case, kill it some seconds after it has done some steps, and resume it."""
     write(folder, case)
     arguments = command("run", str(folder), "-o", str(folder / "out"))

@@ -351,7 +351,7 @@ class Contact:
     def numbers(self) -> dict[str, float]:
         """Columns for the history."""
         found = {
-            "contact.active": float(len(np.unique(self.multipliers.node[self.active_set.active & ~self._tied]))),
+            "contact.active": float(len(set(self.multipliers.node[self.active_set.active & ~self._tied].tolist()))),
             "contact.changes": float(self.active_set.changes),
         }
         if self._sliding.mortars:
