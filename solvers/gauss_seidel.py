@@ -3,7 +3,7 @@
     [ A11  A12 ]        y1 = P1 x1,    y2 = P2 (x2 - A21 y1)
     [ A21  A22 ]
 
-with P1 the inverse of A11 and P2 a preconditioner of A22. PETSc's own kinds of both, `nest` and `fieldsplit`, add
+with preconditioners P1 of A11 and P2 of A22. PETSc's own kinds of both, `nest` and `fieldsplit`, add
 products to each other by kernels that take four times as long for dense blocks as products alone, and multiply the
 second field by zeros.
 Source: Gee, Kuttler, Wall, Int. J. Numer. Meth. Engng 85 (2011) 987-1016.
@@ -12,7 +12,7 @@ Source: Gee, Kuttler, Wall, Int. J. Numer. Meth. Engng 85 (2011) 987-1016.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -54,22 +54,17 @@ def matrix_of(fields: TwoFields) -> PETSc.Mat:
 
 
 class GaussSeidel(PythonContext):
-    """Context of a preconditioner: LU factors of the first field, `second` for the other one."""
+    """Context of a preconditioner: `first` makes that of the first field, `second` is that of the other one."""
 
-    def __init__(self, second: PETSc.PC):
-        self.second = second
+    def __init__(self, first: Callable[[PETSc.Mat], PETSc.KSP], second: PETSc.PC):
+        self._first, self.second = first, second
         self._factors: PETSc.KSP | None = None
         self._fields: TwoFields | None = None
 
     def setUp(self, preconditioner: PETSc.PC) -> None:
         self._fields = fields = preconditioner.getOperators()[1].getPythonContext()
         (A11, _), (_, A22) = fields.blocks
-        self._factors = factors = PETSc.KSP().create(A11.comm)
-        factors.setType(PETSc.KSP.Type.PREONLY)
-        factors.getPC().setType(PETSc.PC.Type.LU)
-        factors.getPC().setFactorSolverType("mumps")
-        factors.setOperators(A11)
-        factors.setUp()
+        self._factors = self._first(A11)
         self.second.setOperators(A22)
         self.second.setUp()
         self.second.setReusePreconditioner(True)  # also when the matrix changes, until this is set up again

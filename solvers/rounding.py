@@ -18,11 +18,12 @@ def rounding_error(matrix: PETSc.Mat, values: Array) -> Array:
     same in every call.
     """
     x, y = matrix.createVecs()
-    x.array[:] = _signs(matrix.comm.rank, len(values)) * values
+    x.array[:] = random_signs(matrix.comm.rank, len(values)) * values
     matrix.mult(x, y)
     return float(np.finfo(float).eps) * np.abs(y.array)
 
 
 @lru_cache(maxsize=8)
-def _signs(rank: int, n: int) -> Array:
+def random_signs(rank: int, n: int) -> Array:
+    """The n signs of a process, the same in every call."""
     return np.random.default_rng(rank).choice((-1.0, 1.0), n)

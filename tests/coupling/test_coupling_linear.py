@@ -38,6 +38,22 @@ def test_krylov_methods_give_what_the_direct_solver_gives(direct, method):
     same_state(coupled, exact)
 
 
+def test_incomplete_factors_of_the_solid_give_what_the_direct_solver_gives(direct, monkeypatch):
+    element, exact = direct
+    used, preconditioner = [], linear.solid_preconditioner
+
+    def recorded(matrix):
+        used.append(preconditioner(matrix))
+        return used[-1]
+
+    monkeypatch.setattr(linear, "SMALL_SOLID", 0)
+    monkeypatch.setattr(linear, "solid_preconditioner", recorded)
+    coupled, _ = after_two_steps("ilu", element)
+    assert coupled.flow.sequence.position == 0
+    assert {factors.getPC().getType() for factors in used} == {"ilu"}
+    same_state(coupled, exact)
+
+
 def test_a_method_that_stalls_is_followed_by_the_next(direct, monkeypatch):
     """The first one fails once: the run goes on with the next one, says so, and finds the same state."""
     element, exact = direct
