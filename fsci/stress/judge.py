@@ -70,7 +70,9 @@ def _balances(draw: Draw, run: Ended) -> Iterator[tuple[str, float, float]]:
     if "interface.momentum" in history:
         flux = draw.scene.parameters.get("density", 0.0)  # of momentum, with unit velocity and width
         force = max(_largest(history, f"force.{i}") for i in "xyz") or flux  # no force: the body has left the box
-        yield "interface.momentum", _largest(history, "interface.momentum"), max(BALANCE * force, AT_REST * flux)
+        solid = draw.scene.parameters.get("solid density", 0.0) * flux  # weight of a body at rest, of unit volume
+        at_rest = AT_REST * max(flux, solid)
+        yield "interface.momentum", _largest(history, "interface.momentum"), max(BALANCE * force, at_rest)
     if draw.scene.name.startswith("press"):
         axes = "xyz"[: draw.scene.dim]
         sums = [history[f"top.{i}"] + history[f"bottom.{i}"] for i in axes]

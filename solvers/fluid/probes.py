@@ -190,7 +190,7 @@ def _facets(fluid: Fluid, patches: Sequence[str]) -> tuple[np.ndarray, list[Cove
     wet = np.zeros(len(grid.numbers), dtype=bool)
     wet[np.concatenate([cut.uncut, cut.cut])] = True
     free, covered = covered_faces(grid, fluid.unknowns, cut, fluid.unknowns.degree + 1, facets, cells)
-    return facets[wet[cells] & free], covered
+    return facets[wet[cells] & free], [part.only(wet) for part in covered]
 
 
 def mass_balance(fluid: Fluid) -> Callable[[], dict[str, float]]:

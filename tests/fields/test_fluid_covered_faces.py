@@ -10,6 +10,8 @@ from solvers.fluid.balances import Balances
 from solvers.fluid.covered_faces import CoveredFaces
 from solvers.fluid.grid import uniform
 from solvers.fluid.patches import Patch
+from solvers.fluid.probes import flow_rate, mass_balance
+from solvers.fluid.wet_faces import wet_face
 from solvers.gauss import gauss
 
 MU = 0.7
@@ -59,6 +61,32 @@ def test_shear_that_leaves(element, back):
     assert nodal_errors(fluid, u, field(0.0, 0.0)[0], 0.0) == pytest.approx((0.0, 0.0), abs=1e-11)
     on_bodies, _ = Balances(fluid.system)(fluid.held)
     assert np.abs(on_bodies - fluid.force()["bar"].sum(axis=0)).max() < 1e-11
+
+
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_flow_rate_beside_a_corner_that_has_left(element):
+    """u = (1, 0): a film of 0.1 cells between body and outlet parts a cell; each part has its own share of the face.
+
+    Parts of the cell that have no fluid do not count.
+    """
+    u = field(1.0, 0.0)
+    points, facets = block([1.485, 0.306], [1.995, 0.736])
+    middle = points.mean(axis=0)
+    x = turned(points, -0.0283, middle)
+    fluid = make_fluid(
+        uniform([0, 0], [2, 1], [40, 5]),
+        [Patch("rest", ("x-", "y+", "y-"), "velocity", u), Patch("out", ("x+",), "outflow")],
+        [body("block", x, facets, velocity=np.broadcast_to([1.0, 0.0], x.shape).copy())],
+        mu=MU, element=element, scheme="steady",
+    )  # fmt: skip
+    solve_steady(fluid)
+    front = x[points[:, 0] > 1.99]
+    front = front[np.argsort(front[:, 1])]
+    assert front[-1, 0] > 2.0 > front[-2, 0]  # the corner has left
+    assert fluid.grid.sheets is not None
+    covered = wet_face(fluid.grid.grid, "x+", gauss(3)[0], fluid.cut.facets, fluid.cut.motion).weights
+    assert flow_rate(fluid)(["out"]) == pytest.approx(1.0 - 0.2 * (1.0 - covered.sum()), abs=1e-11)
+    assert mass_balance(fluid)()["fluid.mass"] == pytest.approx(0.0, abs=1e-11)
 
 
 @pytest.mark.parametrize("side", [0, 1])
