@@ -172,6 +172,8 @@ def test_method_is_chosen_by_size():
     assert linear.choose_flow("iterative", 3, 10**6, degree=2, steady=True, nested=True) == ("ilu", "direct")
     several = linear.choose_flow("iterative", 3, 10**5, degree=1, steady=False, nested=True, processes=2)
     assert several == ("multigrid", "fill", "direct")
+    several = linear.choose_flow("auto", 3, 150_000, degree=1, steady=False, processes=2)
+    assert several == ("ilu", "multigrid", "direct")
     assert linear.choose_flow("auto", 3, 10**5, degree=1, steady=True, nested=True) == ("ilu", "multigrid", "direct")
     assert linear.choose_flow("auto", 3, 200_000, degree=1, steady=False) == ("multigrid", "fill", "direct")
     assert linear.choose_flow("auto", 3, 20_000, degree=2, steady=True) == ("multigrid", "direct")
