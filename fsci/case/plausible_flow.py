@@ -81,18 +81,20 @@ def _thin_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
 
 
 def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, moves: bool) -> str | None:
-    """Whether fluid passes through a body of this thickness [m], because both of its sides share unknowns."""
+    """What may go wrong with a body of this thickness [m]: fluid passes if both of its sides share unknowns."""
     smallest = float(fluid.grid.smallest.min())
     rests = not case.elastic_bodies and not any(body.motion or body.free for body in fluid.bodies.values())
     plane = fluid.grid.dimension == 2 and not any(patch.periodic for patch in fluid.patches.values())
-    apart = rests or case.contact is None
-    if apart and plane and not fluid.grid.refine and length >= CELLS_ALONG * smallest:
+    separate = plane and not fluid.grid.refine and length >= CELLS_ALONG * smallest
+    if separate and (rests or case.contact is None):
         return None  # each side has unknowns of its own
+    size = f"the body is {extent:.4g} thick, {extent / smallest:.2g} of the smallest cells"
+    if separate and extent < CELLS_ACROSS_AT_REST * smallest:
+        return f"{size}: nothing passes through it, but where it is in contact and opens again, steps may fail"
     least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
     if extent >= least * smallest:
         return None
     how = "that moves " if moves else ""
-    size = f"the body is {extent:.4g} thick, {extent / smallest:.2g} of the smallest cells"
     why = f"where it has fluid on both sides, fluid passes through a body {how}with less than {least:g} cells across"
     return f"{size}: {why}; refine the grid"
 

@@ -122,6 +122,8 @@ class Cutter:
         cells, piece_moments = put_where_fluid_is(box, self.points, moments, piece_normal, overlap)
         touched = counts[moments.piece_facet] & (cells >= 0)
         is_cut, in_use = self._cut_cells(moments, cells, touched)
+        if grid.sheets is not None:
+            is_cut[grid.sheets.touching] = True  # where bodies overlap, the sum of their volumes may exceed the cell
         solid = (moments.fraction >= 1.0 - NOTHING) & ~is_cut  # surfaces that touch keep their cells: they may part
         near = _grow(box.as_box(is_cut), layers).ravel(order="F") if layers else is_cut
         strip = solid & (near | self._special)
@@ -159,7 +161,7 @@ class Cutter:
             facets=facets,
             motion=motion,
         )
-        return found if grid.sheets is None else on_sheets(grid, self.points, found)
+        return found if grid.sheets is None else on_sheets(grid, self.points, found, counts)
 
     def _without_surfaces(self, facets: NDArray[np.int64], motion: Motion) -> Cut:
         """The cut without surfaces."""

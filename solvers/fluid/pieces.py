@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.fluid.box import Grid
+from solvers.gauss import gauss
 from solvers.lagrange import lagrange
 
 #: Distance from a plane of the grid, in cells, up to which a piece lies in it.
@@ -62,3 +64,38 @@ def put_where_fluid_is(
             found[at] = np.moveaxis(moved, 1, dim - axis).reshape(len(at), -1, dim)
     behind[behind >= 0] = np.where(full[behind[behind >= 0]], -1, behind[behind >= 0])
     return np.where(full[cell], behind, cell), found
+
+
+def selected(pieces: Pieces, cell: NDArray[np.int64]) -> Pieces:
+    """Pieces with other cells; those with a negative one are left out."""
+    kept = np.flatnonzero(cell >= 0)
+    return Pieces(cell[kept], pieces.facet[kept], pieces.moments[kept], pieces.mass[kept], pieces.normal[kept])
+
+
+def joined_pieces(some: Sequence[Pieces]) -> Pieces:
+    """All pieces, sorted by cell."""
+    order = np.argsort(np.concatenate([pieces.cell for pieces in some]), kind="stable")
+    names = ("cell", "facet", "moments", "mass", "normal")
+    return Pieces(*(np.concatenate([getattr(pieces, name) for pieces in some])[order] for name in names))
+
+
+def parts_of_facets(cell: int, parts: Array, corners: Array, size: Array, points: Array) -> Pieces:
+    """Pieces in a cell that are parts of facets, in 2D.
+
+    parts: (facet, begin, end) in reference coordinates of the cell, shape (n, 5); corners: of these facets in the same
+    coordinates, (n, 2, 2); size: of the cell [m]; points: of the quadrature in one direction.
+    """
+    facet, ends = parts[:, 0].astype(np.int64), parts[:, 1:].reshape(-1, 2, 2)
+    nodes, weights = gauss(len(points) + 1)
+    along = ends[:, 1] - ends[:, 0]
+    at = ends[:, None, 0] + nodes[:, None] * along[:, None]
+    weight = np.linalg.norm(along * size, axis=1)[:, None] * weights
+    way = corners[:, 1] - corners[:, 0]
+    t = np.einsum("pgi,pi->pg", at - corners[:, None, 0], way) / (way**2).sum(axis=1)[:, None]
+    vertex = np.stack([1.0 - t, t], axis=2)
+    L = np.einsum("pga,pgb->pgba", lagrange(points, at[..., 0]), lagrange(points, at[..., 1]))
+    moments = np.einsum("pgq,pgv,pg->pqv", L.reshape(len(facet), len(nodes), -1), vertex, weight)
+    mass = np.einsum("pgv,pgw,pg->pvw", vertex, vertex, weight)
+    tangent = way * size
+    normal = -np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.linalg.norm(tangent, axis=1)[:, None]
+    return Pieces(np.full(len(facet), cell), facet, moments, mass, normal)

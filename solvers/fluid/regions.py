@@ -22,6 +22,9 @@ from solvers.lagrange import lagrange
 #: Length and area, relative to a cell, below which two points coincide and two areas are equal.
 SAME = 1e-9
 
+#: The surface through a cell: a polyline in reference coordinates, and the facet of each of its segments.
+Chord = tuple[Array, Sequence[int]]
+
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
@@ -35,6 +38,8 @@ class Region:
     faces: tuple[tuple[tuple[int, int], float, float], ...]
     facets: frozenset[int] | None = None  #: facets that bound it in this cell; None: it is all fluid of the cell
     polygon: Array = field(default_factory=lambda: np.empty((0, 2)))  #: corners; empty if it is all fluid of the cell
+    #: where surfaces touch, the parts of facets that bound it: (facet, begin, end), shape (n, 5); None: whole facets
+    surface: Array | None = None
 
     def integrals(self, points: Array) -> Array:
         """int L_q of the Lagrange basis on the tensor points, the first direction fastest, shape (points^2,).
@@ -62,18 +67,16 @@ class Region:
 WHOLE = tuple(((axis, side), 0.0, 1.0) for axis in (0, 1) for side in (0, 1))
 
 
-def regions_in_cell(cell: int, fluid: float, chords: Sequence[tuple[Array, Sequence[int]]]) -> list[Region]:
+def regions_in_cell(cell: int, fluid: float, chords: Sequence[Chord]) -> list[Region] | None:
     """Regions of the fluid in a cell that chords cut.
 
     fluid: share of fluid in the cell; chords: polylines with the numbers of their facets, which begin and end on the
     perimeter of the unit square and have the solid on their left.
-    Chords that do not form closed boundaries, with rounding or with bodies that overlap, give one region whose faces
-    are wet all round.
+    None if chords do not form closed boundaries, with rounding or with bodies that overlap.
     """
-    everything = [Region(cell, fluid, WHOLE)]
-    begins, ends = ([_perimeter(chord[end]) for chord, _ in chords] for end in (0, -1))
+    begins, ends = ([on_perimeter(chord[end]) for chord, _ in chords] for end in (0, -1))
     if np.isnan([*begins, *ends]).any():
-        return everything
+        return None
     left, found = set(range(len(chords))), []
     while left:
         first = now = min(left)
@@ -88,14 +91,14 @@ def regions_in_cell(cell: int, fluid: float, chords: Sequence[tuple[Array, Seque
             following = int(np.argmin(ahead))
             to = s + max(0.0, ahead[following] - SAME)
             polygon += [CORNERS[k % 4] for k in range(int(np.floor(s)) + 1, int(np.ceil(to)))]
-            faces += _wet(s, to)
+            faces += wet_faces(s, to)
             now = following
         if now != first:
-            return everything
+            return None
         region = Region(cell, 0.0, tuple(faces), frozenset(facets), np.array(polygon))
-        found.append(Region(cell, _area(region.polygon), region.faces, region.facets, region.polygon))
+        found.append(Region(cell, area_of(region.polygon), region.faces, region.facets, region.polygon))
     if abs(sum(region.share for region in found) - fluid) > SAME or min(r.share for r in found) < -SAME:
-        return everything
+        return None
     return found
 
 
@@ -141,7 +144,7 @@ def _clip(a: Array, b: Array) -> tuple[float, float] | None:
     return (t0, t1) if t1 > t0 else None
 
 
-def _perimeter(x: Array) -> float:
+def on_perimeter(x: Array) -> float:
     """Arc length of a point on the perimeter of the unit square, counterclockwise from (0, 0); NaN if it is off it."""
     off = np.abs([x[1], 1.0 - x[0], 1.0 - x[1], x[0]])
     side = int(np.argmin(off))
@@ -151,7 +154,7 @@ def _perimeter(x: Array) -> float:
     return side + float(np.clip(along, 0.0, 1.0))
 
 
-def _wet(s: float, to: float) -> list[tuple[tuple[int, int], float, float]]:
+def wet_faces(s: float, to: float) -> list[tuple[tuple[int, int], float, float]]:
     """Pieces of the sides between two arc lengths on the perimeter: ((axis, side), begin, end)."""
     found = []
     for k in range(int(np.floor(s)), int(np.ceil(to))):
@@ -162,6 +165,6 @@ def _wet(s: float, to: float) -> list[tuple[tuple[int, int], float, float]]:
     return found
 
 
-def _area(polygon: Array) -> float:
+def area_of(polygon: Array) -> float:
     x, y = polygon.T
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))

@@ -13,13 +13,17 @@ from solvers.api import Array
 from solvers.connected import connected_parts
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.periodic import FAR, LatticeNodes
+from solvers.fluid.pieces import Pieces, joined_pieces, parts_of_facets, selected
 from solvers.gauss import gauss
 
 Indices = NDArray[np.int64]
 
 
-def on_sheets(grid: DistributedGrid, points: Array, cut: Any) -> Any:
-    """A `Cut` of the box extended to new cells: each has its own share of the fluid and of the pieces of surface."""
+def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np.bool_]) -> Any:
+    """A `Cut` of the box extended to new cells: each has its own share of the fluid and of the pieces of surface.
+
+    counts: facets that the flow acts on.
+    """
     sheets, original = grid.sheets, grid.original
     assert sheets is not None
     box, local = sheets.grid.size, np.full(sheets.grid.size + len(sheets.cells), -1)
@@ -50,11 +54,17 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any) -> Any:
     piece_box, target = grid.numbers[cut.cut[cut.pieces.cell]], np.full(len(cut.pieces.cell), -1)
     for piece, (number, facet) in enumerate(zip(piece_box.tolist(), cut.pieces.facet.tolist(), strict=True)):
         cells_there = sheets.successors.get(number)
-        owner = number if cells_there is None else next((c for c in cells_there if sheets.shares[c].has(facet)), None)
+        if cells_there is None:
+            owner = number
+        else:
+            owner = next((c for c in cells_there if sheets.shares[c].has(facet)), None)
         target[piece] = -1 if owner is None or local[owner] < 0 else place[local[owner]]
-    kept = np.flatnonzero(target >= 0)
-    kept = kept[np.argsort(target[kept], kind="stable")]
-    pieces = cut.pieces
+    parts = [
+        _parts_of_facets(grid, cell, int(place[cell]), surface[counts[surface[:, 0].astype(int)]], points, cut)
+        for number, of_cell in sheets.shares.items()
+        if (cell := local[number]) >= 0 and (surface := of_cell.surface) is not None
+    ]
+    pieces = joined_pieces([selected(cut.pieces, target), *parts])
     return replace(
         cut,
         uncut=cut.uncut[~(empty | new)[cut.uncut]],
@@ -66,15 +76,17 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any) -> Any:
         share=share,
         fluid=fluid,
         fraction=fraction,
-        pieces=replace(
-            pieces,
-            cell=target[kept],
-            facet=pieces.facet[kept],
-            moments=pieces.moments[kept],
-            mass=pieces.mass[kept],
-            normal=pieces.normal[kept],
-        ),
+        pieces=pieces,
     )
+
+
+def _parts_of_facets(grid: DistributedGrid, cell: int, row: int, parts: Array, points: Array, cut: Any) -> Pieces:
+    """The pieces of surface of a cell in which bodies touch; cell: local; row: among the cut cells."""
+    box = grid.grid
+    index = np.unravel_index(grid.numbers[cell], box.shape, order="F")
+    low, high = (np.array([edge[i + side] for edge, i in zip(box.edges, index, strict=True)]) for side in (0, 1))
+    corners = (cut.motion.x[cut.facets[parts[:, 0].astype(int)]] - low) / (high - low)
+    return parts_of_facets(row, parts, corners, high - low, points)
 
 
 def _passable(

@@ -18,8 +18,9 @@ from scipy.sparse.csgraph import dijkstra
 
 from solvers.api import Array
 from solvers.fluid.extension import FREE, LARGEST, continued, lagrange
+from solvers.fluid.sheet_parts import AROUND, join
 from solvers.fluid.sheet_windows import neighbours_of
-from solvers.fluid.sheets import AROUND, Sheets, join
+from solvers.fluid.sheets import Sheets
 
 Indices = NDArray[np.int64]
 

@@ -22,15 +22,14 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from solvers import kernels
 from solvers.api import Array
 from solvers.connected import connected_parts
 from solvers.fluid.box import Grid
-from solvers.fluid.pieces import NOTHING
-from solvers.fluid.regions import SAME, WHOLE, Region, chords_of, regions_in_cell
+from solvers.fluid.regions import Region
 from solvers.fluid.sheet_nodes import Joined, node_copies, same_nodes
+from solvers.fluid.sheet_parts import AROUND, facing_of, grown, links_of, parts_of_fluid, without_slivers
 from solvers.gauss import gauss
 from solvers.lagrange import lagrange
 from solvers.mesh import Mesh
@@ -40,7 +39,6 @@ Mask = NDArray[np.bool_]
 
 THIN = 2  #: largest distance [cells] across a body at which a node or the ghost penalty couples the fluid on two sides
 THIN_IF_MOVING = 3  #: the same [cells] of bodies that move, with a strip of cells behind each side
-AROUND = 3  #: layers of cells around surfaces in which parts and links are found
 OPPOSED = -0.7  #: product of unit normals below which two surfaces face opposite directions: corners below 45 degrees
 
 #: Steps from the first corner of a cell to each corner, in the order of `Grid.mesh`.
@@ -67,9 +65,17 @@ class FluidShare:
             total += region.integrals(points)
         return total
 
+    @property
+    def surface(self) -> Array | None:
+        """Parts of facets that bound the regions, as in `Region`; None: whole facets."""
+        found = [region.surface for region in self.regions if region.surface is not None]
+        return np.concatenate(found) if found else None
+
     def has(self, facet: int) -> bool:
-        """Whether the facet bounds this fluid."""
-        return any(region.facets is None or facet in region.facets for region in self.regions)
+        """Whether the facet bounds this fluid, with all of it that is in the cell."""
+        return any(
+            region.facets is None or (region.surface is None and facet in region.facets) for region in self.regions
+        )
 
     def wet(self, axis: int, side: int, points: Array) -> Array:
         """int L_q over the wet part of a face, relative to the face."""
@@ -121,6 +127,12 @@ class Sheets:
         for cell in self.shares:
             found.setdefault(int(self.box_cells(np.array([cell]))[0]), []).append(cell)
         return found
+
+    @cached_property
+    def touching(self) -> Indices:
+        """Cells of the box with fluid in which bodies touch."""
+        cells = [cell for cell, share in self.shares.items() if share.surface is not None]
+        return np.unique(self.box_cells(np.array(cells, dtype=np.int64)))
 
     def cell_at(self, cell: int, x: Array) -> int:
         """Cell of the mesh that has the fluid at x, given in the reference coordinates of a cell of the box."""
@@ -221,13 +233,14 @@ def find_sheets(
     if grid.dim != 2 or not len(facets):
         return None
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
-    parts, special = _parts(grid, moments, facets, x, bounds)
+    parts, special, touching = parts_of_fluid(grid, moments, facets, x, bounds)
     if not parts and not always:  # all surfaces are outside of the box
         return None
-    links = _links(grid, parts)
+    links = links_of(grid, parts)
+    parts, links = without_slivers(grid, parts, links, touching)
     cells = np.array([part.cell for part in parts], dtype=np.int64)
-    close = np.flatnonzero(_grown(grid, special, 1)[cells])
-    if not (always or _is_thin(grid, parts, links, _facing(parts, x[facets]), close, thin)):
+    close = np.flatnonzero(grown(grid, special, 1)[cells])
+    if not (always or _is_thin(grid, parts, links, facing_of(parts, x[facets]), close, thin)):
         return None
     copies = node_copies(grid, parts, links, same_nodes(parts, joined), special)
     moved = (copies > 0).any(axis=1)
@@ -239,20 +252,20 @@ def find_sheets(
         by_cell.setdefault(part.cell, []).append(number)
     shares = {grid.size + k: FluidShare((parts[n],)) for k, n in enumerate(new)}
     staying = {cell: [n for n in numbers if not moved[n]] for cell, numbers in by_cell.items()}
+    staying |= {cell: [] for cell in touching.tolist() if cell not in by_cell}
+    some = {cell for cell, kept in staying.items() if len(kept) < len(by_cell.get(cell, []))} | set(touching.tolist())
     shares |= {
-        cell: FluidShare(tuple(parts[n] for n in kept))
-        for cell, kept in staying.items()
-        if kept and len(kept) < len(by_cell[cell])
+        cell: FluidShare(tuple(parts[n] for n in kept)) for cell, kept in staying.items() if kept and cell in some
     }
     cell_of = np.where(moved, -1, cells)
     cell_of[new] = grid.size + np.arange(len(new))
     ends = links[:, :2]
     linked_cells, changed = cell_of[ends], moved[ends].any(axis=1)
     passing = set(map(tuple, cells[ends[~changed]].tolist()))
-    touching = _neighbours(grid, [cell for cell, kept in staying.items() if kept])
+    adjacent = _neighbours(grid, [cell for cell, kept in staying.items() if kept])
     at_faces = ends[changed & special[cells[ends]].any(axis=1)]
     fluid = np.concatenate([np.clip(1.0 - moments.fraction, 0.0, 1.0), np.zeros(len(new) + 2 * len(at_faces))])
-    fluid[[cell for cell, kept in staying.items() if len(kept) < len(by_cell[cell])]] = 0.0
+    fluid[sorted(some)] = 0.0
     for number, share in shares.items():
         fluid[number] = share.fraction
     bounding = [(cell_of[n], facet) for n, part in enumerate(parts) if cell_of[n] >= 0 for facet in part.facets or ()]
@@ -261,11 +274,11 @@ def find_sheets(
         grid,
         shares,
         np.array(sorted(cell for cell, kept in staying.items() if not kept), dtype=np.int64),
-        frozenset(touching - passing),
+        frozenset(adjacent - passing),
         cells[members],
         len(at_faces),
         copies[members],
-        _grown(grid, special, AROUND),
+        grown(grid, special, AROUND),
         np.unique(linked_cells[(linked_cells >= 0).all(axis=1)], axis=0),
         fluid,
         np.array(bounding, dtype=np.int64).reshape(-1, 2),
@@ -294,71 +307,6 @@ def _is_thin(grid: Grid, parts: Sequence[Region], links: Indices, facing: Array,
         if (group != group[number[part]])[linked[near] & opposed & (apart[near] <= thin)].any():
             return True
     return False
-
-
-def _facing(parts: Sequence[Region], ends: Array) -> Array:
-    """Mean unit normal of the facets in each part, shape (parts, 2); nan without facets. ends: of facets, (n, 2, 2)."""
-    along = ends[:, 1] - ends[:, 0]
-    normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
-    found = np.full((len(parts), 2), np.nan)
-    for number, part in enumerate(parts):
-        if part.facets:
-            mean = normals[list(part.facets)].sum(axis=0)
-            found[number] = mean / max(float(np.linalg.norm(mean)), SAME)
-    return found
-
-
-def _parts(grid: Grid, moments, facets: Indices, x: Array, bounds: NDArray[np.bool_]) -> tuple[list[Region], Mask]:
-    """(parts of the fluid in all cells around surfaces, cells with surface or solid)."""
-    fluid = 1.0 - moments.fraction
-    touched = np.zeros(grid.size, dtype=bool)
-    touched[moments.cells] = True
-    special = touched | (fluid < 1.0 - SAME)
-    whole = _grown(grid, special, AROUND) & (fluid > NOTHING)
-    found = []
-    ends = np.searchsorted(moments.piece_cell, np.arange(len(moments.cells) + 1))
-    for row, cell in enumerate(moments.cells.tolist()):
-        numbers = moments.piece_facet[ends[row] : ends[row + 1]]
-        chords = chords_of(grid, cell, x, facets, numbers[bounds[numbers]].tolist())
-        if chords and whole[cell]:
-            found += regions_in_cell(cell, float(fluid[cell]), chords)
-            whole[cell] = False
-    found += [Region(int(cell), float(fluid[cell]), WHOLE) for cell in np.flatnonzero(whole)]
-    return sorted(found, key=lambda region: region.cell), special
-
-
-def _grown(grid: Grid, cells: Mask, layers: int) -> Mask:
-    """These cells and so many layers around them."""
-    shape = np.ones((3,) * grid.dim, dtype=bool)
-    return ndimage.binary_dilation(grid.as_box(cells), shape, iterations=layers).ravel(order="F")
-
-
-def _links(grid: Grid, parts: Sequence[Region]) -> Indices:
-    """(part, part of the next cell, axis), sorted, for parts whose wet pieces of the common face overlap."""
-    cells = np.array([part.cell for part in parts], dtype=np.int64)
-    wet = np.array([(*face, a, b) for part in parts for face, a, b in part.faces]).reshape(-1, 4)
-    owner = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
-    found = []
-    for axis, count in enumerate(grid.shape):
-        stride = int(np.prod(grid.shape[:axis]))
-        low, high = (np.flatnonzero((wet[:, 0] == axis) & (wet[:, 1] == side)) for side in (1, 0))
-        low = low[cells[owner[low]] // stride % count < count - 1]
-        at, above = join(cells[owner[low]] + stride, high, cells[owner[high]])
-        below = low[at]
-        overlap = np.minimum(wet[below, 3], wet[above, 3]) - np.maximum(wet[below, 2], wet[above, 2])
-        linked = overlap > SAME
-        pairs = owner[below[linked]], owner[above[linked]]
-        found.append(np.stack([*pairs, np.full(len(pairs[0]), axis)], axis=1))
-    return np.unique(np.concatenate(found), axis=0)
-
-
-def join(wanted: Indices, values: Indices, keys: Indices) -> tuple[Indices, Indices]:
-    """All pairs (position in `wanted`, value with this key)."""
-    order = np.argsort(keys, kind="stable")
-    low, high = (np.searchsorted(keys[order], wanted, side=side) for side in ("left", "right"))
-    count = high - low
-    at = np.repeat(np.arange(len(wanted)), count)
-    return at, values[order[np.arange(len(at)) + np.repeat(low - (np.cumsum(count) - count), count)]]
 
 
 def _neighbours(grid: Grid, cells: Sequence[int]) -> set[tuple[int, int]]:

@@ -19,8 +19,9 @@ from solvers.fluid.immersed import ImmersedBody
 from solvers.fluid.nested import Nested
 from solvers.fluid.reach import TOO_FAR
 from solvers.fluid.sheet_cycles import joined_in, recurring
+from solvers.fluid.sheet_parts import AROUND
 from solvers.fluid.sheet_transfer import along_surface, transfer
-from solvers.fluid.sheets import AROUND, OPPOSED, THIN_IF_MOVING, Sheets, find_sheets
+from solvers.fluid.sheets import OPPOSED, THIN_IF_MOVING, Sheets, find_sheets
 from solvers.fluid.space import FlowNodes, Unknowns
 from solvers.fluid.surface import Motion, wetness
 from solvers.fluid.time_scheme import FlowStep
@@ -29,6 +30,10 @@ from solvers.fluid.time_scheme import FlowStep
 #: behind each side instead, and fluid would pass where both strips share nodes. With first-order velocities, whose
 #: strips have ghost penalties, that is where cut cells are THIN_IF_MOVING apart or less, in any direction.
 THICK = {1: math.sqrt(2.0) * (THIN_IF_MOVING + 1), 2: THIN_IF_MOVING + 0.05}
+
+#: The same with contact, as bodies at rest. Where thicker ones touch, Newton's method may not converge: fluid between
+#: them appears and disappears in its course. They leak little without separate cells (docs/theory_fsci.md).
+THICK_IN_CONTACT = 2.0
 
 
 class ThinBodies:
@@ -41,10 +46,10 @@ class ThinBodies:
         self._grid, self.follows, self._sheets, self._thick = grid, False, sheets, THICK[degree]
         self._wet = wetness([body.surface for body in bodies])
         moving = bool(bodies) and not all(body.rests for body in bodies)
-        # between touching surfaces fluid appears and disappears during Newton's iteration, which would not converge
-        touching = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
+        if any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies):
+            self._thick = THICK_IN_CONTACT
         plain = grid.dim == 2 and not periodic and not isinstance(grid, Nested)
-        self._possible: bool | None = None if moving and plain and not touching else False
+        self._possible: bool | None = None if moving and plain else False
         self._x: Array | None = None
         self._tried: list[Sheets] = []  #: sheets of this step, in their order
         self._joined: dict[int, frozenset[int]] = {}  #: parts that stay joined in this step
