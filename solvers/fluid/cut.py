@@ -12,6 +12,7 @@ from solvers import kernels
 from solvers.api import Array
 from solvers.fluid.film import Films, walls_of
 from solvers.fluid.grid import DistributedGrid, Grid
+from solvers.fluid.overlaps import with_unions
 from solvers.fluid.pieces import FLUSH, NOTHING, Pieces, put_where_fluid_is
 from solvers.fluid.sheet_cells import on_sheets
 from solvers.fluid.surface import Motion
@@ -54,13 +55,16 @@ class Cut:
 class Cutter:
     """Cuts one grid by surfaces that move; `points` (n,) are the 1D points of the quadrature on cut cells.
 
+    unions: where bodies overlap, in 2D, the solid is their union. Else volumes are added up: bodies in contact overlap
+    by facets that do not match, and slivers of fluid beside a contact zone would come and go.
+
     Within a step a cell that the ghost penalty has acted on keeps it. Otherwise iterates that alternate between two
     sides of a face would change the system each time, and Newton's method would not converge. Surfaces that have not
     moved are not cut again. Films, where they are detected, are those of the first cut of a step.
     """
 
-    def __init__(self, grid: DistributedGrid, points: Array, films: Films | None = None):
-        self.grid, self.points, self.films = grid, points, films
+    def __init__(self, grid: DistributedGrid, points: Array, films: Films | None = None, *, unions: bool = False):
+        self.grid, self.points, self.films, self._unions = grid, points, films, unions
         self._own = grid.grid.as_box(grid.in_box)
         self._special = np.zeros(grid.grid.size, dtype=bool)
         self._depth = 0
@@ -115,6 +119,8 @@ class Cutter:
         moments = kernels.moments(box.edges, self.points, motion.x, facets, nearby.ravel(order="F"))
         normal = -unit_normals(motion.x[facets])
         off = off_boundary(box, motion.x[facets])
+        if self._unions:
+            moments = with_unions(box, self.points, moments, facets, motion.x, off)
         counts = off if wet is None else off & wet
         # on sheets, cells that are solid except for rounding have no fluid
         overlap = moments.fraction > (1.0 + NOTHING if grid.sheets is None else 1.0 - NOTHING)

@@ -77,5 +77,7 @@ def discretise(
     system.transmissivity = by_facets(surfaces, [surface.transmissivity for surface in surfaces])
     system.may_close, system.seeping = may_close(surfaces), seeping(surfaces)
     films = films_of(patches, settings.penalties) if settings.films else None
-    cutter = Cutter(distributed, system.weights.points, films)
+    in_contact = any(surface.in_contact is not None and surface.in_contact.any() for surface in surfaces)
+    unions = grid.dim == 2 and sheets is None and len(bodies) > 1 and not in_contact
+    cutter = Cutter(distributed, system.weights.points, films, unions=unions)
     return Discretisation(distributed, unknowns, boundary, system, cutter, methods)

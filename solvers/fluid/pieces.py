@@ -94,7 +94,8 @@ def parts_of_facets(cell: int, parts: Array, corners: Array, size: Array, points
     t = np.einsum("pgi,pi->pg", at - corners[:, None, 0], way) / (way**2).sum(axis=1)[:, None]
     vertex = np.stack([1.0 - t, t], axis=2)
     L = np.einsum("pga,pgb->pgba", lagrange(points, at[..., 0]), lagrange(points, at[..., 1]))
-    moments = np.einsum("pgq,pgv,pg->pqv", L.reshape(len(facet), len(nodes), -1), vertex, weight)
+    L = L.reshape(len(facet), len(nodes), len(points) ** 2)
+    moments = np.einsum("pgq,pgv,pg->pqv", L, vertex, weight)
     mass = np.einsum("pgv,pgw,pg->pvw", vertex, vertex, weight)
     tangent = way * size
     normal = -np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.linalg.norm(tangent, axis=1)[:, None]

@@ -57,11 +57,14 @@ class PressureLevels:
     def keep(self, flow: Array) -> None:
         """Shift the pressure, at owned dofs, of each pocket that keeps its level, so that its mean is kept.
 
-        The linear system fixes it at one node. The result must not depend on the choice of this node.
+        The linear system fixes it at one node. The result must not depend on the choice of this node. The mean pressure
+        of a pocket that had none before, as it is there from the start, becomes zero.
         """
         for hold in self._holds:
-            if hold.keeps_level and self._comm.allreduce(float(hold.shares_before.sum())) > 0.0:
-                flow[hold.inside] += hold.level - self._comm.allreduce(float(hold.shares_before @ flow))
+            if hold.keeps_level:
+                known = self._comm.allreduce(float(hold.shares_before.sum())) > 0.0
+                shares = hold.shares_before if known else hold.shares
+                flow[hold.inside] += hold.level - self._comm.allreduce(float(shares @ flow))
 
     def spread_excess(self, rows: Array) -> None:
         """Balance the net flux into each held pocket, in owned rows, by a uniform source in its fluid.
@@ -120,6 +123,7 @@ def _hold(system: FlowSystem, pocket: Pocket, sizes: Array, *, keep_level: bool)
     dofs = nodes.dofs[: nodes.owned, 0]
     inside = np.zeros(unknowns.owned, dtype=bool)
     inside[dofs] = system.dofs_of(np.flatnonzero(pocket.cells).astype(np.int32))[dofs]
+    inside &= system.active_dofs[: unknowns.owned]
     if unknowns.hanging is not None:
         inside &= ~unknowns.hanging.dofs[: unknowns.owned]
     numbers = np.where(inside[dofs], nodes.numbers[: nodes.owned], last)

@@ -1,0 +1,48 @@
+"""Bodies that overlap, as a flag clamped in a cylinder: the flow sees their union."""
+
+import numpy as np
+import pytest
+from fluid_setup import block, body, field, loop, make_fluid, step
+from test_fluid_touching import overlap
+
+from solvers.fluid.grid import uniform
+from solvers.fluid.patches import Patch
+from solvers.fluid.regions import area_of
+
+WEIGHT = 3.0
+
+
+def cylinder_and_flag(draw):
+    """Corners of both; the lower side of the flag is 1e-4 to 1e-2 cells above a plane of the grid."""
+    rng = np.random.default_rng(draw)
+    angle = 2.0 * np.pi * np.arange(60) / 60
+    centre = np.array([0.35, 0.55]) + rng.uniform(-0.05, 0.05, 2)
+    low = 0.45 + 0.05 * 10.0 ** rng.uniform(-4.0, -2.0)
+    flag, facets = block([centre[0] + 0.1, low], [0.8, low + 0.21 + rng.uniform(0.0, 0.03)])
+    return centre + 0.2 * np.stack([np.cos(angle), np.sin(angle)], axis=1), flag, facets
+
+
+def at_rest(draw, element):
+    cylinder, flag, facets = cylinder_and_flag(draw)
+    patches = [Patch("walls", ("x-", "x+", "y-"), "no_slip"), Patch("top", ("y+",), "outflow")]
+    bodies = [body("cylinder", cylinder, loop(len(cylinder))), body("flag", flag, facets)]
+    fluid = make_fluid(
+        uniform([0, 0], [1, 1], [20, 20]), patches, bodies, mu=1.0, element=element, body_force=field(0, -WEIGHT)
+    )
+    step(fluid, 0.0, 1.0)
+    return fluid, 1.0 - area_of(cylinder) - area_of(flag) + overlap(cylinder, flag)
+
+
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+@pytest.mark.parametrize("draw", range(6))
+def test_fluid_at_rest(draw, element):
+    """Its area is exact, the surface is closed, nothing flows, and the union of the bodies has its buoyancy."""
+    fluid, area = at_rest(draw, element)
+    cut = fluid.cut
+    lengths = cut.pieces.moments.sum(axis=(1, 2))
+    assert np.abs(lengths @ cut.pieces.normal).max() < 1e-12
+    inside = np.concatenate([cut.uncut, cut.cut])
+    assert cut.fraction[inside].sum() / 400 == pytest.approx(area, abs=1e-12)
+    assert np.abs(fluid.velocity()).max() < 1e-8
+    force = sum(each.sum(axis=0) for each in fluid.force().values())
+    assert force == pytest.approx([0.0, WEIGHT * (1.0 - area)], abs=1e-8)
