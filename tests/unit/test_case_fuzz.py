@@ -1,5 +1,6 @@
 """Whatever happens to a valid case file, checking it ends with a summary or with located problems."""
 
+import copy
 import io
 
 import pytest
@@ -124,7 +125,7 @@ def mutate(data, kind, where, value):
         if not isinstance(other[name], dict | list):
             container[key] = other[name]
     else:
-        container[key] = value
+        container[key] = copy.deepcopy(value)  # else it may become a part of itself
 
 
 def check(path, overrides=()):
