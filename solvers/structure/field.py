@@ -68,13 +68,18 @@ class Structure:
         self._b, self._x = self.layout.vector(), self.layout.vector()
         method = settings.linear
         self._method = linear.choose(method, self.dim, self.dofs()) if isinstance(method, str) else method
-        # the tangent of a follower pressure has an unsymmetric boundary term
-        self.linear_solver = self._create_solver(symmetric=not any(body.pressures for body in self.bodies))
         self.constrained_solver = None if contact is None else self._create_solver(symmetric=False)
 
     def _create_solver(self, *, symmetric: bool) -> PETSc.KSP:
         make = linear.SOLVERS[self._method] if isinstance(self._method, str) else self._method
         return make(self.comm, linear.Task(self.dim, self.dofs(), symmetric, self.settings.linear_tolerance))
+
+    @cached_property
+    def linear_solver(self) -> PETSc.KSP:
+        """The linear solver away from contact."""
+        # follower pressures have an unsymmetric boundary term, and the velocity of massless nodes has a rule of its own
+        damped = self.constraint is not None and self.damping is not None
+        return self._create_solver(symmetric=not (damped or any(body.pressures for body in self.bodies)))
 
     def dofs(self) -> int:
         """Unknowns of all bodies on all processes, prescribed ones included."""
