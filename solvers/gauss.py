@@ -1,4 +1,4 @@
-"""Gauss points of the unit interval."""
+"""Gauss points of the unit interval, and weights of their tensor products."""
 
 from __future__ import annotations
 
@@ -17,3 +17,12 @@ def gauss(points: int) -> tuple[Array, Array]:
     for array in found:
         array.setflags(write=False)
     return found
+
+
+def tensor_weights(points: int, dim: int) -> Array:
+    """Weights of the tensor Gauss rule on [0, 1]^dim with so many points in each direction."""
+    weights = gauss(points)[1]
+    product = weights
+    for _ in range(dim - 1):
+        product = np.multiply.outer(weights, product)
+    return product.ravel()

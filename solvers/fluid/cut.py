@@ -16,7 +16,7 @@ from solvers.fluid.overlaps import with_unions
 from solvers.fluid.pieces import FLUSH, NOTHING, Pieces, put_where_fluid_is
 from solvers.fluid.sheet_cells import on_sheets
 from solvers.fluid.surface import Motion
-from solvers.gauss import gauss
+from solvers.gauss import tensor_weights
 from solvers.tessellation import unit_normals
 
 #: Layers of cells around those of a process that it cuts too, beyond those of the strip: roots may lie there.
@@ -228,7 +228,7 @@ class Cutter:
 
     def _fluid_weights(self, moments, cut: Cells) -> Array:
         """int_fluid L_q dx / (w_q |K|) on local cut cells, shape (cut, points)."""
-        weights, numbers = _tensor_weights(self.points, self.grid.dim), self.grid.numbers[cut]
+        weights, numbers = tensor_weights(len(self.points), self.grid.dim), self.grid.numbers[cut]
         fluid = np.tile(1.0 - np.round(moments.fraction[numbers])[:, None], (1, len(weights)))
         row = np.minimum(np.searchsorted(moments.cells, numbers), len(moments.cells) - 1)
         has_moments = moments.cells[row] == numbers if len(moments.cells) else np.zeros(len(cut), dtype=bool)
@@ -285,15 +285,6 @@ def cells_between(box: Grid, low: Array, high: Array) -> NDArray[np.int64]:
         offset //= span[of]
         stride *= cells
     return number
-
-
-def _tensor_weights(points: Array, dim: int) -> Array:
-    """Weights of the tensor Gauss rule on [0, 1]^dim with these 1D points."""
-    weights = gauss(len(points))[1]
-    product = weights
-    for _ in range(dim - 1):
-        product = np.multiply.outer(weights, product)
-    return product.ravel()
 
 
 def _grow(marked: NDArray[np.bool_], layers: int) -> NDArray[np.bool_]:

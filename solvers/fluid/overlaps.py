@@ -18,7 +18,7 @@ from solvers.fluid.box import Grid
 from solvers.fluid.pieces import NOTHING, joined_pieces, parts_of_facets
 from solvers.fluid.regions import Region, chords_of
 from solvers.fluid.touching_regions import touching_regions
-from solvers.gauss import gauss
+from solvers.gauss import tensor_weights
 
 Indices = NDArray[np.int64]
 
@@ -46,16 +46,14 @@ def with_unions(grid: Grid, points: Array, moments, facets: Indices, x: Array, b
     if not found:
         return moments
     fraction, solid = moments.fraction.copy(), moments.solid.copy()
-    weights = np.multiply.outer(*2 * (gauss(len(points))[1],)).ravel()
+    weights = tensor_weights(len(points), 2)
     parts = []
     for row, regions in found.items():
         cell = moments.cells[row]
         fraction[cell] = 1.0 - sum(region.share for region in regions)
         solid[row] = weights - sum(region.integrals(points) for region in regions)
-        low, size = _box_of(grid, cell)
         surface = np.concatenate([region.surface for region in regions if region.surface is not None])
-        corners = (x[facets[surface[:, 0].astype(int)]] - low) / size
-        parts.append(parts_of_facets(row, surface, corners, size, points))
+        parts.append(parts_of_facets(grid, cell, row, surface, facets, x, points))
     new = joined_pieces(parts)
     kept = ~np.isin(moments.piece_cell, list(found))
     pairs = (
@@ -83,10 +81,3 @@ def _overlapping(
         if regions and sum(region.share for region in regions) + moments.fraction[cell] > 1.0 + NOTHING:
             found.append((row, regions))
     return found
-
-
-def _box_of(grid: Grid, cell: int) -> tuple[Array, Array]:
-    """(Lowest corner, edge lengths) [m] of a cell."""
-    index = np.unravel_index(cell, grid.shape, order="F")
-    low, high = (np.array([edge[i + side] for edge, i in zip(grid.edges, index, strict=True)]) for side in (0, 1))
-    return low, high - low

@@ -79,13 +79,19 @@ def joined_pieces(some: Sequence[Pieces]) -> Pieces:
     return Pieces(*(np.concatenate([getattr(pieces, name) for pieces in some])[order] for name in names))
 
 
-def parts_of_facets(cell: int, parts: Array, corners: Array, size: Array, points: Array) -> Pieces:
-    """Pieces in a cell that are parts of facets, in 2D.
+def parts_of_facets(
+    grid: Grid, number: int, row: int, parts: Array, facets: NDArray[np.int64], x: Array, points: Array
+) -> Pieces:
+    """Pieces in a cell of the box that are parts of facets, in 2D.
 
-    parts: (facet, begin, end) in reference coordinates of the cell, shape (n, 5); corners: of these facets in the same
-    coordinates, (n, 2, 2); size: of the cell [m]; points: of the quadrature in one direction.
+    number: of the cell; row: among the cut cells; parts: (facet, begin, end) in reference coordinates of the cell,
+    shape (n, 5); x: vertices of the facets [m]; points: of the quadrature in one direction.
     """
     facet, ends = parts[:, 0].astype(np.int64), parts[:, 1:].reshape(-1, 2, 2)
+    index = np.unravel_index(number, grid.shape, order="F")
+    low, high = (np.array([edge[i + side] for edge, i in zip(grid.edges, index, strict=True)]) for side in (0, 1))
+    size = high - low
+    corners = (x[facets[facet]] - low) / size
     nodes, weights = gauss(len(points) + 1)
     along = ends[:, 1] - ends[:, 0]
     at = ends[:, None, 0] + nodes[:, None] * along[:, None]
@@ -99,4 +105,4 @@ def parts_of_facets(cell: int, parts: Array, corners: Array, size: Array, points
     mass = np.einsum("pgv,pgw,pg->pvw", vertex, vertex, weight)
     tangent = way * size
     normal = -np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.linalg.norm(tangent, axis=1)[:, None]
-    return Pieces(np.full(len(facet), cell), facet, moments, mass, normal)
+    return Pieces(np.full(len(facet), row), facet, moments, mass, normal)

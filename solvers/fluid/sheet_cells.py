@@ -13,8 +13,8 @@ from solvers.api import Array
 from solvers.connected import connected_parts
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.periodic import FAR, LatticeNodes
-from solvers.fluid.pieces import Pieces, joined_pieces, parts_of_facets, selected
-from solvers.gauss import gauss
+from solvers.fluid.pieces import joined_pieces, parts_of_facets, selected
+from solvers.gauss import tensor_weights
 
 Indices = NDArray[np.int64]
 
@@ -39,7 +39,7 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
     rows = row_of[grid.numbers[cells]]
     fluid = np.where(rows[:, None] < 0, 1.0, cut.fluid[rows])
     fraction = np.where(empty, 0.0, cut.fraction)
-    weights = _tensor(gauss(len(points))[1])
+    weights = tensor_weights(len(points), 2)
     share, is_active = (
         np.concatenate([some, np.zeros(len(sheets.cells), some.dtype)]) for some in (cut.share, cut.is_active)
     )
@@ -59,8 +59,12 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
         else:
             owner = next((c for c in cells_there if sheets.shares[c].has(facet)), None)
         target[piece] = -1 if owner is None or local[owner] < 0 else place[local[owner]]
+
+    def wet(surface: Array) -> Array:
+        return surface[counts[surface[:, 0].astype(int)]]
+
     parts = [
-        _parts_of_facets(grid, cell, int(place[cell]), surface[counts[surface[:, 0].astype(int)]], points, cut)
+        parts_of_facets(grid.grid, grid.numbers[cell], int(place[cell]), wet(surface), cut.facets, cut.motion.x, points)
         for number, of_cell in sheets.shares.items()
         if (cell := local[number]) >= 0 and (surface := of_cell.surface) is not None
     ]
@@ -80,15 +84,6 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
     )
 
 
-def _parts_of_facets(grid: DistributedGrid, cell: int, row: int, parts: Array, points: Array, cut: Any) -> Pieces:
-    """The pieces of surface of a cell in which bodies touch; cell: local; row: among the cut cells."""
-    box = grid.grid
-    index = np.unravel_index(grid.numbers[cell], box.shape, order="F")
-    low, high = (np.array([edge[i + side] for edge, i in zip(box.edges, index, strict=True)]) for side in (0, 1))
-    corners = (cut.motion.x[cut.facets[parts[:, 0].astype(int)]] - low) / (high - low)
-    return parts_of_facets(row, parts, corners, high - low, points)
-
-
 def _passable(
     grid: DistributedGrid, faces: NDArray[np.int32], empty: NDArray[np.bool_], for_faces: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
@@ -99,10 +94,6 @@ def _passable(
     pairs = np.sort(grid.numbers[ends], axis=1)
     parted = np.array([pair in grid.sheets.parted for pair in map(tuple, pairs.tolist())], dtype=bool)
     return for_faces[ends].all(axis=1) | ~(empty[ends].any(axis=1) | parted)
-
-
-def _tensor(weights: Array) -> Array:
-    return np.multiply.outer(weights, weights).ravel()
 
 
 def join_nodes(
