@@ -16,30 +16,22 @@ from solvers.fluid.time_scheme import STEADY, Difference
 
 @dataclass(frozen=True)
 class DrySide:
-    """The surface that closes the solid behind a wetted surface.
-
-    In 2D it leads from the end of a wetted line along fixed corners to its start. Around a closed wetted surface it is
-    closed, too, and all of its corners are fixed.
-    """
+    """The surface that closes the solid behind a wetted surface, from its ends to fixed corners."""
 
     name: str  #: name of this surface in the fluid
     behind: str  #: name of the wetted surface
-    ends: tuple[int, int] | None  #: vertices of the wetted surface at its end and at its start; None: it is closed
+    ends: NDArray[np.int64]  #: vertices of the wetted surface from which it starts; none if that is closed
     corners: Array  #: positions [m], shape (n, dim)
-    facets: NDArray[np.int64]  #: numbers of its vertices: end, corners, start; of a closed surface the corners
+    facets: NDArray[np.int64]  #: numbers of its vertices: of the ends, then of the corners
 
     def motion(self, wetted: Motion) -> Motion:
-        """Motion of its vertices; the first and the last are the ends of the wetted surface, if it has some."""
-        if self.ends is None:
-            return Motion(self.corners, np.zeros_like(self.corners))
-        end, start = self.ends
-        x = np.concatenate([wetted.x[[end]], self.corners, wetted.x[[start]]])
-        v = np.concatenate([wetted.v[[end]], np.zeros_like(self.corners), wetted.v[[start]]])
-        return Motion(x, v)
+        """Motion of its vertices: the ends move with the wetted surface."""
+        x = np.concatenate([wetted.x[self.ends], self.corners])
+        return Motion(x, np.concatenate([wetted.v[self.ends], np.zeros_like(self.corners)]))
 
 
 class Interface:
-    """All wetted surfaces, with vertices surface by surface; `dry_sides` close those with two ends.
+    """All wetted surfaces, with vertices surface by surface; `dry_sides` close those with fluid on one side.
 
     The velocity of the surface in the fluid follows from the displacements by the difference formula of the fluid,
     g = alpha d_{n+1} - sum_k beta_k d_{n-k}, so that fluid and surface sweep the same volume.

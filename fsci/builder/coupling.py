@@ -16,9 +16,9 @@ from coupling.monolithic import Monolithic
 from coupling.partitioned import FixedPointTolerance, Partitioned
 from coupling.parts import coupled_bodies, coupled_elastic
 from coupling.wetted import WettedSurface, immerse, wetted_surface
-from fsci.builder.dry_side import find_ends
+from fsci.builder.dry_side import Closing
 from fsci.builder.fluid import build_fluid, build_rigid_bodies
-from fsci.builder.skin import Closing, find_skin
+from fsci.builder.skin import find_skin
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.coupling_checks import closed_in
@@ -95,12 +95,7 @@ def _skin(case: Case, comm: MPI.Comm, body: Body) -> tuple[Skin, Closing | None]
 
 
 def _dry_side(surface: WettedSurface, closing: Closing) -> DrySide:
-    corners, facets = closing
-    name, behind = f"{surface.name}.dry_side", surface.name
-    if facets is not None:
-        return DrySide(name, behind, None, corners, facets)
-    vertices = np.arange(len(corners) + 2)
-    return DrySide(name, behind, find_ends(surface.facets), corners, np.stack([vertices[:-1], vertices[1:]], axis=1))
+    return DrySide(f"{surface.name}.dry_side", surface.name, closing.ends, closing.corners, closing.facets)
 
 
 def _dry_surface(side: DrySide) -> ImmersedSurface:

@@ -1,8 +1,9 @@
-"""Surfaces with fluid on one side only: the line behind them that closes the solid, in 2D, or a box around them."""
+"""Surfaces with fluid on one side only: what closes the solid behind them, and in 2D the line that does."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,28 @@ class DrySideError(ValueError):
     """A line that does not close the solid; the message gives the reason."""
 
 
+@dataclass(frozen=True)
+class Closing:
+    """What closes the solid behind a wetted surface."""
+
+    ends: Facets  #: vertices of the wetted surface from which it starts
+    corners: Array  #: fixed corners [m], shape (n, dim)
+    facets: Facets  #: facets between both: numbers of the ends, then of the corners
+
+    def joined(self, other: Closing) -> Closing:
+        """Both together, as one."""
+        n, m = len(self.ends), len(other.ends)
+        mine = np.where(self.facets < n, self.facets, self.facets + m)
+        others = other.facets + np.where(other.facets < m, n, n + len(self.corners))
+        corners = np.concatenate([self.corners, other.corners])
+        return Closing(np.concatenate([self.ends, other.ends]), corners, np.concatenate([mine, others]))
+
+    def together(self, points: Array, facets: Facets) -> tuple[Array, Facets]:
+        """(vertices, facets) of the wetted surface and what closes it."""
+        numbers = np.concatenate([self.ends, len(points) + np.arange(len(self.corners))])
+        return np.concatenate([points, self.corners]), np.concatenate([facets, numbers[self.facets]])
+
+
 def find_ends(facets: Facets) -> tuple[int, int]:
     """(vertex at the end, vertex at the start) of segments that make one line. Raises DrySideError."""
     following = dict(facets.tolist())
@@ -40,8 +63,8 @@ def find_ends(facets: Facets) -> tuple[int, int]:
     return end, start
 
 
-def close(points: Array, facets: Facets, inside: Array, corners: Array, box: tuple[Array, Array]) -> Array:
-    """The corners in the order that leads from the end of a wetted line back to its start, solid on the left.
+def close(points: Array, facets: Facets, inside: Array, corners: Array, box: tuple[Array, Array]) -> Closing:
+    """The line along corners that leads from the end of a wetted line back to its start, solid on the left.
 
     `inside`: points in the body that the line belongs to. The way round must not pass through the box, whose lowest and
     highest corners are given. Raises DrySideError.
@@ -57,44 +80,8 @@ def close(points: Array, facets: Facets, inside: Array, corners: Array, box: tup
             raise DrySideError(
                 f"the line from {_spoken(a)} to {_spoken(b)} crosses the box: add corners that lead around it"
             )
-    return way
-
-
-def surround(points: Array, facets: Facets, box: tuple[Array, Array]) -> tuple[Array, Facets]:
-    """(corners, facets) of a box around the fluid's, for a closed wetted surface with the fluid inside.
-
-    Raises DrySideError.
-    """
-    low, high = box
-    dim = facets.shape[1]
-    if dim == 2:
-        closed = np.array_equal(np.sort(facets[:, 0]), np.sort(facets[:, 1]))
-    else:
-        edges = np.concatenate([facets[:, [k, (k + 1) % 3]] for k in range(3)])
-        closed = set(map(tuple, edges.tolist())) == set(map(tuple, edges[:, ::-1].tolist()))
-    if not closed:
-        raise DrySideError("'outside' needs a wetted surface that is closed")
-    used = points[np.unique(facets)]
-    if (used.min(axis=0) < low).any() or (used.max(axis=0) > high).any():
-        raise DrySideError("'outside' needs a wetted surface within the box")
-    corners = points[facets] - used.mean(axis=0)
-    if np.linalg.det(corners).sum() > 0.0:
-        raise DrySideError("'outside' needs a wetted surface with the body around it")
-    unit, around = _UNIT_BOX[dim]
-    margin: Array = 0.1 * (high - low)
-    fixed: Array = low - margin + np.array(unit, dtype=np.float64) * (high - low + 2.0 * margin)
-    return fixed, np.array(around, dtype=np.int64)
-
-
-#: Corners and facets of the unit square and cube, with the solid inside.
-_UNIT_BOX = {
-    2: ([[0, 0], [1, 0], [1, 1], [0, 1]], [[0, 1], [1, 2], [2, 3], [3, 0]]),
-    3: (
-        [[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))],
-        [[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]]
-        + [triangle for a, b in ((0, 1), (1, 2), (2, 3), (3, 0)) for triangle in ([a, b, b + 4], [a, b + 4, a + 4])],
-    ),
-}
+    numbers = np.concatenate([[0], 2 + np.arange(len(way)), [1]])
+    return Closing(np.array([end, start]), way, np.stack([numbers[:-1], numbers[1:]], axis=1))
 
 
 def outlines(fluid: Fluid, dry_sides: Sequence[DrySide]) -> list[Snapshot]:
@@ -109,10 +96,8 @@ def outlines(fluid: Fluid, dry_sides: Sequence[DrySide]) -> list[Snapshot]:
         if len(edges) == 3:
             continue
         wet = fluid.cut.motion.x[fluid.vertices_of([side.behind])]
-        numbers = len(wet) + np.arange(len(side.corners))
-        way = numbers if side.ends is None else np.concatenate([side.ends[:1], numbers, side.ends[1:]])
-        lines = np.concatenate([surfaces[side.behind].facets, way[side.facets]])
-        points = np.concatenate([wet, np.clip(side.corners, low, high)])
+        closing = Closing(side.ends, np.clip(side.corners, low, high), side.facets)
+        points, lines = closing.together(wet, surfaces[side.behind].facets)
         found.append(Snapshot(side.name, np.pad(points, ((0, 0), (0, 1))), lines, "line", {}))
     return found
 

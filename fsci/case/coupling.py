@@ -25,9 +25,9 @@ class Coupling(Section):
     )
     dry_side: dict[Name, Literal["outside"] | Annotated[tuple[NumberVector, ...], EntryCount(1, None)]] = setting(
         dict,
-        "for walls and membranes with fluid on one side: 'outside' of a closed wetted surface there is no fluid. In 2D "
-        "corners of a polygon outside of the box that leads from one end of a body's wetted surface to the other end; "
-        "there is no fluid between surface and polygon",
+        "walls and membranes with fluid on one side: there is none 'outside' of a wetted surface that is closed, or "
+        "in 3D ends on faces of the box like a tube. In 2D corners of a polygon outside of the box that leads from one "
+        "end of a body's wetted surface to the other end; there is no fluid between surface and polygon",
         unit="m",
     )
     accelerator: Literal["iqn", "aitken", "constant"] = setting(

@@ -64,7 +64,7 @@ def _dry_side_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
         if name not in bodies:
             yield keys, f"unknown body '{name}'{did_you_mean(name, bodies)}"
         elif case.dimension == 3 and corners != "outside":
-            yield keys, "'dry_side' with corners is for 2D only; in 3D a closed surface may have 'outside'"
+            yield keys, "'dry_side' with corners is for 2D only; in 3D 'outside' is for closed surfaces and tubes"
         elif name not in coupling.wetted:
             yield keys, f"say which surface is wet: 'wetted: {{{name}: [..]}}'"
         for i, corner in enumerate(corners if corners != "outside" else ()):

@@ -216,7 +216,7 @@ def test_3d_has_no_dry_side(tmp_path):
     text = text.replace("from: [0, 0], to: [1, 1]", "from: [0, 0, 0], to: [1, 1, 1]")
     (tmp_path / "case.yaml").write_text(text)
     with pytest.raises(
-        CaseError, match="'dry_side' with corners is for 2D only; in 3D a closed surface may have 'outside'"
+        CaseError, match="'dry_side' with corners is for 2D only; in 3D 'outside' is for closed surfaces and tubes"
     ):
         load_case(tmp_path / "case.yaml")
 
@@ -234,6 +234,8 @@ def test_a_way_that_only_touches_the_box_is_good():
     box = np.zeros(2), np.ones(2)
     for corners in ([[0.0, 0.0], [1.0, 0.0]], [[0.0, -1.0], [1.0, -1.0]], [[-1.0, 0.5], [0.5, -7.0], [2.0, 0.5]]):
         way = close(points, np.array([[0, 1]]), inside, np.array(corners), box)
-        assert np.array_equal(way, corners)
+        assert np.array_equal(way.corners, corners)
+        assert way.facets.tolist()[0] == [0, 2]
+        assert way.facets.tolist()[-1] == [len(corners) + 1, 1]
     with pytest.raises(DrySideError, match="crosses the box"):
         close(points, np.array([[0, 1]]), inside, np.array([[0.5, 0.0], [1.0, 0.0]]), box)
