@@ -111,8 +111,8 @@ class Elastic:
     def right_side(self) -> Array:
         return self.structure.right_side()
 
-    def advance(self) -> float:
-        return self.structure.advance()
+    def advance(self, *, keep: bool = False) -> float:
+        return self.structure.advance(keep=keep)
 
     def update(self, increment: Array) -> float:
         return self.structure.update(increment)

@@ -49,6 +49,8 @@ class Monolithic:
         self._noise: Array | None = None
         self._found, self.largest = np.zeros(2), np.zeros(2)  #: residuals of solid and flow: now, largest of the step
         self._prepared: Blocks | None = None  #: the matrix at the present iterate, if it is assembled already
+        #: tangent of the flow, into_flow, into_solid and the derivative of the force by the motion, of the last iterate
+        self._of_flow: tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat, PETSc.Mat] | None = None
 
     def _number_unknowns(self) -> None:
         """Numbering of the unknowns of both parts, and solvers for it."""
@@ -68,7 +70,7 @@ class Monolithic:
     def _begin_system(self) -> None:
         """Discard largest residuals, rounding errors and preconditioners of the last step."""
         self.largest, self._linear_iterations = np.zeros(2), 0
-        self._noise = self._prepared = None
+        self._noise = self._prepared = self._of_flow = None
         self._krylov.begin_step()
         self._direct.begin_step()
         self._secant.forget()
@@ -104,7 +106,7 @@ class Monolithic:
         flow.move(interface.move(interface.displacement()), with_solid=True)
         if flow.renewals > self._numbered:
             self._number_unknowns()
-            self._prepared = None
+            self._prepared = self._of_flow = None
         of_flow = flow.residual()
         solid.load(self.coupled.force())
         found = np.array([solid.residual(), of_flow])
@@ -115,10 +117,14 @@ class Monolithic:
         self._farther = solid if relative[0] > relative[1] else flow
         return float(relative.max() * self.largest.sum())
 
-    def advance(self) -> float:
-        """One Newton iteration; returns the larger of the relative increments of both parts. Raises StepFailed."""
+    def advance(self, *, keep: bool = False) -> float:
+        """One Newton iteration; returns the larger of the relative increments of both parts. Raises StepFailed.
+
+        keep: keep the derivatives of the flow, if the same unknowns are held. Those of the solid are cheap, and contact
+        needs new ones.
+        """
         solid, flow = self.coupled.solid, self.coupled.flow
-        blocks, self._prepared = self._prepared or self.blocks(), None
+        blocks, self._prepared = self._prepared or self.blocks(keep=keep), None
         b, x = blocks.create_vectors()
         own = solid.size
         b.array[:own], b.array[own:] = solid.right_side(), flow.right_side()
@@ -168,20 +174,31 @@ class Monolithic:
             flow.set_up_multigrid(preconditioner, blocks.flow)
         return krylov
 
-    def blocks(self) -> Blocks:
+    def blocks(self, *, keep: bool = False) -> Blocks:
+        """The derivatives at the present iterate; keep: those of the flow at the last one if they still fit."""
         solid, flow = self.coupled.solid, self.coupled.flow
-        K, A = solid.linearise(), flow.linearise()
+        K = solid.linearise()
+        if self._of_flow is None or not (keep and flow.keeps_tangent()):
+            self._of_flow = self._derivatives_of_flow()
+        A, into_flow, into_solid, mass = self._of_flow
         with flow.timer("coupling"):
-            into_flow, into_solid, mass = self.coupling_blocks()
             PETSc.garbage_cleanup(K.comm)  # frees the K of earlier iterates; no solver has this communicator
             K = K.copy()
             K.axpy(1.0, mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-            # the exchanged positions, velocities and forces are rounded too
-            flow.add_rounding(2.0**flow.dim * rounding_error(into_flow, solid.rounded()))
             solid.add_rounding(rounding_error(into_solid, flow.rounded()))
             solid.add_rounding(rounding_error(mass, solid.rounded()))
             self._noise = np.array([solid.round_off(), flow.round_off()])
             return Blocks(K, into_solid, into_flow, A)
+
+    def _derivatives_of_flow(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat, PETSc.Mat]:
+        """The tangent of the flow and the coupling blocks at the present iterate."""
+        solid, flow = self.coupled.solid, self.coupled.flow
+        A = flow.linearise()
+        with flow.timer("coupling"):
+            into_flow, into_solid, mass = self.coupling_blocks()
+            # the exchanged positions, velocities and forces are rounded too
+            flow.add_rounding(2.0**flow.dim * rounding_error(into_flow, solid.rounded()))
+        return A, into_flow, into_solid, mass
 
     def coupling_blocks(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
         """alpha C B, -w B^T C^T S and w alpha B^T M B; rows of held dofs of the flow are empty."""

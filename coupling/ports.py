@@ -181,6 +181,10 @@ class Flow(Part, Protocol):
         """Set the predictor for the end of the step."""
         ...
 
+    def keeps_tangent(self) -> bool:
+        """Whether the last tangent may serve for this iterate: it holds the same unknowns (collective)."""
+        ...
+
     def move(self, surfaces: Mapping[str, Motion], *, with_solid: bool = False) -> None:
         """Set the motion of surfaces by name; with_solid: the rows of the solid are solved in the same system."""
         ...

@@ -20,8 +20,11 @@ class System(Protocol):
         """Assemble the residual; returns its norm over the rows that are solved for."""
         ...
 
-    def advance(self) -> float:
-        """Linearise, solve and update; returns the norm of the increment relative to that of the solution."""
+    def advance(self, *, keep: bool = False) -> float:
+        """Linearise, solve and update; returns the norm of the increment relative to that of the solution.
+
+        keep: the tangent of the last iterate is good enough, if the system still has it.
+        """
         ...
 
     def retreat(self, fraction: float) -> None:
@@ -61,19 +64,30 @@ class Tolerance:
     max_iterations: int = 25
     line_search: bool = False
 
+    def small(self, largest: float) -> float:
+        """Residual that is small enough [N]; largest: residual of the step [N]."""
+        return max(self.residual * largest, self.residual_absolute)
 
-def iterates(system: System, *, line_search: bool = False) -> Iterator[Iterate]:
-    """An endless sequence of Newton iterates; the caller applies tolerances and limits."""
-    number, increment, residual = 0, math.inf, system.residual()
+
+def iterates(system: System, tolerance: Tolerance = Tolerance(), unmoved: float = 0.0) -> Iterator[Iterate]:
+    """An endless sequence of Newton iterates; the caller applies tolerances and limits.
+
+    The tangent is kept for an iterate that is expected to fulfil the tolerance with it. Newton's method leaves
+    r_1 = f'' dx^2 / 2. With the same tangent the next residual is f'' dx dx_1 = 2 (r_1 / r_0) r_1.
+    Source: C. T. Kelley, Solving Nonlinear Equations with Newton's Method, SIAM 2003, section 2.3 (chord method).
+    """
+    number, increment, residual, ratio = 0, math.inf, system.residual(), math.inf
+    largest = max(unmoved, residual)
     while True:
         yield Iterate(number, residual, increment, system.settled())
         before = residual
         imposed = system.settled()
-        increment = system.advance()
+        increment = system.advance(keep=2.0 * ratio * residual <= tolerance.small(largest))
         residual = system.residual()
-        if line_search and imposed:
+        if tolerance.line_search and imposed:
             increment, residual = _halve(system, before, increment, residual)
-        number += 1
+        ratio = residual / before if before > 0.0 else math.inf
+        largest, number = max(largest, residual), number + 1
 
 
 def _halve(system: System, before: float, increment: float, residual: float) -> tuple[float, float]:
@@ -94,7 +108,7 @@ def converge(system: System, tolerance: Tolerance, unmoved: float = 0.0) -> Step
     unmoved: residual [N] before the predictor, with which the tolerance does not depend on the predictor.
     """
     history: list[float] = []
-    for iterate in iterates(system, line_search=tolerance.line_search):
+    for iterate in iterates(system, tolerance, unmoved):
         history.append(iterate.residual)
         if not math.isfinite(iterate.residual):
             reason = "the residual is not a number"
@@ -111,5 +125,6 @@ def converge(system: System, tolerance: Tolerance, unmoved: float = 0.0) -> Step
 def _accepted(iterate: Iterate, largest: float, round_off: float, tolerance: Tolerance) -> bool:
     if iterate.residual <= round_off:
         return True
-    small = max(tolerance.residual * largest, tolerance.residual_absolute)
-    return iterate.residual <= small and (iterate.increment <= tolerance.increment or iterate.residual == 0.0)
+    return iterate.residual <= tolerance.small(largest) and (
+        iterate.increment <= tolerance.increment or iterate.residual == 0.0
+    )

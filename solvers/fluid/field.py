@@ -93,8 +93,10 @@ class Fluid:
             self.sequence: SolverSequence = SolverSequence(self.comm, parts.methods, self.dofs(), self.notes.append)
         self.linear_solver = FlowSolver(self.unknowns, self.sequence, self.linear_tolerance, steady=settings.steady)
         self.rounding: Array | None = None  #: rounding error of `residual_rows`; None before this step linearises
-        self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is assembled already
+        self._prepared: PETSc.Mat | None = None  #: tangent at the present iterate, if it is assembled already
+        self._tangent: PETSc.Mat | None = None  #: that of the last iterate
         self.held = np.zeros(owned, dtype=bool)  #: owned dofs with rows of the identity
+        self._held_in_tangent = self.held  #: those of the last tangent
         self.levels = PressureLevels(self.system, self.bodies)
         moved = not settings.steady and not all(body.rests for body in self.bodies)
         bounds = moved and settings.degree == 2 and sheets is None
@@ -160,7 +162,9 @@ class Fluid:
         self._begin_system(self.current)
         self.prescribe(self.current.t)
         self.steady_iteration.begin()
-        self.rounding = self._tangent = None  # not part of the saved state: a resumed run must start alike
+        self.rounding = self._prepared = self._tangent = (
+            None  # not part of the saved state: a resumed run must start alike
+        )
         self.linear_solver.begin_step()
         self.notes.clear()
         if not self._coupled:
@@ -179,7 +183,7 @@ class Fluid:
 
     def predict(self) -> None:
         """Predictor: extrapolate the velocity linearly from the last two steps, where both have one."""
-        if len(self.current.difference.beta) < 2 or not self.history.steps:
+        if self.steady or len(self.history.steps) < 2:
             return
         old, older = self.history.past[:2]
         continued = old.found & older.found
@@ -297,9 +301,14 @@ class Fluid:
         scaled = np.where(self.unknowns.velocity_mask[: len(rows)], rows, impedance * rows)
         return math.sqrt(self.comm.allreduce(float(scaled @ scaled)))
 
-    def advance(self) -> float:
-        """One iteration of Newton's method; returns the increment relative to the solution. Raises StepFailed."""
-        matrix, self._tangent = self._tangent or self.linearise(), None
+    def advance(self, *, keep: bool = False) -> float:
+        """One iteration of Newton's method; returns the increment relative to the solution. Raises StepFailed.
+
+        keep: use the tangent of the last iterate if the same unknowns are held and the flow is unsteady.
+        """
+        if self._tangent is None or not (keep and self.keeps_tangent()):
+            self._tangent = self._prepared or self.linearise()
+        matrix, self._prepared = self._tangent, None
         b, x = matrix.createVecs()
         b.array[:] = self.right_side()
         try:
@@ -309,8 +318,14 @@ class Fluid:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         return self.update(x.array)
 
+    def keeps_tangent(self) -> bool:
+        """Whether the last tangent has its rows of the identity where this iterate has them (collective)."""
+        same = self.comm.allreduce(bool(np.array_equal(self.held, self._held_in_tangent)), op=MPI.LAND)
+        return same and not self.steady
+
     def linearise(self) -> PETSc.Mat:
         """The tangent at the present iterate; held rows are those of the identity. The next call overwrites it."""
+        self._held_in_tangent = self.held.copy()
         with self.timer("assembly"):
             picard = self.settings.steady and self.settings.convection and self.steady_iteration.far
             matrix = self.system.tangent(self.held, picard=picard)
@@ -358,7 +373,7 @@ class Fluid:
     def round_off(self) -> float:
         """Norm [N] of the rounding error of the residual, at the iterate that this step linearised last."""
         if self.rounding is None:
-            self._tangent = self.linearise()
+            self._prepared = self.linearise()
         assert self.rounding is not None
         return self._norm(np.where(self.held, 0.0, self.rounding))
 

@@ -29,11 +29,13 @@ class Past:
 
 
 class History:
-    """Velocities and lengths of the last accepted steps, newest first: as many as the time scheme needs."""
+    """Velocities and lengths of the last accepted steps, newest first: as many as scheme and predictor need."""
 
     def __init__(self, scheme: FlowTimeScheme, size: int):
         self.scheme = scheme
-        self.past = [Past(np.zeros(size), np.ones(size, dtype=bool)) for _ in range(max(1, scheme.times))]
+        self.past = [
+            Past(np.zeros(size), np.ones(size, dtype=bool)) for _ in range(1 if scheme.steady else max(2, scheme.times))
+        ]
         self.steps: tuple[float, ...] = ()  #: lengths [s]
 
     @property
@@ -55,12 +57,12 @@ class History:
         start = self.past[0].velocity
         back = [Past(start - k * dt * rate, found) for k in range(1, len(self.past))]
         self.past = [self.past[0], *back]
-        self.steps = (dt,) * self.scheme.times
+        self.steps = (dt,) * len(self.past)
 
     def end_step(self, dt: float, velocity: Array, found: Mask) -> None:
         """Accept a step of length dt; found: local dofs at which it had a velocity."""
         self.past = [Past(velocity, found), *self.past][: len(self.past)]
-        self.steps = (dt, *self.steps)[: self.scheme.times]
+        self.steps = (dt, *self.steps)[: len(self.past)]
 
     def rate(self, difference: Difference) -> Array:
         """The history in u_t = alpha u - history: sum_k beta_k u_{n-k} [m/s^2], at local dofs."""

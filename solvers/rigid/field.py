@@ -261,8 +261,8 @@ class RigidBodies:
         self._noise = rounding_error(matrix, self.rounded())
         return matrix
 
-    def advance(self) -> float:
-        """One Newton iteration; returns the norm of the increment relative to that of the step."""
+    def advance(self, *, keep: bool = False) -> float:
+        """One Newton iteration; returns the norm of the increment relative to that of the step. It keeps no tangent."""
         right = -self.balance
         if self.contact is not None:
             right += self.contact.force

@@ -64,6 +64,7 @@ class Structure:
         self.increment = np.zeros(self.layout.size)
         self.rounding: Array | None = None  #: rounding error of `residual_force` [N]; None before this step linearises
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is assembled already
+        self._imposed: PETSc.Mat | None = None  #: tangent of the last iterate with its supports; None in contact
         self._assembled_tangent = Tangent(bodies)
         self._b, self._x = self.layout.vector(), self.layout.vector()
         method = settings.linear
@@ -167,7 +168,9 @@ class Structure:
         for body in self.bodies:
             body.element.begin_step()
         self.current = Step(t + dt, dt)
-        self.rounding = self._tangent = None  # not part of the saved state: a resumed run must start alike
+        self.rounding = self._tangent = self._imposed = (
+            None  # not part of the saved state: a resumed run must start alike
+        )
         if self.constraint is not None:
             self.constraint.begin_step()
         self.target = self.held.displacement(t + dt)
@@ -254,16 +257,24 @@ class Structure:
         """d(balance)/du without supports; the next call overwrites the matrix."""
         return self._assembled_tangent.assemble(self, self.time)
 
-    def advance(self) -> float:
-        """One iteration of Newton's method; returns |du| / |u|. Raises StepFailed."""
-        matrix, self._tangent = self._tangent or self.linearise(), None
-        self._b.array[:] = self.right_side()
-        change, taken = self.row_transformation(), None
-        if change is not None:
-            with self.timer("contact"):
-                matrix, taken = transform_rows(matrix, self._b, change)
+    def advance(self, *, keep: bool = False) -> float:
+        """One iteration of Newton's method; returns |du| / |u|. Raises StepFailed.
+
+        keep: use the matrix and the factors of the last iterate, away from contact.
+        """
+        change, taken, imposed = self.row_transformation(), None, self._imposed
         self._x.array[:] = self.missing_displacement()
-        matrix = self.held.impose(matrix, self._x, self._b)
+        self._b.array[:] = self.right_side()
+        if keep and change is None and imposed is not None and not self.norm(self._x.array):
+            matrix = imposed
+            self._b.array[:] = self.held.free_part(self._b.array)
+        else:
+            matrix, self._tangent = self._tangent or self.linearise(), None
+            if change is not None:
+                with self.timer("contact"):
+                    matrix, taken = transform_rows(matrix, self._b, change)
+            matrix = self.held.impose(matrix, self._x, self._b)
+        self._imposed = matrix if change is None else None
         if self._method == "iterative":
             attach_rigid_modes(matrix, self.bodies, self.now.u)
         try:
