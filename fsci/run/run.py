@@ -134,7 +134,7 @@ class Run:
             raise self.case.error(("contact",), f"{_NO_START}: {failure}") from None
 
     def from_checkpoint(self, state: State) -> int:
-        """Compute from a checkpoint."""
+        """Compute from a checkpoint. Raises OSError for one of another version of fsci."""
         from solvers.distributed import scatter
 
         with self._shown():
@@ -143,7 +143,12 @@ class Run:
             self._initialise(simulation)
             self.clock.restore(state["clock"])
             with self.record.timer("start"):
-                simulation.scheme.restore(scatter(self.comm, state["scheme"], simulation.scheme.save()))
+                try:
+                    restored = scatter(self.comm, state["scheme"], simulation.scheme.save())
+                except KeyError as missing:
+                    reason = f"the checkpoint has no entry {missing}: another version of fsci wrote it"
+                    raise OSError(f"{reason}; run the case again") from None
+                simulation.scheme.restore(restored)
             if self.root:
                 (self.out / "STOP").unlink(missing_ok=True)
                 self.history = HistoryWriter(self.out / "history.csv", resume_after=self.clock.step)

@@ -224,6 +224,26 @@ def test_resume_without_checkpoint(case, tmp_path):
     assert "Traceback" not in result.stderr
 
 
+def test_resume_of_another_version(case, tmp_path, monkeypatch, capsys):
+    """Its checkpoint lacks something that this version keeps."""
+    import fsci.run.run as run
+    from fsci.cli import execute
+
+    out = tmp_path / "out"
+    assert run_case(load_case(case, [("time.end", "0.2"), ("verify", "[]")]), out) == FINISHED
+    read = run.read_checkpoint
+
+    def older(folder):
+        state, path = read(folder)
+        del state["scheme"]["v"]
+        return state, path
+
+    monkeypatch.setattr(run, "read_checkpoint", older)
+    assert execute(["resume", str(out), "--set", "time.end=0.3"]) == FAILED
+    error = capsys.readouterr().err
+    assert "the checkpoint has no entry 'v': another version of fsci wrote it; run the case again" in error
+
+
 def test_resume_with_other_settings(case, tmp_path):
     """It goes on with them from the checkpoint, and the folder's case has them; what the state depends on stays."""
     out = tmp_path / "out"

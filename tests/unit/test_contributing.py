@@ -29,8 +29,8 @@ def test_the_drawing_of_a_coupled_newton_step():
 def test_the_order_of_the_drawing_is_that_of_the_scheme():
     drawing = section("One coupled Newton step").split("```")[1]
     scheme = SOURCES[ROOT / "coupling" / "monolithic.py"]
-    residual = scheme[scheme.index("def residual(self)") : scheme.index("def advance(self)")]
-    advance = scheme[scheme.index("def advance(self)") : scheme.index("def _solve(self")]
+    residual = scheme[scheme.index("def residual(self)") : scheme.index("def advance(self")]
+    advance = scheme[scheme.index("def advance(self") : scheme.index("def _solve(self")]
     in_scheme = (
         (residual, ["flow.residual()", "coupled.force()", "solid.residual()"]),
         (advance, [f"{name}(" for name in ("right_side", "row_transformation", "missing", "recover", "update")]),
