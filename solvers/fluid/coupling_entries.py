@@ -4,6 +4,8 @@ With the operators of `interface` and the derivatives of `shape`, for displaceme
 whose velocity is g = alpha d - ..., rows r and force f of the flow change by
 
     dr = (alpha C + S) dd,    df = C^T S dw - (alpha M + S_f) dd.
+
+In films S and S_f are those of `film_shape`.
 """
 
 from __future__ import annotations
@@ -14,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.fluid.film_shape import FilmDerivatives
 from solvers.fluid.interface import InterfaceTerms, MotionOperator
 from solvers.fluid.shape import shape_derivatives
 from solvers.fluid.space import Unknowns
 from solvers.overlap import OverlappingBlocks
-from solvers.sparse import Sparse
+from solvers.sparse import Sparse, sparse_from_entries
 
 
 @dataclass(frozen=True)
@@ -40,15 +43,23 @@ def interface_entries(
     alpha: float,
     held: NDArray[np.bool_],
     vertices: NDArray[np.int64],
+    films: FilmDerivatives | None = None,
 ) -> InterfaceEntries:
     """Entries for the motion of some vertices, in the given order.
 
-    flow: velocity and pressure at local dofs; held: local dofs with rows of the identity; alpha [1/s]: dg/dd.
+    flow: velocity and pressure at local dofs; held: local dofs with rows of the identity; alpha [1/s]: dg/dd;
+    films: derivatives by the shape of some pieces, which replace those of `shape`.
     """
     by_shape, load_by_shape = shape_derivatives(operator, flow)
+    if films is not None:
+        for part in (by_shape.fields, by_shape.psi, load_by_shape):
+            part[films.pieces] = 0.0
+        load_by_shape[films.pieces] += films.force.transpose(0, 1, 3, 2, 4)
     C = operator.coupling
     sums = _Sums(operator, unknowns, vertices)
     into = sums.with_flow(alpha * C + by_shape)
+    if films is not None:
+        into = into + sums.of_films(films)
     into.data[held[into.indices]] = 0.0
     back = sums.with_flow(replace(-1.0 * C, psi=C.psi))
     load = sums.with_surface(-alpha * operator.mass_blocks + load_by_shape)
@@ -67,6 +78,7 @@ class _Sums:
         self._ours = corner[:, 0] >= 0  # all vertices of a facet are of the same body
         self._corner = corner[self._ours]
         self._shape = (len(vertices), unknowns.local)
+        self._u, self._p = operator.u, operator.p
         self._velocity = self._beside(operator.u, operator.fields)
         self._pressure = self._beside(operator.p[:, :, None], operator.psi[..., None])
 
@@ -88,6 +100,20 @@ class _Sums:
         velocity = np.swapaxes(coefficients.fields[self._ours], 2, 3)
         pressure = coefficients.psi[self._ours][:, None, :, None]
         return (self._velocity.matrix(velocity) + self._pressure.matrix(pressure)).ordered()
+
+    def of_films(self, films: FilmDerivatives) -> Sparse:
+        """The transposed matrix of the derivatives of rows in films; columns are local dofs of the flow."""
+        some = self._ours[films.pieces]
+        pieces = films.pieces[some]
+        corner = np.cumsum(self._ours)[pieces] - 1
+        rows = self._corner[corner][:, :, None] * self._dim + np.arange(self._dim)
+        entries = []
+        for dofs, blocks in ((self._u[pieces], films.momentum[some]), (self._p[pieces], films.continuity[some])):
+            columns = dofs.reshape(*dofs.shape, 1, 1)
+            motion = rows.reshape(len(rows), *[1] * (dofs.ndim - 1), *rows.shape[1:])
+            entries.append([np.broadcast_to(part, blocks.shape).ravel() for part in (motion, columns, blocks)])
+        into, by, values = (np.concatenate(parts) for parts in zip(*entries, strict=True))
+        return sparse_from_entries(into, by, values, (self._shape[0] * self._dim, self._shape[1]))
 
     def with_surface(self, blocks: Array) -> Sparse:
         """The matrix of blocks (pieces, vertices, vertices, dim, dim); columns are dofs of the vertices."""

@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from solvers import kernels
 from solvers.api import Array
-from solvers.fluid.film import Films, walls_of
+from solvers.fluid.film import Films, creeping_cells, walls_of
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.overlaps import with_unions
 from solvers.fluid.pieces import FLUSH, NOTHING, Pieces, put_where_fluid_is
@@ -43,6 +43,7 @@ class Cut:
     fraction: Array  #: share of fluid in each local cell
     pieces: Pieces
     film: Array | None  #: factor of the penalty, by cells of the box, below 1 in films; None: there are none
+    creeping: NDArray[np.bool_] | None  #: cells of the box whose flow is that of films, `creeping_cells`
     facets: NDArray[np.int64]
     motion: Motion
 
@@ -150,6 +151,11 @@ class Cutter:
         pieces = Pieces(
             rows[mine], moments.piece_facet[mine], piece_moments[mine], moments.piece_mass[mine], piece_normal[mine]
         )
+        film = self._film(motion, facets, moments, piece_normal, np.where(touched & in_use[cells], cells, -1), solid)
+        share = np.where(is_active & ~strip, np.clip(1.0 - moments.fraction, 0.0, 1.0), 0.0)
+        creeping = None if self._of_step is None else self._of_step.creeping
+        if film is not None and self._of_step is None:
+            creeping = creeping_cells(box, film, solid, share)
         found = Cut(
             uncut=np.flatnonzero(active & ~local_cut & ~local_strip).astype(np.int32),
             cut=cut,
@@ -158,12 +164,13 @@ class Cutter:
             contact_cells=np.flatnonzero(touching[grid.numbers]).astype(np.int32),
             reach=self._reach(box.as_box(self._special), layers),
             is_active=is_active,
-            share=np.where(is_active & ~strip, np.clip(1.0 - moments.fraction, 0.0, 1.0), 0.0),
+            share=share,
             depth=self._depth,
             fluid=fluid,
             fraction=1.0 - moments.fraction[grid.numbers],
             pieces=pieces,
-            film=self._film(motion, facets, moments, piece_normal, np.where(touched & in_use[cells], cells, -1), solid),
+            film=film,
+            creeping=creeping,
             facets=facets,
             motion=motion,
         )
@@ -188,6 +195,7 @@ class Cutter:
             np.empty((0, points)),
             np.ones(len(everything)),
             pieces,
+            None,
             None,
             facets,
             motion,

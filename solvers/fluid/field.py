@@ -72,6 +72,9 @@ class Fluid:
         self.history = History(settings.time, self.unknowns.local)
         self.current = FlowStep(0.0, 0.0, STEADY)  #: the step that is computed now or was last
         self._began: Began | None = None  #: state at the beginning of the present step
+        #: This step has an increment. Before it, the pressure of films is that of the last height, and the derivative
+        #: by the height in `film_shape`, proportional to it, makes the increment too large.
+        self._improved = False
         self._prescribed_at = 0.0  #: time [s] of the velocities of the boundary
         self.started = False  #: a step was accepted, hence forces exist
         self.smallest_cell = min(float(np.diff(edge).min()) for edge in grid.edges)
@@ -162,6 +165,7 @@ class Fluid:
         self._begin_system(self.current)
         self.prescribe(self.current.t)
         self.steady_iteration.begin()
+        self._improved = False
         self.rounding = self._prepared = self._tangent = (
             None  # not part of the saved state: a resumed run must start alike
         )
@@ -344,7 +348,7 @@ class Fluid:
 
     def update(self, increment: Array) -> float:
         """Add an increment of the owned dofs; returns its norm relative to that of the flow."""
-        self._increment = increment.copy()
+        self._increment, self._improved = increment.copy(), True
         self._add(self._increment)
         size = self._norm(self._diagonal * self.flow[: self.unknowns.owned])
         return self._norm(self._diagonal * self._increment) / size if size > 0.0 else 0.0
@@ -400,7 +404,8 @@ class Fluid:
         mark = np.pad(self.held.astype(float), (0, self.unknowns.local - self.unknowns.owned))
         held = fem.share_owned(self.unknowns.space, mark) > 0.5  # of ghosts too
         operator, vertices = self.system.interface, self.vertices_of(surfaces)
-        found = interface_entries(operator, self.unknowns, self.flow, self.current.difference.alpha, held, vertices)
+        alpha, films = self.current.difference.alpha, self.system.film_derivatives() if self._improved else None
+        found = interface_entries(operator, self.unknowns, self.flow, alpha, held, vertices, films)
         zone = self.system.zone
         return found if zone is None else with_zone(found, zone, self.unknowns, self.flow, vertices)
 

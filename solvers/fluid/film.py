@@ -30,6 +30,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from solvers.api import Array
+from solvers.fluid.extension import FREE
 from solvers.fluid.forms import Penalties
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.patches import Patch
@@ -150,9 +151,22 @@ def _to_walls(grid: Grid, walls: Walls, reach: Array) -> Array:
     return gap
 
 
-def film_cells(grid: DistributedGrid, cells: NDArray[np.int32], factor: Array | None) -> NDArray[np.int32] | None:
-    """Owned cells among some local ones that are in films; None if there are no films on any process (collective)."""
-    if not grid.comm.allreduce(factor is not None, op=MPI.LOR):
+def creeping_cells(grid: Grid, factor: Array, solid: NDArray[np.bool_], share: Array) -> NDArray[np.bool_]:
+    """Cells of the box with creeping flow: those of films, and poorly cut ones at their ends.
+
+    The latter share nodes behind the surface with the solid cells of films, hence the film's velocity continued. Its
+    convection is as inexact as in the film, and steps had no solution with it.
+    factor: of `Films`; solid: solid cells; share: of fluid; all by cells of the box.
+    """
+    beside = ndimage.maximum_filter(grid.as_box(solid & (factor < 1.0)), 3).ravel(order="F")
+    return (factor < 1.0) | (beside & (share < FREE))
+
+
+def film_cells(
+    grid: DistributedGrid, cells: NDArray[np.int32], creeping: NDArray[np.bool_] | None
+) -> NDArray[np.int32] | None:
+    """Owned cells among some local ones with creeping flow; None if no process has any (collective)."""
+    if not grid.comm.allreduce(creeping is not None, op=MPI.LOR):
         return None
     owned = cells[cells < grid.owned]
-    return owned[:0] if factor is None else owned[factor[grid.numbers[owned]] < 1.0]
+    return owned[:0] if creeping is None else owned[creeping[grid.numbers[owned]]]

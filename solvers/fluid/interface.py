@@ -65,6 +65,7 @@ class InterfaceTerms:
         self.mu, self.dim, self._unknowns, self.vertices = mu, grid.dim, unknowns, len(cut.motion.x)
         moments = pieces.moments[mine][:, rule.order]
         self.n, self.penalty, self.mass_of_pieces = pieces.normal[mine], penalty[mine], pieces.mass[mine]
+        self.full_penalty = self.penalty  #: P, where `penalty` becomes P R
         self.facet, self.corners = facet, cut.facets[facet]
         self.x = cut.motion.x[self.corners]
         self.sizes = grid.sizes[cells]
@@ -83,13 +84,16 @@ class InterfaceTerms:
         self.cell_blocks: list[CellBlocks] = []  #: terms of slip and seepage in the rows of the flow
         D, along = np.zeros_like(self.penalty), self.n[:, :, None] * self.n[:, None, :]
         tangents = np.eye(self.dim) - along
+        self.slips = slip_length is not None
+        self.mobility: Array | None = None  #: kappa / mu of a layer [m^3/Pa s]
         if slip_length is not None:
             D += nitsche.compliance(slip_length[facet] / mu, tangents, self.penalty)
         if transmissivity is not None:
-            mobility = transmissivity[facet] / mu
+            mobility = self.mobility = transmissivity[facet] / mu
             D += nitsche.compliance(release(mobility, self.sizes), along, self.penalty)
             seeping = seepage_terms(tangents, area, psi_gradient, mobility, self.sizes)
             self.cell_blocks.append(cell_blocks(cells, self.p, seeping))
+        self.released = D  #: D, zero without slip and layer
         if slip_length is not None or transmissivity is not None:
             own = nitsche.released(mu, self.n, self.penalty, D, area, rule.velocity_table, self.sizes)
             self.cell_blocks.append(cell_blocks(cells, self.u, own))

@@ -15,6 +15,7 @@ from solvers.fluid import forms, nitsche
 from solvers.fluid.cell_forms import cell_forms
 from solvers.fluid.cut import Cut
 from solvers.fluid.film import film_cells
+from solvers.fluid.film_shape import FilmDerivatives, FilmFlow, film_derivatives
 from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.ghost import Scales
 from solvers.fluid.ghost_choice import choose_ghost_penalty
@@ -158,7 +159,7 @@ class FlowSystem:
             pattern_changed = self.ghost.set_cut(cut, self.boundary.dofs)
             self.active_dofs &= ~self.ghost.undetermined
         self.cells = [some[some < grid.owned] for some in (cut.uncut, cut.cut)]
-        if self.settings.films and (films := film_cells(grid, cut.cut, cut.film)) is not None:
+        if self.settings.films and (films := film_cells(grid, cut.cut, cut.creeping)) is not None:
             self.cells = [self.cells[0], np.setdiff1d(self.cells[1], films, assume_unique=True), films]
         self._residuals, self._tangents = (
             [form.on(cell=some) for form, some in zip(integrals, self.cells, strict=False)]
@@ -243,6 +244,18 @@ class FlowSystem:
         self._follow()
         assert self._interface is not None
         return self._interface
+
+    def film_derivatives(self) -> FilmDerivatives | None:
+        """Derivatives by the motion of surfaces in films (collective); None if there are none, or with slip."""
+        at, cut, settings = self.interface, self.cut, self.settings
+        assert cut is not None
+        if at.slips:
+            return None
+        rate = np.zeros(self.unknowns.local) if settings.steady else self.history.x.array
+        if settings.body_force is not None:
+            rate = rate + self._force.x.array / settings.density
+        state = FilmFlow(self.flow.x.array, rate, settings.density, float(self._alpha.value))
+        return film_derivatives(at, self.weights, self.grid, cut, state)
 
     @property
     def zone(self) -> ClosedZone | None:

@@ -69,6 +69,15 @@ def test_forces_balance_and_nothing_penetrates():
     assert touched > 3
 
 
+@pytest.mark.slow
+def test_film_of_a_fast_ball_converges():
+    """A film of 0.1 cells with q2q1, 0.01 Pa s: Newton's method failed, whatever the step, before contact."""
+    size = {"structure__bodies__ball__mesh__translate": "[0, 0.56]", "fluid__grid__cells": "[14, 14]"}
+    scheme = start(fluid__element="q2q1", fluid__viscosity="0.01", solver__newton__residual="1e-8", **size).scheme
+    assert max(scheme.step(step * DT, DT).iterations for step in range(12)) <= 7
+    assert scheme.coupled.flow.motions[0].x[:, 1].min() < 0.02
+
+
 @pytest.mark.parametrize("accelerator", ["iqn", "aitken"])
 def test_both_schemes_agree(accelerator):
     """Each step from the same state: through first contact, more nodes and fewer, with the same result.

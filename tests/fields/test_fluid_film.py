@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 from solvers.fluid import film
 from solvers.fluid.cut import Cutter
+from solvers.fluid.extension import FREE
 from solvers.fluid.forms import TRACE, Penalties
 from solvers.fluid.grid import DistributedGrid, uniform
 from solvers.fluid.patches import Patch
@@ -66,6 +67,18 @@ def test_film_beside_a_thin_body(angle):
     """A plate of 0.3 cells has one on its lower side alone."""
     fluid = scene(plate("lower", 0.3, 0.43, angle), plate("thin", 0.46, 0.49, angle))
     assert fluid.cut.film.min() == pytest.approx(expected(0.03), rel=1e-6)
+
+
+def test_poorly_cut_cells_at_the_end_of_a_film_have_its_flow():
+    """They share nodes with the solid cells above it."""
+    fluid = scene(body("disc", circle([0.5, 0.37], 0.35, 100), loop(100)), convection=True)
+    cut, cells = fluid.cut, fluid.grid.numbers[fluid.system.cells[2]]
+    ends = np.flatnonzero(cut.creeping & (cut.film == 1.0) & (cut.share > 0.0))
+    assert len(ends) == 2
+    assert (cut.share[ends] < FREE).all()
+    assert sorted(cells) == sorted(np.flatnonzero((cut.film < 1.0) & (cut.share > 0.0)).tolist() + ends.tolist())
+    poor = np.flatnonzero((cut.film == 1.0) & (cut.share > 0.0) & (cut.share < FREE))
+    assert len(poor) > 2  # farther away
 
 
 def test_stretched_cells():

@@ -1,0 +1,71 @@
+"""Rows and force of a film by the motion of its walls: against differences."""
+
+import numpy as np
+import pytest
+from fluid_setup import body, circle, field, loop, make_fluid, solve_steady
+
+from solvers.fluid.coupling_entries import interface_entries
+from solvers.fluid.grid import uniform
+from solvers.fluid.patches import Patch
+
+CENTRE = 0.52
+#: of momentum, continuity and force
+LIMITS = np.array([0.001, 0.12, 0.01])
+
+
+def disc_at_wall(kappa):
+    """A disc that approaches a wall, 0.3 cells of 0.1 in front of it, and the displacement of its vertices."""
+    points, facets = circle([CENTRE, 0.28], 0.25, 100), loop(100)
+    moved = np.zeros_like(points)
+    mover = body("disc", points, facets, motion=lambda x, t: (x + moved, 0.0 * x + [0.0, -0.4]))
+    patches = [Patch("wall", ("y-",), "no_slip"), Patch("ends", ("x-", "x+", "y+"), "traction", field(0, 0))]
+    fluid = make_fluid(
+        uniform([0, 0], [1, 0.6], [10, 6]), patches, [mover], element="q2q1", scheme="steady", convection=False, mu=0.3
+    )
+    if kappa:
+        fluid.system.transmissivity = np.full(len(facets), kappa)
+    solve_steady(fluid)
+    return fluid, moved
+
+
+def errors(fluid, moved, films):
+    """Relative errors of the derivatives of momentum, continuity and force, near the least gap, for a wave of the wall.
+
+    Farther away the wall crosses planes of the grid where the stress is not continuous.
+    """
+    x, state = fluid.motions[0].x.copy(), fluid.flow.copy()
+    change = np.cos(7.0 * x[:, :1]) * [0.0, 1.0]
+    at, nothing_held = fluid.system.interface, np.zeros(len(state), dtype=bool)
+    found = interface_entries(at, fluid.unknowns, state, 0.0, nothing_held, np.arange(len(x)), films)
+    rows, forces = [], []
+    for sign in (1.0, -1.0):
+        moved[:] = sign * 1e-6 * change
+        fluid.move({})
+        fluid.flow[:] = state
+        rows.append(fluid.system.residual())
+        forces.append(fluid.system.surface_force())
+    velocity, pressure = (
+        nodes.dofs[np.abs(nodes.points[:, 0] - CENTRE) < 0.09].ravel()
+        for nodes in (fluid.unknowns.velocity, fluid.unknowns.pressure)
+    )
+    below = np.flatnonzero(np.repeat((np.abs(x[:, 0] - CENTRE) < 0.09) & (x[:, 1] < 0.1), 2))
+    result = []
+    for values, block, some in (
+        (rows, found.into_flow.T, velocity),
+        (rows, found.into_flow.T, pressure),
+        (forces, found.force_by_motion, below),
+    ):
+        exact = ((values[0] - values[1]) / 2e-6).ravel()[some]
+        result.append(np.linalg.norm((block @ change.ravel())[some] - exact) / np.linalg.norm(exact))
+    return np.array(result)
+
+
+@pytest.mark.parametrize("kappa", [0.0, 1e-5])
+def test_derivatives_of_a_film(kappa):
+    """Those that assume u = g and the momentum equation at the wall are ten times as wrong."""
+    fluid, moved = disc_at_wall(kappa)
+    assert fluid.cut.film.min() < 1e-3
+    found = errors(fluid, moved, fluid.system.film_derivatives())
+    assert (found < LIMITS).all()
+    fluid, moved = disc_at_wall(kappa)
+    assert (errors(fluid, moved, None) > 3.0 * LIMITS).all()
