@@ -17,7 +17,7 @@ from solvers.fluid.fast_bodies import MOST_CELLS
 MOST_CELLS_PER_STEP = 10.0  #: above which `check` warns: cells that a flow or a body crosses in a time step
 #: Cells across a body that both of its sides need to share no unknowns: with fewer, fluid passes through the body.
 CELLS_ACROSS_AT_REST, CELLS_ACROSS_IF_MOVING = 2.0, 4.0
-CELLS_ALONG = 6.0  #: of a thin body in 2D, from which on each side has unknowns of its own
+CELLS_ALONG = 6.0  #: of a thin body (in 3D, in two directions), from which on each side has unknowns of its own
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
 
 
@@ -75,21 +75,24 @@ def _thin_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
     for (section, kind, name), (mesh, moves) in (moving | elastic).items():
         if not isinstance(mesh, Shape) or name in one_sided:
             continue
-        length = max(mesh.extents) if fluid.grid.dimension == 2 else 0.0
+        length = sorted(mesh.extents)[-1 if fluid.grid.dimension == 2 else -2]
         if warning := thin_body(case, fluid, mesh.thickness, length, moves=moves):
             yield (section, kind, name, "mesh"), warning
 
 
 def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, moves: bool) -> str | None:
-    """What may go wrong with a body of this thickness [m]: fluid passes if both of its sides share unknowns."""
+    """What may go wrong with a body of this thickness [m]: fluid passes if both of its sides share unknowns.
+
+    length [m]: its largest extent, in 3D the second one.
+    """
     smallest = float(fluid.grid.smallest.min())
     rests = not case.elastic_bodies and not any(body.motion or body.free for body in fluid.bodies.values())
-    plane = fluid.grid.dimension == 2 and not any(patch.periodic for patch in fluid.patches.values())
-    separate = plane and not fluid.grid.refine and length >= CELLS_ALONG * smallest
-    if separate and (rests or case.contact is None):
+    plain = not fluid.grid.refine and not any(patch.periodic for patch in fluid.patches.values())
+    separate = plain and length >= CELLS_ALONG * smallest
+    if separate and (rests or (fluid.grid.dimension == 2 and case.contact is None)):
         return None  # each side has unknowns of its own
     size = f"the body is {extent:.4g} thick, {extent / smallest:.2g} of the smallest cells"
-    if separate and extent < CELLS_ACROSS_AT_REST * smallest:
+    if separate and fluid.grid.dimension == 2 and extent < CELLS_ACROSS_AT_REST * smallest:
         return f"{size}: nothing passes through it, but where it is in contact and opens again, steps may fail"
     least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
     if extent >= least * smallest:

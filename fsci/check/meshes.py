@@ -208,9 +208,16 @@ def _against_grid(case: Case, found: Findings, keys: Keys, mesh: Mesh, *, moves:
         found.warnings.append(f"{case.place(*keys)}: the body is outside of the fluid's box")
     if keys[-1] in (case.coupling.dry_side if case.coupling is not None else ()):
         return
-    length = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
-    if warning := thin_body(case, case.fluid, thickness(mesh), length, moves=moves):
+    if warning := thin_body(case, case.fluid, thickness(mesh), _length(mesh), moves=moves):
         found.warnings.append(f"{case.place(*keys, 'mesh')}: {warning}")
+
+
+def _length(mesh: Mesh) -> float:
+    """Largest extent [m], in 3D the second one: of a plate the shorter of its edges."""
+    if mesh.points.shape[1] == 2:
+        return float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    axes = np.linalg.svd(mesh.points - mesh.points.mean(axis=0), full_matrices=False)[2]
+    return float(np.sort(np.ptp(mesh.points @ axes.T, axis=0))[1])
 
 
 def thickness(mesh: Mesh) -> float:

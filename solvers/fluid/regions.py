@@ -40,6 +40,7 @@ class Region:
     polygon: Array = field(default_factory=lambda: np.empty((0, 2)))  #: corners; empty if it is all fluid of the cell
     #: where surfaces touch, the parts of facets that bound it: (facet, begin, end), shape (n, 5); None: whole facets
     surface: Array | None = None
+    flush: frozenset[int] = frozenset()  #: facets that lie in its faces but do not bound it: only in 3D
 
     def integrals(self, points: Array) -> Array:
         """int L_q of the Lagrange basis on the tensor points, the first direction fastest, shape (points^2,).
@@ -53,6 +54,15 @@ class Region:
         first = np.einsum("enpa,p,en->ena", lagrange(points, inner), weights, at[..., 0])
         total = np.einsum("ena,enb,n,e->ba", first, lagrange(points, at[..., 1]), weights, along[:, 1])
         return np.asarray(total).ravel()
+
+    def wet(self, axis: int, side: int, points: Array) -> Array:
+        """int L_q over the wet part of a face, relative to the face."""
+        nodes, weights = gauss(len(points) + 1)
+        total = np.zeros(len(points))
+        for face, a, b in self.faces:
+            if face == (axis, side):
+                total += (b - a) * weights @ lagrange(points, a + (b - a) * nodes)
+        return total
 
     def contains(self, x: Array) -> bool:
         """Whether a point of the cell lies in the region: its winding number is one."""

@@ -39,7 +39,7 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
     rows = row_of[grid.numbers[cells]]
     fluid = np.where(rows[:, None] < 0, 1.0, cut.fluid[rows])
     fraction = np.where(empty, 0.0, cut.fraction)
-    weights = tensor_weights(len(points), 2)
+    weights = tensor_weights(len(points), grid.dim)
     share, is_active = (
         np.concatenate([some, np.zeros(len(sheets.cells), some.dtype)]) for some in (cut.share, cut.is_active)
     )

@@ -13,10 +13,13 @@ from solvers.connected import connected_parts
 from solvers.fluid.box import Grid
 from solvers.fluid.pieces import NOTHING
 from solvers.fluid.regions import SAME, WHOLE, Region, chords_of, regions_in_cell
+from solvers.fluid.space_parts import SpacePart
 from solvers.fluid.touching_regions import meet, touching_regions
+from solvers.tessellation import unit_normals
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+Part = Region | SpacePart
 
 AROUND = 3  #: layers of cells around surfaces in which parts and links are found
 SLIVER = 2  #: cells in each direction within which fluid enclosed by bodies that touch counts as solid
@@ -92,14 +95,16 @@ def links_of(grid: Grid, parts: Sequence[Region]) -> Indices:
     return np.unique(np.concatenate(found), axis=0)
 
 
-def facing_of(parts: Sequence[Region], ends: Array) -> Array:
-    """Mean unit normal of the facets in each part, shape (parts, 2); nan without facets. ends: of facets, (n, 2, 2)."""
-    along = ends[:, 1] - ends[:, 0]
-    normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
-    found = np.full((len(parts), 2), np.nan)
+def facing_of(parts: Sequence[Part], corners: Array) -> Array:
+    """Mean unit normal of the facets in each part, shape (parts, dim); nan without facets.
+
+    corners: of facets, shape (n, dim, dim).
+    """
+    normals = unit_normals(corners)
+    found = np.full((len(parts), corners.shape[1]), np.nan)
     for number, part in enumerate(parts):
-        if part.facets:
-            mean = normals[list(part.facets)].sum(axis=0)
+        if facets := part.facets or part.flush:
+            mean = normals[list(facets)].sum(axis=0)
             found[number] = mean / max(float(np.linalg.norm(mean)), SAME)
     return found
 

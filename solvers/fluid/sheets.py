@@ -22,16 +22,17 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from solvers import kernels
 from solvers.api import Array
 from solvers.connected import connected_parts
 from solvers.fluid.box import Grid
-from solvers.fluid.regions import Region
 from solvers.fluid.sheet_nodes import Joined, node_copies, same_nodes
-from solvers.fluid.sheet_parts import AROUND, facing_of, grown, links_of, parts_of_fluid, without_slivers
+from solvers.fluid.sheet_parts import AROUND, Part, facing_of, grown, links_of, parts_of_fluid, without_slivers
+from solvers.fluid.space_parts import parts_in_space
+from solvers.fluid.thinness import OPPOSED, may_be_thin
 from solvers.gauss import gauss
-from solvers.lagrange import lagrange
 from solvers.mesh import Mesh
 
 Indices = NDArray[np.int64]
@@ -39,7 +40,12 @@ Mask = NDArray[np.bool_]
 
 THIN = 2  #: largest distance [cells] across a body at which a node or the ghost penalty couples the fluid on two sides
 THIN_IF_MOVING = 3  #: the same [cells] of bodies that move, with a strip of cells behind each side
-OPPOSED = -0.7  #: product of unit normals below which two surfaces face opposite directions: corners below 45 degrees
+
+#: Distance [cells] of points in two cells in 3D whose indices differ by one in each direction.
+FARTHEST = 3.0**0.5
+
+#: Distance [cells], in 3D, of points in cells whose indices differ by one in each direction.
+FARTHEST = 3.0**0.5
 
 #: Steps from the first corner of a cell to each corner, in the order of `Grid.mesh`.
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
@@ -50,7 +56,7 @@ CORNER_STEPS = {2: np.array(SQUARE), 3: np.array([[*xy, z] for z in (0, 1) for x
 class FluidShare:
     """The regions of fluid in a cell of the box that one cell of the mesh has, if it does not have all."""
 
-    regions: tuple[Region, ...]
+    regions: tuple[Part, ...]
 
     @property
     def fraction(self) -> float:
@@ -60,10 +66,7 @@ class FluidShare:
         """int L_q over the fluid, relative to the cell; None if the cell has all of the fluid."""
         if any(region.facets is None for region in self.regions):
             return None
-        total = np.zeros(len(points) ** 2)
-        for region in self.regions:
-            total += region.integrals(points)
-        return total
+        return np.asarray(sum(region.integrals(points) for region in self.regions))
 
     @property
     def surface(self) -> Array | None:
@@ -79,12 +82,7 @@ class FluidShare:
 
     def wet(self, axis: int, side: int, points: Array) -> Array:
         """int L_q over the wet part of a face, relative to the face."""
-        nodes, weights = gauss(len(points) + 1)
-        total = np.zeros(len(points))
-        for face, a, b in (wet for region in self.regions for wet in region.faces):
-            if face == (axis, side):
-                total += (b - a) * weights @ lagrange(points, a + (b - a) * nodes)
-        return total
+        return np.asarray(sum(region.wet(axis, side, points) for region in self.regions))
 
 
 @dataclass(frozen=True)
@@ -225,23 +223,30 @@ def find_sheets(
     always: bool = False,
     joined: Joined = MappingProxyType({}),
 ) -> Sheets | None:
-    """Sheets of the fluid around surfaces with vertices at x [m]; None in 3D, and if no body is thin, unless `always`.
+    """Sheets of the fluid around surfaces with vertices at x [m]; None if no body is thin, unless `always`.
 
     bounds: facets that are not on the boundary of the box. thin: cells apart, at most, of the fluid on both sides.
     joined: parts of fluid in these cells at these facets share their nodes.
     """
-    if grid.dim != 2 or not len(facets):
+    if not len(facets) or (grid.dim == 3 and not always and not may_be_thin(grid, facets, x, FARTHEST * (thin + 1))):
         return None
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
-    parts, special, touching = parts_of_fluid(grid, moments, facets, x, bounds)
+    if grid.dim == 3:
+        parts, links, special = parts_in_space(grid, moments, facets, x, AROUND)
+        touching = np.zeros(0, dtype=np.int64)
+    else:
+        parts, special, touching = parts_of_fluid(grid, moments, facets, x, bounds)
+        links = links_of(grid, parts)
+        parts, links = without_slivers(grid, parts, links, touching)
     if not parts and not always:  # all surfaces are outside of the box
         return None
-    links = links_of(grid, parts)
-    parts, links = without_slivers(grid, parts, links, touching)
     cells = np.array([part.cell for part in parts], dtype=np.int64)
-    close = np.flatnonzero(grown(grid, special, 1)[cells])
-    if not (always or _is_thin(grid, parts, links, facing_of(parts, x[facets]), close, thin)):
-        return None
+    if not always:
+        close, facing = np.flatnonzero(grown(grid, special, 1)[cells]), facing_of(parts, x[facets])
+        if grid.dim == 3:
+            close = _opposed(grid, cells, facing, close, thin)
+        if not _is_thin(grid, parts, links, facing, close, thin):
+            return None
     copies = node_copies(grid, parts, links, same_nodes(parts, joined), special)
     moved = (copies > 0).any(axis=1)
     linked = np.zeros(len(parts), dtype=bool)
@@ -285,7 +290,16 @@ def find_sheets(
     )
 
 
-def _is_thin(grid: Grid, parts: Sequence[Region], links: Indices, facing: Array, close: Indices, thin: int) -> bool:
+def _opposed(grid: Grid, cells: Indices, facing: Array, close: Indices, thin: int) -> Indices:
+    """Those parts that face the opposite direction of another one nearby: in 3D all others would take too long."""
+    close = close[~np.isnan(facing[close]).any(axis=1)]
+    index = np.stack(np.unravel_index(cells[close], grid.shape, order="F"), axis=1)
+    pairs = cKDTree(index).query_pairs(thin + 0.5, p=np.inf, output_type="ndarray") if len(close) else index[:, :2]
+    first, second = close[pairs].T
+    return np.unique(close[pairs][(facing[first] * facing[second]).sum(axis=1) < OPPOSED])
+
+
+def _is_thin(grid: Grid, parts: Sequence[Part], links: Indices, facing: Array, close: Indices, thin: int) -> bool:
     """Whether a thin body is between two parts: they face opposite directions and are not linked nearby.
 
     Parts around a corner of a thick body do not face opposite directions, or are linked around it.

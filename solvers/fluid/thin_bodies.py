@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from solvers.api import Array, State, StepFailed
 from solvers.fluid.box import Grid
@@ -21,9 +20,10 @@ from solvers.fluid.reach import TOO_FAR
 from solvers.fluid.sheet_cycles import joined_in, recurring
 from solvers.fluid.sheet_parts import AROUND
 from solvers.fluid.sheet_transfer import along_surface, transfer
-from solvers.fluid.sheets import OPPOSED, THIN_IF_MOVING, Sheets, find_sheets
+from solvers.fluid.sheets import THIN_IF_MOVING, Sheets, find_sheets
 from solvers.fluid.space import FlowNodes, Unknowns
 from solvers.fluid.surface import Motion, wetness
+from solvers.fluid.thinness import cell_sizes_at, may_be_thin
 from solvers.fluid.time_scheme import FlowStep
 
 #: Thickness in cells up to which moving bodies have separate cells for each side. Thicker ones have a strip of cells
@@ -106,35 +106,6 @@ class ThinBodies:
             self._x = self._sheets = None
 
 
-def may_be_thin(grid: Grid, facets: NDArray[np.int64], x: Array, thick: float) -> bool:
-    """Whether two parts of the surface face opposite directions with less than `thick` cells of solid between them."""
-    if not len(facets):
-        return False
-    a, b = x[facets[:, 0]], x[facets[:, 1]]
-    length = np.linalg.norm(b - a, axis=1)
-    cell = max(float(_sizes(edge, x[:, axis]).max()) for axis, edge in enumerate(grid.edges))
-    count = np.maximum(1, np.ceil(length / cell)).astype(int)
-    of = np.repeat(np.arange(len(facets)), count)
-    part = (np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[of]
-    points = a[of] + part[:, None] * (b - a)[of]
-    along = (b - a) / np.where(length > 0.0, length, 1.0)[:, None]
-    normal = np.stack([along[:, 1], -along[:, 0]], axis=1)[of]
-    pairs = cKDTree(points).query_pairs(thick * cell, output_type="ndarray")
-    first, second = pairs.T
-    opposed = np.einsum("pi,pi->p", normal[first], normal[second]) < OPPOSED
-    way = points[second] - points[first]
-    behind = np.einsum("pi,pi->p", way, normal[first]) <= 0.0
-    sizes = np.stack([_sizes(edge, points[:, axis]) for axis, edge in enumerate(grid.edges)], axis=1)
-    size = 1.0 / np.linalg.norm(normal / sizes, axis=1)
-    close = np.linalg.norm(way, axis=1) <= thick * np.maximum(size[first], size[second])
-    return bool((opposed & behind & close).any())
-
-
-def _sizes(edge: Array, x: Array) -> Array:
-    """Edge lengths [m] of the cells at coordinates x [m]."""
-    return np.diff(edge)[np.clip(np.searchsorted(edge, x) - 1, 0, len(edge) - 2)]
-
-
 @dataclass(frozen=True)
 class Began:
     """The state at the beginning of a step: unknowns, sheets, earlier velocities, and positions of the bodies [m]."""
@@ -189,7 +160,7 @@ def carry(old: Unknowns, before: Sheets | None, new: Unknowns, facets: NDArray[n
     """
     after = new.grid.sheets
     assert after is not None
-    cell = max(float(_sizes(edge, x[:, axis]).max()) for axis, edge in enumerate(after.grid.edges))
+    cell = max(float(cell_sizes_at(edge, x[:, axis]).max()) for axis, edge in enumerate(after.grid.edges))
     along, matrices = along_surface(facets, x, cell), []
     for degree in (new.degree, 1):
         if before is not None:
