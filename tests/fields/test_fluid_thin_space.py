@@ -173,7 +173,7 @@ fluid:
   viscosity: 0.02
   scheme: backward_euler
   element: {element}
-  grid: {{from: [0, 0, 0], to: [1.25, 0.75, 1.5], cells: [5, 3, 6]}}
+  grid: {{from: [0, 0, 0], to: [1, 0.5, 1.5], cells: [4, 2, 6]}}
   patches:
     inlet: {{on: x-, velocity: [1, 0, 0]}}
     outlet: {{on: x+, outflow: true}}
@@ -183,8 +183,8 @@ fluid:
       mesh: {{shape: box, size: [0.013, 2, 2], cells: [1, 1, 1], origin: [0.618, -0.5, -0.93]}}
 probes:
   force: {{quantity: force, body: plate}}
-  front: {{quantity: pressure, at: [0.61, 0.4, 0.3]}}
-  back: {{quantity: pressure, at: [0.64, 0.4, 0.3]}}
+  front: {{quantity: pressure, at: [0.61, 0.3, 0.3]}}
+  back: {{quantity: pressure, at: [0.64, 0.3, 0.3]}}
 """
 
 
