@@ -62,18 +62,26 @@ def window(time: Array, values: Array, start: float | None) -> tuple[Array, Arra
     return time[inside], values[inside]
 
 
-def highest(time: Array, values: Array) -> float:
-    """The maximum of a sampled signal; interior peaks are refined by the parabola through three samples.
+def peak(time: Array, values: Array) -> tuple[float, float]:
+    """(time, value) of the maximum of a sampled signal, the first one; interior ones are refined by a parabola.
 
     With the slopes s1, s2 left and right of the middle sample and the steps h1, h2 the parabola about it is
-    y = y1 + b t + c t^2 with c = (s2 - s1)/(h1 + h2), b = s1 + c h1; its top is y1 - b^2/(4c).
+    y = y1 + b t + c t^2 with c = (s2 - s1)/(h1 + h2), b = s1 + c h1; its top is y1 - b^2/(4c) at t = -b/(2c).
     """
     steps, slopes = np.diff(time), np.diff(values) / np.diff(time)
-    peak = (slopes[:-1] >= 0) & (slopes[1:] <= 0) & (slopes[:-1] > slopes[1:])
-    s1, s2, h1, h2 = slopes[:-1][peak], slopes[1:][peak], steps[:-1][peak], steps[1:][peak]
-    curvature = (s2 - s1) / (h1 + h2)
-    tops = values[1:-1][peak] - (s1 + curvature * h1) ** 2 / (4 * curvature)
-    return float(max(values.max(), tops.max(initial=-math.inf)))
+    tops = np.flatnonzero((slopes[:-1] >= 0) & (slopes[1:] <= 0) & (slopes[:-1] > slopes[1:]))
+    s1, s2, h1, h2 = slopes[:-1][tops], slopes[1:][tops], steps[:-1][tops], steps[1:][tops]
+    c = (s2 - s1) / (h1 + h2)
+    b = s1 + c * h1
+    times = np.concatenate([time, time[1:-1][tops] - b / (2 * c)])
+    heights = np.concatenate([values, values[1:-1][tops] - b**2 / (4 * c)])
+    first = int(heights.argmax())
+    return float(times[first]), float(heights[first])
+
+
+def highest(time: Array, values: Array) -> float:
+    """The maximum of a sampled signal; see `peak`."""
+    return peak(time, values)[1]
 
 
 def extremes(time: Array, values: Array) -> tuple[float, float]:
@@ -130,6 +138,7 @@ STATISTICS = {
     "final": lambda time, values: float(values[-1]),
     "min": lambda time, values: float(values.min()),
     "max": lambda time, values: float(values.max()),
+    "time_of_max": lambda time, values: peak(time, values)[0],
     "mean": mean,
     "amplitude": amplitude,
     "frequency": frequency,

@@ -52,15 +52,18 @@ def tube(
     outer_radius: float,
     height: float,
     cells: Sequence[int],
+    angle: float = 360,
+    start: float = 0,
     *,
     order: int = 1,
     cell: str = "hex",
 ) -> Mesh:
-    """Tube about the z axis from z = 0 to `height` [m]; surfaces inner, outer, bottom, top.
+    """Tube about the z axis from z = 0 to `height` [m], or a part of it: `angle` degrees from `start` degrees (0 is x).
 
-    `cells` counts them around, through the wall, and along.
+    `cells` counts them around, through the wall, and along; surfaces inner, outer, bottom, top, and start, end of a
+    part.
     """
-    section = ring_lattice(inner_radius, outer_radius, cells[:2], 360, 0, order)
+    section = ring_lattice(inner_radius, outer_radius, cells[:2], angle, start, order)
     return lattice.mesh(_raised(section, height, cells[2]), cell)
 
 

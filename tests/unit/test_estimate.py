@@ -14,6 +14,7 @@ SHAPES: list[dict[str, Any]] = [
     {"shape": "disc", "radius": 1, "cells": [8, 2]},
     {"shape": "ring", "inner_radius": 1, "outer_radius": 2, "cells": [6, 2]},
     {"shape": "ring", "inner_radius": 1, "outer_radius": 2, "cells": [6, 2], "angle": 90},
+    {"shape": "tube", "inner_radius": 1, "outer_radius": 2, "height": 3, "cells": [6, 2, 2], "angle": 90},
     {"shape": "box", "size": [1, 2, 3], "cells": [1, 2, 3]},
     {"shape": "beam", "length": 3, "width": 1, "height": 1, "cells": [3, 1, 2]},
     {"shape": "cylinder", "radius": 1, "height": 2, "cells": [8, 1, 3]},

@@ -95,6 +95,17 @@ SOLID = {
         9 * pi,
         {"inner": lambda x: radius(x, 0, 1) - 1, "outer": lambda x: radius(x, 0, 1) - 2, **ENDS},
     ),
+    "a quarter of a tube": (
+        lambda n, **kind: shapes.tube(1, 2, 3, (2 * n, n, 2), 90, 180, **kind),
+        9 * pi / 4,
+        {
+            "inner": lambda x: radius(x, 0, 1) - 1,
+            "outer": lambda x: radius(x, 0, 1) - 2,
+            "start": lambda x: x[:, 1],
+            "end": lambda x: x[:, 0],
+            **ENDS,
+        },
+    ),
     "solid torus": (
         lambda n, **kind: shapes.solid_torus(3, 1, (6 * n, 4 * n), **kind),
         6 * pi**2,

@@ -41,6 +41,18 @@ def test_parabola_is_refined_exactly_on_uneven_steps():
     assert result["ok"], result
 
 
+def test_time_of_the_maximum():
+    """Exact for a parabola, at its top and at an end of the window; of a sine the first top, of fourth order."""
+    time = np.array([0.0, 0.3, 0.4, 1.1, 1.3])
+    history = {"time": time, "u": 2 - (time - 0.5) ** 2, "rising": time**2}
+    checks = [check("u", "time_of_max", 0.5, absolute=1e-14), check("rising", "time_of_max", 1.3, absolute=0)]
+    assert all(result["ok"] for result in evaluate(history, checks))
+    (result,) = evaluate(
+        sine(40, 1.3), [check("A.y", "time_of_max", (0.5 * math.pi - 0.3) / 2.2 / math.pi, relative=1e-3)]
+    )
+    assert result["ok"], result
+
+
 def test_final_min_max_are_samples():
     history = {"time": np.array([1.0, 2.0, 3.0, 4.0]), "u": np.array([0.0, 3.0, 2.9, -1.0])}
     checks = [

@@ -118,6 +118,14 @@ def require_around(cells: tuple[int, ...], at: int, *, disc: bool = False) -> No
         raise fault(f"at least 3 cells are needed all the way around, not {cells[at]}", "cells", at)
 
 
+def require_part(angle: float, cells: tuple[int, ...]) -> None:
+    """A ring or a part of it, with the number of cells around first."""
+    if angle > 360:
+        raise fault(f"must be at most 360 degrees, not {angle:g}", "angle")
+    if angle == 360:
+        require_around(cells, 0)
+
+
 def require_wall(inner_radius: float, outer_radius: float) -> None:
     if outer_radius <= inner_radius:
         raise fault(f"must be greater than 'inner_radius', {inner_radius:g}, not {outer_radius:g}", "outer_radius")

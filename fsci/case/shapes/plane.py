@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import model_validator
 
-from fsci.case.section import fault, setting
+from fsci.case.section import setting
 from fsci.case.shapes.built_in import (
     Cells2,
     Counts,
@@ -16,6 +16,7 @@ from fsci.case.shapes.built_in import (
     along,
     product,
     require_around,
+    require_part,
     require_wall,
 )
 from fsci.case.values import EntryCount, Number, Positive
@@ -93,10 +94,7 @@ class Ring(PlaneBuiltIn):
     @model_validator(mode="after")
     def _possible(self) -> Ring:
         require_wall(self.inner_radius, self.outer_radius)
-        if self.angle > 360:
-            raise fault(f"must be at most 360 degrees, not {self.angle:g}", "angle")
-        if self.angle == 360:
-            require_around(self.cells, 0)
+        require_part(self.angle, self.cells)
         return self
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import pi, radians
 from typing import Annotated, Literal
 
 from pydantic import model_validator
@@ -17,6 +17,7 @@ from fsci.case.shapes.built_in import (
     along,
     product,
     require_around,
+    require_part,
     require_wall,
 )
 from fsci.case.values import EntryCount, Number, Positive
@@ -99,7 +100,10 @@ class Cylinder(SolidBuiltIn):
 
 
 class Tube(SolidBuiltIn):
-    """Tube (or annulus) about the z axis, from z = 0, with the surfaces inner, outer, bottom, top."""
+    """Tube (or annulus) about the z axis, from z = 0, or a part of it; surfaces inner, outer, bottom, top, start, end.
+
+    A whole one has no start and end.
+    """
 
     sides = ("inner", "outer", "bottom", "top")
     shape: Literal["tube", "annulus"] = setting(..., "kind of shape")
@@ -107,21 +111,28 @@ class Tube(SolidBuiltIn):
     outer_radius: Positive = setting(..., "outer radius", unit="m")
     height: Positive = setting(..., "extent along z", unit="m")
     cells: Cells3 = setting(..., "number of cells around, through the wall, and along")
+    angle: Positive = setting(360.0, "angle of the part, at most 360", unit="degrees")
+    start: Number = setting(0.0, "angle between the x axis and the start of the part", unit="degrees")
+
+    @property
+    def surfaces(self) -> tuple[str, ...]:
+        return self.sides if self.angle == 360 else (*self.sides, "start", "end")
 
     @model_validator(mode="after")
     def _possible(self) -> Tube:
         require_wall(self.inner_radius, self.outer_radius)
-        require_around(self.cells, 0)
+        require_part(self.angle, self.cells)
         return self
 
     @property
     def lattice(self) -> Counts:
         n, order = self.cells, self.order
-        return product(along(n[0], order, closed=True), along(n[1], order), along(n[2], order))
+        return product(along(n[0], order, closed=self.angle == 360), along(n[1], order), along(n[2], order))
 
     @property
     def extents(self) -> tuple[float, ...]:
-        return pi * (self.inner_radius + self.outer_radius), self.outer_radius - self.inner_radius, self.height
+        middle = (self.inner_radius + self.outer_radius) / 2
+        return radians(self.angle) * middle, self.outer_radius - self.inner_radius, self.height
 
     @property
     def thickness(self) -> float:
