@@ -28,7 +28,7 @@ from solvers.fluid.face_regions import (
     outline,
 )
 from solvers.fluid.sliced_facets import IN_PLANE, SlicedFacets, ragged, sliced_facets
-from solvers.fluid.wet_edges import Lattice, WetEdges, corners_of, wet_edges
+from solvers.fluid.wet_edges import EdgeLattice, WetEdges, corners_of, wet_edges
 from solvers.gauss import gauss
 from solvers.lagrange import lagrange
 
@@ -40,7 +40,7 @@ Mask = NDArray[np.bool_]
 class CellRegions:
     """Regions of fluid in the cells with surface, sorted by cell."""
 
-    lattice: Lattice
+    lattice: EdgeLattice
     polygons: SlicedFacets
     faces: FaceRegions
     edges: WetEdges
@@ -94,7 +94,7 @@ class CellRegions:
 
 def cell_regions(grid: Grid, facets: Indices, x: Array, fraction: Array) -> CellRegions:
     """Regions of the fluid around facets (m, 3) with vertices at x [m]; fraction: of solid in each cell of the box."""
-    lattice, polygons = Lattice(grid), sliced_facets(grid, facets, x)
+    lattice, polygons = EdgeLattice(grid), sliced_facets(grid, facets, x)
     cells = np.unique(polygons.cell)
     faces = np.unique([lattice.face(cells, axis, side) for axis in range(3) for side in (0, 1)])
     numbers = np.unique(edges_of(lattice, faces))
@@ -145,7 +145,7 @@ def _grouped(owner: Indices, size: int) -> tuple[Indices, Indices]:
     return order, np.searchsorted(owner[order], np.arange(size + 1))
 
 
-def cells_beside(lattice: Lattice, faces: Indices) -> Indices:
+def cells_beside(lattice: EdgeLattice, faces: Indices) -> Indices:
     """Cells below and above faces, -1: outside of the box, shape (faces, 2)."""
     shape = np.array(lattice.grid.shape)
     axis, corner = np.divmod(faces, lattice.corners)
@@ -159,7 +159,7 @@ def cells_beside(lattice: Lattice, faces: Indices) -> Indices:
     return found
 
 
-def _edges_of_cells(lattice: Lattice, cells: Indices):
+def _edges_of_cells(lattice: EdgeLattice, cells: Indices):
     """For the 12 edges of cells: (their numbers, and for both faces at them: number, side of the face, above it)."""
     corner, steps = lattice.corner(cells), lattice.strides
     for axis in range(3):
@@ -171,7 +171,7 @@ def _edges_of_cells(lattice: Lattice, cells: Indices):
             yield number, one, two
 
 
-def _at_wet_edges(lattice: Lattice, cells: Indices, edges: WetEdges, on_faces: FaceRegions) -> Indices:
+def _at_wet_edges(lattice: EdgeLattice, cells: Indices, edges: WetEdges, on_faces: FaceRegions) -> Indices:
     """Pairs (2 region + above it) of regions on two faces of a cell that meet at a wet interval of its edge."""
     region, face, side, interval = on_faces.of_interval.T
     width = len(edges.wet)
@@ -192,7 +192,7 @@ def _at_wet_edges(lattice: Lattice, cells: Indices, edges: WetEdges, on_faces: F
     return np.concatenate(found)
 
 
-def _doubtful(lattice: Lattice, cells: Indices, edges: WetEdges, on_faces: FaceRegions) -> Indices:
+def _doubtful(lattice: EdgeLattice, cells: Indices, edges: WetEdges, on_faces: FaceRegions) -> Indices:
     """Cells with a doubtful edge or face."""
     found = np.zeros(len(cells), dtype=bool)
     for number, one, two in _edges_of_cells(lattice, cells):

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from solvers.api import Array
 from solvers.fluid.sliced_facets import IN_PLANE, SlicedFacets, ragged
-from solvers.fluid.wet_edges import Lattice, WetEdges, corners_of
+from solvers.fluid.wet_edges import EdgeLattice, WetEdges, corners_of
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -53,7 +53,7 @@ class FaceRegions:
 
 
 def face_regions(
-    lattice: Lattice, polygons: SlicedFacets, x: Array, facets: Indices, faces: Indices, edges: WetEdges
+    lattice: EdgeLattice, polygons: SlicedFacets, x: Array, facets: Indices, faces: Indices, edges: WetEdges
 ) -> FaceRegions:
     """Regions on faces, given by their sorted numbers, with wet intervals of their edges; x [m]: vertices of facets."""
     chords = _chords(lattice, polygons, len(x), facets, faces)
@@ -104,7 +104,7 @@ def face_regions(
     return _with_holes(found_regions, edges)
 
 
-def edges_of(lattice: Lattice, faces: Indices) -> Indices:
+def edges_of(lattice: EdgeLattice, faces: Indices) -> Indices:
     """Numbers of the edges of faces: two along the first axis after the normal's, two along the second."""
     axis, corner = np.divmod(faces, lattice.corners)
     p, q = (axis + 1) % 3, (axis + 2) % 3
@@ -113,7 +113,7 @@ def edges_of(lattice: Lattice, faces: Indices) -> Indices:
     return np.stack([along_p, along_p + steps[q], along_q, along_q + steps[p]], axis=1)
 
 
-def _chords(lattice: Lattice, polygons: SlicedFacets, vertices: int, facets: Indices, faces: Indices) -> Chords:
+def _chords(lattice: EdgeLattice, polygons: SlicedFacets, vertices: int, facets: Indices, faces: Indices) -> Chords:
     polygon, corner, before, kind = corners_of(polygons)
     index = lattice.index(polygons.cell)
     axis, side = np.divmod(np.maximum(kind - IN_PLANE, 0), 2)
@@ -157,7 +157,7 @@ def _chords(lattice: Lattice, polygons: SlicedFacets, vertices: int, facets: Ind
     )
 
 
-def in_cells(lattice: Lattice, cells: Indices, x: Array) -> Array:
+def in_cells(lattice: EdgeLattice, cells: Indices, x: Array) -> Array:
     """Points x [m] of shape (cells, n, 3) in reference coordinates of these cells."""
     found = np.empty(x.shape)
     index = lattice.index(cells)

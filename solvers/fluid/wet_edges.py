@@ -23,7 +23,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Lattice:
+class EdgeLattice:
     """Numbers of corners, edges and faces of the cells of a box in 3D."""
 
     grid: Grid
@@ -73,7 +73,7 @@ class WetEdges:
         return np.where(self.crossing[found] == key, self.beside[found], -1)
 
 
-def wet_edges(lattice: Lattice, polygons: SlicedFacets, facets: int, edges: Indices, fraction: Array) -> WetEdges:
+def wet_edges(lattice: EdgeLattice, polygons: SlicedFacets, facets: int, edges: Indices, fraction: Array) -> WetEdges:
     """Wet parts of edges, given by their sorted numbers.
 
     fraction: share of solid of each cell of the box, which decides where no surface is.
@@ -106,7 +106,7 @@ def wet_edges(lattice: Lattice, polygons: SlicedFacets, facets: int, edges: Indi
     return WetEdges(edges, count, start, wet, ends, doubtful, facets, key[by_key], beside[by_key])
 
 
-def _crossings(lattice: Lattice, polygons: SlicedFacets) -> tuple[Indices, Indices, Mask, Array]:
+def _crossings(lattice: EdgeLattice, polygons: SlicedFacets) -> tuple[Indices, Indices, Mask, Array]:
     """(number of the edge, facet, whether fluid is above, place from 0 to 1) where facets cross edges of cells."""
     polygon, corner, before, after = corners_of(polygons)
     chosen = (before >= IN_PLANE) & (after >= IN_PLANE) & ((before - IN_PLANE) // 2 != (after - IN_PLANE) // 2)
@@ -132,7 +132,7 @@ def corners_of(polygons: SlicedFacets) -> tuple[Indices, Indices, Indices, Indic
     return polygon, corner, polygons.kind[polygon, last], polygons.kind[polygon, corner]
 
 
-def _votes(lattice: Lattice, polygons: SlicedFacets, fraction: Array) -> Indices:
+def _votes(lattice: EdgeLattice, polygons: SlicedFacets, fraction: Array) -> Indices:
     """At each corner, how many cells without surface around it are full of fluid, minus those full of solid."""
     whole = np.where(fraction < 0.5, 1, -1)
     whole[np.isnan(fraction)] = 0
