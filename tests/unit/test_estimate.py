@@ -40,6 +40,14 @@ def test_cells_nodes_and_surfaces(settings, tmp_path):
         assert set(model.surfaces) == set(mesh.surfaces)
 
 
+@pytest.mark.parametrize("settings", SHAPES, ids=[s["shape"] for s in SHAPES])
+def test_extents(settings):
+    """One for each number in `cells`, and none is shorter than half of the thickness."""
+    model = shape(settings)
+    assert len(model.extents) == len(model.cells)
+    assert min(model.extents) >= 0.5 * model.thickness
+
+
 def test_aspect():
     assert shape({"shape": "rectangle", "size": [2, 1], "cells": [2, 10]}).aspect == pytest.approx(10)
     assert shape({"shape": "box", "size": [1, 1, 1], "cells": [1, 2, 4]}).aspect == pytest.approx(4)

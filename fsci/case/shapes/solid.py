@@ -90,6 +90,10 @@ class Cylinder(SolidBuiltIn):
         return product(across_disc(n[0], n[1], order), along(n[2], order))
 
     @property
+    def extents(self) -> tuple[float, ...]:
+        return 2 * pi * self.radius, self.radius, self.height
+
+    @property
     def aspect(self) -> float:
         around, high = 2 * pi * self.radius / self.cells[0], self.height / self.cells[2]
         return max(around, high) / min(around, high)
@@ -254,6 +258,10 @@ class Sphere(SolidBuiltIn):
         face, edge = 6 * self.cells[0] ** 2, self.order * self.cells[0]
         layers = self.cells[1]
         return self.cells[0] ** 3 + face * layers, (edge + 1) ** 3 + (6 * edge**2 + 2) * self.order * layers
+
+    @property
+    def extents(self) -> tuple[float, ...]:
+        return 2 * self.radius, 2 * self.radius
 
     @property
     def aspect(self) -> float:
