@@ -8,8 +8,8 @@ of the surface and an integrand f,
     d int_Omega f dx = int_Gamma f n . dd ds,     d int_Gamma f(n) ds = int_Gamma grad f . dd + f_n d(n ds),
 
 with f of the rows in films, `forms.film`, and of the terms at the surface, `nitsche` and `seepage`, whose part
--<D t(u, g), t(v, 0)> is that of a layer. The velocity g moves with the surface. The second formula is exact where f is
-continuous across the faces of cells; the stress is not, which is what remains missing.
+-<D t(u, g), t(v, 0)> is that of a layer. The velocity g moves with the surface. Where the surface crosses a plane
+between cells, f jumps: `film_crossings` has this part of the second formula.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.fluid.cut import Cut
+from solvers.fluid.film_crossings import crossing_moments, open_sides
 from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.interface import InterfaceTerms
 from solvers.fluid.shape import normal_derivative
@@ -63,11 +64,12 @@ def film_derivatives(
         return None
     index = np.unravel_index(number[pieces], grid.grid.shape, order="F")
     origin = np.stack([edge[i] for edge, i in zip(grid.grid.edges, index, strict=True)], axis=1)
+    sides = open_sides(grid.grid, number[pieces], cut.creeping)
     blocks = []
     for first in range(0, len(pieces), AT_ONCE):
         some = slice(first, first + AT_ONCE)
         moments = cut.pieces.moments[mine[pieces[some]]][:, rule.order]
-        blocks.append(_blocks(at, pieces[some], rule, moments, origin[some], cut.motion.v, state))
+        blocks.append(_blocks(at, pieces[some], rule, moments, origin[some], sides[some], cut.motion.v, state))
     return FilmDerivatives(pieces, *(np.concatenate(parts) for parts in zip(*blocks, strict=True)))
 
 
@@ -77,6 +79,7 @@ def _blocks(
     rule: Weights,
     moments: Array,
     origin: Array,
+    sides: NDArray[np.bool_],
     velocity: Array,
     state: FilmFlow,
 ) -> tuple[Array, Array, Array]:
@@ -97,6 +100,7 @@ def _blocks(
     stress, dstress = mu * (du + np.swapaxes(du, 2, 3)), mu * (ddu + np.swapaxes(ddu, 2, 3))
     lam = _barycentric(origin[:, None] + rule.reference * sizes[:, None], x)
     w = u - np.einsum("nqb,nbi->nqi", lam, velocity[at.corners[some]])
+    crossings = crossing_moments(x, n, origin, sizes, rule.reference, sides)
 
     stretch = np.einsum("nk,nkbj->nbj", n, slope)
     turn = slope - n[:, :, None, None] * stretch[:, None]
@@ -125,9 +129,10 @@ def _blocks(
     change -= mu * inner[:, :, :, None] * n[:, None, None, :, None]
     change -= mu * (v1n[..., None, None] * du[:, :, None] + w[:, :, None, :, None] * v2n[:, :, :, None])
     w_v1, v1_turn = np.einsum("nql,nqal->nqa", w, v1), np.einsum("nqak,nkbj->nqabj", v1, slope)
+    f = -load[:, :, None] * phi[:, :, None] - mu * (w_v1[..., None] * n[:, None, None] + v1n[..., None] * w[:, :, None])
     by_turn = by_turn - mu * w_v1[..., None, None, None] * slope[:, None, None]
     by_turn -= mu * w[:, :, None, :, None, None] * v1_turn[:, :, :, None]
-    force_change, force_by_turn = dload, load_by_normal
+    of_force, force_change, force_by_turn = load, dload, load_by_normal
 
     d = np.einsum("nii->n", at.released[some])
     if d.any():  # -<D t(u, g), t(v, 0)>, D = d n n^T, n . t(phi e_i, 0) = n_i s
@@ -137,6 +142,7 @@ def _blocks(
         T_by_turn = np.einsum("nqibj,ni->nqbj", by_normal, n) + np.einsum("nqi,nibj->nqbj", traction, turn)
         s, ds = 2.0 * mu * v1n - total[:, None, None] * phi, 2.0 * mu * v2n - total[:, None, None, None] * v1
         s_by_turn = 2.0 * mu * np.einsum("nqak,nkbj->nqabj", v1, turn)
+        f -= (d[:, None, None] * T[:, :, None] * s)[..., None] * n[:, None, None]
         weight = d[:, None, None, None, None]
         product = dT[:, :, None] * s[..., None] + T[:, :, None, None] * ds
         change -= weight * n[:, None, None, :, None] * product[:, :, :, None]
@@ -144,32 +150,37 @@ def _blocks(
         turned = (T[:, :, None] * s)[..., None, None, None] * turn[:, None, None]
         by_turn -= weight[..., None] * (n[:, None, None, :, None, None] * product[:, :, :, None] + turned)
         back = (total * d)[:, None, None, None]
+        of_force = load - back[..., 0] * T[..., None] * n[:, None]
         force_change = dload - back * n[:, None, :, None] * dT[:, :, None]
         turned = normal * T_by_turn[:, :, None] + T[..., None, None, None] * turn[:, None]
         force_by_turn = load_by_normal - back[..., None] * turned
 
-    momentum = _on(on, change) + _mean(area, by_turn)
+    momentum = _on(on, change) + _mean(area, by_turn) - _at_lines(crossings, f)
     # <q, div u> - <q, w . n>, and the layer
     flux = psi * np.einsum("nqii->nq", du)[..., None]
     change = flux[..., None] * n[:, None, None] - psi[..., None] * np.einsum("nqkj,nk->nqj", du, n)[:, :, None]
-    change -= np.einsum("nqk,nk->nq", w, n)[..., None, None] * q1
+    w_n = np.einsum("nqk,nk->nq", w, n)
+    change -= w_n[..., None, None] * q1
+    f = -w_n[..., None] * psi
     by_turn = -psi[..., None, None] * np.einsum("nqk,nkbj->nqbj", w, slope)[:, :, None]
     if at.mobility is not None:
         m = at.mobility[some][:, None, None, None]
         tangents = np.eye(dim) - n[:, :, None] * n[:, None, :]
         q1t, dpt = q1 @ tangents[:, None], np.einsum("nik,nqk->nqi", tangents, dp)
         change += m * (np.einsum("nqak,nqkj->nqaj", q1t, ddp) + np.einsum("nqk,nqakj->nqaj", dpt, q2))
+        f += m[..., 0] * np.einsum("nqk,nqak->nqa", dpt, q1)
         q1n, dpn = np.einsum("nqak,nk->nqa", q1, n), np.einsum("nqk,nk->nq", dp, n)
         turned = np.einsum("nqk,nqak->nqa", dpt, q1)[..., None, None] * stretch[:, None, None]
         turned -= q1n[..., None, None] * np.einsum("nqk,nkbj->nqbj", dp, turn)[:, :, None]
         turned -= dpn[:, :, None, None, None] * np.einsum("nqak,nkbj->nqabj", q1, turn)
         by_turn = by_turn + m[..., None] * turned
-    continuity = _on(on, change) + _mean(area, by_turn)
+    continuity = _on(on, change) + _mean(area, by_turn) - _at_lines(crossings, f)
     # -<(I - P D) t - p n, N_c>
     change, by_turn = (
         -lam.reshape(*lam.shape, *[1] * k) * some[:, :, None] for k, some in ((2, force_change), (3, force_by_turn))
     )
-    return momentum, continuity, _on(on, change) + _mean(area, by_turn)
+    f = -lam[..., None] * of_force[:, :, None]
+    return momentum, continuity, _on(on, change) + _mean(area, by_turn) - _at_lines(crossings, f)
 
 
 def _on(on: Array, change: Array) -> Array:
@@ -177,6 +188,15 @@ def _on(on: Array, change: Array) -> Array:
     pieces, points, *others, j = change.shape
     found = (on @ change.reshape(pieces, points, -1)).reshape(pieces, on.shape[1], *others, j)
     return np.moveaxis(found, 1, -2)
+
+
+def _at_lines(crossings: Array, values: Array) -> Array:
+    """Sum over points of the moments of lines (pieces, vertices, points, j) and (pieces, points, ...)."""
+    pieces, points, *others = values.shape
+    vertices, dim = crossings.shape[1], crossings.shape[3]
+    moments = np.moveaxis(crossings, 2, 3).reshape(pieces, vertices * dim, points)
+    found = (moments @ values.reshape(pieces, points, -1)).reshape(pieces, vertices, dim, *others)
+    return np.moveaxis(found, (1, 2), (-2, -1))
 
 
 def _mean(area: Array, values: Array) -> Array:

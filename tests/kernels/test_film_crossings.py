@@ -1,0 +1,54 @@
+"""Lines along which facets cross planes of the grid: what they add to the derivative of moments by a translation."""
+
+import numpy as np
+import pytest
+from moments_setup import all_cells, box, corners_and_sizes, graded, moved, sphere, star, tensor
+
+from solvers.fluid.film_crossings import crossing_moments
+from solvers.gauss import gauss
+from solvers.kernels import moments
+from solvers.tessellation import unit_normals
+
+STEP = 1e-6
+BODIES = {
+    "disc": star(24, 0.6, 0.6),
+    "square": box([-0.4, -0.4], [0.4, 0.4]),
+    "sphere": sphere(0.6, 2),
+    "cube": box([-0.4, -0.4, -0.4], [0.4, 0.4, 0.4]),
+}
+
+
+def moments_of(edges, points, x, facets):
+    """Moments (points, vertices) of each piece by its cell and facet."""
+    found = moments(edges, points, x, facets, np.ones(len(all_cells(edges)), dtype=bool))
+    cells = found.cells[found.piece_cell]
+    return dict(zip(zip(cells, found.piece_facet, strict=True), found.piece_moments, strict=True))
+
+
+@pytest.mark.parametrize("points", [3, 5])
+@pytest.mark.parametrize("name", BODIES)
+def test_derivative_of_moments_by_a_translation(name, points):
+    """d int f lambda = int grad f . d lambda - int_line f lambda e . d / s, for f of degree 2 in each direction."""
+    x, facets = moved(BODIES[name], np.random.default_rng(5))
+    dim, rng = x.shape[1], np.random.default_rng(1)
+    edges, at, way = graded(dim, -1, 1, 5), gauss(points)[0], rng.normal(size=dim)
+    now, *moves = (moments_of(edges, at, x + h * way, facets) for h in (0.0, STEP, -STEP))
+    pieces = [key for key in now if all(key in after for after in moves)]
+    cell, facet = (np.array(column) for column in zip(*pieces, strict=True))
+    origin, sizes = corners_and_sizes(edges, cell)
+    ones = [np.ones(points)] * dim
+    reference = np.stack([tensor(*[at if k == axis else ones[k] for k in range(dim)]) for axis in range(dim)], axis=1)
+    corners, normals = x[facets[facet]], -unit_normals(x[facets])[facet]
+    sides = np.ones((len(pieces), dim, 2), dtype=bool)
+    lines = crossing_moments(corners, normals, origin, sizes, reference, sides)
+    a, b = rng.normal(size=(2, dim))
+    value = (1.0 + reference @ a) * (1.0 + reference @ b)
+    slope = (a * (1.0 + reference @ b)[:, None] + b * (1.0 + reference @ a)[:, None])[None] / sizes[:, None]
+    M = np.stack([now[key] for key in pieces])
+    exact = np.stack([moves[0][key] - moves[1][key] for key in pieces]) / (2.0 * STEP)
+    exact = np.einsum("nqv,q->nv", exact, value)
+    inside = np.einsum("nqv,nqj,j->nv", M, slope, way)
+    found = inside - np.einsum("nvqj,q,j->nv", lines, value, way)
+    size = np.abs(exact).max()
+    assert np.abs(inside - exact).max() > 0.1 * size
+    assert np.abs(found - exact).max() < 1e-6 * size
