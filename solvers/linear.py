@@ -142,6 +142,7 @@ def choose_flow(
     degree: int,
     steady: bool,
     nested: bool = False,
+    sheets: bool = False,
     processes: int = 1,
     with_solids: bool = False,
 ) -> tuple[FlowMethod, ...]:
@@ -149,10 +150,14 @@ def choose_flow(
 
     degree: of the velocity; incomplete factors with more fill take minutes for second degree, and are left out.
     nested: on nested cells, where multigrid stalls for second degree, and for steady flows of 25,000 and 50,000
-    unknowns takes 2.5 times as long as incomplete factors. with_solids: equations of solids may belong to the system.
+    unknowns takes 2.5 times as long as incomplete factors. sheets: there are several nodes in one place, which the
+    coarse lattices of multigrid do not have; incomplete factors of second degree mostly stall there. with_solids:
+    equations of solids may belong to the system.
     """
     if method == "direct" or (method == "auto" and dofs <= FLOW_DIRECT_LIMIT[dim]):
         return ("direct",)
+    if sheets:
+        return ("direct",) if degree > 1 else ("ilu", "fill", "direct")
     if nested and degree > 1:
         return ("ilu", "direct")
     if nested and steady and method == "auto":

@@ -13,11 +13,13 @@ from fsci.case.rigid_motion import rigid_motion
 from fsci.case.shapes import Shape
 from fsci.case.yaml_text import Keys
 from solvers.fluid.fast_bodies import MOST_CELLS
+from solvers.fluid.thinness import free_length
 
 MOST_CELLS_PER_STEP = 10.0  #: above which `check` warns: cells that a flow or a body crosses in a time step
 #: Cells across a body that both of its sides need to share no unknowns: with fewer, fluid passes through the body.
 CELLS_ACROSS_AT_REST, CELLS_ACROSS_IF_MOVING = 2.0, 4.0
-CELLS_ALONG = 6.0  #: of a thin body (in 3D, in two directions), from which on each side has unknowns of its own
+#: The same that both sides of an inclined body in 2D with q2q1 share unknowns with (docs/theory_fluid.md).
+CELLS_ACROSS_INCLINED = (3.05, 3.55)
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
 
 
@@ -88,17 +90,26 @@ def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, 
     smallest = float(fluid.grid.smallest.min())
     rests = not case.elastic_bodies and not any(body.motion or body.free for body in fluid.bodies.values())
     plain = not fluid.grid.refine and not any(patch.periodic for patch in fluid.patches.values())
-    separate = plain and length >= CELLS_ALONG * smallest
-    if separate and (rests or (fluid.grid.dimension == 2 and case.contact is None)):
-        return None  # each side has unknowns of its own
+    least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
     size = f"the body is {extent:.4g} thick, {extent / smallest:.2g} of the smallest cells"
+    body = "a body that moves" if moves else "a body"
+    free = free_length(fluid.grid.dimension, moves=not rests) * smallest
+    separate = plain and length >= free  # each side has unknowns of its own
+    if separate and (rests or case.contact is None):
+        low, high = CELLS_ACROSS_INCLINED
+        if moves and (fluid.grid.dimension, fluid.element) == (2, "q2q1") and low < extent / smallest < high:
+            why = "where it is inclined to the grid by 30 degrees or more, fluid passes"
+            return f"{size}: {why}; take {high:g} or more"
+        ends_at_walls = length >= min(b - a for a, b in zip(fluid.grid.start, fluid.grid.to, strict=True))
+        if ends_at_walls or length >= 2.0 * free or extent >= least * smallest:
+            return None
+        why = f"if all of its edges are in the fluid, some passes through {body} with less than"
+        return f"{size}, and {length / smallest:.2g} of them long: {why} {2.0 * free / smallest:.3g} cells along"
     if separate and fluid.grid.dimension == 2 and extent < CELLS_ACROSS_AT_REST * smallest:
         return f"{size}: nothing passes through it, but where it is in contact and opens again, steps may fail"
-    least = CELLS_ACROSS_IF_MOVING if moves else CELLS_ACROSS_AT_REST
     if extent >= least * smallest:
         return None
-    how = "that moves " if moves else ""
-    why = f"where it has fluid on both sides, fluid passes through a body {how}with less than {least:g} cells across"
+    why = f"where it has fluid on both sides, fluid passes through {body} with less than {least:g} cells across"
     return f"{size}: {why}; refine the grid"
 
 

@@ -52,7 +52,6 @@ def discretise(
     unknowns = Unknowns(distributed, settings.degree, periodic_axes(patches))
     boundary = Boundary(distributed, unknowns, patches)
     method = solver.linear if isinstance(solver.linear, str) else "auto"
-    method = method if sheets is None else "direct"  # the others need nodes on a lattice
     methods = linear.choose_flow(
         method,
         grid.dim,
@@ -60,6 +59,7 @@ def discretise(
         degree=settings.degree,
         steady=settings.steady,
         nested=distributed.nested is not None,
+        sheets=sheets is not None,
         processes=comm.size,
         with_solids=any(body.motion is None for body in bodies),
     )

@@ -24,6 +24,9 @@ from solvers.fluid.sheets import Sheets
 
 Indices = NDArray[np.int64]
 
+#: Facets whose distances along the surface are computed together, to bound the memory.
+CHUNK = 1024
+
 #: How much more a facet counts than one that is a cell farther away along the fluid.
 NEARER = 8
 #: Cosine between facets seen from two places, weighted so, from which on these are on the same side.
@@ -51,13 +54,23 @@ class _Sides:
 
 def along_surface(facets: Indices, x: Array, distance: float) -> sparse.csr_matrix:
     """1 for facets with at most this distance [m] along the surface between their middles, shape (facets, facets)."""
-    length = np.linalg.norm(x[facets[:, 1]] - x[facets[:, 0]], axis=1)
-    ends = sparse.csr_matrix(
-        (np.ones(facets.size), (np.repeat(np.arange(len(facets)), 2), facets.ravel())), shape=(len(facets), len(x))
-    )
-    one, other = sparse.triu(ends @ ends.T, 1).nonzero()
-    graph = sparse.csr_matrix((0.5 * (length[one] + length[other]), (one, other)), shape=(len(facets), len(facets)))
-    return sparse.csr_matrix(dijkstra(graph, directed=False, limit=distance) < np.inf, dtype=float)
+    dim, count = facets.shape[1], len(facets)
+    entries = (np.ones(facets.size), (np.repeat(np.arange(count), dim), facets.ravel()))
+    corners = sparse.csr_matrix(entries, shape=(count, len(x)))
+    common = sparse.triu(corners @ corners.T, 1).tocoo()  # how many corners
+    one, other = common.row[common.data == dim - 1], common.col[common.data == dim - 1]
+    if dim == 2:
+        length = np.linalg.norm(x[facets[:, 1]] - x[facets[:, 0]], axis=1)
+        way = 0.5 * (length[one] + length[other])
+    else:
+        middle = x[facets].mean(axis=1)
+        way = np.linalg.norm(middle[one] - middle[other], axis=1)
+    graph = sparse.csr_matrix((way, (one, other)), shape=(count, count))
+    rows = [
+        sparse.csr_matrix(dijkstra(graph, directed=False, indices=some, limit=distance) < np.inf, dtype=float)
+        for some in np.array_split(np.arange(count), count // CHUNK + 1)
+    ]
+    return sparse.csr_matrix(sparse.vstack(rows))
 
 
 def transfer(old: Sheets, new: Sheets, degree: int, along: sparse.csr_matrix) -> sparse.csr_matrix:

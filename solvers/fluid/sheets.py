@@ -31,18 +31,12 @@ from solvers.fluid.box import Grid
 from solvers.fluid.sheet_nodes import Joined, node_copies, same_nodes
 from solvers.fluid.sheet_parts import AROUND, Part, facing_of, grown, links_of, parts_of_fluid, without_slivers
 from solvers.fluid.space_parts import parts_in_space
-from solvers.fluid.thinness import OPPOSED, may_be_thin
+from solvers.fluid.thinness import AROUND_PAIR, OPPOSED, THIN, may_be_thin
 from solvers.gauss import gauss
 from solvers.mesh import Mesh
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-
-THIN = 2  #: largest distance [cells] across a body at which a node or the ghost penalty couples the fluid on two sides
-THIN_IF_MOVING = 3  #: the same [cells] of bodies that move, with a strip of cells behind each side
-
-#: Distance [cells] of points in two cells in 3D whose indices differ by one in each direction.
-FARTHEST = 3.0**0.5
 
 #: Distance [cells], in 3D, of points in cells whose indices differ by one in each direction.
 FARTHEST = 3.0**0.5
@@ -313,9 +307,9 @@ def _is_thin(grid: Grid, parts: Sequence[Part], links: Indices, facing: Array, c
     number = np.full(len(parts), -1)
     for part in close[linked[close]]:
         apart = np.abs(index - index[part]).max(axis=1)
-        near = np.flatnonzero(apart <= thin + 1)
+        near = np.flatnonzero(apart <= thin + AROUND_PAIR)
         number[near] = np.arange(len(near))
-        first, second = number[ends[(apart[ends] <= thin + 1).all(axis=1)]].T
+        first, second = number[ends[(apart[ends] <= thin + AROUND_PAIR).all(axis=1)]].T
         group = connected_parts(first, second, len(near))
         opposed = ~(facing[near] @ facing[part] > OPPOSED)
         if (group != group[number[part]])[linked[near] & opposed & (apart[near] <= thin)].any():

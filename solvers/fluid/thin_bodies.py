@@ -20,20 +20,26 @@ from solvers.fluid.reach import TOO_FAR
 from solvers.fluid.sheet_cycles import joined_in, recurring
 from solvers.fluid.sheet_parts import AROUND
 from solvers.fluid.sheet_transfer import along_surface, transfer
-from solvers.fluid.sheets import THIN_IF_MOVING, Sheets, find_sheets
+from solvers.fluid.sheets import Sheets, find_sheets
 from solvers.fluid.space import FlowNodes, Unknowns
 from solvers.fluid.surface import Motion, wetness
-from solvers.fluid.thinness import cell_sizes_at, may_be_thin
+from solvers.fluid.thinness import THIN_IF_MOVING, cell_sizes_at, may_be_thin
 from solvers.fluid.time_scheme import FlowStep
 
-#: Thickness in cells up to which moving bodies have separate cells for each side. Thicker ones have a strip of cells
-#: behind each side instead, and fluid would pass where both strips share nodes. With first-order velocities, whose
-#: strips have ghost penalties, that is where cut cells are THIN_IF_MOVING apart or less, in any direction.
-THICK = {1: math.sqrt(2.0) * (THIN_IF_MOVING + 1), 2: THIN_IF_MOVING + 0.05}
-
-#: The same with contact, as bodies at rest. Where thicker ones touch, Newton's method may not converge: fluid between
-#: them appears and disappears in its course. They leak little without separate cells (docs/theory_fsci.md).
+#: Thickness in cells up to which moving bodies have separate cells with contact in 2D: that of bodies at rest. Where
+#: thicker ones touch, Newton's method may not converge: fluid between them appears and disappears in its course. They
+#: leak little without separate cells (docs/theory_fsci.md).
 THICK_IN_CONTACT = 2.0
+
+
+def thickest(dim: int, degree: int) -> float:
+    """Thickness in cells up to which moving bodies have separate cells for each side.
+
+    Thicker ones have a strip of cells behind each side instead, and fluid would pass where both strips share nodes:
+    where cut cells are THIN_IF_MOVING apart or less in all directions. A body is so thick if it is parallel to a
+    diagonal plane. In 2D the extension of second-order velocities was exact with less.
+    """
+    return math.sqrt(dim) * (THIN_IF_MOVING + 1) if dim == 3 or degree == 1 else THIN_IF_MOVING + 0.05
 
 
 class ThinBodies:
@@ -43,12 +49,12 @@ class ThinBodies:
         self, grid: Grid, bodies: Sequence[ImmersedBody], periodic: bool, sheets: Sheets | None, degree: int = 1
     ):
         """degree: of the velocity."""
-        self._grid, self.follows, self._sheets, self._thick = grid, False, sheets, THICK[degree]
+        self._grid, self.follows, self._sheets = grid, False, sheets
         self._wet = wetness([body.surface for body in bodies])
         moving = bool(bodies) and not all(body.rests for body in bodies)
-        if any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies):
-            self._thick = THICK_IN_CONTACT
-        plain = grid.dim == 2 and not periodic and not isinstance(grid, Nested)
+        touch = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
+        self._thick = THICK_IN_CONTACT if touch else thickest(grid.dim, degree)
+        plain = not periodic and not isinstance(grid, Nested) and not (touch and grid.dim == 3)
         self._possible: bool | None = None if moving and plain else False
         self._x: Array | None = None
         self._tried: list[Sheets] = []  #: sheets of this step, in their order

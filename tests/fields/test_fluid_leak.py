@@ -29,6 +29,8 @@ verify: [{{value: fluid.leak, statistic: max, reference: 0, absolute: 1e-12}}]
 """
 #: the same with cells of 0.1 around the plate only, where both sides share their nodes
 NESTED = CASE.replace("cells: [30, 10]", "cells: [15, 5], refine: [{{box: [[0.8, 0], [2.6, 1]], level: 1}}]")
+#: a plate with both ends in the flow
+SHORT = CASE.replace("1.2]", "0.8]").replace("-0.1]", "0.1]")
 MOVED = ', motion: {displacement: ["0.05*t", 0]}'
 
 
@@ -70,6 +72,12 @@ def test_leak_through_a_thin_plate_is_measured(tmp_path):
         ),
         (0.35, MOVED, NESTED, "fluid passes through a body that moves with less than 4 cells across"),
         (0.41, MOVED, NESTED, None),
+        (0.02, MOVED, SHORT, "8 of them long: if all of its edges are in the fluid, some passes through a body that"),
+        (0.02, MOVED, SHORT, "a body that moves with less than 12.7 cells along"),
+        (0.32, MOVED, CASE.replace("bodies:", "element: q2q1\n  bodies:"), "where it is inclined to the grid by 30"),
+        (0.36, MOVED, CASE.replace("bodies:", "element: q2q1\n  bodies:"), None),
+        (0.02, "", SHORT, "some passes through a body with less than 9.9 cells along"),
+        (0.02, MOVED, SHORT.replace("0.8]", "0.6]"), "fluid passes through a body that moves with less than 4 cells"),
     ],
 )
 def test_check_warns(tmp_path, thickness, motion, text, words):
@@ -80,6 +88,43 @@ def test_check_warns(tmp_path, thickness, motion, text, words):
 
 
 CONTACT = "contact: {pairs: {a: {slave: {body: plate, on: top}, master: {body: plate, on: bottom}}}}"
+
+
+SPACE = """\
+time: {{step: 0.1, end: 0.5}}
+fluid:
+  density: 1
+  viscosity: 1e-3
+  scheme: backward_euler
+  grid: {{from: [0, 0, 0], to: [3, 2, 2], cells: [30, 20, 20]}}
+  patches: {{inlet: {{on: x-, traction: [1, 0, 0]}}, other: {{on: [x+, y-, y+, z-, z+], outflow: true}}}}
+structure:
+  dynamics: {{}}
+  bodies:
+    plate:
+      mesh: {{shape: box, size: [0.02, 2, {width}], cells: [1, 2, 2], origin: [1.5, 0, 0]}}
+      material: {{law: neo_hooke, E: 1, nu: 0, density: 1}}
+coupling: {{}}
+{more}
+"""
+
+
+@pytest.mark.parametrize(
+    ("width", "more", "words"),
+    [
+        (2, "", None),
+        (0.9, "", "9 of them long: if all of its edges are in the fluid, some passes through a body that moves with"),
+        (0.7, "", "fluid passes through a body that moves with less than 4 cells across"),
+        (2, CONTACT, "fluid passes through a body that moves with less than 4 cells across"),
+    ],
+)
+def test_check_warns_in_space(tmp_path, width, more, words):
+    """Of thin bodies that are too short, or where surfaces may touch."""
+    more = more.replace("on: bottom", "on: left").replace("on: top", "on: right")
+    (tmp_path / "case.yaml").write_text(SPACE.format(width=width, more=more))
+    found = [str(warning) for warning in load_case(tmp_path).warnings if "of the smallest cells" in str(warning)]
+    assert len(found) == (words is not None)
+    assert not words or words in found[0]
 
 
 @pytest.mark.parametrize(
