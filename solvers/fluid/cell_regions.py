@@ -27,10 +27,9 @@ from solvers.fluid.face_regions import (
     in_cells,
     outline,
 )
+from solvers.fluid.region_integrals import integral_from_0, over_faces, over_surfaces
 from solvers.fluid.sliced_facets import IN_PLANE, SlicedFacets, ragged, sliced_facets
 from solvers.fluid.wet_edges import EdgeLattice, WetEdges, corners_of, wet_edges
-from solvers.gauss import gauss
-from solvers.lagrange import lagrange
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -76,10 +75,46 @@ class CellRegions:
     def triangles_of(self, region: int) -> Array:
         """The surface of a region in reference coordinates, normals into the fluid, shape (triangles, 3, 3)."""
         order, ends = self._polygons
-        polygons = order[ends[region] : ends[region + 1]]
+        return self._triangles(order[ends[region] : ends[region + 1]])[0]
+
+    def _triangles(self, polygons: Indices) -> tuple[Array, Indices]:
+        """(triangles of polygons, as above, the polygon of each)."""
         of, step = ragged(self.polygons.count[polygons] - 2)
         at = polygons[of]
-        return np.stack([self.corners[at, 0 * step], self.corners[at, step + 1], self.corners[at, step + 2]], axis=1)
+        corners = self.corners[at, 0 * step], self.corners[at, step + 1], self.corners[at, step + 2]
+        return np.stack(corners, axis=1), at
+
+    def integrals(self, points: Array) -> tuple[Array, Array]:
+        """Integrals of the Lagrange basis on some points over the regions, and over the regions on faces.
+
+        int L_q on the tensor points, the first direction fastest, shape (regions, points^3), as
+        int l_a(x) l_b(y) l_c(z) = int over the surface of (int_0^x l_a) l_b l_c n_x; int l_a l_b relative to the face,
+        a: in the axis after its own, b: in the next, shape (regions on faces, points, points).
+        """
+        key = points.tobytes()
+        if key not in self._integrals:
+            faces, count = self.faces, len(self.cell)
+            far = faces.of_interval[faces.of_interval[:, 2] == 3]
+            chords = faces.of_chord >= 0
+            on_faces = over_faces(
+                points,
+                faces.chords.ends[chords],
+                faces.of_chord[chords],
+                self.edges.ends[far[:, 3]],
+                far[:, 0],
+                len(faces.face),
+            )
+            triangles, polygon = self._triangles(np.flatnonzero(self.of_polygon >= 0))
+            total = -over_surfaces(points, triangles, self.of_polygon[polygon], count)
+            right = (faces.faces[faces.face] // self.lattice.corners == 0) & (self.of_face[:, 0] >= 0)
+            whole = integral_from_0(points, np.ones(1))[0]
+            np.add.at(total, self.of_face[right, 0], np.swapaxes(on_faces[right], 1, 2)[..., None] * whole)
+            self._integrals[key] = total.reshape(count, -1), on_faces
+        return self._integrals[key]
+
+    @cached_property
+    def _integrals(self) -> dict[bytes, tuple[Array, Array]]:
+        return {}
 
     def faces_of(self, region: int) -> list[tuple[int, int, int]]:
         """(axis, side, region on this face) for the faces of a region."""
@@ -251,35 +286,14 @@ class SpaceRegion:
     number: int
 
     def integrals(self, points: Array) -> Array:
-        """int L_q of the Lagrange basis on the tensor points, the first direction fastest, shape (points^3,).
-
-        int l_a(x) l_b(y) l_c(z) = int over the surface of (int_0^x l_a) l_b l_c n_x.
-        """
-        size = len(points)
-        total = np.zeros((size,) * 3)  # c, b, a
-        triangles = self.regions.triangles_of(self.number)
-        if len(triangles):
-            nodes, weights = gauss((3 * size + 1) // 2)
-            s, t = np.meshgrid(nodes, nodes, indexing="ij")
-            corner = np.stack([(1.0 - s), s * (1.0 - t), s * t], axis=2).reshape(-1, 3)
-            weight = (np.multiply.outer(weights, weights) * s).ravel()
-            at = np.einsum("gv,tvi->tgi", corner, triangles)
-            p, q = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-            twice = p[:, 1] * q[:, 2] - p[:, 2] * q[:, 1]
-            first = integral_from_0(points, at[..., 0])
-            y, z = (lagrange(points, at[..., axis]) for axis in (1, 2))
-            total -= np.einsum("tga,tgb,tgc,g,t->cba", first, y, z, weight, twice, optimize=True)
-        whole = integral_from_0(points, np.ones(1))[0]
-        total += np.multiply.outer(self.on_face(0, 1, points).T, whole)
-        return np.asarray(total).ravel()
+        """int L_q of the Lagrange basis on the tensor points, the first direction fastest, shape (points^3,)."""
+        return np.asarray(self.regions.integrals(points)[0][self.number])
 
     def on_face(self, axis: int, side: int, points: Array) -> Array:
         """int l_a l_b over its part of a face, relative to the face; a: in the axis after its own, b: in the next."""
-        total = np.zeros((len(points),) * 2)
-        for face in self.regions.faces_of(self.number):
-            if face[:2] == (axis, side):
-                total += _over_face(points, *outline(self.regions.faces, self.regions.edges, face[2]))
-        return total
+        on_faces = self.regions.integrals(points)[1]
+        numbers = [face[2] for face in self.regions.faces_of(self.number) if face[:2] == (axis, side)]
+        return np.asarray(on_faces[numbers].sum(axis=0))
 
     def contains(self, x: Array) -> bool:
         """Whether a point of the cell is in it: a ray from the point along the first axis leaves it once more."""
@@ -295,22 +309,3 @@ class SpaceRegion:
             if (axis, side) == (0, 1):
                 count += contains(*outline(self.regions.faces, self.regions.edges, number), x[1:])
         return count % 2 == 1
-
-
-def integral_from_0(points: Array, x: Array) -> Array:
-    """int_0^x l_a of the Lagrange polynomials on some points, along one more axis."""
-    nodes, weights = gauss(len(points))
-    return np.asarray(np.einsum("...na,n,...->...a", lagrange(points, x[..., None] * nodes), weights, x))
-
-
-def _over_face(points: Array, chords: Array, far: Array) -> Array:
-    """int l_a l_b over a region of a square: int_0^x l_a along its boundary; far: its intervals where x = 1."""
-    nodes, weights = gauss(len(points) + 1)
-    along = chords[:, 1] - chords[:, 0]
-    at = chords[:, None, 0] + nodes[:, None] * along[:, None]
-    first, second = integral_from_0(points, at[..., 0]), lagrange(points, at[..., 1])
-    total = np.einsum("sga,sgb,g,s->ab", first, second, weights, along[:, 1])
-    size = far[:, 1] - far[:, 0]
-    there = lagrange(points, far[:, :1] + nodes * size[:, None])
-    edge = np.einsum("sgb,g,s->b", there, weights, size)
-    return np.asarray(total + np.multiply.outer(integral_from_0(points, np.ones(1))[0], edge))

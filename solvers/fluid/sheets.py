@@ -136,16 +136,16 @@ class Sheets:
         """Mesh of the box and of the new cells, which are not connected to others, except pairs to each other."""
         box, dim = self.grid.mesh(), self.grid.dim
         index = np.stack(np.unravel_index(self.cells, self.grid.shape, order="F"), axis=1)
-        units = [[cell] for cell in range(self.singles)]
-        units += [[cell, cell + 1] for cell in range(self.singles, len(self.cells), 2)]
-        points, cells, count = [], [], len(box.points)
-        for unit in units:
-            lattice = (index[unit][:, None, :] + CORNER_STEPS[dim]).reshape(-1, dim)
-            corners, number = np.unique(lattice, axis=0, return_inverse=True)
-            points.append(np.stack([edge[i] for edge, i in zip(self.grid.edges, corners.T, strict=True)], axis=1))
-            cells.append(count + number.reshape(len(unit), -1))
-            count += len(corners)
-        return Mesh(np.concatenate([box.points, *points]), np.concatenate([box.cells, *cells]), box.cell_type)
+        points, cells, count = [box.points], [box.cells], len(box.points)
+        for units in (index[: self.singles, None], index[self.singles :].reshape(-1, 2, dim)):
+            if len(units):
+                corners, numbers = _corners_of(units)
+                at = corners.reshape(-1, dim).T
+                points.append(np.stack([edge[i] for edge, i in zip(self.grid.edges, at, strict=True)], axis=1))
+                first = count + corners.shape[1] * np.arange(len(units))
+                cells.append((first[:, None, None] + numbers).reshape(-1, numbers.shape[2]))
+                count += len(points[-1])
+        return Mesh(np.concatenate(points), np.concatenate(cells), box.cell_type)
 
     def box_cells(self, original: Indices) -> Indices:
         """Number in the box of each cell of the mesh; new cells have that of the cell they are a copy of."""
@@ -200,6 +200,23 @@ class Sheets:
         steps = np.array(list(product(range(degree + 1), repeat=self.grid.dim)))
         copy = self.copies[:, _in_cell(steps, degree)]
         return np.unique((copy * self.lattice_size(degree) + self._lattice(self.cells, degree, steps))[copy > 0])
+
+
+def _corners_of(units: Indices) -> tuple[Indices, Indices]:
+    """Corners of units of one or two cells, shape (units, corners, dim), and the numbers of each cell's among them.
+
+    units: indices of their cells, shape (units, cells, dim).
+    """
+    ways = (units - units[:, :1]).reshape(len(units), -1)
+    kinds, kind = np.unique(ways, axis=0, return_inverse=True)
+    found = []
+    for way in kinds.reshape(len(kinds), *units.shape[1:]):
+        lattice = (way[:, None] + CORNER_STEPS[units.shape[2]]).reshape(-1, units.shape[2])
+        corners, number = np.unique(lattice, axis=0, return_inverse=True)
+        found.append((corners, number.reshape(units.shape[1], -1)))
+    corners, numbers = (np.stack(some) for some in zip(*found, strict=True))
+    kind = kind.ravel()
+    return units[:, :1] + corners[kind], numbers[kind]
 
 
 def _in_cell(steps: Indices, degree: int) -> Indices:
