@@ -43,9 +43,15 @@ class Elastic:
     def predict(self, t: float) -> None:
         """Extrapolate displacements by a parabola, unless the structure has a predictor of its own."""
         held, now = self.structure.held, self.structure.now
+        before = now.u.copy()
         own_predictor = not np.array_equal(held.free_part(now.u), held.free_part(self.structure.old.u))
         if not self.comm.allreduce(own_predictor, op=MPI.LOR):
             now.u[:] = held.part(now.u) + held.free_part(self.predictor.at(t))
+        self.structure.increment = now.u - before
+
+    def in_contact(self) -> bool:
+        constraint = self.structure.constraint
+        return constraint is not None and bool(constraint.active().any())
 
     def solve(self) -> StepInfo:
         return self.structure.solve()

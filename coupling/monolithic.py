@@ -90,13 +90,24 @@ class Monolithic:
         unmoved = 0.0
         if not coupled.flow.steady:
             unmoved = self.residual()
-            coupled.predict(t + dt)
+            self._predict(t + dt, unmoved)
         info = converge(self, self.tolerance, unmoved)
         coupled.solid.check(info)
         coupled.end_step()
         numbers = coupled.balance.numbers() | {"coupling.linear": float(self._linear_iterations)}
         numbers.update(coupled.solid.numbers())
         return StepInfo(info.iterations, info.residuals, numbers, coupled.take_notes())
+
+    def _predict(self, t: float, unmoved: float) -> None:
+        """Set the predictors for the time t [s]; in closed contact with films only if they reduce the residual [N].
+
+        An extrapolated surface may open parts of the contact. The film there has hardly any height, and the pressure
+        for which its first increment takes it moves the surface out of reach.
+        """
+        doubtful = self.coupled.solid.in_contact() and self.coupled.flow.has_films()
+        self.coupled.predict(t)
+        if doubtful and not self.residual() < unmoved:
+            self.retreat(1.0)
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 

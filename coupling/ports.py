@@ -95,7 +95,11 @@ class Solid(Part, Protocol):
         ...
 
     def predict(self, t: float) -> None:
-        """Set the predictor for the time t [s]."""
+        """Set the predictor for the time t [s]; `retreat` takes it back."""
+        ...
+
+    def in_contact(self) -> bool:
+        """Whether any contact is closed, the same on every process."""
         ...
 
     def displacement(self) -> Array:
@@ -178,7 +182,11 @@ class Flow(Part, Protocol):
     steady_iteration: SteadyIteration  #: how far the iteration to a steady flow is
 
     def predict(self) -> None:
-        """Set the predictor for the end of the step."""
+        """Set the predictor for the end of the step; `retreat` takes it back."""
+        ...
+
+    def has_films(self) -> bool:
+        """Whether the present cut has films that are thinner than a cell (collective)."""
         ...
 
     def keeps_tangent(self) -> bool:

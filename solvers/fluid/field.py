@@ -187,13 +187,20 @@ class Fluid:
 
     def predict(self) -> None:
         """Predictor: extrapolate the velocity linearly from the last two steps, where both have one."""
+        self._increment = np.zeros(self.unknowns.owned)
         if self.steady or len(self.history.steps) < 2:
             return
         old, older = self.history.past[:2]
         continued = old.found & older.found
         continued[self.boundary.dofs] = False
         growth = self.current.dt / self.history.steps[0]
+        before = self.flow[: self.unknowns.owned].copy()
         self.flow[continued] += growth * (old.velocity - older.velocity)[continued]
+        self._increment = self.flow[: self.unknowns.owned] - before
+
+    def has_films(self) -> bool:
+        """Whether the present cut has films that are thinner than a cell (collective)."""
+        return bool(self.comm.allreduce(self.cut.film is not None, op=MPI.LOR))
 
     def move(self, coupled: Mapping[str, Motion], *, with_solid: bool = False) -> None:
         """Cut the grid by the surfaces at their present positions (collective).

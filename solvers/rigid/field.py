@@ -116,6 +116,7 @@ class RigidBodies:
         """Predictor: free components keep their velocity."""
         u, path = self._held_u.copy(), self.current.dt * self._velocity(self.old)
         u[:, self.components] += np.where(self._free, path, 0.0).reshape(len(u), -1)
+        self._last = u - self._u
         self.set_increments(u)
 
     def set_increments(self, u: Array) -> None:
@@ -351,6 +352,10 @@ class RigidBodies:
         return changed
 
     # ------------------------------------------------------------------------------------------- results and state
+
+    def in_contact(self) -> bool:
+        """Whether any contact is closed."""
+        return self.contact is not None and bool(self.contact.active.any())
 
     def touching(self) -> NDArray[np.bool_] | None:
         return None if self.contact is None else self.contact.active
