@@ -83,8 +83,9 @@ PARALLEL := -n 2 --dist worksteal
 test: setup lint
 	$(BIN)/python -m pytest $(PARALLEL) -m "not slow"
 
+# MINUTES=30 begins no test after half an hour and names those that are left out.
 test-slow: setup
-	$(BIN)/python -m pytest $(PARALLEL) -m slow --durations=10
+	$(BIN)/python -m pytest $(PARALLEL) -m slow --durations=10 $(MINUTES:%=--minutes=%)
 
 # What versions of DOLFINx, PETSc, MPI and numpy may break.
 test-versions: setup

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from mpi4py import MPI
-from programs import fsci
+from programs import run_whole
 
 from fsci.builder.build import build
 from fsci.case import load_case
@@ -53,8 +53,7 @@ def stopping_force(out, step):
 @pytest.mark.slow
 def test_two_tori(tmp_path):
     """200 steps, none retried, at most 6 Newton steps in each; momentum to 1e-9, energy to 1 %."""
-    run = fsci("run", "cases/two_tori", "-o", tmp_path, "--set", "output.residuals=[91, 111, 151]", timeout=1200)
-    assert run.returncode == 0, run.stdout[-2000:]
+    run_whole("two_tori", tmp_path, "output.residuals=[91, 111, 151]", "output.fields_every=10")
     summary, history = results(tmp_path)
     assert summary["steps"] == {"accepted": 200, "retried": 0}
     assert summary["newton"]["max"] <= 6
@@ -76,8 +75,7 @@ def test_two_tori(tmp_path):
 @pytest.mark.slow
 def test_sphere_tube(tmp_path):
     """40 steps, none retried, at most 5 Newton steps in each; the sphere moves as if it were free."""
-    run = fsci("run", "cases/sphere_tube", "-o", tmp_path, "--set", "output.fields_every=0", timeout=1200)
-    assert run.returncode == 0, run.stdout[-2000:]
+    run_whole("sphere_tube", tmp_path)
     summary, _ = results(tmp_path)
     assert summary["steps"] == {"accepted": 40, "retried": 0}
     assert summary["newton"]["max"] <= 5

@@ -6,15 +6,14 @@ import json
 
 import numpy as np
 import pytest
-from programs import fsci
+from programs import run_whole
 
 from fsci.run.history import read_history
 
 
 @pytest.mark.slow
 def test_valve(tmp_path):
-    run = fsci("run", "cases/valve", "-o", tmp_path, "--set", "output.fields_every=0", timeout=600)
-    assert run.returncode == 0, run.stdout[-2000:]
+    run_whole("valve", tmp_path)
     assert json.loads((tmp_path / "summary.json").read_text())["steps"] == {"accepted": 150, "retried": 0}
     history = read_history(tmp_path / "history.csv")
     touching = history["time"][history["contact.active"] > 0]

@@ -19,7 +19,7 @@ from solvers.fluid.surface import Motion
 from solvers.fluid.thin_bodies import ThinBodies, may_be_thin
 
 THICKNESS = [1e-3, 0.2, 1.0, 1.5, 3.0]  # in cells
-DRAWS = (range(1), pytest.param(range(1, 20), marks=pytest.mark.slow))
+DRAWS = (range(1), pytest.param(range(1, 10), marks=pytest.mark.slow))
 H = 0.1
 
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from contact_setup import make_body, make_contact, solve_step
-from programs import fsci
+from programs import run_whole
 from structure_setup import constant
 
 from fsci import shapes
@@ -172,8 +172,7 @@ def test_newton(ironing):
 @pytest.mark.slow
 def test_with_friction(tmp_path):
     """The case: both components are among the published ones, at full depth and on the way, and smooth there."""
-    run = fsci("run", "cases/ironing", "-o", tmp_path, "--set", "output.fields_every=0", timeout=600)
-    assert run.returncode == 0, run.stdout + run.stderr
+    run_whole("ironing", tmp_path)
     history = read_history(tmp_path / "history.csv")
     down, way = np.argmin(np.abs(history["time"] - 1.0)), history["time"] > 3.0
     for name, sign, published in (("force.y", -1.0, PUBLISHED), ("force.x", 1.0, PUBLISHED_ALONG)):

@@ -87,6 +87,16 @@ def test_commands_of_the_docs_run(page, tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.parametrize(("minutes", "last"), [(0, "1 skipped"), (9, "1 passed")])
+def test_tests_end_in_time(minutes, last):
+    """Those that do not begin within the bound are named."""
+    name = f"{Path(__file__).name}::{test_readme_begins_with_demo_and_test.__name__}"
+    program = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", f"--minutes={minutes}", f"tests/unit/{name}"]
+    done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True)
+    assert last in done.stdout
+    assert (name in done.stdout.partition("left out, no time is left")[2]) == (minutes == 0)
+
+
 def text_files() -> list[Path]:
     """What is, or would be, under version control, except pictures and other binary files."""
     listing = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"]
