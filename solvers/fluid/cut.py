@@ -13,7 +13,7 @@ from solvers.api import Array
 from solvers.fluid.film import Films, creeping_cells, walls_of
 from solvers.fluid.grid import DistributedGrid, Grid
 from solvers.fluid.overlaps import with_unions
-from solvers.fluid.pieces import FLUSH, NOTHING, Pieces, put_where_fluid_is
+from solvers.fluid.pieces import FLUSH, NOTHING, Pieces, in_planes, put_where_fluid_is
 from solvers.fluid.sheet_cells import on_sheets
 from solvers.fluid.surface import Motion
 from solvers.gauss import tensor_weights
@@ -117,11 +117,12 @@ class Cutter:
             self._special[:] = False  # a cell behind a thin body is one of its other side
         self._depth = max(self._depth, layers)
         nearby = _grow(self._own, self._depth + MARGIN)
-        moments = kernels.moments(box.edges, self.points, motion.x, facets, nearby.ravel(order="F"))
+        x = in_planes(box, motion.x)
+        moments = kernels.moments(box.edges, self.points, x, facets, nearby.ravel(order="F"))
         normal = -unit_normals(motion.x[facets])
         off = off_boundary(box, motion.x[facets])
         if self._unions:
-            moments = with_unions(box, self.points, moments, facets, motion.x, off)
+            moments = with_unions(box, self.points, moments, facets, x, off)
         counts = off if wet is None else off & wet
         # on sheets, cells that are solid except for rounding have no fluid
         overlap = moments.fraction > (1.0 + NOTHING if grid.sheets is None else 1.0 - NOTHING)

@@ -16,7 +16,7 @@ from solvers.api import Array
 from solvers.connected import connected_parts
 from solvers.fluid.box import Grid
 from solvers.fluid.pieces import NOTHING, joined_pieces, parts_of_facets
-from solvers.fluid.regions import Region, chords_of
+from solvers.fluid.regions import SAME, Region, chords_of
 from solvers.fluid.touching_regions import touching_regions
 from solvers.gauss import tensor_weights
 
@@ -78,6 +78,18 @@ def _overlapping(
         numbers = moments.piece_facet[moments.piece_cell == row]
         chords = chords_of(grid, cell, x, facets, numbers[bounds[numbers]].tolist())
         regions = touching_regions(cell, float(moments.fraction[cell]), chords) if chords else None
-        if regions and sum(region.share for region in regions) + moments.fraction[cell] > 1.0 + NOTHING:
+        if not regions:
+            continue
+        twice = sum(region.share for region in regions) + moments.fraction[cell] > 1.0 + NOTHING
+        bounding = sum(
+            length(region.surface[:, 1:].reshape(-1, 2, 2)) for region in regions if region.surface is not None
+        )
+        hidden = sum(length(np.stack([line[:-1], line[1:]], axis=1)) for line, _ in chords) - bounding > SAME
+        if twice or hidden:
             found.append((row, regions))
     return found
+
+
+def length(ends: Array) -> float:
+    """Sum of the lengths of segments, (n, 2, 2)."""
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())

@@ -17,6 +17,8 @@ from solvers.lagrange import lagrange
 FLUSH = 1e-6
 #: Share of a cell (of its face) below which fluid (surface) in it is rounding error of the geometry.
 NOTHING = 1e-10
+#: Rounding error of a position, relative to the largest coordinate of the box: of some sums of rotated coordinates.
+ROUNDING = 16 * np.finfo(float).eps
 
 
 @dataclass(frozen=True)
@@ -30,21 +32,37 @@ class Pieces:
     normal: Array  #: unit normal out of the fluid, shape (pieces, dim)
 
 
+def in_planes(grid: Grid, x: Array) -> Array:
+    """Vertices [m], those beside a plane of the grid by rounding put into it.
+
+    Then the kernel knows from the normal which of the two cells has the fluid.
+    """
+    placed = x.copy()
+    for axis, edge in enumerate(grid.edges):
+        above = np.clip(np.searchsorted(edge, x[:, axis]), 1, len(edge) - 1)
+        for plane in (edge[above - 1], edge[above]):
+            near = np.abs(x[:, axis] - plane) <= ROUNDING * np.abs(edge).max()
+            placed[near, axis] = plane[near]
+    return placed
+
+
 def put_where_fluid_is(
     grid: Grid, points: Array, moments, normal: Array, full: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], Array]:
     """(cell of the box whose fluid each piece bounds, -1: none; moments of the piece in that cell).
 
-    A piece in a `full` cell bounds no fluid there. If it lies in a face of the cell towards the fluid, it is moved to
-    the cell behind this face: rounding decides on which side of the face the facet is.
+    A piece in a `full` cell bounds no fluid there, nor does one in a face of a cell that is solid: it is inside of
+    another body, or rounding put it on the wrong side of the face. In the latter case it is moved to the cell behind
+    the face.
     moments: result of the kernel; normal: out of the fluid, (pieces, dim); points: of the quadrature in one direction.
     """
     cell, found = moments.cells[moments.piece_cell], moments.piece_moments
-    inside = np.flatnonzero(full[cell])
+    solid = moments.fraction >= 1.0 - NOTHING
+    inside = np.flatnonzero((solid | full)[cell])
     if not len(inside):
         return cell, found
     found, count, dim = found.copy(), len(points), grid.dim
-    behind = np.full(len(cell), -1)
+    bounds = np.where(full[cell], -1, cell)
     axes = np.argmax(np.abs(normal), axis=1)
     index = np.stack(np.unravel_index(cell, grid.shape, order="F"))
     for axis in range(dim):
@@ -55,15 +73,17 @@ def put_where_fluid_is(
             by_layer = np.moveaxis(found[at].reshape(len(at), *[count] * dim, dim), dim - axis, 1)
             across = by_layer.sum(axis=1)
             area = across.reshape(len(at), -1).sum(axis=1)
-            square = np.einsum("pa,a->p", by_layer.reshape(len(at), count, -1).sum(axis=2), (points - side) ** 2)
+            level = by_layer.reshape(len(at), count, -1).sum(axis=2)
+            flush, covered = (level @ (points - face) ** 2 <= FLUSH**2 * area for face in (side, 1 - side))
+            bounds[at[covered]] = -1
             next_index = index[axis, at] + (1 if side else -1)
-            flush = (square <= FLUSH**2 * area) & (next_index >= 0) & (next_index < grid.shape[axis])
-            stride = int(np.prod(grid.shape[:axis]))
-            behind[at[flush]] = cell[at[flush]] + (stride if side else -stride)
+            flush &= (next_index >= 0) & (next_index < grid.shape[axis])
+            at, across = at[flush], across[flush]
+            behind = cell[at] + (1 if side else -1) * int(np.prod(grid.shape[:axis]))
+            bounds[at] = np.where((solid | full)[behind], -1, behind)
             moved = np.moveaxis(np.multiply.outer(lagrange(points, np.array(1.0 - side)), across), 1, 0)
-            found[at] = np.moveaxis(moved, 1, dim - axis).reshape(len(at), -1, dim)
-    behind[behind >= 0] = np.where(full[behind[behind >= 0]], -1, behind[behind >= 0])
-    return np.where(full[cell], behind, cell), found
+            found[at] = np.moveaxis(moved, 1, dim - axis).reshape(len(at), count**dim, dim)
+    return bounds, found
 
 
 def selected(pieces: Pieces, cell: NDArray[np.int64]) -> Pieces:

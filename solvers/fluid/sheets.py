@@ -28,6 +28,7 @@ from solvers import kernels
 from solvers.api import Array
 from solvers.connected import connected_parts
 from solvers.fluid.box import Grid
+from solvers.fluid.pieces import in_planes
 from solvers.fluid.sheet_nodes import Joined, node_copies, same_nodes
 from solvers.fluid.sheet_parts import AROUND, Part, facing_of, grown, links_of, parts_of_fluid, without_slivers
 from solvers.fluid.space_parts import parts_in_space
@@ -241,6 +242,7 @@ def find_sheets(
     """
     if not len(facets) or (grid.dim == 3 and not always and not may_be_thin(grid, facets, x, FARTHEST * (thin + 1))):
         return None
+    x = in_planes(grid, x)
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
     if grid.dim == 3:
         parts, links, special = parts_in_space(grid, moments, facets, x, AROUND)

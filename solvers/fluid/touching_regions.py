@@ -19,6 +19,9 @@ from solvers.fluid.regions import CORNERS, SAME, Chord, Region, area_of, on_peri
 
 #: Gap, relative to a cell, up to which surfaces touch: there is no fluid between them. As with the box's boundary.
 TOUCHING = FLUSH
+#: Decimals of points, relative to a cell, without their rounding errors.
+DECIMALS = 12
+ROUNDING = 10.0**-DECIMALS
 
 
 def meet(chords: Sequence[Chord], body: NDArray[np.int64]) -> bool:
@@ -42,8 +45,11 @@ def touching_regions(cell: int, solid: float, chords: Sequence[Chord]) -> list[R
     """
     if np.isnan([on_perimeter(line[end]) for line, _ in chords for end in (0, -1)]).any():
         return None
+    chords = [_rounded(*chord) for chord in chords]
     wet = _wet(solid, chords)
     ends, facets = _divided(chords)
+    _, single = np.unique(ends.round(DECIMALS).reshape(-1, 4), axis=0, return_index=True)  # bodies with common sides
+    ends, facets = ends[np.sort(single)], facets[np.sort(single)]
     middle, along = ends.mean(axis=1), ends[:, 1] - ends[:, 0]
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
     open_side = wet(middle + TOUCHING * outward)
@@ -51,7 +57,8 @@ def touching_regions(cell: int, solid: float, chords: Sequence[Chord]) -> list[R
     round_it = _perimeter_between(np.concatenate([*(line[[0, -1]] for line, _ in chords), ends.reshape(-1, 2)]))
     inward = round_it[:, 1] - round_it[:, 0]
     inward = np.stack([-inward[:, 1], inward[:, 0]], axis=1) / np.linalg.norm(inward, axis=1)[:, None]
-    round_it = round_it[wet(round_it.mean(axis=1) + TOUCHING * inward)]
+    covered = (np.abs(round_it[:, None] - ends).max(axis=(2, 3)) < 2.0 * TOUCHING).any(axis=1)  # surface in a face
+    round_it = round_it[wet(round_it.mean(axis=1) + TOUCHING * inward) & ~covered]
     ends = np.concatenate([ends, round_it])
     facets = np.concatenate([facets, np.full(len(round_it), -1)])
     loops = _loops(ends)
@@ -67,6 +74,13 @@ def touching_regions(cell: int, solid: float, chords: Sequence[Chord]) -> list[R
             surface = np.concatenate([of[of >= 0, None], ends[loop][of >= 0].reshape(-1, 4)], axis=1)
             found.append(Region(cell, area, tuple(faces), frozenset(of[of >= 0].tolist()), polygon, surface))
     return found
+
+
+def _rounded(line: Array, of: Sequence[int]) -> Chord:
+    """The chord with points on the perimeter that are beside it by rounding, without segments of no length."""
+    line = np.where(np.abs(line - line.round()) < ROUNDING, line.round(), line)
+    long = np.abs(np.diff(line, axis=0)).max(axis=1) > 0.0
+    return line[np.r_[True, long]], [facet for facet, kept in zip(of, long, strict=True) if kept]
 
 
 def _wet(solid: float, chords: Sequence[Chord]) -> Callable[[Array], NDArray[np.bool_]]:
@@ -183,7 +197,7 @@ def _faces(a: Array, b: Array) -> list[tuple[tuple[int, int], float, float]]:
 
 def _loops(ends: Array) -> list[list[int]] | None:
     """Closed loops of directed parts, the inside on their left; None if some part does not belong to one."""
-    _, number = np.unique(ends.reshape(-1, 2).round(12), axis=0, return_inverse=True)
+    _, number = np.unique(ends.reshape(-1, 2).round(DECIMALS), axis=0, return_inverse=True)
     number = number.reshape(-1, 2)
     along = ends[:, 1] - ends[:, 0]
     angle = np.arctan2(along[:, 1], along[:, 0])

@@ -22,8 +22,24 @@ def cylinder_and_flag(draw):
     return centre + 0.2 * np.stack([np.cos(angle), np.sin(angle)], axis=1), flag, facets
 
 
-def at_rest(draw, element):
-    cylinder, flag, facets = cylinder_and_flag(draw)
+def flag_in_planes():
+    """As `cylinder_and_flag`; all sides of the flag lie in planes of the grid, two cells apart."""
+    angle = 2.0 * np.pi * np.arange(60) / 60
+    return [0.35, 0.5] + 0.2 * np.stack([np.cos(angle), np.sin(angle)], axis=1), *block([0.35, 0.45], [0.8, 0.55])
+
+
+def rectangles_in_planes(draw):
+    """Corners of two rectangles that touch or overlap, in planes of the grid or in the middle between them."""
+    rng = np.random.default_rng(draw)
+    while True:
+        low = rng.integers(4, 24, (2, 2))
+        high = low + rng.integers(4, 14, (2, 2))
+        if (high.min(axis=0) >= low.max(axis=0)).all():
+            (one, _), (other, facets) = (block(*corners) for corners in zip(low / 40, high / 40, strict=True))
+            return one, other, facets
+
+
+def at_rest(cylinder, flag, facets, element):
     patches = [Patch("walls", ("x-", "x+", "y-"), "no_slip"), Patch("top", ("y+",), "outflow")]
     bodies = [body("cylinder", cylinder, loop(len(cylinder))), body("flag", flag, facets)]
     fluid = make_fluid(
@@ -37,7 +53,25 @@ def at_rest(draw, element):
 @pytest.mark.parametrize("draw", range(6))
 def test_fluid_at_rest(draw, element):
     """Its area is exact, the surface is closed, nothing flows, and the union of the bodies has its buoyancy."""
-    fluid, area = at_rest(draw, element)
+    fluid, area = at_rest(*cylinder_and_flag(draw), element)
+    balanced(fluid, area)
+
+
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_sides_in_planes_of_the_grid(element):
+    """The sides of the flag inside of the cylinder bound no fluid: cells beside them are not active."""
+    fluid, area = at_rest(*flag_in_planes(), element)
+    assert fluid.cut.fraction[fluid.cut.active].min() > 1e-3
+    balanced(fluid, area)
+
+
+@pytest.mark.parametrize("draw", [*range(3, 9), 29, *(pytest.param(n, marks=pytest.mark.slow) for n in range(30, 50))])
+def test_rectangles_in_planes_of_the_grid(draw):
+    """They touch, have common sides or corners in the sides of the other one."""
+    balanced(*at_rest(*rectangles_in_planes(draw), "q2q1"))
+
+
+def balanced(fluid, area):
     cut = fluid.cut
     lengths = cut.pieces.moments.sum(axis=(1, 2))
     assert np.abs(lengths @ cut.pieces.normal).max() < 1e-12
