@@ -194,6 +194,20 @@ def test_closed_wall(parts, ball, tmp_path):
     assert np.abs(history["interface.momentum"]).max() < 1e-8
 
 
+@pytest.mark.slow
+def test_closed_wall_in_space_for_200_steps(tmp_path):
+    """A wall of 0.3 cells that swings: the fluid inside keeps its volume."""
+    parts = {
+        "GRID": "{from: [-0.5, -0.5, -0.5], to: [0.5, 0.5, 0.5], cells: [5, 5, 5]}",
+        "MESH": "{shape: hollow_sphere, inner_radius: 0.36, outer_radius: 0.42, cells: [3, 1]}",
+    }
+    text = balloon(SOLID | parts).replace("step: 0.02, end: 0.06", "step: 0.01, end: 2")
+    history = run(text, tmp_path)
+    assert len(history["volume"]) == 200
+    assert history["volume"] == pytest.approx(history["volume"][0], rel=1e-8)
+    assert np.abs(history["fluid.mass"]).max() < 1e-11
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
