@@ -33,12 +33,12 @@ class Coupled:
         self.interface.begin_step(self.flow.current.difference)
         self.solid.begin_step(t, dt)
 
-    def predict(self, t: float) -> None:
-        """Set the predictors of both parts for the time t [s].
+    def predict(self, t: float, *, with_pressure: bool = False) -> None:
+        """Set the predictors of both parts for the time t [s]; with_pressure: see `Flow.predict`.
 
         Cut the grid at the old positions before that, so that cells that the surface leaves have the ghost penalty.
         """
-        self.flow.predict()
+        self.flow.predict(with_pressure=with_pressure)
         self.solid.predict(t)
 
     def end_step(self) -> None:

@@ -181,8 +181,12 @@ class Flow(Part, Protocol):
     current: FlowStep  #: the present step, with its difference formula
     steady_iteration: SteadyIteration  #: how far the iteration to a steady flow is
 
-    def predict(self) -> None:
-        """Set the predictor for the end of the step; `retreat` takes it back."""
+    def predict(self, *, with_pressure: bool = False) -> None:
+        """Set the predictor for the end of the step; `retreat` takes it back.
+
+        with_pressure: not of the velocity alone. A flow alone is solved to a share of its first residual, which
+        a predictor of the pressure makes smaller.
+        """
         ...
 
     def has_films(self) -> bool:

@@ -41,18 +41,25 @@ class OverlappingBlocks:
         starts = np.flatnonzero(new)
         #: row block of each position, and the first position of each row block
         self._row, self._begins = row[starts], np.searchsorted(row[starts], np.arange(shape[0] + 1))
-        self._numbers = numbers[order[starts]]
+        self._numbers, self._order, self._ends = numbers[order[starts]], order, np.append(starts, len(order))
         factors = weights.shape[1]
         given = sources[order, None] * np.int32(factors) + np.arange(factors, dtype=np.int32)
-        ends = (np.append(starts, len(order)) * factors).astype(np.int32)
+        ends = (self._ends * factors).astype(np.int32)
         size = (int(sources.max(initial=-1)) + 1) * factors
         self._combination = Sparse(weights[order].ravel(), given.ravel(), ends, (len(starts), size))
 
-    def matrix(self, given: Array) -> Sparse:
-        """The sum of all blocks, each row in the order of column blocks; given: (sources, factors, r, c)."""
+    def matrix(self, given: Array, more: Array | None = None) -> Sparse:
+        """The sum of all blocks, each row in the order of column blocks.
+
+        given: (sources, factors, r, c); more: added to each block, (n, r, c).
+        """
         *_, r, c = given.shape
         count, size = self._combination.shape
         summed = (self._combination @ given.reshape(-1, r * c)[:size]).reshape(count, r, c)
+        if more is not None:
+            n = len(more)
+            each = Sparse(np.ones(n), self._order, self._ends.astype(np.int32), (count, n))
+            summed += (each @ more.reshape(n, r * c)).reshape(count, r, c)
         width, row = np.diff(self._begins), self._row
         # row i of the k-th of m blocks of a row block whose first position is s has the line s r + i m + k
         line = (np.arange(count) + (r - 1) * self._begins[row])[:, None] + width[row][:, None] * np.arange(r)

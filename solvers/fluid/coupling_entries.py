@@ -5,7 +5,8 @@ whose velocity is g = alpha d - ..., rows r and force f of the flow change by
 
     dr = (alpha C + S) dd,    df = C^T S dw - (alpha M + S_f) dd.
 
-In films S and S_f are those of `film_shape`.
+In films S and S_f are those of `film_shape`. Those of `cut_shape` are taken in first-degree flows in time without slip
+and layers.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.fluid.cut_shape import CutDerivatives
 from solvers.fluid.film_shape import FilmDerivatives
 from solvers.fluid.interface import InterfaceTerms, MotionOperator
 from solvers.fluid.shape import shape_derivatives
@@ -43,23 +45,25 @@ def interface_entries(
     alpha: float,
     held: NDArray[np.bool_],
     vertices: NDArray[np.int64],
-    films: FilmDerivatives | None = None,
+    shape: FilmDerivatives | CutDerivatives | None = None,
 ) -> InterfaceEntries:
     """Entries for the motion of some vertices, in the given order.
 
     flow: velocity and pressure at local dofs; held: local dofs with rows of the identity; alpha [1/s]: dg/dd;
-    films: derivatives by the shape of some pieces, which replace those of `shape`.
+    shape: derivatives by the shape of some or all pieces, which replace those of the module `shape`.
     """
-    by_shape, load_by_shape = shape_derivatives(operator, flow)
-    if films is not None:
-        for part in (by_shape.fields, by_shape.psi, load_by_shape):
-            part[films.pieces] = 0.0
-        load_by_shape[films.pieces] += films.force.transpose(0, 1, 3, 2, 4)
-    C = operator.coupling
-    sums = _Sums(operator, unknowns, vertices)
-    into = sums.with_flow(alpha * C + by_shape)
-    if films is not None:
-        into = into + sums.of_films(films)
+    C, sums = operator.coupling, _Sums(operator, unknowns, vertices)
+    if isinstance(shape, CutDerivatives):
+        into, load_by_shape = sums.with_flow(alpha * C + shape.operator, shape.rows), shape.force
+    else:
+        by_shape, load_by_shape = shape_derivatives(operator, flow)
+        if shape is not None:
+            for part in (by_shape.fields, by_shape.psi, load_by_shape):
+                part[shape.pieces] = 0.0
+            load_by_shape[shape.pieces] += shape.force.transpose(0, 1, 3, 2, 4)
+        into = sums.with_flow(alpha * C + by_shape)
+        if shape is not None:
+            into = into + sums.of_films(shape)
     into.data[held[into.indices]] = 0.0
     back = sums.with_flow(replace(-1.0 * C, psi=C.psi))
     load = sums.with_surface(-alpha * operator.mass_blocks + load_by_shape)
@@ -79,8 +83,12 @@ class _Sums:
         self._corner = corner[self._ours]
         self._shape = (len(vertices), unknowns.local)
         self._u, self._p = operator.u, operator.p
-        self._velocity = self._beside(operator.u, operator.fields)
-        self._pressure = self._beside(operator.p[:, :, None], operator.psi[..., None])
+        self._together = operator.u.shape[1] == operator.p.shape[1]  #: the functions of velocity are those of pressure
+        if self._together:
+            self._both = self._beside(np.concatenate([operator.u, operator.p[..., None]], axis=2), operator.fields)
+        else:
+            self._velocity = self._beside(operator.u, operator.fields)
+            self._pressure = self._beside(operator.p[:, :, None], operator.psi[..., None])
 
     def _beside(self, dofs: NDArray[np.int32], weights: Array) -> OverlappingBlocks:
         """Couplings of the vertices of each piece with functions of its cell.
@@ -95,10 +103,18 @@ class _Sums:
         columns = np.ascontiguousarray(numbers[:, 0])
         return OverlappingBlocks(rows, columns, numbers, weights, pieces, self._shape, self._shape[1])
 
-    def with_flow(self, coefficients: MotionOperator) -> Sparse:
-        """The transposed matrix of an operator; columns are local dofs of the flow."""
+    def with_flow(self, coefficients: MotionOperator, blocks: Array | None = None) -> Sparse:
+        """The transposed matrix of an operator; columns are local dofs of the flow.
+
+        blocks: added to it, for first degree, (pieces, functions, vertices, dim, dim + 1).
+        """
         velocity = np.swapaxes(coefficients.fields[self._ours], 2, 3)
         pressure = coefficients.psi[self._ours][:, None, :, None]
+        if self._together:
+            both = np.zeros((*velocity.shape[:3], self._dim + 1))
+            both[..., :-1], both[:, :1, :, -1:] = velocity, pressure
+            more = None if blocks is None else blocks[self._ours].reshape(-1, *both.shape[2:])
+            return self._both.matrix(both, more).ordered()
         return (self._velocity.matrix(velocity) + self._pressure.matrix(pressure)).ordered()
 
     def of_films(self, films: FilmDerivatives) -> Sparse:

@@ -72,6 +72,7 @@ class Fluid:
         self.history = History(settings.time, self.unknowns.local)
         self.current = FlowStep(0.0, 0.0, STEADY)  #: the step that is computed now or was last
         self._began: Began | None = None  #: state at the beginning of the present step
+        self._pressure: Array | None = None  #: at local dofs [Pa] then, zero where there was none
         #: This step has an increment. Before it, the pressure of films is that of the last height, and the derivative
         #: by the height in `film_shape`, proportional to it, makes the increment too large.
         self._improved = False
@@ -160,6 +161,7 @@ class Fluid:
             self.flow[mask] = self.history.past[0].velocity[mask]
         history = tuple(self.history.past)
         self._began = Began(self.unknowns, self.grid.sheets, self.current, history, tuple(self.motions))
+        self._pressure = self._present_pressure()
         self.thin.begin_step()
         self.cutter.begin_step()
         self._begin_system(self.current)
@@ -185,8 +187,15 @@ class Fluid:
         self._prescribed_at = t
         self.flow[self.boundary.dofs] = self.boundary.velocity(t)
 
-    def predict(self) -> None:
-        """Predictor: extrapolate the velocity linearly from the last two steps, where both have one."""
+    def _present_pressure(self) -> Array:
+        """Pressure [Pa] at local dofs, zero where it is no unknown."""
+        return np.where(self.system.active_dofs & ~self.unknowns.velocity_mask, self.flow, 0.0)
+
+    def predict(self, *, with_pressure: bool = False) -> None:
+        """Predictor: extrapolate the velocity linearly from the last two steps, where both have one.
+
+        with_pressure: the pressure, too, for first degree. With second degree, that of films follows their height.
+        """
         self._increment = np.zeros(self.unknowns.owned)
         if self.steady or len(self.history.steps) < 2:
             return
@@ -196,6 +205,8 @@ class Fluid:
         growth = self.current.dt / self.history.steps[0]
         before = self.flow[: self.unknowns.owned].copy()
         self.flow[continued] += growth * (old.velocity - older.velocity)[continued]
+        if with_pressure and self.settings.degree == 1:
+            self.flow[:] += growth * self.history.pressure_change
         self._increment = self.flow[: self.unknowns.owned] - before
 
     def has_films(self) -> bool:
@@ -250,6 +261,7 @@ class Fluid:
         if began is not None and began.unknowns is not old:
             carrier = carry(began.unknowns, began.sheets, self.unknowns, facets, motion.x)
         self.history.past = [carrier.past(past) for past in (self.history.past if began is None else began.past)]
+        self.history.pressure_change, self._pressure = np.zeros(self.unknowns.local), None
         if began is not None:
             self._begin_system(began.step)
             self.prescribe(self._prescribed_at)
@@ -284,9 +296,16 @@ class Fluid:
         velocity = self.velocity()
         if self._behind is not None:
             velocity = self._behind.bounded(velocity, self.cut, self._wet)
-        self.history.end_step(self.current.dt, velocity, found)
+        self.history.end_step(self.current.dt, velocity, found, self._pressure_change())
         self.forget_step()
         self.started = True
+
+    def _pressure_change(self) -> Array:
+        """Change of the pressure in this step [Pa] at local dofs; zero where it had none at the start or the end."""
+        before, now = self._pressure, self._present_pressure()
+        if before is None or len(before) != len(now):  # cells of thin bodies became others
+            return np.zeros(len(now))
+        return np.where((before != 0.0) & (now != 0.0), now - before, 0.0)
 
     def forget_step(self) -> None:
         """Let the next step start from the present history."""
@@ -411,8 +430,8 @@ class Fluid:
         mark = np.pad(self.held.astype(float), (0, self.unknowns.local - self.unknowns.owned))
         held = fem.share_owned(self.unknowns.space, mark) > 0.5  # of ghosts too
         operator, vertices = self.system.interface, self.vertices_of(surfaces)
-        alpha, films = self.current.difference.alpha, self.system.film_derivatives() if self._improved else None
-        found = interface_entries(operator, self.unknowns, self.flow, alpha, held, vertices, films)
+        alpha, shape = self.current.difference.alpha, self.system.shape_derivatives(improved=self._improved)
+        found = interface_entries(operator, self.unknowns, self.flow, alpha, held, vertices, shape)
         zone = self.system.zone
         return found if zone is None else with_zone(found, zone, self.unknowns, self.flow, vertices)
 

@@ -37,6 +37,8 @@ class History:
             Past(np.zeros(size), np.ones(size, dtype=bool)) for _ in range(1 if scheme.steady else max(2, scheme.times))
         ]
         self.steps: tuple[float, ...] = ()  #: lengths [s]
+        #: change of the pressure in the last step [Pa], at local dofs; zero where it had none at the start or the end
+        self.pressure_change = np.zeros(size)
 
     @property
     def longest_step(self) -> float:
@@ -59,8 +61,9 @@ class History:
         self.past = [self.past[0], *back]
         self.steps = (dt,) * len(self.past)
 
-    def end_step(self, dt: float, velocity: Array, found: Mask) -> None:
-        """Accept a step of length dt; found: local dofs at which it had a velocity."""
+    def end_step(self, dt: float, velocity: Array, found: Mask, pressure_change: Array) -> None:
+        """Accept a step of length dt; found: local dofs at which it had a velocity; pressure_change [Pa]: in it."""
+        self.pressure_change = pressure_change
         self.past = [Past(velocity, found), *self.past][: len(self.past)]
         self.steps = (dt, *self.steps)[: len(self.past)]
 
@@ -80,12 +83,13 @@ class History:
         return missing
 
     def save(self, unknowns: Unknowns) -> State:
-        """Velocities of all times, where they were found, and the lengths of the steps."""
+        """Velocities of all times, where they were found, the last change of the pressure, the lengths of the steps."""
         nodes = unknowns.velocity
         found = np.stack([past.found for past in self.past], axis=1)[nodes.dofs[:, 0]]
         return {
             "velocity": {str(k): unknowns.to_nodes(past.velocity, nodes) for k, past in enumerate(self.past)},
             "found": Nodal(found[: nodes.owned].astype(float), nodes.consecutive[: nodes.owned]),
+            "pressure_change": unknowns.to_nodes(self.pressure_change, unknowns.pressure),
             "steps": list(self.steps),
         }
 
@@ -99,4 +103,5 @@ class History:
             )
             for k in range(len(self.past))
         ]
+        self.pressure_change = unknowns.from_nodes(state["pressure_change"].values, unknowns.pressure)
         self.steps = tuple(state["steps"])

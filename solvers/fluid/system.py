@@ -14,6 +14,7 @@ from solvers.api import Array
 from solvers.fluid import forms, nitsche
 from solvers.fluid.cell_forms import cell_forms
 from solvers.fluid.cut import Cut
+from solvers.fluid.cut_shape import CutDerivatives, CutFlow, cut_derivatives
 from solvers.fluid.film import film_cells
 from solvers.fluid.film_shape import FilmDerivatives, FilmFlow, film_derivatives
 from solvers.fluid.flow_settings import FlowSettings
@@ -245,17 +246,25 @@ class FlowSystem:
         assert self._interface is not None
         return self._interface
 
-    def film_derivatives(self) -> FilmDerivatives | None:
-        """Derivatives by the motion of surfaces in films (collective); None if there are none, or with slip."""
-        at, cut, settings = self.interface, self.cut, self.settings
+    def shape_derivatives(self, *, improved: bool) -> FilmDerivatives | CutDerivatives | None:
+        """Derivatives by the motion of surfaces: of first-degree flows in time, or in films (collective).
+
+        None with slip, in steady first-degree flows, where the first increments would be too large, and without films.
+        improved: the step has an increment; before, there are no derivatives in films.
+        """
+        at, cut, settings, degree = self.interface, self.cut, self.settings, self.settings.degree
         assert cut is not None
-        if at.slips:
+        if at.slips or (not improved if degree > 1 else settings.steady or at.mobility is not None):
             return None
         rate = np.zeros(self.unknowns.local) if settings.steady else self.history.x.array
         if settings.body_force is not None:
             rate = rate + self._force.x.array / settings.density
-        state = FilmFlow(self.flow.x.array, rate, settings.density, float(self._alpha.value))
-        return film_derivatives(at, self.weights, self.grid, cut, state)
+        flow, density, alpha = self.flow.x.array, settings.density, float(self._alpha.value)
+        if degree > 1:
+            return film_derivatives(at, self.weights, self.grid, cut, FilmFlow(flow, rate, density, alpha))
+        scale, convection = self._scale_velocity.x.array * settings.convection, settings.convection
+        state = CutFlow(flow, rate, scale, density, alpha, convection, settings.penalties)
+        return cut_derivatives(at, self.weights, self.grid, cut, state)
 
     @property
     def zone(self) -> ClosedZone | None:

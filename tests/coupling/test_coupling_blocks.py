@@ -8,6 +8,7 @@ from coupling_setup import post_in_flow
 
 from coupling.monolithic import Monolithic
 from solvers.fluid import coupling_entries
+from solvers.fluid.system import FlowSystem
 from solvers.newton import Tolerance
 
 
@@ -51,6 +52,7 @@ def without_shape(monkeypatch):
         return 0.0 * into_flow, 0.0 * load
 
     monkeypatch.setattr(coupling_entries, "shape_derivatives", without)
+    monkeypatch.setattr(FlowSystem, "shape_derivatives", lambda *_, **__: None)
 
 
 def split(scheme, rows_of_both) -> tuple[np.ndarray, np.ndarray]:
@@ -127,9 +129,9 @@ def test_every_coupling_block_counts(disturbed, without_shape, number: int, name
     assert difference(found - share, exact) > 1e-3
 
 
-@pytest.mark.parametrize(("E", "rho_s", "factor"), [(1000.0, 10.0, 300.0), (100.0, 2.0, 50.0)])
+@pytest.mark.parametrize(("E", "rho_s", "factor"), [(1000.0, 10.0, 3000.0), (100.0, 2.0, 100.0)])
 def test_every_newton_step_gains_much(E, rho_s, factor):
-    """Fast linear convergence in the mean: the derivative by the shape is approximate, which counts for soft bodies."""
+    """Fast convergence in the mean: the derivative by the shape lacks little, which counts for soft bodies."""
     coupled = post_in_flow(E=E, rho_s=rho_s)
     coupled.initialise(0.0, 0.02)
     scheme = Monolithic(coupled, Tolerance(1e-9))

@@ -63,6 +63,7 @@ probes:
   plate: {body: plate, quantity: velocity, at: [1.037, 0.5]}
   force: {quantity: force, body: plate}
   flow: {quantity: flow_rate, through: outlet}
+solver: {newton: {residual: 1.0e-13}}
 """
 
 

@@ -68,7 +68,7 @@ def test_derivatives_of_a_film(kappa, direction):
     """Those that assume u = g and the momentum equation at the wall are wrong by several per cent."""
     fluid, moved = disc_at_wall(kappa)
     assert fluid.cut.film.min() < 1e-3
-    found = errors(fluid, moved, fluid.system.film_derivatives(), direction)
+    found = errors(fluid, moved, fluid.system.shape_derivatives(improved=True), direction)
     assert (found < LIMITS).all()
     fluid, moved = disc_at_wall(kappa)
     momentum, _, force = errors(fluid, moved, None, direction)
@@ -80,5 +80,5 @@ def test_without_the_jump_where_the_wall_crosses_planes_of_the_grid(kappa, monke
     """It moves along the film: momentum and force of the nodes at these planes are wrong."""
     monkeypatch.setattr(film_shape, "crossing_moments", lambda *arguments: 0.0 * crossing_moments(*arguments))
     fluid, moved = disc_at_wall(kappa)
-    momentum, _, force = errors(fluid, moved, fluid.system.film_derivatives(), (1.0, 0.0))
+    momentum, _, force = errors(fluid, moved, fluid.system.shape_derivatives(improved=True), (1.0, 0.0))
     assert min(momentum, force) > 0.005

@@ -1,0 +1,152 @@
+"""Derivatives of the flow's rows and of its force by the motion of surfaces, for first-degree velocities in time.
+
+The discrete terms themselves are differentiated. For displacements dd of the surface and an integrand f,
+
+    d int_Omega f dx = int_Gamma f n . dd ds,     d int_Gamma f(n) ds = int_Gamma grad f . dd + f_n d(n ds),
+
+with f of `forms.bulk` and `forms.residual_based`, and of the terms of `nitsche` with their penalty. The first formula
+is exact. In the second one the fields are averaged over each piece of surface, and of terms that the slip u - g at the
+surface multiplies by the viscosity those with d(n ds) are left out, as are second derivatives. Also missing: the stress
+jumps at the faces of cells, which a surface that moves crosses elsewhere, and the ends of pieces at other surfaces and
+at the boundary of the box move. `shape` assumes u = g and the momentum equation at the surface instead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.fluid.cut import Cut
+from solvers.fluid.forms import TRACE, Penalties
+from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.interface import InterfaceTerms, MotionOperator
+from solvers.fluid.shape import normal_derivative
+from solvers.fluid.weights import Weights
+
+
+@dataclass(frozen=True)
+class CutFlow:
+    """The iterate, and the coefficients of the forms; arrays at local dofs."""
+
+    flow: Array  #: velocity [m/s] and pressure [Pa]
+    rate: Array  #: alpha times the history and f / rho [m/s^2]
+    scale: Array  #: velocity [m/s] that scales the stabilisation, zero without convection
+    density: float  #: [kg/m^3]
+    alpha: float  #: [1/s]
+    convection: bool
+    penalties: Penalties
+
+
+@dataclass(frozen=True)
+class CutDerivatives:
+    """Derivatives of all pieces of surface: an operator like C, and dense blocks, to be added up."""
+
+    operator: MotionOperator
+    rows: Array  #: (pieces, functions, vertices, dim, dim + 1), component of rows last, the continuity equation's last
+    force: Array  #: of the force on vertices, (pieces, vertices, vertices, dim, dim), component of force first
+
+
+def cut_derivatives(
+    at: InterfaceTerms, rule: Weights, grid: DistributedGrid, cut: Cut, state: CutFlow
+) -> CutDerivatives:
+    """Derivatives of all pieces of this process.
+
+    In subscripts p: pieces, a: functions, c: vertices, i: rows of momentum and continuity, k, l: components, j:
+    displacements.
+    """
+    (n, mu, dim), mine = (at.n, at.mu, at.dim), np.flatnonzero(cut.cut[cut.pieces.cell] < grid.owned)
+    local, moments = cut.cut[cut.pieces.cell[mine]], cut.pieces.moments[mine][:, rule.order]
+    pieces, identity = len(mine), np.eye(dim)
+    _, first, of_cell = np.unique(local, return_index=True, return_inverse=True)
+    density = _density(at.u[first], at.p[first], at.sizes[first], mu, rule, state)
+    points, functions, rows_of_node = density.shape[1:]  # a process may have no pieces: no -1 below
+    bulk = np.swapaxes(moments, 1, 2) @ density[of_cell].reshape(pieces, points, functions * rows_of_node)
+    bulk = bulk.reshape(pieces, dim, functions, rows_of_node).swapaxes(1, 2)
+
+    velocity, slope = cut.motion.v[at.corners], normal_derivative(at.x, n)
+    both, slopes = _means(at, state.flow)
+    du, dp, area = slopes[:, :dim], slopes[:, dim], moments.sum(axis=1)
+    share = area / np.maximum(area.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+    w = both[:, :dim] - np.einsum("pc,pck->pk", share, velocity)
+    stress = mu * (du + np.swapaxes(du, 1, 2)) - both[:, dim, None, None] * identity
+    load = (stress @ n[:, :, None] - at.penalty @ w[:, :, None])[..., 0]
+    dload = -(at.penalty @ du) - n[:, :, None] * dp[:, None]
+    fields = np.empty((pieces, 1 + dim, dim, dim))
+    fields[:, 0] = -dload
+    fields[:, 1:] = -load[:, None, :, None] * identity[:, None] - mu * n[:, None, :, None] * du[:, :, None]
+    fields[:, 1:] -= mu * n[:, :, None, None] * du[:, None]
+    operator = MotionOperator(fields, -np.einsum("pkj,pk->pj", du, n))
+
+    by_normal = np.empty((pieces, dim, dim, dim + 1))
+    of_load = (stress @ slope.reshape(pieces, dim, dim * dim)).reshape(slope.shape)
+    of_load -= _penalty_by_motion(at, velocity.mean(axis=1) * state.convection, slope, w, state)
+    by_normal[..., :dim] = np.moveaxis(of_load, 1, 3)
+    by_normal[..., dim] = np.einsum("pk,pkcj->pcj", w, slope)
+    rows = bulk[:, :, :, None] * n[:, None, None, :, None]
+    rows -= at.fields[..., 0].sum(axis=2)[:, :, None, None, None] * by_normal[:, None]
+    rows[..., dim] -= np.einsum("pk,pk->p", w, n)[:, None, None, None] * at.fields[..., 1:]
+
+    force = -at.mass_of_pieces[..., None, None] * dload[:, None, None]
+    force -= area[:, :, None, None, None] * np.swapaxes(of_load, 1, 2)[:, None]
+    return CutDerivatives(operator, rows, force)
+
+
+def _means(at: InterfaceTerms, flow: Array) -> tuple[Array, Array]:
+    """Means over pieces of velocity and pressure, (pieces, dim + 1), and of their slopes, (pieces, dim + 1, dim)."""
+    area = at.psi.sum(axis=(1, 2))
+    share = np.where(area > 0.0, 1.0 / np.where(area > 0.0, area, 1.0), 0.0)
+    nodal = np.concatenate([flow[at.u], flow[at.p][..., None]], axis=2)
+    means = share[:, None, None] * (np.swapaxes(nodal, 1, 2) @ at.fields.sum(axis=2))
+    return means[..., 0], means[..., 1:]
+
+
+def _penalty_by_motion(at: InterfaceTerms, g: Array, slope: Array, w: Array, state: CutFlow) -> Array:
+    """d(P ds) w / ds by the motion of vertices, (pieces, k, c, j), with P of `nitsche.penalties`.
+
+    g: mean velocity of each facet where there is convection; slope: of `normal_derivative`; w: mean of u - g.
+    """
+    n, dim, factors = at.n, at.dim, state.penalties
+    stretch = np.einsum("pk,pkcj->pcj", n, slope)
+    turn = slope - n[:, :, None, None] * stretch[:, None]
+    total = np.einsum("pk,pkl,pl->p", n, at.penalty, n)
+    along = total - (np.einsum("pkk->p", at.penalty) - total) / (dim - 1)
+    h = 1.0 / np.linalg.norm(n / at.sizes, axis=1)[:, None, None]
+    dh = -(h**3) * np.einsum("pk,pkcj->pcj", n / at.sizes**2, turn)
+    inflow = state.density * (np.einsum("pk,pk->p", g, n) < 0.0)[:, None, None]
+    ds = -factors.nitsche * at.mu * TRACE[dim, 1] / h**2 * dh
+    ds -= inflow * (np.einsum("pk,pkcj->pcj", g, turn) + state.alpha / dim * n[:, None])
+    normal = state.density * factors.mass * state.alpha * dh
+    w_n, w_turn = (w * n).sum(axis=1)[:, None, None, None], np.einsum("pl,plcj->pcj", w, turn)[:, None]
+    of_n = n[:, :, None, None]
+    found = (w[:, None] @ at.penalty)[:, 0, :, None, None] * stretch[:, None] + w[..., None, None] * ds[:, None]
+    return found + along[:, None, None, None] * (turn * w_n + of_n * w_turn) + of_n * normal[:, None] * w_n
+
+
+def _density(u: NDArray, p: NDArray, sizes: Array, mu: float, rule: Weights, state: CutFlow) -> Array:
+    """`forms.bulk` + `forms.residual_based` at the points of cells for each test function, (cells, q, a, i).
+
+    u, p: local dofs of the cells, (cells, a, k) and (cells, a); sizes: lengths of their edges [m].
+    """
+    (phi, slopes), rho, dim = rule.velocity_table, state.density, sizes.shape[1]
+    gradient = slopes / sizes[:, None, None]
+    velocity, rate, a = (phi @ values[u] for values in (state.flow, state.rate, state.scale))
+    du = np.swapaxes(state.flow[u], 1, 2)[:, None] @ gradient
+    pressure, dp = state.flow[p] @ phi.T, (state.flow[p][:, None, None] @ gradient)[:, :, 0]
+    inertia = rho * (state.alpha * velocity - rate)
+    if state.convection:
+        inertia += rho * (du @ velocity[..., None])[..., 0]
+    metric = 4.0 / sizes[:, None] ** 2
+    common = rho**2 * (metric * a**2).sum(axis=2, keepdims=True) + 4.0 * rho**2 * state.alpha**2
+    strong = (inertia + dp) / np.sqrt(common + 36.0 * mu**2 * dim * metric**2)
+    divergence = np.einsum("Cqkk->Cq", du)
+    viscous = 36.0 * mu**2 * (metric**2).sum(axis=2)
+    against = np.sqrt(common[..., 0] + viscous) / metric.sum(axis=2) * divergence - pressure
+    value = np.concatenate([inertia, divergence[..., None]], axis=2)
+    by_slope = np.empty((*velocity.shape, dim + 1))
+    by_slope[..., :dim] = mu * (du + np.swapaxes(du, 2, 3)) + against[..., None, None] * np.eye(dim)
+    by_slope[..., :dim] += rho * a[..., None] * strong[:, :, None]
+    by_slope[..., dim] = strong
+    return phi[:, :, None] * value[:, :, None] + gradient @ by_slope

@@ -1,0 +1,83 @@
+"""Rows and force of a first-degree flow by the motion of a body in it: against differences."""
+
+import numpy as np
+import pytest
+from fluid_setup import body, circle, field, loop, make_fluid, sphere, step, wall
+
+from solvers.fluid.coupling_entries import interface_entries
+from solvers.fluid.grid import uniform
+from solvers.fluid.patches import Patch
+
+DT = 0.05
+
+
+class Moving:
+    """A body in a flow by backward Euler in its second step; `by` displaces its vertices, `g` are their velocities."""
+
+    def __init__(self, dim, patches, **flow):
+        points, facets = (circle((0.47, 0.52), 0.23, 14), loop(14)) if dim == 2 else sphere((0.47, 0.52, 0.5), 0.27, 1)
+        self.by, self.g = np.zeros_like(points), np.zeros_like(points)
+        mover = body("mover", points, facets, motion=lambda x, t: (x + self.by, self.g + self.by / DT))
+        cells = [6, 5] if dim == 2 else [4, 5, 4]
+        self.fluid = make_fluid(
+            uniform([0] * dim, [1] * dim, cells), patches, [mover], dt=DT, scheme="backward_euler", **flow
+        )
+        step(self.fluid, 0.0, DT)
+        self.fluid.begin_step(DT, DT)
+
+    def derivatives(self, *, shape=True):
+        """(found, by differences) for a random displacement: of momentum rows, of continuity rows, of the force."""
+        fluid, change = self.fluid, np.random.default_rng(2).normal(size=self.by.shape)
+        fluid.move({})
+        fluid.residual()
+        state, system, nodes = fluid.flow.copy(), fluid.system, fluid.unknowns
+        derived = system.shape_derivatives(improved=True) if shape else None
+        nothing_held, at = np.zeros(len(state), dtype=bool), (nodes.velocity.dofs, nodes.pressure.dofs)
+        given = system.interface, nodes, state, 1.0 / DT, nothing_held, np.arange(len(change)), derived
+        entries, rows, forces = interface_entries(*given), [], []
+        for sign in (1.0, -1.0):
+            self.by[:] = sign * 1e-7 * change
+            fluid.move({})
+            fluid.flow[:] = state
+            rows.append(system.residual())
+            forces.append(system.surface_force())
+        exact, force = (rows[0] - rows[1]) / 2e-7, (forces[0] - forces[1]).ravel() / 2e-7
+        into = entries.into_flow.T @ change.ravel()
+        found_force = entries.force_by_motion @ change.ravel()
+        return [(into[dofs], exact[dofs]) for dofs in at] + [(found_force, force)]
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_exact_where_the_stress_is_constant(dim):
+    """A constant stress and a constant slip u - g. Slopes of test functions jump, but not those of their sum."""
+    slopes = np.array([[0.4, 2.0, -0.5], [1.0, -0.7, 0.8], [0.6, -1.1, 0.3]])[:dim, :dim]
+    moving = Moving(dim, [wall(field(*[0.3, -0.2, 0.1][:dim]))], rho=1.3, mu=0.7)
+    fluid, slip = moving.fluid, np.array([0.5, -0.8, 0.3])[:dim]
+    nodes = fluid.unknowns.velocity
+    fluid.flow[nodes.dofs] = nodes.points[:, :dim] @ slopes.T
+    fluid.flow[fluid.unknowns.pressure.dofs] = 2.0
+    fluid.system.set_scales(np.where(fluid.unknowns.velocity_mask, 0.6, 0.0))
+    moving.g[:] = fluid.bodies[0].motion(0.0).x @ slopes.T - slip
+    (momentum, by_differences), *others = moving.derivatives()
+    for found, exact in (momentum.sum(axis=0), by_differences.sum(axis=0)), *others:
+        np.testing.assert_allclose(found, exact, atol=3e-6 * np.abs(by_differences).max())
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_nearly_exact_in_a_flow(dim):
+    """A body across an inflow in cells of a fifth: the derivatives that assume u = g are three times as wrong."""
+    inflow = field(*[lambda x, y, *zt: 2.0 + y, 0.3, 0.0][:dim])
+    sides = ("y-", "y+", "z-", "z+")[: 2 * dim - 2]
+    patches = [
+        Patch("in", ("x-",), "velocity", inflow),
+        Patch("out", ("x+",), "outflow"),
+        Patch("walls", sides, "no_slip"),
+    ]
+    errors = []
+    for shape in (True, False):
+        moving = Moving(dim, patches, mu=0.05, body_force=field(*[1.0, -2.0, 0.5][:dim]))
+        pairs = moving.derivatives(shape=shape)
+        errors.append([np.linalg.norm(found - exact) / np.linalg.norm(exact) for found, exact in pairs])
+    now, before = np.array(errors)
+    assert (now < 0.1).all()
+    assert (before > 3.0 * now).all()
