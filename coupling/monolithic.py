@@ -31,10 +31,6 @@ from solvers.rounding import rounding_error
 from solvers.rows import Numbering, distributed, from_entries, gather
 from solvers.sparse import Sparse
 
-#: Residual that a linear solver leaves over the one that the step needs, and over the one at its start at most. Kelley
-#: takes a half; here both are of different norms.
-SHARE, LARGEST = 0.3, 0.1
-
 
 class Monolithic:
     """A Scheme, and the system that Newton's method solves."""
@@ -52,7 +48,6 @@ class Monolithic:
         #: rounding errors of the residuals of solid and flow [N]; None before this step linearises
         self._noise: Array | None = None
         self._found, self.largest = np.zeros(2), np.zeros(2)  #: residuals of solid and flow: now, largest of the step
-        self._relative = 1.0  #: the larger one of both by its largest
         self._prepared: Blocks | None = None  #: the matrix at the present iterate, if it is assembled already
         #: tangent of the flow, into_flow, into_solid and the derivative of the force by the motion, of the last iterate
         self._of_flow: tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat, PETSc.Mat] | None = None
@@ -131,8 +126,7 @@ class Monolithic:
         above = found > (np.zeros(2) if self._noise is None else self._noise)
         relative = np.divide(found, self.largest, out=np.zeros(2), where=above)
         self._farther = solid if relative[0] > relative[1] else flow
-        self._relative = float(relative.max())
-        return float(self._relative * self.largest.sum())
+        return float(relative.max() * self.largest.sum())
 
     def advance(self, *, keep: bool = False) -> float:
         """One Newton iteration; returns the larger of the relative increments of both parts. Raises StepFailed.
@@ -171,28 +165,20 @@ class Monolithic:
         sequence = self.coupled.flow.sequence
         while sequence.current != "direct":
             try:
-                matrix, tolerance = blocks.product(self._numbering), self._linear_tolerance()
-                iterations = self._krylov.solve_again(matrix, b, x, tolerance)
+                matrix = blocks.product(self._numbering)
+                iterations = self._krylov.solve_again(matrix, b, x)
                 if iterations is None:
-                    iterations = self._krylov.solve(self._krylov_solver(blocks, tolerance), matrix, b, x)
+                    iterations = self._krylov.solve(self._krylov_solver(blocks), matrix, b, x)
                 self._linear_iterations += iterations
                 return
             except linear.LinearSolveFailed as failure:
                 sequence.advance(failure)
         self._direct.solve(blocks.assembled(), b, x)
 
-    def _linear_tolerance(self) -> float:
-        """That of the flow, or larger where a share of the residual that the step needs is larger.
-
-        Source: C. T. Kelley, Solving Nonlinear Equations with Newton's Method, SIAM 2003, section 3.2.3.
-        """
-        needed = SHARE * self.tolerance.residual / max(self._relative, self.tolerance.residual)
-        return max(self.coupled.flow.linear_tolerance, min(needed, LARGEST))
-
-    def _krylov_solver(self, blocks: Blocks, tolerance: float) -> PETSc.KSP:
+    def _krylov_solver(self, blocks: Blocks) -> PETSc.KSP:
         flow = self.coupled.flow
         method = flow.sequence.current
-        krylov = linear.coupled_solver(self.comm, tolerance=tolerance, fill=method == "fill")
+        krylov = linear.coupled_solver(self.comm, tolerance=flow.linear_tolerance, fill=method == "fill")
         if method == "multigrid":
             preconditioner = krylov.getPC().getPythonContext().second
             preconditioner.setOperators(blocks.flow)

@@ -26,17 +26,12 @@ class Lagged:
         """Discard the preconditioner of the last step."""
         self.made, self._kept = 0, None
 
-    def solve_again(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, tolerance: float | None = None) -> int | None:
-        """Solve matrix x = b with the kept preconditioner. Returns the iterations, or None: a new solver is needed.
-
-        tolerance: |b - A x| / |b|; None: that of the kept solver.
-        """
+    def solve_again(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> int | None:
+        """Solve matrix x = b with the kept preconditioner. Returns the iterations, or None: a new solver is needed."""
         kept, self._kept = self._kept, None
         if kept is None or self.made < self.fresh:
             return None
         ksp, made_of, first = kept
-        if tolerance is not None:
-            ksp.setTolerances(rtol=tolerance)
         try:
             linear.solve(ksp, matrix, b, x, made_of)
         except linear.LinearSolveFailed:
