@@ -28,7 +28,7 @@ from solvers.fluid.weights import Weights
 
 
 @dataclass(frozen=True)
-class CutFlow:
+class FlowTerms:
     """The iterate, and the coefficients of the forms; arrays at local dofs."""
 
     flow: Array  #: velocity [m/s] and pressure [Pa]
@@ -50,7 +50,7 @@ class CutDerivatives:
 
 
 def cut_derivatives(
-    at: InterfaceTerms, rule: Weights, grid: DistributedGrid, cut: Cut, state: CutFlow
+    at: InterfaceTerms, rule: Weights, grid: DistributedGrid, cut: Cut, state: FlowTerms
 ) -> CutDerivatives:
     """Derivatives of all pieces of this process.
 
@@ -103,7 +103,7 @@ def _means(at: InterfaceTerms, flow: Array) -> tuple[Array, Array]:
     return means[..., 0], means[..., 1:]
 
 
-def _penalty_by_motion(at: InterfaceTerms, g: Array, slope: Array, w: Array, state: CutFlow) -> Array:
+def _penalty_by_motion(at: InterfaceTerms, g: Array, slope: Array, w: Array, state: FlowTerms) -> Array:
     """d(P ds) w / ds by the motion of vertices, (pieces, k, c, j), with P of `nitsche.penalties`.
 
     g: mean velocity of each facet where there is convection; slope: of `normal_derivative`; w: mean of u - g.
@@ -125,7 +125,7 @@ def _penalty_by_motion(at: InterfaceTerms, g: Array, slope: Array, w: Array, sta
     return found + along[:, None, None, None] * (turn * w_n + of_n * w_turn) + of_n * normal[:, None] * w_n
 
 
-def _density(u: NDArray, p: NDArray, sizes: Array, mu: float, rule: Weights, state: CutFlow) -> Array:
+def _density(u: NDArray, p: NDArray, sizes: Array, mu: float, rule: Weights, state: FlowTerms) -> Array:
     """`forms.bulk` + `forms.residual_based` at the points of cells for each test function, (cells, q, a, i).
 
     u, p: local dofs of the cells, (cells, a, k) and (cells, a); sizes: lengths of their edges [m].

@@ -32,7 +32,8 @@ from solvers.fluid.pieces import in_planes
 from solvers.fluid.sheet_nodes import Joined, node_copies, same_nodes
 from solvers.fluid.sheet_parts import AROUND, Part, facing_of, grown, links_of, parts_of_fluid, without_slivers
 from solvers.fluid.space_parts import parts_in_space
-from solvers.fluid.thinness import AROUND_PAIR, OPPOSED, THIN, may_be_thin
+from solvers.fluid.thickness import AROUND_PAIR, THIN
+from solvers.fluid.thinness import OPPOSED, may_be_thin
 from solvers.gauss import gauss
 from solvers.mesh import Mesh
 

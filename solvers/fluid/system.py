@@ -14,7 +14,7 @@ from solvers.api import Array
 from solvers.fluid import forms, nitsche
 from solvers.fluid.cell_forms import cell_forms
 from solvers.fluid.cut import Cut
-from solvers.fluid.cut_shape import CutDerivatives, CutFlow, cut_derivatives
+from solvers.fluid.cut_shape import CutDerivatives, FlowTerms, cut_derivatives
 from solvers.fluid.film import film_cells
 from solvers.fluid.film_shape import FilmDerivatives, FilmFlow, film_derivatives
 from solvers.fluid.flow_settings import FlowSettings
@@ -263,7 +263,7 @@ class FlowSystem:
         if degree > 1:
             return film_derivatives(at, self.weights, self.grid, cut, FilmFlow(flow, rate, density, alpha))
         scale, convection = self._scale_velocity.x.array * settings.convection, settings.convection
-        state = CutFlow(flow, rate, scale, density, alpha, convection, settings.penalties)
+        state = FlowTerms(flow, rate, scale, density, alpha, convection, settings.penalties)
         return cut_derivatives(at, self.weights, self.grid, cut, state)
 
     @property

@@ -23,7 +23,8 @@ from solvers.fluid.sheet_transfer import along_surface, transfer
 from solvers.fluid.sheets import Sheets, find_sheets
 from solvers.fluid.space import FlowNodes, Unknowns
 from solvers.fluid.surface import Motion, wetness
-from solvers.fluid.thinness import THIN_IF_MOVING, cell_sizes_at, may_be_thin
+from solvers.fluid.thickness import THIN_IF_MOVING
+from solvers.fluid.thinness import cell_sizes_at, may_be_thin
 from solvers.fluid.time_scheme import FlowStep
 
 #: Thickness in cells up to which moving bodies have separate cells with contact in 2D: that of bodies at rest. Where

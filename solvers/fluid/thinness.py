@@ -1,8 +1,6 @@
-"""Whether bodies are thin somewhere, from their surface alone; sizes from which on they are."""
+"""Whether bodies are thin somewhere, from their surface alone."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +12,6 @@ from solvers.tessellation import unit_normals
 
 Indices = NDArray[np.int64]
 
-THIN = 2  #: largest distance [cells] across a body at which a node or the ghost penalty couples the fluid on two sides
-THIN_IF_MOVING = 3  #: the same [cells] of bodies that move, with a strip of cells behind each side
-AROUND_PAIR = 1  #: layers of cells, beyond this distance, in which fluid on both sides must not be connected
 OPPOSED = -0.7  #: product of unit normals below which two surfaces face opposite directions: corners below 45 degrees
 ALIKE = 4  #: normals of facets in one cell whose components differ by less than 1 / ALIKE count as one
 
@@ -51,14 +46,6 @@ def _opposed(points: Array, normal: Array) -> tuple[Indices, Indices]:
     one, other = (cKDTree(np.concatenate([points * np.sqrt(bound), way], axis=1)) for way in (normal, -normal))
     found = one.sparse_distance_matrix(other, np.sqrt(2.0 * bound), output_type="ndarray")
     return found["i"], found["j"]
-
-
-def free_length(dim: int, *, moves: bool) -> float:
-    """Distance [cells] to the edge of a thin body in the fluid at which both sides surely have their own unknowns.
-
-    Around an edge that is nearer they may be connected within the cells of `AROUND_PAIR`, in a diagonal direction.
-    """
-    return math.sqrt(dim) * ((THIN_IF_MOVING if moves else THIN) + AROUND_PAIR + 0.5)
 
 
 def cell_sizes_at(edge: Array, x: Array) -> Array:

@@ -15,7 +15,7 @@ class Part:
         self.in_contact, self.has_films = (lambda: contact), (lambda: films)
         self.calls = []
 
-    def predict(self, *t):
+    def predict(self, *_, **__):
         self.calls.append("predict")
 
     def retreat(self, fraction):

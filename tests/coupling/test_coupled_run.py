@@ -195,7 +195,7 @@ def test_a_case_that_fails_at_once_says_so_and_keeps_a_checkpoint(tmp_path):
         pytest.param(BLOCK, "monolithic", id="block-monolithic"),
         pytest.param(BLOCK, "iqn", id="block-iqn", marks=pytest.mark.slow),
         pytest.param(MEETING, "monolithic", id="contact-monolithic"),
-        pytest.param(MEETING, "iqn", id="contact-iqn"),
+        pytest.param(MEETING, "iqn", id="contact-iqn", marks=pytest.mark.slow),
     ],
 )
 def test_two_processes(text, scheme, tmp_path):

@@ -18,7 +18,7 @@ PROGRAM = Path(__file__).parents[1] / "setups" / "fluid_parallel.py"
     ("dim", "element", "boxes"),
     [
         (2, "q1q1", ("channel", "closed", "nested")),
-        (2, "q2q1", ("closed", "periodic", "film", "nested")),
+        pytest.param(2, "q2q1", ("closed", "periodic", "film", "nested"), marks=pytest.mark.slow),
         (3, "q1q1", ("channel", "nested")),
     ],
 )

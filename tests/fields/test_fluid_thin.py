@@ -208,7 +208,8 @@ probes:
 """
 
 
-@pytest.mark.parametrize("element", [pytest.param("q1q1", marks=pytest.mark.slow), "q2q1"])
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+@pytest.mark.slow
 def test_two_processes(tmp_path, element):
     """A plate in the middle of the flow, its tip within the box, its end behind the outlet; a run that goes on, too."""
     (tmp_path / "case.yaml").write_text(CASE.format(element=element))

@@ -34,7 +34,12 @@ RESTING, MOVING = DISC.replace("MOTION", ""), DISC.replace("MOTION", ', motion: 
 FAR = BLOCK.replace("0.001", "5")
 PLOTTING = ("pyvista", "matplotlib", "gmsh")
 #: numbers that `fsci check` needs, too
-LIGHT = ("solvers.structure.elastic_constants", "solvers.fluid.fast_bodies", "solvers.fluid.patch_kinds")
+LIGHT = (
+    "solvers.structure.elastic_constants",
+    "solvers.fluid.fast_bodies",
+    "solvers.fluid.patch_kinds",
+    "solvers.fluid.thickness",
+)
 
 
 def written(tmp_path, text, end):
