@@ -106,7 +106,7 @@ VERIFIED = [folder.name for folder in CASES if folder.name not in (*LONG, *WHOLE
 )
 def test_published_numbers(name, tmp_path):
     """The published numbers, as the case itself verifies them."""
-    run_whole(name, tmp_path, *([f"time.end={EARLIER[name]}"] if name in EARLIER else []), timeout=900)
+    run_whole(name, tmp_path, *([f"time.end={EARLIER[name]}"] if name in EARLIER else []), timeout=1800)
 
 
 def test_every_case_is_documented():

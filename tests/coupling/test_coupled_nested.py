@@ -84,7 +84,7 @@ def test_schemes_agree(nested, tmp_path):
 @pytest.mark.parametrize("text", [NESTED, BALL], ids=["post", "ball"])
 def test_two_processes(text, tmp_path):
     one = run(text, tmp_path)
-    done = fsci("run", tmp_path, "-o", tmp_path / "two", "--set", "verify=[]", processes=2, timeout=300)
+    done = fsci("run", tmp_path, "-o", tmp_path / "two", "--set", "verify=[]", processes=2)
     assert done.returncode == 0, done.stdout + done.stderr
     two = read_history(tmp_path / "two" / "history.csv")
     for name in one.keys() - SOLVING:

@@ -201,7 +201,7 @@ def test_a_case_that_fails_at_once_says_so_and_keeps_a_checkpoint(tmp_path):
 def test_two_processes(text, scheme, tmp_path):
     text = text.replace(SCHEMES["monolithic"], SCHEMES[scheme])
     one = run(text, tmp_path, ("verify", "[]"))
-    done = fsci("run", tmp_path, "-o", tmp_path / "two", "--set", "verify=[]", processes=2, timeout=300)
+    done = fsci("run", tmp_path, "-o", tmp_path / "two", "--set", "verify=[]", processes=2)
     assert done.returncode == 0, done.stdout + done.stderr
     two = read_history(tmp_path / "two" / "history.csv")
     if "contact.active" in one:

@@ -168,7 +168,7 @@ def test_elastic_seal(tmp_path):
 @pytest.mark.slow
 def test_two_processes(tmp_path):
     one = run(SEALED, tmp_path)
-    done = fsci("run", tmp_path, "-o", tmp_path / "two", processes=2, timeout=300)
+    done = fsci("run", tmp_path, "-o", tmp_path / "two", processes=2)
     assert done.returncode == 0, done.stdout + done.stderr
     two = read_history(tmp_path / "two" / "history.csv")
     for name in ("contact.floor.y", "fluid.seepage"):

@@ -116,7 +116,7 @@ def test_fewer_cells_than_processes(case, processes, tmp_path):
     (tmp_path / "case.yaml").write_text(case)
     found = []
     for count in (1, processes):
-        run = fsci("run", tmp_path, "-o", tmp_path / str(count), processes=count, timeout=100)
+        run = fsci("run", tmp_path, "-o", tmp_path / str(count), processes=count)
         assert run.returncode == 0, run.stdout + run.stderr
         found.append(read_history(tmp_path / str(count) / "history.csv"))
     alone, together = found

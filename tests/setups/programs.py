@@ -27,7 +27,7 @@ def command(*arguments, processes: int = 1) -> list[str]:
     return [*launcher, sys.executable, "-m", "fsci", *map(str, arguments)]
 
 
-def fsci(*arguments, processes: int = 1, timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
+def fsci(*arguments, processes: int = 1, timeout: float = 600.0) -> subprocess.CompletedProcess[str]:
     """Run `fsci` to its end."""
     environment = PARALLEL if processes > 1 else ENVIRONMENT
     return subprocess.run(
@@ -45,7 +45,7 @@ def run_whole(name: str, folder, *changes: str, processes: int = 1, timeout: flo
     return run.stdout
 
 
-def on_processes(processes: int, *program, timeout: float = 200.0) -> subprocess.CompletedProcess[str]:
+def on_processes(processes: int, *program, timeout: float = 600.0) -> subprocess.CompletedProcess[str]:
     """Run a Python program of the tests by mpirun; an exception in one process ends all, instead of a wait."""
     launcher = ["mpirun", "-n", str(processes)] if processes > 1 else []
     command = [*launcher, sys.executable, "-m", "mpi4py", *map(str, program)]
