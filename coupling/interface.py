@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from coupling.ports import Solid
 from solvers.api import Array, State
-from solvers.fluid.surface import Motion
+from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.time_scheme import STEADY, Difference
 
 

@@ -13,13 +13,13 @@ from coupling.interface import DrySide
 from coupling.ports import Start
 from coupling.wetted import immerse, wetted_surface
 from solvers.api import Array
+from solvers.fluid.background.grid import Grid
+from solvers.fluid.bodies.immersed import ImmersedBody
+from solvers.fluid.bodies.surface import ImmersedSurface
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.field import Fluid
 from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.grid import Grid
-from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.patches import Patch
 from solvers.fluid.start import FlowStart
-from solvers.fluid.surface import ImmersedSurface
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.start import RigidStart
 from solvers.skin import cut_out_skin

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array, Stateful, StepInfo
+from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.coupling_entries import InterfaceEntries
 from solvers.fluid.history import History
-from solvers.fluid.krylov import SolverSequence
+from solvers.fluid.linear_systems.krylov import SolverSequence
 from solvers.fluid.steady_iteration import SteadyIteration
-from solvers.fluid.surface import Motion
 from solvers.fluid.time_scheme import FlowStep, FlowTimeScheme
 from solvers.newton import System
 from solvers.rows import RowTransformation, TakenRows

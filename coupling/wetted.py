@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from coupling.contact_surfaces import global_dofs
 from solvers.api import Array
 from solvers.blocks import Layout
-from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.inside import winding
-from solvers.fluid.surface import ImmersedSurface, Motion
+from solvers.fluid.bodies.immersed import ImmersedBody
+from solvers.fluid.bodies.inside import winding
+from solvers.fluid.bodies.surface import ImmersedSurface, Motion
 from solvers.skin import Skin
 from solvers.structure.field import Structure
 

@@ -23,7 +23,7 @@ SWAPPED = {"+": "-", "-": "+", "*": "/", "/": "*", "<": ">", ">": "<"}
 #: part -> (its sources, their tests, the fast ones first)
 GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "flow": (
-        ("solvers/fluid/forms.py", "solvers/fluid/nitsche.py", "solvers/fluid/patch_kinds.py"),
+        ("solvers/fluid/forms.py", "solvers/fluid/nitsche.py", "solvers/fluid/boundary/patch_kinds.py"),
         (
             "fluid_patch", "fluid_tangent", "fluid_ghost", "fluid_covered_faces", "fluid_slip", "fluid_stretched",
             "fluid_nitsche", "fluid_slip_bodies", "fluid_film", "fluid_time", "fluid_reactions", "constants",

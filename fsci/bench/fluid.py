@@ -10,11 +10,11 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fsci.bench.table import Row
+from solvers.fluid.background.grid import Grid, uniform
+from solvers.fluid.bodies.immersed import ImmersedBody, rigid_body
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.field import Fluid
 from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.grid import Grid, uniform
-from solvers.fluid.immersed import ImmersedBody, rigid_body
-from solvers.fluid.patches import Patch
 from solvers.fluid.probes import at_point, difference
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings

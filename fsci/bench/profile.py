@@ -23,12 +23,12 @@ from fsci.builder.build import build
 from fsci.case.load import load_case
 from solvers import fem, linear, unlocked
 from solvers.fluid import field as flow_field
-from solvers.fluid.cut import Cutter
+from solvers.fluid.cutting.cut import Cutter
+from solvers.fluid.cutting.weights import Weights
 from solvers.fluid.field import Fluid
 from solvers.fluid.interface import InterfaceTerms
-from solvers.fluid.multigrid import Multigrid
+from solvers.fluid.linear_systems.multigrid import Multigrid
 from solvers.fluid.system import FlowSystem
-from solvers.fluid.weights import Weights
 from solvers.timing import Timer
 
 #: Part -> functions that belong to it; what one calls that belongs to another part counts there alone.

@@ -14,11 +14,11 @@ from fsci.bench.family import ERROR, TIME, UNKNOWNS
 from fsci.bench.fluid import graded, polygon, zero
 from fsci.bench.table import Row
 from solvers.api import Array
+from solvers.fluid.background.grid import Grid, uniform
+from solvers.fluid.bodies.immersed import rigid_body
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.field import Fluid
 from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.grid import Grid, uniform
-from solvers.fluid.immersed import rigid_body
-from solvers.fluid.patches import Patch
 from solvers.fluid.probes import interpolation
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings

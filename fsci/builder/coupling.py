@@ -23,9 +23,9 @@ from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.coupling_checks import closed_in
 from fsci.meshes.of_case import require_inside_period
+from solvers.fluid.bodies.immersed import ImmersedBody
+from solvers.fluid.bodies.surface import ImmersedSurface
 from solvers.fluid.field import Fluid
-from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.surface import ImmersedSurface
 from solvers.rigid.field import RigidBodies
 from solvers.skin import Skin
 from solvers.structure.body import Body

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Snapshot
-from solvers.fluid.inside import winding
-from solvers.fluid.surface import Motion
+from solvers.fluid.bodies.inside import winding
+from solvers.fluid.bodies.surface import Motion
 
 if TYPE_CHECKING:
     from coupling.interface import DrySide

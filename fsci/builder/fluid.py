@@ -20,12 +20,12 @@ from fsci.case.rigid_motion import rigid_motion
 from fsci.meshes.nested import read_grid
 from fsci.meshes.of_case import read_rigid_body, require_inside_period
 from solvers.fluid import probes
+from solvers.fluid.background.grid import Grid
+from solvers.fluid.bodies.immersed import ImmersedBody, rigid_body
+from solvers.fluid.bodies.inside import PointInBody
+from solvers.fluid.boundary.patches import Patch, UncoveredFaces
 from solvers.fluid.field import Fluid
 from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.grid import Grid
-from solvers.fluid.immersed import ImmersedBody, rigid_body
-from solvers.fluid.inside import PointInBody
-from solvers.fluid.patches import Patch, UncoveredFaces
 from solvers.solver_settings import SolverSettings
 from solvers.timing import Timer
 from solvers.values import Value

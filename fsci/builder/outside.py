@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.builder.dry_side import Closing, DrySideError
-from solvers.fluid.inside import winding
-from solvers.fluid.surface import Motion
+from solvers.fluid.bodies.inside import winding
+from solvers.fluid.bodies.surface import Motion
 
 Array = NDArray[np.float64]
 Facets = NDArray[np.int64]

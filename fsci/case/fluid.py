@@ -27,7 +27,7 @@ from fsci.case.values import (
     TimeVector,
     Vector,
 )
-from solvers.fluid.patch_kinds import PATCH_KINDS
+from solvers.fluid.boundary.patch_kinds import PATCH_KINDS
 
 FACES = ("x-", "x+", "y-", "y+", "z-", "z+")
 Face = Literal["x-", "x+", "y-", "y+", "z-", "z+"]

@@ -12,8 +12,8 @@ from fsci.case.fluid import FluidSection, Movement, PatchSection
 from fsci.case.rigid_motion import rigid_motion
 from fsci.case.shapes import Shape
 from fsci.case.yaml_text import Keys
-from solvers.fluid.fast_bodies import MOST_CELLS
-from solvers.fluid.thickness import free_length
+from solvers.fluid.bodies.fast_bodies import MOST_CELLS
+from solvers.fluid.thin.thickness import free_length
 
 MOST_CELLS_PER_STEP = 10.0  #: above which `check` warns: cells that a flow or a body crosses in a time step
 #: Cells across a body that both of its sides need to share no unknowns: with fewer, fluid passes through the body.

@@ -22,8 +22,8 @@ from fsci.case.plausible_flow import fast_body, thin_body
 from fsci.case.rigid_motion import rigid_motion
 from fsci.meshes.nested import read_grid
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body, require_inside_period, slave_surfaces
-from solvers.fluid.inside import PointInBody, require_outside
-from solvers.fluid.surface import ImmersedSurface, Motion
+from solvers.fluid.bodies.inside import PointInBody, require_outside
+from solvers.fluid.bodies.surface import ImmersedSurface, Motion
 from solvers.locate import locate
 from solvers.mesh import Mesh
 from solvers.mesh_topology import signed_volumes, surface_facets

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from fsci.case import Case
 from fsci.case.grid import Refinement
 from fsci.meshes.of_case import read_body, read_rigid_body
-from solvers.fluid.box import Grid
+from solvers.fluid.background.box import Grid
 from solvers.tessellation import tessellate
 
 if TYPE_CHECKING:  # SciPy, which cases without nested cells do not need to be checked
-    from solvers.fluid.nested import Nested, RefinedRegion
+    from solvers.fluid.background.nested import Nested, RefinedRegion
 
 Surface = tuple[NDArray[np.float64], NDArray[np.int64]]
 
@@ -45,7 +45,7 @@ def fluid_dofs(case: Case) -> int:
 
 def _refined(case: Case, grid: Grid) -> Nested:
     """Raises CaseError if a body is too close to coarse cells."""
-    from solvers.fluid.nested import FINE_LAYERS, Nested, RefinedSurface, refined
+    from solvers.fluid.background.nested import FINE_LAYERS, Nested, RefinedSurface, refined
 
     assert case.fluid is not None
     section = case.fluid.grid
@@ -64,7 +64,7 @@ def _refined(case: Case, grid: Grid) -> Nested:
 
 
 def _region(refinement: Refinement, surfaces: dict[str, Surface]) -> RefinedRegion:
-    from solvers.fluid.nested import RefinedBox, RefinedSurface
+    from solvers.fluid.background.nested import RefinedBox, RefinedSurface
 
     if refinement.box is not None:
         low, high = refinement.box

@@ -6,9 +6,9 @@ __getattr__, __all__ = lazy_names(
     __name__,
     {
         "field": ["Fluid"],
-        "grid": ["Grid", "uniform"],
-        "immersed": ["ImmersedBody", "rigid_body"],
-        "patches": ["Patch"],
+        "background.grid": ["Grid", "uniform"],
+        "bodies.immersed": ["ImmersedBody", "rigid_body"],
+        "boundary.patches": ["Patch"],
         "flow_settings": ["FlowSettings"],
     },
 )

@@ -20,11 +20,11 @@ from scipy.spatial import cKDTree
 
 from solvers import fem
 from solvers.api import Array
-from solvers.fluid.cut import Cut
-from solvers.fluid.directory import Directory
-from solvers.fluid.extension import lagrange
-from solvers.fluid.space import Unknowns
-from solvers.fluid.surface import Motion
+from solvers.fluid.background.directory import Directory
+from solvers.fluid.background.space import Unknowns
+from solvers.fluid.bodies.surface import Motion
+from solvers.fluid.cutting.cut import Cut
+from solvers.fluid.poorly_cut.extension import lagrange
 from solvers.tessellation import unit_normals
 
 #: Facets nearest by their centres among which the nearest one is looked for.

@@ -9,8 +9,8 @@ import ufl
 
 from solvers import fem
 from solvers.fluid import forms, nitsche
-from solvers.fluid.space import Unknowns
-from solvers.fluid.weights import Weights
+from solvers.fluid.background.space import Unknowns
+from solvers.fluid.cutting.weights import Weights
 
 
 @dataclass(frozen=True)

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.fluid.background.space import Unknowns
 from solvers.fluid.cut_shape import CutDerivatives
-from solvers.fluid.film_shape import FilmDerivatives
+from solvers.fluid.films.film_shape import FilmDerivatives
 from solvers.fluid.interface import InterfaceTerms, MotionOperator
 from solvers.fluid.shape import shape_derivatives
-from solvers.fluid.space import Unknowns
 from solvers.overlap import OverlappingBlocks
 from solvers.sparse import Sparse, sparse_from_entries
 

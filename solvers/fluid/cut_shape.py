@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.fluid.cut import Cut
+from solvers.fluid.background.grid import DistributedGrid
+from solvers.fluid.cutting.cut import Cut
+from solvers.fluid.cutting.weights import Weights
 from solvers.fluid.forms import TRACE, Penalties
-from solvers.fluid.grid import DistributedGrid
 from solvers.fluid.interface import InterfaceTerms, MotionOperator
 from solvers.fluid.shape import normal_derivative
-from solvers.fluid.weights import Weights
 
 
 @dataclass(frozen=True)

@@ -8,18 +8,18 @@ from dataclasses import dataclass
 from mpi4py import MPI
 
 from solvers import linear
-from solvers.fluid.cut import Cutter
-from solvers.fluid.film import films_of
+from solvers.fluid.background.grid import DistributedGrid, Grid
+from solvers.fluid.background.nested import Nested
+from solvers.fluid.background.partition import partition
+from solvers.fluid.background.space import Unknowns
+from solvers.fluid.bodies.immersed import ImmersedBody
+from solvers.fluid.bodies.surface import by_facets, may_close, seeping
+from solvers.fluid.boundary.patches import Boundary, Patch, periodic_axes
+from solvers.fluid.cutting.cut import Cutter
+from solvers.fluid.films.film import films_of
 from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.grid import DistributedGrid, Grid
-from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.nested import Nested
-from solvers.fluid.partition import partition
-from solvers.fluid.patches import Boundary, Patch, periodic_axes
-from solvers.fluid.sheets import Sheets
-from solvers.fluid.space import Unknowns
-from solvers.fluid.surface import by_facets, may_close, seeping
 from solvers.fluid.system import FlowSystem
+from solvers.fluid.thin.sheets import Sheets
 from solvers.solver_settings import SolverSettings
 
 

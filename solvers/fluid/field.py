@@ -14,28 +14,28 @@ from petsc4py import PETSc
 from solvers import fem, linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.distributed import everywhere, scatter
+from solvers.fluid.background.grid import Grid
+from solvers.fluid.background.space import set_velocity
 from solvers.fluid.balances import Balances
 from solvers.fluid.behind import BehindWalls
+from solvers.fluid.bodies.fast_bodies import FastBodies
+from solvers.fluid.bodies.immersed import ImmersedBody, sheets_of
+from solvers.fluid.bodies.reach import require_finest, require_history, require_within_period, strip_layers
+from solvers.fluid.bodies.surface import Motion, together, vertex_ranges, wetness
+from solvers.fluid.boundary.patches import Patch, periodic_axes
+from solvers.fluid.closed_contact.zone_entries import with_zone
 from solvers.fluid.coupling_entries import InterfaceEntries, interface_entries
-from solvers.fluid.cut import Cut
+from solvers.fluid.cutting.cut import Cut
+from solvers.fluid.cutting.pressure_level import PressureLevels
 from solvers.fluid.discretisation import discretise
-from solvers.fluid.fast_bodies import FastBodies
 from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.grid import Grid
 from solvers.fluid.history import History
-from solvers.fluid.immersed import ImmersedBody, sheets_of
-from solvers.fluid.krylov import FlowSolver, SolverSequence
-from solvers.fluid.patches import Patch, periodic_axes
-from solvers.fluid.pressure_level import PressureLevels
-from solvers.fluid.reach import require_finest, require_history, require_within_period, strip_layers
+from solvers.fluid.linear_systems.krylov import FlowSolver, SolverSequence
 from solvers.fluid.saved import nodal_state, set_nodal_state
-from solvers.fluid.sheets import Sheets
-from solvers.fluid.space import set_velocity
 from solvers.fluid.steady_iteration import SteadyIteration
-from solvers.fluid.surface import Motion, together, vertex_ranges, wetness
-from solvers.fluid.thin_bodies import Began, ThinBodies, carry
+from solvers.fluid.thin.sheets import Sheets
+from solvers.fluid.thin.thin_bodies import Began, ThinBodies, carry
 from solvers.fluid.time_scheme import STEADY, FlowStep
-from solvers.fluid.zone_entries import with_zone
 from solvers.largest import position_of_largest
 from solvers.newton import converge
 from solvers.rounding import rounding_error

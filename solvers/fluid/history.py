@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from solvers.api import Array, State
 from solvers.distributed import Nodal
-from solvers.fluid.space import Unknowns
+from solvers.fluid.background.space import Unknowns
 from solvers.fluid.time_scheme import Difference, FlowTimeScheme
 
 Mask = NDArray[np.bool_]

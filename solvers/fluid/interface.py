@@ -16,12 +16,12 @@ import numpy as np
 
 from solvers.api import Array
 from solvers.fluid import nitsche
+from solvers.fluid.background.grid import DistributedGrid
+from solvers.fluid.background.space import Unknowns
 from solvers.fluid.cell_blocks import CellBlocks, cell_blocks
-from solvers.fluid.cut import Cut
-from solvers.fluid.grid import DistributedGrid
-from solvers.fluid.seepage import release, seepage_terms
-from solvers.fluid.space import Unknowns
-from solvers.fluid.weights import Weights
+from solvers.fluid.closed_contact.seepage import release, seepage_terms
+from solvers.fluid.cutting.cut import Cut
+from solvers.fluid.cutting.weights import Weights
 
 
 @dataclass(frozen=True)

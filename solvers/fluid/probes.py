@@ -15,12 +15,12 @@ import ufl
 from solvers import fem
 from solvers.api import Array
 from solvers.fluid import forms
+from solvers.fluid.background.nested import Nested
+from solvers.fluid.background.space import FlowNodes
 from solvers.fluid.balances import leak, seepage
-from solvers.fluid.covered_faces import CoveredFaces, covered_faces
+from solvers.fluid.bodies.inside import INSIDE, require_outside, winding
+from solvers.fluid.boundary.covered_faces import CoveredFaces, covered_faces
 from solvers.fluid.field import Fluid
-from solvers.fluid.inside import INSIDE, require_outside, winding
-from solvers.fluid.nested import Nested
-from solvers.fluid.space import FlowNodes
 from solvers.lagrange import lagrange
 
 Probe = Callable[[], dict[str, float]]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from solvers.api import State
 from solvers.distributed import Nodal
-from solvers.fluid.grid import DistributedGrid
+from solvers.fluid.background.grid import DistributedGrid
+from solvers.fluid.background.space import Unknowns
 from solvers.fluid.history import History
-from solvers.fluid.space import Unknowns
 from solvers.fluid.system import FlowSystem
 
 

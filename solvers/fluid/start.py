@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
+from solvers.fluid.bodies.immersed import ImmersedBody
+from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.field import Fluid
-from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.surface import Motion
 from solvers.fluid.time_scheme import Difference, FlowStep
 from solvers.values import evaluate_components
 

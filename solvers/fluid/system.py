@@ -12,26 +12,26 @@ from petsc4py import PETSc
 from solvers import fem
 from solvers.api import Array
 from solvers.fluid import forms, nitsche
+from solvers.fluid.background.grid import DistributedGrid
+from solvers.fluid.background.hanging_system import HangingSystem
+from solvers.fluid.background.space import Unknowns, set_velocity
+from solvers.fluid.boundary.outer_faces import OuterFaces, OuterOnCut
+from solvers.fluid.boundary.patches import Boundary
 from solvers.fluid.cell_forms import cell_forms
-from solvers.fluid.cut import Cut
+from solvers.fluid.closed_contact.zone import ClosedZone, find_zone
+from solvers.fluid.closed_contact.zone_seepage import ZoneSeepage
 from solvers.fluid.cut_shape import CutDerivatives, FlowTerms, cut_derivatives
-from solvers.fluid.film import film_cells
-from solvers.fluid.film_shape import FilmDerivatives, FilmFlow, film_derivatives
+from solvers.fluid.cutting.cut import Cut
+from solvers.fluid.cutting.pieces import Pieces
+from solvers.fluid.cutting.weights import Weights
+from solvers.fluid.films.film import film_cells
+from solvers.fluid.films.film_shape import FilmDerivatives, FilmFlow, film_derivatives
 from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.ghost import Scales
-from solvers.fluid.ghost_choice import choose_ghost_penalty
-from solvers.fluid.grid import DistributedGrid
-from solvers.fluid.hanging_system import HangingSystem
 from solvers.fluid.interface import InterfaceTerms
-from solvers.fluid.matrix import Pattern, choose_pattern, create_matrix, fits, pattern_of
-from solvers.fluid.outer_faces import OuterFaces, OuterOnCut
-from solvers.fluid.patches import Boundary
-from solvers.fluid.pieces import Pieces
-from solvers.fluid.space import Unknowns, set_velocity
+from solvers.fluid.linear_systems.matrix import Pattern, choose_pattern, create_matrix, fits, pattern_of
+from solvers.fluid.poorly_cut.ghost import Scales
+from solvers.fluid.poorly_cut.ghost_choice import choose_ghost_penalty
 from solvers.fluid.time_scheme import FlowStep
-from solvers.fluid.weights import Weights
-from solvers.fluid.zone import ClosedZone, find_zone
-from solvers.fluid.zone_seepage import ZoneSeepage
 
 
 class FlowSystem:

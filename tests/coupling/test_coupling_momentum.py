@@ -7,8 +7,8 @@ import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, step, wall
 from test_coupled_run import MEETING, run
 
+from solvers.fluid.background.grid import uniform
 from solvers.fluid.balances import Balances
-from solvers.fluid.grid import uniform
 
 #: one ball, thrown across the flow and held by nothing
 THROWN = """\

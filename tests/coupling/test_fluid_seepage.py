@@ -10,9 +10,9 @@ from test_fsci_lubrication import SETTLING
 
 from fsci.case import CaseError, load_case
 from fsci.run.history import read_history
-from solvers.fluid import seepage
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.closed_contact import seepage
 
 KAPPA, MU = 1e-3, 0.7
 

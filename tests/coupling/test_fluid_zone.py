@@ -12,12 +12,12 @@ from mpi4py import MPI
 from fsci import shapes
 from fsci.builder.build import build
 from fsci.case import load_case
-from solvers.fluid import zone
-from solvers.fluid.grid import uniform
-from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.patches import Patch
-from solvers.fluid.surface import ImmersedSurface, Motion
-from solvers.fluid.zone import stiffness, stiffness_by_motion
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.bodies.immersed import ImmersedBody
+from solvers.fluid.bodies.surface import ImmersedSurface, Motion
+from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.closed_contact import zone
+from solvers.fluid.closed_contact.zone import stiffness, stiffness_by_motion
 from solvers.tessellation import area_vectors, tessellate
 from solvers.timing import Timer
 

@@ -11,12 +11,12 @@ from test_coupled_run import MEETING, run
 
 from fsci.case import CaseError, load_case
 from fsci.run.history import read_history
+from solvers.fluid.background.grid import uniform
 from solvers.fluid.balances import seepage
-from solvers.fluid.grid import uniform
-from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.patches import Patch
+from solvers.fluid.bodies.immersed import ImmersedBody
+from solvers.fluid.bodies.surface import ImmersedSurface, Motion
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.probes import flow_rate
-from solvers.fluid.surface import ImmersedSurface, Motion
 
 KAPPA, MU, INSIDE, OUTSIDE = 1e-7, 0.5, 3.0, 1.0
 

@@ -10,9 +10,9 @@ from mpi4py import MPI
 
 from coupling.monolithic import Monolithic
 from fsci import shapes
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Body, Symmetry
 from solvers.structure.dynamics import Dynamics

@@ -10,10 +10,10 @@ from coupling import couple_rigid
 from coupling.accelerate import QuasiNewton
 from coupling.monolithic import Monolithic
 from coupling.partitioned import FixedPointTolerance, Partitioned
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.bodies.immersed import rigid_body
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.grid import uniform
-from solvers.fluid.immersed import rigid_body
-from solvers.fluid.patches import Patch
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.march import march
 from solvers.newton import Tolerance

@@ -24,10 +24,10 @@ from coupling.wetted import immerse
 from fsci.shapes import rectangle
 from solvers.api import StepInfo
 from solvers.contact import Contact, Frictionless, Pair
-from solvers.fluid.grid import uniform
-from solvers.fluid.patch_kinds import PatchKind
-from solvers.fluid.patches import Patch
-from solvers.fluid.surface import ImmersedSurface
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.bodies.surface import ImmersedSurface
+from solvers.fluid.boundary.patch_kinds import PatchKind
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.time_scheme import Difference, FlowTimeScheme
 from solvers.march import march
 from solvers.mesh import Mesh

@@ -6,8 +6,8 @@ from fluid_setup import block, sphere
 from thin_space import turn
 
 from solvers import kernels
-from solvers.fluid.cell_regions import SpaceRegion, cell_regions
-from solvers.fluid.grid import Grid, uniform
+from solvers.fluid.background.grid import Grid, uniform
+from solvers.fluid.thin.cell_regions import SpaceRegion, cell_regions
 from solvers.gauss import gauss
 
 POINTS, WEIGHTS = gauss(3)

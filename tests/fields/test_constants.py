@@ -16,8 +16,9 @@ from fsci.case import load_case
 from solvers.cell_types import CELL_TYPES
 from solvers.contact import dual_tree, mortar, self_search, share, sharp_edges
 from solvers.contact.sharp_edges import split_nodes
-from solvers.fluid import extension, film
-from solvers.fluid.surface import ImmersedSurface
+from solvers.fluid.bodies.surface import ImmersedSurface
+from solvers.fluid.films import film
+from solvers.fluid.poorly_cut import extension
 from solvers.mesh_topology import cut_out
 from solvers.structure import dynamics
 from solvers.tessellation import tessellate

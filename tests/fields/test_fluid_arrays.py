@@ -8,8 +8,8 @@ import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, solve_steady, sphere
 
 from solvers import fem
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.probes import on_patch
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings

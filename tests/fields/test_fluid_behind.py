@@ -6,9 +6,9 @@ from fluid_setup import body, field, loop, make_fluid, sphere, wall
 from mpi4py import MPI
 from test_fluid_oscillating import morison, noise, oscillate
 
+from solvers.fluid.background.grid import uniform
 from solvers.fluid.behind import BehindWalls, mirrored
-from solvers.fluid.grid import uniform
-from solvers.fluid.surface import Motion
+from solvers.fluid.bodies.surface import Motion
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 SPEED = np.array([0.5, -0.25])

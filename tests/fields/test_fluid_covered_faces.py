@@ -6,12 +6,12 @@ from fluid_setup import block, body, field, make_fluid, nodal_errors, solve_stea
 from programs import fsci
 
 from fsci.run.history import read_history
+from solvers.fluid.background.grid import uniform
 from solvers.fluid.balances import Balances
-from solvers.fluid.covered_faces import CoveredFaces
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
+from solvers.fluid.boundary.covered_faces import CoveredFaces
+from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.boundary.wet_faces import wet_face
 from solvers.fluid.probes import flow_rate, mass_balance
-from solvers.fluid.wet_faces import wet_face
 from solvers.gauss import gauss
 
 MU = 0.7

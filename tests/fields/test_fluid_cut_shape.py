@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, sphere, step, wall
 
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.coupling_entries import interface_entries
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
 
 DT = 0.05
 

@@ -7,10 +7,10 @@ import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, step, turned, wall
 
 from fsci.bench import fluid as bench
-from solvers.fluid.extension import FREE, Extension
+from solvers.fluid.background.grid import Grid, uniform
 from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.forms import Penalties
-from solvers.fluid.grid import Grid, uniform
+from solvers.fluid.poorly_cut.extension import FREE, Extension
 
 
 def around_a_disc(scheme="steady", **settings):

@@ -5,13 +5,13 @@ import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, solve_steady, step
 from mpi4py import MPI
 
-from solvers.fluid import film
-from solvers.fluid.cut import Cutter
-from solvers.fluid.extension import FREE
+from solvers.fluid.background.grid import DistributedGrid, uniform
+from solvers.fluid.bodies.surface import together
+from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.cutting.cut import Cutter
+from solvers.fluid.films import film
 from solvers.fluid.forms import TRACE, Penalties
-from solvers.fluid.grid import DistributedGrid, uniform
-from solvers.fluid.patches import Patch
-from solvers.fluid.surface import together
+from solvers.fluid.poorly_cut.extension import FREE
 
 H = 0.1
 

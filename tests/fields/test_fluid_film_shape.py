@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, solve_steady
 
-from solvers.fluid import film_shape
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.coupling_entries import interface_entries
-from solvers.fluid.film_crossings import crossing_moments
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
+from solvers.fluid.films import film_shape
+from solvers.fluid.films.film_crossings import crossing_moments
 
 CENTRE = 0.52
 #: of momentum, continuity (which hardly changes) and force

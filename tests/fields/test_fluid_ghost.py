@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, wall
 
+from solvers.fluid.background.grid import uniform
 from solvers.fluid.forms import Penalties
-from solvers.fluid.grid import uniform
 
 
 def kinked_flow(dt, **factors):

@@ -5,10 +5,10 @@ import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, nodal_errors, step, wall
 
 from solvers.api import StepFailed
-from solvers.fluid.grid import uniform
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.bodies.immersed import ImmersedBody
+from solvers.fluid.bodies.surface import ImmersedSurface, Motion
 from solvers.fluid.history import History, Past
-from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.surface import ImmersedSurface, Motion
 from solvers.fluid.time_scheme import SCHEMES, FlowStep
 
 VELOCITY, DT = field(2.0, 0.0), 0.01

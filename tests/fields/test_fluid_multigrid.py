@@ -13,12 +13,12 @@ from programs import on_processes
 from fsci.case import load_case
 from fsci.run.run import FAILED, run_case
 from solvers import linear
-from solvers.fluid import krylov
-from solvers.fluid.grid import Grid, uniform
-from solvers.fluid.krylov import SolverSequence
-from solvers.fluid.level_grid import LevelGrid
-from solvers.fluid.multigrid import coarsen, finest, interpolation
-from solvers.fluid.nested import RefinedBox, refined
+from solvers.fluid.background.grid import Grid, uniform
+from solvers.fluid.background.nested import RefinedBox, refined
+from solvers.fluid.linear_systems import krylov
+from solvers.fluid.linear_systems.krylov import SolverSequence
+from solvers.fluid.linear_systems.level_grid import LevelGrid
+from solvers.fluid.linear_systems.multigrid import coarsen, finest, interpolation
 from solvers.linear import LinearSolveFailed
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings

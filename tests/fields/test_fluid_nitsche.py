@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, sphere, wall
 
+from solvers.fluid.background.grid import uniform
 from solvers.fluid.coupling_entries import interface_entries
-from solvers.fluid.grid import uniform
 
 MU, PRESSURE = 0.7, 2.0
 

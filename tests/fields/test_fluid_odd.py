@@ -19,8 +19,8 @@ from fluid_setup import (
 )
 
 from solvers.api import StepFailed
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
 
 STILL = field(0, 0)
 

@@ -5,7 +5,7 @@ import pytest
 import sympy
 from fluid_setup import body, circle, errors, field, loop, make_fluid, solve_steady, sphere, symbolic, wall
 
-from solvers.fluid.grid import uniform
+from solvers.fluid.background.grid import uniform
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 

@@ -5,9 +5,9 @@ import pytest
 from fluid_setup import block, body, field, loop, make_fluid, step
 from test_fluid_touching import overlap
 
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
-from solvers.fluid.regions import area_of
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.thin.regions import area_of
 
 WEIGHT = 3.0
 

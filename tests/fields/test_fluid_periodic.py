@@ -5,8 +5,8 @@ import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, nodal_errors, solve_steady, step
 
 from solvers.api import StepFailed
-from solvers.fluid.grid import Grid, uniform
-from solvers.fluid.patches import Patch
+from solvers.fluid.background.grid import Grid, uniform
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.probes import at_point, mass_balance, on_patch
 from solvers.fluid.snapshot import snapshots
 

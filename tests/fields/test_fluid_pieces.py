@@ -5,8 +5,8 @@ import pytest
 from fluid_setup import block
 
 from solvers import kernels
-from solvers.fluid.grid import uniform
-from solvers.fluid.pieces import put_where_fluid_is
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.cutting.pieces import put_where_fluid_is
 from solvers.tessellation import unit_normals
 
 

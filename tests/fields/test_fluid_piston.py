@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fluid_setup import block, body, field, make_fluid, nodal_errors, step
 
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
 
 RHO, MU, LEFT, START, DT = 1.0, 0.1, -0.5, 0.1, 0.1
 

@@ -17,7 +17,7 @@ from fluid_setup import (
     wall,
 )
 
-from solvers.fluid.grid import uniform
+from solvers.fluid.background.grid import uniform
 
 RHO, MU, DT = 1.3, 0.02, 0.03
 

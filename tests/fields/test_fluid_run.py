@@ -18,9 +18,9 @@ from fsci.plot.scene import UPRIGHT
 from fsci.run.history import read_history
 from fsci.run.output import read_collection
 from fsci.run.run import FINISHED, run_case
-from solvers.fluid.inside import winding
+from solvers.fluid.bodies.inside import winding
+from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.snapshot import vertex_areas
-from solvers.fluid.surface import Motion
 from solvers.tessellation import is_closed, tessellate, unit_normals
 
 MOVING = """\

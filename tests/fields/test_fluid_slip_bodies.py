@@ -18,8 +18,8 @@ from fluid_setup import (
 from lubrication import film_force, slip_ratio
 
 from solvers.fluid import coupling_entries
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
 
 MU = 0.7
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fsci.bench import fluid as bench
-from solvers.fluid.grid import Grid
+from solvers.fluid.background.grid import Grid
 from solvers.fluid.probes import at_point, difference
 
 

@@ -7,7 +7,7 @@ import pytest
 from fluid_setup import around_moving_body, field, make_fluid, moving_body, step, wall
 
 from solvers.fluid import cell_forms
-from solvers.fluid.patches import Patch
+from solvers.fluid.boundary.patches import Patch
 
 
 def channel(dim, element, scheme, convection):

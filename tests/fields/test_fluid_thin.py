@@ -7,11 +7,11 @@ from programs import fsci
 
 from fsci.run.history import read_history
 from solvers.distributed import gather, scatter
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.probes import at_point
-from solvers.fluid.sheet_windows import SheetWindows
-from solvers.fluid.sheets import find_sheets
+from solvers.fluid.thin.sheet_windows import SheetWindows
+from solvers.fluid.thin.sheets import find_sheets
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 

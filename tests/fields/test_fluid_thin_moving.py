@@ -10,13 +10,13 @@ from programs import fsci
 from fsci.run.history import read_history
 from solvers.api import StepFailed
 from solvers.distributed import gather, scatter
-from solvers.fluid.cut import off_boundary
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
-from solvers.fluid.sheet_transfer import along_surface, transfer
-from solvers.fluid.sheets import find_sheets
-from solvers.fluid.surface import Motion
-from solvers.fluid.thin_bodies import ThinBodies, may_be_thin
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.bodies.surface import Motion
+from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.cutting.cut import off_boundary
+from solvers.fluid.thin.sheet_transfer import along_surface, transfer
+from solvers.fluid.thin.sheets import find_sheets
+from solvers.fluid.thin.thin_bodies import ThinBodies, may_be_thin
 
 THICKNESS = [1e-3, 0.2, 1.0, 1.5, 3.0]  # in cells
 DRAWS = (range(1), pytest.param(range(1, 10), marks=pytest.mark.slow))

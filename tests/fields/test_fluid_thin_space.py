@@ -8,10 +8,10 @@ from thin_space import duct, sealing, turn
 
 from fsci.run.history import read_history
 from solvers.distributed import gather, scatter
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.probes import at_point
-from solvers.fluid.sheets import find_sheets
+from solvers.fluid.thin.sheets import find_sheets
 
 SLOW = pytest.mark.slow
 THICKNESS = [pytest.param(1e-3, marks=SLOW), 0.2, pytest.param(1.0, marks=SLOW), 1.5, pytest.param(3.0, marks=SLOW)]

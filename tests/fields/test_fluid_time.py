@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, errors, field, loop, make_fluid, nodal_errors, step, symbolic, wall
 
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
 
 RHO, MU, END = 1.3, 0.05, 0.8
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from fluid_setup import block, body, field, make_fluid, step, turned
 
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
-from solvers.fluid.regions import area_of
-from solvers.fluid.sheets import find_sheets
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.thin.regions import area_of
+from solvers.fluid.thin.sheets import find_sheets
 
 H = 0.1
 DRAWS = (range(2), pytest.param(range(2, 20), marks=pytest.mark.slow))

@@ -5,11 +5,11 @@ import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, sphere, step, turned, wall
 from mpi4py import MPI
 
-from solvers.fluid.grid import Grid, uniform
-from solvers.fluid.patches import Patch
+from solvers.fluid.background.grid import Grid, uniform
+from solvers.fluid.bodies.surface import Motion
+from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.boundary.wet_faces import wet_face
 from solvers.fluid.probes import mass_balance, on_patch
-from solvers.fluid.surface import Motion
-from solvers.fluid.wet_faces import wet_face
 
 POINTS = np.polynomial.legendre.leggauss(3)[0] / 2.0 + 0.5
 

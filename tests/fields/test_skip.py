@@ -10,8 +10,8 @@ import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, solve_steady
 from mpi4py import MPI
 
-import solvers.fluid.cut
-import solvers.fluid.pressure_level
+import solvers.fluid.cutting.cut
+import solvers.fluid.cutting.pressure_level
 import solvers.fluid.system
 from fsci.bench.small import BEAM, BLOCK, FLOW, POST
 from fsci.builder.build import build
@@ -19,8 +19,8 @@ from fsci.case import load_case
 from fsci.run.run import FINISHED, Run, run_case
 from solvers.contact.mortar import Mortar
 from solvers.contact.search import Search
-from solvers.fluid.grid import uniform
-from solvers.fluid.patches import Patch
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.system import FlowSystem
 from solvers.structure.body import Body
 from solvers.structure.field import Structure
@@ -36,9 +36,12 @@ PLOTTING = ("pyvista", "matplotlib", "gmsh")
 #: numbers that `fsci check` needs, too
 LIGHT = (
     "solvers.structure.elastic_constants",
-    "solvers.fluid.fast_bodies",
-    "solvers.fluid.patch_kinds",
-    "solvers.fluid.thickness",
+    "solvers.fluid.bodies.fast_bodies",
+    "solvers.fluid.bodies",
+    "solvers.fluid.boundary",
+    "solvers.fluid.boundary.patch_kinds",
+    "solvers.fluid.thin",
+    "solvers.fluid.thin.thickness",
 )
 
 
@@ -122,13 +125,13 @@ def test_bodies_that_come_near_are_searched_in_time(law, tmp_path, monkeypatch):
 
 def test_bodies_at_rest_are_cut_once(tmp_path, monkeypatch):
     calls = Counter()
-    moments = solvers.fluid.cut.kernels.moments
+    moments = solvers.fluid.cutting.cut.kernels.moments
 
     def counting(*arguments, **keywords):
         calls["moments"] += 1
         return moments(*arguments, **keywords)
 
-    monkeypatch.setattr(solvers.fluid.cut.kernels, "moments", counting)
+    monkeypatch.setattr(solvers.fluid.cutting.cut.kernels, "moments", counting)
     iterations_of(written(tmp_path, FLOW + RESTING, 0.1), 4)
     assert calls["moments"] == 2  # to look for thin bodies, and the cut
     iterations_of(written(tmp_path, FLOW + MOVING, 0.1), 4)
@@ -137,7 +140,7 @@ def test_bodies_at_rest_are_cut_once(tmp_path, monkeypatch):
 
 def test_a_body_outside_of_the_box_changes_nothing(tmp_path, monkeypatch):
     """A disc at rest there: the same flow, bit for bit; no pocket is looked for."""
-    monkeypatch.setattr(solvers.fluid.pressure_level, "find_pockets", None)
+    monkeypatch.setattr(solvers.fluid.cutting.pressure_level, "find_pockets", None)
     found = []
     for text in (FLOW, FLOW + RESTING.replace("0.78, 0.51", "5, 5")):
         simulation = build(written(tmp_path, text, 0.1), MPI.COMM_WORLD, Timer())

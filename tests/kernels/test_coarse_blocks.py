@@ -8,8 +8,8 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from solvers import kernels
-from solvers.fluid import coarse_matrix
-from solvers.fluid.coarse_matrix import CoarseMatrix
+from solvers.fluid.linear_systems import coarse_matrix
+from solvers.fluid.linear_systems.coarse_matrix import CoarseMatrix
 
 
 def example(size, seed=3):

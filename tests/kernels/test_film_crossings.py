@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from moments_setup import all_cells, box, corners_and_sizes, graded, moved, sphere, star, tensor
 
-from solvers.fluid.film_crossings import crossing_moments
+from solvers.fluid.films.film_crossings import crossing_moments
 from solvers.gauss import gauss
 from solvers.kernels import moments
 from solvers.tessellation import unit_normals

@@ -8,9 +8,9 @@ import pytest
 from mpi4py import MPI
 from programs import on_processes
 
-from solvers.fluid.cut import cells_between
-from solvers.fluid.grid import DistributedGrid, Grid, uniform
-from solvers.fluid.pockets import find_pockets
+from solvers.fluid.background.grid import DistributedGrid, Grid, uniform
+from solvers.fluid.cutting.cut import cells_between
+from solvers.fluid.cutting.pockets import find_pockets
 
 SHAPES = [((9, 8), ()), ((9, 8), (0,)), ((6, 5, 4), ()), ((6, 5, 4), (1, 2))]
 

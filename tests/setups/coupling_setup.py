@@ -10,9 +10,9 @@ from mpi4py import MPI
 from coupling.coupled import Coupled
 from coupling.parts import couple
 from fsci import shapes
+from solvers.fluid.background.grid import Grid, uniform
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.grid import Grid, uniform
-from solvers.fluid.patches import Patch
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.linear import Method
 from solvers.newton import Tolerance

@@ -8,9 +8,9 @@ from fluid_setup import SolverSettings, Tolerance, block, body, circle, field, l
 from mpi4py import MPI
 
 from solvers.distributed import Nodal, gather_nodal
-from solvers.fluid.grid import uniform
-from solvers.fluid.nested import RefinedBox, RefinedSurface, refined
-from solvers.fluid.patches import Patch
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.background.nested import RefinedBox, RefinedSurface, refined
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.probes import mass_balance
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from fluid_setup import SolverSettings, Tolerance, body, field, make_fluid, sphere, step, wall
 from mpi4py import MPI
 
-from solvers.fluid.grid import uniform
+from solvers.fluid.background.grid import uniform
 
 if __name__ == "__main__":
     ball = body("ball", *sphere((0.5, 0.5, 0.5), 0.33, 2))

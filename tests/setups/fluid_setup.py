@@ -9,13 +9,13 @@ import numpy as np
 from mpi4py import MPI
 
 from solvers import fem
-from solvers.fluid.cut import Cutter
+from solvers.fluid.background.grid import Grid, uniform
+from solvers.fluid.bodies.immersed import ImmersedBody
+from solvers.fluid.bodies.surface import ImmersedSurface, Motion
+from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.cutting.cut import Cutter
 from solvers.fluid.field import Fluid
 from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.grid import Grid, uniform
-from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.patches import Patch
-from solvers.fluid.surface import ImmersedSurface, Motion
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 

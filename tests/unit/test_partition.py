@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, loop
 
-from solvers.fluid.grid import uniform
-from solvers.fluid.immersed import ImmersedBody
-from solvers.fluid.partition import CUT, blocks, destinations, work
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.background.partition import CUT, blocks, destinations, work
+from solvers.fluid.bodies.immersed import ImmersedBody
 
 
 def extent(owner, shape, rank):

@@ -10,11 +10,11 @@ from mpi4py import MPI
 from fsci.bench.fluid import polygon
 from fsci.bench.table import Row
 from solvers.api import Array
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.bodies.immersed import rigid_body
+from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.field import Fluid
 from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.grid import uniform
-from solvers.fluid.immersed import rigid_body
-from solvers.fluid.patches import Patch
 from solvers.fluid.probes import interpolation
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings

@@ -1,0 +1,1 @@
+"""The background grid: cells, processes, unknowns on it."""

@@ -1,0 +1,1 @@
+"""Bodies in the flow: their surfaces and motion."""

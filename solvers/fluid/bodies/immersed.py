@@ -1,0 +1,61 @@
+"""Bodies in the flow: closed surfaces that rest, follow a given motion, or are moved by another field."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.fluid.background.grid import Grid
+from solvers.fluid.background.nested import Nested
+from solvers.fluid.bodies.surface import ImmersedSurface, Motion, together
+from solvers.fluid.cutting.cut import off_boundary
+from solvers.fluid.thin.sheets import Sheets, find_sheets
+
+
+@dataclass(frozen=True)
+class ImmersedBody:
+    """A surface in the flow; motion: time [s] -> motion of its vertices; None if another field moves it."""
+
+    surface: ImmersedSurface
+    motion: Callable[[float], Motion] | None
+    rests: bool = False  #: it never moves
+    deforms: bool = False  #: its volume may change
+    start: Array | None = None  #: positions of its vertices [m] at the start, if another field moves it
+
+    @property
+    def at_start(self) -> Array | None:
+        """Positions of its vertices [m] at the time 0, or where another field starts to move it; None if unknown."""
+        return self.start if self.motion is None else self.motion(0.0).x
+
+
+def rigid_body(
+    name: str,
+    points: Array,
+    facets: NDArray[np.int64],
+    motion: Callable[[float], tuple[Array, Array]] | None = None,
+) -> ImmersedBody:
+    """A body with a prescribed motion.
+
+    points: vertices [m], shape (n, dim). facets: segments (2D) or triangles (3D) as vertex numbers, shape (m, dim);
+    their right-hand normals point out of the body: in 2D they run with the body on their left.
+    motion: t [s] -> (positions [m], velocities [m/s]) of the vertices, each of shape (n, dim); None: it rests.
+    """
+    points = np.ascontiguousarray(points, dtype=float)
+    surface = ImmersedSurface(name, np.asarray(facets, dtype=np.int64), len(points))
+    if motion is None:
+        return ImmersedBody(surface, lambda t: Motion(points, np.zeros_like(points)), rests=True)
+    given = motion
+    return ImmersedBody(surface, lambda t: Motion(*given(t)))
+
+
+def sheets_of(grid: Grid, bodies: Sequence[ImmersedBody]) -> Sheets | None:
+    """Sheets of the fluid around thin bodies at rest; None if there are none, or where cells are nested."""
+    if isinstance(grid, Nested) or not bodies or not all(body.rests for body in bodies):
+        return None
+    motions = [body.motion(0.0) for body in bodies if body.motion is not None]
+    facets, motion = together([body.surface for body in bodies], motions, grid.dim)
+    return find_sheets(grid, facets, motion.x, off_boundary(grid, motion.x[facets]))

@@ -1,0 +1,1 @@
+"""Conditions on the faces of the box."""

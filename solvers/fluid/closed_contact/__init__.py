@@ -1,0 +1,1 @@
+"""Closed contact: fluid pressure and seepage where surfaces touch."""

@@ -1,0 +1,1 @@
+"""The cut of the grid by surfaces, and the integrals over it."""

@@ -1,0 +1,95 @@
+"""Cells in which bodies overlap, in 2D: the solid there is the union of the bodies.
+
+Moments of several bodies are sums over them. So an overlap counts twice: the solid may exceed the cell though there is
+fluid in it, and surface inside of another body bounds no fluid. In such a cell the regions of the fluid are found
+exactly (`touching_regions`), and the moments are those of these regions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.connected import connected_parts
+from solvers.fluid.background.box import Grid
+from solvers.fluid.cutting.pieces import NOTHING, joined_pieces, parts_of_facets
+from solvers.fluid.thin.regions import SAME, Region, chords_of
+from solvers.fluid.thin.touching_regions import touching_regions
+from solvers.gauss import tensor_weights
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Integrals over a solid and its surface, named as those of `kernels.moments`."""
+
+    fraction: Array
+    cells: Indices
+    solid: Array
+    piece_cell: Indices
+    piece_facet: Indices
+    piece_moments: Array
+    piece_mass: Array
+
+
+def with_unions(grid: Grid, points: Array, moments, facets: Indices, x: Array, bounds: NDArray[np.bool_]):
+    """Moments in 2D with the union of the bodies as solid, in cells with fluid where they overlap.
+
+    moments: of `kernels.moments`, which are returned where nothing overlaps; points: of the quadrature in one
+    direction; x: vertices [m]; bounds: facets that are not on the boundary of the box.
+    """
+    found = dict(_overlapping(grid, moments, facets, x, bounds))
+    if not found:
+        return moments
+    fraction, solid = moments.fraction.copy(), moments.solid.copy()
+    weights = tensor_weights(len(points), 2)
+    parts = []
+    for row, regions in found.items():
+        cell = moments.cells[row]
+        fraction[cell] = 1.0 - sum(region.share for region in regions)
+        solid[row] = weights - sum(region.integrals(points) for region in regions)
+        surface = np.concatenate([region.surface for region in regions if region.surface is not None])
+        parts.append(parts_of_facets(grid, cell, row, surface, facets, x, points))
+    new = joined_pieces(parts)
+    kept = ~np.isin(moments.piece_cell, list(found))
+    pairs = (
+        (moments.piece_cell, new.cell),
+        (moments.piece_facet, new.facet),
+        (moments.piece_moments, new.moments),
+        (moments.piece_mass, new.mass),
+    )
+    return Moments(fraction, moments.cells, solid, *(np.concatenate([old[kept], some]) for old, some in pairs))
+
+
+def _overlapping(
+    grid: Grid, moments, facets: Indices, x: Array, bounds: NDArray[np.bool_]
+) -> list[tuple[int, list[Region]]]:
+    """(row of each cell with fluid in which bodies overlap, regions of the fluid)."""
+    body = connected_parts(facets[:, 0], facets[:, 1], len(x))[facets[:, 0]]
+    rows, _ = np.unique(np.stack([moments.piece_cell, body[moments.piece_facet]]), axis=1)
+    several, counts = np.unique(rows, return_counts=True)
+    found = []
+    for row in several[counts > 1].tolist():
+        cell = int(moments.cells[row])
+        numbers = moments.piece_facet[moments.piece_cell == row]
+        chords = chords_of(grid, cell, x, facets, numbers[bounds[numbers]].tolist())
+        regions = touching_regions(cell, float(moments.fraction[cell]), chords) if chords else None
+        if not regions:
+            continue
+        twice = sum(region.share for region in regions) + moments.fraction[cell] > 1.0 + NOTHING
+        bounding = sum(
+            length(region.surface[:, 1:].reshape(-1, 2, 2)) for region in regions if region.surface is not None
+        )
+        hidden = sum(length(np.stack([line[:-1], line[1:]], axis=1)) for line, _ in chords) - bounding > SAME
+        if twice or hidden:
+            found.append((row, regions))
+    return found
+
+
+def length(ends: Array) -> float:
+    """Sum of the lengths of segments, (n, 2, 2)."""
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())

@@ -1,0 +1,1 @@
+"""Films between walls that are closer than a cell."""

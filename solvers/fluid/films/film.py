@@ -1,0 +1,172 @@
+"""Films between walls that are closer than a cell: the factor by which stabilisation is reduced in their cells.
+
+A film of height g between two walls has the flux g^3 / (12 mu) dp/dx. The stabilisation of a cell of size h > g acts
+over h instead of g. Relative to the film's own flux or resistance its terms are, where pressure and height change along
+one cell,
+
+    PSPG                 12 mu tau_M / g^2 < (h / g)^2 / 4    additional flux
+    extension, pressure  12 gamma (h / g)^3                   additional flux
+    extension, velocity  3 gamma (h / g)^3                    resistance: the parabola continues to h behind the walls
+    grad-div             tau_C / mu, about 8 in the plane     resistance where the pressure decays within a few cells
+
+Pressure: gamma h^2 / mu (c p)^2 at a node with c p = h^2 p'' = h p', over g^3 / (12 mu) p'^2 times h. Velocity:
+gamma mu (c u)^2 with c u = u = 4 U y/g (1 - y/g) at y = h, over mu int u_y^2 dy = 16/3 mu U^2 / g times h.
+The penalty on the distance to the extension is multiplied by eps min(1, (g/h)^3 / (12 gamma)), so that its relative
+contribution is below eps. PSPG and grad-div terms are left out: second-order velocities with first-order pressures are
+stable without them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from solvers.api import Array
+from solvers.fluid.background.grid import DistributedGrid, Grid
+from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.cutting.pieces import FLUSH
+from solvers.fluid.forms import Penalties
+from solvers.fluid.poorly_cut.extension import FREE
+
+#: eps, the largest relative contribution of the penalty to a film. Drags are the same to 1.6 % from 3e-3 to 1e-6.
+SHARE = 3e-3
+#: g / h below which the factor is constant. Nodes with little fluid have rounding errors of 1e-9 of the velocity,
+#: divided by the factor. Drags of films from 0.05 cells on are the same to 1.3 % from 0.1 to 1e-4.
+LEAST = 0.1
+#: Sine of half of 45 degrees: normals are grouped by the nearest of eight directions in the plane.
+OCTANT = np.sin(np.pi / 8)
+#: Product of the unit normals below which two walls are opposite: the angle between them is at most 60 degrees.
+OPPOSITE = -0.5
+
+
+@dataclass(frozen=True)
+class Walls:
+    """Plane pieces of surface, sorted by cell."""
+
+    cell: NDArray[np.int64]  #: number in the box
+    x: Array  #: middle [m], shape (n, dim)
+    n: Array  #: unit normal out of the fluid, shape (n, dim)
+
+
+@dataclass(frozen=True)
+class Films:
+    """Faces of the box that are walls, and the penalty factor; `factor` reduces it in films."""
+
+    faces: Sequence[tuple[int, int]]  #: axis and side (0, 1)
+    penalty: float  #: gamma
+
+    def factor(self, grid: Grid, walls: Walls, solid: NDArray[np.bool_]) -> Array | None:
+        """Factor of the penalty in each cell of the box; 1 outside of films. None if there is no film.
+
+        Solid cells around those of a film have its factor: they share nodes with it.
+        """
+        index = np.unravel_index(walls.cell, grid.shape, order="F")
+        sizes = np.stack([np.diff(edge)[i] for edge, i in zip(grid.edges, index, strict=True)], axis=1)
+        across = 1.0 / np.linalg.norm(walls.n / sizes, axis=1)
+        gap = np.minimum(self._to_faces(grid, walls), _to_walls(grid, walls, across))
+        near = gap < (1.0 - FLUSH) * across  # a gap of one cell is no film, whatever the rounding
+        if not near.any():
+            return None
+        ratio = np.maximum(gap[near] / sizes[near].max(axis=1), LEAST)
+        factor = np.ones(grid.size)
+        np.minimum.at(factor, walls.cell[near], SHARE * np.minimum(1.0, ratio**3 / (12.0 * self.penalty)))
+        around = ndimage.minimum_filter(grid.as_box(factor), 3).ravel(order="F")
+        return np.where(solid, around, factor)
+
+    def _to_faces(self, grid: Grid, walls: Walls) -> Array:
+        """Distance [m] through the fluid to faces of the box, along the normal."""
+        gap = np.full(len(walls.cell), np.inf)
+        for axis, side in self.faces:
+            slope = walls.n[:, axis] if side == 0 else -walls.n[:, axis]
+            height = np.abs(walls.x[:, axis] - grid.edges[axis][-side])
+            facing = slope > -OPPOSITE
+            gap[facing] = np.minimum(gap[facing], height[facing] / slope[facing])
+        return gap
+
+
+def films_of(patches: Sequence[Patch], penalties: Penalties) -> Films:
+    """Films of a flow with second-order velocities: faces of the box that hold the normal velocity are walls."""
+    walls = {face for patch in patches if patch.record.prescribed in ("all", "normal") for face in patch.faces}
+    faces = sorted(("xyz".index(face[0]), int(face[1] == "+")) for face in walls)
+    return Films(faces, penalties.extension)
+
+
+def walls_of(cell: NDArray[np.int64], corners: NDArray[np.int64], x: Array, lengths: Array, normal: Array) -> Walls:
+    """Merge connected pieces of one cell with similar normals, in 2D within one of eight directions, into planes.
+
+    corners: vertices of the pieces' facets, shape (pieces, dim), with positions x [m]; lengths: int lambda_v ds over
+    each piece [m^(dim-1)], of the same shape; normal: unit normals out of the fluid.
+    """
+    count, dim = corners.shape
+    # a vertex has one number per cell: pieces in different cells are not connected
+    corner = np.unique(cell[:, None] * len(x) + corners, return_inverse=True)[1].ravel()
+    links = coo_array((np.ones(corner.size), (np.repeat(np.arange(count), dim), count + corner)), [2 * corner.size] * 2)
+    part = connected_components(links, directed=False)[1][:count]
+    facing = (np.where(np.abs(normal) > OCTANT, np.sign(normal), 0.0) + 1.0) @ 3.0 ** np.arange(dim)
+    _, first, group = np.unique(3**dim * part + facing.astype(np.int64), return_index=True, return_inverse=True)
+    area = lengths.sum(axis=1)
+
+    def total(values: Array) -> Array:
+        return np.stack([np.bincount(group, column) for column in values.T], axis=1)
+
+    n, middle = total(area[:, None] * normal), total(np.einsum("pv,pvi->pi", lengths, x[corners]))
+    middle, n = middle / total(area[:, None]), n / np.linalg.norm(n, axis=1, keepdims=True)
+    order = np.argsort(cell[first], kind="stable")
+    return Walls(cell[first][order], middle[order], n[order])
+
+
+def _to_walls(grid: Grid, walls: Walls, reach: Array) -> Array:
+    """Distance [m] through the fluid, along the normal, to the closest opposite wall in the neighbouring cells.
+
+    Infinite where there is none within `reach` [m]. Surfaces at negative distance do not count: they are on the other
+    side of the body.
+    """
+    index = np.stack(np.unravel_index(walls.cell, grid.shape, order="F"))
+    shape = np.array(grid.shape)[:, None]
+    gap, closest = np.full((2, len(walls.cell)), np.inf)
+    for offset in product((-1, 0, 1), repeat=grid.dim):
+        there = index + np.array(offset)[:, None]
+        inside = np.flatnonzero(((there >= 0) & (there < shape)).all(axis=0))
+        number = np.ravel_multi_index(tuple(there[:, inside]), grid.shape, order="F")
+        first, last = (np.searchsorted(walls.cell, number, side=side) for side in ("left", "right"))
+        for k in range((last - first).max(initial=0)):
+            some = first + k < last
+            a, b = inside[some], first[some] + k
+            opposing = np.einsum("ai,ai->a", walls.n[a], walls.n[b])
+            a, b, opposing = (v[opposing < OPPOSITE] for v in (a, b, opposing))
+            away = walls.x[a] - walls.x[b]
+            distance = np.einsum("ai,ai->a", away, walls.n[b]) / opposing
+            aside = away - distance[:, None] * walls.n[a]
+            far = distance**2 + (aside**2).sum(axis=1)
+            better = (distance > 0.0) & (distance < reach[a]) & (far < closest[a])
+            gap[a[better]], closest[a[better]] = distance[better], far[better]
+    return gap
+
+
+def creeping_cells(grid: Grid, factor: Array, solid: NDArray[np.bool_], share: Array) -> NDArray[np.bool_]:
+    """Cells of the box with creeping flow: those of films, and poorly cut ones at their ends.
+
+    The latter share nodes behind the surface with the solid cells of films, hence the film's velocity continued. Its
+    convection is as inexact as in the film, and steps had no solution with it.
+    factor: of `Films`; solid: solid cells; share: of fluid; all by cells of the box.
+    """
+    beside = ndimage.maximum_filter(grid.as_box(solid & (factor < 1.0)), 3).ravel(order="F")
+    return (factor < 1.0) | (beside & (share < FREE))
+
+
+def film_cells(
+    grid: DistributedGrid, cells: NDArray[np.int32], creeping: NDArray[np.bool_] | None
+) -> NDArray[np.int32] | None:
+    """Owned cells among some local ones with creeping flow; None if no process has any (collective)."""
+    if not grid.comm.allreduce(creeping is not None, op=MPI.LOR):
+        return None
+    owned = cells[cells < grid.owned]
+    return owned[:0] if creeping is None else owned[creeping[grid.numbers[owned]]]

@@ -1,0 +1,1 @@
+"""Matrices of the flow and the solution of linear systems with them."""

@@ -1,0 +1,106 @@
+"""Iterative solution of the linear systems of the flow, and the sequence of solvers to try when one fails."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from functools import cached_property
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from solvers import linear
+from solvers.fluid.background.space import Unknowns
+from solvers.fluid.linear_systems.multigrid import Multigrid
+from solvers.lagged import Lagged, LaggedFactors
+
+#: Names of the methods in messages.
+WORDS: dict[linear.FlowMethod, str] = {
+    "multigrid": "multigrid",
+    "ilu": "incomplete factors",
+    "fill": "incomplete factors with more fill and overlap",
+    "direct": "the direct solver",
+}
+#: Memory [bytes] of the factors of a 3D flow with n unknowns over n^(4/3): 490 measured for q1q1, 1,040 for q2q1.
+FACTORS = 1_100.0
+
+
+class SolverSequence:
+    """A sequence of solvers: if the current one fails, the next one replaces it. `position` is part of the state."""
+
+    def __init__(self, comm: MPI.Comm, methods: Sequence[linear.FlowMethod], dofs: int, note: Callable[[str], None]):
+        self.comm, self.methods, self._dofs, self._note = comm, methods, dofs, note
+        self.position = 0
+
+    @property
+    def current(self) -> linear.FlowMethod:
+        return self.methods[self.position]
+
+    def advance(self, failure: linear.LinearSolveFailed) -> None:
+        """Change to the next solver for the rest of the run. Raises LinearSolveFailed if there is none (collective)."""
+        if failure.singular or self.position == len(self.methods) - 1:
+            raise failure
+        need, free = FACTORS * self._dofs ** (4.0 / 3.0), free_memory(self.comm)
+        if self.methods[self.position + 1] == "direct" and need > free:
+            raise linear.LinearSolveFailed(
+                f"{failure} with {WORDS[self.current]}, and the direct solver would need about {need / 1e9:.3g} GB "
+                f"of the {free / 1e9:.3g} GB that are free; take cells that grow less from one to the next, "
+                f"'element: q1q1', or a larger 'solver.linear.tolerance'"
+            ) from failure
+        before = WORDS[self.current]
+        self.position += 1
+        self._note(f"{failure} with {before}: {WORDS[self.current]} from here on ('solver.linear.method' chooses)")
+
+
+def free_memory(comm: MPI.Comm) -> float:
+    """Smallest free memory of all processes [bytes] (collective)."""
+    return float(comm.allreduce(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"), op=MPI.MIN))
+
+
+class FlowSolver:
+    """Solves with the current solver of the sequence, and reuses the preconditioner of an earlier matrix of the step.
+
+    Only the position of the sequence is kept from step to step, so that resumed runs give the same results.
+    """
+
+    def __init__(self, unknowns: Unknowns, sequence: SolverSequence, tolerance: float, *, steady: bool):
+        self.sequence, self._unknowns, self._tolerance = sequence, unknowns, tolerance
+        self._krylov = Lagged()
+        self._direct = LaggedFactors(sequence.comm, fresh=math.inf if steady else 1)
+
+    @cached_property
+    def multigrid(self) -> Multigrid:
+        """The levels of multigrid (collective)."""
+        return Multigrid(self.sequence.comm, self._unknowns)
+
+    def begin_step(self) -> None:
+        """Discard preconditioners of the last step."""
+        self._krylov.begin_step()
+        self._direct.begin_step()
+
+    def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, held: NDArray[np.bool_]) -> int:
+        """Solve matrix x = b. Returns the count of iterations. Raises LinearSolveFailed (collective).
+
+        held: owned unknowns whose rows are those of the identity.
+        """
+        while self.sequence.current != "direct":
+            try:
+                iterations = self._krylov.solve_again(matrix, b, x)
+                if iterations is not None:
+                    return iterations
+                return self._krylov.solve(self._create(matrix, held), matrix, b, x)
+            except linear.LinearSolveFailed as failure:
+                self.sequence.advance(failure)
+        return self._direct.solve(matrix, b, x)
+
+    def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> PETSc.KSP:
+        comm, method = self.sequence.comm, self.sequence.current
+        if method != "multigrid":
+            return linear.flow_solver(comm, tolerance=self._tolerance, fill=method == "fill")
+        ksp = linear.flexible_solver(comm, tolerance=self._tolerance)
+        ksp.setOperators(matrix)
+        self.multigrid.set_up(ksp.getPC(), matrix, held)
+        return ksp

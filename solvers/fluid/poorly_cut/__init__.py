@@ -1,0 +1,1 @@
+"""What determines the flow in poorly cut cells: ghost penalty and extension."""

@@ -1,0 +1,1 @@
+"""Thin bodies: each side of the fluid has cells and unknowns of its own."""

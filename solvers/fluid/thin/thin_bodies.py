@@ -1,0 +1,189 @@
+"""Moving thin bodies: detection of changes of the sheets, and transfer of the flow to the nodes of new sheets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from solvers.api import Array, State, StepFailed
+from solvers.fluid.background.box import Grid
+from solvers.fluid.background.nested import Nested
+from solvers.fluid.background.space import FlowNodes, Unknowns
+from solvers.fluid.bodies.immersed import ImmersedBody
+from solvers.fluid.bodies.reach import TOO_FAR
+from solvers.fluid.bodies.surface import Motion, wetness
+from solvers.fluid.cutting.cut import off_boundary
+from solvers.fluid.history import Past
+from solvers.fluid.thin.sheet_cycles import joined_in, recurring
+from solvers.fluid.thin.sheet_parts import AROUND
+from solvers.fluid.thin.sheet_transfer import along_surface, transfer
+from solvers.fluid.thin.sheets import Sheets, find_sheets
+from solvers.fluid.thin.thickness import THIN_IF_MOVING
+from solvers.fluid.thin.thinness import cell_sizes_at, may_be_thin
+from solvers.fluid.time_scheme import FlowStep
+
+#: Thickness in cells up to which moving bodies have separate cells with contact in 2D: that of bodies at rest. Where
+#: thicker ones touch, Newton's method may not converge: fluid between them appears and disappears in its course. They
+#: leak little without separate cells (docs/theory_fsci.md).
+THICK_IN_CONTACT = 2.0
+
+
+def thickest(dim: int, degree: int) -> float:
+    """Thickness in cells up to which moving bodies have separate cells for each side.
+
+    Thicker ones have a strip of cells behind each side instead, and fluid would pass where both strips share nodes:
+    where cut cells are THIN_IF_MOVING apart or less in all directions. A body is so thick if it is parallel to a
+    diagonal plane. In 2D the extension of second-order velocities was exact with less.
+    """
+    return math.sqrt(dim) * (THIN_IF_MOVING + 1) if dim == 3 or degree == 1 else THIN_IF_MOVING + 0.05
+
+
+class ThinBodies:
+    """Finds the sheets of the fluid for each position of the bodies, after one of these has been thin."""
+
+    def __init__(
+        self, grid: Grid, bodies: Sequence[ImmersedBody], periodic: bool, sheets: Sheets | None, degree: int = 1
+    ):
+        """degree: of the velocity."""
+        self._grid, self.follows, self._sheets = grid, False, sheets
+        self._wet = wetness([body.surface for body in bodies])
+        moving = bool(bodies) and not all(body.rests for body in bodies)
+        touch = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
+        self._thick = THICK_IN_CONTACT if touch else thickest(grid.dim, degree)
+        plain = not periodic and not isinstance(grid, Nested) and not (touch and grid.dim == 3)
+        self._possible: bool | None = None if moving and plain else False
+        self._x: Array | None = None
+        self._tried: list[Sheets] = []  #: sheets of this step, in their order
+        self._joined: dict[int, frozenset[int]] = {}  #: parts that stay joined in this step
+
+    @property
+    def may_follow(self) -> bool:
+        """Whether the cells may change during the run."""
+        return self._possible is not False
+
+    def sheets(self, facets: NDArray[np.int64], motion: Motion) -> Sheets | None:
+        """Sheets of the fluid around surfaces at their present positions; None if no body has been thin yet."""
+        if self._possible is None:
+            self._possible = may_be_thin(self._grid, facets[self._wet], motion.x, self._thick)
+        if not self._possible:
+            return self._sheets
+        if self._x is None or not np.array_equal(self._x, motion.x):
+            found = self._find(facets, motion.x)
+            if found is not None and self._join(joined_in(recurring(self._tried, found))):
+                found = self._find(facets, motion.x)
+            if found is not None and not (self._tried and self._tried[-1].same_unknowns(found)):
+                self._tried.append(found)
+            self._sheets, self._x, self.follows = found, motion.x, found is not None
+        return self._sheets
+
+    def _find(self, facets: NDArray[np.int64], x: Array) -> Sheets | None:
+        off = off_boundary(self._grid, x[facets])
+        thin, always = THIN_IF_MOVING, self.follows
+        return find_sheets(self._grid, facets, x, off, thin=thin, always=always, joined=self._joined)
+
+    def _join(self, parts: dict[int, frozenset[int]]) -> bool:
+        """Keep parts joined until the step ends; returns whether some are new."""
+        before = self._joined
+        self._joined = before | {cell: before.get(cell, frozenset()) | some for cell, some in parts.items()}
+        return self._joined != before
+
+    def begin_step(self) -> None:
+        """Forget the sheets of the last step."""
+        self._tried = []
+        if self._joined:
+            self._joined, self._x = {}, None
+
+    def save(self) -> State:
+        """The state: whether a body has been thin, and (cell, facet) of joined parts."""
+        pairs = [(cell, facet) for cell, some in sorted(self._joined.items()) for facet in sorted(some)]
+        return {"follows": self.follows, "joined": np.array(pairs, dtype=np.int64).reshape(-1, 2)}
+
+    def restore(self, state: State) -> None:
+        """Restore a saved state."""
+        self.begin_step()
+        self.follows = bool(state["follows"])
+        for cell, facet in np.asarray(state["joined"]).tolist():
+            self._joined[cell] = self._joined.get(cell, frozenset()) | {facet}
+        if self._possible is not False:
+            self._x = self._sheets = None
+
+
+@dataclass(frozen=True)
+class Began:
+    """The state at the beginning of a step: unknowns, sheets, earlier velocities, and positions of the bodies [m]."""
+
+    unknowns: Unknowns
+    sheets: Sheets | None
+    step: FlowStep  #: that the system has the terms of
+    past: tuple[Past, ...]
+    motions: tuple[Motion, ...]
+
+    def require_near(self, smallest: float, x: Array) -> None:
+        """Raise StepFailed if a vertex has moved farther than the cells in which sheets are followed."""
+        if self.motions:
+            way = np.abs(x - np.concatenate([motion.x for motion in self.motions])).max(initial=0.0)
+            if way > AROUND * smallest:
+                raise StepFailed("fluid", TOO_FAR)
+
+
+@dataclass(frozen=True)
+class Carrier:
+    """Transfers values from old unknowns to those after bodies have moved (collective)."""
+
+    old: Unknowns
+    new: Unknowns
+    velocity: sparse.csr_matrix  #: of all nodes of the velocity by their numbers, shape (new, old)
+    pressure: sparse.csr_matrix
+
+    def velocities(self, values: Array) -> Array:
+        """Transferred values at local velocity dofs."""
+        out = np.zeros(self.new.local)
+        return _carry(self.velocity, self.old.velocity, self.new.velocity, values, out, self.new)
+
+    def flow(self, values: Array) -> Array:
+        """Transferred values at local dofs of velocity and pressure."""
+        out = self.velocities(values)
+        return _carry(self.pressure, self.old.pressure, self.new.pressure, values, out, self.new)
+
+    def past(self, past: Past) -> Past:
+        """Transferred velocities of an earlier time; found where all velocities exist that a value depends on."""
+        unknown = (~past.found & self.old.velocity_mask).astype(float)
+        known = np.diff(self.velocity.indptr) > 0
+        lost, nodes = np.zeros(self.new.local), self.new.velocity
+        found = _carry(abs(self.velocity), self.old.velocity, nodes, unknown, lost, self.new) == 0.0
+        found[nodes.dofs] &= known[nodes.numbers][:, None]
+        return Past(self.velocities(past.velocity), found)
+
+
+def carry(old: Unknowns, before: Sheets | None, new: Unknowns, facets: NDArray[np.int64], x: Array) -> Carrier:
+    """The transfer from old to new unknowns around facets with vertices now at x [m].
+
+    before: sheets of the old ones, None: nodes of the box.
+    """
+    after = new.grid.sheets
+    assert after is not None
+    cell = max(float(cell_sizes_at(edge, x[:, axis]).max()) for axis, edge in enumerate(after.grid.edges))
+    along, matrices = along_surface(facets, x, cell), []
+    for degree in (new.degree, 1):
+        if before is not None:
+            matrices.append(transfer(before, after, degree, along))
+            continue
+        count = after.node_count(degree)
+        entries = (np.ones(count), (np.arange(count), after.on_lattice(np.arange(count), degree)))
+        matrices.append(sparse.csr_matrix(entries, shape=(count, after.lattice_size(degree))))
+    return Carrier(old, new, *matrices)
+
+
+def _carry(
+    matrix: sparse.csr_matrix, old: FlowNodes, new: FlowNodes, values: Array, out: Array, unknowns: Unknowns
+) -> Array:
+    everything = np.zeros((matrix.shape[1], old.dofs.shape[1]))
+    everything[old.numbers[: old.owned]] = values[old.dofs[: old.owned]]
+    everything = unknowns.grid.comm.allreduce(everything)
+    out[new.dofs] = (matrix @ everything)[new.numbers]
+    return out
