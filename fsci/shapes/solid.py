@@ -68,18 +68,26 @@ def tube(
 
 
 def solid_torus(
-    major_radius: float, minor_radius: float, cells: Sequence[int], *, order: int = 1, cell: str = "hex"
+    major_radius: float,
+    minor_radius: float,
+    cells: Sequence[int],
+    angle: float = 360,
+    start: float = 0,
+    *,
+    order: int = 1,
+    cell: str = "hex",
 ) -> Mesh:
-    """Torus about the y axis: a disc of `minor_radius` led around at `major_radius` [m]; surface outer.
+    """Torus about the y axis, or a part of it: `angle` degrees from `start` degrees (0 is x, 90 is z).
 
-    `cells` counts them around the y axis, and around the section (a multiple of 4).
+    A disc of `minor_radius` is led around at `major_radius` [m]. `cells` counts them around the y axis, and around the
+    section (a multiple of 4); surfaces outer, and start, end of a part.
     """
     if not 0 < minor_radius < major_radius:
         raise ValueError(f"radii must be 0 < minor < major, got {minor_radius:g} and {major_radius:g}")
     around, section_around = cells
     section = lattice.disc(section_around, max(1, section_around // 8), order)
     section = section.mapped(lambda x, y: (minor_radius * x, minor_radius * y))
-    return lattice.mesh(_turned(section, major_radius, around), cell)
+    return lattice.mesh(_turned(section, major_radius, around, angle, start), cell)
 
 
 def hollow_torus(
@@ -132,11 +140,16 @@ def _raised(section: lattice.Lattice, height: float, cells: int) -> lattice.Latt
     return lattice.product(section, along).mapped(lambda x, y, s: (x, y, height * s))
 
 
-def _turned(section: lattice.Lattice, major_radius: float, cells: int) -> lattice.Lattice:
+def _turned(
+    section: lattice.Lattice, major_radius: float, cells: int, angle: float = 360, start: float = 0
+) -> lattice.Lattice:
     """The section's x leads away from the y axis, its y along it."""
+    if not 0 < angle <= 360:
+        raise ValueError(f"angle must be above 0 and at most 360 degrees, got {angle:g}")
 
     def torus(a: lattice.Array, b: lattice.Array, t: lattice.Array) -> list[lattice.Array]:
-        turn = 2 * np.pi * t
+        turn = 2 * np.pi * (start / 360 + angle / 360 * t)
         return [(major_radius + a) * np.cos(turn), b, (major_radius + a) * np.sin(turn)]
 
-    return lattice.product(section, lattice.line(cells, section.order)).mapped(torus)
+    around = lattice.line(cells, section.order, None if angle == 360 else ("start", "end"))
+    return lattice.product(section, around).mapped(torus)

@@ -20,6 +20,7 @@ SHAPES: list[dict[str, Any]] = [
     {"shape": "cylinder", "radius": 1, "height": 2, "cells": [8, 1, 3]},
     {"shape": "tube", "inner_radius": 1, "outer_radius": 2, "height": 2, "cells": [5, 2, 3]},
     {"shape": "solid_torus", "major_radius": 3, "minor_radius": 1, "cells": [5, 16]},
+    {"shape": "solid_torus", "major_radius": 3, "minor_radius": 1, "cells": [3, 16], "angle": 180},
     {"shape": "hollow_torus", "major_radius": 3, "inner_radius": 0.5, "outer_radius": 1, "cells": [6, 5, 2]},
     {"shape": "hollow_sphere", "inner_radius": 1, "outer_radius": 2, "cells": [3, 2]},
     {"shape": "sphere", "radius": 2, "cells": [3, 2]},

@@ -111,6 +111,11 @@ SOLID = {
         6 * pi**2,
         {"outer": lambda x: about_circle(x) - 1},
     ),
+    "half of a solid torus": (
+        lambda n, **kind: shapes.solid_torus(3, 1, (3 * n, 4 * n), 180, 90, **kind),
+        3 * pi**2,
+        {"outer": lambda x: about_circle(x) - 1, "start": lambda x: x[:, 0], "end": lambda x: x[:, 0]},
+    ),
     "hollow torus": (
         lambda n, **kind: shapes.hollow_torus(3, 0.5, 1, (6 * n, 4 * n, 1), **kind),
         4.5 * pi**2,

@@ -144,13 +144,19 @@ class Tube(SolidBuiltIn):
 
 
 class SolidTorus(SolidBuiltIn):
-    """Torus about the y axis, with the surface outer."""
+    """Torus about the y axis, or a part of it; surfaces outer, start, end. A whole one has no start and end."""
 
     sides = ("outer",)
     shape: Literal["solid_torus"] = setting(..., "kind of shape")
     major_radius: Positive = setting(..., "radius of the circle of section centres", unit="m")
     minor_radius: Positive = setting(..., "radius of the section", unit="m")
     cells: Cells2 = setting(..., "number of cells around the y axis, and around the section (a multiple of 4)")
+    angle: Positive = setting(360.0, "angle of the part, at most 360", unit="degrees")
+    start: Number = setting(0.0, "angle from the x axis to the start of the part, towards z", unit="degrees")
+
+    @property
+    def surfaces(self) -> tuple[str, ...]:
+        return self.sides if self.angle == 360 else (*self.sides, "start", "end")
 
     @model_validator(mode="after")
     def _possible(self) -> SolidTorus:
@@ -159,18 +165,19 @@ class SolidTorus(SolidBuiltIn):
                 f"must be less than 'major_radius', {self.major_radius:g}, not {self.minor_radius:g}",
                 "minor_radius",
             )
-        require_around(self.cells, 0)
+        require_part(self.angle, self.cells)
         require_around(self.cells, 1, disc=True)
         return self
 
     @property
     def lattice(self) -> Counts:
         n, order = self.cells, self.order
-        return product(along(n[0], order, closed=True), across_disc(n[1], max(1, n[1] // 8), order))
+        around = along(n[0], order, closed=self.angle == 360)
+        return product(around, across_disc(n[1], max(1, n[1] // 8), order))
 
     @property
     def extents(self) -> tuple[float, ...]:
-        return 2 * pi * self.major_radius, 2 * pi * self.minor_radius
+        return radians(self.angle) * self.major_radius, 2 * pi * self.minor_radius
 
     @property
     def thickness(self) -> float:
