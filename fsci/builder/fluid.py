@@ -17,7 +17,7 @@ from fsci.case.contact import FilmSection
 from fsci.case.fluid import FluidSection
 from fsci.case.probes import Reference
 from fsci.case.rigid_motion import rigid_motion
-from fsci.meshes.nested import read_grid
+from fsci.meshes.nested import following, read_grid
 from fsci.meshes.of_case import read_rigid_body, require_inside_period
 from solvers.fluid import probes
 from solvers.fluid.background.grid import Grid
@@ -47,8 +47,9 @@ def build_fluid(case: Case, comm: MPI.Comm, timer: Timer, bodies: Sequence[Immer
     solver = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
     bodies = [_with_layer(case, body) for body in bodies]
     grid, flow, patches = _grid(case, comm), _flow(settings), _patches(settings)
+    follows = following(case) if settings.grid.refine else None
     try:
-        return Fluid(grid, flow, patches, bodies, solver, timer=timer, comm=comm)
+        return Fluid(grid, flow, patches, bodies, solver, following=follows, timer=timer, comm=comm)
     except UncoveredFaces as error:
         faces = ", ".join(error.faces)
         raise case.error(("fluid", "patches"), f"no patch is on part of the box's boundary: {faces}") from None

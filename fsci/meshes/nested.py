@@ -14,16 +14,36 @@ from solvers.fluid.background.box import Grid
 from solvers.tessellation import tessellate
 
 if TYPE_CHECKING:  # SciPy, which cases without nested cells do not need to be checked
+    from solvers.fluid.background.following import Following
     from solvers.fluid.background.nested import Nested, RefinedRegion
 
 Surface = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 def read_grid(case: Case) -> Grid:
-    """The grid of the flow. Raises CaseError."""
+    """The grid of the flow at its start. Raises CaseError."""
     assert case.fluid is not None
     grid = Grid(case.fluid.grid.planes)
     return _refined(case, grid) if case.fluid.grid.refine else grid
+
+
+def following(case: Case) -> Following | None:
+    """How nested cells follow the bodies that they are around and that move; None if they do not."""
+    from solvers.fluid.background.following import Following, RefinedBody
+
+    assert case.fluid is not None
+    section = case.fluid.grid
+    resting = {name for name, body in case.fluid.bodies.items() if body.motion is None and body.free is None}
+    bodies = [
+        RefinedBody(part.around, part.layers, part.level)
+        for part in section.refine
+        if part.around is not None and part.around not in resting
+    ]
+    if not bodies or case.fluid.scheme == "steady":
+        return None
+    surfaces = {name: _surface(case, name) for name in resting}
+    regions = [_region(part, surfaces) for part in section.refine if part.around is None or part.around in resting]
+    return Following(Grid(section.planes), regions, bodies)
 
 
 def cells_of(case: Case) -> int:

@@ -14,7 +14,10 @@ from petsc4py import PETSc
 from solvers import fem, linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.distributed import everywhere, scatter
+from solvers.fluid.background.carrier import Carrier
+from solvers.fluid.background.following import Following, interpolation
 from solvers.fluid.background.grid import Grid
+from solvers.fluid.background.nested import Nested
 from solvers.fluid.background.space import set_velocity
 from solvers.fluid.balances import Balances
 from solvers.fluid.behind import BehindWalls
@@ -56,11 +59,14 @@ class Fluid:
         bodies: Sequence[ImmersedBody] = (),
         solver: SolverSettings = SolverSettings(),
         *,
+        following: Following | None = None,
         timer: Timer | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ):
+        """following: how nested cells follow bodies; None: they stay."""
         self.comm, self.settings, self.solver, self.timer = comm, settings, solver, timer or Timer()
         self.bodies, self.dim, self._box, self._patches = list(bodies), grid.dim, grid, patches
+        self._following = following
         periodic = bool(periodic_axes(patches))
         sheets = None if periodic else sheets_of(grid, self.bodies)
         self.thin = ThinBodies(grid, self.bodies, periodic, sheets, settings.degree)
@@ -159,9 +165,11 @@ class Fluid:
         if self._behind is not None:
             mask = self.unknowns.velocity_mask
             self.flow[mask] = self.history.past[0].velocity[mask]
+        self._pressure = self._present_pressure()
+        if self._following is not None:
+            self._follow_bodies(self._following)
         history = tuple(self.history.past)
         self._began = Began(self.unknowns, self.grid.sheets, self.current, history, tuple(self.motions))
-        self._pressure = self._present_pressure()
         self.thin.begin_step()
         self.cutter.begin_step()
         self._begin_system(self.current)
@@ -265,6 +273,28 @@ class Fluid:
         if began is not None:
             self._begin_system(began.step)
             self.prescribe(self._prescribed_at)
+
+    def _follow_bodies(self, following: Following) -> None:
+        """Nested cells for this step, if bodies come close to coarse cells in it."""
+        surfaces = {
+            body.surface.name: (body.surface.facets, [motion.x, self._expected(body, motion)])
+            for body, motion in self.moved()
+        }
+        assert isinstance(self._box, Nested)
+        if (cells := following.cells(self._box, surfaces)) is self._box:
+            return
+        old, flow, pressure, change = self.unknowns, self.flow, self._present_pressure(), self.history.pressure_change
+        matrices = [interpolation(self._box, cells, degree) for degree in (self.settings.degree, 1)]
+        self._box = cells
+        self.discretise(None)
+        carrier = Carrier(old, self.unknowns, *matrices)
+        self.flow[:] = carrier.flow(flow)
+        self._pressure, self.history.pressure_change = carrier.flow(pressure), carrier.flow(change)
+        self.history.past = [carrier.past(past) for past in self.history.past]
+
+    def _expected(self, body: ImmersedBody, motion: Motion) -> Array:
+        """Positions [m] of a body at the end of this step, extrapolated if another field moves it."""
+        return motion.x + self.current.dt * motion.v if body.motion is None else body.motion(self.current.t).x
 
     def _layers(self, motion: Motion) -> int:
         """Number of cell layers behind the surface that the next steps may uncover; none around thin bodies."""
@@ -443,11 +473,17 @@ class Fluid:
     # ---------------------------------------------------------------------------------------- save and restore
 
     def save(self) -> State:
-        """The state that the next step starts from; whole arrays where thin bodies may change cells (collective)."""
-        return everywhere(self.comm, self._by_process()) if self.thin.may_follow else self._by_process()
+        """The state that the next step starts from; whole arrays where cells may change (collective)."""
+        return everywhere(self.comm, self._by_process()) if self._cells_may_change else self._by_process()
+
+    @property
+    def _cells_may_change(self) -> bool:
+        return self.thin.may_follow or self._following is not None
 
     def _by_process(self) -> State:
+        nested = {"first": self._box.first, "width": self._box.width} if isinstance(self._box, Nested) else {}
         return nodal_state(self.unknowns, self.grid, self.history, self.system) | {
+            "nested": nested,
             "time": self.current.t,
             "thin": self.thin.save(),
             "linear_solver": self.sequence.position,
@@ -460,10 +496,13 @@ class Fluid:
         self.forget_step()
         self.thin.restore(state["thin"])
         facets, motion = together([body.surface for body in self.bodies], list(motions.values()), self.dim)
-        if (sheets := self.thin.sheets(facets, motion)) is not self.grid.sheets:
+        if self._following is not None:
+            nested = self.comm.bcast(state["nested"], root=0)
+            self._box = Nested(self._box.edges, np.asarray(nested["first"]), np.asarray(nested["width"]))
+        if (sheets := self.thin.sheets(facets, motion)) is not self.grid.sheets or self._following is not None:
             self.discretise(sheets)
             self.history = History(self.settings.time, self.unknowns.local)
-        if self.thin.may_follow:
+        if self._cells_may_change:
             state = scatter(self.comm, state, self._by_process())
         set_nodal_state(state, self.unknowns, self.history, self.system)
         self.current = FlowStep(state["time"], 0.0, STEADY)

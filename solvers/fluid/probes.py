@@ -61,10 +61,10 @@ def at_point(fluid: Fluid, quantity: str, point: Sequence[float], t: float) -> P
         nodes, degree = (unknowns.velocity, unknowns.degree) if quantity == "velocity" else (unknowns.pressure, 1)
         return interpolation(fluid, nodes, degree, x)
 
-    found = shape_functions()
+    found = renewed(fluid, shape_functions)
 
     def probe() -> dict[str, float]:
-        dofs, weights = shape_functions() if may_be_covered and fluid.grid.sheets is not None else found
+        dofs, weights = shape_functions() if may_be_covered and fluid.grid.sheets is not None else found()
         value = fluid.comm.allreduce(weights @ fluid.flow[dofs])
         if may_be_covered and winding(x, fluid.cut.motion, fluid.cut.facets) > INSIDE:
             value = np.full_like(value, np.nan)

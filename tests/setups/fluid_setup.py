@@ -48,12 +48,14 @@ def make_fluid(
     start: float = 0.0,
     dt: float = 1.0,
     timer=None,
+    following=None,
     rho: float = 1.0,
     mu: float = 1.0,
     **settings,
 ) -> Fluid:
     """A flow at its start."""
-    fluid = Fluid(grid, FlowSettings(rho, mu, **settings), patches, bodies, solver, timer=timer, comm=comm)
+    flow = FlowSettings(rho, mu, **settings)
+    fluid = Fluid(grid, flow, patches, bodies, solver, following=following, timer=timer, comm=comm)
     fluid.initialise(start, dt)
     return fluid
 

@@ -145,11 +145,18 @@ class Nested(Grid):
         """
         cells, at = self._coarsest_at(nodes, degree)
         hangs = (at % self.width[cells, None]).any(axis=1)
-        cells, at = cells[hangs], at[hangs]
+        return hangs, *self._shape_functions(degree, cells[hangs], at[hangs])
+
+    def polynomials(self, degree: int, nodes: Indices) -> tuple[Indices, Array]:
+        """(nodes of the widest cell at some nodes of the lattice, its shape functions), shape (nodes, functions)."""
+        return self._shape_functions(degree, *self._coarsest_at(nodes, degree))
+
+    def _shape_functions(self, degree: int, cells: Indices, at: Indices) -> tuple[Indices, Array]:
+        """(nodes, shape functions) of cells at positions from 0 to degree * width in them, shape (cells, functions)."""
         along = lagrange(np.arange(degree + 1) / degree, at / (degree * self.width[cells, None]))
         steps = np.array(list(product(range(degree + 1), repeat=self.dim)))
         weights = np.prod([along[:, axis, steps[:, axis]] for axis in range(self.dim)], axis=0)
-        return hangs, self.nodes(cells, degree, steps), weights
+        return self.nodes(cells, degree, steps), weights
 
     def unknowns(self, degree: int) -> int:
         """Nodes that do not hang."""

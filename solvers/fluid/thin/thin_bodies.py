@@ -12,8 +12,9 @@ from scipy import sparse
 
 from solvers.api import Array, State, StepFailed
 from solvers.fluid.background.box import Grid
+from solvers.fluid.background.carrier import Carrier
 from solvers.fluid.background.nested import Nested
-from solvers.fluid.background.space import FlowNodes, Unknowns
+from solvers.fluid.background.space import Unknowns
 from solvers.fluid.bodies.immersed import ImmersedBody
 from solvers.fluid.bodies.reach import TOO_FAR
 from solvers.fluid.bodies.surface import Motion, wetness
@@ -131,35 +132,6 @@ class Began:
                 raise StepFailed("fluid", TOO_FAR)
 
 
-@dataclass(frozen=True)
-class Carrier:
-    """Transfers values from old unknowns to those after bodies have moved (collective)."""
-
-    old: Unknowns
-    new: Unknowns
-    velocity: sparse.csr_matrix  #: of all nodes of the velocity by their numbers, shape (new, old)
-    pressure: sparse.csr_matrix
-
-    def velocities(self, values: Array) -> Array:
-        """Transferred values at local velocity dofs."""
-        out = np.zeros(self.new.local)
-        return _carry(self.velocity, self.old.velocity, self.new.velocity, values, out, self.new)
-
-    def flow(self, values: Array) -> Array:
-        """Transferred values at local dofs of velocity and pressure."""
-        out = self.velocities(values)
-        return _carry(self.pressure, self.old.pressure, self.new.pressure, values, out, self.new)
-
-    def past(self, past: Past) -> Past:
-        """Transferred velocities of an earlier time; found where all velocities exist that a value depends on."""
-        unknown = (~past.found & self.old.velocity_mask).astype(float)
-        known = np.diff(self.velocity.indptr) > 0
-        lost, nodes = np.zeros(self.new.local), self.new.velocity
-        found = _carry(abs(self.velocity), self.old.velocity, nodes, unknown, lost, self.new) == 0.0
-        found[nodes.dofs] &= known[nodes.numbers][:, None]
-        return Past(self.velocities(past.velocity), found)
-
-
 def carry(old: Unknowns, before: Sheets | None, new: Unknowns, facets: NDArray[np.int64], x: Array) -> Carrier:
     """The transfer from old to new unknowns around facets with vertices now at x [m].
 
@@ -177,13 +149,3 @@ def carry(old: Unknowns, before: Sheets | None, new: Unknowns, facets: NDArray[n
         entries = (np.ones(count), (np.arange(count), after.on_lattice(np.arange(count), degree)))
         matrices.append(sparse.csr_matrix(entries, shape=(count, after.lattice_size(degree))))
     return Carrier(old, new, *matrices)
-
-
-def _carry(
-    matrix: sparse.csr_matrix, old: FlowNodes, new: FlowNodes, values: Array, out: Array, unknowns: Unknowns
-) -> Array:
-    everything = np.zeros((matrix.shape[1], old.dofs.shape[1]))
-    everything[old.numbers[: old.owned]] = values[old.dofs[: old.owned]]
-    everything = unknowns.grid.comm.allreduce(everything)
-    out[new.dofs] = (matrix @ everything)[new.numbers]
-    return out
