@@ -14,8 +14,7 @@ from petsc4py import PETSc
 from solvers import fem, linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.distributed import everywhere, scatter
-from solvers.fluid.background.carrier import Carrier
-from solvers.fluid.background.following import Following, interpolation
+from solvers.fluid.background.following import Following
 from solvers.fluid.background.grid import Grid
 from solvers.fluid.background.nested import Nested
 from solvers.fluid.background.space import set_velocity
@@ -34,6 +33,7 @@ from solvers.fluid.discretisation import discretise
 from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.history import History
 from solvers.fluid.linear_systems.krylov import FlowSolver, SolverSequence
+from solvers.fluid.regrid import follow_bodies
 from solvers.fluid.saved import nodal_state, set_nodal_state
 from solvers.fluid.steady_iteration import SteadyIteration
 from solvers.fluid.thin.sheets import Sheets
@@ -65,7 +65,7 @@ class Fluid:
     ):
         """following: how nested cells follow bodies; None: they stay."""
         self.comm, self.settings, self.solver, self.timer = comm, settings, solver, timer or Timer()
-        self.bodies, self.dim, self._box, self._patches = list(bodies), grid.dim, grid, patches
+        self.bodies, self.dim, self.box, self._patches = list(bodies), grid.dim, grid, patches
         self._following = following
         periodic = bool(periodic_axes(patches))
         sheets = None if periodic else sheets_of(grid, self.bodies)
@@ -95,7 +95,7 @@ class Fluid:
     def discretise(self, sheets: Sheets | None) -> None:
         """Create grid, unknowns and equations, with separate cells for the fluid on each side of thin bodies."""
         settings = self.settings
-        parts = discretise(self.comm, self._box, sheets, settings, self._patches, self.bodies, self.solver)
+        parts = discretise(self.comm, self.box, sheets, settings, self._patches, self.bodies, self.solver)
         self.grid, self.unknowns, self.boundary = parts.grid, parts.unknowns, parts.boundary
         self.system, self.cutter = parts.system, parts.cutter
         self.size = owned = self.unknowns.owned  #: unknowns that this process owns
@@ -161,13 +161,13 @@ class Fluid:
 
     def begin_step(self, t: float, dt: float) -> None:
         """Store the state at t; set boundary values, loads and moving bodies at t + dt. Times in [s]."""
+        if self._following is not None:
+            follow_bodies(self, self._following, t, dt)
         self.current = FlowStep(t + dt, dt, self.history.difference(dt))
         if self._behind is not None:
             mask = self.unknowns.velocity_mask
             self.flow[mask] = self.history.past[0].velocity[mask]
         self._pressure = self._present_pressure()
-        if self._following is not None:
-            self._follow_bodies(self._following)
         history = tuple(self.history.past)
         self._began = Began(self.unknowns, self.grid.sheets, self.current, history, tuple(self.motions))
         self.thin.begin_step()
@@ -273,28 +273,6 @@ class Fluid:
         if began is not None:
             self._begin_system(began.step)
             self.prescribe(self._prescribed_at)
-
-    def _follow_bodies(self, following: Following) -> None:
-        """Nested cells for this step, if bodies come close to coarse cells in it."""
-        surfaces = {
-            body.surface.name: (body.surface.facets, [motion.x, self._expected(body, motion)])
-            for body, motion in self.moved()
-        }
-        assert isinstance(self._box, Nested)
-        if (cells := following.cells(self._box, surfaces)) is self._box:
-            return
-        old, flow, pressure, change = self.unknowns, self.flow, self._present_pressure(), self.history.pressure_change
-        matrices = [interpolation(self._box, cells, degree) for degree in (self.settings.degree, 1)]
-        self._box = cells
-        self.discretise(None)
-        carrier = Carrier(old, self.unknowns, *matrices)
-        self.flow[:] = carrier.flow(flow)
-        self._pressure, self.history.pressure_change = carrier.flow(pressure), carrier.flow(change)
-        self.history.past = [carrier.past(past) for past in self.history.past]
-
-    def _expected(self, body: ImmersedBody, motion: Motion) -> Array:
-        """Positions [m] of a body at the end of this step, extrapolated if another field moves it."""
-        return motion.x + self.current.dt * motion.v if body.motion is None else body.motion(self.current.t).x
 
     def _layers(self, motion: Motion) -> int:
         """Number of cell layers behind the surface that the next steps may uncover; none around thin bodies."""
@@ -481,7 +459,7 @@ class Fluid:
         return self.thin.may_follow or self._following is not None
 
     def _by_process(self) -> State:
-        nested = {"first": self._box.first, "width": self._box.width} if isinstance(self._box, Nested) else {}
+        nested = {"first": self.box.first, "width": self.box.width} if isinstance(self.box, Nested) else {}
         return nodal_state(self.unknowns, self.grid, self.history, self.system) | {
             "nested": nested,
             "time": self.current.t,
@@ -498,7 +476,7 @@ class Fluid:
         facets, motion = together([body.surface for body in self.bodies], list(motions.values()), self.dim)
         if self._following is not None:
             nested = self.comm.bcast(state["nested"], root=0)
-            self._box = Nested(self._box.edges, np.asarray(nested["first"]), np.asarray(nested["width"]))
+            self.box = Nested(self.box.edges, np.asarray(nested["first"]), np.asarray(nested["width"]))
         if (sheets := self.thin.sheets(facets, motion)) is not self.grid.sheets or self._following is not None:
             self.discretise(sheets)
             self.history = History(self.settings.time, self.unknowns.local)

@@ -39,7 +39,7 @@ solver: {newton: {residual: 1.0e-11}, linear: {method: iterative, tolerance: 1.0
 
 LEAVING = "title: a disc leaves\ntime: {step: 0.02, end: 0.4}\n"
 LEAVING += (
-    CHANNEL.replace("10]}", "10], refine: [{around: disc, level: 1}]}")
+    CHANNEL.replace("10]}", "10], refine: [{box: [[0.3, 0], [1.3, 1]], level: 1}]}")
     + """\
   bodies:
     disc:
@@ -47,6 +47,30 @@ LEAVING += (
       motion: {velocity: [1.5, 0]}
 """
 )
+
+#: a free disc that sinks by three large cells and turns
+SINKING = """\
+title: a disc sinks
+time: {step: 0.02, end: 0.46}
+fluid:
+  density: 1
+  viscosity: 0.05
+  grid: {from: [0, 0], to: [1, 1.5], cells: [10, 15], refine: [{around: disc, layers: 5, level: 1}]}
+  patches:
+    top: {on: y+, outflow: true}
+    walls: {on: [x-, x+, y-], no_slip: true}
+  bodies:
+    disc:
+      mesh: {shape: disc, radius: 0.14, cells: [24, 2], translate: [0.46, 1.02]}
+      free: {density: 3, gravity: [0, -9.81]}
+coupling: {scheme: monolithic}
+probes:
+  force: {quantity: force}
+  disc: {body: disc, quantity: centre}
+  turning: {body: disc, quantity: angular_momentum}
+  speed: {quantity: velocity, at: [0.9, 0.5]}
+solver: {newton: {residual: 1.0e-11}}
+"""
 
 
 def run(text, folder, *overrides):
@@ -81,6 +105,32 @@ def test_schemes_agree(nested, tmp_path):
         assert differ(nested[1], other, name) < 1e-7, name
 
 
+@pytest.fixture(scope="module")
+def sinking(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sinking")
+    return folder, run(SINKING, folder)
+
+
+def test_cells_follow_a_free_body(sinking, tmp_path):
+    """By more than its layers; as with fine cells on all of its way, to what the larger cells around change."""
+    _, found = sinking
+    assert found["disc.y"][0] - found["disc.y"][-1] > 0.3
+    box = run(SINKING.replace("{around: disc, layers: 5, level: 1}", "{box: [[0, 0], [1, 1.5]], level: 1}"), tmp_path)
+    assert differ(found, box, "disc.y") < 1e-3
+    assert differ(found, box, "force.y") < 0.02
+    assert np.abs(found["fluid.mass"]).max() < 1e-9
+
+
+@pytest.mark.parametrize("processes", [2, 3])
+def test_cells_follow_on_several_processes(sinking, tmp_path, processes):
+    folder, one = sinking
+    done = fsci("run", folder, "-o", tmp_path / "out", processes=processes)
+    assert done.returncode == 0, done.stdout + done.stderr
+    several = read_history(tmp_path / "out" / "history.csv")
+    for name in one.keys() - SOLVING:
+        assert differ(one, several, name) < 1e-8, name
+
+
 @pytest.mark.parametrize("text", [NESTED, BALL], ids=["post", "ball"])
 def test_two_processes(text, tmp_path):
     one = run(text, tmp_path)
@@ -91,15 +141,19 @@ def test_two_processes(text, tmp_path):
         assert differ(one, two, name) < 1e-8, name
 
 
-def test_resumed_bit_for_bit(nested, tmp_path):
-    run(NESTED, tmp_path, ("time.end", "0.06"))
+@pytest.mark.parametrize(
+    ("text", "whole", "middle", "end"), [(NESTED, "nested", "0.06", "0.1"), (SINKING, "sinking", "0.28", "0.46")]
+)
+def test_resumed_bit_for_bit(text, whole, middle, end, tmp_path, request):
+    _, uninterrupted = request.getfixturevalue(whole)
+    run(text, tmp_path, ("time.end", middle))
     text = (tmp_path / "out" / "case.yaml").read_text()
-    (tmp_path / "out" / "case.yaml").write_text(text.replace("end: 0.06", "end: 0.1"))
+    (tmp_path / "out" / "case.yaml").write_text(text.replace(f"end: {middle}", f"end: {end}"))
     done = fsci("resume", tmp_path / "out")
     assert done.returncode == 0, done.stdout + done.stderr
     resumed = read_history(tmp_path / "out" / "history.csv")
-    for name in nested[1].keys() - {"wall"}:
-        assert np.array_equal(nested[1][name], resumed[name]), name
+    for name in uninterrupted.keys() - {"wall"}:
+        assert np.array_equal(uninterrupted[name], resumed[name]), name
 
 
 def test_a_body_that_leaves_the_finest_cells_stops_the_run(tmp_path):

@@ -16,6 +16,7 @@ from scipy import sparse
 from solvers.api import Array
 from solvers.fluid.background.box import Grid
 from solvers.fluid.background.nested import FINE_LAYERS, Nested, RefinedRegion, RefinedSurface, refined
+from solvers.fluid.thin.sheets import CORNER_STEPS
 
 Surfaces = Mapping[str, tuple[NDArray[np.int64], Sequence[Array]]]
 
@@ -76,3 +77,12 @@ def interpolation(old: Nested, new: Nested, degree: int) -> sparse.csr_matrix:
     at = np.concatenate([np.flatnonzero(~hangs), np.searchsorted(nodes, masters).ravel()])
     values = np.concatenate([np.ones(np.count_nonzero(~hangs)), weights.ravel()])
     return (sparse.csr_matrix((values, (rows, at)), shape=(len(nodes),) * 2) @ at_nodes).tocsr()
+
+
+def changed_nodes(old: Nested, new: Nested) -> NDArray[np.int64]:
+    """Numbers of the corners of new cells with a corner of a cell that the old ones did not have."""
+    corners = new.nodes(np.arange(len(new.first)), 1, CORNER_STEPS[new.dim])
+    present = np.isin(new.first, old.first)
+    present[present] = old.width[np.searchsorted(old.first, new.first[present])] == new.width[present]
+    near = np.isin(corners, corners[~present]).any(axis=1)
+    return np.unique(corners[near])
