@@ -1,12 +1,15 @@
 """Monolithic coupling: one Newton iteration for solid and flow, with condensed contact and a new cut for each iterate.
 
-    [ K + w alpha B^T M B    -w B^T C^T S ] [du]       [ r_s ]      w: weight of the load in the solid's balance
-    [ alpha C B                    A      ] [dw]  =  - [ r_f ]      B: vertices by unknowns of the solid
+    [ K + w alpha B^T M B    -w B^T C^T S ] [du]       [ r_s ]
+    [ alpha C B                    A      ] [dw]  =  - [ r_f ]
 
-C, S and M are those of solvers.fluid.interface, with g = alpha d - ...
-The derivatives by the shape of the fluid, of solvers.fluid.shape or cut_shape, are added to alpha C and M. In steady
-flows, where alpha = 0, they are the whole dependence of the flow on du, and coupling.secant corrects what they lack. In
-unsteady flows they halve the number of Newton iterations, and those of cut_shape take one more away.
+du: unknowns of the solid, dw: velocity and pressure. K, A: tangents of solid and flow. B: derivative of the vertices of
+the surfaces by du. w: weight of the load at the end of the step in the solid's balance. C, S, M: coupling block, change
+of sign and mass of `solvers.fluid.interface`; the velocity of the surface is g = alpha d - (earlier displacements).
+
+The derivatives by the shape of the fluid (`solvers.fluid.shape`, or `cut_shape`) are added to alpha C and M. In steady
+flows, where alpha = 0, they are the whole dependence of the flow on du, and `coupling.secant` corrects what they lack.
+In unsteady flows they halve the number of Newton iterations.
 Source: Schott, Ager, Wall, Int. J. Numer. Meth. Engng 119 (2019) 757-796.
 """
 
@@ -33,7 +36,7 @@ from solvers.sparse import Sparse
 
 
 class Monolithic:
-    """A Scheme, and the system that Newton's method solves."""
+    """Implements `Scheme`, and `System` for Newton's method: residual, advance, retreat, settled."""
 
     name = "fluid-structure system"
 
@@ -53,7 +56,7 @@ class Monolithic:
         self._of_flow: tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat, PETSc.Mat] | None = None
 
     def _number_unknowns(self) -> None:
-        """Numbering of the unknowns of both parts, and solvers for it."""
+        """Number the unknowns of both parts; the linear solvers start anew."""
         solid, flow = self.coupled.solid, self.coupled.flow
         self._numbering, self._numbered = Numbering(self.comm, solid.size, flow.size), flow.renewals
         # unsteady: the factors of the first iterate do not precondition the later ones well enough
@@ -186,7 +189,10 @@ class Monolithic:
         return krylov
 
     def blocks(self, *, keep: bool = False) -> Blocks:
-        """The derivatives at the present iterate; keep: those of the flow at the last one if they still fit."""
+        """The matrix at the present iterate.
+
+        keep: with the derivatives of the flow at the last iterate, if they still fit.
+        """
         solid, flow = self.coupled.solid, self.coupled.flow
         K = solid.linearise()
         if self._of_flow is None or not (keep and flow.keeps_tangent()):

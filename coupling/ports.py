@@ -1,7 +1,8 @@
-"""The protocols `Solid` and `Flow` that coupling schemes use.
+"""The protocols `Solid` and `Flow`: all that coupling schemes know of the two parts of a coupled system.
 
-Each part has its own unknowns, distributed over the processes. The vertices of the surfaces are the same on all
-processes. The solid gives their positions, the flow the force [N] on them. All calls are collective.
+The parts exchange motion and force at the vertices of the surfaces: the solid gives displacements [m], the flow the
+force [N]. Each part has its own unknowns, distributed over the processes; the vertices are the same on all processes.
+All calls are collective.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from solvers.vertices import VertexJacobian
 
 
 class Part(System, Stateful, Protocol):
-    """One block of the coupled system: it can be solved alone, or give its rows to a larger system.
+    """One block of the coupled system. It can be solved alone, or give its rows to the matrix of all blocks.
 
     Arrays have the shape (size,): the unknowns that this process owns.
     """
@@ -44,7 +45,10 @@ class Part(System, Stateful, Protocol):
         """Set the state at the first time t [s]; dt [s]: length of the first step."""
         ...
 
-    def begin_step(self, t: float, dt: float) -> None: ...
+    def begin_step(self, t: float, dt: float) -> None:
+        """Begin a step from t to t + dt [s]."""
+        ...
+
     def solve(self) -> StepInfo:
         """Solve this part alone, with the data of the other one fixed. Raises StepFailed."""
         ...
@@ -75,7 +79,9 @@ class Part(System, Stateful, Protocol):
 
 
 class Solid(Part, Protocol):
-    """A part that moves its surfaces and takes a load on them. Contact is condensed by a transformation of its rows.
+    """The part with the bodies: it moves its surfaces and takes a load on them.
+
+    Contact multipliers are condensed by a transformation of its rows.
 
     Arrays of the shape (m,) are generalised forces or displacements, the same on all processes: the components at all
     vertices for elastic bodies, forces and moments for rigid ones.
@@ -160,7 +166,7 @@ class Solid(Part, Protocol):
 
 
 class Flow(Part, Protocol):
-    """A part whose domain follows surfaces, and which exerts a force on them."""
+    """The part with the fluid: its domain follows the surfaces, and it exerts a force on them."""
 
     @property
     def dim(self) -> int: ...
@@ -168,7 +174,7 @@ class Flow(Part, Protocol):
     @property
     def steady(self) -> bool: ...
 
-    renewals: int  #: how often its unknowns have become others, because thin bodies went to other cells
+    renewals: int  #: how often its unknowns have changed, because bodies went to other cells
     timer: Timer
     notes: list[str]  #: notes to the user on this step
 
@@ -184,8 +190,8 @@ class Flow(Part, Protocol):
     def predict(self, *, with_pressure: bool = False) -> None:
         """Set the predictor for the end of the step; `retreat` takes it back.
 
-        with_pressure: not of the velocity alone. A flow alone is solved to a share of its first residual, which
-        a predictor of the pressure makes smaller.
+        with_pressure: extrapolate the pressure, too. Not for a flow alone: its tolerance is a share of its first
+        residual, which this predictor makes smaller.
         """
         ...
 

@@ -1,4 +1,9 @@
-"""The field `Fluid`: incompressible flow on a fixed grid that surfaces at rest or in motion cut."""
+"""The field `Fluid`: incompressible flow on a fixed grid, cut by surfaces of bodies at rest or in motion.
+
+A time step is `begin_step` (boundary values, loads, history), `move` (cut of the grid by the surfaces), `solve`
+(Newton's method on the equations of `FlowSystem`) and `end_step` (the velocity becomes history). A coupled scheme takes
+the place of `solve`: it calls `move`, `residual`, `linearise` and `update` for each of its iterates.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +52,7 @@ from solvers.timing import Timer
 
 
 class Fluid:
-    """Velocity and pressure on the cut grid; each step is solved by Newton's method."""
+    """Implements `Field`: velocity and pressure on the cut grid, from step to step."""
 
     name = "fluid"
 
@@ -79,8 +84,8 @@ class Fluid:
         self.current = FlowStep(0.0, 0.0, STEADY)  #: the step that is computed now or was last
         self._began: Began | None = None  #: state at the beginning of the present step
         self._pressure: Array | None = None  #: at local dofs [Pa] then, zero where there was none
-        #: This step has an increment. Before it, the pressure of films is that of the last height, and the derivative
-        #: by the height in `film_shape`, proportional to it, makes the increment too large.
+        #: Newton's method has made an increment in this step. Before the first one, the pressure of films belongs to
+        #: their last height; the derivative in `film_shape` is proportional to it, and would move surfaces too far.
         self._improved = False
         self._prescribed_at = 0.0  #: time [s] of the velocities of the boundary
         self.started = False  #: a step was accepted, hence forces exist

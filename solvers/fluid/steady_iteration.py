@@ -1,4 +1,4 @@
-"""The iteration to a steady flow: Picard's method first, then Newton's; when the scales of stabilisation stay."""
+"""The iteration to a steady flow: Picard's method first, then Newton's, and when the stabilisation is frozen."""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""The discrete equations of the flow on one cut: residual, tangent and the force on surfaces."""
+"""The discrete equations of the flow on one cut of the grid: residual, tangent, and the force on surfaces.
+
+The residual is the sum of the forms over uncut cells, cut cells and cells of films (`cell_forms`), those over the faces
+of the box (`outer_faces`), the penalty on poorly cut cells (a matrix times the flow), the terms of the
+surfaces' velocity (`interface`), and seepage in closed contact. A cut is set by `set_cut`; all that depends on it is
+updated by the first call that needs it.
+"""
 
 from __future__ import annotations
 
@@ -195,7 +201,7 @@ class FlowSystem:
         return self.unknowns.expand(blocks)
 
     def pattern_state(self) -> Array:
-        """Sparsity pattern of the matrix per owned cell: whether it has couplings in the cell, and across its faces."""
+        """Sparsity pattern of the matrix, as two flags per owned cell: couplings in the cell, and across its faces."""
         if self._pattern is None:
             return np.zeros((self.grid.owned, 2))
         return np.stack([self._pattern.cells, self._pattern.reach], axis=1)[: self.grid.owned].astype(float)

@@ -2,7 +2,8 @@
 
 A region is bounded by polygons of surface and by regions on the cell's faces. Polygons meet at edges of facets, a
 polygon meets a region of a face at their chord, and two of these regions meet at a wet interval of an edge of the cell.
-So regions are connected parts of a graph. A closed surface within a cell is a hole in another region.
+So regions are the connected components of a graph, found by names of edges and planes alone, without distances. A
+closed surface within a cell is a hole in another region.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Sheets of fluid: where a body is thinner than a cell, the fluid on each side of it has its own copy of the cell.
+"""Sheets: separate cells, and hence unknowns, for the fluid on each side of a thin body.
 
 A cell with two parts of fluid becomes two cells. Parts of neighbouring cells are linked if both touch the same piece of
 the common face, and only linked parts share nodes. Hence a node near a thin body has a copy for each part of the fluid
