@@ -35,7 +35,7 @@ Stretches = Annotated[tuple[Stretch, ...], EntryCount(1, None)]
 
 
 class Refinement(Section):
-    """A region in which cells are halved: a box, or cells near the surface of a body at its initial position."""
+    """A region in which cells are halved: a box, or cells near the surface of a body, which follow it if it moves."""
 
     box: Annotated[tuple[NumberVector, ...], EntryCount(2, 2)] | None = setting(
         None, "lowest and highest corner of a box", unit="m"
