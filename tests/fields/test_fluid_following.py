@@ -100,7 +100,7 @@ def towed(element, following, steps):
 
 @pytest.mark.parametrize("element", ["q1q1", pytest.param("q2q1", marks=pytest.mark.slow)])
 def test_forces_do_not_show_the_change_of_cells(element):
-    """Against fine cells on all of the way: jumps of up to 0.15 and 0.10 %, without the correction 1.2 and 0.9 %."""
+    """Against fine cells on all of the way: jumps of up to 0.15 and 0.10 %, without the correction 1.2 and 0.08 %."""
     steps = 40 if element == "q1q1" else 60
     force, changed = towed(element, True, steps)
     difference = force - towed(element, False, steps)[0]
