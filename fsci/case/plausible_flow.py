@@ -18,8 +18,6 @@ from solvers.fluid.thin.thickness import free_length
 MOST_CELLS_PER_STEP = 10.0  #: above which `check` warns: cells that a flow or a body crosses in a time step
 #: Cells across a body that both of its sides need to share no unknowns: with fewer, fluid passes through the body.
 CELLS_ACROSS_AT_REST, CELLS_ACROSS_IF_MOVING = 2.0, 4.0
-#: The same that both sides of an inclined body in 2D with q2q1 share unknowns with (docs/theory_fluid.md).
-CELLS_ACROSS_INCLINED = (3.05, 3.55)
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
 
 
@@ -96,10 +94,6 @@ def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, 
     free = free_length(fluid.grid.dimension, moves=not rests) * smallest
     separate = plain and length >= free  # each side has unknowns of its own
     if separate and (rests or case.contact is None):
-        low, high = CELLS_ACROSS_INCLINED
-        if moves and (fluid.grid.dimension, fluid.element) == (2, "q2q1") and low < extent / smallest < high:
-            why = "where it is inclined to the grid by 30 degrees or more, fluid passes"
-            return f"{size}: {why}; take {high:g} or more"
         ends_at_walls = length >= min(b - a for a, b in zip(fluid.grid.start, fluid.grid.to, strict=True))
         if ends_at_walls or length >= 2.0 * free or extent >= least * smallest:
             return None

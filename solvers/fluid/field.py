@@ -74,7 +74,7 @@ class Fluid:
         self._following = following
         periodic = bool(periodic_axes(patches))
         sheets = None if periodic else sheets_of(grid, self.bodies)
-        self.thin = ThinBodies(grid, self.bodies, periodic, sheets, settings.degree)
+        self.thin = ThinBodies(grid, self.bodies, periodic, sheets)
         self.steady, self.scheme = settings.steady, settings.time  #: steps are steady states; the time scheme
         self.linear_tolerance = solver.linear_tolerance
         self.notes: list[str] = []  #: notes to the user on this step

@@ -23,12 +23,12 @@ DRAWS = (range(1), pytest.param(range(1, 10), marks=pytest.mark.slow))
 H = 0.1
 
 
-def pushed(thickness, element, draw, cells_per_step=1.0, number=4):
+def pushed(thickness, element, draw, cells_per_step=1.0, number=4, angles=(-0.6, 0.6)):
     """A plate at a random place and angle that seals a channel and moves along it: largest errors of all steps."""
     rng = np.random.default_rng(draw)
-    angle, dt, pressures = rng.uniform(-0.6, 0.6), 0.1, (1.0, 0.7)
-    plate, facets = block([-thickness * H / 2, -0.9], [thickness * H / 2, 0.9])
-    plate = turned(plate, angle) + np.array([1.2, 0.5]) + rng.uniform(-0.1, 0.1, 2)
+    angle, dt, pressures = rng.uniform(*angles), 0.1, (1.0, 0.7)
+    plate, facets = block([-thickness * H / 2, -1.5], [thickness * H / 2, 1.5])
+    plate = turned(plate, angle) + np.array([1.5, 0.5]) + rng.uniform(-0.1, 0.1, 2)
     along, speed = np.array([1.0, 0.0]), cells_per_step * H / dt
     patches = [
         Patch("in", ("x-",), "traction", field(pressures[0], 0.0)),
@@ -67,6 +67,16 @@ def test_thicker_plate_that_hardly_moves(element, thickness, draws):
     """Strips behind both sides, of a cut cell and one more in any direction, would meet within five cells."""
     for draw in draws:
         assert (pushed(thickness, element, draw, cells_per_step=0.05, number=3) < 1e-9).all(), draw
+
+
+@pytest.mark.parametrize("draws", DRAWS, ids=str)
+@pytest.mark.parametrize("thickness", [3.06, 3.3, 3.5, 4.2, 5.5])
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+def test_inclined_plate_that_hardly_moves(element, thickness, draws):
+    """Inclined by 35 to 50 degrees, its strips would meet in diagonal directions."""
+    for draw in draws:
+        off = pushed(thickness, element, draw, cells_per_step=0.05, number=3, angles=(0.6, 0.87))
+        assert (off < 1e-8).all(), draw
 
 
 def test_plate_that_moves_too_far():
@@ -161,6 +171,22 @@ def test_tip_that_crosses_a_plane_to_and_fro():
     for one in (thin, again):
         one.begin_step()
         assert one.sheets(facets, far).node_count(1) == before[1]
+
+
+def test_body_that_becomes_thin_by_turning():
+    """A plate of 4.5 cells, first parallel to the grid: the first position in a step decides, resumed or not."""
+    grid = uniform([0, 0], [4, 4], [40, 40])
+    plate, facets = block([-0.225, -1.5], [0.225, 1.5])
+    straight, inclined = (Motion(turned(plate, angle) + 2.03, 0.0 * plate) for angle in (0.0, 0.8))
+    bodies = [body("plate", plate, facets, motion=lambda x, t: (x, 0.0 * x))]
+    thin, again = (ThinBodies(grid, bodies, False, None) for _ in range(2))
+    assert [thin.sheets(facets, motion) for motion in (straight, inclined)] == [None, None]
+    again.restore(thin.save())
+    assert again.sheets(facets, inclined) is None
+    for one in (thin, again):
+        one.begin_step()
+        assert one.sheets(facets, inclined).singles > 0
+        assert one.sheets(facets, straight) is not None
 
 
 @pytest.mark.parametrize("thick", [3.05, 5.6])

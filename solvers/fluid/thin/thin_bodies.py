@@ -34,31 +34,29 @@ from solvers.fluid.time_scheme import FlowStep
 THICK_IN_CONTACT = 2.0
 
 
-def thickest(dim: int, degree: int) -> float:
+def thickest(dim: int) -> float:
     """Thickness in cells up to which moving bodies have separate cells for each side.
 
     Thicker ones have a strip of cells behind each side instead, and fluid would pass where both strips share nodes:
     where cut cells are THIN_IF_MOVING apart or less in all directions. A body is so thick if it is parallel to a
-    diagonal plane. In 2D the extension of second-order velocities was exact with less.
+    diagonal plane.
     """
-    return math.sqrt(dim) * (THIN_IF_MOVING + 1) if dim == 3 or degree == 1 else THIN_IF_MOVING + 0.05
+    return math.sqrt(dim) * (THIN_IF_MOVING + 1)
 
 
 class ThinBodies:
     """Finds the sheets of the fluid for each position of the bodies, after one of these has been thin."""
 
-    def __init__(
-        self, grid: Grid, bodies: Sequence[ImmersedBody], periodic: bool, sheets: Sheets | None, degree: int = 1
-    ):
-        """degree: of the velocity."""
+    def __init__(self, grid: Grid, bodies: Sequence[ImmersedBody], periodic: bool, sheets: Sheets | None):
         self._grid, self.follows, self._sheets = grid, False, sheets
         self._wet = wetness([body.surface for body in bodies])
         moving = bool(bodies) and not all(body.rests for body in bodies)
         touch = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
-        self._thick = THICK_IN_CONTACT if touch else thickest(grid.dim, degree)
+        self._thick = THICK_IN_CONTACT if touch else thickest(grid.dim)
         plain = not periodic and not isinstance(grid, Nested) and not (touch and grid.dim == 3)
         self._possible: bool | None = None if moving and plain else False
         self._x: Array | None = None
+        self._searched = False  #: in this step, without a result: a search takes as long as a tenth of an iterate
         self._tried: list[Sheets] = []  #: sheets of this step, in their order
         self._joined: dict[int, frozenset[int]] = {}  #: parts that stay joined in this step
 
@@ -68,10 +66,13 @@ class ThinBodies:
         return self._possible is not False
 
     def sheets(self, facets: NDArray[np.int64], motion: Motion) -> Sheets | None:
-        """Sheets of the fluid around surfaces at their present positions; None if no body has been thin yet."""
+        """Sheets of the fluid around surfaces at their present positions.
+
+        None if no body has been thin yet, which the first position in a step decides.
+        """
         if self._possible is None:
             self._possible = may_be_thin(self._grid, facets[self._wet], motion.x, self._thick)
-        if not self._possible:
+        if not self._possible or (self._searched and not self.follows):
             return self._sheets
         if self._x is None or not np.array_equal(self._x, motion.x):
             found = self._find(facets, motion.x)
@@ -79,7 +80,7 @@ class ThinBodies:
                 found = self._find(facets, motion.x)
             if found is not None and not (self._tried and self._tried[-1].same_unknowns(found)):
                 self._tried.append(found)
-            self._sheets, self._x, self.follows = found, motion.x, found is not None
+            self._sheets, self._x, self.follows, self._searched = found, motion.x, found is not None, True
         return self._sheets
 
     def _find(self, facets: NDArray[np.int64], x: Array) -> Sheets | None:
@@ -94,8 +95,8 @@ class ThinBodies:
         return self._joined != before
 
     def begin_step(self) -> None:
-        """Forget the sheets of the last step."""
-        self._tried = []
+        """Forget the sheets of the last step, and search once for thin bodies if there has been none."""
+        self._tried, self._searched = [], False
         if self._joined:
             self._joined, self._x = {}, None
 
@@ -107,7 +108,7 @@ class ThinBodies:
     def restore(self, state: State) -> None:
         """Restore a saved state."""
         self.begin_step()
-        self.follows = bool(state["follows"])
+        self.follows, self._searched = bool(state["follows"]), True
         for cell, facet in np.asarray(state["joined"]).tolist():
             self._joined[cell] = self._joined.get(cell, frozenset()) | {facet}
         if self._possible is not False:
