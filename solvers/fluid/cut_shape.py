@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers import kernels
 from solvers.api import Array
 from solvers.fluid.background.grid import DistributedGrid
 from solvers.fluid.cutting.cut import Cut
@@ -62,9 +63,6 @@ def cut_derivatives(
     pieces, identity = len(mine), np.eye(dim)
     _, first, of_cell = np.unique(local, return_index=True, return_inverse=True)
     density = _density(at.u[first], at.p[first], at.sizes[first], mu, rule, state)
-    points, functions, rows_of_node = density.shape[1:]  # a process may have no pieces: no -1 below
-    bulk = np.swapaxes(moments, 1, 2) @ density[of_cell].reshape(pieces, points, functions * rows_of_node)
-    bulk = bulk.reshape(pieces, dim, functions, rows_of_node).swapaxes(1, 2)
 
     velocity, slope = cut.motion.v[at.corners], normal_derivative(at.x, n)
     both, slopes = _means(at, state.flow)
@@ -80,14 +78,14 @@ def cut_derivatives(
     fields[:, 1:] -= mu * n[:, :, None, None] * du[:, None]
     operator = MotionOperator(fields, -np.einsum("pkj,pk->pj", du, n))
 
-    by_normal = np.empty((pieces, dim, dim, dim + 1))
     of_load = (stress @ slope.reshape(pieces, dim, dim * dim)).reshape(slope.shape)
     of_load -= _penalty_by_motion(at, velocity.mean(axis=1) * state.convection, slope, w, state)
-    by_normal[..., :dim] = np.moveaxis(of_load, 1, 3)
-    by_normal[..., dim] = np.einsum("pk,pkcj->pcj", w, slope)
-    rows = bulk[:, :, :, None] * n[:, None, None, :, None]
-    rows -= at.fields[..., 0].sum(axis=2)[:, :, None, None, None] * by_normal[:, None]
-    rows[..., dim] -= np.einsum("pk,pk->p", w, n)[:, None, None, None] * at.fields[..., 1:]
+    by_motion = np.empty((pieces, dim, dim, dim + 1))
+    by_motion[..., :dim] = of_load.transpose(0, 2, 3, 1)
+    by_motion[..., dim] = np.einsum("pk,pkcj->pcj", w, slope)
+    rows = np.empty((pieces, density.shape[2], *by_motion.shape[1:]))
+    leak = np.einsum("pk,pk->p", w, n)
+    kernels.surface_rows(moments, density, of_cell, n, at.fields, by_motion, leak, rows)
 
     force = -at.mass_of_pieces[..., None, None] * dload[:, None, None]
     force -= area[:, :, None, None, None] * np.swapaxes(of_load, 1, 2)[:, None]

@@ -13,4 +13,5 @@ from ._kernels import (
     mortar,
     nodal_normals,
     nodal_tangents,
+    surface_rows,
 )

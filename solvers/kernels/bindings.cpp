@@ -6,6 +6,7 @@ void bind_factors(nanobind::module_& module);
 void bind_kdop(nanobind::module_& module);
 void bind_moments(nanobind::module_& module);
 void bind_mortar(nanobind::module_& module);
+void bind_surface(nanobind::module_& module);
 
 NB_MODULE(_kernels, module)
 {
@@ -14,4 +15,5 @@ NB_MODULE(_kernels, module)
   bind_kdop(module);
   bind_moments(module);
   bind_mortar(module);
+  bind_surface(module);
 }
