@@ -74,11 +74,12 @@ class InterfaceTerms:
         psi, psi_gradient = rule.pressure_table
         table = np.concatenate([phi[:, :, None], gradient], axis=2)
         #: int phi_a N_b, int grad phi_a N_b over each piece, shape (pieces, functions, vertices, 1 + dim)
-        self.fields = np.ascontiguousarray(np.tensordot(moments, table, (1, 0)).transpose(0, 2, 1, 3))
-        self.fields[..., 1:] /= self.sizes[:, None, None, :]
+        fields = np.tensordot(moments, table.reshape(len(table), -1), (1, 0))
+        fields /= np.tile(np.insert(self.sizes, 0, 1.0, axis=1), table.shape[1])[:, None]
+        self.fields = np.ascontiguousarray(fields.reshape(*fields.shape[:2], *table.shape[1:]).swapaxes(1, 2))
         #: int psi_a N_b, (pieces, functions, vertices), and int grad psi_a, (pieces, functions, dim)
         self.psi = np.tensordot(moments, psi, (1, 0)).transpose(0, 2, 1)
-        area = moments.sum(axis=2)
+        area = pieces.area[mine][:, rule.order]
         self.pressure_slope = np.tensordot(area, psi_gradient, (1, 0)) / self.sizes[:, None, :]
         self.coupling = MotionOperator(nitsche.stress(mu, self.n, self.penalty), self.n)  #: C
         self.cell_blocks: list[CellBlocks] = []  #: terms of slip and seepage in the rows of the flow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,11 @@ class Pieces:
     moments: Array  #: int L_q lambda_v ds [m^(dim-1)], shape (pieces, points, dim)
     mass: Array  #: int lambda_v lambda_w ds, shape (pieces, dim, dim)
     normal: Array  #: unit normal out of the fluid, shape (pieces, dim)
+
+    @cached_property
+    def area(self) -> Array:
+        """int L_q ds, shape (pieces, points)."""
+        return sum(np.moveaxis(self.moments, 2, 0))  # by columns: NumPy's sum of three neighbours takes five times as long
 
 
 def in_planes(grid: Grid, x: Array) -> Array:

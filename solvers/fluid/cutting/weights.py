@@ -68,7 +68,7 @@ class Weights:
         count = len(self.order)
         place = np.argsort(self.order)  # in the rule, of the points of the kernel
         area = Sparse(
-            pieces.moments.sum(axis=2).ravel(),
+            pieces.area.ravel(),
             (count * pieces.cell[:, None] + place).astype(np.int32).ravel(),
             count * np.arange(len(values) + 1, dtype=np.int32),
             (len(values), size * count),
