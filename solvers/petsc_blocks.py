@@ -23,19 +23,66 @@ class BlockRows:
     values: Array  #: of the matrix itself, shape (blocks, n, n), each transposed
 
 
+@dataclass(frozen=True)
+class SharedBlockRows:
+    """Owned rows of blocks of a matrix on several processes."""
+
+    own: BlockRows  #: in columns of this process
+    others: BlockRows  #: in columns of others: column k is `ghosts[k]`
+    ghosts: NDArray[np.int32]  #: numbers of columns of blocks
+
+
 def block_rows(matrix: PETSc.Mat) -> BlockRows | None:
     """A view of a matrix of the type seqbaij; None of any other, or if PETSc's functions are not found."""
-    library = _library()
-    if matrix.getType() != PETSc.Mat.Type.SEQBAIJ or library is None or PETSc.IntType != np.int32:
+    if matrix.getType() != PETSc.Mat.Type.SEQBAIJ or not _available():
         return None
-    start, columns = matrix.getRowIJ(compressed=True)
-    pointer, size = ctypes.POINTER(ctypes.c_double)(), matrix.getBlockSize()
-    handle = ctypes.c_void_p(matrix.handle)
-    if library.MatSeqBAIJGetArray(handle, ctypes.byref(pointer)) != 0:
+    return _rows(ctypes.c_void_p(matrix.handle), matrix.getBlockSize())
+
+
+def shared_block_rows(matrix: PETSc.Mat) -> SharedBlockRows | None:
+    """A view of a matrix of the type seqbaij or mpibaij; None of any other, or if PETSc's functions are not found."""
+    if not _available():
         return None
-    values = np.ctypeslib.as_array(pointer, shape=(len(columns), size, size))
-    library.MatSeqBAIJRestoreArray(handle, ctypes.byref(pointer))
-    return BlockRows(start, columns, values)
+    if (own := block_rows(matrix)) is not None:
+        size = own.values.shape[1]
+        nothing = BlockRows(np.zeros_like(own.start), np.empty(0, np.int32), np.empty((0, size, size)))
+        return SharedBlockRows(own, nothing, np.empty(0, np.int32))
+    if matrix.getType() != PETSc.Mat.Type.MPIBAIJ:
+        return None
+    parts, ghosts = (ctypes.c_void_p(), ctypes.c_void_p()), ctypes.POINTER(ctypes.c_int32)()
+    references = [ctypes.byref(place) for place in (*parts, ghosts)]
+    if _library().MatMPIBAIJGetSeqBAIJ(ctypes.c_void_p(matrix.handle), *references) != 0:
+        return None
+    own, others = (_rows(part, matrix.getBlockSize()) for part in parts)
+    if own is None or others is None:
+        return None
+    return SharedBlockRows(own, others, _array(ghosts, (int(others.columns.max(initial=-1)) + 1,)))
+
+
+def _rows(handle: ctypes.c_void_p, size: int) -> BlockRows | None:
+    """A view of a matrix of the type seqbaij."""
+    library, count, done = _library(), ctypes.c_int32(), ctypes.c_int()
+    start, columns = ctypes.POINTER(ctypes.c_int32)(), ctypes.POINTER(ctypes.c_int32)()
+    places = [ctypes.byref(place) for place in (count, start, columns, done)]
+    values = ctypes.POINTER(ctypes.c_double)()
+    if library.MatGetRowIJ(handle, 0, 0, 1, *places) != 0 or not done.value:
+        return None
+    if library.MatSeqBAIJGetArray(handle, ctypes.byref(values)) != 0:
+        return None
+    starts = _array(start, (count.value + 1,))
+    blocks = int(starts[-1])
+    found = BlockRows(starts, _array(columns, (blocks,)), _array(values, (blocks, size, size)))
+    library.MatRestoreRowIJ(handle, 0, 0, 1, *places)  # sets the pointers to zero
+    library.MatSeqBAIJRestoreArray(handle, ctypes.byref(values))
+    return found
+
+
+def _array(pointer: Any, shape: tuple[int, ...]) -> NDArray:
+    return np.ctypeslib.as_array(pointer, shape) if pointer else np.empty(shape, pointer._type_)
+
+
+def _available() -> bool:
+    return _library() is not None and PETSc.IntType == np.int32
 
 
 @cache
@@ -43,9 +90,17 @@ def _library() -> Any:
     """PETSc as petsc4py has loaded it."""
     try:
         library = ctypes.CDLL(PETSc.__file__)
-        functions = library.MatSeqBAIJGetArray, library.MatSeqBAIJRestoreArray
+        for name, places in (
+            ("MatSeqBAIJGetArray", 1),
+            ("MatSeqBAIJRestoreArray", 1),
+            ("MatMPIBAIJGetSeqBAIJ", 3),
+        ):
+            function = getattr(library, name)
+            function.restype, function.argtypes = ctypes.c_int, [ctypes.c_void_p] * (1 + places)
+        for name in ("MatGetRowIJ", "MatRestoreRowIJ"):
+            function = getattr(library, name)
+            function.restype = ctypes.c_int
+            function.argtypes = [ctypes.c_void_p, *[ctypes.c_int] * 3, *[ctypes.c_void_p] * 4]
     except (OSError, AttributeError):
         return None
-    for function in functions:
-        function.restype, function.argtypes = ctypes.c_int, [ctypes.c_void_p, ctypes.c_void_p]
     return library

@@ -47,7 +47,7 @@ def test_both_ways_give_the_same_matrix(size, monkeypatch):
     found = []
     for by_rows in (False, True):
         if by_rows:
-            monkeypatch.setattr(coarse_matrix, "block_rows", lambda matrix: None)
+            monkeypatch.setattr(coarse_matrix, "shared_block_rows", lambda matrix: None)
         coarse = CoarseMatrix(interpolation)
         for factor in (1.0, 3.0):
             fine.scale(factor)

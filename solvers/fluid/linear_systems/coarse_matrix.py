@@ -6,12 +6,16 @@ C then follows block by block (`kernels.coarse_product`), in a fifth of the time
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers import kernels
 from solvers.api import Array
-from solvers.petsc_blocks import BlockRows, block_rows
+from solvers.petsc_blocks import SharedBlockRows, shared_block_rows
 
 
 class CoarseMatrix:
@@ -38,7 +42,7 @@ class CoarseMatrix:
 
     def update(self, fine: PETSc.Mat, free: Array) -> PETSc.Mat:
         """C with rows of the identity for coarse unknowns that correct nothing (collective)."""
-        blocks = block_rows(fine)
+        blocks = shared_block_rows(fine)
         if blocks is None:
             matrix = self._by_rows(fine)
         else:
@@ -57,32 +61,86 @@ class CoarseMatrix:
 
 
 class _Blocks:
-    """A coarse matrix of dense blocks, on one process."""
+    """A coarse matrix of dense blocks.
 
-    def __init__(self, interpolation: PETSc.Mat, fine: BlockRows):
-        self._size = size = fine.values.shape[1]
-        start, columns, weights = interpolation.getValuesCSR()
-        some = np.repeat(np.arange(len(start) - 1) % size == 0, np.diff(start))  # the first unknown of each node
-        self._P = (start[::size] // size).astype(np.int32), columns[some] // size
-        self._weights = weights[some]
-        self._pattern = kernels.coarse_pattern(fine.start, fine.columns, *self._P, interpolation.size[1] // size)
-        self._values = np.zeros((len(self._pattern[1]), size, size))
+    A process computes the products of its rows of A, for which it has the rows of P of its columns. They belong to rows
+    of C of other processes, too, to which PETSc adds them.
+    """
+
+    def __init__(self, interpolation: PETSc.Mat, fine: SharedBlockRows):
+        size = fine.own.values.shape[1]
+        self._free = interpolation.createVecLeft()
+        of_ghosts = PETSc.IS().createBlock(size, fine.ghosts, comm=PETSc.COMM_SELF)
+        self._ghost_free = PETSc.Vec().createSeq(size * len(fine.ghosts), comm=PETSc.COMM_SELF)
+        self._scatter = PETSc.Scatter().create(self._free, of_ghosts, self._ghost_free, None)
+        every = _node_table(interpolation, size)
+        if interpolation.comm.size > 1:
+            rows = PETSc.IS().createGeneral(size * fine.ghosts, comm=PETSc.COMM_SELF)
+            columns = PETSc.IS().createStride(interpolation.size[1], 0, 1, comm=PETSc.COMM_SELF)
+            every = _below(every, _node_table(interpolation.createSubMatrices([rows], [columns])[0], 1, size))
+        start, columns, self._weights = every
+        nodes, columns = np.unique(columns, return_inverse=True)
+        self._P, self._nodes = (start, columns.astype(np.int32)), nodes.astype(PETSc.IntType)
+        self._ghost_columns = fine.others.columns + np.int32(len(fine.own.start) - 1)
+        pattern = _joined(fine, self._ghost_columns)
+        self._pattern = start, columns = kernels.coarse_pattern(*pattern, *self._P, len(nodes))
+        self._entries = start, self._nodes[columns]
+        self._values = np.zeros((len(columns), size, size))
+        most = int(interpolation.comm.tompi4py().allreduce(np.diff(start).max(initial=1), op=MPI.MAX))
+        own = interpolation.getLocalSize()[1]
         matrix = PETSc.Mat().createBAIJ(
-            (interpolation.size[1],) * 2, size, nnz=np.diff(self._pattern[0]), comm=interpolation.comm
-        )
-        self._set(matrix)
+            ((own, None), (own, None)), size, nnz=most if interpolation.comm.size == 1 else (most, most),
+            comm=interpolation.comm,
+        )  # fmt: skip
+        matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)  # rows at the boundary of a process
+        self._add(matrix)
         # its copy multiplies by BLAS, see `FlowSystem`
         self._matrix = matrix.duplicate(copy=True)
         self._matrix.setOption(PETSc.Mat.Option.ROW_ORIENTED, False)
 
-    def update(self, fine: BlockRows, free: Array) -> PETSc.Mat:
+    def update(self, fine: SharedBlockRows, free: Array) -> PETSc.Mat:
+        self._free.array[:] = free
+        self._scatter.scatter(self._free, self._ghost_free)
+        marks = np.concatenate([free, self._ghost_free.array_r])
         self._values[:] = 0.0
-        kernels.coarse_product(
-            fine.start, fine.columns, fine.values, *self._P, self._weights, free, *self._pattern, self._values
-        )
-        self._set(self._matrix)
+        for part, columns in ((fine.own, fine.own.columns), (fine.others, self._ghost_columns)):
+            kernels.coarse_product(
+                part.start, columns, part.values, *self._P, self._weights, marks, *self._pattern, self._values
+            )
+        self._matrix.zeroEntries()
+        self._add(self._matrix)
         return self._matrix
 
-    def _set(self, matrix: PETSc.Mat) -> None:
-        matrix.setValuesBlockedCSR(*self._pattern, self._values)
+    def _add(self, matrix: PETSc.Mat) -> None:
+        matrix.setValuesBlockedIJV(*self._entries, self._values, PETSc.InsertMode.ADD_VALUES, self._nodes)
         matrix.assemble()
+
+
+Table: TypeAlias = tuple[NDArray[np.int32], NDArray[np.int32], Array]
+
+
+def _node_table(interpolation: PETSc.Mat, step: int, size: int | None = None) -> Table:
+    """Rows (starts, columns, weights) of the first unknown of each node, the first of every `step` rows of P.
+
+    Columns are nodes of `size` unknowns, as many as `step` by default.
+    """
+    start, columns, weights = interpolation.getValuesCSR()
+    some = np.repeat(np.arange(len(start) - 1) % step == 0, np.diff(start))
+    counts = np.diff(start)[::step]
+    starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    return starts, columns[some] // (size or step), weights[some]
+
+
+def _below(first: Table, second: Table) -> Table:
+    """The rows of the first table, then those of the second."""
+    starts = np.concatenate([first[0], first[0][-1] + second[0][1:]])
+    return starts, np.concatenate([first[1], second[1]]), np.concatenate([first[2], second[2]])
+
+
+def _joined(fine: SharedBlockRows, ghost_columns: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Which blocks there are in rows of this process, by compressed rows."""
+    counts = [np.diff(part.start) for part in (fine.own, fine.others)]
+    rows = np.concatenate([np.repeat(np.arange(len(count)), count) for count in counts])
+    columns = np.concatenate([fine.own.columns, ghost_columns])
+    start = np.concatenate([[0], np.cumsum(counts[0] + counts[1])]).astype(np.int32)
+    return start, columns[np.argsort(rows, kind="stable")]
