@@ -7,7 +7,7 @@ import pytest
 from fluid_setup import body, circle, loop
 
 from solvers.fluid.background.grid import uniform
-from solvers.fluid.background.partition import CUT, blocks, destinations, work
+from solvers.fluid.background.partition import COUPLED, CUT, MOVING, blocks, destinations, work
 from solvers.fluid.bodies.immersed import ImmersedBody
 
 
@@ -39,14 +39,21 @@ def test_heavy_cells_count():
 
 
 def test_work_of_cells():
-    """A disc of radius 0.3 that rests, and the same one moved by another field: no work inside, CUT on its rim."""
+    """A disc that rests, one with a motion, and one moved by another field: no work inside, most on the rim."""
     grid, rests = uniform([0, 0], [1, 1], [10, 10]), body("disc", circle((0.5, 0.5), 0.3, 64), loop(64))
+    given = ImmersedBody(rests.surface, rests.motion)
     moved = ImmersedBody(rests.surface, None, start=rests.motion(0.0).x)
-    for some in (rests, moved):
+    rim = {}
+    for some, of_piece in ((rests, 0.0), (given, MOVING), (moved, COUPLED)):
         amount = work(grid, [some]).reshape(10, 10, order="F")
         assert np.all(amount[4:6, 4:6] == 0.0)
         assert np.all(amount[0] == 1.0)
-        assert amount[2, 4] == amount[7, 5] == CUT
+        pieces = (amount[2, 4] - CUT, amount[7, 5] - CUT)
+        assert pieces[0] == pytest.approx(pieces[1])
+        rim[of_piece] = pieces[0]
+    assert rim[0.0] == 0.0
+    assert rim[COUPLED] / COUPLED == pytest.approx(rim[MOVING] / MOVING)
+    assert 3 <= round(rim[COUPLED] / COUPLED, 9) <= 5  # a segment has 0.029, a cell 0.1
     assert np.all(work(grid, [ImmersedBody(rests.surface, None)]) == 1.0)
 
 
