@@ -1,15 +1,19 @@
 """Coarse matrices of dense blocks: the products that scipy and PETSc find."""
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
 from petsc4py import PETSc
+from programs import on_processes
 from scipy import sparse
 
 from solvers import kernels
 from solvers.fluid.linear_systems import coarse_matrix
 from solvers.fluid.linear_systems.coarse_matrix import CoarseMatrix
+
+PROGRAM = Path(__file__).parents[1] / "setups" / "coarse_parallel.py"
 
 
 def example(size, seed=3):
@@ -57,6 +61,11 @@ def test_both_ways_give_the_same_matrix(size, monkeypatch):
     for one, other in zip(found[:2], found[2:], strict=True):
         assert np.abs(one - other).max() < 1e-13 * np.abs(other).max()
     assert np.abs(found[0]).max() > 0.0
+
+
+@pytest.mark.parametrize("processes", [2, 3])
+def test_both_ways_give_the_same_matrix_on_several_processes(processes):
+    on_processes(processes, PROGRAM)
 
 
 def dense(matrix):
