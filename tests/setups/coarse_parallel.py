@@ -7,9 +7,9 @@ from fluid_setup import body, field, make_fluid, sphere, wall
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from solvers.fluid import coarse_matrix
-from solvers.fluid.coarse_matrix import CoarseMatrix
-from solvers.fluid.grid import uniform
+from solvers.fluid.background.grid import uniform
+from solvers.fluid.linear_systems import coarse_matrix
+from solvers.fluid.linear_systems.coarse_matrix import CoarseMatrix
 from solvers.solver_settings import SolverSettings
 
 comm = MPI.COMM_WORLD
