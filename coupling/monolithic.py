@@ -183,9 +183,7 @@ class Monolithic:
         method = flow.sequence.current
         krylov = linear.coupled_solver(self.comm, tolerance=flow.linear_tolerance, fill=method == "fill")
         if method == "multigrid":
-            preconditioner = krylov.getPC().getPythonContext().second
-            preconditioner.setOperators(blocks.flow)
-            flow.set_up_multigrid(preconditioner, blocks.flow)
+            krylov.getPC().getPythonContext().second = flow.multigrid(blocks.flow)
         return krylov
 
     def blocks(self, *, keep: bool = False) -> Blocks:

@@ -225,7 +225,7 @@ SOLVERS: Mapping[str, Maker] = {"direct": direct_solver, "iterative": elastic_so
 
 def _schwarz_solver(comm, prefix: str, tolerance: float, **more: str | float) -> PETSc.KSP:
     options = PETSc.Options(prefix)
-    for name, value in _incomplete_factors(comm, **more).items():
+    for name, value in incomplete_factors(comm, **more).items():
         options[name] = value
     ksp = PETSc.KSP().create(comm)
     ksp.setOptionsPrefix(prefix)
@@ -237,7 +237,7 @@ def _schwarz_solver(comm, prefix: str, tolerance: float, **more: str | float) ->
     return ksp
 
 
-def _incomplete_factors(comm, **more: str | float) -> dict[str, str | float]:
+def incomplete_factors(comm, **more: str | float) -> dict[str, str | float]:
     """Options of incomplete factors on overlapping subdomains; on one process without subdomains, to save a copy."""
     given: dict[str, str | float] = {"sub_pc_type": "ilu", "sub_pc_factor_levels": 0, **more}
     given["sub_pc_factor_zeropivot"] = ZERO_PIVOT
@@ -253,7 +253,7 @@ def coupled_solver(comm, *, tolerance: float, fill: bool = False) -> PETSc.KSP:
     (fill: more fill and overlap), unless the caller sets it up otherwise.
     """
     options = PETSc.Options("coupled_flow_")
-    for name, value in _incomplete_factors(comm, **(FILL if fill else BLOCKS)).items():
+    for name, value in incomplete_factors(comm, **(FILL if fill else BLOCKS)).items():
         options[name] = value
     flow = PETSc.PC().create(comm)
     flow.setOptionsPrefix("coupled_flow_")

@@ -51,7 +51,7 @@ PARTS: dict[str, list[tuple[Any, str]]] = {
         (Fluid, "linearise"),
         *((Blocks, name) for name in ("transform", "hold", "product", "assembled")),
     ],
-    "set-up": [(Multigrid, "set_up"), (Monolithic, "_krylov_solver")],
+    "set-up": [(Multigrid, "preconditioner"), (Monolithic, "_krylov_solver")],
 }
 
 #: What `cases` are run for, with these steps.

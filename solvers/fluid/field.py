@@ -392,9 +392,9 @@ class Fluid:
         size = self._norm(self._diagonal * self.flow[: self.unknowns.owned])
         return self._norm(self._diagonal * self._increment) / size if size > 0.0 else 0.0
 
-    def set_up_multigrid(self, preconditioner: PETSc.PC, matrix: PETSc.Mat) -> None:
-        """Set a preconditioner up as a multigrid cycle for the tangent (collective)."""
-        self.linear_solver.multigrid.set_up(preconditioner, matrix, self.held)
+    def multigrid(self, matrix: PETSc.Mat) -> PETSc.PC:
+        """A multigrid cycle for the tangent; the next call overwrites it (collective)."""
+        return self.linear_solver.multigrid.preconditioner(matrix, self.held)
 
     def _add(self, owned: Array) -> None:
         self.flow[: self.unknowns.owned] += owned

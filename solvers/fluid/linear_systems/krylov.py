@@ -102,5 +102,5 @@ class FlowSolver:
             return linear.flow_solver(comm, tolerance=self._tolerance, fill=method == "fill")
         ksp = linear.flexible_solver(comm, tolerance=self._tolerance)
         ksp.setOperators(matrix)
-        self.multigrid.set_up(ksp.getPC(), matrix, held)
+        ksp.setPC(self.multigrid.preconditioner(matrix, held))
         return ksp

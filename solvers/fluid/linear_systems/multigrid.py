@@ -21,7 +21,7 @@ from solvers.fluid.background.space import Unknowns
 from solvers.fluid.linear_systems.coarse_matrix import CoarseMatrix
 from solvers.fluid.linear_systems.decoupled import decoupled
 from solvers.fluid.linear_systems.level_grid import LevelGrid
-from solvers.linear import BLOCKS, ZERO_PIVOT
+from solvers.linear import BLOCKS, incomplete_factors
 
 Indices = NDArray[np.int64]
 
@@ -130,6 +130,7 @@ class Multigrid:
         #: is the same
         self._last: PETSc.Mat | None = None
         self._coarse: list[CoarseMatrix] = []
+        self._cycle: PETSc.PC | None = None
         while comm.allreduce(self.levels[-1].owned) > COARSEST:
             lattices = [component.lattice for component in self.levels[-1].components]
             if lattices[-1].smallest:
@@ -139,56 +140,63 @@ class Multigrid:
             self.levels.append(coarsen(comm, self.levels[-1], [next_one] * len(lattices)))
             self._interpolations.append(interpolation(comm, *self.levels[-2:]))
 
-    def set_up(self, preconditioner: PETSc.PC, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> None:
-        """Set a preconditioner up as one V-cycle for a matrix; it does not follow later changes (collective).
+    def preconditioner(self, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> PETSc.PC:
+        """One V-cycle for a matrix; it does not follow later changes (collective).
 
-        The coarse matrices of the preconditioner before are overwritten.
-        held: owned unknowns with rows of the identity.
+        The next call overwrites it if the pattern of the matrix is the same: subdomains and patterns of factors are
+        found once. held: owned unknowns with rows of the identity.
         """
         matrices, interpolations = self._galerkin(matrix, held)
-        count = len(matrices)
-        preconditioner.setType(PETSc.PC.Type.MG)
-        preconditioner.setMGLevels(count)
+        cycle = self._cycle = self._cycle or self._new_cycle(interpolations)
+        for level, (here, of) in enumerate(zip(reversed(self.levels), reversed(matrices), strict=True)):
+            smoother = cycle.getMGSmoother(level)
+            if level == 0:
+                smoother.reset()  # the pivots of LU factors may depend on those before
+                smoother.setOperators(of)
+            else:
+                smoother.getPC().setReusePreconditioner(False)
+                smoother.setOperators(of, decoupled(of, here.component_of()) if self._second else of)
+        cycle.setOperators(matrix)
+        cycle.setUp()
+        for level in range(len(matrices)):
+            smoother = cycle.getMGSmoother(level)
+            smoother.setUp()
+            smoother.getPC().setReusePreconditioner(True)
+        cycle.setReusePreconditioner(True)
+        return cycle
+
+    def _new_cycle(self, interpolations: Sequence[PETSc.Mat]) -> PETSc.PC:
+        cycle, count = PETSc.PC().create(self.comm), len(self.levels)
+        cycle.setType(PETSc.PC.Type.MG)
+        cycle.setMGLevels(count)
         for level in range(1, count):
-            preconditioner.setMGInterpolation(level, interpolations[count - 1 - level])
+            cycle.setMGInterpolation(level, interpolations[count - 1 - level])
         for level in range(count):
-            smoother = preconditioner.getMGSmoother(level)
-            smoother.setOperators(matrices[count - 1 - level])
+            smoother = cycle.getMGSmoother(level)
             smoother.setNormType(PETSc.KSP.NormType.NONE)
             if level == 0:
                 smoother.setType(PETSc.KSP.Type.PREONLY)
                 smoother.getPC().setType(PETSc.PC.Type.LU)
                 smoother.getPC().setFactorSolverType("mumps")
             else:
-                self._smooth(smoother, matrices[count - 1 - level], self.levels[count - 1 - level])
-        preconditioner.setUp()
-        for level in range(count):
-            smoother = preconditioner.getMGSmoother(level)
-            smoother.setUp()
-            smoother.getPC().setReusePreconditioner(True)
-        preconditioner.setReusePreconditioner(True)
+                self._smooth(smoother)
+        return cycle
 
-    def _smooth(self, smoother: PETSc.KSP, matrix: PETSc.Mat, level: Level) -> None:
+    def _smooth(self, smoother: PETSc.KSP) -> None:
         """Smoother: incomplete factors on each process with one layer of overlap, which halves the time."""
         prefix = "flow_second_" if self._second else "flow_first_"
         smoother.setOptionsPrefix(prefix)
         if self._second:
             # a single step diverges on stretched cells; without reordering there are 20 iterations instead of 13
-            options: dict[str, str | float] = {
-                "sub_pc_type": "ilu",
-                "sub_pc_factor_mat_ordering_type": "rcm",
-                "sub_pc_factor_zeropivot": ZERO_PIVOT,
-            }
+            options = incomplete_factors(self.comm, sub_pc_factor_mat_ordering_type="rcm")
             smoother.setType(PETSc.KSP.Type.GMRES)
             smoother.setTolerances(max_it=2)
-            smoother.setOperators(matrix, decoupled(matrix, level.component_of()))
         else:
-            options = dict(BLOCKS)
+            options = incomplete_factors(self.comm, **BLOCKS)
             smoother.setType(PETSc.KSP.Type.RICHARDSON)
             smoother.setTolerances(max_it=1)
         for name, value in options.items():
             PETSc.Options(prefix)[name] = value
-        smoother.getPC().setType(PETSc.PC.Type.ASM if self.comm.size > 1 else PETSc.PC.Type.BJACOBI)
         smoother.getPC().setFromOptions()
 
     def _galerkin(self, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> tuple[list[PETSc.Mat], list[PETSc.Mat]]:
@@ -196,7 +204,7 @@ class Multigrid:
         matrices, interpolations, free = [matrix], [], (~held).astype(float)
         if self._last is None or self._last.handle != matrix.handle:
             self._last = matrix
-            self._coarse = [CoarseMatrix(level) for level in self._interpolations]
+            self._coarse, self._cycle = [CoarseMatrix(level) for level in self._interpolations], None
         for coarse in self._coarse:
             interpolations.append(coarse.mark(free))
             matrices.append(coarse.update(matrices[-1], free))
