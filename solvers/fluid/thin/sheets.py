@@ -31,6 +31,7 @@ from solvers.fluid.background.box import Grid
 from solvers.fluid.cutting.pieces import in_planes
 from solvers.fluid.thin.sheet_nodes import Joined, node_copies, same_nodes
 from solvers.fluid.thin.sheet_parts import AROUND, Part, facing_of, grown, links_of, parts_of_fluid, without_slivers
+from solvers.fluid.thin.sliced_facets import ragged
 from solvers.fluid.thin.space_parts import parts_in_space
 from solvers.fluid.thin.thickness import AROUND_PAIR, THIN
 from solvers.fluid.thin.thinness import OPPOSED, may_be_thin
@@ -324,16 +325,21 @@ def _is_thin(grid: Grid, parts: Sequence[Part], links: Indices, facing: Array, c
     ends = links[:, :2]
     linked = np.zeros(len(parts), dtype=bool)
     linked[ends.ravel()] = True
+    some = close[linked[close]]
+    around = cKDTree(index).query_ball_point(index[some], thin + AROUND_PAIR, p=np.inf, return_sorted=True)
+    ends = ends[np.argsort(ends[:, 0], kind="stable")]
+    begins = np.searchsorted(ends[:, 0], np.arange(len(parts) + 1))
     number = np.full(len(parts), -1)
-    for part in close[linked[close]]:
-        apart = np.abs(index - index[part]).max(axis=1)
-        near = np.flatnonzero(apart <= thin + AROUND_PAIR)
+    for part, near in zip(some, map(np.array, around), strict=True):
         number[near] = np.arange(len(near))
-        first, second = number[ends[(apart[ends] <= thin + AROUND_PAIR).all(axis=1)]].T
-        group = connected_parts(first, second, len(near))
+        first, place = ragged(begins[near + 1] - begins[near])
+        second = number[ends[begins[near][first] + place, 1]]
+        group = connected_parts(first[second >= 0], second[second >= 0], len(near))
         opposed = ~(facing[near] @ facing[part] > OPPOSED)
-        if (group != group[number[part]])[linked[near] & opposed & (apart[near] <= thin)].any():
+        opposed &= np.abs(index[near] - index[part]).max(axis=1) <= thin
+        if (group != group[number[part]])[linked[near] & opposed].any():
             return True
+        number[near] = -1
     return False
 
 
