@@ -25,13 +25,23 @@ class CellForms:
         return [*self.residuals[:2], *self.tangents[:2]]
 
 
-def cell_forms(unknowns: Unknowns, flow: forms.Coefficients, function: Any, weights: Weights | None) -> CellForms:
-    """Forms at a function of velocity and pressure; weights: coefficients of cut cells, None without bodies."""
+def cell_forms(
+    unknowns: Unknowns,
+    flow: forms.Coefficients,
+    function: Any,
+    weights: Weights | None,
+    gaps: forms.GapScales | None = None,
+) -> CellForms:
+    """Forms at a function of velocity and pressure; weights: coefficients of cut cells, None without bodies.
+
+    gaps: coefficients of gaps, for first degree.
+    """
     domain = unknowns.grid.domain
     test, trial = ufl.TestFunction(unknowns.space), ufl.TrialFunction(unknowns.space)
-    residuals = _residuals(unknowns, flow, function, test, weights)
+    residuals = _residuals(unknowns, flow, function, test, weights, gaps)
     # the body force has no derivative: without it, all flows share their compiled tangents
-    same_slope = _residuals(unknowns, replace(flow, force=forms.nothing(unknowns.grid.dim)), function, test, weights)
+    unloaded = replace(flow, force=forms.nothing(unknowns.grid.dim))
+    same_slope = _residuals(unknowns, unloaded, function, test, weights, gaps)
     tangents = [ufl.derivative(form, function, trial) for form in same_slope]
     return CellForms(
         tuple(fem.Integral(domain, form) for form in residuals),
@@ -40,9 +50,14 @@ def cell_forms(unknowns: Unknowns, flow: forms.Coefficients, function: Any, weig
 
 
 def _residuals(
-    unknowns: Unknowns, flow: forms.Coefficients, function: Any, test: Any, weights: Weights | None
+    unknowns: Unknowns,
+    flow: forms.Coefficients,
+    function: Any,
+    test: Any,
+    weights: Weights | None,
+    gaps: forms.GapScales | None,
 ) -> list[Any]:
-    """Forms over uncut cells and, with weights, over cut ones and films."""
+    """Forms over uncut cells and, with weights, over cut ones and films; in gaps: what is added in cut, uncut cells."""
     domain, degree = unknowns.grid.domain, unknowns.degree
     (u, p), (v, q) = (unknowns.parts(f) for f in (function, test))
     everywhere = forms.bulk(flow, u, p, v, q) + forms.residual_based(flow, u, p, v, q)
@@ -51,5 +66,9 @@ def _residuals(
         return [uncut]
     dx_cut = fem.measure(domain, "dx", weights.degree)
     on_interface = nitsche.own(flow, weights, u, p, v, q)
+    if gaps is not None:
+        added = forms.in_gaps(flow, gaps, u, p, q)
+        in_cut = weights.fluid * everywhere * dx_cut + on_interface * dx_cut
+        return [uncut, in_cut, weights.fluid * added * dx_cut, added * fem.measure(domain, "dx", 2 * degree + 1)]
     film = forms.film(flow, u, p, v, q)
     return [uncut, *(weights.fluid * bulk * dx_cut + on_interface * dx_cut for bulk in (everywhere, film))]

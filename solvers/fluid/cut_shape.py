@@ -4,11 +4,12 @@ The discrete terms themselves are differentiated. For displacements dd of the su
 
     d int_Omega f dx = int_Gamma f n . dd ds,     d int_Gamma f(n) ds = int_Gamma grad f . dd + f_n d(n ds),
 
-with f of `forms.bulk` and `forms.residual_based`, and of the terms of `nitsche` with their penalty. The first formula
-is exact. In the second one the fields are averaged over each piece of surface, and of terms that the slip u - g at the
-surface multiplies by the viscosity those with d(n ds) are left out, as are second derivatives. Also missing: the stress
-jumps at the faces of cells, which a surface that moves crosses elsewhere, and the ends of pieces at other surfaces and
-at the boundary of the box move. `shape` assumes u = g and the momentum equation at the surface instead.
+with f of `forms.bulk`, `forms.residual_based` and `forms.in_gaps`, and of the terms of `nitsche` with their penalty.
+The first formula is exact. In the second one the fields are averaged over each piece of surface, and of terms that the
+slip u - g at the surface multiplies by the viscosity those with d(n ds) are left out, as are second derivatives. Also
+missing: the stress jumps at the faces of cells, which a surface that moves crosses elsewhere, and the ends of pieces at
+other surfaces and at the boundary of the box move. `shape` assumes u = g and the momentum equation at the surface
+instead.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from solvers.api import Array
 from solvers.fluid.background.grid import DistributedGrid
 from solvers.fluid.cutting.cut import Cut
 from solvers.fluid.cutting.weights import Weights
+from solvers.fluid.films.gap_terms import GapTerms
 from solvers.fluid.forms import TRACE, Penalties
 from solvers.fluid.interface import InterfaceTerms, MotionOperator
 from solvers.fluid.shape import normal_derivative
@@ -39,6 +41,7 @@ class FlowTerms:
     alpha: float  #: [1/s]
     convection: bool
     penalties: Penalties
+    gaps: GapTerms
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ def cut_derivatives(
     local, moments = cut.cut[cut.pieces.cell[mine]], cut.pieces.moments[mine][:, rule.order]
     pieces, identity = len(mine), np.eye(dim)
     _, first, of_cell = np.unique(local, return_index=True, return_inverse=True)
-    density = _density(at.u[first], at.p[first], at.sizes[first], mu, rule, state)
+    density = _density(local[first], at.u[first], at.p[first], at.sizes[first], mu, rule, state)
 
     velocity, slope = cut.motion.v[at.corners], normal_derivative(at.x, n)
     both, slopes = _means(at, state.flow)
@@ -79,7 +82,8 @@ def cut_derivatives(
     operator = MotionOperator(fields, -np.einsum("pkj,pk->pj", du, n))
 
     of_load = (stress @ slope.reshape(pieces, dim, dim * dim)).reshape(slope.shape)
-    of_load -= _penalty_by_motion(at, velocity.mean(axis=1) * state.convection, slope, w, state)
+    reduced = state.gaps.lengths(local)
+    of_load -= _penalty_by_motion(at, velocity.mean(axis=1) * state.convection, slope, w, state, reduced)
     by_motion = np.empty((pieces, dim, dim, dim + 1))
     by_motion[..., :dim] = of_load.transpose(0, 2, 3, 1)
     by_motion[..., dim] = np.einsum("pk,pkcj->pcj", w, slope)
@@ -101,7 +105,7 @@ def _means(at: InterfaceTerms, flow: Array) -> tuple[Array, Array]:
     return means[..., 0], means[..., 1:]
 
 
-def _penalty_by_motion(at: InterfaceTerms, g: Array, slope: Array, w: Array, state: FlowTerms) -> Array:
+def _penalty_by_motion(at: InterfaceTerms, g: Array, slope: Array, w: Array, state: FlowTerms, reduced: Array) -> Array:
     """d(P ds) w / ds by the motion of vertices, (pieces, k, c, j), with P of `nitsche.penalties`.
 
     g: mean velocity of each facet where there is convection; slope: of `normal_derivative`; w: mean of u - g.
@@ -114,7 +118,7 @@ def _penalty_by_motion(at: InterfaceTerms, g: Array, slope: Array, w: Array, sta
     h = 1.0 / np.linalg.norm(n / at.sizes, axis=1)[:, None, None]
     dh = -(h**3) * np.einsum("pk,pkcj->pcj", n / at.sizes**2, turn)
     inflow = state.density * (np.einsum("pk,pk->p", g, n) < 0.0)[:, None, None]
-    ds = -factors.nitsche * at.mu * TRACE[dim, 1] / h**2 * dh
+    ds = -factors.nitsche * at.mu * TRACE[dim, 1] / (reduced[:, None, None] * h**2) * dh
     ds -= inflow * (np.einsum("pk,pkcj->pcj", g, turn) + state.alpha / dim * n[:, None])
     normal = state.density * factors.mass * state.alpha * dh
     w_n, w_turn = (w * n).sum(axis=1)[:, None, None, None], np.einsum("pl,plcj->pcj", w, turn)[:, None]
@@ -123,10 +127,10 @@ def _penalty_by_motion(at: InterfaceTerms, g: Array, slope: Array, w: Array, sta
     return found + along[:, None, None, None] * (turn * w_n + of_n * w_turn) + of_n * normal[:, None] * w_n
 
 
-def _density(u: NDArray, p: NDArray, sizes: Array, mu: float, rule: Weights, state: FlowTerms) -> Array:
-    """`forms.bulk` + `forms.residual_based` at the points of cells for each test function, (cells, q, a, i).
+def _density(cells: NDArray, u: NDArray, p: NDArray, sizes: Array, mu: float, rule: Weights, state: FlowTerms) -> Array:
+    """`forms.bulk` + `forms.residual_based` + `forms.in_gaps` at points for each test function, (cells, q, a, i).
 
-    u, p: local dofs of the cells, (cells, a, k) and (cells, a); sizes: lengths of their edges [m].
+    cells: local; u, p: their dofs, (cells, a, k) and (cells, a); sizes: lengths of their edges [m].
     """
     (phi, slopes), rho, dim = rule.velocity_table, state.density, sizes.shape[1]
     gradient = slopes / sizes[:, None, None]
@@ -138,7 +142,8 @@ def _density(u: NDArray, p: NDArray, sizes: Array, mu: float, rule: Weights, sta
         inertia += rho * (du @ velocity[..., None])[..., 0]
     metric = 4.0 / sizes[:, None] ** 2
     common = rho**2 * (metric * a**2).sum(axis=2, keepdims=True) + 4.0 * rho**2 * state.alpha**2
-    strong = (inertia + dp) / np.sqrt(common + 36.0 * mu**2 * dim * metric**2)
+    taus = 1.0 / np.sqrt(common + 36.0 * mu**2 * dim * metric**2)
+    strong = taus * (inertia + dp)
     divergence = np.einsum("Cqkk->Cq", du)
     viscous = 36.0 * mu**2 * (metric**2).sum(axis=2)
     against = np.sqrt(common[..., 0] + viscous) / metric.sum(axis=2) * divergence - pressure
@@ -147,4 +152,9 @@ def _density(u: NDArray, p: NDArray, sizes: Array, mu: float, rule: Weights, sta
     by_slope[..., :dim] = mu * (du + np.swapaxes(du, 2, 3)) + against[..., None, None] * np.eye(dim)
     by_slope[..., :dim] += rho * a[..., None] * strong[:, :, None]
     by_slope[..., dim] = strong
+    if state.gaps.marked is not None:
+        share, tangents = state.gaps.share_and_tangents(cells)
+        against = (inertia + dp) @ tangents
+        through = taus * against + state.gaps.flow(cells, inertia + dp, a)
+        by_slope[..., dim] -= (share[:, None, None] * through) @ tangents
     return phi[:, :, None] * value[:, :, None] + gradient @ by_slope

@@ -17,6 +17,7 @@ from solvers.fluid.bodies.surface import by_facets, may_close, seeping
 from solvers.fluid.boundary.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.cutting.cut import Cutter
 from solvers.fluid.films.film import films_of
+from solvers.fluid.films.gaps import gap_finder
 from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.system import FlowSystem
 from solvers.fluid.thin.sheets import Sheets
@@ -77,7 +78,8 @@ def discretise(
     system.transmissivity = by_facets(surfaces, [surface.transmissivity for surface in surfaces])
     system.may_close, system.seeping = may_close(surfaces), seeping(surfaces)
     films = films_of(patches, settings.penalties) if settings.films else None
+    gaps = None if settings.films else gap_finder(patches, settings.penalties)
     in_contact = any(surface.in_contact is not None and surface.in_contact.any() for surface in surfaces)
     unions = grid.dim == 2 and sheets is None and len(bodies) > 1 and not in_contact
-    cutter = Cutter(distributed, system.weights.points, films, unions=unions)
+    cutter = Cutter(distributed, system.weights.points, films, gaps, unions=unions)
     return Discretisation(distributed, unknowns, boundary, system, cutter, methods)

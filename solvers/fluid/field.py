@@ -41,6 +41,7 @@ from solvers.fluid.linear_systems.krylov import FlowSolver, SolverSequence
 from solvers.fluid.regrid import follow_bodies
 from solvers.fluid.saved import nodal_state, set_nodal_state
 from solvers.fluid.steady_iteration import SteadyIteration
+from solvers.fluid.system import FlowSystem
 from solvers.fluid.thin.sheets import Sheets
 from solvers.fluid.thin.thin_bodies import Began, ThinBodies, carry
 from solvers.fluid.time_scheme import STEADY, FlowStep
@@ -55,6 +56,7 @@ class Fluid:
     """Implements `Field`: velocity and pressure on the cut grid, from step to step."""
 
     name = "fluid"
+    system: FlowSystem  #: the equations on the present grid
 
     def __init__(
         self,
@@ -100,9 +102,12 @@ class Fluid:
     def discretise(self, sheets: Sheets | None) -> None:
         """Create grid, unknowns and equations, with separate cells for the fluid on each side of thin bodies."""
         settings = self.settings
+        in_gaps = self.system.gaps if self.renewals else None
         parts = discretise(self.comm, self.box, sheets, settings, self._patches, self.bodies, self.solver)
         self.grid, self.unknowns, self.boundary = parts.grid, parts.unknowns, parts.boundary
         self.system, self.cutter = parts.system, parts.cutter
+        if in_gaps is not None and self.system.gaps is not None:
+            self.system.gaps.memory = in_gaps.memory
         self.size = owned = self.unknowns.owned  #: unknowns that this process owns
         if not self.renewals or parts.methods != self.sequence.methods:
             self.sequence: SolverSequence = SolverSequence(self.comm, parts.methods, self.dofs(), self.notes.append)
@@ -304,7 +309,7 @@ class Fluid:
         """Accept the step. Cells between surfaces in contact get the velocity zero."""
         if self._coupled:
             self._note_fast_bodies()
-        self.system.settle()
+        self.system.end_step()
         found = self.system.active_dofs | self.system.dofs_of(self.cut.contact_cells)
         velocity = self.velocity()
         if self._behind is not None:

@@ -62,6 +62,18 @@ class Coefficients:
 
 
 @dataclass(frozen=True)
+class GapScales:
+    """What the terms of gaps need in each cell, `gaps.Gaps`."""
+
+    share: Expr  #: of the PSPG term along the walls
+    friction: Expr  #: 1 / tau where inertia along the gap does not matter [Pa s/m^2]
+    past: Expr  #: momentum per volume and time of the flow in the gap at the start of the step [N/m^3]
+    tangents: Expr  #: projector along the walls
+    pressure: Expr  #: factor of the ghost penalty of the pressure
+    kink: Expr  #: factor of that of the velocity, less 1, times the squares of the components of the normal
+
+
+@dataclass(frozen=True)
 class GhostScales:
     """Scales of the ghost penalty in each cell.
 
@@ -120,6 +132,22 @@ def residual_based(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Ex
     return _tested(flow, u, p, test) + grad_div
 
 
+def in_gaps(flow: Coefficients, gaps: GapScales, u: Expr, p: Expr, q: Expr) -> Expr:
+    """Integrand of (tau (R - past), grad q) - (T R, grad q) along the walls of a gap, T that of `residual_based`.
+
+    tau = (rho^2 a . G a + friction^2)^(-1/2).
+    """
+    metric, common, viscous = _rates(flow)
+    strong, test = dot(gaps.tangents, inertia(flow, u) + grad(p)), dot(gaps.tangents, grad(q))
+    past, convective = dot(gaps.tangents, gaps.past), gaps.friction**2
+    if flow.convection:
+        convective += flow.rho**2 * sum(g * flow.a[i] ** 2 for i, g in enumerate(metric))
+    tau = 1.0 / sqrt(convective)
+    taus = [1.0 / sqrt(common + viscous * len(metric) * g**2) for g in metric]
+    added = (tau * (strong[i] - past[i]) - elsewhere * strong[i] for i, elsewhere in enumerate(taus))
+    return gaps.share * sum(test[i] * value for i, value in enumerate(added))
+
+
 def film(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     """Integrand in cut cells with a film, where viscosity dominates: `bulk` of a flow without convection.
 
@@ -166,8 +194,7 @@ def ghost_penalty(
     its value in cells without history, it penalises alpha u and dissipates a power that grows as steps get smaller.
     Source of mass matrices with it: Sticko, Kreiss, J. Sci. Comput. 80 (2019), doi:10.1007/s10915-019-01004-2.
     """
-    n = ufl.FacetNormal(flow.mesh)
-    h = avg(abs(sum(n[i] ** 2 * size for i, size in enumerate(flow.sizes))))
+    n, h = _across_faces(flow)
     factor, mass = factors.ghost_viscous * flow.mu, 0.0
     if not flow.steady:
         mass = factors.ghost_mass * flow.rho * h**2
@@ -178,6 +205,24 @@ def ghost_penalty(
     change = flow.alpha * _jump(u, n) - memory * _jump(flow.history, n)
     of_pressure = factors.ghost_pressure * h**3 / (flow.rho * avg(scales.phi)) * _jump(p, n) * _jump(q, n)
     return of_pressure + h * dot(factor * _jump(u, n) + mass * change, _jump(v, n))
+
+
+def ghost_penalty_in_gaps(
+    flow: Coefficients, factors: Penalties, scales: GhostScales, gaps: GapScales, u: Expr, p: Expr, v: Expr, q: Expr
+) -> Expr:
+    """Integrand over faces of what `ghost_penalty` is more, or less, in gaps."""
+    n, h = _across_faces(flow)
+    less = ufl.min_value(gaps.pressure("+"), gaps.pressure("-")) - 1.0
+    kink = avg(gaps.kink)
+    more = sum(n("+")[i] ** 2 * kink[i] for i in range(len(v)))
+    of_pressure = factors.ghost_pressure * h**3 / (flow.rho * avg(scales.phi)) * _jump(p, n) * _jump(q, n)
+    return less * of_pressure + more * h * factors.ghost_viscous * flow.mu * dot(_jump(u, n), _jump(v, n))
+
+
+def _across_faces(flow: Coefficients) -> tuple[Expr, Expr]:
+    """Normal of a face, and the mean length of the cells beside it along the normal."""
+    n = ufl.FacetNormal(flow.mesh)
+    return n, avg(abs(sum(n[i] ** 2 * size for i, size in enumerate(flow.sizes))))
 
 
 def _jump(field: Expr, n: Expr) -> Expr:

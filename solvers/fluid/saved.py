@@ -11,13 +11,21 @@ from solvers.fluid.system import FlowSystem
 
 
 def nodal_state(unknowns: Unknowns, grid: DistributedGrid, history: History, system: FlowSystem) -> State:
-    """Velocity [m/s], pressure [Pa], past velocities and the sparsity pattern by nodes that this process owns."""
+    """Velocity [m/s], pressure [Pa], past velocities and the sparsity pattern by nodes that this process owns.
+
+    With first-order velocities, the flow in gaps, which is the same on all processes.
+    """
     flow = system.flow.x.array
-    return history.save(unknowns) | {
-        "flow": unknowns.to_nodes(flow, unknowns.velocity),
-        "pressure": unknowns.to_nodes(flow, unknowns.pressure),
-        "pattern": Nodal(system.pattern_state(), grid.original[: grid.owned]),
-    }
+    in_gaps = {} if system.gaps is None else {"gaps": system.gaps.memory}
+    return (
+        history.save(unknowns)
+        | in_gaps
+        | {
+            "flow": unknowns.to_nodes(flow, unknowns.velocity),
+            "pressure": unknowns.to_nodes(flow, unknowns.pressure),
+            "pattern": Nodal(system.pattern_state(), grid.original[: grid.owned]),
+        }
+    )
 
 
 def set_nodal_state(state: State, unknowns: Unknowns, history: History, system: FlowSystem) -> None:
@@ -27,3 +35,5 @@ def set_nodal_state(state: State, unknowns: Unknowns, history: History, system: 
     flow[:] = unknowns.from_nodes(state["flow"].values, unknowns.velocity)
     flow[:] += unknowns.from_nodes(state["pressure"].values, unknowns.pressure)
     system.restore_pattern(state["pattern"].values)
+    if system.gaps is not None:
+        system.gaps.memory = state["gaps"]

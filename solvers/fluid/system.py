@@ -32,6 +32,7 @@ from solvers.fluid.cutting.pieces import Pieces
 from solvers.fluid.cutting.weights import Weights
 from solvers.fluid.films.film import film_cells
 from solvers.fluid.films.film_shape import FilmDerivatives, FilmFlow, film_derivatives
+from solvers.fluid.films.gap_terms import GapTerms
 from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.interface import InterfaceTerms
 from solvers.fluid.linear_systems.matrix import Pattern, choose_pattern, create_matrix, fits, pattern_of
@@ -60,8 +61,13 @@ class FlowSystem:
         self._alpha, self._newton = fem.constant(domain, 0.0), fem.constant(domain, 1.0)
         self.weights = Weights(grid, settings.degree)
         self.terms = self._terms()
-        self.ghost = choose_ghost_penalty(unknowns, self.terms, settings.penalties) if with_bodies else None
-        self.forms = cell_forms(unknowns, self.terms, self.flow, self.weights if with_bodies else None)
+        #: gaps of a few cells, with first-order velocities
+        self.gaps = (
+            GapTerms(grid, settings.viscosity, settings.density) if with_bodies and settings.degree == 1 else None
+        )
+        self.ghost = choose_ghost_penalty(unknowns, self.terms, settings.penalties, self.gaps) if with_bodies else None
+        of_gaps = None if self.gaps is None else self.gaps.scales
+        self.forms = cell_forms(unknowns, self.terms, self.flow, self.weights if with_bodies else None, of_gaps)
         self._hanging = (
             None if unknowns.hanging is None else HangingSystem(unknowns, unknowns.hanging, self.forms.tangents[0])
         )
@@ -127,6 +133,8 @@ class FlowSystem:
         incomplete; velocity [m/s]: for the scales.
         """
         self._alpha.value = step.difference.alpha
+        if self.gaps is not None:
+            self.gaps.begin_step(None if self.settings.steady else step.dt)
         self.history.x.array[:] = rate
         if self.ghost is not None:
             self.ghost.begin_step(missing)
@@ -162,14 +170,19 @@ class FlowSystem:
                 self._interface = None
         self.active_dofs = self.dofs_of(cut.active)
         pattern_changed = False
+        if self.gaps is not None:
+            self.gaps.set(cut)
         if self.ghost is not None:
             pattern_changed = self.ghost.set_cut(cut, self.boundary.dofs)
             self.active_dofs &= ~self.ghost.undetermined
         self.cells = [some[some < grid.owned] for some in (cut.uncut, cut.cut)]
         if self.settings.films and (films := film_cells(grid, cut.cut, cut.creeping)) is not None:
             self.cells = [self.cells[0], np.setdiff1d(self.cells[1], films, assume_unique=True), films]
+        cells = self.cells
+        if self.gaps is not None and self.gaps.marked is not None:
+            cells = [*cells, self.gaps.among(cells[1]), self.gaps.among(cells[0])]
         self._residuals, self._tangents = (
-            [form.on(cell=some) for form, some in zip(integrals, self.cells, strict=False)]
+            [form.on(cell=some) for form, some in zip(integrals, cells, strict=False)]
             for integrals in (self.forms.residuals, self.forms.tangents)
         )
         self._outer_on_cut = self._outer.on_cut(cut, active)
@@ -269,7 +282,8 @@ class FlowSystem:
         if degree > 1:
             return film_derivatives(at, self.weights, self.grid, cut, FilmFlow(flow, rate, density, alpha))
         scale, convection = self._scale_velocity.x.array * settings.convection, settings.convection
-        state = FlowTerms(flow, rate, scale, density, alpha, convection, settings.penalties)
+        assert self.gaps is not None
+        state = FlowTerms(flow, rate, scale, density, alpha, convection, settings.penalties, self.gaps)
         return cut_derivatives(at, self.weights, self.grid, cut, state)
 
     @property
@@ -323,6 +337,27 @@ class FlowSystem:
             self.ghost.assemble(self.ghost_matrix, self._ghost_history)
         self.ghost_matrix.assemble()
 
+    def end_step(self) -> None:
+        """Accept the step (collective)."""
+        if self.gaps is not None:
+            self.gaps.end_step(self._in_the_middle)
+        self.settle()
+
+    def _in_the_middle(self, cells: NDArray[np.int32]) -> tuple[Array, Array]:
+        """Residual of the momentum equation [N/m^3] and a [m/s] in the middle of some cells, (cells, dim)."""
+        settings, u, p = self.settings, self.unknowns.cell_velocity[cells], self.unknowns.cell_pressure[cells]
+        values, slopes = fem.tabulate_lagrange(self.grid.domain, 1, np.full((1, self.grid.dim), 0.5))
+        gradient = slopes[0] / self.grid.sizes[cells][:, None]
+        flow, history, a = (f.x.array for f in (self.flow, self.history, self._scale_velocity))
+        velocity, rate, a = (values[0] @ some[u] for some in (flow, history, a))
+        strong = settings.density * (float(self._alpha.value) * velocity - rate)
+        if settings.body_force is not None:
+            strong -= values[0] @ self._force.x.array[u]
+        strong += np.einsum("ca,cai->ci", flow[p], gradient)
+        if settings.convection:
+            strong += settings.density * np.einsum("cak,cai,ci->ck", flow[u], gradient, velocity)
+        return strong, a * settings.convection
+
     def settle(self) -> None:
         """Set the values of nodes without fluid by extension (collective)."""
         if self.ghost is not None:
@@ -337,7 +372,13 @@ class FlowSystem:
         flow = settings.viscosity, settings.density, float(self._alpha.value)
         speeds = self.speed[cells], g * settings.convection
         return nitsche.penalties(
-            flow, settings.penalties, settings.degree, pieces.normal, self.grid.sizes[cells], *speeds
+            flow,
+            settings.penalties,
+            settings.degree,
+            pieces.normal,
+            self.grid.sizes[cells],
+            *speeds,
+            1.0 if self.gaps is None else self.gaps.lengths(cells),
         )
 
     # --------------------------------------------------------------------------------------- residual and tangent

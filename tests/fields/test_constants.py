@@ -17,7 +17,7 @@ from solvers.cell_types import CELL_TYPES
 from solvers.contact import dual_tree, mortar, self_search, share, sharp_edges
 from solvers.contact.sharp_edges import split_nodes
 from solvers.fluid.bodies.surface import ImmersedSurface
-from solvers.fluid.films import film
+from solvers.fluid.films import film, gaps
 from solvers.fluid.poorly_cut import extension
 from solvers.mesh_topology import cut_out
 from solvers.structure import dynamics
@@ -171,6 +171,30 @@ def test_how_far_the_penalty_steps_back_in_films(monkeypatch, name, value):
     found = drags_of_films()
     assert found[:2] == pytest.approx(wanted[:2], rel=4e-3)
     assert found[2] == pytest.approx(wanted[2], rel=0.016)
+
+
+def drags_in_gaps():
+    """Of a cylinder over a wall, over the exact one, with first-order velocities, at 1, 0.5 and 0.2 cells."""
+    return [drag_ratio(2, gap * 0.1, 0.1, "q1q1") for gap in (1.0, 0.5, 0.2)]
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "value", "same"),
+    [
+        (film, "SHARE", 3e-2, 0.01),
+        (film, "SHARE", 3e-5, 0.002),
+        (film, "LEAST", 1e-2, 0.002),
+        (gaps, "KINK", 0.3, 0.006),
+        (gaps, "KINK", 3e-4, 0.006),
+        (gaps, "FULL", 1.5, 0.03),
+    ],
+)
+def test_constants_of_gaps(monkeypatch, module, name, value, same):
+    """Drags are the same to 1 % over three decades, and to 3 % where the term ends earlier."""
+    wanted = drags_in_gaps()
+    for some in (module, gaps):
+        monkeypatch.setattr(some, name, value)
+    assert drags_in_gaps() == pytest.approx(wanted, rel=same)
 
 
 def test_largest_amplification_of_an_extension(monkeypatch):

@@ -14,7 +14,8 @@ from solvers.fluid.background.grid import DistributedGrid, Grid
 from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.cutting.overlaps import with_unions
 from solvers.fluid.cutting.pieces import FLUSH, NOTHING, Pieces, in_planes, put_where_fluid_is
-from solvers.fluid.films.film import Films, creeping_cells, walls_of
+from solvers.fluid.films.film import Films, Walls, creeping_cells, walls_of
+from solvers.fluid.films.gaps import GapFinder, Gaps
 from solvers.fluid.thin.sheet_cells import on_sheets
 from solvers.gauss import tensor_weights
 from solvers.tessellation import unit_normals
@@ -44,6 +45,7 @@ class Cut:
     pieces: Pieces
     film: Array | None  #: factor of the penalty, by cells of the box, below 1 in films; None: there are none
     creeping: NDArray[np.bool_] | None  #: cells of the box whose flow is that of films, `creeping_cells`
+    gaps: Gaps | None  #: gaps of a few cells, with first-order velocities; None: there are none
     facets: NDArray[np.int64]
     motion: Motion
 
@@ -61,11 +63,19 @@ class Cutter:
 
     Within a step a cell that the ghost penalty has acted on keeps it. Otherwise iterates that alternate between two
     sides of a face would change the system each time, and Newton's method would not converge. Surfaces that have not
-    moved are not cut again. Films, where they are detected, are those of the first cut of a step.
+    moved are not cut again. Films and gaps, where they are detected, are those of the first cut of a step.
     """
 
-    def __init__(self, grid: DistributedGrid, points: Array, films: Films | None = None, *, unions: bool = False):
-        self.grid, self.points, self.films, self._unions = grid, points, films, unions
+    def __init__(
+        self,
+        grid: DistributedGrid,
+        points: Array,
+        films: Films | None = None,
+        gaps: GapFinder | None = None,
+        *,
+        unions: bool = False,
+    ):
+        self.grid, self.points, self.films, self.gaps, self._unions = grid, points, films, gaps, unions
         self._own = grid.grid.as_box(grid.in_box)
         self._special = np.zeros(grid.grid.size, dtype=bool)
         self._depth = 0
@@ -152,7 +162,8 @@ class Cutter:
         pieces = Pieces(
             rows[mine], moments.piece_facet[mine], piece_moments[mine], moments.piece_mass[mine], piece_normal[mine]
         )
-        film = self._film(motion, facets, moments, piece_normal, np.where(touched & in_use[cells], cells, -1), solid)
+        narrow = motion, facets, moments, piece_normal, np.where(touched & in_use[cells], cells, -1)
+        film, gaps = self._film(*narrow, solid), self._gaps(*narrow, solid)
         share = np.where(is_active & ~strip, np.clip(1.0 - moments.fraction, 0.0, 1.0), 0.0)
         creeping = None if self._of_step is None else self._of_step.creeping
         if film is not None and self._of_step is None:
@@ -172,6 +183,7 @@ class Cutter:
             pieces=pieces,
             film=film,
             creeping=creeping,
+            gaps=gaps,
             facets=facets,
             motion=motion,
         )
@@ -198,6 +210,7 @@ class Cutter:
             pieces,
             None,
             None,
+            None,
             facets,
             motion,
         )
@@ -206,9 +219,18 @@ class Cutter:
         """Factor of the penalty in cells of the box, `Films.factor`; cells: that of each piece, negative: neglected."""
         if self._of_step is not None or self.films is None:
             return None if self._of_step is None else self._of_step.film
+        return self.films.factor(self.grid.grid, self._walls(motion, facets, moments, normal, cells), solid)
+
+    def _gaps(self, motion: Motion, facets, moments, normal, cells, solid) -> Gaps | None:
+        """Gaps of a few cells; arguments as in `_film`."""
+        if self._of_step is not None or self.gaps is None:
+            return None if self._of_step is None else self._of_step.gaps
+        return self.gaps(self.grid.grid, self._walls(motion, facets, moments, normal, cells), solid)
+
+    def _walls(self, motion: Motion, facets, moments, normal, cells) -> Walls:
         at = np.flatnonzero(cells >= 0)
         corners, lengths = facets[moments.piece_facet[at]], moments.piece_mass[at].sum(axis=2)
-        return self.films.factor(self.grid.grid, walls_of(cells[at], corners, motion.x, lengths, normal[at]), solid)
+        return walls_of(cells[at], corners, motion.x, lengths, normal[at])
 
     def _reach(self, special: NDArray[np.bool_], layers: int) -> NDArray[np.bool_]:
         """Cells with ghost penalty and one layer around them; without the layer around bodies at rest."""

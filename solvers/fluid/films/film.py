@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from mpi4py import MPI
@@ -28,6 +27,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from solvers.api import Array
 from solvers.fluid.background.grid import DistributedGrid, Grid
@@ -64,39 +64,51 @@ class Films:
     penalty: float  #: gamma
 
     def factor(self, grid: Grid, walls: Walls, solid: NDArray[np.bool_]) -> Array | None:
-        """Factor of the penalty in each cell of the box; 1 outside of films. None if there is no film.
-
-        Solid cells around those of a film have its factor: they share nodes with it.
-        """
-        index = np.unravel_index(walls.cell, grid.shape, order="F")
-        sizes = np.stack([np.diff(edge)[i] for edge, i in zip(grid.edges, index, strict=True)], axis=1)
-        across = 1.0 / np.linalg.norm(walls.n / sizes, axis=1)
-        gap = np.minimum(self._to_faces(grid, walls), _to_walls(grid, walls, across))
+        """Factor of the penalty in each cell of the box; 1 outside of films. None if there is no film."""
+        sizes, across = sizes_of(grid, walls)
+        gap = np.minimum(to_faces(grid, walls, self.faces), to_walls(grid, walls, across))
         near = gap < (1.0 - FLUSH) * across  # a gap of one cell is no film, whatever the rounding
         if not near.any():
             return None
         ratio = np.maximum(gap[near] / sizes[near].max(axis=1), LEAST)
         factor = np.ones(grid.size)
         np.minimum.at(factor, walls.cell[near], SHARE * np.minimum(1.0, ratio**3 / (12.0 * self.penalty)))
-        around = ndimage.minimum_filter(grid.as_box(factor), 3).ravel(order="F")
-        return np.where(solid, around, factor)
+        return with_solid(grid, factor, solid)
 
-    def _to_faces(self, grid: Grid, walls: Walls) -> Array:
-        """Distance [m] through the fluid to faces of the box, along the normal."""
-        gap = np.full(len(walls.cell), np.inf)
-        for axis, side in self.faces:
-            slope = walls.n[:, axis] if side == 0 else -walls.n[:, axis]
-            height = np.abs(walls.x[:, axis] - grid.edges[axis][-side])
-            facing = slope > -OPPOSITE
-            gap[facing] = np.minimum(gap[facing], height[facing] / slope[facing])
-        return gap
+
+def with_solid(grid: Grid, factor: Array, solid: NDArray[np.bool_]) -> Array:
+    """Factors of cells of the box; solid cells around those of a film get its factor: they share nodes with it."""
+    around: Array = ndimage.minimum_filter(grid.as_box(factor), 3).ravel(order="F")
+    return np.where(solid, around, factor)
+
+
+def sizes_of(grid: Grid, walls: Walls) -> tuple[Array, Array]:
+    """Edge lengths of the cells of walls, shape (n, dim), and their lengths along the normals, (n,) [m]."""
+    index = np.unravel_index(walls.cell, grid.shape, order="F")
+    sizes = np.stack([np.diff(edge)[i] for edge, i in zip(grid.edges, index, strict=True)], axis=1)
+    return sizes, 1.0 / np.linalg.norm(walls.n / sizes, axis=1)
+
+
+def to_faces(grid: Grid, walls: Walls, faces: Sequence[tuple[int, int]]) -> Array:
+    """Distance [m] through the fluid to faces of the box (axis and side), along the normal."""
+    gap = np.full(len(walls.cell), np.inf)
+    for axis, side in faces:
+        slope = walls.n[:, axis] if side == 0 else -walls.n[:, axis]
+        height = np.abs(walls.x[:, axis] - grid.edges[axis][-side])
+        facing = slope > -OPPOSITE
+        gap[facing] = np.minimum(gap[facing], height[facing] / slope[facing])
+    return gap
 
 
 def films_of(patches: Sequence[Patch], penalties: Penalties) -> Films:
-    """Films of a flow with second-order velocities: faces of the box that hold the normal velocity are walls."""
+    """Films of a flow with second-order velocities."""
+    return Films(wall_faces(patches), penalties.extension)
+
+
+def wall_faces(patches: Sequence[Patch]) -> list[tuple[int, int]]:
+    """Axis and side (0, 1) of the faces of the box that hold the normal velocity: they are walls."""
     walls = {face for patch in patches if patch.record.prescribed in ("all", "normal") for face in patch.faces}
-    faces = sorted(("xyz".index(face[0]), int(face[1] == "+")) for face in walls)
-    return Films(faces, penalties.extension)
+    return sorted(("xyz".index(face[0]), int(face[1] == "+")) for face in walls)
 
 
 def walls_of(cell: NDArray[np.int64], corners: NDArray[np.int64], x: Array, lengths: Array, normal: Array) -> Walls:
@@ -123,31 +135,27 @@ def walls_of(cell: NDArray[np.int64], corners: NDArray[np.int64], x: Array, leng
     return Walls(cell[first][order], middle[order], n[order])
 
 
-def _to_walls(grid: Grid, walls: Walls, reach: Array) -> Array:
-    """Distance [m] through the fluid, along the normal, to the closest opposite wall in the neighbouring cells.
+def to_walls(grid: Grid, walls: Walls, reach: Array, layers: int = 1) -> Array:
+    """Distance [m] through the fluid, along the normal, to the closest opposite wall in so many layers of cells around.
 
     Infinite where there is none within `reach` [m]. Surfaces at negative distance do not count: they are on the other
     side of the body.
     """
-    index = np.stack(np.unravel_index(walls.cell, grid.shape, order="F"))
-    shape = np.array(grid.shape)[:, None]
-    gap, closest = np.full((2, len(walls.cell)), np.inf)
-    for offset in product((-1, 0, 1), repeat=grid.dim):
-        there = index + np.array(offset)[:, None]
-        inside = np.flatnonzero(((there >= 0) & (there < shape)).all(axis=0))
-        number = np.ravel_multi_index(tuple(there[:, inside]), grid.shape, order="F")
-        first, last = (np.searchsorted(walls.cell, number, side=side) for side in ("left", "right"))
-        for k in range((last - first).max(initial=0)):
-            some = first + k < last
-            a, b = inside[some], first[some] + k
-            opposing = np.einsum("ai,ai->a", walls.n[a], walls.n[b])
-            a, b, opposing = (v[opposing < OPPOSITE] for v in (a, b, opposing))
-            away = walls.x[a] - walls.x[b]
-            distance = np.einsum("ai,ai->a", away, walls.n[b]) / opposing
-            aside = away - distance[:, None] * walls.n[a]
-            far = distance**2 + (aside**2).sum(axis=1)
-            better = (distance > 0.0) & (distance < reach[a]) & (far < closest[a])
-            gap[a[better]], closest[a[better]] = distance[better], far[better]
+    index = np.stack(np.unravel_index(walls.cell, grid.shape, order="F"), axis=1)
+    a, b = cKDTree(index).query_pairs(layers, p=np.inf, output_type="ndarray").T
+    opposing = np.einsum("ai,ai->a", walls.n[a], walls.n[b])
+    a, b, opposing = (v[opposing < OPPOSITE] for v in (a, b, opposing))
+    a, b, opposing = np.concatenate([a, b]), np.concatenate([b, a]), np.tile(opposing, 2)
+    away = walls.x[a] - walls.x[b]
+    distance = np.einsum("ai,ai->a", away, walls.n[b]) / opposing
+    aside = away - distance[:, None] * walls.n[a]
+    far = distance**2 + (aside**2).sum(axis=1)
+    some = np.flatnonzero((distance > 0.0) & (distance < reach[a]))
+    # of several that are equally close, the one in the first cell in the order of the lattice's axes
+    some = some[np.lexsort((b[some], *index[b[some]].T[::-1], far[some], a[some]))]
+    first = np.unique(a[some], return_index=True)[1]
+    gap = np.full(len(walls.cell), np.inf)
+    gap[a[some[first]]] = distance[some[first]]
     return gap
 
 

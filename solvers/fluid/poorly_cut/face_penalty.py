@@ -12,6 +12,7 @@ from solvers.api import Array
 from solvers.fluid import forms
 from solvers.fluid.background.space import Unknowns
 from solvers.fluid.cutting.cut import Cut
+from solvers.fluid.films.gap_terms import GapTerms
 from solvers.fluid.linear_systems.matrix import Pattern
 from solvers.fluid.poorly_cut.ghost import Scales
 
@@ -21,8 +22,9 @@ class FacePenalty:
 
     by_faces = True
 
-    def __init__(self, unknowns: Unknowns, flow: forms.Coefficients, penalties: forms.Penalties):
-        self.unknowns, self._grid = unknowns, unknowns.grid
+    def __init__(self, unknowns: Unknowns, flow: forms.Coefficients, penalties: forms.Penalties, gaps: GapTerms):
+        """gaps: those of the present cut when it is set."""
+        self.unknowns, self._grid, self._gaps = unknowns, unknowns.grid, gaps
         domain = self._grid.domain
         self.outside = np.zeros(unknowns.owned, dtype=bool)
         self.undetermined = np.zeros(unknowns.local, dtype=bool)
@@ -33,7 +35,12 @@ class FacePenalty:
         form = forms.ghost_penalty(flow, penalties, scales, *unknowns.parts(trial), *unknowns.parts(test)) * dS
         self._form, history = fem.Integral(domain, ufl.lhs(form)), ufl.rhs(form)
         self._history = None if history.empty() else fem.Integral(domain, history)
+        in_gaps = forms.ghost_penalty_in_gaps(
+            flow, penalties, scales, gaps.scales, *unknowns.parts(trial), *unknowns.parts(test)
+        )
+        self._in_gaps = fem.Integral(domain, in_gaps * dS)  # compiled when there is a gap
         self._faces = np.empty(0, dtype=np.int32)
+        self._marked: NDArray[np.bool_] | None = None
         self.stale = True
 
     @property
@@ -51,8 +58,9 @@ class FacePenalty:
         self.stale = True
 
     def set_cut(self, cut: Cut, prescribed: NDArray[np.int64]) -> bool:
-        self.stale |= not np.array_equal(self._faces, cut.ghost_faces)
-        self._faces = cut.ghost_faces
+        marked = self._gaps.marked
+        self.stale |= not np.array_equal(self._faces, cut.ghost_faces) or marked is not self._marked
+        self._faces, self._marked = cut.ghost_faces, marked
         return False
 
     def extra_entries(self) -> NDArray[np.int64] | None:
@@ -70,6 +78,10 @@ class FacePenalty:
         fem.assemble_matrix(matrix, self._form.on(interior_facet=self._faces))
         if self._history is not None:
             fem.assemble_vector(self._history.on(interior_facet=self._faces), history)
+        if self._marked is not None:
+            faces, sides = self._grid.interior_faces
+            beside = np.isin(self._faces, faces[self._gaps.narrow[sides].any(axis=1)])
+            fem.assemble_matrix(matrix, self._in_gaps.on(interior_facet=self._faces[beside]))
 
     def settle(self, values: Array) -> Array:
         return values

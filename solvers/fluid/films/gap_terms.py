@@ -1,0 +1,153 @@
+"""The coefficients of gaps in the weak forms, the cells in which they act, and the memory of the flow in them.
+
+The parabola has inertia: its mean velocity B obeys rho B_t + friction B = -R, by backward Euler
+
+    B = -tau (R - rho / dt B_before),   tau = 1 / (friction + rho / dt).
+
+Without its past, the flow in a gap would vanish as steps get smaller. Cells that were in no gap take the mean velocity
+of the cells around that were.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from solvers import fem
+from solvers.api import Array
+from solvers.fluid.background.grid import DistributedGrid
+from solvers.fluid.cutting.cut import Cut
+from solvers.fluid.films.gaps import Gaps
+from solvers.fluid.forms import GapScales
+
+Cells = NDArray[np.int32]
+
+
+class GapTerms:
+    """Functions that are constant in each cell; outside of gaps the terms vanish."""
+
+    def __init__(self, grid: DistributedGrid, viscosity: float, density: float):
+        self._grid, self._viscosity, self._density, dim = grid, viscosity, density, grid.dim
+        space = fem.cellwise_space(grid.domain)
+        self._share, self._friction, self._pressure = (fem.function(space) for _ in range(3))
+        self._tangents = [fem.function(space) for _ in range(dim**2)]
+        self._past, self._kink = ([fem.function(space) for _ in range(dim)] for _ in range(2))
+        self.scales = GapScales(
+            self._share,
+            self._friction,
+            ufl.as_vector(self._past),
+            ufl.as_matrix([[self._tangents[dim * i + j] for j in range(dim)] for i in range(dim)]),
+            self._pressure,
+            ufl.as_vector(self._kink),
+        )
+        self.marked: NDArray[np.bool_] | None = None  #: mask of the local cells in gaps; None: no process has any
+        self._gaps: Gaps | None = None
+        self._inertia = 0.0  #: rho / dt [Pa s/m^2], zero in steady flow
+        #: number in the box of each cell that was in a gap, sorted, and B [m/s] in it; the same on all processes
+        self.memory: Array = np.empty((0, 1 + dim))
+
+    def begin_step(self, dt: float | None) -> None:
+        """Start a step of the length dt [s]; None: a steady flow."""
+        self._inertia = 0.0 if dt is None else self._density / dt
+        if self._gaps is not None:
+            self._set_inertia(self._gaps)
+
+    def set(self, cut: Cut) -> None:
+        """Set the gaps to those of a cut (collective)."""
+        if not self._grid.comm.allreduce(cut.gaps is not None, op=MPI.LOR):
+            self.marked = self._gaps = None
+            return
+        if self.marked is not None and cut.gaps is self._gaps:
+            return
+        gaps = self._gaps = cut.gaps
+        self.marked = np.zeros(len(self._grid.numbers), dtype=bool)
+        self._pressure.x.array[:] = 1.0
+        of_cells = (self._share, *self._tangents, *self._kink)
+        for function in of_cells:
+            function.x.array[:] = 0.0
+        if gaps is None:
+            return
+        row, self.marked = _rows(gaps.cells, self._grid.numbers)
+        self._pressure.x.array[:] = gaps.pressure[self._grid.numbers]
+        values = (gaps.share, *gaps.tangents.reshape(len(gaps.cells), -1).T, *gaps.across.T)
+        for function, of_gaps in zip(of_cells, values, strict=True):
+            function.x.array[self.marked] = of_gaps[row]
+        self._set_inertia(gaps)
+
+    def _set_inertia(self, gaps: Gaps) -> None:
+        """1 / tau, and the past of the flow in the gaps; both only matter there, and 1 / tau is positive elsewhere."""
+        row, marked = _rows(gaps.cells, self._grid.numbers)
+        self._friction.x.array[:] = self._viscosity
+        self._friction.x.array[marked] = gaps.friction(self._viscosity)[row] + self._inertia
+        for function, component in zip(self._past, self._before(gaps.cells).T, strict=True):
+            function.x.array[:] = 0.0
+            function.x.array[marked] = self._inertia * component[row]
+
+    def _before(self, cells: NDArray[np.int64]) -> Array:
+        """B [m/s] at the start of the step in some cells of the box, shape (cells, dim)."""
+        known, values = self.memory[:, 0].astype(np.int64), self.memory[:, 1:]
+        found = np.zeros((len(cells), self._grid.dim))
+        if not len(known):
+            return found
+        row, has = _rows(known, cells)
+        found[has] = values[row]
+        shape = self._grid.grid.shape
+        index, of_known = (np.stack(np.unravel_index(some, shape, order="F"), axis=1) for some in (cells, known))
+        for cell in np.flatnonzero(~has):
+            around = (np.abs(of_known - index[cell]) <= 1).all(axis=1)
+            if around.any():
+                found[cell] = values[around].mean(axis=0)
+        return found
+
+    def end_step(self, strong: Callable[[Cells], tuple[Array, Array]]) -> None:
+        """Keep B of the step (collective). strong: cells -> R [N/m^3] and a [m/s] at their middle, (cells, dim)."""
+        if self.marked is None or not self._inertia:
+            self.memory = self.memory[:0]
+            return
+        cells = self.among(np.arange(self._grid.owned, dtype=np.int32))
+        R, a = strong(cells)
+        B = self.flow(cells, R[:, None], a[:, None])[:, 0]
+        found = np.concatenate([self._grid.numbers[cells, None], B], axis=1)
+        everywhere = np.concatenate(self._grid.comm.allgather(found))
+        self.memory = everywhere[np.unique(everywhere[:, 0], return_index=True)[1]]
+
+    def flow(self, cells: Cells, strong: Array, a: Array) -> Array:
+        """B [m/s] at points of local cells, with the residual [N/m^3] and a [m/s], shape (cells, points, dim)."""
+        past, friction = np.stack([part.x.array[cells] for part in self._past], axis=1), self._friction.x.array[cells]
+        convective = self._density**2 * (4.0 / self._grid.sizes[cells][:, None] ** 2 * a**2).sum(axis=2)
+        against: Array = (strong - past[:, None]) @ self.share_and_tangents(cells)[1]
+        return -against / np.sqrt(convective + friction[:, None] ** 2)[..., None]
+
+    def share_and_tangents(self, cells: Cells) -> tuple[Array, Array]:
+        """Share of the term (n,) and projectors (n, dim, dim) in some local cells."""
+        tangents = np.stack([part.x.array[cells] for part in self._tangents], axis=1)
+        return self._share.x.array[cells], tangents.reshape(len(cells), self._grid.dim, self._grid.dim)
+
+    @property
+    def narrow(self) -> NDArray[np.bool_]:
+        """Mask of the local cells with another ghost penalty."""
+        return self._pressure.x.array < 1.0
+
+    def among(self, cells: Cells) -> Cells:
+        """Those in gaps among some local cells."""
+        assert self.marked is not None
+        return cells[self.marked[cells]]
+
+    def lengths(self, cells: Cells) -> Array:
+        """Factor of the length over which Nitsche's penalty acts, `Gaps.reduced`, in some local cells."""
+        factor = np.ones(len(cells))
+        if self._gaps is not None:
+            row, found = _rows(self._gaps.cells, self._grid.numbers[cells])
+            factor[found] = self._gaps.reduced[row]
+        return factor
+
+
+def _rows(known: NDArray[np.int64], numbers: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """(rows in a sorted table of those numbers that are in it, mask of these numbers)."""
+    row = np.minimum(np.searchsorted(known, numbers), len(known) - 1)
+    found = known[row] == numbers
+    return row[found], found
