@@ -143,7 +143,6 @@ def choose_flow(
     steady: bool,
     nested: bool = False,
     sheets: bool = False,
-    processes: int = 1,
     with_solids: bool = False,
 ) -> tuple[FlowMethod, ...]:
     """The sequence of solvers for a flow: each is used when those before it have failed.
@@ -162,8 +161,7 @@ def choose_flow(
         return ("ilu", "direct")
     if nested and steady and method == "auto":
         return ("ilu", "multigrid", "direct")
-    alone = FLOW_WITH_SOLIDS_LIMIT if with_solids else FLOW_INCOMPLETE_LIMIT
-    limit = (FLOW_PARALLEL_LIMIT if processes > 1 else alone)[degree]
+    limit = (FLOW_WITH_SOLIDS_LIMIT if with_solids else FLOW_INCOMPLETE_LIMIT)[degree]
     if method == "ilu" or (method == "auto" and not steady and dofs <= limit):
         return ("ilu", "multigrid", "direct")
     return ("multigrid", "direct") if degree > 1 else ("multigrid", "fill", "direct")
@@ -173,16 +171,12 @@ def choose_flow(
 FLOW_DIRECT_LIMIT = {2: 400_000, 3: 4_000}
 
 #: Unknowns of an unsteady flow above which multigrid is faster than incomplete factors, by degree. Measured times per
-#: step: `channel` takes 7 % less at 20,000 and 22 % less at 62,000; q2q1 with incomplete factors takes 1.4 s instead of
-#: 2.8 s at 15,000, but 9.4 s instead of 5.6 s at 49,000.
+#: step: `channel` takes 7 % less at 20,000 and 22 % less at 62,000, on two processes 20 % less at 37,000; q2q1 with
+#: incomplete factors takes 1.4 s instead of 2.8 s at 15,000, but 9.4 s instead of 5.6 s at 49,000.
 FLOW_INCOMPLETE_LIMIT = {1: 20_000, 2: 25_000}
 #: The same with solids. `torus_wall` (14,200) takes 15 us per unknown and Newton step with incomplete factors, 18 with
-#: multigrid; `torus_wall_fine` (102,500) 11 with both.
-FLOW_WITH_SOLIDS_LIMIT = {1: 100_000, 2: 25_000}
-#: The same on several processes, where PETSc computes the coarse matrices. On two, the second to fourth step of
-#: `torus_wall_fine` take 4.3 instead of 5.8 s with incomplete factors, two steps of `channel` with 470,000 unknowns 6.1
-#: to 6.9 instead of 6.7 s; q2q1 was not measured.
-FLOW_PARALLEL_LIMIT = {1: 200_000, 2: 25_000}
+#: multigrid; `torus_wall_fine` (102,500) 14 and 17, on two processes 8.6 and 9.5.
+FLOW_WITH_SOLIDS_LIMIT = {1: 200_000, 2: 25_000}
 
 
 #: Options of incomplete factors: of dense blocks, and with more fill and overlap.

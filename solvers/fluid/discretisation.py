@@ -61,7 +61,6 @@ def discretise(
         steady=settings.steady,
         nested=distributed.nested is not None,
         sheets=sheets is not None,
-        processes=comm.size,
         with_solids=any(body.motion is None for body in bodies),
     )
     system = FlowSystem(
