@@ -99,7 +99,7 @@ def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, 
             return None
         why = f"if all of its edges are in the fluid, some passes through {body} with less than"
         return f"{size}, and {length / smallest:.2g} of them long: {why} {2.0 * free / smallest:.3g} cells along"
-    if separate and fluid.grid.dimension == 2 and extent < CELLS_ACROSS_AT_REST * smallest:
+    if separate and extent < CELLS_ACROSS_AT_REST * smallest:
         return f"{size}: nothing passes through it, but where it is in contact and opens again, steps may fail"
     if extent >= least * smallest:
         return None

@@ -9,6 +9,7 @@ from ._kernels import (
     basis_transformation,
     coarse_pattern,
     coarse_product,
+    divide_cells,
     moments,
     mortar,
     nodal_normals,

@@ -2,6 +2,7 @@
 #include <nanobind/nanobind.h>
 
 void bind_coarse(nanobind::module_& module);
+void bind_division(nanobind::module_& module);
 void bind_factors(nanobind::module_& module);
 void bind_kdop(nanobind::module_& module);
 void bind_moments(nanobind::module_& module);
@@ -11,6 +12,7 @@ void bind_surface(nanobind::module_& module);
 NB_MODULE(_kernels, module)
 {
   bind_coarse(module);
+  bind_division(module);
   bind_factors(module);
   bind_kdop(module);
   bind_moments(module);

@@ -128,13 +128,23 @@ class CellRegions:
         return found
 
 
-def cell_regions(grid: Grid, facets: Indices, x: Array, fraction: Array) -> CellRegions:
-    """Regions of the fluid around facets (m, 3) with vertices at x [m]; fraction: of solid in each cell of the box."""
-    lattice, polygons = EdgeLattice(grid), sliced_facets(grid, facets, x)
+def cell_regions(
+    grid: Grid,
+    facets: Indices,
+    x: Array,
+    fraction: Array,
+    polygons: SlicedFacets | None = None,
+    known: tuple[Indices, Indices] | None = None,
+) -> CellRegions:
+    """Regions of the fluid around facets (m, 3) with vertices at x [m]; fraction: of solid in each cell of the box.
+
+    polygons: `sliced_facets` of these, if they are known; known: of `wet_edges`.
+    """
+    lattice, polygons = EdgeLattice(grid), polygons or sliced_facets(grid, facets, x)
     cells = np.unique(polygons.cell)
     faces = np.unique([lattice.face(cells, axis, side) for axis in range(3) for side in (0, 1)])
     numbers = np.unique(edges_of(lattice, faces))
-    edges = wet_edges(lattice, polygons, len(facets), numbers, fraction)
+    edges = wet_edges(lattice, polygons, len(facets), numbers, fraction, known)
     on_faces = face_regions(lattice, polygons, x, facets, faces, edges)
     count, size = len(polygons.cell), len(on_faces.face)
     chords = on_faces.chords

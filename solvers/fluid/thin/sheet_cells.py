@@ -14,6 +14,7 @@ from solvers.connected import connected_parts
 from solvers.fluid.background.grid import DistributedGrid
 from solvers.fluid.background.periodic import FAR, LatticeNodes
 from solvers.fluid.cutting.pieces import joined_pieces, parts_of_facets, selected
+from solvers.fluid.cutting.triangle_pieces import parts_of_triangles
 from solvers.gauss import tensor_weights
 
 Indices = NDArray[np.int64]
@@ -63,8 +64,9 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
     def wet(surface: Array) -> Array:
         return surface[counts[surface[:, 0].astype(int)]]
 
+    parts_of = parts_of_facets if grid.dim == 2 else parts_of_triangles
     parts = [
-        parts_of_facets(grid.grid, grid.numbers[cell], int(place[cell]), wet(surface), cut.facets, cut.motion.x, points)
+        parts_of(grid.grid, grid.numbers[cell], int(place[cell]), wet(surface), cut.facets, cut.motion.x, points)
         for number, of_cell in sheets.shares.items()
         if (cell := local[number]) >= 0 and (surface := of_cell.surface) is not None
     ]

@@ -12,10 +12,23 @@ from solvers.api import Array
 from solvers.fluid.background.box import Grid
 from solvers.fluid.cutting.pieces import NOTHING
 from solvers.fluid.thin.cell_regions import CellRegions, SpaceRegion, cell_regions
+from solvers.fluid.thin.face_regions import contains, outline
 from solvers.fluid.thin.regions import SAME
+from solvers.fluid.thin.sliced_facets import ragged, sliced_facets
+from solvers.fluid.thin.touching_cells import (
+    CLOSING,
+    TouchingCells,
+    TouchingRegion,
+    contained,
+    touching_cells,
+    touching_links,
+)
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+
+#: A direction along which both sides of a body are one before the other, if it is not parallel to the surface.
+OBLIQUE = np.array([1.0, 2.0**0.5, 3.0**0.5])
 
 
 @dataclass(frozen=True)
@@ -25,9 +38,9 @@ class SpacePart:
     cell: int  #: number in the box
     share: float  #: its volume, as a share of the cell
     facets: frozenset[int] | None = None  #: facets that bound it in this cell; None: it is all fluid of the cell
-    region: SpaceRegion | None = None
+    region: SpaceRegion | TouchingRegion | None = None
     flush: frozenset[int] = frozenset()  #: facets that lie in its faces
-    surface: None = None  #: no part of a facet bounds it, but whole facets
+    surface: Array | None = None  #: where surfaces touch, (facet, corners) of triangles, shape (n, 10); None: whole facets
 
     def integrals(self, points: Array) -> Array:
         """int L_q of the Lagrange basis on the tensor points, the first direction fastest, shape (points^3,)."""
@@ -46,12 +59,15 @@ class SpacePart:
 
 
 def parts_in_space(grid: Grid, moments, facets: Indices, x: Array, around: int):
-    """(parts of the fluid, links (part, part of the next cell, axis), cells with surface or solid).
+    """(parts of the fluid, links (part, part of the next cell, axis), cells with surface or solid, cells that touch).
 
     around: layers of cells around surfaces in which parts are found.
     """
     fluid = 1.0 - moments.fraction
-    regions = cell_regions(grid, facets, x, moments.fraction)
+    polygons = sliced_facets(grid, facets, x)
+    touching = touching_cells(grid, polygons, facets, x, moments.fraction)
+    known = None if touching is None else touching.votes
+    regions = cell_regions(grid, facets, x, moments.fraction, polygons, known)
     cut = np.zeros(grid.size, dtype=bool)
     cut[regions.polygons.cell] = True
     special = cut | (fluid < 1.0 - SAME)
@@ -63,25 +79,50 @@ def parts_in_space(grid: Grid, moments, facets: Indices, x: Array, around: int):
     total = np.bincount(regions.cell, regions.share, grid.size)
     doubtful |= cut & (np.abs(total - fluid) > SAME)
     doubtful[regions.cell[regions.share < -SAME]] = True
+    if touching is not None:
+        doubtful[touching.cells] = True
     found = _kept(regions, moments, facets, fluid, doubtful)
     whole = near & (fluid > NOTHING) & (~cut | doubtful)
-    order = np.argsort(np.concatenate([found.cells, np.flatnonzero(whole)]), kind="stable")
+    if touching is not None:
+        whole[touching.cells] = False
+    special_cells = np.zeros(0, dtype=np.int64) if touching is None else touching.cell
+    in_cell = np.concatenate([found.cells, np.flatnonzero(whole), special_cells])
+    towards = [_area_vectors(regions)[found.region], np.zeros((int(whole.sum()), 3))]
+    towards += [] if touching is None else [touching.area_vectors()]
+    order = np.lexsort((np.concatenate(towards) @ OBLIQUE, in_cell))  # of the sides, wherever other cells change
     number = np.empty(len(order), dtype=np.int64)
     number[order] = np.arange(len(order))
     of_cell = np.full(grid.size, -1)
-    of_cell[whole] = number[len(found.cells) :]
+    of_cell[whole] = number[len(found.cells) : len(found.cells) + whole.sum()]
     wholes = [
         SpacePart(cell, float(fluid[cell]), flush=frozenset(found.flush.get(cell, ())))
         for cell in np.flatnonzero(whole).tolist()
     ]
-    everything = [*found.parts, *wholes]
-    links = _links(grid, regions, np.append(number[: len(found.cells)], -1)[found.of_region], of_cell, cut)
-    return [everything[k] for k in order], links, special
+    part = np.append(number[: len(found.cells)], -1)[found.of_region]
+    links = _links(grid, regions, part, of_cell, cut)
+    if touching is None:
+        everything = [*found.parts, *wholes]
+        return [everything[k] for k in order], links, special, np.zeros(0, dtype=np.int64)
+    divided, own = _divided(grid, touching, regions, part, of_cell, number[len(number) - len(touching.cell) :])
+    everything = [*found.parts, *wholes, *divided]
+    links = np.unique(np.concatenate([links, own]), axis=0)
+    return [everything[k] for k in order], links, special, touching.cells
+
+
+def _area_vectors(regions: CellRegions) -> Array:
+    """int n ds over the surface of regions, n out of the solid, relative to their cells."""
+    polygon, step = ragged(regions.polygons.count - 2)
+    a, b, c = regions.corners[polygon, 0], regions.corners[polygon, step + 1], regions.corners[polygon, step + 2]
+    found = np.zeros((len(regions.cell), 3))
+    of = regions.of_polygon[polygon]
+    np.add.at(found, of[of >= 0], 0.5 * np.cross(b - a, c - a)[of >= 0])
+    return found
 
 
 @dataclass(frozen=True)
 class _Kept:
     parts: list[SpacePart]
+    region: Indices  #: of each part
     cells: Indices
     of_region: Indices  #: part of each region, -1: none
     flush: dict[int, set[int]]  #: facets in faces of cells without surface
@@ -112,7 +153,7 @@ def _kept(regions: CellRegions, moments, facets: Indices, fluid: Array, doubtful
         SpacePart(int(regions.cell[k]), float(regions.share[k]), bounding[k], SpaceRegion(regions, int(k)))
         for k in kept.tolist()
     ]
-    return _Kept(parts, regions.cell[kept], of_region, flush)
+    return _Kept(parts, kept, regions.cell[kept], of_region, flush)
 
 
 def _links(grid: Grid, regions: CellRegions, part: Indices, of_cell: Indices, cut: Mask) -> Indices:
@@ -133,3 +174,46 @@ def _links(grid: Grid, regions: CellRegions, part: Indices, of_cell: Indices, cu
         low = low[(of_cell[low + stride] >= 0) & ~cut[low + stride]]
         found.append(np.stack([of_cell[low], of_cell[low + stride], np.full(len(low), d)], axis=1))
     return np.unique(np.concatenate(found), axis=0)
+
+
+def _divided(
+    grid: Grid, touching: TouchingCells, regions: CellRegions, part: Indices, of_cell: Indices, number: Indices
+) -> tuple[list[SpacePart], Indices]:
+    """(parts in cells where bodies touch, their links).
+
+    part: of each region of other cells; of_cell: the part that has all fluid of a cell, -1: there is none; number: of
+    the part of each region of cells where bodies touch.
+    """
+    at_face: dict[tuple[int, int], list[int]] = {}
+    rows = touching.at_faces()
+    for row, cell, kind in zip(rows, touching.cell[touching.region[rows]], touching.kind[rows], strict=True):
+        at_face.setdefault((int(cell), int(kind)), []).append(row)
+    on_face: dict[int, list[int]] = {}
+    for region, face in enumerate(regions.faces.faces[regions.faces.face].tolist()):
+        on_face.setdefault(face, []).append(region)
+    is_touching = frozenset(touching.cells.tolist())
+
+    def other_side(cell: int, axis: int, side: int, x: Array) -> int:
+        plane = [(axis + 1) % 3, (axis + 2) % 3]
+        if cell in is_touching:
+            there = np.array(at_face.get((cell, 2 * axis + side), []), dtype=np.int64)
+            inside = contained(touching.triangles[there][..., plane], x[plane])
+            return int(number[touching.region[there[inside]][0]]) if inside.any() else -1
+        if of_cell[cell] >= 0:
+            return int(of_cell[cell])
+        face = int(regions.lattice.face(np.array([cell]), axis, side)[0])
+        for region in on_face.get(face, ()):
+            beside = regions.of_face[region, 1 - side]
+            if beside >= 0 and part[beside] >= 0 and contains(*outline(regions.faces, regions.edges, region), x[plane]):
+                return int(part[beside])
+        return -1
+
+    links, closed = touching_links(grid, touching, other_side)
+    touching.kind[closed] = CLOSING
+    ends = np.stack([number[links[:, 0]], links[:, 2]], axis=1)
+    ends = np.where(links[:, 1:2] == 1, ends, ends[:, ::-1])
+    parts = []
+    for k, (cell, share) in enumerate(zip(touching.cell.tolist(), touching.share.tolist(), strict=True)):
+        region = TouchingRegion(touching, k)
+        parts.append(SpacePart(cell, share, region.facets, region, surface=region.surface))
+    return parts, np.column_stack([ends, links[:, 3]])

@@ -28,7 +28,7 @@ from solvers.fluid.thin.thickness import THIN_IF_MOVING
 from solvers.fluid.thin.thinness import cell_sizes_at, may_be_thin
 from solvers.fluid.time_scheme import FlowStep
 
-#: Thickness in cells up to which moving bodies have separate cells with contact in 2D: that of bodies at rest. Where
+#: Thickness in cells up to which moving bodies have separate cells with contact: that of bodies at rest. Where
 #: thicker ones touch, Newton's method may not converge: fluid between them appears and disappears in its course. They
 #: leak little without separate cells (docs/theory_fsci.md).
 THICK_IN_CONTACT = 2.0
@@ -53,7 +53,7 @@ class ThinBodies:
         moving = bool(bodies) and not all(body.rests for body in bodies)
         touch = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
         self._thick = THICK_IN_CONTACT if touch else thickest(grid.dim)
-        plain = not periodic and not isinstance(grid, Nested) and not (touch and grid.dim == 3)
+        plain = not periodic and not isinstance(grid, Nested)
         self._possible: bool | None = None if moving and plain else False
         self._x: Array | None = None
         self._searched = False  #: in this step, without a result: a search takes as long as a tenth of an iterate

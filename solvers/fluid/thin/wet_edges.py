@@ -73,10 +73,18 @@ class WetEdges:
         return np.where(self.crossing[found] == key, self.beside[found], -1)
 
 
-def wet_edges(lattice: EdgeLattice, polygons: SlicedFacets, facets: int, edges: Indices, fraction: Array) -> WetEdges:
+def wet_edges(
+    lattice: EdgeLattice,
+    polygons: SlicedFacets,
+    facets: int,
+    edges: Indices,
+    fraction: Array,
+    known: tuple[Indices, Indices] | None = None,
+) -> WetEdges:
     """Wet parts of edges, given by their sorted numbers.
 
-    fraction: share of solid of each cell of the box, which decides where no surface is.
+    fraction: share of solid of each cell of the box, which decides where no surface is; known: votes on corners of the
+    lattice, (their numbers, positive: wet).
     """
     number, facet, upward_wet, at = _crossings(lattice, polygons)
     key, first = np.unique(number * facets + facet, return_index=True)
@@ -94,6 +102,8 @@ def wet_edges(lattice: EdgeLattice, polygons: SlicedFacets, facets: int, edges: 
     lowest, highest = place == start[row], place + 1 == start[row] + count[row] - 1
     np.add.at(votes, corner[row[lowest]], np.where(wet_above[lowest], -1, 1))
     np.add.at(votes, top[row[highest]], np.where(wet_above[highest], 1, -1))
+    if known is not None:
+        np.add.at(votes, *known)
     plain = count == 1
     is_wet = _by_votes(votes, corner[plain], top[plain])
     wet = np.zeros(len(ends), dtype=bool)
