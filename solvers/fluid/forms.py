@@ -63,7 +63,7 @@ class Coefficients:
 
 @dataclass(frozen=True)
 class GapScales:
-    """What the terms of gaps need in each cell, `gaps.Gaps`."""
+    """What the terms of gaps need in each cell, `gaps.NarrowGaps`."""
 
     share: Expr  #: of the PSPG term along the walls
     friction: Expr  #: 1 / tau where inertia along the gap does not matter [Pa s/m^2]

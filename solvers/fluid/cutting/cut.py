@@ -15,7 +15,7 @@ from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.cutting.overlaps import with_unions
 from solvers.fluid.cutting.pieces import FLUSH, NOTHING, Pieces, in_planes, put_where_fluid_is
 from solvers.fluid.films.film import Films, Walls, creeping_cells, walls_of
-from solvers.fluid.films.gaps import GapFinder, Gaps
+from solvers.fluid.films.gaps import GapFinder, NarrowGaps
 from solvers.fluid.thin.sheet_cells import on_sheets
 from solvers.gauss import tensor_weights
 from solvers.tessellation import unit_normals
@@ -45,7 +45,7 @@ class Cut:
     pieces: Pieces
     film: Array | None  #: factor of the penalty, by cells of the box, below 1 in films; None: there are none
     creeping: NDArray[np.bool_] | None  #: cells of the box whose flow is that of films, `creeping_cells`
-    gaps: Gaps | None  #: gaps of a few cells, with first-order velocities; None: there are none
+    gaps: NarrowGaps | None  #: gaps of a few cells, with first-order velocities; None: there are none
     facets: NDArray[np.int64]
     motion: Motion
 
@@ -221,7 +221,7 @@ class Cutter:
             return None if self._of_step is None else self._of_step.film
         return self.films.factor(self.grid.grid, self._walls(motion, facets, moments, normal, cells), solid)
 
-    def _gaps(self, motion: Motion, facets, moments, normal, cells, solid) -> Gaps | None:
+    def _gaps(self, motion: Motion, facets, moments, normal, cells, solid) -> NarrowGaps | None:
         """Gaps of a few cells; arguments as in `_film`."""
         if self._of_step is not None or self.gaps is None:
             return None if self._of_step is None else self._of_step.gaps

@@ -4,8 +4,8 @@ The parabola has inertia: its mean velocity B obeys rho B_t + friction B = -R, b
 
     B = -tau (R - rho / dt B_before),   tau = 1 / (friction + rho / dt).
 
-Without its past, the flow in a gap would vanish as steps get smaller. Cells that were in no gap take the mean velocity
-of the cells around that were.
+Without its past, the flow in a gap would vanish as steps get smaller. In cells that were in no gap it follows the
+pressure at once, B = -R / friction, in their first step.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from solvers import fem
 from solvers.api import Array
 from solvers.fluid.background.grid import DistributedGrid
 from solvers.fluid.cutting.cut import Cut
-from solvers.fluid.films.gaps import Gaps
+from solvers.fluid.films.gaps import NarrowGaps
 from solvers.fluid.forms import GapScales
 
 Cells = NDArray[np.int32]
@@ -45,7 +45,7 @@ class GapTerms:
             ufl.as_vector(self._kink),
         )
         self.marked: NDArray[np.bool_] | None = None  #: mask of the local cells in gaps; None: no process has any
-        self._gaps: Gaps | None = None
+        self._gaps: NarrowGaps | None = None
         self._inertia = 0.0  #: rho / dt [Pa s/m^2], zero in steady flow
         #: number in the box of each cell that was in a gap, sorted, and B [m/s] in it; the same on all processes
         self.memory: Array = np.empty((0, 1 + dim))
@@ -78,30 +78,19 @@ class GapTerms:
             function.x.array[self.marked] = of_gaps[row]
         self._set_inertia(gaps)
 
-    def _set_inertia(self, gaps: Gaps) -> None:
+    def _set_inertia(self, gaps: NarrowGaps) -> None:
         """1 / tau, and the past of the flow in the gaps; both only matter there, and 1 / tau is positive elsewhere."""
         row, marked = _rows(gaps.cells, self._grid.numbers)
+        known, of_memory = self.memory[:, 0].astype(np.int64), np.zeros((len(gaps.cells), 1 + self._grid.dim))
+        if len(known):
+            at, has = _rows(known, gaps.cells)
+            of_memory[has, 0], of_memory[has, 1:] = 1.0, self.memory[at, 1:]
+        inertia = self._inertia * of_memory[:, 0]
         self._friction.x.array[:] = self._viscosity
-        self._friction.x.array[marked] = gaps.friction(self._viscosity)[row] + self._inertia
-        for function, component in zip(self._past, self._before(gaps.cells).T, strict=True):
+        self._friction.x.array[marked] = (gaps.friction(self._viscosity) + inertia)[row]
+        for function, component in zip(self._past, of_memory[:, 1:].T, strict=True):
             function.x.array[:] = 0.0
-            function.x.array[marked] = self._inertia * component[row]
-
-    def _before(self, cells: NDArray[np.int64]) -> Array:
-        """B [m/s] at the start of the step in some cells of the box, shape (cells, dim)."""
-        known, values = self.memory[:, 0].astype(np.int64), self.memory[:, 1:]
-        found = np.zeros((len(cells), self._grid.dim))
-        if not len(known):
-            return found
-        row, has = _rows(known, cells)
-        found[has] = values[row]
-        shape = self._grid.grid.shape
-        index, of_known = (np.stack(np.unravel_index(some, shape, order="F"), axis=1) for some in (cells, known))
-        for cell in np.flatnonzero(~has):
-            around = (np.abs(of_known - index[cell]) <= 1).all(axis=1)
-            if around.any():
-                found[cell] = values[around].mean(axis=0)
-        return found
+            function.x.array[marked] = (inertia * component)[row]
 
     def end_step(self, strong: Callable[[Cells], tuple[Array, Array]]) -> None:
         """Keep B of the step (collective). strong: cells -> R [N/m^3] and a [m/s] at their middle, (cells, dim)."""
@@ -138,7 +127,7 @@ class GapTerms:
         return cells[self.marked[cells]]
 
     def lengths(self, cells: Cells) -> Array:
-        """Factor of the length over which Nitsche's penalty acts, `Gaps.reduced`, in some local cells."""
+        """Factor of the length over which Nitsche's penalty acts, `NarrowGaps.reduced`, in some local cells."""
         factor = np.ones(len(cells))
         if self._gaps is not None:
             row, found = _rows(self._gaps.cells, self._grid.numbers[cells])

@@ -46,7 +46,7 @@ MOST_SLIP = 0.9
 
 
 @dataclass(frozen=True)
-class Gaps:
+class NarrowGaps:
     """Cells in gaps, with what the terms need; numbers in the box, sorted."""
 
     cells: NDArray[np.int64]
@@ -76,7 +76,7 @@ class GapFinder:
     faces: Sequence[tuple[int, int]]  #: axis and side (0, 1)
     penalties: Penalties
 
-    def __call__(self, grid: Grid, walls: Walls, solid: NDArray[np.bool_]) -> Gaps | None:
+    def __call__(self, grid: Grid, walls: Walls, solid: NDArray[np.bool_]) -> NarrowGaps | None:
         """The gaps between walls; None if there is none."""
         sizes, across = sizes_of(grid, walls)
         to_face = to_faces(grid, walls, self.faces)
@@ -100,7 +100,7 @@ class GapFinder:
         pressure = np.ones(grid.size)
         pressure[cells] = np.where(narrow, SHARE * np.minimum(1.0, of_pressure), 1.0)
         kink = 3.0 / 16.0 / KINK / self.penalties.ghost_viscous * height - 1.0
-        return Gaps(
+        return NarrowGaps(
             cells,
             height,
             walls.n[of],
