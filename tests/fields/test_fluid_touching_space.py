@@ -1,4 +1,4 @@
-"""Thin bodies in 3D that touch or overlap: nothing flows between them, and they carry the difference of the pressures."""
+"""Thin bodies in 3D that touch or overlap: nothing flows between them, both carry the difference of the pressures."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,8 @@ from fluid_setup import block, body, field, solve_steady, step
 from thin_space import SIZE, duct, turn
 
 from solvers import kernels
-from solvers.fluid.thin.face_regions import in_cells
 from solvers.fluid.background.grid import uniform
+from solvers.fluid.thin.face_regions import in_cells
 from solvers.fluid.thin.sheets import find_sheets
 from solvers.fluid.thin.sliced_facets import sliced_facets
 from solvers.fluid.thin.wet_edges import EdgeLattice
@@ -21,7 +21,7 @@ PRESSURES, AREA = (2.0, 0.7), (3 * SIZE) ** 2
 def plates(thickness, depth, draw):
     """Two plates across a duct at a random place and angle, side by side over 1.5 cells, that overlap by a depth.
 
-    thickness in cells, depth in thicknesses; the second plate is turned by so little that they overlap in all of the duct.
+    thickness in cells, depth in thicknesses; the second plate is turned by so little that they overlap everywhere.
     """
     rng = np.random.default_rng(draw)
     t = thickness * SIZE
@@ -64,7 +64,9 @@ def test_two_plates_that_move_along_a_duct(element, thickness, draws):
     for draw in draws[:8]:
         below, above, facets = plates(thickness, 0.1, draw)
         moved = {"motion": lambda x, t: (x + speed * t * along, 0.0 * x + speed * along)}
-        bodies = [body(*one, facets, **moved) for one in (("below", below - 0.2 * along), ("above", above - 0.2 * along))]
+        bodies = [
+            body(*one, facets, **moved) for one in (("below", below - 0.2 * along), ("above", above - 0.2 * along))
+        ]
         initial = field(speed, 0.0, 0.0)
         fluid = duct(bodies, element, PRESSURES, cells=(9, 3, 3), mu=0.05, dt=dt, initial_velocity=initial)
         for count in range(3):
@@ -131,7 +133,7 @@ def test_regions_between_bent_plates(bend):
     plate, facets = closed_plate(np.concatenate(sheet), count)
     grid, matrix = uniform([0, 0, 0], [1, 1, 1], [5, 5, 5]), turn(0.3, 0.2)
     for apart in (1e-3, -0.4 * t):
-        x = np.concatenate([plate, plate + [t + apart, 0.0, 0.0]]) @ matrix.T + 0.5
+        x = np.concatenate([plate, plate + np.array([t + apart, 0.0, 0.0])]) @ matrix.T + 0.5
         both = np.concatenate([facets, facets + len(plate)])
         fluid, gap = divided(grid, both, x, np.repeat([0, 1], len(facets)))
         assert gap < 1e-10
@@ -159,7 +161,7 @@ def test_volume_of_the_fluid():
     rng = np.random.default_rng(1)
     for shift in (1.0, 0.5, 0.02):
         matrix = turn(*rng.uniform(-0.5, 0.5, 2))
-        both = np.concatenate([plate, plate + [shift * t, 0.1, 0.05]]) @ matrix.T + 0.48
+        both = np.concatenate([plate, plate + np.array([shift * t, 0.1, 0.05])]) @ matrix.T + 0.48
         sheets = find_sheets(
             grid, np.concatenate([facets, facets + 8]), both, np.ones(24, dtype=bool), thin=3, always=True
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,9 @@ class SpacePart:
     facets: frozenset[int] | None = None  #: facets that bound it in this cell; None: it is all fluid of the cell
     region: SpaceRegion | TouchingRegion | None = None
     flush: frozenset[int] = frozenset()  #: facets that lie in its faces
-    surface: Array | None = None  #: where surfaces touch, (facet, corners) of triangles, shape (n, 10); None: whole facets
+    surface: Array | None = (
+        None  #: where surfaces touch, (facet, corners) of triangles, shape (n, 10); None: whole facets
+    )
 
     def integrals(self, points: Array) -> Array:
         """int L_q of the Lagrange basis on the tensor points, the first direction fastest, shape (points^3,)."""
@@ -209,11 +211,13 @@ def _divided(
         return -1
 
     links, closed = touching_links(grid, touching, other_side)
-    touching.kind[closed] = CLOSING
+    kind = touching.kind.copy()
+    kind[closed] = CLOSING
+    found = replace(touching, kind=kind)
     ends = np.stack([number[links[:, 0]], links[:, 2]], axis=1)
     ends = np.where(links[:, 1:2] == 1, ends, ends[:, ::-1])
     parts = []
     for k, (cell, share) in enumerate(zip(touching.cell.tolist(), touching.share.tolist(), strict=True)):
-        region = TouchingRegion(touching, k)
-        parts.append(SpacePart(cell, share, region.facets, region, surface=region.surface))
+        mine = TouchingRegion(found, k)
+        parts.append(SpacePart(cell, share, mine.facets, mine, surface=mine.surface))
     return parts, np.column_stack([ends, links[:, 3]])

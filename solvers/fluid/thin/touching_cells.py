@@ -1,8 +1,8 @@
 """Regions of the fluid in cells in 3D where surfaces touch, cross or overlap: the cell without the union of the bodies.
 
 The surfaces divide the cell into convex parts, each inside or outside of each body (`kernels.divide_cells`). Open parts
-are connected across faces that no surface covers. A part that is thinner than TOUCHING between two bodies is closed. The
-triangles that bound a region form a closed surface, to rounding, so that int grad f = int f n in it.
+are connected across their faces. A part that is thinner than TOUCHING between two bodies is closed. The triangles that
+bound a region form a closed surface, to rounding, so that int grad f = int f n in it.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from solvers import kernels
 from solvers.api import Array
 from solvers.connected import connected_parts
 from solvers.fluid.background.box import Grid
-from solvers.fluid.thin.face_regions import in_cells
 from solvers.fluid.cutting.pieces import NOTHING
+from solvers.fluid.thin.face_regions import in_cells
 from solvers.fluid.thin.region_integrals import over_faces, over_surfaces
 from solvers.fluid.thin.sliced_facets import SlicedFacets
 from solvers.fluid.thin.touching_regions import TOUCHING
