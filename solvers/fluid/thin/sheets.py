@@ -30,12 +30,8 @@ from solvers.connected import connected_parts
 from solvers.fluid.background.box import Grid
 from solvers.fluid.cutting.pieces import in_planes
 from solvers.fluid.thin.sheet_nodes import Joined, node_copies, same_nodes
-<<<<<<< HEAD
-from solvers.fluid.thin.sheet_parts import AROUND, Part, facing_of, grown, links_of, parts_of_fluid, without_slivers
-from solvers.fluid.thin.sliced_facets import ragged
-=======
 from solvers.fluid.thin.sheet_parts import AROUND, Part, facing_of, grown, links_of, parts_of_fluid
->>>>>>> b06db4d (Slivers of fluid that touching bodies enclose keep their pressure: removing them (two cells) lost force, without them all is exact)
+from solvers.fluid.thin.sliced_facets import ragged
 from solvers.fluid.thin.space_parts import parts_in_space
 from solvers.fluid.thin.thickness import AROUND_PAIR, THIN
 from solvers.fluid.thin.thinness import OPPOSED, may_be_thin
