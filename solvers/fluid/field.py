@@ -361,7 +361,9 @@ class Fluid:
         b.array[:] = self.right_side()
         try:
             with self.timer("solve"):
-                self.linear_iterations = self.linear_solver.solve(matrix, b, x, self.held)
+                self.linear_iterations = self.linear_solver.solve(
+                    matrix, b, x, self.held, self.system.dofs_near_surfaces
+                )
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         return self.update(x.array)
@@ -399,7 +401,7 @@ class Fluid:
 
     def multigrid(self, matrix: PETSc.Mat) -> PETSc.PC:
         """A multigrid cycle for the tangent; the next call overwrites it (collective)."""
-        return self.linear_solver.multigrid.preconditioner(matrix, self.held)
+        return self.linear_solver.multigrid.preconditioner(matrix, self.held, self.system.dofs_near_surfaces)
 
     def _add(self, owned: Array) -> None:
         self.flow[: self.unknowns.owned] += owned

@@ -209,6 +209,13 @@ class FlowSystem:
             held |= unknowns.hanging.dofs[: unknowns.owned]
         return held
 
+    def dofs_near_surfaces(self) -> NDArray[np.bool_]:
+        """Mask of the owned dofs of cut cells and of the cells around them (collective)."""
+        assert self.cut is not None
+        blocks = self.dofs_of(self.cut.cut)[:: self.unknowns.block_size]
+        around = np.flatnonzero(blocks[self.unknowns.cell_blocks].any(axis=1)).astype(np.int32)
+        return self.dofs_of(around)[: self.unknowns.owned]
+
     def dofs_of(self, cells: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Mask of the local dofs that belong to some cells; every process passes its local ones (collective)."""
         blocks = np.zeros(self.unknowns.local // self.unknowns.block_size, dtype=bool)

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from solvers import linear
 from solvers.fluid.background.space import Unknowns
-from solvers.fluid.linear_systems.multigrid import Multigrid
+from solvers.fluid.linear_systems.multigrid import Marker, Multigrid
 from solvers.lagged import Lagged, LaggedFactors
 
 #: Names of the methods in messages.
@@ -81,26 +81,26 @@ class FlowSolver:
         self._krylov.begin_step()
         self._direct.begin_step()
 
-    def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, held: NDArray[np.bool_]) -> int:
+    def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, held: NDArray[np.bool_], near: Marker) -> int:
         """Solve matrix x = b. Returns the count of iterations. Raises LinearSolveFailed (collective).
 
-        held: owned unknowns whose rows are those of the identity.
+        held: owned unknowns whose rows are those of the identity; near: marks those near surfaces.
         """
         while self.sequence.current != "direct":
             try:
                 iterations = self._krylov.solve_again(matrix, b, x)
                 if iterations is not None:
                     return iterations
-                return self._krylov.solve(self._create(matrix, held), matrix, b, x)
+                return self._krylov.solve(self._create(matrix, held, near), matrix, b, x)
             except linear.LinearSolveFailed as failure:
                 self.sequence.advance(failure)
         return self._direct.solve(matrix, b, x)
 
-    def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> PETSc.KSP:
+    def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_], near: Marker) -> PETSc.KSP:
         comm, method = self.sequence.comm, self.sequence.current
         if method != "multigrid":
             return linear.flow_solver(comm, tolerance=self._tolerance, fill=method == "fill")
         ksp = linear.flexible_solver(comm, tolerance=self._tolerance)
         ksp.setOperators(matrix)
-        ksp.setPC(self.multigrid.preconditioner(matrix, held))
+        ksp.setPC(self.multigrid.preconditioner(matrix, held, near))
         return ksp

@@ -8,7 +8,7 @@ Source: Trottenberg, Oosterlee, Schuller, Multigrid (2001), sections 2.4, 5.1 an
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,9 +21,12 @@ from solvers.fluid.background.space import Unknowns
 from solvers.fluid.linear_systems.coarse_matrix import CoarseMatrix
 from solvers.fluid.linear_systems.decoupled import decoupled
 from solvers.fluid.linear_systems.level_grid import LevelGrid
+from solvers.fluid.linear_systems.near_smoother import NearSmoother
 from solvers.linear import BLOCKS, incomplete_factors
 
 Indices = NDArray[np.int64]
+#: Marks some of the owned unknowns.
+Marker = Callable[[], NDArray[np.bool_]]
 
 #: Unknowns below which a level is solved directly, in less time than the levels above take to smooth.
 COARSEST = 2_000
@@ -140,14 +143,18 @@ class Multigrid:
             self.levels.append(coarsen(comm, self.levels[-1], [next_one] * len(lattices)))
             self._interpolations.append(interpolation(comm, *self.levels[-2:]))
 
-    def preconditioner(self, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> PETSc.PC:
+    def preconditioner(self, matrix: PETSc.Mat, held: NDArray[np.bool_], near: Marker) -> PETSc.PC:
         """One V-cycle for a matrix; it does not follow later changes (collective).
 
-        The next call overwrites it if the pattern of the matrix is the same: subdomains and patterns of factors are
-        found once. held: owned unknowns with rows of the identity.
+        With first degree the next call overwrites it if the pattern of the matrix is the same: subdomains and patterns
+        of factors are found once. held: owned unknowns with rows of the identity; near: marks those near surfaces.
         """
         matrices, interpolations = self._galerkin(matrix, held)
         cycle = self._cycle = self._cycle or self._new_cycle(interpolations)
+        if self._second and interpolations:
+            self._cycle = None  # the smoothers depend on where the surfaces are
+            for level, marked in enumerate(reversed(self._near_by_level(near() & ~held, interpolations[:-1])), 1):
+                self._solve_near_surfaces(cycle.getMGSmoother(level), marked)
         for level, (here, of) in enumerate(zip(reversed(self.levels), reversed(matrices), strict=True)):
             smoother = cycle.getMGSmoother(level)
             if level == 0:
@@ -198,6 +205,25 @@ class Multigrid:
         for name, value in options.items():
             PETSc.Options(prefix)[name] = value
         smoother.getPC().setFromOptions()
+
+    def _near_by_level(self, near: NDArray[np.bool_], interpolations: list[PETSc.Mat]) -> list[NDArray[np.bool_]]:
+        """Unknowns near surfaces by level, finest first: those on which finer ones depend (collective)."""
+        found = [near]
+        for P in interpolations:
+            coarse, fine = P.createVecs()
+            fine.array[:] = found[-1]
+            P.multTranspose(fine, coarse)
+            found.append(coarse.array > 0.0)
+        return found
+
+    def _solve_near_surfaces(self, smoother: PETSc.KSP, near: NDArray[np.bool_]) -> None:
+        """Let a smoother have exact factors of marked owned unknowns, incomplete ones of others (collective)."""
+        if not self.comm.allreduce(bool(near.any()), op=MPI.LOR):
+            return
+        both = PETSc.PC().create(self.comm)
+        both.setType(PETSc.PC.Type.PYTHON)
+        both.setPythonContext(NearSmoother(smoother.getPC(), near))
+        smoother.setPC(both)
 
     def _galerkin(self, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> tuple[list[PETSc.Mat], list[PETSc.Mat]]:
         """Matrices and interpolations, finest first (collective)."""
