@@ -15,7 +15,7 @@ fluid:
   scheme: backward_euler
   grid: {{from: [0, 0], to: [3, 1], cells: [30, 10]}}
   patches:
-    inlet: {{on: x-, traction: ["ramp(t,0,1)", 0]}}
+    inlet: {{on: x-, traction: ["ramp(t,0,1) - {back}*ramp(t,1.5,2.5)", 0]}}
     outlet: {{on: x+, traction: [0, 0]}}
     walls: {{on: [y-, y+], slip: true}}
 structure:
@@ -41,7 +41,7 @@ probes:
 
 
 def history_of(folder, **changes):
-    (folder / "case.yaml").write_text(CASE.format(**changes))
+    (folder / "case.yaml").write_text(CASE.format(**{"back": 0} | changes))
     assert run_case(load_case(folder), folder / "out") == 0
     return read_history(folder / "out" / "history.csv")
 
@@ -71,3 +71,16 @@ def test_flap_that_stays_apart(tmp_path):
     check(history, 30)
     assert not history["contact.active"].any()
     assert 1e-3 < history["flow"][-1] < 2e-3
+
+
+def test_flap_that_opens_again(tmp_path):
+    """The pressure turns round after the flap has sealed the channel, and pulls both apart: no step is repeated."""
+    history = history_of(tmp_path, E=2.5e5, end=3.5, back=1.6)
+    check(history, 70)
+    active, flow, time = history["contact.active"], history["flow"], history["time"]
+    assert (active[(time > 0.9) & (time < 2.0)] > 0).all()
+    assert not active[time > 2.2].any()
+    closed = np.argmin(np.abs(time - 1.5))
+    assert abs(flow[closed]) < 1e-5  # still moving: 1e-8 at rest
+    assert flow[-1] < -1e-3
+    assert history["lower.x"][-1] + history["upper.x"][-1] == pytest.approx(-0.6, abs=1e-3)

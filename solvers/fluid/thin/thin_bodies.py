@@ -24,14 +24,14 @@ from solvers.fluid.thin.sheet_cycles import joined_in, recurring
 from solvers.fluid.thin.sheet_parts import AROUND
 from solvers.fluid.thin.sheet_transfer import along_surface, transfer
 from solvers.fluid.thin.sheets import Sheets, find_sheets
-from solvers.fluid.thin.thickness import THIN_IF_MOVING
+from solvers.fluid.thin.thickness import THIN, THIN_IF_MOVING
 from solvers.fluid.thin.thinness import cell_sizes_at, may_be_thin
 from solvers.fluid.time_scheme import FlowStep
 
 #: Thickness in cells up to which moving bodies have separate cells with contact: that of bodies at rest. Where
 #: thicker ones touch, Newton's method may not converge: fluid between them appears and disappears in its course. They
 #: leak little without separate cells (docs/theory_fsci.md).
-THICK_IN_CONTACT = 2.0
+THICK_IN_CONTACT = float(THIN)
 
 
 def thickest(dim: int) -> float:
