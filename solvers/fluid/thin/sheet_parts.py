@@ -22,7 +22,7 @@ Mask = NDArray[np.bool_]
 Part = Region | SpacePart
 
 AROUND = 3  #: layers of cells around surfaces in which parts and links are found
-SLIVER = 2  #: cells in each direction within which fluid enclosed by bodies that touch counts as solid
+SLIVER = 2  #: in 3D, cells in each direction within which fluid enclosed by bodies that touch counts as solid
 
 
 def parts_of_fluid(grid: Grid, moments, facets: Indices, x: Array, bounds: Mask) -> tuple[list[Region], Mask, Indices]:

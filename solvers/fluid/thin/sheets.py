@@ -248,10 +248,10 @@ def find_sheets(
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
     if grid.dim == 3:
         parts, links, special, touching = parts_in_space(grid, moments, facets, x, AROUND)
+        parts, links = without_slivers(grid, parts, links, touching)
     else:
         parts, special, touching = parts_of_fluid(grid, moments, facets, x, bounds)
         links = links_of(grid, parts)
-    parts, links = without_slivers(grid, parts, links, touching)
     if not parts and not always:  # all surfaces are outside of the box
         return None
     cells = np.array([part.cell for part in parts], dtype=np.int64)
