@@ -127,6 +127,7 @@ def curved_plates(thickness, draw):
 @pytest.mark.parametrize(("element", "speed"), [("q1q1", 0.0), ("q2q1", 0.0), ("q1q1", 0.7)])
 def test_curved_plates_with_different_facets(element, speed, thickness, draws):
     """Slivers of fluid between facets, up to a few cells long, have pressures of their own: nothing is lost."""
+    exact = 1e-6 if speed else 1e-8  # of single nodes at slivers, with the parabola of gaps
     for draw in draws:
         off = errors(element, *((x, loop(len(x))) for x in curved_plates(thickness, draw)), speed, 3 if speed else 1)
-        assert (off < 1e-8).all(), draw
+        assert (off < [exact, 1e-8]).all(), draw
