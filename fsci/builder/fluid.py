@@ -71,6 +71,7 @@ def _flow(settings: FluidSection) -> FlowSettings:
         scheme=settings.scheme,
         body_force=_body_force(settings),
         initial_velocity=settings.initial_velocity,
+        narrow_gaps=settings.narrow_gaps,
     )
 
 

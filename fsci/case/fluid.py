@@ -181,6 +181,11 @@ class FluidSection(Section):
     element: Literal["q1q1", "q2q1"] = setting(
         "q1q1", "q1q1: velocity and pressure of first order; q2q1: velocity of second order"
     )
+    narrow_gaps: bool = setting(
+        False,
+        "with q1q1: the flow through gaps below 2.5 cells, which first-order velocities lack, is part of the equation "
+        "of continuity; not around thin bodies with cells for each side",
+    )
     grid: GridSection = setting(..., "box and cells")
     patches: dict[Name, PatchSection] = setting(
         ..., "conditions on the boundary of the box by name; where patches meet, the one named last decides"
@@ -190,6 +195,12 @@ class FluidSection(Section):
     gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
     body_force: Vector | None = setting(None, "force per volume", unit="N/m^3")
     initial_velocity: Vector | None = setting(None, "velocity at the start; default: at rest", unit="m/s")
+
+    @model_validator(mode="after")
+    def _gaps_of_first_order(self) -> FluidSection:
+        if self.narrow_gaps and self.element != "q1q1":
+            raise fault("is for q1q1; q2q1 has the flow through narrow gaps without it", "narrow_gaps")
+        return self
 
     @property
     def free_bodies(self) -> dict[str, Free]:

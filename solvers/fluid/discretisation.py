@@ -78,7 +78,7 @@ def discretise(
     system.may_close, system.seeping = may_close(surfaces), seeping(surfaces)
     films = films_of(patches, settings.penalties) if settings.films else None
     # both sides of a thin body have cells in the same place, and a gap may be on one side alone
-    gaps = None if settings.films or sheets is not None else gap_finder(patches, settings.penalties)
+    gaps = gap_finder(patches, settings.penalties) if settings.with_gaps and sheets is None else None
     in_contact = any(surface.in_contact is not None and surface.in_contact.any() for surface in surfaces)
     unions = grid.dim == 2 and sheets is None and len(bodies) > 1 and not in_contact
     cutter = Cutter(distributed, system.weights.points, films, gaps, unions=unions)

@@ -23,6 +23,8 @@ class FlowSettings:
     body_force: Sequence[Value] | None = None  #: [N/m^3]
     initial_velocity: Sequence[Value] | None = None  #: [m/s]
     penalties: forms.Penalties = forms.Penalties()
+    #: first-order velocities: the parabola across gaps of a few cells is part of the continuity equation
+    narrow_gaps: bool = False
 
     @property
     def degree(self) -> int:
@@ -40,3 +42,8 @@ class FlowSettings:
     def films(self) -> bool:
         """Whether films are detected. One cell across does not resolve a film with first-order velocities."""
         return self.degree > 1
+
+    @property
+    def with_gaps(self) -> bool:
+        """Whether narrow gaps are detected."""
+        return self.degree == 1 and self.narrow_gaps

@@ -98,8 +98,7 @@ def test_it_runs_without_repeated_steps(run):
 def test_pressure_has_no_spikes(run):
     """Once the inflow is steady, impact included: below three times the stagnation pressure of the fastest fluid.
 
-    And smooth: from step to step it changes by less than 25 % of its maximum. The gap falls by a quarter per step when
-    the largest pressure is that of the film below it (15 % before there was a film with first-order velocities).
+    And smooth: from step to step it changes by less than 15 % of its maximum.
     """
     import meshio
 
@@ -111,4 +110,4 @@ def test_pressure_has_no_spikes(run):
             largest.append(np.abs(fields["pressure"]).max())
     assert len(largest) >= 35
     assert np.max(np.divide(largest, stagnation)) < 3.0
-    assert np.abs(np.diff(largest)).max() < 0.25 * max(largest)
+    assert np.abs(np.diff(largest)).max() < 0.15 * max(largest)

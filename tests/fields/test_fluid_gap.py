@@ -46,11 +46,8 @@ def test_second_order_is_exact_at_any_width():
         assert np.abs(ratios - 1).max() < 1e-7, (gap, ratios)
 
 
-@pytest.mark.parametrize(("gap", "low", "high"), [(8, 0.97, 1), (4, 0.9, 1), (2, 0.6, 1), (1, 0.1, 1), (0.5, 0.1, 1)])
+@pytest.mark.parametrize(("gap", "low", "high"), [(8, 0.97, 1), (4, 0.9, 1), (2, 0.6, 1), (1, 0.1, 1), (0.5, 0.2, 1)])
 def test_first_order_resists_too_much(gap, low, high):
-    """Known and documented: the velocity lacks the parabola, which is part of the continuity equation in gaps.
-
-    `test_fluid_gaps.py` has the flow through them.
-    """
+    """Known and documented: with few cells across, too little flows."""
     ratios = np.array([flow_ratio(gap, "q1q1", place) for place in PLACES])
     assert np.all((low < ratios) & (ratios < high)), ratios

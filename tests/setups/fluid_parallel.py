@@ -52,7 +52,7 @@ def scene(dim, element, comm, box="channel"):
         at_bodies = RefinedBox([0] * dim, [0.9, 0.9] if dim == 2 else [1.6, 1, 1], 1)
         grid = refined(coarse, [at_outlet, at_bodies, RefinedSurface(*brick, 4, 1)])
     return make_fluid(
-        grid, patches, bodies, mu=0.01, element=element, dt=0.03, comm=comm,
+        grid, patches, bodies, mu=0.01, element=element, dt=0.03, comm=comm, narrow_gaps=True,
         body_force=field(*[0.1, -0.5, 0][:dim]),
         solver=SolverSettings(Tolerance(1e-10), linear="direct" if dim == 2 else "iterative", linear_tolerance=1e-11),
     )  # fmt: skip

@@ -61,6 +61,7 @@ def approaching(
     fine=1.0,
     slip: float = 0.0,
     transmissivity=0.0,
+    narrow_gaps: bool = False,
 ) -> Fluid:
     """A body of radius 1 at rest for an instant, its surface moving down to the wall y = 0 (z = 0) with velocity 1.
 
@@ -83,7 +84,8 @@ def approaching(
     wall = Patch("wall", face, "slip_length", field(slip)) if slip else Patch("wall", face, "no_slip")
     moving = with_slip(body("body", points, facets, velocity=down), slip, transmissivity)
     grid = Grid((*[sides] * (dim - 1), up))
-    fluid = make_fluid(grid, [*planes, wall], [moving], element=element, scheme="steady", convection=False)
+    settings = {"element": element, "scheme": "steady", "convection": False, "narrow_gaps": narrow_gaps}
+    fluid = make_fluid(grid, [*planes, wall], [moving], **settings)
     solve_steady(fluid)
     return fluid
 

@@ -29,6 +29,9 @@ class NearSmoother(PythonContext):
         self._exact = PETSc.PC().create(incomplete.comm)
         self._exact.setType(PETSc.PC.Type.LU)
         self._exact.setFactorSolverType("mumps")
+        #: matrix of the smoother, its residual, right-hand side and solution near surfaces; made in `setUp`
+        self._matrix: PETSc.Mat = PETSc.Mat()
+        self._residual, self._right, self._found = PETSc.Vec(), PETSc.Vec(), PETSc.Vec()
 
     def setUp(self, preconditioner: PETSc.PC) -> None:
         self._matrix = matrix = preconditioner.getOperators()[1]
