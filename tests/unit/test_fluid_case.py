@@ -278,6 +278,12 @@ MISTAKES = [
         "19:16: the structure has no such quantity 'flow_rate'",
         "structure",
     ),
+    (
+        "viscosity: 1e-3",
+        "viscosity: 1e-3\n  element: q2q1\n  narrow_gaps: true",
+        "7:16: 'narrow_gaps' is for q1q1; q2q1 has the flow through narrow gaps without it",
+        "true",
+    ),
     ("{quantity: force}", "{quantity: force, about: [1, 1]}", "16:35: 'about' is for the quantity 'moment'", "[1, 1]"),
     ("force.x", "structure.energy", "21:13: there is no value 'structure.energy'", "structure"),
 ]
