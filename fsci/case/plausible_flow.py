@@ -99,7 +99,8 @@ def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, 
             return None
         why = f"if all of its edges are in the fluid, some passes through {body} with less than"
         return f"{size}, and {length / smallest:.2g} of them long: {why} {2.0 * free / smallest:.3g} cells along"
-    if separate and extent < CELLS_ACROSS_AT_REST * smallest:
+    in_contact = CELLS_ACROSS_AT_REST if fluid.grid.dimension == 2 else 1.0
+    if separate and extent < in_contact * smallest:
         return f"{size}: nothing passes through it, but where it is in contact and opens again, steps may fail"
     if extent >= least * smallest:
         return None
