@@ -30,8 +30,8 @@ from solvers.fluid.time_scheme import FlowStep
 
 #: Thickness in cells up to which moving bodies have separate cells with contact, by dimension: in 2D that of bodies at
 #: rest. Where thicker ones touch, Newton's method may not converge: fluid between them appears and disappears in its
-#: course. In 3D it did not where a torus of 1.6 cells comes down on a wall (torus_wall on 8 x 8 x 13 cells). They leak
-#: little without separate cells (docs/theory_fsci.md).
+#: course. In 3D elastic bodies of 0.3 cells were computed; from one cell on it is as without separate cells, because
+#: no elastic body between one and two cells has been tried. They leak little (docs/theory_fsci.md).
 THICK_IN_CONTACT = {2: float(THIN), 3: 1.0}
 
 
