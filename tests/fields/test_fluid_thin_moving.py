@@ -89,6 +89,16 @@ def sheets_at(grid, facets, x):
     return find_sheets(grid, facets, x, off_boundary(grid, x[facets]), always=True)
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_body_outside_of_the_box(dim):
+    """An increment may push it out: no cell has two sides then."""
+    grid = uniform([0.0] * dim, [1.0] * dim, [6] * dim)
+    x, facets = block([2.0] * dim, [2.1] + [2.5] * (dim - 1))
+    sheets = sheets_at(grid, facets, x)
+    assert sheets.size == grid.size
+    assert not sheets.shares
+
+
 def sides(sheets, degree, plate):
     """(numbers of the nodes with fluid, on which side of the plate each is: its cells are all on one)."""
     fluid = np.zeros(sheets.size, dtype=bool)

@@ -50,7 +50,7 @@ def node_copies(
         first.append((a[:, None] * size + upper).ravel())
         second.append((b[:, None] * size + lower).ravel())
     group = connected_parts(np.concatenate(first), np.concatenate(second), len(parts) * size)
-    cells = np.array([part.cell for part in parts])
+    cells = np.array([part.cell for part in parts], dtype=np.int64)
     index = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1)
     counts = [2 * n + 1 for n in grid.shape]
     node = np.ravel_multi_index(tuple(np.moveaxis(2 * index[:, None] + steps, 2, 0)), counts, order="F").ravel()

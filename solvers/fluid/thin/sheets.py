@@ -344,7 +344,8 @@ def _is_thin(grid: Grid, parts: Sequence[Part], links: Indices, facing: Array, c
 
 def _neighbours(grid: Grid, cells: Sequence[int]) -> set[tuple[int, int]]:
     """Pairs of these cells with a common face, the lower first."""
-    index, members, found = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1), set(cells), set()
+    members, found = set(cells), set()
+    index = np.stack(np.unravel_index(np.array(cells, dtype=np.int64), grid.shape, order="F"), axis=1)
     for axis, count in enumerate(grid.shape):
         stride = int(np.prod(grid.shape[:axis]))
         found |= {(c, c + stride) for c, i in zip(cells, index[:, axis], strict=True) if i + 1 < count}

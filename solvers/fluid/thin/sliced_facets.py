@@ -72,12 +72,13 @@ def _slabs(
     new = np.stack(
         [corners, _crossing(low, high, axis, edge[own + ~from_low]), _crossing(low, high, axis, edge[own + to_high])], 2
     )
+    width = 3 * corners.shape[1]
     new_kind = np.stack([kind, kind, IN_PLANE + 2 * axis + to_high], axis=2)
-    used = np.stack([begins_within, enters, leaves], axis=2).reshape(len(of), -1)
+    used = np.stack([begins_within, enters, leaves], axis=2).reshape(len(of), width)
     number = used.sum(axis=1)
     order = np.argsort(~used, axis=1, kind="stable")[:, : int(number.max(initial=3))]
-    new = np.take_along_axis(new.reshape(len(of), -1, 3), order[:, :, None], axis=1)
-    new_kind = np.take_along_axis(new_kind.reshape(len(of), -1), order, axis=1)
+    new = np.take_along_axis(new.reshape(len(of), width, 3), order[:, :, None], axis=1)
+    new_kind = np.take_along_axis(new_kind.reshape(len(of), width), order, axis=1)
     kept = number >= 3
     return of[kept], k[kept], number[kept], new[kept], new_kind[kept]
 
