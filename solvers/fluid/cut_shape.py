@@ -6,10 +6,11 @@ The discrete terms themselves are differentiated. For displacements dd of the su
 
 with f of `forms.bulk`, `forms.residual_based` and `forms.in_gaps`, and of the terms of `nitsche` with their penalty.
 The first formula is exact. In the second one the fields are averaged over each piece of surface, and of terms that the
-slip u - g at the surface multiplies by the viscosity those with d(n ds) are left out, as are second derivatives. Also
-missing: the stress jumps at the faces of cells, which a surface that moves crosses elsewhere, and the ends of pieces at
-other surfaces and at the boundary of the box move. `shape` assumes u = g and the momentum equation at the surface
-instead.
+slip u - g at the surface multiplies by the viscosity those with d(n ds) are left out, as are second derivatives. Where
+a surface ends at the boundary of the box its end moves, too, by -e . dd / s (`film_crossings`): a body that is pressed
+onto a wall of the box goes through it a little. That derivative holds while the end moves by less than a facet.
+Missing: the stress jumps at the faces of cells, which a surface that moves crosses elsewhere, and ends of pieces at
+other surfaces. `shape` assumes u = g and the momentum equation at the surface instead.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from solvers.api import Array
 from solvers.fluid.background.grid import DistributedGrid
 from solvers.fluid.cutting.cut import Cut
 from solvers.fluid.cutting.weights import Weights
+from solvers.fluid.films.film_crossings import barycentric, crossing_moments
 from solvers.fluid.films.gap_terms import GapTerms
 from solvers.fluid.forms import TRACE, Penalties
 from solvers.fluid.interface import InterfaceTerms, MotionOperator
@@ -42,6 +44,7 @@ class FlowTerms:
     convection: bool
     penalties: Penalties
     gaps: GapTerms
+    moved: float  #: largest motion of a vertex in the last iterate [m], infinite in the first one
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,32 @@ def cut_derivatives(
 
     force = -at.mass_of_pieces[..., None, None] * dload[:, None, None]
     force -= area[:, :, None, None, None] * np.swapaxes(of_load, 1, 2)[:, None]
+    some, of_phi, of_vertices = _ends_at_walls(at, rule, grid, local, state.moved)
+    rows[some, ..., :dim] += of_phi[..., None] * load[some][:, None, None, None]
+    rows[some, ..., dim] += of_phi * leak[some][:, None, None, None]
+    force[some] += of_vertices[:, :, :, None] * load[some][:, None, None, :, None]
     return CutDerivatives(operator, rows, force)
+
+
+def _ends_at_walls(
+    at: InterfaceTerms, rule: Weights, grid: DistributedGrid, local: NDArray[np.int32], moved: float
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Pieces that end at the boundary of the box, and integrals of phi_a N_c e / s and N_b N_c e / s over these lines.
+
+    Shapes (pieces, functions, vertices, dim) and (pieces, vertices, vertices, dim); e and s: `film_crossings`.
+    moved: motion [m] that is to be expected; a facet with a smaller extent normal to the boundary may cross it or leave
+    it as a whole, and does not count.
+    """
+    index = np.stack(np.unravel_index(grid.numbers[local], grid.grid.shape, order="F"), axis=1)
+    sides = np.stack([index == 0, index == np.array(grid.grid.shape) - 1], axis=2)
+    sides &= (np.ptp(at.x, axis=1) > moved)[:, :, None]
+    some = np.flatnonzero(sides.any(axis=(1, 2)))
+    origin = np.stack([edge[i] for edge, i in zip(grid.grid.edges, index[some].T, strict=True)], axis=1)
+    x, sizes = at.x[some], at.sizes[some]
+    lines = crossing_moments(x, at.n[some], origin, sizes, rule.reference, sides[some])
+    of_phi = np.einsum("pcqj,qa->pacj", lines, rule.velocity_table[0])
+    on_facet = barycentric(origin[:, None] + rule.reference * sizes[:, None], x)
+    return some, of_phi, np.einsum("pcqj,pqb->pbcj", lines, on_facet)
 
 
 def _means(at: InterfaceTerms, flow: Array) -> tuple[Array, Array]:

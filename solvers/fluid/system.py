@@ -89,6 +89,7 @@ class FlowSystem:
         self.ghost_matrix: PETSc.Mat | None = None
         self._pattern: Pattern | None = None
         self.cut: Cut | None = None
+        self._moved = np.inf  #: largest motion of a vertex from the last cut to this one [m]
         self.slip_length: Array | None = None  #: of the facets of all surfaces [m]; None: no slip
         self.transmissivity: Array | None = None  #: of the layer on these facets [m^3]; None: no layer
         self.may_close: NDArray[np.bool_] | None = None  #: facets with fluid pressure in closed contact; None: none
@@ -161,6 +162,8 @@ class FlowSystem:
         """Set the cut: cells, faces, active dofs, and a larger sparsity pattern if it needs one (collective)."""
         if cut is self.cut:
             return
+        if self.cut is not None and self.cut.motion.x.shape == cut.motion.x.shape:
+            self._moved = float(np.abs(cut.motion.x - self.cut.motion.x).max(initial=0.0))
         self.cut, self._current, grid = cut, False, self.grid
         active = np.zeros(len(grid.numbers), dtype=bool)
         active[cut.active] = True
@@ -290,7 +293,8 @@ class FlowSystem:
             return film_derivatives(at, self.weights, self.grid, cut, FilmFlow(flow, rate, density, alpha))
         scale, convection = self._scale_velocity.x.array * settings.convection, settings.convection
         assert self.gaps is not None
-        state = FlowTerms(flow, rate, scale, density, alpha, convection, settings.penalties, self.gaps)
+        moved = self._moved if improved else np.inf
+        state = FlowTerms(flow, rate, scale, density, alpha, convection, settings.penalties, self.gaps, moved)
         return cut_derivatives(at, self.weights, self.grid, cut, state)
 
     @property

@@ -25,13 +25,13 @@ class Moving:
         step(self.fluid, 0.0, DT)
         self.fluid.begin_step(DT, DT)
 
-    def derivatives(self, *, shape=True):
+    def derivatives(self, *, shape=True, improved=True):
         """(found, by differences) for a random displacement: of momentum rows, of continuity rows, of the force."""
         fluid, change = self.fluid, np.random.default_rng(2).normal(size=self.by.shape)
         fluid.move({})
         fluid.residual()
         state, system, nodes = fluid.flow.copy(), fluid.system, fluid.unknowns
-        derived = system.shape_derivatives(improved=True) if shape else None
+        derived = system.shape_derivatives(improved=improved) if shape else None
         nothing_held, at = np.zeros(len(state), dtype=bool), (nodes.velocity.dofs, nodes.pressure.dofs)
         given = system.interface, nodes, state, 1.0 / DT, nothing_held, np.arange(len(change)), derived
         entries, rows, forces = interface_entries(*given), [], []
@@ -85,3 +85,28 @@ def test_nearly_exact_in_a_flow(dim):
     now, before = np.array(errors)
     assert (now < 0.1).all()
     assert (before > 3.0 * now).all()
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_body_through_a_wall_of_the_box(dim):
+    """Its surface ends at the wall. Without this end momentum rows and force are 15 to 29 % and 9 to 24 % wrong.
+
+    The first tangent of a step does without.
+    """
+    inflow = field(*[lambda x, y, *zt: 2.0 + y, 0.3, 0.0][:dim])
+    sides = ("y-", "y+", "z-", "z+")[: 2 * dim - 2]
+    patches = [
+        Patch("in", ("x-",), "velocity", inflow),
+        Patch("out", ("x+",), "outflow"),
+        Patch("walls", sides, "no_slip"),
+    ]
+    moving, errors = Moving(dim, patches, centre=(0.47, 0.13), mu=0.05), []
+    moving.derivatives()  # moves the body by 1e-7, which the next tangent takes for the size of an increment
+    for improved in (True, False):
+        pairs = moving.derivatives(improved=improved)
+        errors.append([np.linalg.norm(found - exact) / np.linalg.norm(exact) for found, exact in pairs])
+    (momentum, continuity, force), without = errors
+    assert max(momentum, force) < 0.05
+    assert continuity < 0.07
+    assert without[0] > 3.0 * momentum
+    assert without[2] > 3.0 * force

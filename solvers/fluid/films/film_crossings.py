@@ -80,6 +80,13 @@ def crossing_moments(
     return found
 
 
+def barycentric(points: Array, x: Array) -> Array:
+    """Barycentric coordinates (pieces, points, vertices) in facets (pieces, vertices, dim), constant along normals."""
+    edges, away = x[:, 1:] - x[:, :1], points - x[:, :1]
+    inner = np.swapaxes(np.linalg.solve(edges @ np.swapaxes(edges, 1, 2), edges @ np.swapaxes(away, 1, 2)), 1, 2)
+    return np.concatenate([1.0 - inner.sum(axis=2, keepdims=True), inner], axis=2)
+
+
 def _line(height: Array, counts: NDArray[np.bool_]) -> tuple[NDArray[np.int64], Array]:
     """Facets that a plane crosses, and barycentric coordinates of the ends of the line, shape (facets, 2, vertices).
 

@@ -23,7 +23,7 @@ from solvers.api import Array
 from solvers.fluid.background.grid import DistributedGrid
 from solvers.fluid.cutting.cut import Cut
 from solvers.fluid.cutting.weights import Weights
-from solvers.fluid.films.film_crossings import crossing_moments, open_sides
+from solvers.fluid.films.film_crossings import barycentric, crossing_moments, open_sides
 from solvers.fluid.interface import InterfaceTerms
 from solvers.fluid.shape import normal_derivative
 
@@ -98,7 +98,7 @@ def _blocks(
     pressure, dp = np.einsum("qa,na->nq", psi, p), np.einsum("nqaj,na->nqj", q1, p)
     ddp = np.einsum("nqakj,na->nqkj", q2, p)
     stress, dstress = mu * (du + np.swapaxes(du, 2, 3)), mu * (ddu + np.swapaxes(ddu, 2, 3))
-    lam = _barycentric(origin[:, None] + rule.reference * sizes[:, None], x)
+    lam = barycentric(origin[:, None] + rule.reference * sizes[:, None], x)
     w = u - np.einsum("nqb,nbi->nqi", lam, velocity[at.corners[some]])
     crossings = crossing_moments(x, n, origin, sizes, rule.reference, sides)
 
@@ -213,10 +213,3 @@ def _slopes(values: Array, slopes: Array, sizes: Array) -> tuple[Array, Array]:
     second = np.einsum("qck,caj->qakj", slopes, np.einsum("cp,paj->caj", np.linalg.pinv(values), slopes))
     first = slopes / sizes[:, None, None]
     return first, second / (sizes[:, None, None, :, None] * sizes[:, None, None, None])
-
-
-def _barycentric(points: Array, x: Array) -> Array:
-    """Barycentric coordinates (pieces, points, vertices) in facets (pieces, vertices, dim), constant along normals."""
-    edges, away = x[:, 1:] - x[:, :1], points - x[:, :1]
-    inner = np.swapaxes(np.linalg.solve(edges @ np.swapaxes(edges, 1, 2), edges @ np.swapaxes(away, 1, 2)), 1, 2)
-    return np.concatenate([1.0 - inner.sum(axis=2, keepdims=True), inner], axis=2)
