@@ -31,9 +31,8 @@ from solvers.fluid.forms import TRACE, Penalties
 from solvers.fluid.interface import InterfaceTerms, MotionOperator
 from solvers.fluid.shape import normal_derivative
 
-
-#: Extent of a facet, in motions, from which on the end of a surface stays on it. Newton iterations of `torus_wall` on 8 x
-#: 8 x 13 cells: with 1 they cycle in contact, with 3, 10, 100 and 1,000 a run takes 231, 235, 242 and 249, without
+#: Extent of a facet, in motions, from which on the end of a surface stays on it. Newton's method cycles in contact with
+#: 1; with 3, 10, 100 and 1,000 `torus_wall` on 8 x 8 x 13 cells takes 231, 235, 242 and 249 iterations in all, without
 #: this derivative 265.
 FAR = 10.0
 
