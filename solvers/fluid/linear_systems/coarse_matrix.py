@@ -15,6 +15,7 @@ from petsc4py import PETSc
 
 from solvers import kernels
 from solvers.api import Array
+from solvers.fluid.linear_systems.matrix import quick_copy
 from solvers.petsc_blocks import SharedBlockRows, shared_block_rows
 
 
@@ -94,8 +95,7 @@ class _Blocks:
         )  # fmt: skip
         matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)  # rows at the boundary of a process
         self._add(matrix)
-        # its copy multiplies by BLAS, see `FlowSystem`
-        self._matrix = matrix.duplicate(copy=True)
+        self._matrix = quick_copy(matrix)
         self._matrix.setOption(PETSc.Mat.Option.ROW_ORIENTED, False)
 
     def update(self, fine: SharedBlockRows, free: Array) -> PETSc.Mat:
