@@ -70,7 +70,7 @@ def test_exact_where_the_stress_is_constant(dim, slip, layer):
 
 
 def errors(dim, *, shape=True, mu=0.05, **more):
-    """Relative errors in a flow across a body, in cells of a fifth: of momentum rows, of continuity rows, of the force."""
+    """Relative errors of momentum rows, continuity rows and force in a flow across a body, in cells of a fifth."""
     inflow = field(*[lambda x, y, *zt: 2.0 + y, 0.3, 0.0][:dim])
     sides = ("y-", "y+", "z-", "z+")[: 2 * dim - 2]
     patches = [
