@@ -5,8 +5,7 @@ whose velocity is g = alpha d - ..., rows r and force f of the flow change by
 
     dr = (alpha C + S) dd,    df = C^T S dw - (alpha M + S_f) dd.
 
-In films S and S_f are those of `film_shape`. Those of `cut_shape` are taken in first-degree flows in time without slip
-and layers.
+In films S and S_f are those of `film_shape`. Those of `cut_shape` are taken in first-degree flows in time.
 """
 
 from __future__ import annotations

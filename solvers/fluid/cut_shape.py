@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from solvers import kernels
 from solvers.api import Array
 from solvers.fluid.background.grid import DistributedGrid
+from solvers.fluid.compliant_shape import PenaltyChanges, compliant_terms, layer_by_motion
 from solvers.fluid.cutting.cut import Cut
 from solvers.fluid.cutting.weights import Weights
 from solvers.fluid.films.film_crossings import barycentric, crossing_moments
@@ -82,22 +83,30 @@ def cut_derivatives(
     w = both[:, :dim] - np.einsum("pc,pck->pk", share, velocity)
     stress = mu * (du + np.swapaxes(du, 1, 2)) - both[:, dim, None, None] * identity
     load = (stress @ n[:, :, None] - at.penalty @ w[:, :, None])[..., 0]
+    changes = _penalty_changes(at, velocity.mean(axis=1) * state.convection, slope, state, state.gaps.lengths(local))
+    more = compliant_terms(at, mu * (du + np.swapaxes(du, 1, 2)), w, slope, changes)
+    of_slip = du
+    if more is not None:
+        load, of_slip = load - more.load, du - more.gradient @ du
     dload = -(at.penalty @ du) - n[:, :, None] * dp[:, None]
     fields = np.empty((pieces, 1 + dim, dim, dim))
     fields[:, 0] = -dload
-    fields[:, 1:] = -load[:, None, :, None] * identity[:, None] - mu * n[:, None, :, None] * du[:, :, None]
-    fields[:, 1:] -= mu * n[:, :, None, None] * du[:, None]
+    fields[:, 1:] = -load[:, None, :, None] * identity[:, None] - mu * n[:, None, :, None] * of_slip[:, :, None]
+    fields[:, 1:] -= mu * n[:, :, None, None] * of_slip[:, None]
     operator = MotionOperator(fields, -np.einsum("pkj,pk->pj", du, n))
 
     of_load = (stress @ slope.reshape(pieces, dim, dim * dim)).reshape(slope.shape)
-    reduced = state.gaps.lengths(local)
-    of_load -= _penalty_by_motion(at, velocity.mean(axis=1) * state.convection, slope, w, state, reduced)
+    of_load -= _penalty_by_motion(at, slope, w, changes)
+    if more is not None:
+        of_load -= more.by_motion
     by_motion = np.empty((pieces, dim, dim, dim + 1))
     by_motion[..., :dim] = of_load.transpose(0, 2, 3, 1)
     by_motion[..., dim] = np.einsum("pk,pkcj->pcj", w, slope)
     rows = np.empty((pieces, density.shape[2], *by_motion.shape[1:]))
     leak = np.einsum("pk,pk->p", w, n)
     kernels.surface_rows(moments, density, of_cell, n, at.fields, by_motion, leak, rows)
+    if at.mobility is not None:
+        rows[..., dim] += layer_by_motion(at, dp, slope)
 
     force = -at.mass_of_pieces[..., None, None] * dload[:, None, None]
     force -= area[:, :, None, None, None] * np.swapaxes(of_load, 1, 2)[:, None]
@@ -138,26 +147,31 @@ def _means(at: InterfaceTerms, flow: Array) -> tuple[Array, Array]:
     return means[..., 0], means[..., 1:]
 
 
-def _penalty_by_motion(at: InterfaceTerms, g: Array, slope: Array, w: Array, state: FlowTerms, reduced: Array) -> Array:
-    """d(P ds) w / ds by the motion of vertices, (pieces, k, c, j), with P of `nitsche.penalties`.
+def _penalty_changes(at: InterfaceTerms, g: Array, slope: Array, state: FlowTerms, reduced: Array) -> PenaltyChanges:
+    """Derivatives of s and s_n of `nitsche.penalties` by the motion of vertices.
 
-    g: mean velocity of each facet where there is convection; slope: of `normal_derivative`; w: mean of u - g.
+    g: mean velocity of each facet where there is convection; slope: of `normal_derivative`.
     """
     n, dim, factors = at.n, at.dim, state.penalties
-    stretch = np.einsum("pk,pkcj->pcj", n, slope)
-    turn = slope - n[:, :, None, None] * stretch[:, None]
-    total = np.einsum("pk,pkl,pl->p", n, at.penalty, n)
-    along = total - (np.einsum("pkk->p", at.penalty) - total) / (dim - 1)
+    turn = slope - n[:, :, None, None] * np.einsum("pk,pkcj->pcj", n, slope)[:, None]
     h = 1.0 / np.linalg.norm(n / at.sizes, axis=1)[:, None, None]
     dh = -(h**3) * np.einsum("pk,pkcj->pcj", n / at.sizes**2, turn)
     inflow = state.density * (np.einsum("pk,pk->p", g, n) < 0.0)[:, None, None]
     ds = -factors.nitsche * at.mu * TRACE[dim, 1] / (reduced[:, None, None] * h**2) * dh
     ds -= inflow * (np.einsum("pk,pkcj->pcj", g, turn) + state.alpha / dim * n[:, None])
-    normal = state.density * factors.mass * state.alpha * dh
+    return PenaltyChanges(turn, ds, state.density * factors.mass * state.alpha * dh)
+
+
+def _penalty_by_motion(at: InterfaceTerms, slope: Array, w: Array, changes: PenaltyChanges) -> Array:
+    """d(P ds) w / ds by the motion of vertices, (pieces, k, c, j), with the parts of P held; w: mean of u - g."""
+    n, dim, turn = at.n, at.dim, changes.turn
+    stretch = np.einsum("pk,pkcj->pcj", n, slope)
+    total = np.einsum("pk,pkl,pl->p", n, at.penalty, n)
+    along = total - (np.einsum("pkk->p", at.penalty) - total) / (dim - 1)
     w_n, w_turn = (w * n).sum(axis=1)[:, None, None, None], np.einsum("pl,plcj->pcj", w, turn)[:, None]
     of_n = n[:, :, None, None]
-    found = (w[:, None] @ at.penalty)[:, 0, :, None, None] * stretch[:, None] + w[..., None, None] * ds[:, None]
-    return found + along[:, None, None, None] * (turn * w_n + of_n * w_turn) + of_n * normal[:, None] * w_n
+    found = (w[:, None] @ at.penalty)[:, 0, :, None, None] * stretch[:, None] + w[..., None, None] * changes.s[:, None]
+    return found + along[:, None, None, None] * (turn * w_n + of_n * w_turn) + of_n * changes.normal[:, None] * w_n
 
 
 def _density(cells: NDArray, u: NDArray, p: NDArray, sizes: Array, mu: float, rule: Weights, state: FlowTerms) -> Array:

@@ -274,12 +274,12 @@ class FlowSystem:
     def shape_derivatives(self, *, improved: bool) -> FilmDerivatives | CutDerivatives | None:
         """Derivatives by the motion of surfaces: of first-degree flows in time, or in films (collective).
 
-        None with slip, in steady first-degree flows, where the first increments would be too large, and without films.
-        improved: the step has an increment; before, there are no derivatives in films.
+        None in steady first-degree flows, where the first increments would be too large, with slip in films, and
+        without films. improved: the step has an increment; before, there are no derivatives in films.
         """
         at, cut, settings, degree = self.interface, self.cut, self.settings, self.settings.degree
         assert cut is not None
-        if at.slips or (not improved if degree > 1 else settings.steady or at.mobility is not None):
+        if (at.slips or not improved) if degree > 1 else settings.steady:
             return None
         rate = np.zeros(self.unknowns.local) if settings.steady else self.history.x.array
         if settings.body_force is not None:
@@ -289,7 +289,8 @@ class FlowSystem:
             return film_derivatives(at, self.weights, self.grid, cut, FilmFlow(flow, rate, density, alpha))
         scale, convection = self._scale_velocity.x.array * settings.convection, settings.convection
         assert self.gaps is not None
-        moved = self._moved if improved else np.inf
+        # with fluid pressure in closed contact the zone ends where the flow does, and their pressures cancel
+        moved = self._moved if improved and self.may_close is None else np.inf
         state = FlowTerms(flow, rate, scale, density, alpha, convection, settings.penalties, self.gaps, moved)
         return cut_derivatives(at, self.weights, self.grid, cut, state)
 

@@ -179,11 +179,11 @@ class Structure:
     def load(self, force: Array) -> None:
         """Set the forces [N] of another field at the end of the step, at owned dofs."""
         self.now.surface[:] = force
-        if self.constraint is not None:
-            self.constraint.begin_solve()
 
     def solve(self) -> StepInfo:
         """Newton's method to the tolerance. Raises StepFailed."""
+        if self.constraint is not None:
+            self.constraint.begin_solve()  # other loads may have chosen the earlier sets
         try:
             info = converge(self, self.settings.newton)
         except StepFailed as failure:

@@ -197,3 +197,13 @@ def test_sets_of_other_loads_are_no_cycle():
         active_set.begin_solve()
         assert update(active_set, [-1], [0], ALL[:1], ONE[:1]) == [False]
     assert active_set.changes == 6 * MAX_RECURRENCES
+
+
+def test_loads_between_iterates_forget_no_set():
+    """A monolithic iteration sets a load in each iterate of its one solve; `solve` of the structure begins anew."""
+    structure, contact, _ = press(SHAPES["ring"](), plane(2, -1.02))
+    contact.active_set.damping = 0.1  # as after a return
+    structure.load(np.zeros(structure.layout.size))
+    assert contact.active_set.damping == 0.1
+    structure.solve()
+    assert contact.active_set.damping == 1.0
