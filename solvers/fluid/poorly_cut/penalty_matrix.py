@@ -1,4 +1,4 @@
-"""The matrix of the ghost penalty: it has rows near surfaces alone, and is added to that of the flow, which has more."""
+"""The matrix of the ghost penalty: it has rows near surfaces alone and is added to that of the flow, which has more."""
 
 from __future__ import annotations
 
