@@ -30,6 +30,7 @@ from solvers import linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.lagged import Lagged, LaggedFactors
 from solvers.newton import Tolerance, converge
+from solvers.petsc_python import free_deleted
 from solvers.rounding import rounding_error
 from solvers.rows import Numbering, distributed, from_entries, gather
 from solvers.sparse import Sparse
@@ -197,7 +198,7 @@ class Monolithic:
             self._of_flow = self._derivatives_of_flow()
         A, into_flow, into_solid, mass = self._of_flow
         with flow.timer("coupling"):
-            PETSc.garbage_cleanup(K.comm)  # frees the K of earlier iterates; no solver has this communicator
+            free_deleted(K.comm)  # frees the K of earlier iterates; no solver has this communicator
             K = K.copy()
             K.axpy(1.0, mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
             solid.add_rounding(rounding_error(into_solid, flow.rounded()))

@@ -11,6 +11,7 @@ from petsc4py import PETSc
 from solvers import unlocked
 from solvers.counted import counted
 from solvers.gauss_seidel import GaussSeidel
+from solvers.petsc_python import free_deleted
 from solvers.rounding import random_signs
 
 Method = Literal["auto", "direct", "iterative", "ilu"]
@@ -318,9 +319,8 @@ def solve(
     """
     if ksp.getOptionsPrefix() == "elastic_":
         ksp.setPC(_multigrid(ksp.comm))
-    # PETSc frees objects that Python has deleted only in this collective call, for each communicator
     for comm in (ksp.comm, matrix.comm):
-        PETSc.garbage_cleanup(comm)
+        free_deleted(comm)
     ksp.setOperators(matrix, preconditioned_by)
     unlocked.solve(ksp, b, x)
     reason = ksp.getConvergedReason()

@@ -10,6 +10,17 @@ from petsc4py import PETSc
 from solvers.unlocked import petsc_library
 
 _alive: dict[int, type] = {}  # those of this process, by their addresses
+_freed: list[PythonContext] = []  # contexts of objects that PETSc has freed
+
+
+def free_deleted(comm: PETSc.Comm) -> None:
+    """Free the objects of PETSc that Python has deleted on a communicator; PETSc does so in no other call (collective).
+
+    Freeing may delete contexts, and what they hold is deleted with them. PETSc loses objects that are deleted within
+    the call, with their memory, so they are deleted after it, and freed in the next call.
+    """
+    PETSc.garbage_cleanup(comm)
+    _freed.clear()
 
 
 class PythonContext:
@@ -22,6 +33,7 @@ class PythonContext:
     def destroy(self, owner: PETSc.Object) -> None:
         """Called by petsc4py when the object is freed."""
         _alive.pop(owner.handle, None)
+        _freed.append(self)
 
 
 @atexit.register

@@ -94,7 +94,6 @@ def _restore_continuity(fluid: Regridded, changed: NDArray[np.int64], t: float, 
     rows = nodes.dofs[: nodes.owned, 0][np.isin(nodes.numbers[: nodes.owned], changed)]
     step = fluid.current = FlowStep(t, dt, history.difference(dt))
     fluid.prescribe(t)
-    fluid.linear_solver.begin_step()
     fluid.move({body.surface.name: motion for body, motion in fluid.moved() if body.motion is None})
     middle = 0.5 * (last.velocity + earlier.velocity)
     fluid.flow[:] = np.where(mask, middle, flow - 0.5 * history.pressure_change)
@@ -103,7 +102,11 @@ def _restore_continuity(fluid: Regridded, changed: NDArray[np.int64], t: float, 
     of_changed = np.zeros(fluid.unknowns.owned)
     of_changed[rows] = fluid.residual_rows[rows]
     fluid.residual_rows = of_changed
-    fluid.advance()
+    of_steps, fluid.linear_solver = fluid.linear_solver, fluid.linear_solver.for_sources()
+    try:
+        fluid.advance()
+    finally:
+        fluid.linear_solver = of_steps
     correction = np.where(fluid.system.active_dofs & mask, fluid.flow - middle, 0.0)
     history.past = [replace(past, velocity=past.velocity + correction) for past in history.past]
     fluid.flow[:] = flow + correction

@@ -8,7 +8,11 @@ from solvers.fluid.background.following import Following, RefinedBody, interpola
 from solvers.fluid.background.grid import uniform
 from solvers.fluid.background.nested import RefinedBox, RefinedSurface, refined
 from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.linear_systems import krylov
 from solvers.fluid.probes import Forces
+from solvers.linear import LinearSolveFailed
+from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 
 FACETS = loop(40)
 
@@ -67,6 +71,29 @@ def test_a_linear_flow_does_not_notice(element, scheme):
         assert max(nodal_errors(fluid, velocity, lambda x, t: 0.0 * x[0], 0.0, level=True)) < 1e-10
     assert len(grids) > 3
     assert np.abs(list(force().values())).max() < 1e-10
+
+
+def test_a_correction_that_stalls_leaves_the_solver_of_the_steps(monkeypatch):
+    """Multigrid stalls in the correction: the direct solver follows there, and steps keep incomplete factors."""
+
+    tried = []
+
+    def stalled(comm, *, tolerance):
+        tried.append(tolerance)
+        raise LinearSolveFailed("the linear solver stalled")
+
+    monkeypatch.setattr(krylov.linear, "flexible_solver", stalled)
+    points, disc = moving_disc(velocity=1.25)
+    coarsest = uniform([0, 0], [2, 1], [16, 8])
+    fluid = make_fluid(
+        around(coarsest, points), [wall(field(0.0, 0.0))], [disc], dt=0.04, mu=0.1, scheme="bdf2",
+        following=Following(coarsest, [], [RefinedBody("disc", 5, 1)]),
+        solver=SolverSettings(Tolerance(1e-8), linear="ilu"),
+    )  # fmt: skip
+    for n in range(5):
+        step(fluid, 0.04 * n, 0.04)
+    assert len(tried) == fluid.renewals - 1 > 0
+    assert fluid.sequence.current == "ilu"
 
 
 def towed(element, following, steps):

@@ -32,7 +32,7 @@ class SolverSequence:
     """A sequence of solvers: if the current one fails, the next one replaces it. `position` is part of the state."""
 
     def __init__(self, comm: MPI.Comm, methods: Sequence[linear.FlowMethod], dofs: int, note: Callable[[str], None]):
-        self.comm, self.methods, self._dofs, self._note = comm, methods, dofs, note
+        self.comm, self.methods, self.dofs, self._note = comm, methods, dofs, note
         self.position = 0
 
     @property
@@ -43,7 +43,7 @@ class SolverSequence:
         """Change to the next solver for the rest of the run. Raises LinearSolveFailed if there is none (collective)."""
         if failure.singular or self.position == len(self.methods) - 1:
             raise failure
-        need, free = FACTORS * self._dofs ** (4.0 / 3.0), free_memory(self.comm)
+        need, free = FACTORS * self.dofs ** (4.0 / 3.0), free_memory(self.comm)
         if self.methods[self.position + 1] == "direct" and need > free:
             raise linear.LinearSolveFailed(
                 f"{failure} with {WORDS[self.current]}, and the direct solver would need about {need / 1e9:.3g} GB "
@@ -75,6 +75,17 @@ class FlowSolver:
     def multigrid(self) -> Multigrid:
         """The levels of multigrid (collective)."""
         return Multigrid(self.sequence.comm, self._unknowns)
+
+    def for_sources(self) -> FlowSolver:
+        """A solver for a right-hand side of sources of volume; its failures leave the sequence of the run as it is.
+
+        Their pressure reaches through the whole flow. Incomplete factors stall there, multigrid does not.
+        """
+        sequence = self.sequence
+        rest = sequence.methods[sequence.position :]
+        methods = rest[rest.index("multigrid") :] if "multigrid" in rest else rest
+        own = SolverSequence(sequence.comm, methods, sequence.dofs, lambda message: None)
+        return FlowSolver(self._unknowns, own, self._tolerance, steady=False)
 
     def begin_step(self) -> None:
         """Discard preconditioners of the last step."""
