@@ -17,7 +17,7 @@ namespace division {
 using Point = std::array<double, 3>;
 using Shape = std::vector<Point>;  // corners of a convex polygon in a plane
 
-constexpr double on_plane = 1e-14;  // distance, in cells, up to which a point lies in a plane
+constexpr double on_plane = 1e-14;  // distance, in cells, up to which a point lies in a plane; far below `coplanar`
 constexpr double coplanar = 1e-10;  // the same for polygons, which count as part of the first plane they are in
 constexpr double no_area = 1e-13;   // area, in faces of cells, that is rounding error
 

@@ -26,7 +26,7 @@ namespace division {
 constexpr double nothing = 1e-13;  // volume, in cells, that is rounding error
 constexpr double enclosed = 1e-6;    // volume, in cells, up to which fluid enclosed within a cell counts as solid
 constexpr double close = 1e-9;       // distance, in cells, from the edge of a polygon at which rounding decides
-constexpr double sliver = 1e-8;
+constexpr double sliver = 1e-8;      // height, in cells, of parts whose side of a surface is doubtful; far above `coplanar`
 constexpr double no_passage = 1e-9;  // area, in faces of cells, below which parts of two cells are not linked
 constexpr double no_piece = 1e-15;    // area of a part of a polygon, in faces of cells, that is rounding error
 constexpr double beside = 1e-6;    // distance, in cells, of polygons that a face may be part of from its middle
