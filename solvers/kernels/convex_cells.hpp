@@ -17,7 +17,7 @@ namespace division {
 using Point = std::array<double, 3>;
 using Shape = std::vector<Point>;  // corners of a convex polygon in a plane
 
-constexpr double on_plane = 1e-12;  // distance, in cells, up to which a point lies in a plane
+constexpr double on_plane = 1e-14;  // distance, in cells, up to which a point lies in a plane; far below `coplanar`
 constexpr double coplanar = 1e-10;  // the same for polygons, which count as part of the first plane they are in
 constexpr double no_area = 1e-13;   // area, in faces of cells, that is rounding error
 
@@ -170,12 +170,18 @@ private:
       const bool along = (dot(planes_[faces[f].plane].n, plane.n) > 0.0) == outward;
       int above = -1;  // the face of what is above
       if (low < 0.0 && high > 0.0) {
-        Face other = faces[f];
-        std::erase_if(other.loop, [&](int corner) { return d[corner] < 0.0; });
-        std::erase_if(faces[f].loop, [&](int corner) { return d[corner] > 0.0; });
-        above = static_cast<int>(faces.size());
-        if (const int beyond = outward ? other.above : other.below; beyond >= 0) faces_of[beyond].push_back(above);
-        faces.push_back(std::move(other));
+        auto [upper_loop, lower_loops] = divided(faces[f].loop, d);
+        const int beyond = outward ? faces[f].above : faces[f].below;
+        const auto add = [&](std::vector<int> loop) {
+          Face other = faces[f];
+          other.loop = std::move(loop);
+          if (beyond >= 0) faces_of[beyond].push_back(static_cast<int>(faces.size()));
+          faces.push_back(std::move(other));
+          return static_cast<int>(faces.size()) - 1;
+        };
+        above = add(std::move(upper_loop));
+        for (std::size_t k = 1; k < lower_loops.size(); ++k) faces_of[part].push_back(add(std::move(lower_loops[k])));
+        faces[f].loop = std::move(lower_loops[0]);
       } else if (high > 0.0 || (low == 0.0 && along)) {
         above = f;
       }
@@ -186,6 +192,26 @@ private:
       if (above != f) faces_of[part].push_back(f);
     }
     cover(part, upper, number);
+  }
+
+  // What of a face is above a plane, and what is below; d: offsets of corners, with one in the plane between any two on
+  // different sides. By rounding, a face that nearly lies in the plane may cross it more than twice. Both have the same
+  // edges in the plane nevertheless, so that parts stay closed.
+  static std::pair<std::vector<int>, std::vector<std::vector<int>>> divided(std::vector<int> loop, const std::vector<double>& d) {
+    std::rotate(loop.begin(), std::find_if(loop.begin(), loop.end(), [&](int corner) { return d[corner] > 0.0; }), loop.end());
+    std::vector<int> upper;
+    std::vector<std::vector<int>> lower;
+    for (std::size_t k = 0; k < loop.size(); ++k) {
+      if (d[loop[k]] < 0.0) {
+        std::size_t end = k;  // the last corner below before one above
+        for (std::size_t m = k; m < loop.size() && d[loop[m]] <= 0.0; ++m)
+          if (d[loop[m]] < 0.0) end = m;
+        lower.emplace_back(loop.begin() + static_cast<std::ptrdiff_t>(k) - 1, loop.begin() + static_cast<std::ptrdiff_t>(end) + 2);
+        k = end + 1;
+      }
+      upper.push_back(loop[k]);
+    }
+    return {std::move(upper), std::move(lower)};
   }
 
   // New corners where edges cross a plane, for all faces at these edges.

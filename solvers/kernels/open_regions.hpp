@@ -19,12 +19,14 @@
 #include <vector>
 
 #include "convex_cells.hpp"
+#include "least_surface.hpp"
 
 namespace division {
 
 constexpr double nothing = 1e-13;  // volume, in cells, that is rounding error
 constexpr double enclosed = 1e-6;    // volume, in cells, up to which fluid enclosed within a cell counts as solid
 constexpr double close = 1e-9;       // distance, in cells, from the edge of a polygon at which rounding decides
+constexpr double sliver = 1e-8;      // height, in cells, of parts whose side of a surface is doubtful; far above `coplanar`
 constexpr double no_passage = 1e-9;  // area, in faces of cells, below which parts of two cells are not linked
 constexpr double no_piece = 1e-15;    // area of a part of a polygon, in faces of cells, that is rounding error
 constexpr double beside = 1e-6;    // distance, in cells, of polygons that a face may be part of from its middle
@@ -134,6 +136,7 @@ public:
   Regions regions() {
     Regions found;
     classify(found);
+    settle();
     const int count = parts_->size();
     std::vector<char> open(count);
     for (int p = 0; p < count; ++p) {
@@ -205,6 +208,31 @@ private:
     found.sound = std::abs(input_.fraction - solid - others) < unsound;
     if (others > 0.5)
       for (auto& part : inside_) part.insert(bodies);
+  }
+
+  // Slivers between planes that nearly coincide: their middle does not say on which side of a body they are, because
+  // polygons that nearly lie in one plane count as part of it. The surface takes the shortest way through them. Where it
+  // ran to and fro, penalties would be counted several times.
+  void settle() {
+    const int count = parts_->size(), bodies = 1 + *std::max_element(input_.body.begin(), input_.body.end());
+    std::vector<char> doubtful(count);
+    for (int p = 0; p < count; ++p) {
+      double largest = 0.0;
+      for (const int f : parts_->faces_of[p]) largest = std::max(largest, area(parts_->faces[f].shape));
+      doubtful[p] = parts_->volume(p) < sliver * largest;
+    }
+    std::vector<Border> borders;
+    for (const auto& face : parts_->faces)
+      if (face.above >= 0 && (doubtful[face.below] || doubtful[face.above]))
+        borders.push_back({face.below, face.above, area(face.shape)});
+    if (borders.empty()) return;
+    for (int b = 0; b < bodies; ++b) {
+      std::vector<int> known(count);
+      for (int p = 0; p < count; ++p) known[p] = doubtful[p] ? -1 : inside_[p].contains(b);
+      const auto inside = least_surface(known, borders, no_piece);
+      for (int p = 0; p < count; ++p)
+        if (doubtful[p]) inside[p] ? (void)inside_[p].insert(b) : (void)inside_[p].erase(b);
+    }
   }
 
   // Whether a point is inside of a body: it is behind the first polygon of it on the way to one of them.

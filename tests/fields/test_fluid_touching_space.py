@@ -97,7 +97,10 @@ def test_two_plates_that_close_a_duct(element):
 
 
 def divided(grid, facets, x, bodies):
-    """Result of the kernel for all cells with surface: (shares of the fluid by cell, largest gap in a boundary)."""
+    """Result of the kernel for all cells with surface: (fluid by cell, largest gap in a boundary, area of surface).
+
+    Shares of the cells, which are cubes, and areas of their faces.
+    """
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
     polygons, lattice = sliced_facets(grid, facets, x), EdgeLattice(grid)
     cells = np.unique(polygons.cell)
@@ -117,12 +120,13 @@ def divided(grid, facets, x, bodies):
     np.add.at(gap, rows[:, 0], 0.5 * np.cross(ways[:, 0], ways[:, 1]))
     fluid = np.clip(1.0 - fraction, 0.0, 1.0)
     fluid[cells] = np.bincount(of, share, len(cells))
-    return fluid, np.abs(gap).max()
+    area = 0.5 * np.linalg.norm(np.cross(ways[:, 0], ways[:, 1]), axis=1)
+    return fluid, np.abs(gap).max(), area[rows[:, 1] < 0].sum()
 
 
-@pytest.mark.parametrize("bend", [0.0, 1e-9, 1e-7, 1e-5, 1e-3])
+@pytest.mark.parametrize("bend", [0.0, 1e-10, 1e-9, 1e-7, 1e-5, 1e-3])
 def test_regions_between_bent_plates(bend):
-    """Facets whose planes nearly coincide: regions are closed, and their volumes are those without the solid."""
+    """Facets whose planes nearly coincide: regions are closed, their volumes and surfaces those without the solid."""
     rng = np.random.default_rng(3)
     count, t = 7, 0.03
     s = np.linspace(-0.3, 0.3, count)
@@ -135,8 +139,10 @@ def test_regions_between_bent_plates(bend):
     for apart in (1e-3, -0.4 * t):
         x = np.concatenate([plate, plate + np.array([t + apart, 0.0, 0.0])]) @ matrix.T + 0.5
         both = np.concatenate([facets, facets + len(plate)])
-        fluid, gap = divided(grid, both, x, np.repeat([0, 1], len(facets)))
+        fluid, gap, area = divided(grid, both, x, np.repeat([0, 1], len(facets)))
         assert gap < 1e-10
+        whole = 0.5 * np.linalg.norm(np.cross(*np.moveaxis(x[both[:, 1:]] - x[both[:, :1]], 1, 0)), axis=1).sum()
+        assert apart < 0.0 or area * 0.2**2 == pytest.approx(whole, rel=1e-8)
         solid = 0.36 * (2.0 * t + min(apart, 0.0))
         assert fluid.sum() / grid.size == pytest.approx(1.0 - solid, abs=1e-9)
 

@@ -23,6 +23,7 @@ from solvers.fluid.background.grid import DistributedGrid
 from solvers.fluid.cutting.cut import Cut
 from solvers.fluid.films.gaps import NarrowGaps
 from solvers.fluid.forms import GapScales
+from solvers.fluid.thin.contact_wedges import beside_contact
 
 Cells = NDArray[np.int32]
 
@@ -47,6 +48,7 @@ class GapTerms:
         self.marked: NDArray[np.bool_] | None = None  #: mask of the local cells in gaps; None: no process has any
         self._gaps: NarrowGaps | None = None
         self._inertia = 0.0  #: rho / dt [Pa s/m^2], zero in steady flow
+        self._beside_contact: Array | None = None  #: factor of `lengths` in local cells, where a contact is closed
         #: number in the box of each cell that was in a gap, sorted, and B [m/s] in it; the same on all processes
         self.memory: Array = np.empty((0, 1 + dim))
 
@@ -58,6 +60,7 @@ class GapTerms:
 
     def set(self, cut: Cut) -> None:
         """Set the gaps to those of a cut (collective)."""
+        self._beside_contact = None if self._grid.sheets is None else beside_contact(self._grid, cut)
         if not self._grid.comm.allreduce(cut.gaps is not None, op=MPI.LOR):
             self.marked = self._gaps = None
             return
@@ -127,7 +130,12 @@ class GapTerms:
         return cells[self.marked[cells]]
 
     def lengths(self, cells: Cells) -> Array:
-        """Factor of the length over which Nitsche's penalty acts, `NarrowGaps.reduced`, in some local cells."""
+        """Factor of the length over which Nitsche's penalty acts in some local cells.
+
+        `NarrowGaps.reduced`, and `beside_contact` on sheets.
+        """
+        if self._beside_contact is not None:
+            return self._beside_contact[cells]
         factor = np.ones(len(cells))
         if self._gaps is not None:
             row, found = _rows(self._gaps.cells, self._grid.numbers[cells])

@@ -15,7 +15,7 @@ which cells share unknowns.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 from types import MappingProxyType
@@ -98,6 +98,8 @@ class Sheets:
     links: Indices  #: cells of the mesh with fluid on both sides of the face between them, shape (n, 2)
     fluid: Array  #: share of fluid in each cell of the mesh
     bounds: Indices  #: (cell of the mesh, facet that bounds its fluid), shape (n, 2)
+    #: cells of the box in which bodies touched when the step began, sorted
+    closed: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def same_unknowns(self, other: Sheets) -> bool:
         """The mesh and what is linked in it are the same, wherever the surface is in the cells."""

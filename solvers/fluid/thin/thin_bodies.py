@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,7 @@ class ThinBodies:
         self._possible: bool | None = None if moving and plain else False
         self._x: Array | None = None
         self._searched = False  #: in this step, without a result: a search takes as long as a tenth of an iterate
+        self._closed: NDArray[np.int64] | None = None  #: `Sheets.closed` of this step; None: it has no sheets yet
         self._tried: list[Sheets] = []  #: sheets of this step, in their order
         self._joined: dict[int, frozenset[int]] = {}  #: parts that stay joined in this step
 
@@ -82,6 +83,11 @@ class ThinBodies:
             if found is not None and not (self._tried and self._tried[-1].same_unknowns(found)):
                 self._tried.append(found)
             self._sheets, self._x, self.follows, self._searched = found, motion.x, found is not None, True
+        if self._sheets is not None:
+            if self._closed is None:
+                self._closed = self._sheets.touching
+            if not np.array_equal(self._sheets.closed, self._closed):
+                self._sheets = replace(self._sheets, closed=self._closed)
         return self._sheets
 
     def _find(self, facets: NDArray[np.int64], x: Array) -> Sheets | None:
@@ -97,7 +103,7 @@ class ThinBodies:
 
     def begin_step(self) -> None:
         """Forget the sheets of the last step, and search once for thin bodies if there has been none."""
-        self._tried, self._searched = [], False
+        self._tried, self._searched, self._closed = [], False, None
         if self._joined:
             self._joined, self._x = {}, None
 

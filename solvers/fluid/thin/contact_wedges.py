@@ -1,0 +1,43 @@
+"""Wedges of fluid beside closed contact of thin bodies: the length over which Nitsche's penalty acts, with `q1q1`.
+
+A linear velocity s x across a film of the height g between two walls of the area A has the viscous energy mu s^2 g A.
+The other terms of Nitsche's method take away 2 mu s^2 g A and the penalty k mu / h adds k mu s^2 g^2 A / (2 h). So
+the form is positive for k g > 2 h only, unless the ghost penalty holds the film's nodes by a well-cut cell nearby. The
+sides of thin bodies have unknowns of their own, and a wedge between two of them has no such cell: its nodes reach
+1,000 times the velocity of the flow, and Newton's method goes to and fro. With the penalty k mu / g, as in
+`films.gaps`, the form is positive at any height.
+
+It acts in 3D, in cells in which bodies touched when the step began. Before, a film leaves by the slip that the lower
+penalty allows: linear velocities have no other flow through it. In 2D only the cell of the contact itself is one of
+these, not the rest of the wedge, and with the penalty there alone flaps repeat steps that they do not repeat without.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solvers.api import Array
+from solvers.fluid.background.grid import DistributedGrid
+from solvers.fluid.cutting.cut import Cut
+from solvers.fluid.films.film import LEAST
+
+
+def beside_contact(grid: DistributedGrid, cut: Cut) -> Array | None:
+    """min(g, h) / h in the local cells, at least `LEAST`, and 1 away from contact; None if no contact is closed.
+
+    g = 2 |K| / (A - |int n|) with the fluid |K| of a cell and its surface, of the area A: the height of a film, or the
+    mean one of a wedge, and infinite at a plane. h: shortest edge of the cell.
+    """
+    assert grid.sheets is not None
+    if grid.dim == 2 or not len(grid.sheets.closed):
+        return None
+    pieces, sizes, count = cut.pieces, grid.sizes[cut.cut], len(cut.cut)
+    area = pieces.area.sum(axis=1)
+    net = np.stack([np.bincount(pieces.cell, area * n, count) for n in pieces.normal.T], axis=1)
+    facing = np.bincount(pieces.cell, area, count) - np.linalg.norm(net, axis=1)
+    twice, h = 2.0 * cut.fraction[cut.cut] * sizes.prod(axis=1), sizes.min(axis=1)
+    closed = np.isin(grid.numbers[cut.cut], grid.sheets.closed)
+    found = np.ones(len(grid.numbers))
+    narrow = closed & (facing * h > twice)
+    found[cut.cut[narrow]] = np.maximum(twice[narrow] / (facing * h)[narrow], LEAST)
+    return found
