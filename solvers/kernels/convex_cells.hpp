@@ -171,8 +171,7 @@ private:
       int above = -1;  // the face of what is above
       if (low < 0.0 && high > 0.0) {
         Face other = faces[f];
-        std::erase_if(other.loop, [&](int corner) { return d[corner] < 0.0; });
-        std::erase_if(faces[f].loop, [&](int corner) { return d[corner] > 0.0; });
+        cut(faces[f].loop, other.loop, d);
         above = static_cast<int>(faces.size());
         if (const int beyond = outward ? other.above : other.below; beyond >= 0) faces_of[beyond].push_back(above);
         faces.push_back(std::move(other));
@@ -186,6 +185,17 @@ private:
       if (above != f) faces_of[part].push_back(f);
     }
     cover(part, upper, number);
+  }
+
+  // Divides a loop that crosses a plane once, between the two corners in the plane next to what is above it. Rounding may
+  // put more corners into the plane: they stay below, so that both loops have only the edge between these two in common.
+  static void cut(std::vector<int>& below, std::vector<int>& above, const std::vector<double>& d) {
+    const auto last = std::find_if(below.rbegin(), below.rend(), [&](int corner) { return d[corner] < 0.0; });
+    std::rotate(below.begin(), last.base(), below.end());  // begins after what is below
+    const auto first = std::find_if(below.begin(), below.end(), [&](int corner) { return d[corner] > 0.0; });
+    const auto end = std::find_if(below.rbegin(), below.rend(), [&](int corner) { return d[corner] > 0.0; }).base();
+    above.assign(first - 1, end + 1);
+    below.erase(first, end);
   }
 
   // New corners where edges cross a plane, for all faces at these edges.
