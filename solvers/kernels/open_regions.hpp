@@ -294,11 +294,14 @@ private:
           high = std::max(high, plane.distance(x));
         }
       if (high - low >= gap_) continue;
-      double mine = 0.0, others = 0.0;
+      double mine = 0.0, others = 0.0;  // others face this wall: tops of two bodies beside each other do not
       for (const int f : parts_->faces_of[part]) {
-        if (faces[f].above < 0 || std::abs(dot(planes_[faces[f].plane].n, plane.n)) < 0.5) continue;
+        if (faces[f].above < 0) continue;
+        const double along = dot(outward(f, part), outward(wall, part));
         const auto& there = inside_[other(f, part)];
-        if (!there.empty()) (there == inside_[other(wall, part)] ? mine : others) += area(faces[f].shape);
+        if (there.empty()) continue;
+        if (const bool same = there == inside_[other(wall, part)]; same && along > 0.5) mine += area(faces[f].shape);
+        else if (!same && along < -0.5) others += area(faces[f].shape);
       }
       if (std::min(mine, others) > 0.25 * largest) return true;
     }
@@ -319,6 +322,12 @@ private:
 
   int other(int number, int part) const {
     return parts_->faces[number].below == part ? parts_->faces[number].above : parts_->faces[number].below;
+  }
+
+  // Normal of a face out of a part.
+  Point outward(int number, int part) const {
+    const Point& n = planes_[parts_->faces[number].plane].n;
+    return parts_->faces[number].below == part ? n : Point{-n[0], -n[1], -n[2]};
   }
 
   int nearest(const Point& x) const {

@@ -147,6 +147,24 @@ def test_regions_between_bent_plates(bend):
         assert fluid.sum() / grid.size == pytest.approx(1.0 - solid, abs=1e-9)
 
 
+@pytest.mark.parametrize("bend", [1e-8, 1e-7])
+@pytest.mark.parametrize("count", [21, 31])
+def test_regions_at_a_plate_of_small_facets(count, bend):
+    """Up to three facets along a cell, bent so little that rounding decides where planes meet: the volume is right."""
+    y, z = np.meshgrid(*[np.linspace(-0.9, 0.9, count)] * 2, indexing="ij")
+    grid = uniform([0, 0, 0], [1, 1, 1], [5, 5, 5])
+    for draw in range(6):
+        rng = np.random.default_rng(draw)
+        ways = rng.uniform(-2.0, 2.0, (2, 2, 1, 1))
+        off = bend * np.sin(ways[0] * y + ways[1] * z + 1.0).sum(axis=0).ravel()
+        sheet = [np.stack([shift + off, y.ravel(), z.ravel()], axis=1) for shift in (0.0, 0.06)]
+        plate, facets = closed_plate(np.concatenate(sheet), count)
+        matrix = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        matrix *= np.sign(np.linalg.det(matrix))
+        x = plate @ matrix.T + rng.uniform(0.4, 0.6, 3)
+        assert divided(grid, facets, x, np.zeros(len(facets), dtype=int))[1] < 1e-10
+
+
 def closed_plate(points, count):
     """(points, facets) of a plate: two sides of count^2 points each, and its rim."""
     number = np.arange(count * count).reshape(count, count)
