@@ -22,7 +22,6 @@ Mask = NDArray[np.bool_]
 Part = Region | SpacePart
 
 AROUND = 3  #: layers of cells around surfaces in which parts and links are found
-SLIVER = 2  #: in 3D, cells in each direction within which fluid enclosed by bodies that touch counts as solid
 
 
 def parts_of_fluid(grid: Grid, moments, facets: Indices, x: Array, bounds: Mask) -> tuple[list[Region], Mask, Indices]:
@@ -54,26 +53,6 @@ def parts_of_fluid(grid: Grid, moments, facets: Indices, x: Array, bounds: Mask)
             whole[cell] = False
     found += [Region(int(cell), float(fluid[cell]), WHOLE) for cell in np.flatnonzero(whole)]
     return sorted(found, key=lambda region: region.cell), special, np.array(touching, dtype=np.int64)
-
-
-def without_slivers(grid: Grid, parts: list[Region], links: Indices, touching: Indices) -> tuple[list[Region], Indices]:
-    """Without fluid that bodies which touch enclose within SLIVER cells in each direction: it counts as solid."""
-    if not len(touching):
-        return parts, links
-    group = connected_parts(links[:, 0], links[:, 1], len(parts))
-    cells = np.array([part.cell for part in parts])
-    index = np.stack(np.unravel_index(cells, grid.shape, order="F"), axis=1)
-    low, high = np.full((len(parts), grid.dim), np.iinfo(np.int64).max), np.full((len(parts), grid.dim), -1)
-    np.minimum.at(low, group, index)
-    np.maximum.at(high, group, index)
-    small = (high - low < SLIVER).all(axis=1)
-    touched = np.zeros(len(parts), dtype=bool)
-    np.logical_or.at(touched, group, np.isin(cells, touching))
-    kept = ~(small & touched)[group]
-    number = np.cumsum(kept) - 1
-    links = links[kept[links[:, 0]]].copy()
-    links[:, :2] = number[links[:, :2]]
-    return [part for part, is_kept in zip(parts, kept, strict=True) if is_kept], links
 
 
 def links_of(grid: Grid, parts: Sequence[Region]) -> Indices:

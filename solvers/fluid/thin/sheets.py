@@ -30,7 +30,7 @@ from solvers.connected import connected_parts
 from solvers.fluid.background.box import Grid
 from solvers.fluid.cutting.pieces import in_planes
 from solvers.fluid.thin.sheet_nodes import Joined, node_copies, same_nodes
-from solvers.fluid.thin.sheet_parts import AROUND, Part, facing_of, grown, links_of, parts_of_fluid, without_slivers
+from solvers.fluid.thin.sheet_parts import AROUND, Part, facing_of, grown, links_of, parts_of_fluid
 from solvers.fluid.thin.sliced_facets import ragged
 from solvers.fluid.thin.space_parts import parts_in_space
 from solvers.fluid.thin.thickness import AROUND_PAIR, THIN
@@ -250,7 +250,6 @@ def find_sheets(
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
     if grid.dim == 3:
         parts, links, special, touching = parts_in_space(grid, moments, facets, x, AROUND)
-        parts, links = without_slivers(grid, parts, links, touching)
     else:
         parts, special, touching = parts_of_fluid(grid, moments, facets, x, bounds)
         links = links_of(grid, parts)
