@@ -18,6 +18,9 @@ from solvers.fluid.thin.thickness import free_length
 MOST_CELLS_PER_STEP = 10.0  #: above which `check` warns: cells that a flow or a body crosses in a time step
 #: Cells across a body that both of its sides need to share no unknowns: with fewer, fluid passes through the body.
 CELLS_ACROSS_AT_REST, CELLS_ACROSS_IF_MOVING = 2.0, 4.0
+#: Cells across up to which bodies in contact have unknowns of each side, by dimension: `THICK_IN_CONTACT` of the flow,
+#: which a check of a case does not import.
+CELLS_ACROSS_IN_CONTACT = {2: CELLS_ACROSS_AT_REST, 3: 1.0}
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
 
 
@@ -99,8 +102,7 @@ def thin_body(case: Case, fluid: FluidSection, extent: float, length: float, *, 
             return None
         why = f"if all of its edges are in the fluid, some passes through {body} with less than"
         return f"{size}, and {length / smallest:.2g} of them long: {why} {2.0 * free / smallest:.3g} cells along"
-    in_contact = CELLS_ACROSS_AT_REST if fluid.grid.dimension == 2 else 1.0
-    if separate and extent < in_contact * smallest:
+    if separate and extent < CELLS_ACROSS_IN_CONTACT[fluid.grid.dimension] * smallest:
         return f"{size}: nothing passes through it, but where it is in contact and opens again, steps may fail"
     if extent >= least * smallest:
         return None

@@ -406,8 +406,9 @@ class FlowSystem:
         fem.add_ghosts(self.unknowns.space, self._out)
         owned = self.unknowns.owned
         rows = self._out[:owned]
-        rows = rows.copy() if self._hanging is None else self._hanging.table.rows(rows)
-        return rows if self.penalty is None else rows + self.penalty.times(self.flow.x.array[:owned])
+        if self._hanging is not None:
+            rows = self._hanging.table.rows(rows)
+        return rows.copy() if self.penalty is None else rows + self.penalty.times(self.flow.x.array[:owned])
 
     def tangent(self, identity: Array, *, picard: bool) -> PETSc.Mat:
         """d(residual)/d(flow), with rows of the identity at the marked owned dofs; the next call overwrites it.

@@ -7,6 +7,7 @@ import pytest
 from fluid_setup import block, body, field, make_fluid, step, turned
 from programs import fsci
 
+from fsci.case.plausible_flow import CELLS_ACROSS_IN_CONTACT
 from fsci.run.history import read_history
 from solvers.api import StepFailed
 from solvers.distributed import gather, scatter
@@ -16,7 +17,7 @@ from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.cutting.cut import off_boundary
 from solvers.fluid.thin.sheet_transfer import along_surface, transfer
 from solvers.fluid.thin.sheets import find_sheets
-from solvers.fluid.thin.thin_bodies import ThinBodies, may_be_thin
+from solvers.fluid.thin.thin_bodies import THICK_IN_CONTACT, ThinBodies, may_be_thin
 
 THICKNESS = [1e-3, 0.2, 1.0, 1.5, 3.0]  # in cells
 DRAWS = (range(1), pytest.param(range(1, 10), marks=pytest.mark.slow))
@@ -87,6 +88,10 @@ def test_plate_that_moves_too_far():
 
 def sheets_at(grid, facets, x):
     return find_sheets(grid, facets, x, off_boundary(grid, x[facets]), always=True)
+
+
+def test_a_check_knows_the_thickness_in_contact():
+    assert CELLS_ACROSS_IN_CONTACT == THICK_IN_CONTACT
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -150,7 +150,7 @@ def test_regions_between_bent_plates(bend):
 @pytest.mark.parametrize("bend", [1e-8, 1e-7])
 @pytest.mark.parametrize("count", [21, 31])
 def test_regions_at_a_plate_of_small_facets(count, bend):
-    """Up to three facets along a cell, bent so little that rounding decides where planes meet: the volume is right."""
+    """Up to three facets along a cell, bent so little that rounding decides where planes meet: regions are closed."""
     y, z = np.meshgrid(*[np.linspace(-0.9, 0.9, count)] * 2, indexing="ij")
     grid = uniform([0, 0, 0], [1, 1, 1], [5, 5, 5])
     for draw in range(6):
