@@ -156,8 +156,7 @@ def rows(what: str, flow: Fluid, step: Callable[[int], int], steps: int) -> list
     step(0)
     with measured() as parts:
         newton = sum(step(number) for number in range(1, steps + 1))
-    matrix = flow.system._matrix
-    assert matrix is not None
+    matrix = flow.system.matrix.values
     size, entries = flow.dofs(), matrix.getInfo()["nz_used"]
     passes = {
         "assembly": 2.0 * newton,  # read and written

@@ -11,6 +11,7 @@ from solvers import fem
 from solvers.fluid import forms, nitsche
 from solvers.fluid.background.space import Unknowns
 from solvers.fluid.cutting.weights import Weights
+from solvers.fluid.flow_settings import FlowSettings
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,25 @@ class CellForms:
     def integrals(self) -> list[fem.Integral]:
         """Forms to compile at the start; those of films are compiled when a film appears."""
         return [*self.residuals[:2], *self.tangents[:2]]
+
+
+def coefficients(
+    domain: fem.Domain, settings: FlowSettings, a: Any, history: Any, force: Any, *, alpha: Any, newton: Any
+) -> forms.Coefficients:
+    """Coefficients of the terms of a flow: functions a [m/s], history [m/s^2] and force [N/m^3], and its constants."""
+    return forms.Coefficients(
+        rho=fem.constant(domain, settings.density),
+        mu=fem.constant(domain, settings.viscosity),
+        alpha=alpha,
+        a=a,
+        newton=newton,
+        history=history,
+        force=forms.nothing(domain.dim) if settings.body_force is None else force,
+        convection=settings.convection,
+        steady=settings.steady,
+        degree=settings.degree,
+        mesh=domain.mesh.ufl_domain(),
+    )
 
 
 def cell_forms(

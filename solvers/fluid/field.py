@@ -18,10 +18,8 @@ from petsc4py import PETSc
 
 from solvers import fem, linear
 from solvers.api import Array, State, StepFailed, StepInfo
-from solvers.distributed import everywhere, scatter
 from solvers.fluid.background.following import Following
 from solvers.fluid.background.grid import Grid
-from solvers.fluid.background.nested import Nested
 from solvers.fluid.background.space import set_velocity
 from solvers.fluid.balances import Balances
 from solvers.fluid.behind import BehindWalls
@@ -39,11 +37,12 @@ from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.history import History
 from solvers.fluid.linear_systems.krylov import FlowSolver, SolverSequence
 from solvers.fluid.regrid import follow_bodies
-from solvers.fluid.saved import nodal_state, set_nodal_state
+from solvers.fluid.saved import restore_state, saved_state
 from solvers.fluid.steady_iteration import SteadyIteration
 from solvers.fluid.system import FlowSystem
+from solvers.fluid.thin.follow_sheets import follow_sheets
 from solvers.fluid.thin.sheets import Sheets
-from solvers.fluid.thin.thin_bodies import Began, ThinBodies, carry
+from solvers.fluid.thin.thin_bodies import Began, ThinBodies
 from solvers.fluid.time_scheme import STEADY, FlowStep
 from solvers.largest import position_of_largest
 from solvers.newton import converge
@@ -73,7 +72,7 @@ class Fluid:
         """following: how nested cells follow bodies; None: they stay."""
         self.comm, self.settings, self.solver, self.timer = comm, settings, solver, timer or Timer()
         self.bodies, self.dim, self.box, self._patches = list(bodies), grid.dim, grid, patches
-        self._following = following
+        self.following = following
         periodic = bool(periodic_axes(patches))
         sheets = None if periodic else sheets_of(grid, self.bodies)
         self.thin = ThinBodies(grid, self.bodies, periodic, sheets)
@@ -84,12 +83,11 @@ class Fluid:
         self.discretise(sheets)
         self.history = History(settings.time, self.unknowns.local)
         self.current = FlowStep(0.0, 0.0, STEADY)  #: the step that is computed now or was last
-        self._began: Began | None = None  #: state at the beginning of the present step
-        self._pressure: Array | None = None  #: at local dofs [Pa] then, zero where there was none
+        self.began: Began | None = None  #: state at the beginning of the present step
         #: Newton's method has made an increment in this step. Before the first one, the pressure of films belongs to
         #: their last height; the derivative in `film_shape` is proportional to it, and would move surfaces too far.
         self._improved = False
-        self._prescribed_at = 0.0  #: time [s] of the velocities of the boundary
+        self.prescribed_at = 0.0  #: time [s] of the velocities of the boundary
         self.started = False  #: a step was accepted, hence forces exist
         self.smallest_cell = min(float(np.diff(edge).min()) for edge in grid.edges)
         self.motions: list[Motion] = []
@@ -121,7 +119,7 @@ class Fluid:
         moved = not settings.steady and not all(body.rests for body in self.bodies)
         bounds = moved and settings.degree == 2 and sheets is None
         self._behind: BehindWalls | None = BehindWalls(self.unknowns) if bounds else None
-        self.residual_rows, self._increment, self._diagonal = (np.zeros(owned) for _ in range(3))
+        self.residual_rows, self.increment, self._diagonal = (np.zeros(owned) for _ in range(3))
         self._balances: Balances | None = None
         self.renewals += 1
 
@@ -171,18 +169,18 @@ class Fluid:
 
     def begin_step(self, t: float, dt: float) -> None:
         """Store the state at t; set boundary values, loads and moving bodies at t + dt. Times in [s]."""
-        if self._following is not None:
-            follow_bodies(self, self._following, t, dt)
+        if self.following is not None:
+            follow_bodies(self, self.following, t, dt)
         self.current = FlowStep(t + dt, dt, self.history.difference(dt))
         if self._behind is not None:
             mask = self.unknowns.velocity_mask
             self.flow[mask] = self.history.past[0].velocity[mask]
-        self._pressure = self._present_pressure()
+        self.history.begin_step(self._present_pressure())
         history = tuple(self.history.past)
-        self._began = Began(self.unknowns, self.grid.sheets, self.current, history, tuple(self.motions))
+        self.began = Began(self.unknowns, self.grid.sheets, self.current, history, tuple(self.motions))
         self.thin.begin_step()
         self.cutter.begin_step()
-        self._begin_system(self.current)
+        self.begin_system(self.current)
         self.prescribe(self.current.t)
         self.steady_iteration.begin()
         self._improved = False
@@ -195,14 +193,14 @@ class Fluid:
             self.predict()
             self.move({})
 
-    def _begin_system(self, step: FlowStep) -> None:
+    def begin_system(self, step: FlowStep) -> None:
         """Set loads and history terms of the step."""
         difference, last = step.difference, self.history.past[0].velocity
         self.system.begin_step(step, self.history.rate(difference), self.history.missing(difference), last)
 
     def prescribe(self, t: float) -> None:
         """Set the velocities of the boundary to those at time t [s], until the next step begins."""
-        self._prescribed_at = t
+        self.prescribed_at = t
         self.flow[self.boundary.dofs] = self.boundary.velocity(t)
 
     def _present_pressure(self) -> Array:
@@ -214,18 +212,16 @@ class Fluid:
 
         with_pressure: the pressure, too, for first degree. With second degree, that of films follows their height.
         """
-        self._increment = np.zeros(self.unknowns.owned)
+        self.increment = np.zeros(self.unknowns.owned)
         if self.steady or len(self.history.steps) < 2:
             return
-        old, older = self.history.past[:2]
-        continued = old.found & older.found
+        change, continued = self.history.extrapolation(self.current.dt)
         continued[self.boundary.dofs] = False
-        growth = self.current.dt / self.history.steps[0]
         before = self.flow[: self.unknowns.owned].copy()
-        self.flow[continued] += growth * (old.velocity - older.velocity)[continued]
+        self.flow[continued] += change[continued]
         if with_pressure and self.settings.degree == 1:
-            self.flow[:] += growth * self.history.pressure_change
-        self._increment = self.flow[: self.unknowns.owned] - before
+            self.flow[:] += self.current.dt / self.history.steps[0] * self.history.pressure_change
+        self.increment = self.flow[: self.unknowns.owned] - before
 
     def has_films(self) -> bool:
         """Whether the present cut has films that are thinner than a cell (collective)."""
@@ -243,7 +239,7 @@ class Fluid:
         self.motions = motions
         with self.timer("cut"):
             facets, motion = together([body.surface for body in self.bodies], motions, self.dim)
-            self._follow(self.thin.sheets(facets, motion), facets, motion)
+            follow_sheets(self, self.thin.sheets(facets, motion), facets, motion)
             if self.settings.steady and self.steady_iteration.scales_follow:
                 # roots belong to the final position of the bodies, not to the initial one
                 self.cutter.begin_step()
@@ -259,30 +255,6 @@ class Fluid:
                 self.unknowns.share(self.system.flow)
             self.held = self.system.held()
             self.levels.hold(self.held, set_by_solids=with_solid and not self.settings.steady)
-
-    def _follow(self, sheets: Sheets | None, facets: NDArray[np.int64], motion: Motion) -> None:
-        """Update the sheets of the fluid around thin bodies to their present positions."""
-        if sheets is self.grid.sheets:
-            return
-        assert sheets is not None
-        began = self._began
-        if began is not None:
-            began.require_near(self.smallest_cell, motion.x)
-        now, old, flow, increment = self.grid.sheets, self.unknowns, self.flow, self._increment
-        if now is not None and now.same_unknowns(sheets):
-            self.grid.sheets = sheets
-            return
-        self.discretise(sheets)
-        carrier = carry(old, now, self.unknowns, facets, motion.x)
-        self.flow[:] = carrier.flow(flow)
-        self._increment = carrier.flow(np.pad(increment, (0, old.local - old.owned)))[: self.unknowns.owned]
-        if began is not None and began.unknowns is not old:
-            carrier = carry(began.unknowns, began.sheets, self.unknowns, facets, motion.x)
-        self.history.past = [carrier.past(past) for past in (self.history.past if began is None else began.past)]
-        self.history.pressure_change, self._pressure = np.zeros(self.unknowns.local), None
-        if began is not None:
-            self._begin_system(began.step)
-            self.prescribe(self._prescribed_at)
 
     def _layers(self, motion: Motion) -> int:
         """Number of cell layers behind the surface that the next steps may uncover; none around thin bodies."""
@@ -314,20 +286,13 @@ class Fluid:
         velocity = self.velocity()
         if self._behind is not None:
             velocity = self._behind.bounded(velocity, self.cut, self._wet)
-        self.history.end_step(self.current.dt, velocity, found, self._pressure_change())
+        self.history.end_step(self.current.dt, velocity, found, self._present_pressure())
         self.forget_step()
         self.started = True
 
-    def _pressure_change(self) -> Array:
-        """Change of the pressure in this step [Pa] at local dofs; zero where it had none at the start or the end."""
-        before, now = self._pressure, self._present_pressure()
-        if before is None or len(before) != len(now):  # cells of thin bodies became others
-            return np.zeros(len(now))
-        return np.where((before != 0.0) & (now != 0.0), now - before, 0.0)
-
     def forget_step(self) -> None:
         """Let the next step start from the present history."""
-        self._began = None
+        self.began = None
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
@@ -394,10 +359,10 @@ class Fluid:
 
     def update(self, increment: Array) -> float:
         """Add an increment of the owned dofs; returns its norm relative to that of the flow."""
-        self._increment, self._improved = increment.copy(), True
-        self._add(self._increment)
+        self.increment, self._improved = increment.copy(), True
+        self._add(self.increment)
         size = self._norm(self._diagonal * self.flow[: self.unknowns.owned])
-        return self._norm(self._diagonal * self._increment) / size if size > 0.0 else 0.0
+        return self._norm(self._diagonal * self.increment) / size if size > 0.0 else 0.0
 
     def multigrid(self, matrix: PETSc.Mat) -> PETSc.PC:
         """A multigrid cycle for the tangent; the next call overwrites it (collective)."""
@@ -409,7 +374,7 @@ class Fluid:
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""
-        self._add(-fraction * self._increment)
+        self._add(-fraction * self.increment)
 
     def settled(self) -> bool:
         """True: a flow has no active set that an iterate could change."""
@@ -464,43 +429,11 @@ class Fluid:
 
     def save(self) -> State:
         """The state that the next step starts from; whole arrays where cells may change (collective)."""
-        return everywhere(self.comm, self._by_process()) if self._cells_may_change else self._by_process()
-
-    @property
-    def _cells_may_change(self) -> bool:
-        return self.thin.may_follow or self._following is not None
-
-    def _by_process(self) -> State:
-        nested = {"first": self.box.first, "width": self.box.width} if isinstance(self.box, Nested) else {}
-        return nodal_state(self.unknowns, self.grid, self.history, self.system) | {
-            "nested": nested,
-            "time": self.current.t,
-            "thin": self.thin.save(),
-            "linear_solver": self.sequence.position,
-            "motion": {body.surface.name: {"x": motion.x, "v": motion.v} for body, motion in self.moved()},
-        }
+        return saved_state(self)
 
     def restore(self, state: State) -> None:
         """Restore a saved state (collective)."""
-        motions = {name: Motion(m["x"], m["v"]) for name, m in state["motion"].items()}
-        self.forget_step()
-        self.thin.restore(state["thin"])
-        facets, motion = together([body.surface for body in self.bodies], list(motions.values()), self.dim)
-        if self._following is not None:
-            nested = self.comm.bcast(state["nested"], root=0)
-            self.box = Nested(self.box.edges, np.asarray(nested["first"]), np.asarray(nested["width"]))
-        if (sheets := self.thin.sheets(facets, motion)) is not self.grid.sheets or self._following is not None:
-            self.discretise(sheets)
-            self.history = History(self.settings.time, self.unknowns.local)
-        if self._cells_may_change:
-            state = scatter(self.comm, state, self._by_process())
-        set_nodal_state(state, self.unknowns, self.history, self.system)
-        self.current = FlowStep(state["time"], 0.0, STEADY)
-        self.sequence.position = state["linear_solver"]
-        self.cutter.begin_step()
-        flow = self.flow.copy()
-        self.move(motions)
-        self.flow[:] = flow
+        restore_state(self, state)
 
     def moved(self) -> Iterator[tuple[ImmersedBody, Motion]]:
         """Pairs of each body and its present motion."""

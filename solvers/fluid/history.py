@@ -39,6 +39,7 @@ class History:
         self.steps: tuple[float, ...] = ()  #: lengths [s]
         #: change of the pressure in the last step [Pa], at local dofs; zero where it had none at the start or the end
         self.pressure_change = np.zeros(size)
+        self._pressure: Array | None = None  #: at the beginning of the present step [Pa]; None: of other unknowns
 
     @property
     def longest_step(self) -> float:
@@ -61,9 +62,24 @@ class History:
         self.past = [self.past[0], *back]
         self.steps = (dt,) * len(self.past)
 
-    def end_step(self, dt: float, velocity: Array, found: Mask, pressure_change: Array) -> None:
-        """Accept a step of length dt; found: local dofs at which it had a velocity; pressure_change [Pa]: in it."""
-        self.pressure_change = pressure_change
+    def begin_step(self, pressure: Array) -> None:
+        """Keep the pressure [Pa] at the beginning of a step, at local dofs, zero where there is none."""
+        self._pressure = pressure
+
+    def extrapolation(self, dt: float) -> tuple[Array, Mask]:
+        """Change of the velocity [m/s] in a next step of length dt [s], by the last one, and where both have one."""
+        old, older = self.past[:2]
+        return dt / self.steps[0] * (old.velocity - older.velocity), old.found & older.found
+
+    def forget_pressure(self, size: int) -> None:
+        """Drop the pressure of earlier unknowns, because there are others: `size` local dofs."""
+        self.pressure_change, self._pressure = np.zeros(size), None
+
+    def end_step(self, dt: float, velocity: Array, found: Mask, pressure: Array) -> None:
+        """Accept a step of length dt; found: local dofs at which it had a velocity; pressure [Pa]: at its end."""
+        before = self._pressure
+        both = False if before is None else (before != 0.0) & (pressure != 0.0)
+        self.pressure_change = np.where(both, pressure - (0.0 if before is None else before), 0.0)
         self.past = [Past(velocity, found), *self.past][: len(self.past)]
         self.steps = (dt, *self.steps)[: len(self.past)]
 

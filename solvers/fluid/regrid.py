@@ -12,58 +12,19 @@ equation of continuity have the rate and the pressure in the middle of the last 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array
-from solvers.fluid.background.box import Grid
 from solvers.fluid.background.carrier import Carrier
 from solvers.fluid.background.following import Following, changed_nodes, interpolation
 from solvers.fluid.background.nested import Nested
-from solvers.fluid.background.space import Unknowns
-from solvers.fluid.bodies.immersed import ImmersedBody
-from solvers.fluid.bodies.surface import Motion
-from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.history import History
-from solvers.fluid.linear_systems.krylov import FlowSolver
-from solvers.fluid.system import FlowSystem
-from solvers.fluid.thin.sheets import Sheets
+from solvers.fluid.exchanged import ExchangedFlow
 from solvers.fluid.time_scheme import FlowStep
 
 
-class Regridded(Protocol):
-    """What the transfer needs of a flow; `Fluid` is one."""
-
-    box: Grid
-    settings: FlowSettings
-    unknowns: Unknowns
-    history: History
-    system: FlowSystem
-    linear_solver: FlowSolver
-    current: FlowStep
-    residual_rows: Array
-
-    @property
-    def flow(self) -> Array: ...
-
-    def moved(self) -> Iterator[tuple[ImmersedBody, Motion]]: ...
-
-    def discretise(self, sheets: Sheets | None) -> None: ...
-
-    def prescribe(self, t: float) -> None: ...
-
-    def move(self, coupled: Mapping[str, Motion]) -> None: ...
-
-    def residual(self) -> float: ...
-
-    def advance(self) -> float: ...
-
-
-def follow_bodies(fluid: Regridded, following: Following, t: float, dt: float) -> None:
+def follow_bodies(fluid: ExchangedFlow, following: Following, t: float, dt: float) -> None:
     """Change the cells for a step from t to t + dt [s], if bodies come close to coarse cells in it (collective)."""
     surfaces = {}
     for body, motion in fluid.moved():
@@ -85,7 +46,7 @@ def follow_bodies(fluid: Regridded, following: Following, t: float, dt: float) -
     _restore_continuity(fluid, changed_nodes(before, cells), t, dt)
 
 
-def _restore_continuity(fluid: Regridded, changed: NDArray[np.int64], t: float, dt: float) -> None:
+def _restore_continuity(fluid: ExchangedFlow, changed: NDArray[np.int64], t: float, dt: float) -> None:
     """Correct the velocities of the past; changed: numbers of the nodes of the pressure whose equations changed."""
     flow, history, mask = fluid.flow.copy(), fluid.history, fluid.unknowns.velocity_mask
     last, earlier = history.past[0], history.past[1 if history.steps else 0]

@@ -17,13 +17,13 @@ from petsc4py import PETSc
 
 from solvers import fem
 from solvers.api import Array
-from solvers.fluid import forms, nitsche
+from solvers.fluid import nitsche
 from solvers.fluid.background.grid import DistributedGrid
 from solvers.fluid.background.hanging_system import HangingSystem
 from solvers.fluid.background.space import Unknowns, set_velocity
 from solvers.fluid.boundary.outer_faces import OuterFaces, OuterOnCut
 from solvers.fluid.boundary.patches import Boundary
-from solvers.fluid.cell_forms import cell_forms
+from solvers.fluid.cell_forms import cell_forms, coefficients
 from solvers.fluid.closed_contact.zone import ClosedZone, find_zone
 from solvers.fluid.closed_contact.zone_seepage import ZoneSeepage
 from solvers.fluid.cut_shape import CutDerivatives, FlowTerms, cut_derivatives
@@ -35,10 +35,9 @@ from solvers.fluid.films.film_shape import FilmDerivatives, FilmFlow, film_deriv
 from solvers.fluid.films.gap_terms import GapTerms
 from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.interface import InterfaceTerms
-from solvers.fluid.linear_systems.matrix import Pattern, choose_pattern, create_matrix, fits, pattern_of, quick_copy
+from solvers.fluid.linear_systems.tangent_matrix import TangentMatrix
 from solvers.fluid.poorly_cut.ghost import Scales
 from solvers.fluid.poorly_cut.ghost_choice import choose_ghost_penalty
-from solvers.fluid.poorly_cut.penalty_matrix import PenaltyMatrix
 from solvers.fluid.time_scheme import FlowStep
 
 
@@ -55,13 +54,14 @@ class FlowSystem:
         with_bodies: bool,
         blocked: bool,
     ):
-        self.with_bodies, self._blocked = with_bodies, blocked
+        self.with_bodies = with_bodies
         self.grid, self.settings, self.boundary, self.unknowns = grid, settings, boundary, unknowns
         domain, space = grid.domain, unknowns.space
         self.flow, self.history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
         self._alpha, self._newton = fem.constant(domain, 0.0), fem.constant(domain, 1.0)
         self.weights = Weights(grid, settings.degree)
-        self.terms = self._terms()
+        parts = (unknowns.parts(f)[0] for f in (self._scale_velocity, self.history, self._force))
+        self.terms = coefficients(domain, settings, *parts, alpha=self._alpha, newton=self._newton)
         #: gaps of a few cells, with first-order velocities
         self.gaps = (
             GapTerms(grid, settings.viscosity, settings.density) if with_bodies and settings.degree == 1 else None
@@ -72,6 +72,7 @@ class FlowSystem:
         self._hanging = (
             None if unknowns.hanging is None else HangingSystem(unknowns, unknowns.hanging, self.forms.tangents[0])
         )
+        self.matrix = TangentMatrix(unknowns, self.ghost, self._hanging, self.forms.tangents[0], blocked=blocked)
         self._outer = OuterFaces(grid, boundary, unknowns, self.terms, self.flow)
         ghost = [] if self.ghost is None else self.ghost.integrals
         fem.compile_integrals([*self.forms.integrals(), *self._outer.integrals(), *ghost], "the flow")
@@ -86,9 +87,6 @@ class FlowSystem:
         #: the ghost penalty adds its matrix times the flow to the residual, minus this part of the history
         self._ghost_history = np.zeros(unknowns.local)
         self._out = np.zeros(unknowns.local)
-        self._matrix: PETSc.Mat | None = None
-        self.penalty: PenaltyMatrix | None = None
-        self._pattern: Pattern | None = None
         self.cut: Cut | None = None
         self._moved = np.inf  #: largest motion of a vertex from the last cut to this one [m]
         self.slip_length: Array | None = None  #: of the facets of all surfaces [m]; None: no slip
@@ -100,26 +98,6 @@ class FlowSystem:
         self._zone: ClosedZone | None = None
         self._seepage: ZoneSeepage | None = None
         self._current = False  #: weights, interface and ghost penalty belong to the present cut and scales
-
-    def _terms(self) -> forms.Coefficients:
-        settings, domain = self.settings, self.grid.domain
-        a, history, force = (self.unknowns.parts(f)[0] for f in (self._scale_velocity, self.history, self._force))
-        rho, mu = fem.constant(domain, settings.density), fem.constant(domain, settings.viscosity)
-        if settings.body_force is None:
-            force = forms.nothing(self.grid.dim)
-        return forms.Coefficients(
-            rho=rho,
-            mu=mu,
-            alpha=self._alpha,
-            a=a,
-            newton=self._newton,
-            history=history,
-            force=force,
-            convection=settings.convection,
-            steady=settings.steady,
-            degree=settings.degree,
-            mesh=domain.mesh.ufl_domain(),
-        )
 
     # ------------------------------------------------------------------------------------------------- a new step
 
@@ -193,11 +171,7 @@ class FlowSystem:
         self._tangents += self._outer_on_cut.tangents
         if self._hanging is not None:
             self._tangents[0] = self._hanging.set_cells(self.cells[0], self._outer_on_cut.hanging)
-        if not fits(self.unknowns, self._pattern, cut):
-            self._allocate(choose_pattern(self.unknowns, cut, by_faces=self._by_faces))
-        elif pattern_changed:
-            assert self._pattern is not None
-            self._allocate(self._pattern)
+        self.matrix.fit(cut, changed=pattern_changed)
 
     def held(self) -> NDArray[np.bool_]:
         """Owned dofs with rows of the identity: prescribed, inactive, hanging, and those of nodes without fluid."""
@@ -223,46 +197,6 @@ class FlowSystem:
         blocks[self.unknowns.cell_blocks[cells]] = True
         blocks = fem.sum_ghosts(self.unknowns.space, blocks.astype(float)) > 0.0
         return self.unknowns.expand(blocks)
-
-    def pattern_state(self) -> Array:
-        """Sparsity pattern of the matrix, as two flags per owned cell: couplings in the cell, and across its faces."""
-        if self._pattern is None:
-            return np.zeros((self.grid.owned, 2))
-        return np.stack([self._pattern.cells, self._pattern.reach], axis=1)[: self.grid.owned].astype(float)
-
-    def restore_pattern(self, state: Array) -> None:
-        """Allocate the matrix of a saved state: rounding in a direct solver depends on the pattern (collective)."""
-        both = np.zeros((2, len(self.grid.numbers)))
-        both[:, : self.grid.owned] = state.T
-        cells, reach = (fem.share_owned(fem.cellwise_space(self.grid.domain), column) > 0.5 for column in both)
-        self._allocate(pattern_of(self.unknowns, cells, reach, by_faces=self._by_faces))
-
-    @property
-    def _by_faces(self) -> bool:
-        return self.ghost is not None and self.ghost.by_faces
-
-    def _allocate(self, pattern: Pattern) -> None:
-        self._pattern, self._matrix = pattern, self._fill_pattern(pattern)
-        self.penalty = None
-
-    def _fill_pattern(self, pattern: Pattern) -> PETSc.Mat:
-        """A matrix with all entries of a pattern; their values are arbitrary."""
-        more = None if self.ghost is None else self.ghost.extra_entries()
-        if self._hanging is not None:
-            more = self._hanging.extra_entries() + (0 if more is None else more)
-        matrix = create_matrix(self.unknowns, pattern, more, blocked=self._blocked)
-        cells = np.flatnonzero(pattern.cells[: self.grid.owned]).astype(np.int32)
-        if self._hanging is not None:
-            cells = self._hanging.others(cells)
-            self._hanging.fill(matrix)
-        fem.assemble_matrix(matrix, self.forms.tangents[0].on(cell=cells))
-        if self.ghost is not None:
-            self.ghost.fill(matrix, pattern)
-        diagonal = matrix.createVecLeft()
-        diagonal.set(1.0)
-        matrix.setDiagonal(diagonal, addv=PETSc.InsertMode.ADD_VALUES)
-        matrix.assemble()
-        return quick_copy(matrix)
 
     @property
     def interface(self) -> InterfaceTerms:
@@ -330,18 +264,8 @@ class FlowSystem:
                 self._seepage = None
                 if zone is not None and self.seeping is not None:
                     self._seepage = ZoneSeepage(zone, self.seeping / self.settings.viscosity)
-        self._assemble_ghost_penalty()
+        self.matrix.assemble_penalty(self._ghost_history)
         self._current = True
-
-    def _assemble_ghost_penalty(self) -> None:
-        if self.ghost is None:
-            return
-        if not self.grid.comm.allreduce(self.penalty is None or self.ghost.stale, op=MPI.LOR):
-            return
-        if self.penalty is None:
-            assert self._pattern is not None
-            self.penalty = PenaltyMatrix(self.unknowns, self.ghost, self._pattern, blocked=self._blocked)
-        self.penalty.assemble(self._ghost_history)
 
     def end_step(self) -> None:
         """Accept the step (collective)."""
@@ -408,7 +332,8 @@ class FlowSystem:
         rows = self._out[:owned]
         if self._hanging is not None:
             rows = self._hanging.table.rows(rows)
-        return rows.copy() if self.penalty is None else rows + self.penalty.times(self.flow.x.array[:owned])
+        penalty = self.matrix.penalty
+        return rows.copy() if penalty is None else rows + penalty.times(self.flow.x.array[:owned])
 
     def tangent(self, identity: Array, *, picard: bool) -> PETSc.Mat:
         """d(residual)/d(flow), with rows of the identity at the marked owned dofs; the next call overwrites it.
@@ -416,12 +341,11 @@ class FlowSystem:
         picard: u . grad u is linearised without its second term, about the velocity of `set_scales`.
         """
         self._follow()
-        assert self._matrix is not None
         self._newton.value = 0.0 if picard else 1.0
-        matrix = self._matrix
+        matrix = self.matrix.values
         matrix.zeroEntries()
-        if self.penalty is not None:
-            self.penalty.add_to(matrix)
+        if self.matrix.penalty is not None:
+            self.matrix.penalty.add_to(matrix)
         for form in self._tangents:
             fem.assemble_matrix(matrix, form)
         if self._hanging is not None:

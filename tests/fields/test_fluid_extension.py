@@ -38,7 +38,7 @@ def at_nodes(fluid, polynomial):
 
 def penalty(fluid, values):
     """The penalty's matrix times owned values."""
-    matrix = fluid.system.penalty.matrix
+    matrix = fluid.system.matrix.penalty.matrix
     x, y = matrix.createVecs()
     x.array[:] = values
     matrix.mult(x, y)

@@ -24,7 +24,7 @@ def kinked_flow(dt, **factors):
 def energy(dt, **factors):
     """u^T G u of one kinked velocity around a disc, for an ordinary flow of speed 1."""
     fluid = kinked_flow(dt, **factors)
-    ghost = fluid.system.penalty.matrix
+    ghost = fluid.system.matrix.penalty.matrix
     u, out = ghost.createVecs()
     u.array[:] = fluid.velocity()[: fluid.unknowns.owned]
     ghost.mult(u, out)
@@ -80,7 +80,7 @@ def test_mass_term_without_an_earlier_velocity():
 
 def ghost_rows(fluid):
     """The ghost penalty's matrix times the flow, at the rows that `momentum` has."""
-    u, out = fluid.system.penalty.matrix.createVecs()
+    u, out = fluid.system.matrix.penalty.matrix.createVecs()
     u.array[:] = fluid.flow[: fluid.unknowns.owned]
-    fluid.system.penalty.matrix.mult(u, out)
+    fluid.system.matrix.penalty.matrix.mult(u, out)
     return np.where(fluid.held, 0.0, out.array)[fluid.unknowns.velocity_mask[: fluid.unknowns.owned]]

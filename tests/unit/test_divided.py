@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from coupling.divided import lengths, step_in_parts
@@ -47,8 +48,8 @@ def test_longest_step_after_others():
     euler, bdf2 = (History(SCHEMES[name], 1) for name in ("backward_euler", "bdf2"))
     for history in (euler, bdf2):
         assert history.longest_step == math.inf
-        history.end_step(0.1, history.past[0].velocity, history.past[0].found, history.pressure_change)
+        history.end_step(0.1, history.past[0].velocity, history.past[0].found, np.zeros(1))
         assert history.longest_step == math.inf
-        history.end_step(0.2, history.past[0].velocity, history.past[0].found, history.pressure_change)
+        history.end_step(0.2, history.past[0].velocity, history.past[0].found, np.zeros(1))
     assert euler.longest_step == math.inf
     assert bdf2.longest_step == 0.4
