@@ -21,6 +21,11 @@ CELLS_ACROSS_AT_REST, CELLS_ACROSS_IF_MOVING = 2.0, 4.0
 #: Cells across up to which bodies in contact have unknowns of each side, by dimension: `THICK_IN_CONTACT` of the flow,
 #: which a check of a case does not import.
 CELLS_ACROSS_IN_CONTACT = {2: CELLS_ACROSS_AT_REST, 3: 1.0}
+#: Nitsche's shear in a film that closes is several hundred times the viscous one, and zero where it is closed.
+NO_SLIP_IN_THE_LAYER = (
+    "the shear of a film that closes jumps to zero without slip, and Newton's method may fail in contact; "
+    "give the bodies a 'slip_length' as large as the roughness"
+)
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
 
 
@@ -34,6 +39,8 @@ def flow_warnings(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]
     if case.coupling is None and not _driven(fluid):
         yield ("fluid", "patches"), "nothing drives the flow: no velocity, traction, pressure, force or moving body"
     yield from _thin_bodies(case, fluid)
+    if fluid.narrow_gaps and case.contact is not None and case.contact.film.value and not _slips(case, fluid):
+        yield ("contact", "film"), NO_SLIP_IN_THE_LAYER
     if fluid.scheme == "steady":
         return
     yield from _fast_bodies(case, fluid)
@@ -42,6 +49,12 @@ def flow_warnings(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]
         if crossed > MOST_CELLS_PER_STEP:
             message = f"the flow crosses {crossed:.0f} cells in a time step here; take a smaller 'step'"
             yield ("fluid", "patches", name), message
+
+
+def _slips(case: Case, fluid: FluidSection) -> bool:
+    """Whether the flow slips along a body."""
+    elastic = () if case.structure is None else case.structure.bodies.values()
+    return any(body.slip_length for body in elastic) or any(body.slip_length for body in fluid.bodies.values())
 
 
 def _fast_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:

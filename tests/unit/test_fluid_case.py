@@ -3,17 +3,20 @@
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from case_mistakes import assert_located, load, refused
 from case_text import with_section, without
 
-from fsci.case import CaseError
+from fsci.case import CaseError, load_case
 from fsci.case.grid import GridSection
 from fsci.check.check import summary
 from fsci.check.meshes import check_meshes
 from fsci.meshes.nested import read_grid
+
+ROUGH = Path(__file__).parents[2] / "cases/torus_rough/case.yaml"
 
 CASE = """\
 title: channel
@@ -391,3 +394,15 @@ def test_check_of_a_fluid_needs_no_finite_elements():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_layer_without_slip():
+    """Fine grids of this case failed without the slip length."""
+    no_slip = ("structure.bodies.torus.slip_length", "0")
+    expected = (
+        "the shear of a film that closes jumps to zero without slip, and Newton's method may fail in contact; "
+        "give the bodies a 'slip_length' as large as the roughness"
+    )
+    assert f"{ROUGH}:31:9: {expected}" in load_case(ROUGH, [no_slip]).warnings
+    for cure in ((), (no_slip, ("fluid.narrow_gaps", "false")), (no_slip, ("contact.film.roughness", "0"))):
+        assert not any("slip_length" in warning for warning in load_case(ROUGH, cure).warnings)
