@@ -1,7 +1,9 @@
 """Partitioned Dirichlet-Neumann coupling: the flow takes the motion of the surface, the solid the force of the flow.
 
 Displacement d_k -> flow around the surface at d_k -> force f_k -> solid under f_k -> D(d_k), until D(d) = d.
-Source: Kuttler, Wall, Comput. Mech. 43 (2008) 61-72.
+A closed pocket of incompressible fluid has a pressure level q that the flow does not determine. It is another unknown
+of the iteration, whose residual is the distance by which the bodies squeeze the pocket: q + s(d) = q.
+Sources: Kuttler, Wall, Comput. Mech. 43 (2008) 61-72; for pockets Kuttler, Forster, Wall, ibid. 38 (2006) 417-429.
 """
 
 from __future__ import annotations
@@ -39,6 +41,7 @@ class Partitioned:
         tolerance: FixedPointTolerance = FixedPointTolerance(),
     ):
         self.coupled, self.accelerator, self.tolerance = coupled, accelerator or QuasiNewton(0.5), tolerance
+        self._pockets = 0  #: closed pockets of the last iterate
 
     def initialise(self, t: float, dt: float) -> None:
         """Set both fields to the first time t [s]; dt [s]: length of the first step."""
@@ -65,7 +68,7 @@ class Partitioned:
         """Iterate to the tolerance. Returns (residuals [m], Newton iterations of both fields). Raises StepFailed."""
         coupled, interface = self.coupled, self.coupled.interface
         self.accelerator.begin_step()
-        d = interface.displacement()
+        d, levels = interface.displacement(), np.zeros(self._pockets)
         history: list[float] = []
         newton = 0
         ends: tuple[CouplingIterate, CouplingIterate] | None = None
@@ -73,10 +76,15 @@ class Partitioned:
         while True:
             coupled.flow.move(interface.move(d))
             newton += coupled.flow.solve().iterations
+            squeezed = coupled.flow.squeezed()
+            if len(squeezed) != len(levels):
+                levels, ends, last = np.zeros(len(squeezed)), None, None
+                self.accelerator.forget()
+            self._pockets = len(levels)
             coupled.solid.load(coupled.force())
             newton += coupled.solid.solve().iterations
             found = interface.displacement()
-            residual = _mean(found - d)
+            residual = max(_mean(found - d), float(np.abs(squeezed).max(initial=0.0)))
             history.append(residual)
             if residual <= self._small(found):
                 return history, newton
@@ -84,13 +92,14 @@ class Partitioned:
                 taken = counted(len(history), "iteration")
                 reason = f"the coupling iteration did not converge in {taken} (residual {residual:.3g} m)"
                 raise StepFailed("coupling", reason, iteration=len(history), history=tuple(history))
-            now = CouplingIterate(d, found, coupled.solid.touching())
+            before = np.concatenate([d.ravel(), levels])
+            now = CouplingIterate(before, np.append(found, levels + squeezed), coupled.solid.touching())
             if ends is not None:
                 ends = halved(*ends, now)
             elif last is not None and brackets(last, now):
                 ends = last, now
             if ends is not None and not ends[0].same_contact(ends[1]):
-                d = 0.5 * (ends[0].d + ends[1].d)
+                after = 0.5 * (ends[0].d + ends[1].d)
             else:
                 if ends is not None:
                     self.accelerator.forget()
@@ -98,7 +107,9 @@ class Partitioned:
                 elif last is not None and not last.same_contact(now):
                     self.accelerator.forget()
                 ends = None
-                d = self.accelerator.next(d, found)
+                after = self.accelerator.next(now.d, now.found)
+            d, levels = after[: d.size].reshape(d.shape), after[d.size :]
+            coupled.flow.add_levels(levels - before[d.size :])
             last = now
 
     def _small(self, found: Array) -> float:
@@ -108,11 +119,12 @@ class Partitioned:
         return max(self.tolerance.relative * moved, self.tolerance.absolute, float(rounding))
 
     def save(self) -> State:
-        return {**self.coupled.save(), "accelerator": self.accelerator.save()}
+        return {**self.coupled.save(), "accelerator": self.accelerator.save(), "pockets": self._pockets}
 
     def restore(self, state: State) -> None:
         self.coupled.restore(state)
         self.accelerator.restore(state["accelerator"])
+        self._pockets = int(state["pockets"])
 
 
 def _mean(vectors: Array) -> float:

@@ -207,6 +207,14 @@ class Flow(Part, Protocol):
         """Set the motion of surfaces by name; with_solid: the rows of the solid are solved in the same system."""
         ...
 
+    def squeezed(self) -> Array:
+        """Mean distance [m] by which bodies squeeze each closed pocket of fluid in this step, after `solve`."""
+        ...
+
+    def add_levels(self, distance: Array) -> None:
+        """Raise the pressure of each such pocket, by an amount proportional to a distance [m]."""
+        ...
+
     def force(self) -> dict[str, Array]:
         """Force [N] on the vertices by surface, shape (n, dim)."""
         ...

@@ -21,7 +21,7 @@ from fsci.builder.fluid import build_fluid, build_rigid_bodies
 from fsci.builder.skin import find_skin
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
-from fsci.case.coupling_checks import closed_in
+from fsci.case.coupling_checks import level_unknown
 from fsci.meshes.of_case import require_inside_period
 from solvers.fluid.bodies.immersed import ImmersedBody
 from solvers.fluid.bodies.surface import ImmersedSurface
@@ -74,9 +74,8 @@ def _scheme(case: Case, coupled: Coupled) -> Monolithic | Partitioned:
 def start(case: Case, scheme: Monolithic | Partitioned, fluid: Fluid, t: float, dt: float) -> None:
     """Both fields at the first time. Raises CaseError (collective)."""
     scheme.initialise(t, dt)
-    if fluid.levels.unknown:
-        where, why = closed_in(case)
-        raise case.error(where, f"bodies enclose a part of the fluid, and {why}")
+    if fluid.levels.unknown and (mistake := level_unknown(case)):
+        raise case.error(mistake[0], f"bodies enclose a part of the fluid, and {mistake[1]}")
 
 
 def _skin(case: Case, comm: MPI.Comm, body: Body) -> tuple[Skin, Closing | None]:

@@ -42,19 +42,21 @@ def coupling_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:
     if static and not steady:
         yield ("fluid", "scheme"), "a flow in time needs 'dynamics' in 'structure', or choose the scheme steady"
     is_open = any(patch.open for patch in case.fluid.patches.values())
-    if (steady or coupling.scheme == "partitioned") and not is_open:
-        where, why = closed_in(case)
+    if not is_open and (mistake := level_unknown(case)):
+        where, why = mistake
         kinds = listed([name for name, kind in PATCH_KINDS.items() if kind.open])
         yield where, f"the boundary encloses the fluid, and {why}, or give a patch with {kinds}"
 
 
-def closed_in(case: Case) -> Mistake:
-    """Why a steady or partitioned solution does not determine the pressure level of enclosed fluid."""
+def level_unknown(case: Case) -> Mistake | None:
+    """Why the coupling does not find the pressure level of enclosed fluid; None if it does."""
     assert case.fluid is not None
+    assert case.coupling is not None
     if case.fluid.scheme == "steady":
-        return ("fluid", "scheme"), "a steady flow does not determine the pressure of enclosed fluid: take 'bdf2'"
-    reason = "the partitioned scheme does not determine the pressure of enclosed fluid: take 'monolithic'"
-    return ("coupling", "scheme"), reason
+        return ("fluid", "scheme"), "a steady flow does not determine its pressure: take 'bdf2'"
+    if case.coupling.scheme == "partitioned" and case.coupling.accelerator != "iqn":
+        return ("coupling", "accelerator"), "relaxation alone does not find its pressure: take 'iqn'"
+    return None
 
 
 def _dry_side_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:

@@ -376,6 +376,14 @@ class Fluid:
         """Take back a fraction of the last increment."""
         self._add(-fraction * self.increment)
 
+    def squeezed(self) -> Array:
+        """Mean distance [m] by which elastic bodies squeeze each closed pocket in this step, after `solve`."""
+        return self.current.dt * self.levels.squeezed()
+
+    def add_levels(self, distance: Array) -> None:
+        """Add the pressure that accelerates a cell of fluid by a distance [m] to the level of each such pocket."""
+        self.levels.add(self.settings.density * self.smallest_cell / self.current.dt**2 * distance)
+
     def settled(self) -> bool:
         """True: a flow has no active set that an iterate could change."""
         return True

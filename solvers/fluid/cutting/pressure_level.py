@@ -31,6 +31,7 @@ class Hold:
     shares_before: Array  #: the same for nodes that had a pressure before; their sum is one or zero
     level: float  #: mean pressure at these nodes [Pa]
     elastic: bool  #: bounded by a surface that another field moves
+    area: float  #: of a cube with the volume of its fluid [m^2] (2D: of a square [m])
 
 
 class PressureLevels:
@@ -40,6 +41,7 @@ class PressureLevels:
         self._system, self._comm = system, system.grid.comm
         self._elastic = np.concatenate([np.full(b.surface.vertices, b.deforms) for b in bodies] + [[]]) > 0.0
         self._holds: list[Hold] = []
+        self._excess: list[float] = []  #: net flux out of each of them by the motion of its boundary [m^3/s]
 
     @property
     def unknown(self) -> bool:
@@ -71,16 +73,29 @@ class PressureLevels:
 
         Otherwise the fixed node would be a point source, which causes an error of the pressure that does not converge.
         """
-        for hold in self._holds:
-            excess = self._comm.allreduce(float(rows[hold.inside].sum()))
+        self._excess = [self._comm.allreduce(float(rows[hold.inside].sum())) for hold in self._holds]
+        for hold, excess in zip(self._holds, self._excess, strict=True):
             rows -= excess * hold.shares
+
+    def squeezed(self) -> Array:
+        """Mean velocity [m/s] with which elastic bodies squeeze each of their pockets, at the last residual."""
+        found = zip(self._holds, self._excess, strict=True)
+        return np.array([-excess / hold.area for hold, excess in found if hold.elastic])
+
+    def add(self, pressure: Array) -> None:
+        """Add a pressure [Pa] to the level of each pocket of `squeezed`."""
+        elastic = [hold for hold in self._holds if hold.elastic]
+        for hold, more in zip(elastic, pressure, strict=True):
+            self._system.flow.x.array[: len(hold.inside)][hold.inside] += more
+        self._system.unknowns.share(self._system.flow)
 
 
 def hold_pressure(system: FlowSystem, elastic: Mask, *, set_by_solids: bool) -> list[Hold]:
     """The pockets whose level is held, with one node each (collective).
 
     elastic: mask of vertices that another field moves; set_by_solids: the equations of these fields determine the
-    level of their pockets, which are not held. In a closed box, the level of the largest pocket is zero at its node.
+    level of their pockets, which are not held. In a closed box, the level of the largest pocket is zero at its node, if
+    no elastic body is in it.
     Other levels are those of the time when the pocket closed.
     """
     closed = system.boundary.closed()
@@ -93,7 +108,8 @@ def hold_pressure(system: FlowSystem, elastic: Mask, *, set_by_solids: bool) -> 
     pockets = find_pockets(system.grid, system.cut, open_cells, elastic, periodic)
     pockets = [pocket for pocket in pockets if not (pocket.elastic and set_by_solids)]
     sizes = _pressure_sizes(system) if pockets else np.empty(0)
-    return [_hold(system, pocket, sizes, keep_level=not (closed and pocket.largest)) for pocket in pockets]
+    keeps_level = [pocket.elastic or not (closed and pocket.largest) for pocket in pockets]
+    return [_hold(system, *each, sizes) for each in zip(pockets, keeps_level, strict=True)]
 
 
 def _in_fluid(grid: DistributedGrid, cut: Cut) -> bool:
@@ -116,7 +132,7 @@ def _pressure_sizes(system: FlowSystem) -> Array:
     return owned if unknowns.hanging is None else unknowns.hanging.rows(owned)
 
 
-def _hold(system: FlowSystem, pocket: Pocket, sizes: Array, *, keep_level: bool) -> Hold:
+def _hold(system: FlowSystem, pocket: Pocket, keep_level: bool, sizes: Array) -> Hold:
     """Hold a pocket at its first node in the lattice, if possible one that had a pressure before (collective)."""
     unknowns, comm = system.unknowns, system.grid.comm
     nodes, last = unknowns.pressure, np.iinfo(np.int64).max
@@ -134,9 +150,9 @@ def _hold(system: FlowSystem, pocket: Pocket, sizes: Array, *, keep_level: bool)
     before = system.flow.x.array[: unknowns.owned]
     shares, shares_before = (_shares(comm, np.where(part, sizes, 0.0)) for part in (inside, inside & (before != 0.0)))
     at = dofs[nodes.numbers[: nodes.owned] == best].astype(np.int64)
-    return Hold(
-        at, inside, shares, keep_level, shares_before, comm.allreduce(float(shares_before @ before)), pocket.elastic
-    )
+    level = comm.allreduce(float(shares_before @ before))
+    volume, dim = comm.allreduce(float(sizes[inside].sum())), system.grid.dim
+    return Hold(at, inside, shares, keep_level, shares_before, level, pocket.elastic, volume ** ((dim - 1) / dim))
 
 
 def _shares(comm: MPI.Comm, sizes: Array) -> Array:
