@@ -52,3 +52,15 @@ def test_derivative_of_moments_by_a_translation(name, points):
     size = np.abs(exact).max()
     assert np.abs(inside - exact).max() > 0.1 * size
     assert np.abs(found - exact).max() < 1e-6 * size
+
+
+def test_facet_that_is_nearly_in_the_plane():
+    """Its slope s is known to rounding: the weights of a point on the plane add up to 1 / s."""
+    slope, at = 7e-6, gauss(3)[0]
+    x = np.array([[[0.2, -0.3 * slope], [0.8, 0.3 * slope]]])
+    normal = np.array([[-slope, 1.0]]) / np.hypot(slope, 1.0)
+    reference = np.stack([tensor(at, np.ones(3)), tensor(np.ones(3), at)], axis=1)
+    sides = np.ones((1, 2, 2), dtype=bool)
+    lines = crossing_moments(x, normal, np.zeros((1, 2)), np.ones((1, 2)), reference, sides)
+    assert lines[..., 1].sum() == pytest.approx(-1.0 / slope, rel=1e-9)
+    assert not lines[..., 0].any()

@@ -75,7 +75,8 @@ def crossing_moments(
             if dim == 3:
                 along = np.einsum("nb,nbi->ni", ends[:, 1] - ends[:, 0], x[some])
                 length = (last - first) * np.linalg.norm(along, axis=1)
-            scale = (2 * side - 1) * length / np.sqrt(1.0 - n[some, axis] ** 2)
+            steepness = np.linalg.norm(np.delete(n[some], axis, axis=1), axis=1)
+            scale = (2 * side - 1) * length / steepness
             found[some, :, :, axis] += np.einsum("n,l,nlq,nlb->nbq", scale, weights, basis, lam)
     return found
 
