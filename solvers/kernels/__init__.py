@@ -14,5 +14,6 @@ from ._kernels import (
     mortar,
     nodal_normals,
     nodal_tangents,
+    node_blocks,
     surface_rows,
 )

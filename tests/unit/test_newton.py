@@ -23,7 +23,7 @@ class Scalar:
     def residual(self):
         return abs(self.f(self.x))
 
-    def advance(self, *, keep=False):
+    def advance(self, *, keep=False, reduction=0.0):
         self.used = self.used if keep else self.slope(self.x)
         self.kept.append(keep)
         self.increment = -self.f(self.x) / self.used
