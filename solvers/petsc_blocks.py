@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from solvers import kernels
 from solvers.api import Array
 
 
@@ -59,6 +60,20 @@ def shared_block_rows(matrix: PETSc.Mat) -> SharedBlockRows | None:
     return SharedBlockRows(own, others, _array(ghosts, (int(others.columns.max(initial=-1)) + 1,)))
 
 
+def has_entries_of(matrix: PETSc.Mat, rows: BlockRows) -> bool:
+    """Whether an assembled matrix of the type seqaij has as many entries as full blocks."""
+    return matrix.getType() == PETSc.Mat.Type.SEQAIJ and int(matrix.getInfo()["nz_used"]) == rows.values.size
+
+
+def write_entries(matrix: PETSc.Mat, rows: BlockRows) -> None:
+    """Set the entries of a matrix with the pattern of full blocks."""
+    handle, values = ctypes.c_void_p(matrix.handle), ctypes.POINTER(ctypes.c_double)()
+    if _library().MatSeqAIJGetArray(handle, ctypes.byref(values)) != 0:
+        raise PETSc.Error(1)
+    kernels.spread_blocks(rows.start, rows.values, _array(values, (rows.values.size,)))
+    _library().MatSeqAIJRestoreArray(handle, ctypes.byref(values))
+
+
 def _rows(handle: ctypes.c_void_p, size: int) -> BlockRows | None:
     """A view of a matrix of the type seqbaij."""
     library, count, done = _library(), ctypes.c_int32(), ctypes.c_int()
@@ -91,6 +106,8 @@ def _library() -> Any:
     try:
         library = ctypes.CDLL(PETSc.__file__)
         for name, places in (
+            ("MatSeqAIJGetArray", 1),
+            ("MatSeqAIJRestoreArray", 1),
             ("MatSeqBAIJGetArray", 1),
             ("MatSeqBAIJRestoreArray", 1),
             ("MatMPIBAIJGetSeqBAIJ", 3),

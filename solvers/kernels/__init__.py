@@ -15,5 +15,6 @@ from ._kernels import (
     nodal_normals,
     nodal_tangents,
     node_blocks,
+    spread_blocks,
     surface_rows,
 )

@@ -1,4 +1,4 @@
-// Python names of block_factors.hpp and node_blocks.hpp: BlockFactors, node_blocks.
+// Python names of block_factors.hpp and node_blocks.hpp: BlockFactors, node_blocks, spread_blocks.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
@@ -77,6 +77,18 @@ nb::object collect(const Numbers& start, const Numbers& columns, const Vector& v
                           to_numpy(std::move(found.values), blocks, size, size));
 }
 
+void spread(const Numbers& start, const Blocks& blocks, const Result& entries) {
+    require(start.size() > 0 && start.data()[0] == 0, "no compressed rows");
+    for (std::size_t i = 1; i < start.size(); ++i) require(start.data()[i - 1] <= start.data()[i], "no compressed rows");
+    require(static_cast<std::size_t>(start.data()[start.size() - 1]) == blocks.shape(0), "each column needs a block");
+    require(entries.size() == blocks.size(), "each number of a block needs an entry");
+    const std::size_t nodes = start.size() - 1, n = blocks.shape(1);
+    require(n == blocks.shape(2) && (n == 2 || n == 3), "blocks must have 2 or 3 rows");
+    nb::gil_scoped_release release;
+    if (n == 2) node_blocks::spread<2>(nodes, start.data(), blocks.data(), entries.data());
+    else node_blocks::spread<3>(nodes, start.data(), blocks.data(), entries.data());
+}
+
 bool update(factors::Factors& self, const Blocks& values) {
     require(values.size() == self.values(), "each column needs a square block");
     nb::gil_scoped_release release;
@@ -102,4 +114,6 @@ void bind_factors(nb::module_& module) {
         .def("solve", &solve, "b"_a, "x"_a, "x = (L U)^-1 b.");
     module.def("node_blocks", &collect, "start"_a, "columns"_a, "values"_a, "size"_a,
                "(start, columns, blocks (m, n, n), each transposed) of a matrix in compressed rows, n of which are a node's.");
+    module.def("spread_blocks", &spread, "start"_a, "blocks"_a, "entries"_a,
+               "Write the entries of blocks, each transposed, in the order of compressed rows.");
 }
