@@ -226,9 +226,6 @@ def _entry_solver(comm, tolerance: float) -> PETSc.KSP:
 #: Solvers for solids by the names of methods. A field also accepts a function of this type.
 SOLVERS: Mapping[str, Maker] = {"direct": direct_solver, "iterative": elastic_solver, "ilu": incomplete_solver}
 
-#: Those that stop at a tolerance.
-ITERATIVE = ("iterative", "ilu")
-
 
 def _schwarz_solver(comm, prefix: str, tolerance: float, **more: str | float) -> PETSc.KSP:
     options = PETSc.Options(prefix)
@@ -324,19 +321,40 @@ def keep_preconditioner(ksp: PETSc.KSP) -> None:
     ksp.getPC().setReusePreconditioner(True)
 
 
+#: Iterations that cost less than another iterate of Newton's method may: assembly takes the time of 20 to 50.
+FEW = 10
+
+
 def solve(
-    ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, preconditioned_by: PETSc.Mat | None = None
+    ksp: PETSc.KSP,
+    matrix: PETSc.Mat,
+    b: PETSc.Vec,
+    x: PETSc.Vec,
+    preconditioned_by: PETSc.Mat | None = None,
+    *,
+    reduction: float = 0.0,
 ) -> None:
     """Solve matrix x = b (collective). Raises LinearSolveFailed.
 
-    preconditioned_by: the matrix of an earlier solve whose preconditioner is reused; None: `matrix`.
+    preconditioned_by: the matrix of an earlier solve whose preconditioner is reused; None: `matrix`. reduction: of the
+    residual that is good enough for a Krylov method, unless the tolerance of the solver costs few iterations.
     """
     if ksp.getOptionsPrefix() == "elastic_":
         ksp.setPC(_multigrid(ksp.comm))
     for comm in (ksp.comm, matrix.comm):
         free_deleted(comm)
     ksp.setOperators(matrix, preconditioned_by)
-    unlocked.solve(ksp, b, x)
+    tolerance = ksp.getTolerances()[0]
+    if reduction > tolerance and ksp.getType() != PETSc.KSP.Type.PREONLY:
+        ksp.setTolerances(rtol=reduction)
+        unlocked.solve(ksp, b, x)
+        ksp.setTolerances(rtol=tolerance)
+        if ksp.getConvergedReason() > 0 and ksp.getIterationNumber() <= FEW:
+            ksp.setInitialGuessNonzero(True)
+            unlocked.solve(ksp, b, x)
+            ksp.setInitialGuessNonzero(False)
+    else:
+        unlocked.solve(ksp, b, x)
     reason = ksp.getConvergedReason()
     if reason < 0:
         failed = PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED

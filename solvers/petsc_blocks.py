@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -67,10 +69,32 @@ def has_entries_of(matrix: PETSc.Mat, rows: BlockRows) -> bool:
 
 def write_entries(matrix: PETSc.Mat, rows: BlockRows) -> None:
     """Set the entries of a matrix with the pattern of full blocks."""
+    with _entries(matrix) as entries:
+        kernels.spread_blocks(rows.start, rows.values, entries)
+
+
+def join_entries(matrices: Sequence[PETSc.Mat], out: PETSc.Mat) -> bool:
+    """Set the entries of diag(matrices). False unless all are of the type seqaij and `out` has as many entries."""
+    together = (*matrices, out)
+    if any(matrix.getType() != PETSc.Mat.Type.SEQAIJ for matrix in together) or not _available():
+        return False
+    counts = [int(matrix.getInfo()["nz_used"]) for matrix in together]
+    if sum(counts[:-1]) != counts[-1]:
+        return False
+    with _entries(out) as entries:
+        for matrix, part in zip(matrices, np.split(entries, np.cumsum(counts[:-2])), strict=True):
+            with _entries(matrix) as own:
+                part[:] = own
+    return True
+
+
+@contextmanager
+def _entries(matrix: PETSc.Mat) -> Iterator[Array]:
+    """A view of the entries of an assembled matrix of the type seqaij; PETSc notes that they may have changed."""
     handle, values = ctypes.c_void_p(matrix.handle), ctypes.POINTER(ctypes.c_double)()
-    if _library().MatSeqAIJGetArray(handle, ctypes.byref(values)) != 0:
-        raise PETSc.Error(1)
-    kernels.spread_blocks(rows.start, rows.values, _array(values, (rows.values.size,)))
+    if code := _library().MatSeqAIJGetArray(handle, ctypes.byref(values)):
+        raise PETSc.Error(code)
+    yield _array(values, (int(matrix.getInfo()["nz_used"]),))
     _library().MatSeqAIJRestoreArray(handle, ctypes.byref(values))
 
 

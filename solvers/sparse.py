@@ -126,6 +126,12 @@ class Sparse:
         row[numbers] = np.arange(self.shape[0])
         return _with_empty_row(self)[np.where(row < 0, self.shape[0], row)]
 
+    def with_other_rows(self, numbers: NDArray[np.int64], rows: Sparse) -> Sparse:
+        """The matrix whose rows `numbers`, each once, are those of another one."""
+        of = np.arange(self.shape[0])
+        of[numbers] = self.shape[0] + np.arange(len(numbers))
+        return stack([self, rows])[of]
+
     def scaled_rows(self, factors: Array) -> Sparse:
         """Rows multiplied by factors, shape (rows,)."""
         data = self.data * np.repeat(factors, self.indptr[1:] - self.indptr[:-1])

@@ -261,8 +261,8 @@ class Structure:
         """One iteration of Newton's method; returns |du| / |u|. Raises StepFailed.
 
         keep: use the matrix and the factors of the last iterate, away from contact. reduction: of the residual of the
-        linear system that is good enough. It applies in contact, whose first iterates only find the active set; of a
-        linear system without contact one exact solution may be all that is needed.
+        linear system that is good enough. It applies near contact, where the first iterates only find the active set;
+        elsewhere one exact solution may be all that is needed.
         """
         change, taken, imposed = self.row_transformation(), None, self._imposed
         self._x.array[:] = self.missing_displacement()
@@ -279,15 +279,10 @@ class Structure:
         self._imposed = matrix if change is None else None
         if self._method == "iterative":
             attach_rigid_modes(matrix, self.bodies, self.now.u)
-        ksp = self.linear_solver
-        if change is not None:
-            assert self.constrained_solver is not None
-            ksp = self.constrained_solver
-            if self._method in linear.ITERATIVE:
-                ksp.setTolerances(rtol=max(reduction, self.settings.linear_tolerance))
+        solver, enough = (self.linear_solver, 0.0) if change is None else (self.constrained_solver, reduction)
         try:
             with self.timer("solve"):
-                linear.solve(ksp, matrix, self._b, self._x)
+                linear.solve(solver, matrix, self._b, self._x, reduction=enough)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         if taken is not None:

@@ -9,6 +9,7 @@ from structure_setup import constant
 from fsci import shapes
 from fsci.run.history import read_history
 from solvers.newton import Tolerance
+from solvers.solid_factors import SolidFactors
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
 from solvers.structure.elastic_constants import lame
@@ -37,7 +38,7 @@ def test_static_contact():
     force = direct[1].resultant(0)
     assert np.abs(ilu[1].resultant(0) - force).max() < 1e-6 * np.abs(force).max()
     used = ilu[0].constrained_solver
-    assert used.getPC().getType() == "ilu"
+    assert isinstance(used.getPC().getPythonContext(), SolidFactors)
     assert 0 < used.getIterationNumber() < 100
 
 

@@ -43,7 +43,7 @@ def test_pressure_inside(solutions):
 
 
 def test_the_top_carries_the_force(solutions):
-    """Force balance: what contact gives, the support at the top takes, but for what Newton's tolerance of 1e-10 leaves."""
+    """Force balance: what contact gives, the support at the top takes, up to Newton's tolerance."""
     for found in solutions:
         structure = found.structure
         points = structure.bodies[0].points[:, : structure.bodies[0].owned]
