@@ -6,7 +6,8 @@ import ufl
 from structure_setup import CELL_TYPES, block, constant, distort, make_structure
 
 from solvers import fem
-from solvers.petsc_blocks import block_rows
+from solvers.blocks import block_diagonal
+from solvers.petsc_blocks import block_rows, join_entries
 from solvers.structure import forms
 from solvers.structure.block_assembly import BlockAssembly
 from solvers.structure.body import Pressure
@@ -73,3 +74,20 @@ def test_what_else_is_in_a_tangent(more):
         body.assemble_tangent(matrix, 0.0)
         found.append(matrix.getValuesCSR()[2])
     assert np.array_equal(*found)
+
+
+def test_entries_side_by_side():
+    """diag(A, B) in a matrix that is there is that of a new one; with another pattern its entries are not touched."""
+    bodies = [make_structure(block(cell_type, 2), NEO_HOOKE).bodies[0] for cell_type in ("quad", "triangle")]
+    matrices = [body.create_tangent() for body in bodies]
+    out = None
+    for scale in (0.01, 0.02):
+        for body, matrix in zip(bodies, matrices, strict=True):
+            body.set_displacement(scale * np.cos(np.arange(body.size)))
+            body.assemble_tangent(matrix, 0.0)
+        out = block_diagonal(matrices, out)
+        new = block_diagonal(matrices)
+        assert all(map(np.array_equal, out.getValuesCSR(), new.getValuesCSR()))
+    assert join_entries(matrices, out)
+    assert not join_entries(matrices[:1], out)
+    assert np.array_equal(out.getValuesCSR()[2], new.getValuesCSR()[2])

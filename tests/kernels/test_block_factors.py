@@ -157,6 +157,30 @@ def test_solver_of_solids(dim, kind):
     assert ksp.getIterationNumber() < 15
 
 
+def test_solution_that_is_good_enough(monkeypatch):
+    """A Krylov method stops at the reduction that is asked for, unless its own tolerance costs few iterations."""
+    A = sparse.diags([np.full(299, -1.0), np.full(300, 2.02), np.full(299, -1.0)], [-1, 0, 1], format="csr")
+    matrix = PETSc.Mat().createAIJ((300, 300), csr=(A.indptr, A.indices, A.data), comm=PETSC_SELF)
+    ksp = PETSc.KSP().create(PETSC_SELF)
+    ksp.setType(PETSc.KSP.Type.GMRES)
+    ksp.getPC().setType(PETSc.PC.Type.NONE)
+    ksp.setTolerances(rtol=1e-9, max_it=1000)
+    b, x = matrix.createVecs()
+    b.set(1.0)
+
+    def missed(reduction):
+        x.set(7.0)  # solvers start from zero
+        linear.solve(ksp, matrix, b, x, reduction=reduction)
+        return (matrix * x - b).norm() / b.norm()
+
+    assert missed(0.0) <= 1e-9
+    assert 1e-9 < missed(1e-3) <= 1e-3
+    assert missed(1e-10) <= 1e-9
+    monkeypatch.setattr(linear, "FEW", 1000)
+    assert missed(1e-3) <= 1e-9
+    assert ksp.getTolerances()[0] == 1e-9
+
+
 def test_solver_of_solids_without_factors_of_blocks():
     """A singular block on the diagonal: factors of entries take over, which exist by fill outside of it."""
     A = sparse.lil_matrix(stretched_cube())
