@@ -12,6 +12,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from solvers import kernels
+from solvers.petsc_blocks import quick_to_multiply
 from solvers.petsc_python import PythonContext
 
 #: Unknowns of a node.
@@ -28,7 +29,7 @@ class SolidFactors(PythonContext):
     def setUp(self, preconditioner: PETSc.PC) -> None:
         multiplied, matrix = preconditioner.getOperators()
         if multiplied.getType() == PETSc.Mat.Type.SEQAIJ:
-            multiplied.setOption(PETSc.Mat.Option.USE_INODES, False)  # products take a third of the time
+            quick_to_multiply(multiplied)
         start, columns, blocks = kernels.node_blocks(*matrix.getValuesCSR(), SIZE)
         self._factors = kernels.BlockFactors(start, columns, SIZE, order_by_bandwidth(start, columns))
         if not self._factors.update(blocks):

@@ -15,6 +15,7 @@ from solvers import fem
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
 from solvers.mesh import Mesh
+from solvers.petsc_blocks import quick_to_multiply
 from solvers.structure import forms
 from solvers.structure.block_assembly import BlockAssembly
 from solvers.structure.element import Element
@@ -203,7 +204,7 @@ class Body:
 
     def mass(self) -> PETSc.Mat:
         """Consistent mass matrix [kg]."""
-        matrix = fem.create_matrix(self._mass)
+        matrix = quick_to_multiply(fem.create_matrix(self._mass))
         fem.assemble_matrix(matrix, self._mass)
         matrix.assemble()
         return matrix
@@ -222,7 +223,7 @@ class Body:
 
     def create_tangent(self) -> PETSc.Mat:
         """An empty matrix for `assemble_tangent`."""
-        return fem.create_matrix(self._tangent)
+        return quick_to_multiply(fem.create_matrix(self._tangent))
 
     def assemble_tangent(self, matrix: PETSc.Mat, t: float) -> None:
         """d(internal - external force)/du [N/m] at the time t [s] (collective)."""
