@@ -112,8 +112,10 @@ def change_rows(matrix: PETSc.Mat, own: Sparse, b: PETSc.Vec, changes: RowChange
 
     replace, add = owned(changes.replaced), owned(changes.added)
     replaced, added = changes.replaced[replace] - start, changes.added[add] - start
-    new = stack([changes.replaced_rows[replace], changes.added_rows[add]])
-    changed = np.concatenate([replaced, added])
+    more = changes.added_rows[add]
+    some = np.diff(more.indptr) > 0  # most nodes of the surfaces are not near
+    new = stack([changes.replaced_rows[replace], more[some]])
+    changed = np.concatenate([replaced, added[some]])
     before = own[changed]
     before.data[: before.indptr[len(replaced)]] = 0.0
     total = own.with_other_rows(changed, before + new.ordered())

@@ -21,6 +21,9 @@ except ImportError:
 
 Indices = NDArray[np.int32]
 
+#: Rows up to which they are copied one by one; more are copied with a second copy of the matrix.
+MANY_ROWS = 500
+
 
 @dataclass(frozen=True, eq=False)
 class Sparse:
@@ -128,6 +131,10 @@ class Sparse:
 
     def with_other_rows(self, numbers: NDArray[np.int64], rows: Sparse) -> Sparse:
         """The matrix whose rows `numbers`, each once, are those of another one."""
+        if len(numbers) > MANY_ROWS:
+            of = np.arange(self.shape[0])
+            of[numbers] = self.shape[0] + np.arange(len(numbers))
+            return stack([self, rows])[of]
         order = np.argsort(numbers)
         where, rows = numbers[order], rows[order]
         lengths = np.diff(self.indptr)
