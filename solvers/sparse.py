@@ -132,9 +132,9 @@ class Sparse:
     def with_other_rows(self, numbers: NDArray[np.int64], rows: Sparse) -> Sparse:
         """The matrix whose rows `numbers`, each once, are those of another one."""
         if len(numbers) > MANY_ROWS:
-            of = np.arange(self.shape[0])
-            of[numbers] = self.shape[0] + np.arange(len(numbers))
-            return stack([self, rows])[of]
+            source = np.arange(self.shape[0])
+            source[numbers] = self.shape[0] + np.arange(len(numbers))
+            return stack([self, rows])[source]
         order = np.argsort(numbers)
         where, rows = numbers[order], rows[order]
         lengths = np.diff(self.indptr)
