@@ -117,8 +117,8 @@ class Elastic:
     def right_side(self) -> Array:
         return self.structure.right_side()
 
-    def advance(self, *, keep: bool = False) -> float:
-        return self.structure.advance(keep=keep)
+    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> float:
+        return self.structure.advance(keep=keep, reduction=reduction)
 
     def update(self, increment: Array) -> float:
         return self.structure.update(increment)

@@ -132,7 +132,7 @@ class Monolithic:
         self._farther = solid if relative[0] > relative[1] else flow
         return float(relative.max() * self.largest.sum())
 
-    def advance(self, *, keep: bool = False) -> float:
+    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> float:
         """One Newton iteration; returns the larger of the relative increments of both parts. Raises StepFailed.
 
         keep: keep the derivatives of the flow, if the same unknowns are held. Those of the solid are cheap, and contact

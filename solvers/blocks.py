@@ -9,6 +9,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from solvers.api import Array
+from solvers.petsc_blocks import join_entries, quick_to_multiply
 
 
 class Layout:
@@ -44,8 +45,10 @@ def block_diagonal(blocks: Sequence[PETSc.Mat], out: PETSc.Mat | None = None) ->
     """
     if len(blocks) == 1:
         return blocks[0]
+    if out is not None and join_entries(blocks, out):
+        return out
     rows = [[block if i == j else None for j in range(len(blocks))] for i, block in enumerate(blocks)]
     nest = PETSc.Mat().createNest(rows, comm=blocks[0].comm)
     if out is None:
-        return nest.convert(PETSc.Mat.Type.AIJ, PETSc.Mat())
+        return quick_to_multiply(nest.convert(PETSc.Mat.Type.AIJ, PETSc.Mat()))
     return nest.convert(PETSc.Mat.Type.AIJ, out)

@@ -20,10 +20,11 @@ class System(Protocol):
         """Assemble the residual; returns its norm over the rows that are solved for."""
         ...
 
-    def advance(self, *, keep: bool = False) -> float:
+    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> float:
         """Linearise, solve and update; returns the norm of the increment relative to that of the solution.
 
-        keep: the tangent of the last iterate is good enough, if the system still has it.
+        keep: the tangent of the last iterate is good enough, if the system still has it. reduction: of the residual of
+        the linear system that is good enough, for systems whose linear solver iterates.
         """
         ...
 
@@ -75,6 +76,8 @@ def iterates(system: System, tolerance: Tolerance = Tolerance(), unmoved: float 
     The tangent is kept for an iterate that is expected to fulfil the tolerance with it. Newton's method leaves
     r_1 = f'' dx^2 / 2. With the same tangent the next residual is f'' dx dx_1 = 2 (r_1 / r_0) r_1.
     Source: C. T. Kelley, Solving Nonlinear Equations with Newton's Method, SIAM 2003, section 2.3 (chord method).
+
+    The linear system may be solved as inexactly as `enough` says.
     """
     number, increment, residual, ratio = 0, math.inf, system.residual(), math.inf
     largest = max(unmoved, residual)
@@ -82,12 +85,33 @@ def iterates(system: System, tolerance: Tolerance = Tolerance(), unmoved: float 
         yield Iterate(number, residual, increment, system.settled())
         before = residual
         imposed = system.settled()
-        increment = system.advance(keep=2.0 * ratio * residual <= tolerance.small(largest))
+        small = tolerance.small(largest)
+        increment = system.advance(
+            keep=2.0 * ratio * residual <= small, reduction=enough(residual, ratio, tolerance=small)
+        )
         residual = system.residual()
         if tolerance.line_search and imposed:
             increment, residual = _halve(system, before, increment, residual)
         ratio = residual / before if before > 0.0 else math.inf
         largest, number = max(largest, residual), number + 1
+
+
+#: Reduction of the residual of a linear system that is enough while nothing is known of the convergence. Measured with
+#: Hertz contact: 1e-2 takes as long, and another iterate on two of three meshes; 1e-4 takes 1.2 times as long.
+ENOUGH = 1e-3
+
+
+def enough(residual: float, ratio: float, *, tolerance: float) -> float:
+    """Reduction of the residual of a linear system by which the next iterate is hardly worse than by an exact solution.
+
+    Newton's method leaves (r_1 / r_0)^2 r_1, of which a tenth is added, or what is below the tolerance. Of that only a
+    hundredth is added: errors of linear solvers are smooth, and add up in resultants. ratio: r_1 / r_0 of the last
+    iterates, infinite before the second.
+    Source: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996), choice 2.
+    """
+    if residual == 0.0:
+        return ENOUGH
+    return min(ENOUGH, max(0.1 * ratio * ratio, 0.01 * tolerance / residual))
 
 
 def _halve(system: System, before: float, increment: float, residual: float) -> tuple[float, float]:

@@ -104,7 +104,7 @@ def _on_all(comm: MPI.Comm, own: Sparse, start: int, rows: NDArray[np.int64]) ->
 
 
 def change_rows(matrix: PETSc.Mat, own: Sparse, b: PETSc.Vec, changes: RowChanges) -> PETSc.Mat:
-    """The changed matrix (collective). own: a copy of the rows of this process, which is overwritten; b changes too."""
+    """The changed matrix (collective). own: a copy of the rows of this process; b changes in place."""
     start, end = matrix.getOwnershipRange()
 
     def owned(rows: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -112,10 +112,13 @@ def change_rows(matrix: PETSc.Mat, own: Sparse, b: PETSc.Vec, changes: RowChange
 
     replace, add = owned(changes.replaced), owned(changes.added)
     replaced, added = changes.replaced[replace] - start, changes.added[add] - start
-    new = stack([changes.replaced_rows[replace], changes.added_rows[add]])
-    for row in replaced:
-        own.data[own.indptr[row] : own.indptr[row + 1]] = 0.0
-    total = own + new.with_rows(np.concatenate([replaced, added]), end - start).ordered()
+    more = changes.added_rows[add]
+    some = np.diff(more.indptr) > 0  # most nodes of the surfaces are not near
+    new = stack([changes.replaced_rows[replace], more[some]])
+    changed = np.concatenate([replaced, added[some]])
+    before = own[changed]
+    before.data[: before.indptr[len(replaced)]] = 0.0
+    total = own.with_other_rows(changed, before + new.ordered())
     right = b.array
     right[replaced] = changes.replaced_right[replace]
     right[added] += changes.added_right[add]

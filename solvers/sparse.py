@@ -21,6 +21,9 @@ except ImportError:
 
 Indices = NDArray[np.int32]
 
+#: Rows up to which they are copied one by one; more are copied with a second copy of the matrix.
+MANY_ROWS = 500
+
 
 @dataclass(frozen=True, eq=False)
 class Sparse:
@@ -125,6 +128,30 @@ class Sparse:
         row = np.full(rows, -1, dtype=np.int64)
         row[numbers] = np.arange(self.shape[0])
         return _with_empty_row(self)[np.where(row < 0, self.shape[0], row)]
+
+    def with_other_rows(self, numbers: NDArray[np.int64], rows: Sparse) -> Sparse:
+        """The matrix whose rows `numbers`, each once, are those of another one."""
+        if len(numbers) > MANY_ROWS:
+            source = np.arange(self.shape[0])
+            source[numbers] = self.shape[0] + np.arange(len(numbers))
+            return stack([self, rows])[source]
+        order = np.argsort(numbers)
+        where, rows = numbers[order], rows[order]
+        lengths = np.diff(self.indptr)
+        lengths[where] = np.diff(rows.indptr)
+        indptr = np.zeros(self.shape[0] + 1, dtype=np.int32)
+        np.cumsum(lengths, out=indptr[1:])
+        data, indices = np.empty(indptr[-1]), np.empty(indptr[-1], dtype=np.int32)
+        # runs of rows in sequence are copied at once
+        kept = np.split(np.arange(-1, self.shape[0]), where + 1)
+        for run in kept:
+            first, last = run[0] + 1, run[-1] + 1
+            to, of = slice(indptr[first], indptr[last]), slice(self.indptr[first], self.indptr[last])
+            data[to], indices[to] = self.data[of], self.indices[of]
+        for number, start, end in zip(where, rows.indptr[:-1], rows.indptr[1:], strict=True):
+            to = slice(indptr[number], indptr[number + 1])
+            data[to], indices[to] = rows.data[start:end], rows.indices[start:end]
+        return Sparse(data, indices, indptr, self.shape)
 
     def scaled_rows(self, factors: Array) -> Sparse:
         """Rows multiplied by factors, shape (rows,)."""

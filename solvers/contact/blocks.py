@@ -27,10 +27,17 @@ def add_up(parts: Sequence[Part], shape: tuple[int, int]) -> Sparse:
     """The sum of matrices, each with the numbers of its rows and columns in the sum."""
     if not parts:
         return nothing(shape)
+    if len(parts) == 1 and all(_once(numbers) for numbers in parts[0][1:]):
+        matrix, rows, columns = parts[0]
+        return matrix.with_columns(columns, shape[1]).with_rows(rows, shape[0]).ordered()
     data = np.concatenate([matrix.data for matrix, _, _ in parts])
     rows = np.concatenate([rows[matrix.row_numbers()] for matrix, rows, _ in parts])
     columns = np.concatenate([columns[matrix.indices] for matrix, _, columns in parts])
     return sparse_from_entries(rows, columns, data, shape)
+
+
+def _once(numbers: NDArray[np.int64]) -> bool:
+    return bool(np.bincount(numbers).max(initial=0) <= 1)
 
 
 def components(items: NDArray[np.int64], dim: int) -> NDArray[np.int64]:

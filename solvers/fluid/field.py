@@ -314,7 +314,7 @@ class Fluid:
         scaled = np.where(self.unknowns.velocity_mask[: len(rows)], rows, impedance * rows)
         return math.sqrt(self.comm.allreduce(float(scaled @ scaled)))
 
-    def advance(self, *, keep: bool = False) -> float:
+    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> float:
         """One iteration of Newton's method; returns the increment relative to the solution. Raises StepFailed.
 
         keep: use the tangent of the last iterate if the same unknowns are held and the flow is unsteady.

@@ -14,5 +14,7 @@ from ._kernels import (
     mortar,
     nodal_normals,
     nodal_tangents,
+    node_blocks,
+    spread_blocks,
     surface_rows,
 )

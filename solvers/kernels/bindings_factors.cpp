@@ -1,11 +1,19 @@
-// Python name of block_factors.hpp: BlockFactors.
+// Python names of block_factors.hpp and node_blocks.hpp: BlockFactors, node_blocks, spread_blocks.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <numeric>
+#include <optional>
 #include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include <nanobind/stl/optional.h>
 
 #include "block_factors.hpp"
+#include "node_blocks.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -21,13 +29,64 @@ void require(bool condition, const char* message) {
     if (!condition) throw std::invalid_argument(message);
 }
 
-void create(factors::Factors* self, const Numbers& start, const Numbers& columns, int size) {
+// Throws unless these are compressed rows of a square matrix.
+void require_square(const Numbers& start, const Numbers& columns) {
     require(start.size() > 0 && start.data()[0] == 0, "no compressed rows");
     require(static_cast<std::size_t>(start.data()[start.size() - 1]) == columns.size(), "no compressed rows");
     for (std::size_t i = 1; i < start.size(); ++i) require(start.data()[i - 1] <= start.data()[i], "no compressed rows");
     for (std::size_t k = 0; k < columns.size(); ++k)
         require(columns.data()[k] >= 0 && static_cast<std::size_t>(columns.data()[k]) + 1 < start.size(), "no square matrix");
-    new (self) factors::Factors(start.size() - 1, start.data(), columns.data(), size);
+}
+
+void create(factors::Factors* self, const Numbers& start, const Numbers& columns, int size,
+            const std::optional<Numbers>& order) {
+    require_square(start, columns);
+    const std::size_t rows = start.size() - 1;
+    std::vector<std::int32_t> nodes(rows);
+    std::iota(nodes.begin(), nodes.end(), 0);
+    if (order) {
+        std::vector<std::int32_t> given(order->data(), order->data() + order->size()), sorted = given;
+        std::sort(sorted.begin(), sorted.end());
+        require(sorted == nodes, "the order must have each row once");
+        nodes = std::move(given);
+    }
+    new (self) factors::Factors(rows, start.data(), columns.data(), size, nodes.data());
+}
+
+template <class T, class... Shape>
+nb::object to_numpy(std::vector<T> values, Shape... shape) {
+    auto* owned = new std::vector<T>(std::move(values));
+    nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+    return nb::cast(nb::ndarray<nb::numpy, T>(owned->data(), {static_cast<std::size_t>(shape)...}, owner));
+}
+
+nb::object collect(const Numbers& start, const Numbers& columns, const Vector& values, int size) {
+    require_square(start, columns);
+    require(values.size() == columns.size(), "each column needs a value");
+    require(size == 3 || size == 4, "blocks must have 3 or 4 rows");
+    require((start.size() - 1) % size == 0, "the rows are not those of whole nodes");
+    node_blocks::Blocks found;
+    {
+        nb::gil_scoped_release release;
+        const node_blocks::Rows A{start.data(), columns.data(), values.data()};
+        const std::size_t nodes = (start.size() - 1) / size;
+        found = size == 3 ? node_blocks::collect<3>(nodes, A) : node_blocks::collect<4>(nodes, A);
+    }
+    const std::size_t rows = found.start.size(), blocks = found.columns.size();
+    return nb::make_tuple(to_numpy(std::move(found.start), rows), to_numpy(std::move(found.columns), blocks),
+                          to_numpy(std::move(found.values), blocks, size, size));
+}
+
+void spread(const Numbers& start, const Blocks& blocks, const Result& entries) {
+    require(start.size() > 0 && start.data()[0] == 0, "no compressed rows");
+    for (std::size_t i = 1; i < start.size(); ++i) require(start.data()[i - 1] <= start.data()[i], "no compressed rows");
+    require(static_cast<std::size_t>(start.data()[start.size() - 1]) == blocks.shape(0), "each column needs a block");
+    require(entries.size() == blocks.size(), "each number of a block needs an entry");
+    const std::size_t nodes = start.size() - 1, n = blocks.shape(1);
+    require(n == blocks.shape(2) && (n == 2 || n == 3), "blocks must have 2 or 3 rows");
+    nb::gil_scoped_release release;
+    if (n == 2) node_blocks::spread<2>(nodes, start.data(), blocks.data(), entries.data());
+    else node_blocks::spread<3>(nodes, start.data(), blocks.data(), entries.data());
 }
 
 bool update(factors::Factors& self, const Blocks& values) {
@@ -47,9 +106,14 @@ void solve(factors::Factors& self, const Vector& b, const Result& x) {
 void bind_factors(nb::module_& module) {
     nb::class_<factors::Factors>(module, "BlockFactors",
         "Incomplete factors, in single precision, of square matrices of n x n blocks with one pattern, n = 3 or 4.\n\n"
-        "The pattern is given by compressed rows, with increasing columns and the diagonal in each.")
-        .def("__init__", &create, "start"_a, "columns"_a, "size"_a)
+        "The pattern is given by compressed rows, with increasing columns and the diagonal in each; order: that of\n"
+        "elimination, of rows.")
+        .def("__init__", &create, "start"_a, "columns"_a, "size"_a, "order"_a = nb::none())
         .def("update", &update, "values"_a,
              "Factors of a matrix; values: shape (blocks, n, n), each transposed. False if they do not exist.")
         .def("solve", &solve, "b"_a, "x"_a, "x = (L U)^-1 b.");
+    module.def("node_blocks", &collect, "start"_a, "columns"_a, "values"_a, "size"_a,
+               "(start, columns, blocks (m, n, n), each transposed) of a matrix in compressed rows, n of which are a node's.");
+    module.def("spread_blocks", &spread, "start"_a, "blocks"_a, "entries"_a,
+               "Write the entries of blocks, each transposed, in the order of compressed rows.");
 }

@@ -89,6 +89,7 @@ struct View {
     Column* blocks;       // of the factors of S A S, the diagonal of U inverted
     std::int32_t* place;  // block of each column in the present row, or one behind all
     Column* scale;        // S: 1 / sqrt(|a_ii|), so that units do not leave the range of the numbers
+    const std::int32_t *node, *source;  // row of the caller's matrix for each row; its block for each block
 };
 
 template <int n>
@@ -112,7 +113,7 @@ FSCI_INLINE bool factor(View F, const double* values) {
     for (std::size_t i = 0; i < F.rows; ++i) {
         const std::int32_t own = F.start[i] + F.lower[i + 1] - F.lower[i];
         for (int a = 0; a < n; ++a) {
-            const double size = std::abs(values[static_cast<std::size_t>(own) * area + a * n + a]);
+            const double size = std::abs(values[static_cast<std::size_t>(F.source[own]) * area + a * n + a]);
             F.scale[i][a] = size > 0.0 ? static_cast<float>(1.0 / std::sqrt(size)) : 1.0f;
         }
     }
@@ -120,7 +121,7 @@ FSCI_INLINE bool factor(View F, const double* values) {
         const std::int32_t below = F.lower[i + 1] - F.lower[i], count = F.start[i + 1] - F.start[i];
         for (std::int32_t k = 0; k < count; ++k) {
             const std::int32_t from = F.start[i] + k, to = k < below ? F.lower[i] + k : F.upper[i] + k - below;
-            const double* value = values + static_cast<std::size_t>(from) * area;
+            const double* value = values + static_cast<std::size_t>(F.source[from]) * area;
             const Column left = F.scale[i], right = F.scale[F.columns[from]];
             for (int c = 0; c < n; ++c)
                 for (int r = 0; r < n; ++r) block<n>(F, to)[c][r] = static_cast<float>(value[c * n + r] * right[c] * left[r]);
@@ -159,7 +160,8 @@ template <int n>
 FSCI_INLINE void solve(View F, const double* b, double* x, Column* work) {
     for (std::size_t i = 0; i < F.rows; ++i) {
         Column right = {};
-        for (int a = 0; a < n; ++a) right[a] = static_cast<float>(b[i * n + a] * F.scale[i][a]);
+        const double* own = b + static_cast<std::size_t>(F.node[i]) * n;
+        for (int a = 0; a < n; ++a) right[a] = static_cast<float>(own[a] * F.scale[i][a]);
         work[i] = right - product<n>(F, F.lower[i + 1] - F.lower[i], F.lower[i], F.columns + F.start[i], work);
     }
     for (std::size_t i = F.rows; i-- > 0;) {
@@ -168,7 +170,8 @@ FSCI_INLINE void solve(View F, const double* b, double* x, Column* work) {
         Sum<n> solved;
         solved.add(block<n>(F, F.upper[i]), work[i] - known);
         work[i] = solved.total();
-        for (int a = 0; a < n; ++a) x[i * n + a] = static_cast<double>(work[i][a]) * F.scale[i][a];
+        double* own = x + static_cast<std::size_t>(F.node[i]) * n;
+        for (int a = 0; a < n; ++a) own[a] = static_cast<double>(work[i][a]) * F.scale[i][a];
     }
 }
 
@@ -177,20 +180,32 @@ FSCI_CLONES inline bool factor_4(View F, const double* values) { return factor<4
 FSCI_CLONES inline void solve_3(View F, const double* b, double* x, Column* work) { solve<3>(F, b, x, work); }
 FSCI_CLONES inline void solve_4(View F, const double* b, double* x, Column* work) { solve<4>(F, b, x, work); }
 
-// Factors for matrices that share a pattern.
+// Factors for matrices that share a pattern; order: that of elimination, a row of the matrix for each of the factors.
 class Factors {
 public:
-    Factors(std::size_t rows, const std::int32_t* start, const std::int32_t* columns, int size)
-        : size_(size), start_(start, start + rows + 1), columns_(columns, columns + start[rows]), lower_(rows + 1, 0),
-          upper_(rows + 1), place_(rows), blocks_((columns_.size() + 1) * static_cast<std::size_t>(size)), scale_(rows),
-          work_(rows) {
+    Factors(std::size_t rows, const std::int32_t* start, const std::int32_t* columns, int size, const std::int32_t* order)
+        : size_(size), start_(rows + 1, 0), columns_(static_cast<std::size_t>(start[rows])), lower_(rows + 1, 0),
+          upper_(rows + 1), place_(rows), node_(order, order + rows), source_(columns_.size()),
+          blocks_((columns_.size() + 1) * static_cast<std::size_t>(size)), scale_(rows), work_(rows) {
         if (size != 3 && size != 4) throw std::invalid_argument("blocks must have 3 or 4 rows");
+        std::vector<std::int32_t> number(rows, -1);
+        for (std::size_t i = 0; i < rows; ++i) number[node_[i]] = static_cast<std::int32_t>(i);
+        std::vector<std::pair<std::int32_t, std::int32_t>> row;
         for (std::size_t i = 0; i < rows; ++i) {
-            const auto begin = columns_.begin() + start_[i], end = columns_.begin() + start_[i + 1];
-            const auto own = std::lower_bound(begin, end, static_cast<std::int32_t>(i));
-            if (!std::is_sorted(begin, end) || own == end || *own != static_cast<std::int32_t>(i))
+            const auto own = static_cast<std::int32_t>(i), begin = start[node_[i]], end = start[node_[i] + 1];
+            row.clear();
+            for (std::int32_t k = begin; k < end; ++k) row.emplace_back(number[columns[k]], k);
+            const auto less = [](const auto& a, const auto& b) { return a.first < b.first; };
+            std::sort(row.begin(), row.end(), less);
+            const auto diagonal = std::lower_bound(row.begin(), row.end(), std::pair{own, 0}, less);
+            if (!std::is_sorted(columns + begin, columns + end) || diagonal == row.end() || diagonal->first != own)
                 throw std::invalid_argument("each row must have increasing columns and a block on the diagonal");
-            lower_[i + 1] = lower_[i] + static_cast<std::int32_t>(own - begin);
+            lower_[i + 1] = lower_[i] + static_cast<std::int32_t>(diagonal - row.begin());
+            start_[i + 1] = start_[i] + static_cast<std::int32_t>(row.size());
+            for (std::size_t k = 0; k < row.size(); ++k) {
+                columns_[start_[i] + k] = row[k].first;
+                source_[start_[i] + k] = row[k].second;
+            }
         }
         for (std::size_t i = 0; i <= rows; ++i) upper_[i] = lower_[rows] + start_[i] - lower_[i];
     }
@@ -212,11 +227,11 @@ public:
 private:
     View view() {
         return {scale_.size(), start_.data(), columns_.data(), lower_.data(), upper_.data(), blocks_.data(), place_.data(),
-                scale_.data()};
+                scale_.data(), node_.data(), source_.data()};
     }
 
     int size_;
-    std::vector<std::int32_t> start_, columns_, lower_, upper_, place_;
+    std::vector<std::int32_t> start_, columns_, lower_, upper_, place_, node_, source_;
     std::vector<Column, Aligned<Column>> blocks_, scale_, work_;
 };
 

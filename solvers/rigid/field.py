@@ -262,7 +262,7 @@ class RigidBodies:
         self._noise = rounding_error(matrix, self.rounded())
         return matrix
 
-    def advance(self, *, keep: bool = False) -> float:
+    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> float:
         """One Newton iteration; returns the norm of the increment relative to that of the step. It keeps no tangent."""
         right = -self.balance
         if self.contact is not None:

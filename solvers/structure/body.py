@@ -15,7 +15,9 @@ from solvers import fem
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
 from solvers.mesh import Mesh
+from solvers.petsc_blocks import quick_to_multiply
 from solvers.structure import forms
+from solvers.structure.block_assembly import BlockAssembly
 from solvers.structure.element import Element
 from solvers.structure.elements import Displacement, Formulation, Mixed
 from solvers.structure.loads import DeadLoads, FollowerPressure, LineForce, PointForce, Pressure, Traction
@@ -65,6 +67,7 @@ class Body:
         self.parameters = {k: self._parameter(p) for k, p in parameters(material).items()}
         self.element = self._element(fem.volume_measure(domain, self.stiffness_degree))
         self._energy, self._internal, self._tangent, self._mass = self._compiled()
+        self._tangent_assembly = BlockAssembly(self._tangent)
         self._force = fem.function(self.space)
         gradient = forms.deformation_gradient(self.u)
         self._jacobian = fem.compile_expression(ufl.det(gradient), fem.reference_nodes(domain))
@@ -201,7 +204,7 @@ class Body:
 
     def mass(self) -> PETSc.Mat:
         """Consistent mass matrix [kg]."""
-        matrix = fem.create_matrix(self._mass)
+        matrix = quick_to_multiply(fem.create_matrix(self._mass))
         fem.assemble_matrix(matrix, self._mass)
         matrix.assemble()
         return matrix
@@ -220,14 +223,13 @@ class Body:
 
     def create_tangent(self) -> PETSc.Mat:
         """An empty matrix for `assemble_tangent`."""
-        return fem.create_matrix(self._tangent)
+        return quick_to_multiply(fem.create_matrix(self._tangent))
 
     def assemble_tangent(self, matrix: PETSc.Mat, t: float) -> None:
         """d(internal - external force)/du [N/m] at the time t [s] (collective)."""
         self._evaluate_loads(t)
         self.element.linearise()
-        matrix.zeroEntries()
-        fem.assemble_matrix(matrix, self._tangent)
+        self._tangent_assembly.assemble(matrix)
         for pressure in () if self.linear else self.pressures:
             pressure.add_tangent(self._shape, matrix)
         matrix.assemble()

@@ -257,10 +257,12 @@ class Structure:
         """d(balance)/du without supports; the next call overwrites the matrix."""
         return self._assembled_tangent.assemble(self, self.time)
 
-    def advance(self, *, keep: bool = False) -> float:
+    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> float:
         """One iteration of Newton's method; returns |du| / |u|. Raises StepFailed.
 
-        keep: use the matrix and the factors of the last iterate, away from contact.
+        keep: use the matrix and the factors of the last iterate, away from contact. reduction: of the residual of the
+        linear system that is good enough. It applies near contact, where the first iterates only find the active set;
+        elsewhere one exact solution may be all that is needed.
         """
         change, taken, imposed = self.row_transformation(), None, self._imposed
         self._x.array[:] = self.missing_displacement()
@@ -277,11 +279,10 @@ class Structure:
         self._imposed = matrix if change is None else None
         if self._method == "iterative":
             attach_rigid_modes(matrix, self.bodies, self.now.u)
+        solver, enough = (self.linear_solver, 0.0) if change is None else (self.constrained_solver, reduction)
         try:
             with self.timer("solve"):
-                linear.solve(
-                    self.linear_solver if change is None else self.constrained_solver, matrix, self._b, self._x
-                )
+                linear.solve(solver, matrix, self._b, self._x, reduction=enough)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         if taken is not None:

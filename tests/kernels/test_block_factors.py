@@ -8,6 +8,8 @@ from scipy import sparse
 from solvers import kernels, linear
 from solvers.incomplete import Incomplete
 
+PETSC_SELF = PETSc.COMM_SELF
+
 #: Relative rounding error of single precision, times a few hundred operations.
 ROUNDING = 1e-4
 
@@ -86,6 +88,115 @@ def test_factors_that_do_not_exist():
         linear.solve(linear.flow_solver(PETSc.COMM_SELF, tolerance=1e-10), matrix, b, x)
 
 
+def permuted(pattern, blocks, order):
+    """The matrix whose rows and columns are those of another one in this order."""
+    A = sparse.bsr_matrix((blocks, pattern.indices, pattern.indptr)).tocsr()
+    unknowns = (blocks.shape[1] * order[:, None] + np.arange(blocks.shape[1])).ravel()
+    P = A[unknowns][:, unknowns].tobsr((blocks.shape[1],) * 2)
+    P.sort_indices()
+    return P, unknowns
+
+
+@pytest.mark.parametrize("size", [3, 4])
+def test_factors_in_another_order(size):
+    """They are those of the matrix with rows and columns in this order, which differ from those in the first one."""
+    pattern, blocks = example(size, 0.2)
+    order = np.random.default_rng(3).permutation(30).astype(np.int32)
+    b = np.random.default_rng(1).standard_normal(30 * size)
+    factors = kernels.BlockFactors(pattern.indptr, pattern.indices, size, order)
+    found = np.empty(len(b))
+    assert factors.update(blocks.transpose(0, 2, 1).copy())
+    factors.solve(b, found)
+    P, unknowns = permuted(pattern, blocks, order)
+    expected = np.empty(len(b))
+    expected[unknowns] = solve(P, P.data, b[unknowns])
+    assert found == pytest.approx(expected, abs=ROUNDING * np.abs(expected).max())
+    first = solve(pattern, blocks, b)
+    assert np.abs(found - first).max() > 100.0 * ROUNDING * np.abs(first).max()
+
+
+def test_blocks_of_nodes():
+    """Of rows with different patterns, and of a node without entries: the matrix is the same; and back."""
+    A = sparse.random(30, 30, 0.1, format="csr", random_state=np.random.default_rng(2))
+    A = sparse.diags((np.arange(30) // 3 != 2).astype(float)) @ A
+    A.eliminate_zeros()
+    A.sort_indices()
+    start, columns, blocks = kernels.node_blocks(A.indptr, A.indices, A.data, 3)
+    B = sparse.bsr_matrix((blocks.transpose(0, 2, 1), columns, start), shape=(30, 30))
+    assert np.array_equal(B.toarray(), A.toarray())
+    assert all((np.diff(row) > 0).all() for row in np.split(columns, start[1:-1]))
+    assert all(i in columns[start[i] : start[i + 1]] for i in range(10))
+    full = B.copy()
+    full.data[:] = np.random.default_rng(4).standard_normal(full.data.shape)
+    entries = np.empty(full.data.size)
+    kernels.spread_blocks(start, full.data.transpose(0, 2, 1).copy(), entries)
+    C = full.tocsr()
+    C.sort_indices()
+    assert np.array_equal(entries, C.data)
+
+
+def stretched_cube():
+    """A matrix of elasticity whose rows at one node differ in their patterns, as those of contact do."""
+    rng = np.random.default_rng(5)
+    A = sparse.random(90, 90, 0.05, format="csr", random_state=rng)
+    return (A + A.T + 20.0 * sparse.eye(90)).tocsr()
+
+
+@pytest.mark.parametrize(("dim", "kind"), [(3, "python"), (2, "ilu")])
+def test_solver_of_solids(dim, kind):
+    A = stretched_cube()
+    matrix = PETSc.Mat().createAIJ((90, 90), csr=(A.indptr, A.indices, A.data), comm=PETSC_SELF)
+    ksp = linear.incomplete_solver(PETSC_SELF, linear.Task(dim, 90, symmetric=False, tolerance=1e-12))
+    assert ksp.getPC().getType() == kind
+    b, x = matrix.createVecs()
+    b.set(1.0)
+    for factor in (1.0, -3.0):
+        matrix.scale(factor)
+        linear.solve(ksp, matrix, b, x)
+        assert (matrix * x - b).norm() < 1e-11 * b.norm()
+    assert ksp.getIterationNumber() < 15
+
+
+def test_solution_that_is_good_enough(monkeypatch):
+    """A Krylov method stops at the reduction that is asked for, unless its own tolerance costs few iterations."""
+    A = sparse.diags([np.full(299, -1.0), np.full(300, 2.02), np.full(299, -1.0)], [-1, 0, 1], format="csr")
+    matrix = PETSc.Mat().createAIJ((300, 300), csr=(A.indptr, A.indices, A.data), comm=PETSC_SELF)
+    ksp = PETSc.KSP().create(PETSC_SELF)
+    ksp.setType(PETSc.KSP.Type.GMRES)
+    ksp.getPC().setType(PETSc.PC.Type.NONE)
+    ksp.setTolerances(rtol=1e-9, max_it=1000)
+    b, x = matrix.createVecs()
+    b.set(1.0)
+
+    def missed(reduction):
+        x.set(7.0)  # solvers start from zero
+        linear.solve(ksp, matrix, b, x, reduction=reduction)
+        return (matrix * x - b).norm() / b.norm()
+
+    assert missed(0.0) <= 1e-9
+    assert 1e-9 < missed(1e-3) <= 1e-3
+    assert missed(1e-10) <= 1e-9
+    monkeypatch.setattr(linear, "FEW", 1000)
+    assert missed(1e-3) <= 1e-9
+    assert ksp.getTolerances()[0] == 1e-9
+
+
+def test_solver_of_solids_without_factors_of_blocks():
+    """A singular block on the diagonal: factors of entries take over, which exist by fill outside of it."""
+    A = sparse.lil_matrix(stretched_cube())
+    A[0, :3], A[1, :3], A[2, :3] = [1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]
+    A[0, 5] = A[5, 0] = A[1, 7] = A[7, 1] = 9.0
+    A = A.tocsr()
+    found = kernels.node_blocks(A.indptr, A.indices, A.data, 3)
+    assert not kernels.BlockFactors(*found[:2], 3).update(found[2])
+    matrix = PETSc.Mat().createAIJ((90, 90), csr=(A.indptr, A.indices, A.data), comm=PETSC_SELF)
+    ksp = linear.incomplete_solver(PETSC_SELF, linear.Task(3, 90, symmetric=False, tolerance=1e-10))
+    b, x = matrix.createVecs()
+    b.set(1.0)
+    linear.solve(ksp, matrix, b, x)
+    assert (matrix * x - b).norm() < 1e-9 * b.norm()
+
+
 def numbers(*values):
     return np.array(values, dtype=np.int32)
 
@@ -104,6 +215,28 @@ def numbers(*values):
 def test_mistakes(start, columns, size, message):
     with pytest.raises(ValueError, match=message):
         kernels.BlockFactors(start, columns, size)
+
+
+@pytest.mark.parametrize("order", [numbers(0, 0), numbers(0), numbers(1, 2)])
+def test_an_order_that_is_none(order):
+    with pytest.raises(ValueError, match="each row once"):
+        kernels.BlockFactors(numbers(0, 1, 2), numbers(0, 1), 3, order)
+
+
+def test_rows_that_are_no_nodes():
+    start, columns = numbers(0, 1, 2), numbers(0, 1)
+    with pytest.raises(ValueError, match="whole nodes"):
+        kernels.node_blocks(start, columns, np.ones(2), 3)
+    with pytest.raises(ValueError, match="needs a value"):
+        kernels.node_blocks(start, columns, np.ones(3), 3)
+    with pytest.raises(ValueError, match="3 or 4 rows"):
+        kernels.node_blocks(start, columns, np.ones(2), 2)
+    with pytest.raises(ValueError, match="needs an entry"):
+        kernels.spread_blocks(start, np.ones((2, 3, 3)), np.ones(17))
+    with pytest.raises(ValueError, match="needs a block"):
+        kernels.spread_blocks(start, np.ones((3, 3, 3)), np.ones(27))
+    with pytest.raises(ValueError, match="2 or 3 rows"):
+        kernels.spread_blocks(start, np.ones((2, 4, 4)), np.ones(32))
 
 
 def test_arrays_of_other_sizes():

@@ -23,6 +23,9 @@ A, DENSE_A = random(7, 5)
 B, DENSE_B = random(5, 6)
 C, DENSE_C = random(7, 5)
 
+DENSE_A_WITH_ROWS_OF_C = np.where(np.arange(7)[:, None] == 5, DENSE_C[3], DENSE_A)
+DENSE_A_WITH_ROWS_OF_C[2] = DENSE_C[0]
+
 
 @pytest.mark.parametrize(
     ("found", "expected"),
@@ -40,6 +43,7 @@ C, DENSE_C = random(7, 5)
         (A.with_columns(np.array([2, -1, 0, -1, 8]), 9), DENSE_A[:, [0, 2, 4]] @ np.eye(9)[[2, 0, 8]]),
         (A.with_columns(np.arange(5)[::-1], 5), DENSE_A[:, ::-1]),
         (A.with_rows(np.array([8, 0, 1, 2, 3, 4, 5]), 10), np.eye(10)[:, [8, 0, 1, 2, 3, 4, 5]] @ DENSE_A),
+        (A.with_other_rows(np.array([5, 2]), C[np.array([3, 0])]), DENSE_A_WITH_ROWS_OF_C),
         (A.scaled_rows(np.arange(7.0)), np.arange(7.0)[:, None] * DENSE_A),
         ((A @ B).ordered(), DENSE_A @ DENSE_B),
         (A.without_small(0.5), np.where(DENSE_A > 0.5, DENSE_A, 0.0)),
@@ -131,3 +135,12 @@ def test_counted_order():
     keys = NUMBERS.integers(0, 6, 50).astype(np.int32)
     np.testing.assert_array_equal(counted_order(keys, 9), np.argsort(keys, kind="stable"))
     assert len(counted_order(np.empty(0, dtype=np.int32), 9)) == 0
+
+
+def test_many_other_rows(monkeypatch):
+    """The same, bit for bit, by another way."""
+    few = A.with_other_rows(np.array([5, 2]), C[np.array([3, 0])])
+    monkeypatch.setattr("solvers.sparse.MANY_ROWS", 1)
+    many = A.with_other_rows(np.array([5, 2]), C[np.array([3, 0])])
+    for name in ("data", "indices", "indptr"):
+        assert np.array_equal(getattr(few, name), getattr(many, name))

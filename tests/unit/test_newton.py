@@ -6,7 +6,7 @@ import math
 import pytest
 
 from solvers.api import StepFailed
-from solvers.newton import Tolerance, converge, iterates
+from solvers.newton import ENOUGH, Tolerance, converge, enough, iterates
 
 
 class Scalar:
@@ -16,16 +16,17 @@ class Scalar:
 
     def __init__(self, f, slope, x, *, round_off=0.0, settled_after=0):
         self.f, self.slope, self.x = f, slope, x
-        self.increment, self.solves, self.kept = 0.0, 0, []
+        self.increment, self.solves, self.kept, self.reductions = 0.0, 0, [], []
         self.used = math.nan  #: slope of the last iterate
         self._round_off, self.settled_after = round_off, settled_after
 
     def residual(self):
         return abs(self.f(self.x))
 
-    def advance(self, *, keep=False):
+    def advance(self, *, keep=False, reduction=0.0):
         self.used = self.used if keep else self.slope(self.x)
         self.kept.append(keep)
+        self.reductions.append(reduction)
         self.increment = -self.f(self.x) / self.used
         self.x += self.increment
         self.solves += 1
@@ -132,3 +133,31 @@ def test_a_good_first_guess_does_not_make_the_tolerance_stricter():
     alone, moved = (Scalar(lambda x: x * x - 2, lambda x: 2 * x, guess) for _ in range(2))
     assert converge(moved, Tolerance(1e-8), 7.0).iterations == 1
     assert converge(alone, Tolerance(1e-8)).iterations == 2
+
+
+class Inexact(Scalar):
+    """A linear solver that leaves as much of the residual as is allowed."""
+
+    def advance(self, *, keep=False, reduction=0.0):
+        found = super().advance(keep=keep, reduction=reduction)
+        self.x -= reduction * self.increment
+        return found
+
+
+def test_inexact_solutions_cost_no_iterate():
+    """As many iterates as with exact solutions, and the linear systems are solved to what each of them needs."""
+    for start in (2.0, 5.0, 40.0):
+        exact, inexact = (kind(lambda x: x * x - 2, lambda x: 2 * x, start) for kind in (Scalar, Inexact))
+        found = [converge(system, Tolerance(residual=1e-12)) for system in (exact, inexact)]
+        assert found[0].iterations == found[1].iterations
+        assert abs(inexact.x**2 - 2) <= 1e-12 * abs(start**2 - 2)
+        assert max(inexact.reductions) == inexact.reductions[0] == ENOUGH
+        assert min(inexact.reductions) < 1e-4
+
+
+def test_reduction_that_is_enough():
+    assert enough(0.0, math.inf, tolerance=0.0) == ENOUGH
+    assert enough(1.0, math.inf, tolerance=1e-8) == ENOUGH
+    assert enough(1.0, 1e-2, tolerance=1e-8) == pytest.approx(1e-5)  # Newton's method leaves 1e-4
+    assert enough(1e-4, 1e-4, tolerance=1e-8) == pytest.approx(1e-6)  # a hundredth of the tolerance
+    assert enough(1e-9, 1.0, tolerance=1e-8) == ENOUGH
