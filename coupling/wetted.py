@@ -78,8 +78,8 @@ def immerse(
 def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]], box: tuple[Array, Array]) -> list[ImmersedSurface]:
     """The surfaces, given with the positions of their vertices [m], with marked wet facets.
 
-    Facets in other bodies are not wet, nor those on the boundary of the box, except where they take part in contact.
-    Marks that a surface has already are kept.
+    Facets with their middle in another body are not wet, nor those on the boundary of the box, except where they take
+    part in contact. Marks that a surface has already are kept.
     """
     low, high = box
     found = []
@@ -90,6 +90,7 @@ def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]], box: tuple[Array
             wet = distance > ON_BOX * (high - low).max()
             if surface.in_contact is not None:
                 wet |= surface.in_contact
+            partly = np.zeros(len(wet), dtype=bool)
             for other, (body, at) in enumerate(surfaces):
                 if other == index:
                     continue
@@ -97,6 +98,8 @@ def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]], box: tuple[Array
                 motion = Motion(at, np.zeros_like(at))
                 for facet in np.flatnonzero(near & wet):
                     wet[facet] = winding(middles[facet], motion, body.facets) < INSIDE
-            surface = replace(surface, wet=wet)
+                    corners = () if wet[facet] else x[surface.facets[facet]]
+                    partly[facet] = any(winding(corner, motion, body.facets) < INSIDE for corner in corners)
+            surface = replace(surface, wet=wet, partly=partly)
         found.append(surface)
     return found

@@ -23,6 +23,8 @@ class ImmersedSurface:
     facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
     vertices: int
     wet: NDArray[np.bool_] | None = None  #: facets that the fluid acts on; the others only close the solid; None: all
+    #: facets with their middle, but not all corners, in another body: wet, too, where the solid is the union of bodies
+    partly: NDArray[np.bool_] | None = None
     in_contact: NDArray[np.bool_] | None = None  #: facets that take part in contact
     slip_length: float = 0.0  #: b [m]: the shear stress is mu / b times the tangential velocity; 0: no slip
     transmissivity: float = 0.0  #: kappa [m^3]: the flux of a layer along it is kappa / mu grad p; 0: no layer
@@ -48,9 +50,14 @@ def together(
     return facets, Motion(np.concatenate([m.x for m in motions]), np.concatenate([m.v for m in motions]))
 
 
-def wetness(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_]:
-    """Mask of the facets of all surfaces that the fluid acts on."""
+def wetness(surfaces: Sequence[ImmersedSurface], *, unions: bool = False) -> NDArray[np.bool_]:
+    """Mask of the facets of all surfaces that the fluid acts on.
+
+    unions: the solid is the union of the bodies, so that parts of facets in other bodies are left out by the cut.
+    """
     parts = [np.ones(len(s.facets), dtype=bool) if s.wet is None else s.wet for s in surfaces]
+    if unions:
+        parts = [wet if s.partly is None else wet | s.partly for wet, s in zip(parts, surfaces, strict=True)]
     return np.concatenate([*parts, np.empty(0, dtype=bool)])
 
 
