@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.meshes.files import MeshError, read_mesh, unknown
 from fsci import shapes
+from fsci.meshes.files import MeshError, read_mesh, unknown
 from fsci.rotation import rotation_matrix
 from solvers.cell_types import CELL_TYPES
 from solvers.mesh import Mesh

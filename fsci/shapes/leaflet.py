@@ -40,7 +40,9 @@ def leaflet(
         raise ValueError(f"lip and post, {lip:g} and {post:g}, must be lower together than {height:g}")
     half = np.radians(angle / 2)
     nodes = lattice.product(
-        lattice.product(lattice.line(through, order, ("inner", "outer")), lattice.line(around, order, ("start", "end"))),
+        lattice.product(
+            lattice.line(through, order, ("inner", "outer")), lattice.line(around, order, ("start", "end"))
+        ),
         lattice.line(up, order, ("bottom", "top")),
     )
 

@@ -280,7 +280,7 @@ class Sphere(SolidBuiltIn):
 
 
 class Leaflet(SolidBuiltIn):
-    """Leaflet of a valve in a tube about the z axis, upright lips at its top; surfaces inner, outer, bottom, top, start, end.
+    """Leaflet of a valve in a tube about the z axis; surfaces inner, outer, bottom, top (upright lips), start, end.
 
     Its bottom, start and end are at the wall, its middle is on the x axis. The lips are half of the gap away from the
     straight sides of its sector at the axis, nothing at the wall.
@@ -288,9 +288,13 @@ class Leaflet(SolidBuiltIn):
 
     sides = ("inner", "outer", "bottom", "top", "start", "end")
     shape: Literal["leaflet"] = setting(..., "kind of shape")
-    radius: Positive = setting(..., "radius at which the lips end; the edge below them is one thickness farther out", unit="m")
+    radius: Positive = setting(
+        ..., "radius at which the lips end; the edge below them is one thickness farther out", unit="m"
+    )
     wall: Positive = setting(..., "thickness of the leaflet", unit="m", name="thickness")
-    height: Positive = setting(..., "from the lowest point of the edge at the wall, z = 0, to the top of the lips", unit="m")
+    height: Positive = setting(
+        ..., "from the lowest point of the edge at the wall, z = 0, to the top of the lips", unit="m"
+    )
     lip: Positive = setting(..., "height of the upright lips", unit="m")
     post: Positive = setting(..., "height of the sides at the wall below the lips", unit="m")
     angle: Positive = setting(120.0, "angle of the sector, at most 180", unit="degrees")
