@@ -90,16 +90,15 @@ def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]], box: tuple[Array
             wet = distance > ON_BOX * (high - low).max()
             if surface.in_contact is not None:
                 wet |= surface.in_contact
-            partly = np.zeros(len(wet), dtype=bool)
+            hidden = np.zeros(len(wet), dtype=bool)
             for other, (body, at) in enumerate(surfaces):
                 if other == index:
                     continue
                 near = np.all((middles > at.min(axis=0)) & (middles < at.max(axis=0)), axis=1)
                 motion = Motion(at, np.zeros_like(at))
                 for facet in np.flatnonzero(near & wet):
-                    wet[facet] = winding(middles[facet], motion, body.facets) < INSIDE
-                    corners = () if wet[facet] else x[surface.facets[facet]]
-                    partly[facet] = any(winding(corner, motion, body.facets) < INSIDE for corner in corners)
-            surface = replace(surface, wet=wet, partly=partly)
+                    hidden[facet] = winding(middles[facet], motion, body.facets) >= INSIDE
+                    wet[facet] = not hidden[facet]
+            surface = replace(surface, wet=wet, hidden=hidden)
         found.append(surface)
     return found

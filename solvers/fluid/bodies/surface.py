@@ -23,12 +23,12 @@ class ImmersedSurface:
     facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
     vertices: int
     wet: NDArray[np.bool_] | None = None  #: facets that the fluid acts on; the others only close the solid; None: all
-    #: facets with their middle, but not all corners, in another body: wet, too, where the solid is the union of bodies
-    partly: NDArray[np.bool_] | None = None
     in_contact: NDArray[np.bool_] | None = None  #: facets that take part in contact
     slip_length: float = 0.0  #: b [m]: the shear stress is mu / b times the tangential velocity; 0: no slip
     transmissivity: float = 0.0  #: kappa [m^3]: the flux of a layer along it is kappa / mu grad p; 0: no layer
     zone: Zone = "dry"  #: fluid in closed contact
+    #: dry facets with their middle in another body: wet, too, where the solid is the union of bodies
+    hidden: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def wetness(surfaces: Sequence[ImmersedSurface], *, unions: bool = False) -> NDA
     """
     parts = [np.ones(len(s.facets), dtype=bool) if s.wet is None else s.wet for s in surfaces]
     if unions:
-        parts = [wet if s.partly is None else wet | s.partly for wet, s in zip(parts, surfaces, strict=True)]
+        parts = [wet if s.hidden is None else wet | s.hidden for wet, s in zip(parts, surfaces, strict=True)]
     return np.concatenate([*parts, np.empty(0, dtype=bool)])
 
 
