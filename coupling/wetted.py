@@ -78,8 +78,8 @@ def immerse(
 def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]], box: tuple[Array, Array]) -> list[ImmersedSurface]:
     """The surfaces, given with the positions of their vertices [m], with marked wet facets.
 
-    Facets in other bodies are not wet, nor those on the boundary of the box, except where they take part in contact.
-    Marks that a surface has already are kept.
+    Facets with their middle in another body are not wet, nor those on the boundary of the box, except where they take
+    part in contact. Marks that a surface has already are kept.
     """
     low, high = box
     found = []
@@ -90,13 +90,15 @@ def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]], box: tuple[Array
             wet = distance > ON_BOX * (high - low).max()
             if surface.in_contact is not None:
                 wet |= surface.in_contact
+            hidden = np.zeros(len(wet), dtype=bool)
             for other, (body, at) in enumerate(surfaces):
                 if other == index:
                     continue
                 near = np.all((middles > at.min(axis=0)) & (middles < at.max(axis=0)), axis=1)
                 motion = Motion(at, np.zeros_like(at))
                 for facet in np.flatnonzero(near & wet):
-                    wet[facet] = winding(middles[facet], motion, body.facets) < INSIDE
-            surface = replace(surface, wet=wet)
+                    hidden[facet] = winding(middles[facet], motion, body.facets) >= INSIDE
+                    wet[facet] = not hidden[facet]
+            surface = replace(surface, wet=wet, hidden=hidden)
         found.append(surface)
     return found

@@ -77,6 +77,9 @@ EXAMPLES = {
     ),
     "HollowSphere": "mesh: {shape: hollow_sphere, inner_radius: 9, outer_radius: 10, cells: [8, 1]}",
     "Sphere": "mesh: {shape: sphere, radius: 1, cells: [4, 3]}",
+    "Leaflet": (
+        "mesh: {shape: leaflet, radius: 1, thickness: 0.06, height: 1.2, lip: 0.4, post: 0.2, cells: [8, 1, 6]}"
+    ),
     "Elastic": "material: {law: neo_hooke, E: 4000, nu: 0.4, density: 1000}",
     "MooneyRivlin": "material: {law: mooney_rivlin, c10: 3e5, c01: 1e5, bulk: 5e8, density: 1100}",
     "Support": (

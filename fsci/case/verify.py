@@ -45,6 +45,7 @@ class Check(Section):
     start: Number | None = setting(
         None, "start of the time window; default: the start of the run", unit="s", name="from"
     )
+    end: Number | None = setting(None, "end of the time window; default: the end of the run", unit="s", name="to")
     reference: Number = setting(..., "the value to reach")
     relative: NotNegative | None = setting(None, "allowed deviation, relative to the reference", unit="1")
     absolute: NotNegative | None = setting(None, "allowed deviation, in the unit of the value")
@@ -57,6 +58,8 @@ class Check(Section):
     def _one_tolerance(self) -> Check:
         if self.relative is not None and self.absolute is not None:
             raise fault("give either 'relative' or 'absolute', not both", "absolute")
+        if self.start is not None and self.end is not None and self.end < self.start:
+            raise fault(f"must not be before 'from', {self.start:g}, not {self.end:g}", "to")
         if self.relative is None and self.absolute is None:
             raise fault("a check needs a tolerance: 'relative' or 'absolute'")
         if self.relative is not None and self.reference == 0:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci import shapes
 from fsci.meshes.files import MeshError, read_mesh, unknown
 from fsci.rotation import rotation_matrix
-from fsci.shapes import plane, solid
 from solvers.cell_types import CELL_TYPES
 from solvers.mesh import Mesh
 from solvers.mesh_topology import find_facets
@@ -30,7 +30,7 @@ def build_mesh(settings: Any, folder: Path) -> Mesh:
 
 
 def _shape(settings: Any) -> Mesh:
-    function = getattr(plane if hasattr(plane, settings.shape) else solid, settings.shape)
+    function = getattr(shapes, settings.shape)
     given = {name: getattr(settings, name, None) for name in signature(function).parameters}
     try:
         return function(**{name: value for name, value in given.items() if value is not None})

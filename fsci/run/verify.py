@@ -29,7 +29,7 @@ def evaluate_one(history: Mapping[str, Array], check: Check) -> dict[str, Any]:
     if check.value not in history:
         message = f"'{check.value}' is not in the history"
     else:
-        time, values = window(history["time"], history[check.value], check.start)
+        time, values = window(history["time"], history[check.value], check.start, check.end)
         if len(time) == 0:
             message = "no step in the time window"
         elif check.statistic == "final" and not np.isfinite(values[-1]):
@@ -43,8 +43,9 @@ def evaluate_one(history: Mapping[str, Array], check: Check) -> dict[str, Any]:
     relative = (check.relative or 0.0) * abs(check.reference)
     tolerance = relative if check.absolute is None else check.absolute
     since = "" if check.start is None else f" from {check.start:g}"
+    until = "" if check.end is None else f" to {check.end:g}"
     return {
-        "name": f"{check.value} {check.statistic}{since}",
+        "name": f"{check.value} {check.statistic}{since}{until}",
         "value": value,
         "reference": check.reference,
         "tolerance": tolerance,
@@ -54,11 +55,13 @@ def evaluate_one(history: Mapping[str, Array], check: Check) -> dict[str, Any]:
     }
 
 
-def window(time: Array, values: Array, start: float | None) -> tuple[Array, Array]:
-    """The samples from `start` on; a sample that misses it by rounding belongs to them."""
-    if start is None or len(time) == 0:
+def window(time: Array, values: Array, start: float | None, end: float | None = None) -> tuple[Array, Array]:
+    """The samples from `start` to `end`; a sample that misses them by rounding belongs to them."""
+    if len(time) == 0:
         return time, values
-    inside = time >= start - 1e-9 * max(abs(start), abs(time[-1]))
+    first, last = time[0] if start is None else start, time[-1] if end is None else end
+    rounding = 1e-9 * max(abs(first), abs(time[-1]))
+    inside = (time >= first - rounding) & (time <= last + rounding)
     return time[inside], values[inside]
 
 

@@ -93,6 +93,7 @@ class Fluid:
         self.motions: list[Motion] = []
         surfaces = [body.surface for body in self.bodies]
         self._wet, self._vertices = wetness(surfaces), vertex_ranges(surfaces)
+        self._wet_on_sheets = wetness(surfaces, unions=True)
         self._fast_bodies = FastBodies(grid)
         self.linear_iterations = 0  #: of the last linear system
         self.steady_iteration = SteadyIteration()
@@ -244,7 +245,8 @@ class Fluid:
                 # roots belong to the final position of the bodies, not to the initial one
                 self.cutter.begin_step()
                 self.system.forget_roots()
-            cut = self.cutter(facets, motion, self._layers(motion), self._wet)
+            wet = self._wet if self.grid.sheets is None else self._wet_on_sheets
+            cut = self.cutter(facets, motion, self._layers(motion), wet)
             require_finest(self.cutter, self.comm)
         with self.timer("weights"):
             self.system.set_cut(cut)

@@ -95,7 +95,7 @@ def assert_same(folder, first, second):
 #: cases whose whole run takes seconds; FSI3 takes half an hour
 SHORT = ("csm1", "csm2", "cavity", "cook_membrane", "sealed_plate", "cylinder_nested")
 #: tests of their own run them to their end
-WHOLE = ("double_arch", "falling_sphere", "ironing", "piston_impact", "sphere_tube", "two_tori", "valve")
+WHOLE = ("double_arch", "falling_sphere", "ironing", "piston_impact", "sphere_tube", "two_tori", "valve", "valve_thin")
 #: earlier ends [s]: two of three maxima, one of four periods
 EARLIER = {"flap": 2.6, "cavity_flexible_bottom": 56.0}
 VERIFIED = [folder.name for folder in CASES if folder.name not in (*LONG, *WHOLE, "fsi3")]

@@ -34,7 +34,7 @@ solver:
 MESH = "mesh: {shape: rectangle, size: [2, 1], cells: [4, 2]}"
 SECTIONS = "title, units, time, curves, structure, fluid, coupling, contact, probes, output, verify, solver"
 SHAPES = "rectangle, disc, ring, box, beam, cylinder, tube, annulus, solid_torus, hollow_torus, hollow_sphere, "
-SHAPES += "sphere"
+SHAPES += "sphere, leaflet"
 CONSTANTS = "needs two constants, either E and nu, or lambda and mu, or mu and nu"
 
 #: what is replaced, by what, the message with line and column, the text that stands there
@@ -97,6 +97,12 @@ MISTAKES = [
         "not 'minimum'; "
         "did you mean 'min'?",
         "minimum",
+    ),
+    (
+        "statistic: min,",
+        "statistic: min, from: 2, to: 1,",
+        "19:49: 'to' must not be before 'from', 2, not 1",
+        "1,",
     ),
     ("nu: 0.3", "nu: 0.5", "9:46: 'nu' must be above -1 and below 0.5, not 0.5", "0.5"),
     ("  bodies:\n", "  bodies: {}\n  bodies2:\n", "6:11: 'bodies' needs at least one body", "{}"),

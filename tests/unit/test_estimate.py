@@ -24,6 +24,7 @@ SHAPES: list[dict[str, Any]] = [
     {"shape": "hollow_torus", "major_radius": 3, "inner_radius": 0.5, "outer_radius": 1, "cells": [6, 5, 2]},
     {"shape": "hollow_sphere", "inner_radius": 1, "outer_radius": 2, "cells": [3, 2]},
     {"shape": "sphere", "radius": 2, "cells": [3, 2]},
+    {"shape": "leaflet", "radius": 1, "thickness": 0.06, "height": 1.2, "lip": 0.4, "post": 0.2, "cells": [4, 1, 3]},
 ]
 
 

@@ -237,3 +237,39 @@ def test_surface_facets_inside_the_mesh_are_refused():
     mesh.surfaces["middle"] = middle[None]
     with pytest.raises(ValueError, match="'middle': 1 of its facets are not on the boundary"):
         surface_facets(mesh, "middle")
+
+
+@pytest.mark.parametrize(("cell", "order"), [("hex", 1), ("hex", 2), ("tet", 1)])
+def test_leaflet(cell, order):
+    """Three leaflets side by side: lips parallel to planes through the axis, half of the gap away at the axis."""
+    gap, thickness, height, lip = 0.04, 0.06, 1.2, 0.4
+    mesh = shapes.leaflet(1.0, thickness, height, lip, 0.2, (8, 1, 6), gap=gap, order=order, cell=cell)
+    assert smallest_determinant(mesh) > 0.05
+    facets = np.concatenate([surface_facets(mesh, name) for name in mesh.surfaces])
+    assert np.array_equal(
+        np.unique(np.sort(facets, axis=1), axis=0), np.unique(np.sort(boundary_facets(mesh), axis=1), axis=0)
+    )
+    assert len(facets) == len(boundary_facets(mesh))
+
+    x = mesh.points[np.unique(surface_facets(mesh, "inner"))]
+    lips = x[(x[:, 2] > height - lip - 1e-9) & (x[:, 1] > -1e-9)]
+    distance = np.sin(pi / 3) * lips[:, 0] - np.cos(pi / 3) * lips[:, 1]  # from the plane at 60 degrees
+    assert distance.max() == pytest.approx(gap / 2, abs=1e-13)
+    assert distance.min() == pytest.approx(0.0, abs=1e-13)
+    assert np.abs(radius(lips[np.abs(distance) < 1e-12], 0, 1) - 1.0).max() < 1e-12
+    foot = mesh.points[np.unique(surface_facets(mesh, "bottom"))]
+    assert radius(foot, 0, 1).min() > 1.0  # within the wall of a tube of radius 1
+    outer = mesh.points[np.unique(surface_facets(mesh, "outer"))]
+    lips = outer[(outer[:, 2] > height - lip - 1e-9) & (outer[:, 1] > 1e-9)]
+    distance = np.sin(pi / 3) * lips[:, 0] - np.cos(pi / 3) * lips[:, 1]
+    assert distance.min() == pytest.approx(thickness, abs=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [({"cells": (7, 1, 6)}, "must be even, got 7"), ({"lip": 1.1}, "lip and post, 1.1 and 0.2, must be lower")],
+)
+def test_leaflets_that_are_none(settings, message):
+    sizes = {"radius": 1, "thickness": 0.06, "height": 1.2, "lip": 0.4, "post": 0.2, "cells": (8, 1, 6)}
+    with pytest.raises(ValueError, match=message):
+        shapes.leaflet(**(sizes | settings))

@@ -11,8 +11,17 @@ from fsci.case.verify import Check
 from fsci.run.verify import evaluate
 
 
-def check(value: str, statistic: str, reference: float, *, start: float | None = None, **tolerance: float) -> Check:
-    return Check(**{"value": value, "statistic": statistic, "reference": reference, "from": start, **tolerance})
+def check(
+    value: str,
+    statistic: str,
+    reference: float,
+    *,
+    start: float | None = None,
+    end: float | None = None,
+    **tolerance: float,
+) -> Check:
+    window = {"from": start, "to": end}
+    return Check(**{"value": value, "statistic": statistic, "reference": reference, **window, **tolerance})
 
 
 def sine(samples: int, periods: float, *, frequency: float = 1.1, phase: float = 0.3) -> dict[str, np.ndarray]:
@@ -76,6 +85,11 @@ def test_window_leaves_the_transient_out():
     assert late["name"] == "u amplitude from 5"
     (first,) = evaluate({"time": time, "u": time}, [check("u", "min", 0.3, absolute=1e-12, start=0.1 + 0.2)])
     assert first["ok"], "the sample at the start of the window counts in spite of rounding"
+    (last,) = evaluate({"time": time, "u": time}, [check("u", "max", 0.3, absolute=1e-12, end=0.1 + 0.2 - 1e-16)])
+    assert last["ok"], "and so does that at its end, but no later one"
+    (both,) = evaluate(history, [check("u", "min", 10, absolute=1.1, start=1.0, end=4.9)])
+    assert both["ok"]
+    assert both["name"] == "u min from 1 to 4.9"
 
 
 def test_ripple_is_no_period():

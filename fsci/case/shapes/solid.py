@@ -20,7 +20,7 @@ from fsci.case.shapes.built_in import (
     require_part,
     require_wall,
 )
-from fsci.case.values import EntryCount, Number, Positive
+from fsci.case.values import EntryCount, NotNegative, Number, Positive
 
 
 class Box(SolidBuiltIn):
@@ -279,4 +279,52 @@ class Sphere(SolidBuiltIn):
         return 2 * self.radius
 
 
-SolidShape = Box | Beam | Cylinder | Tube | SolidTorus | HollowTorus | HollowSphere | Sphere
+class Leaflet(SolidBuiltIn):
+    """Leaflet of a valve in a tube about the z axis; surfaces inner, outer, bottom, top (upright lips), start, end.
+
+    Its bottom, start and end are at the wall, its middle is on the x axis. The lips are half of the gap away from the
+    straight sides of its sector at the axis, nothing at the wall.
+    """
+
+    sides = ("inner", "outer", "bottom", "top", "start", "end")
+    shape: Literal["leaflet"] = setting(..., "kind of shape")
+    radius: Positive = setting(
+        ..., "radius at which the lips end; the edge below them is one thickness farther out", unit="m"
+    )
+    wall: Positive = setting(..., "thickness of the leaflet", unit="m", name="thickness")
+    height: Positive = setting(
+        ..., "from the lowest point of the edge at the wall, z = 0, to the top of the lips", unit="m"
+    )
+    lip: Positive = setting(..., "height of the upright lips", unit="m")
+    post: Positive = setting(..., "height of the sides at the wall below the lips", unit="m")
+    angle: Positive = setting(120.0, "angle of the sector, at most 180", unit="degrees")
+    gap: NotNegative = setting(0.0, "distance at the axis between the lips of leaflets side by side", unit="m")
+    cells: Cells3 = setting(..., "number of cells along the wall (even), through the thickness, and up")
+
+    @model_validator(mode="after")
+    def _possible(self) -> Leaflet:
+        if self.angle > 180:
+            raise fault(f"must be at most 180 degrees, not {self.angle:g}", "angle")
+        if self.cells[0] % 2:
+            raise fault(f"the number of cells along the wall must be even, not {self.cells[0]}", "cells", 0)
+        if self.lip + self.post >= self.height:
+            raise fault(f"'lip' and 'post' must be lower together than 'height', {self.height:g}", "lip")
+        if self.wall + self.gap / 2 >= self.radius / 2:
+            raise fault(f"must be less than half of 'radius', {self.radius:g}, with half of 'gap'", "thickness")
+        return self
+
+    @property
+    def lattice(self) -> Counts:
+        n, order = self.cells, self.order
+        return product(*(along(count, order) for count in n))
+
+    @property
+    def extents(self) -> tuple[float, ...]:
+        return radians(self.angle) * self.radius, self.wall, self.height
+
+    @property
+    def thickness(self) -> float:
+        return self.wall
+
+
+SolidShape = Box | Beam | Cylinder | Tube | SolidTorus | HollowTorus | HollowSphere | Sphere | Leaflet

@@ -27,6 +27,8 @@ class ImmersedSurface:
     slip_length: float = 0.0  #: b [m]: the shear stress is mu / b times the tangential velocity; 0: no slip
     transmissivity: float = 0.0  #: kappa [m^3]: the flux of a layer along it is kappa / mu grad p; 0: no layer
     zone: Zone = "dry"  #: fluid in closed contact
+    #: dry facets with their middle in another body: wet, too, where the solid is the union of bodies
+    hidden: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)
@@ -48,9 +50,14 @@ def together(
     return facets, Motion(np.concatenate([m.x for m in motions]), np.concatenate([m.v for m in motions]))
 
 
-def wetness(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_]:
-    """Mask of the facets of all surfaces that the fluid acts on."""
+def wetness(surfaces: Sequence[ImmersedSurface], *, unions: bool = False) -> NDArray[np.bool_]:
+    """Mask of the facets of all surfaces that the fluid acts on.
+
+    unions: the solid is the union of the bodies, so that parts of facets in other bodies are left out by the cut.
+    """
     parts = [np.ones(len(s.facets), dtype=bool) if s.wet is None else s.wet for s in surfaces]
+    if unions:
+        parts = [wet if s.hidden is None else wet | s.hidden for wet, s in zip(parts, surfaces, strict=True)]
     return np.concatenate([*parts, np.empty(0, dtype=bool)])
 
 
