@@ -39,8 +39,7 @@ class ExtensionPenalty:
         self._comm = unknowns.grid.comm
         self._lattices = [self._lattice(unknowns.velocity, unknowns.degree), self._lattice(unknowns.pressure, 1)]
         self._entries: tuple[Numbers, Numbers] = (np.empty(0, dtype=np.int64),) * 2
-        self._scales, self._creeping_scales, self._weight = np.zeros((3, unknowns.owned))
-        self._in_film = np.zeros(unknowns.owned, dtype=bool)  #: dofs of cells in films
+        self._scales, self._weight = np.zeros((2, unknowns.owned))
         #: owned dofs of nodes without fluid, and those that are penalised
         self.outside, self.dependent = np.zeros((2, unknowns.owned), dtype=bool)
         self.undetermined = np.zeros(unknowns.local, dtype=bool)
@@ -73,9 +72,7 @@ class ExtensionPenalty:
         free = np.ones(unknowns.local, dtype=bool)
         free[prescribed] = False
         parts = [self._find(cut, free, *lattice) for lattice in self._lattices]
-        film = self._film(cut)[: unknowns.owned]
-        self._weight *= film
-        self._in_film = film < 1.0
+        self._weight *= self._film(cut)[: unknowns.owned]
         self.undetermined[:] = fem.share_owned(unknowns.space, self.undetermined.astype(float)) > 0.5
         rows, columns, data = (np.concatenate(some) for some in zip(*parts, strict=True))
         outside = self.outside[rows - unknowns.global_dofs[0]] if len(rows) else np.zeros(0, dtype=bool)
@@ -124,16 +121,13 @@ class ExtensionPenalty:
             dofs, own = nodes.dofs[: nodes.owned], slice(nodes.owned)
             h, volume = nodes.sizes[own].min(axis=1), nodes.sizes[own].prod(axis=1)
             phi = scales.viscosity + scales.density * (speed[own] * h + scales.alpha * h**2)
-            scale = creeping = volume / phi
-            if nodes is unknowns.velocity:
-                scale, creeping = phi * volume / h**2, scales.viscosity * volume / h**2
+            scale = phi * volume / h**2 if nodes is unknowns.velocity else volume / phi
             self._scales[dofs] = self.factor * scale[:, None]
-            self._creeping_scales[dofs] = self.factor * creeping[:, None]
 
     def _product(self) -> tuple[Numbers, Numbers, Array]:
         """S by compressed owned rows (collective)."""
         scaled, d = self._distance.copy(), self._distance.createVecLeft()
-        d.array[:] = self._weight * np.where(self._in_film, self._creeping_scales, self._scales)
+        d.array[:] = self._weight * self._scales
         scaled.diagonalScale(L=d)
         product = self._distance.transposeMatMult(scaled)
         rows = product.getValuesCSR()
