@@ -9,6 +9,10 @@ differs from the wall's by no more than the flow does at the mirror image x* of 
 
 Flow that is linear across the wall is not changed, as it is odd: u(x) - w = -(u(x*) - w). What is behind a wall is
 never faster, relative to it, than the fluid around.
+
+Nodes of films are left as they are: a parabola across a film of height g is (h / g)^2 times as large at the other side
+of its cell, and the film's velocity is interpolated from there. With a bound on them it would lose momentum in each
+step, a force that grows as rho h^2 / (mu dt).
 """
 
 from __future__ import annotations
@@ -51,12 +55,23 @@ class BehindWalls:
         """Velocity [m/s] at local dofs, bounded as far as the strip reaches behind wet facets (collective)."""
         result, reach = velocity.copy(), (cut.depth + 1) * self._cell
         behind, mirror, wall = mirrored(self._points, cut.facets[wet], cut.motion, reach)
+        outside = ~self._in_films(cut)[behind]
+        behind, mirror, wall = behind[outside], mirror[outside], wall[outside]
         found, there = self._interpolated(velocity, mirror)
         rise, bound = velocity[self._dofs[behind]] - wall, np.linalg.norm(there - wall, axis=1)
         size = np.linalg.norm(rise, axis=1)
         large = found & (size > bound)
         result[self._dofs[behind[large]]] = wall[large] + (bound[large] / size[large])[:, None] * rise[large]
         return fem.share_owned(self.unknowns.space, result)
+
+    def _in_films(self, cut: Cut) -> NDArray[np.bool_]:
+        """Mask of the owned nodes of cut cells with creeping flow."""
+        unknowns, found = self.unknowns, np.zeros(self.unknowns.local, dtype=bool)
+        if cut.creeping is not None:
+            cells = cut.cut[cut.creeping[unknowns.grid.numbers[cut.cut]]]
+            found[unknowns.cell_velocity[cells].ravel()] = True
+        mask: NDArray[np.bool_] = found[self._dofs[:, 0]]
+        return mask
 
     def _interpolated(self, velocity: Array, points: Array) -> tuple[NDArray[np.bool_], Array]:
         """(whether points are in cells with all their nodes, the velocity [m/s] there) (collective)."""

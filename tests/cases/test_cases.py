@@ -32,6 +32,11 @@ SMALLER = {
         "fluid.grid.x=[{to: 0.1288, cells: 6, ratio: 0.5}, {to: 0.2712, cells: 10}, {to: 2.2, cells: 16, ratio: 9}]",
         "fluid.grid.y=[{to: 0.1288, cells: 6, ratio: 0.5}, {to: 0.2712, cells: 10}, {to: 0.41, cells: 6, ratio: 2}]",
     ],
+    "rebound_stokes": [
+        *(f"fluid.grid.{axis}=[{{to: 0.6, cells: 2}}, {{to: 2, cells: 1}}]" for axis in "xy"),
+        "fluid.grid.z=[{to: 1.2, cells: 4}, {to: 2.5, cells: 1}]",
+        "structure.bodies.ball.mesh.parameters={fine: 0.1}",
+    ],
     "torus_wall": ["fluid.grid.cells=[8, 8, 13]", "structure.bodies.torus.mesh.cells=[16, 8]"],
     "sphere_tube": ["structure.bodies.tube.mesh.cells=[24, 1, 30]", "structure.bodies.sphere.mesh.cells=[5, 1]"],
     "falling_sphere": [
@@ -95,7 +100,8 @@ def assert_same(folder, first, second):
 #: cases whose whole run takes seconds; FSI3 takes half an hour
 SHORT = ("csm1", "csm2", "cavity", "cook_membrane", "sealed_plate", "cylinder_nested")
 #: tests of their own run them to their end
-WHOLE = ("double_arch", "falling_sphere", "ironing", "piston_impact", "sphere_tube", "two_tori", "valve", "valve_thin")
+WHOLE = ("double_arch", "falling_sphere", "ironing", "piston_impact", "rebound_stokes", "sphere_tube", "two_tori")
+WHOLE += ("valve", "valve_thin")
 #: earlier ends [s]: two of three maxima, one of four periods
 EARLIER = {"flap": 2.6, "cavity_flexible_bottom": 56.0}
 VERIFIED = [folder.name for folder in CASES if folder.name not in (*LONG, *WHOLE, "fsi3")]

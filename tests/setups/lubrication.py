@@ -111,12 +111,18 @@ def seepage_ratio(dim: int, gap: float, h: float, element: str, transmissivity: 
     return float(force / film_force(dim, gap, transmissivity=transmissivity))
 
 
-def closing_ratios(h: float, steps: int, dt: float, **settings) -> list[tuple[float, float]]:
-    """(gap in cells, computed over exact drag) of a cylinder whose gap is h exp(-t), h at the start, step by step."""
+def closing_ratios(
+    h: float, steps: int, dt: float, start: float | None = None, more: tuple[float, ...] = (), **settings
+) -> list[tuple[float, float]]:
+    """(gap in cells, computed over exact drag) of a cylinder whose gap is start exp(-t), step by step.
+
+    start: h if it is not given; more: lengths of further steps.
+    """
+    start, t = h if start is None else start, 0.0
     points, facets = circle([0.0, 1.0], 1.0, 2000), loop(2000)
 
     def motion(x, t):
-        gap = h * np.exp(-t)
+        gap = start * np.exp(-t)
         return x + np.array([0.0, gap]), 0.0 * x - np.array([0.0, gap])
 
     patches = [
@@ -128,9 +134,10 @@ def closing_ratios(h: float, steps: int, dt: float, **settings) -> list[tuple[fl
     settings = {"element": "q2q1", "scheme": "bdf2", "convection": False, "rho": 1e-3} | settings
     fluid = make_fluid(grid, patches, [body("body", points, facets, motion=motion)], dt=dt, **settings)
     ratios = []
-    for number in range(steps):
-        step(fluid, number * dt, dt)
-        gap = h * np.exp(-(number + 1) * dt)
+    for length in (*[dt] * steps, *more):
+        step(fluid, t, length)
+        t += length
+        gap = start * np.exp(-t)
         force = 2.0 * fluid.force()["body"].sum(axis=0)[1]
         ratios.append((gap / h, float(force / (gap * cylinder_drag(gap)))))
     return ratios
