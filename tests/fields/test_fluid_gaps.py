@@ -303,9 +303,9 @@ def test_derivatives_by_the_motion_of_a_body(height):
 
 
 def test_the_flow_in_a_gap_has_inertia():
-    """A cylinder that starts at half a cell, with steps of a tenth of rho g^2 / mu: its drag is that of second order.
+    """A cylinder that starts at half a cell, with steps of a tenth of rho g^2 / mu: drags against that on finer cells.
 
-    It would be 2.6 times as large without the past of the flow in the gap.
+    Of first order 22 % too large; it would be 3.1 times as large without the past of the flow in the gap.
     """
     points, facets = circle([0.0, 1.0], 1.0, 2000), loop(2000)
 
@@ -318,8 +318,9 @@ def test_the_flow_in_a_gap_has_inertia():
         Patch("free", ("x+", "y+"), "traction", field(0, 0)),
         Patch("wall", ("y-",), "no_slip"),
     ]
-    grid, forces = Grid((stretched(H, 1.0, 8.0, 1.15), stretched(H, 4 * H, 8.0, 1.15))), []
-    for element in ("q1q1", "q2q1"):
+    forces = []
+    for element, h, growth in (("q2q1", 0.5 * H, 1.05), ("q2q1", H, 1.15), ("q1q1", H, 1.15)):
+        grid = Grid((stretched(h, 1.0, 8.0, growth), stretched(h, 4 * H, 8.0, growth)))
         fluid = make_fluid(
             grid, patches, [body("disc", points, facets, motion=motion)], dt=0.005, element=element, rho=18.0,
             scheme="bdf2", convection=False, narrow_gaps=True,
@@ -327,4 +328,5 @@ def test_the_flow_in_a_gap_has_inertia():
         for number in range(16):
             step(fluid, 0.005 * number, 0.005)
         forces.append(fluid.force()["disc"].sum(axis=0)[1])
-    assert forces[0] == pytest.approx(forces[1], rel=0.05)
+    assert forces[1] == pytest.approx(forces[0], rel=0.03)
+    assert 1.0 < forces[2] / forces[0] < 1.25

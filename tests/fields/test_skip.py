@@ -201,9 +201,9 @@ def test_no_stiffness_where_only_a_residual_is_needed(tmp_path, monkeypatch):
     calls = counted(monkeypatch, body__assemble_tangent=Body, structure__residual=Structure)
     kept, advance = [], Structure.advance
 
-    def recorded(self, *, keep=False):
+    def recorded(self, *, keep=False, reduction=0.0):
         kept.append(keep)
-        return advance(self, keep=keep)
+        return advance(self, keep=keep, reduction=reduction)
 
     monkeypatch.setattr(Structure, "advance", recorded)
     iterations = iterations_of(written(tmp_path, BEAM, 0.2), 4)
