@@ -19,7 +19,6 @@ from solvers.fluid.thin.touching_cells import (
     CLOSING,
     TouchingCells,
     TouchingRegion,
-    contained,
     touching_cells,
     touching_links,
 )
@@ -186,21 +185,12 @@ def _divided(
     part: of each region of other cells; of_cell: the part that has all fluid of a cell, -1: there is none; number: of
     the part of each region of cells where bodies touch.
     """
-    at_face: dict[tuple[int, int], list[int]] = {}
-    rows = touching.at_faces()
-    for row, cell, kind in zip(rows, touching.cell[touching.region[rows]], touching.kind[rows], strict=True):
-        at_face.setdefault((int(cell), int(kind)), []).append(row)
     on_face: dict[int, list[int]] = {}
     for region, face in enumerate(regions.faces.faces[regions.faces.face].tolist()):
         on_face.setdefault(face, []).append(region)
-    is_touching = frozenset(touching.cells.tolist())
 
     def other_side(cell: int, axis: int, side: int, x: Array) -> int:
         plane = [(axis + 1) % 3, (axis + 2) % 3]
-        if cell in is_touching:
-            there = np.array(at_face.get((cell, 2 * axis + side), []), dtype=np.int64)
-            inside = contained(touching.triangles[there][..., plane], x[plane])
-            return int(number[touching.region[there[inside]][0]]) if inside.any() else -1
         if of_cell[cell] >= 0:
             return int(of_cell[cell])
         face = int(regions.lattice.face(np.array([cell]), axis, side)[0])
@@ -210,7 +200,7 @@ def _divided(
                 return int(part[beside])
         return -1
 
-    links, closed = touching_links(grid, touching, other_side)
+    links, closed = touching_links(grid, touching, number, other_side)
     kind = touching.kind.copy()
     kind[closed] = CLOSING
     found = replace(touching, kind=kind)

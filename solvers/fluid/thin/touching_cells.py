@@ -120,7 +120,7 @@ class TouchingRegion:
 
 
 def contained(triangles: Array, x: Array) -> NDArray[np.bool_]:
-    """Whether triangles in a plane, (n, 3, 2), contain a point."""
+    """Whether triangles in a plane, (n, 3, 2), contain a point, or each its own, (n, 2)."""
     return _across(triangles, x, np.zeros((len(triangles), 3)))[0]
 
 
@@ -183,10 +183,11 @@ def touching_cells(grid: Grid, polygons: SlicedFacets, facets: Indices, x: Array
     )
 
 
-def touching_links(grid: Grid, touching: TouchingCells, other_side) -> tuple[Indices, Indices]:
+def touching_links(grid: Grid, touching: TouchingCells, number: Indices, other_side) -> tuple[Indices, Indices]:
     """(rows (region, side of the face, number of what is on its other side, axis), triangles with nothing there).
 
-    other_side: (cell beyond the face, axis, side of that cell, point in its reference coordinates) -> number, or -1.
+    number: of each region; other_side: (cell in which no bodies touch, axis, side, point in its reference coordinates)
+    -> number of what is at this face of the cell, or -1.
     """
     rows = touching.at_faces()
     axis, side = np.divmod(touching.kind[rows], 2)
@@ -195,18 +196,32 @@ def touching_links(grid: Grid, touching: TouchingCells, other_side) -> tuple[Ind
     beyond = index[np.arange(len(rows)), axis] + 2 * side - 1
     inside = (beyond >= 0) & (beyond < shape[axis])
     strides = np.cumprod([1, *shape[:-1]])
-    found, nothing = [], []
-    for row, d, s, there in zip(
-        rows[inside].tolist(),
-        axis[inside].tolist(),
-        side[inside].tolist(),
-        (cell + (2 * side - 1) * strides[axis])[inside].tolist(),
-        strict=True,
-    ):
-        at = touching.triangles[row].mean(axis=0)
-        number = other_side(there, d, 1 - s, at)
-        if number < 0:
-            nothing.append(row)
-        else:
-            found.append((int(touching.region[row]), s, number, d))
-    return np.array(found, dtype=np.int64).reshape(-1, 4), np.array(nothing, dtype=np.int64)
+    rows, axis, side, there = rows[inside], axis[inside], side[inside], (cell + (2 * side - 1) * strides[axis])[inside]
+    at = touching.triangles[rows].mean(axis=1)
+    found = np.append(number, -1)[_opposite(touching, there, 2 * axis + 1 - side, at)]
+    for k in np.flatnonzero(~np.isin(there, touching.cells)).tolist():
+        found[k] = other_side(int(there[k]), int(axis[k]), int(1 - side[k]), at[k])
+    some = found >= 0
+    links = np.stack([touching.region[rows], side, found, axis], axis=1)
+    return links[some], rows[~some]
+
+
+def _opposite(touching: TouchingCells, cell: Indices, kind: Indices, x: Array) -> Indices:
+    """The region with a triangle in a face of its cell that contains a point; -1: there is none.
+
+    cell, kind: of the faces, (n,); x: in reference coordinates, (n, 3).
+    """
+    rows = touching.at_faces()
+    key = 6 * touching.cell[touching.region[rows]] + touching.kind[rows]
+    order = np.argsort(key, kind="stable")
+    first, behind = (np.searchsorted(key[order], 6 * cell + kind, side=side) for side in ("left", "right"))
+    count = behind - first
+    point = np.repeat(np.arange(len(cell)), count)
+    place = np.arange(len(point)) - np.repeat(np.cumsum(count) - count, count)
+    triangle = rows[order[np.repeat(first, count) + place]]
+    plane = (kind[point, None] // 2 + [1, 2]) % 3
+    corners = np.take_along_axis(touching.triangles[triangle], plane[:, None], axis=2)
+    inside = contained(corners, np.take_along_axis(x[point], plane, axis=1))
+    found = np.full(len(cell), -1)
+    found[point[inside][::-1]] = touching.region[triangle[inside]][::-1]  # the first triangle is the last one written
+    return found
