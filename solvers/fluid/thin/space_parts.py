@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -189,6 +190,8 @@ def _divided(
     for region, face in enumerate(regions.faces.faces[regions.faces.face].tolist()):
         on_face.setdefault(face, []).append(region)
 
+    outline_of = cache(lambda region: outline(regions.faces, regions.edges, region))
+
     def other_side(cell: int, axis: int, side: int, x: Array) -> int:
         plane = [(axis + 1) % 3, (axis + 2) % 3]
         if of_cell[cell] >= 0:
@@ -196,7 +199,7 @@ def _divided(
         face = int(regions.lattice.face(np.array([cell]), axis, side)[0])
         for region in on_face.get(face, ()):
             beside = regions.of_face[region, 1 - side]
-            if beside >= 0 and part[beside] >= 0 and contains(*outline(regions.faces, regions.edges, region), x[plane]):
+            if beside >= 0 and part[beside] >= 0 and contains(*outline_of(region), x[plane]):
                 return int(part[beside])
         return -1
 
