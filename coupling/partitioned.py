@@ -2,7 +2,7 @@
 
 Displacement d_k -> flow around the surface at d_k -> force f_k -> solid under f_k -> D(d_k), until D(d) = d.
 A closed pocket of incompressible fluid has a pressure level q that the flow does not determine. It is another unknown
-of the iteration, whose residual is the distance by which the bodies squeeze the pocket: q + s(d) = q.
+of the iteration: q -> q + s(d), until s(d) = 0, the distance by which the bodies squeeze the pocket.
 Sources: Kuttler, Wall, Comput. Mech. 43 (2008) 61-72; for pockets Kuttler, Forster, Wall, ibid. 38 (2006) 417-429.
 """
 

@@ -95,8 +95,7 @@ def hold_pressure(system: FlowSystem, elastic: Mask, *, set_by_solids: bool) -> 
 
     elastic: mask of vertices that another field moves; set_by_solids: the equations of these fields determine the
     level of their pockets, which are not held. In a closed box, the level of the largest pocket is zero at its node, if
-    no elastic body is in it.
-    Other levels are those of the time when the pocket closed.
+    no elastic body is in it. Other levels are those of the last iterate.
     """
     closed = system.boundary.closed()
     if not (closed or system.with_bodies):
