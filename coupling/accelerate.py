@@ -16,6 +16,11 @@ from solvers.api import Array, State
 class Accelerator(Protocol):
     """Computes the next iterate from those of this step and of earlier ones."""
 
+    @property
+    def finds_levels(self) -> bool:
+        """Whether it converges with the pressure levels of closed pockets among the unknowns."""
+        ...
+
     def begin_step(self) -> None: ...
 
     def next(self, d: Array, found: Array) -> Array:
@@ -32,6 +37,8 @@ class Accelerator(Protocol):
 
 class Relaxation:
     """d + omega r with a constant omega; omega = 1 is the plain Dirichlet-Neumann iteration."""
+
+    finds_levels = False
 
     def __init__(self, omega: float = 1.0):
         self.omega = omega
@@ -54,6 +61,8 @@ class Aitken:
     A step starts with the last omega of the step before, at most `first`.
     Source: Kuttler, Wall, Comput. Mech. 43 (2008) 61-72.
     """
+
+    finds_levels = False
 
     def __init__(self, first: float = 0.5):
         self.first = first
@@ -92,6 +101,8 @@ class QuasiNewton:
     |R_ii| < `filter` |V_i|, are dropped. Sources: Degroote, Bathe, Vierendeels, Comput. Struct. 87 (2009) 793-801;
     Haelterman, Bogaers, Scheufele, Uekermann, Mehl, Comput. Struct. 171 (2016) 9-17 (filter).
     """
+
+    finds_levels = True
 
     def __init__(self, first: float = 0.1, reuse: int = 8, filter: float = 0.1):
         self.first, self.reuse, self.filter = first, reuse, filter

@@ -76,7 +76,7 @@ class Partitioned:
         while True:
             coupled.flow.move(interface.move(d))
             newton += coupled.flow.solve().iterations
-            squeezed = coupled.flow.squeezed()
+            squeezed = coupled.flow.squeezed() if self.accelerator.finds_levels else np.zeros(0)
             if len(squeezed) != len(levels):
                 levels, ends, last = np.zeros(len(squeezed)), None, None
                 self.accelerator.forget()
@@ -109,7 +109,8 @@ class Partitioned:
                 ends = None
                 after = self.accelerator.next(now.d, now.found)
             d, levels = after[: d.size].reshape(d.shape), after[d.size :]
-            coupled.flow.add_levels(levels - before[d.size :])
+            if len(levels):
+                coupled.flow.add_levels(levels - before[d.size :])
             last = now
 
     def _small(self, found: Array) -> float:
