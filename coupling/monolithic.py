@@ -62,7 +62,7 @@ class Monolithic:
         self._numbering, self._numbered = Numbering(self.comm, solid.size, flow.size), flow.renewals
         # unsteady: the factors of the first iterate do not precondition the later ones well enough
         self._direct = LaggedFactors(self.comm, fresh=math.inf if flow.steady else 2)
-        self._krylov = Lagged()
+        self._krylov = Lagged(fresh=math.inf if flow.steady else 1)
 
     # ------------------------------------------------------------------------------------------------- steps
 

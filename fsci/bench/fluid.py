@@ -170,8 +170,8 @@ def ring(count: int, around: int, radius: float, thickness: float, tilt: float) 
     return flat @ turn.T, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
-def ring_in_channel(cells: int, timer: Timer, comm: MPI.Comm = MPI.COMM_SELF) -> Fluid:
-    """A tilted ring that sinks through a channel (collective)."""
+def ring_in_channel(cells: int, timer: Timer, comm: MPI.Comm = MPI.COMM_SELF, *, steady: bool = False) -> Fluid:
+    """A tilted ring that sinks through a channel, Reynolds number 200 by its width; steady: at rest (collective)."""
     points, facets = ring(64, 32, 0.5, 0.2, math.radians(65.0))
     speed = np.array([0.0, 0.0, -0.2])
 
@@ -183,8 +183,9 @@ def ring_in_channel(cells: int, timer: Timer, comm: MPI.Comm = MPI.COMM_SELF) ->
         Patch("out", ("z-",), "outflow"),
         Patch("walls", ("x-", "x+", "y-", "y+"), "no_slip"),
     ]
-    body = rigid_body("ring", points, facets, lambda t: (points + t * speed, 0.0 * points + speed))
-    flow = FlowSettings(1.0, 0.01, scheme="backward_euler")
+    motion = None if steady else lambda t: (points + t * speed, 0.0 * points + speed)
+    body = rigid_body("ring", points, facets, motion)
+    flow = FlowSettings(1.0, 0.01, scheme="steady" if steady else "backward_euler")
     solver = SolverSettings(Tolerance(1e-6), linear_tolerance=1e-5)
     grid = uniform([-1.0] * 3, [1.0] * 3, [cells] * 3)
     return Fluid(grid, flow, patches, [body], solver, timer=timer, comm=comm)

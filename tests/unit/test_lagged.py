@@ -5,8 +5,8 @@ import pytest
 from petsc4py import PETSc
 from scipy import sparse
 
-from solvers.lagged import LaggedFactors
-from solvers.linear import LinearSolveFailed
+from solvers.lagged import Lagged, LaggedFactors
+from solvers.linear import LinearSolveFailed, flexible_solver
 
 SIZE = 60
 NUMBERS = np.random.default_rng(3)
@@ -16,11 +16,16 @@ LOAD = NUMBERS.standard_normal(SIZE)
 
 
 def solve(factors: LaggedFactors, matrix: sparse.csr_matrix) -> np.ndarray:
+    as_petsc, b, x = system(matrix)
+    factors.solve(as_petsc, b, x)
+    return x.array.copy()
+
+
+def system(matrix: sparse.csr_matrix) -> tuple[PETSc.Mat, PETSc.Vec, PETSc.Vec]:
     as_petsc = PETSc.Mat().createAIJ(matrix.shape, csr=(matrix.indptr, matrix.indices, matrix.data))
     b, x = as_petsc.createVecs()
     b.array[:] = LOAD
-    factors.solve(as_petsc, b, x)
-    return x.array.copy()
+    return as_petsc, b, x
 
 
 def error(x: np.ndarray, matrix: sparse.csr_matrix) -> float:
@@ -64,3 +69,15 @@ def test_singular_matrices_are_an_error() -> None:
     singular[7, 7] = 0.0
     with pytest.raises(LinearSolveFailed):
         solve(factors, singular.tocsr())
+
+
+def test_a_preconditioner_that_no_longer_serves_costs_few_iterations() -> None:
+    """Twice as many as it took for its own matrix."""
+    lagged, ksp = Lagged(), flexible_solver(PETSc.COMM_SELF, tolerance=1e-8)
+    ksp.getPC().setType(PETSc.PC.Type.ILU)
+    first = lagged.solve(ksp, *system((BASE + 0.5 * NEAR).tocsr()))
+    again = lagged.solve_again(*system((BASE + 0.51 * NEAR).tocsr()))
+    assert again is not None and again <= 2 * first
+    assert lagged.solve_again(*system((BASE + 5.0 * NEAR).tocsr())) is None
+    assert ksp.getIterationNumber() == 2 * first
+    assert lagged.solve_again(*system(BASE)) is None

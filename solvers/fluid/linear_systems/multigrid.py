@@ -125,8 +125,8 @@ def _everywhere(comm: MPI.Comm, component: Component) -> Indices:
 class Multigrid:
     """The levels of one flow, the same for all cuts, and preconditioners on them."""
 
-    def __init__(self, comm: MPI.Comm, unknowns: Unknowns):
-        self.comm, self._second = comm, unknowns.degree > 1
+    def __init__(self, comm: MPI.Comm, unknowns: Unknowns, cycle: PETSc.PC.MGCycleType = PETSc.PC.MGCycleType.V):
+        self.comm, self._second, self._kind = comm, unknowns.degree > 1, cycle
         self.levels = [finest(unknowns)]
         self._interpolations: list[PETSc.Mat] = []
         #: the finest matrix of the last preconditioner, and the coarse ones, reused while it, and thus its pattern,
@@ -144,7 +144,7 @@ class Multigrid:
             self._interpolations.append(interpolation(comm, *self.levels[-2:]))
 
     def preconditioner(self, matrix: PETSc.Mat, held: NDArray[np.bool_], near: Marker) -> PETSc.PC:
-        """One V-cycle for a matrix; it does not follow later changes (collective).
+        """One cycle for a matrix; it does not follow later changes (collective).
 
         With first degree the next call overwrites it if the pattern of the matrix is the same: subdomains and patterns
         of factors are found once. held: owned unknowns with rows of the identity; near: marks those near surfaces.
@@ -176,6 +176,7 @@ class Multigrid:
         cycle, count = PETSc.PC().create(self.comm), len(self.levels)
         cycle.setType(PETSc.PC.Type.MG)
         cycle.setMGLevels(count)
+        cycle.setMGCycleType(self._kind)
         for level in range(1, count):
             cycle.setMGInterpolation(level, interpolations[count - 1 - level])
         for level in range(count):
