@@ -44,10 +44,10 @@ class Blocks:
         beside = [self.solid, self.into_solid]
         self.solid, self.into_solid = part.impose_rows(beside, x.array[:own], b.array[:own])
 
-    def product(self, numbering: Numbering) -> PETSc.Mat:
-        """The matrix as its product with vectors."""
+    def product(self, numbering: Numbering, flow: PETSc.Mat) -> PETSc.Mat:
+        """The matrix as its product with vectors, and that of the flow as it multiplies them."""
         blocks = (self.solid, self.into_solid), (self.into_flow, self.flow)
-        return matrix_of(TwoFields(blocks, numbering.first, numbering.second))
+        return matrix_of(TwoFields(blocks, numbering.first, numbering.second, flow))
 
     def assembled(self) -> PETSc.Mat:
         """The matrix as one sparse matrix."""

@@ -169,7 +169,7 @@ class Monolithic:
         sequence = self.coupled.flow.sequence
         while sequence.current != "direct":
             try:
-                matrix = blocks.product(self._numbering)
+                matrix = blocks.product(self._numbering, self.coupled.flow.product(blocks.flow))
                 iterations = self._krylov.solve_again(matrix, b, x)
                 if iterations is None:
                     iterations = self._krylov.solve(self._krylov_solver(blocks), matrix, b, x)

@@ -28,13 +28,14 @@ class TwoFields(PythonContext):
     blocks: tuple[tuple[PETSc.Mat, PETSc.Mat], tuple[PETSc.Mat, PETSc.Mat]]
     first: PETSc.IS
     second: PETSc.IS
+    product: PETSc.Mat | None = None  #: the last block as it multiplies vectors; None: as it is
 
     def mult(self, matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         with self.parts(x) as (x1, x2), self.parts(y) as (y1, y2):
             (A11, A12), (A21, A22) = self.blocks
             A11.mult(x1, y1)
             A12.multAdd(x2, y1, y1)
-            A22.mult(x2, y2)
+            (self.product or A22).mult(x2, y2)
             A21.multAdd(x1, y2, y2)
 
     @contextmanager

@@ -41,13 +41,18 @@ class Lagged:
         self._kept = kept
         return int(ksp.getIterationNumber())
 
-    def solve(self, ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> int:
-        """Solve matrix x = b with a solver for this matrix, which is kept; iterations. Raises LinearSolveFailed."""
-        linear.solve(ksp, matrix, b, x)
+    def solve(
+        self, ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, entries: PETSc.Mat | None = None
+    ) -> int:
+        """Solve matrix x = b with a solver for this matrix, which is kept; iterations. Raises LinearSolveFailed.
+
+        entries: the matrix with its entries, if `matrix` has products with vectors alone.
+        """
+        linear.solve(ksp, matrix, b, x, entries)
         linear.keep_preconditioner(ksp)
         self.made += 1
         first = int(ksp.getIterationNumber())
-        self._kept = ksp, matrix, first
+        self._kept = ksp, entries or matrix, first
         return first
 
 

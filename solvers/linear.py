@@ -143,24 +143,19 @@ def choose_flow(
     *,
     degree: int,
     steady: bool,
-    nested: bool = False,
     sheets: bool = False,
     with_solids: bool = False,
 ) -> tuple[FlowMethod, ...]:
     """The sequence of solvers for a flow: each is used when those before it have failed.
 
     degree: of the velocity; incomplete factors with more fill take minutes for second degree, and are left out.
-    nested: on nested cells, where multigrid for steady flows of first degree with 25,000 and 50,000 unknowns takes 2.5
-    times as long as incomplete factors. sheets: there are several nodes in one place, which the
-    coarse lattices of multigrid do not have; incomplete factors of second degree mostly stall there. with_solids:
-    equations of solids may belong to the system.
+    sheets: there are several nodes in one place, which the coarse lattices of multigrid do not have; incomplete factors
+    of second degree mostly stall there. with_solids: equations of solids may belong to the system.
     """
     if method == "direct" or (method == "auto" and dofs <= FLOW_DIRECT_LIMIT[dim]):
         return ("direct",)
     if sheets:
         return ("direct",) if degree > 1 else ("ilu", "fill", "direct")
-    if nested and degree == 1 and steady and method == "auto":
-        return ("ilu", "multigrid", "direct")
     limit = (FLOW_WITH_SOLIDS_LIMIT if with_solids else FLOW_INCOMPLETE_LIMIT)[degree]
     if method == "ilu" or (method == "auto" and not steady and dofs <= limit):
         return ("ilu", "multigrid", "direct")

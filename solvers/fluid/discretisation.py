@@ -59,7 +59,6 @@ def discretise(
         unknowns.counted(),
         degree=settings.degree,
         steady=settings.steady,
-        nested=distributed.nested is not None,
         sheets=sheets is not None,
         with_solids=any(body.motion is None for body in bodies),
     )

@@ -368,7 +368,12 @@ class Fluid:
 
     def multigrid(self, matrix: PETSc.Mat) -> PETSc.PC:
         """A multigrid cycle for the tangent; the next call overwrites it (collective)."""
-        return self.linear_solver.multigrid.preconditioner(matrix, self.held, self.system.dofs_near_surfaces)
+        near, product = self.system.dofs_near_surfaces, self.product(matrix)
+        return self.linear_solver.multigrid.preconditioner(matrix, self.held, near, product)
+
+    def product(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """The tangent as it multiplies vectors in a Krylov method; the next call overwrites it (collective)."""
+        return self.linear_solver.products.of(matrix)
 
     def _add(self, owned: Array) -> None:
         self.flow[: self.unknowns.owned] += owned

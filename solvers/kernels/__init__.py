@@ -2,6 +2,7 @@
 
 from ._kernels import (
     BlockFactors,
+    BlockProduct,
     KdopTree2,
     KdopTree3,
     Moments,

@@ -1,4 +1,5 @@
-// Python names of block_factors.hpp and node_blocks.hpp: BlockFactors, node_blocks, spread_blocks.
+// Python names of block_factors.hpp, block_product.hpp and node_blocks.hpp: BlockFactors, BlockProduct, node_blocks,
+// spread_blocks.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
@@ -13,6 +14,7 @@
 #include <nanobind/stl/optional.h>
 
 #include "block_factors.hpp"
+#include "block_product.hpp"
 #include "node_blocks.hpp"
 
 namespace nb = nanobind;
@@ -29,13 +31,35 @@ void require(bool condition, const char* message) {
     if (!condition) throw std::invalid_argument(message);
 }
 
-// Throws unless these are compressed rows of a square matrix.
-void require_square(const Numbers& start, const Numbers& columns) {
+// Throws unless these are compressed rows of a matrix with so many columns.
+void require_rows(const Numbers& start, const Numbers& columns, std::size_t width) {
     require(start.size() > 0 && start.data()[0] == 0, "no compressed rows");
     require(static_cast<std::size_t>(start.data()[start.size() - 1]) == columns.size(), "no compressed rows");
     for (std::size_t i = 1; i < start.size(); ++i) require(start.data()[i - 1] <= start.data()[i], "no compressed rows");
     for (std::size_t k = 0; k < columns.size(); ++k)
-        require(columns.data()[k] >= 0 && static_cast<std::size_t>(columns.data()[k]) + 1 < start.size(), "no square matrix");
+        require(columns.data()[k] >= 0 && static_cast<std::size_t>(columns.data()[k]) < width, "no such column");
+}
+
+void require_square(const Numbers& start, const Numbers& columns) {
+    require_rows(start, columns, start.size() > 0 ? start.size() - 1 : 0);
+}
+
+void create_product(block_product::Product* self, const Numbers& start, const Numbers& columns, std::size_t width) {
+    require_rows(start, columns, width);
+    new (self) block_product::Product(start.size() - 1, width, start.data(), columns.data());
+}
+
+void update_product(block_product::Product& self, const Blocks& values, const Vector& left, const Vector& right) {
+    require(values.shape(0) == self.blocks() && values.shape(1) == 4 && values.shape(2) == 4, "each column needs a block");
+    require(left.size() == self.rows() && right.size() == self.width(), "each row and column needs a scale");
+    nb::gil_scoped_release release;
+    self.update(values.data(), left.data(), right.data());
+}
+
+void add_product(block_product::Product& self, const Vector& x, const Result& y) {
+    require(x.size() == self.width() && y.size() == self.rows(), "vectors need a number for each row and column");
+    nb::gil_scoped_release release;
+    self.add(x.data(), y.data());
 }
 
 void create(factors::Factors* self, const Numbers& start, const Numbers& columns, int size,
@@ -112,6 +136,13 @@ void bind_factors(nb::module_& module) {
         .def("update", &update, "values"_a,
              "Factors of a matrix; values: shape (blocks, n, n), each transposed. False if they do not exist.")
         .def("solve", &solve, "b"_a, "x"_a, "x = (L U)^-1 b.");
+    nb::class_<block_product::Product>(module, "BlockProduct",
+        "A matrix of 4 x 4 blocks, stored in single precision, that multiplies vectors; sums are in double precision.\n\n"
+        "The pattern is given by compressed rows; width: count of columns.")
+        .def("__init__", &create_product, "start"_a, "columns"_a, "width"_a)
+        .def("update", &update_product, "values"_a, "left"_a, "right"_a,
+             "Store L A R; values: of A, shape (blocks, 4, 4), each transposed; diagonals of L and R: powers of two.")
+        .def("add", &add_product, "x"_a, "y"_a, "y += A x.");
     module.def("node_blocks", &collect, "start"_a, "columns"_a, "values"_a, "size"_a,
                "(start, columns, blocks (m, n, n), each transposed) of a matrix in compressed rows, n of which are a node's.");
     module.def("spread_blocks", &spread, "start"_a, "blocks"_a, "entries"_a,

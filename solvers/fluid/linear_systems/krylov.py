@@ -16,6 +16,7 @@ from solvers import linear
 from solvers.fluid.background.space import Unknowns
 from solvers.fluid.linear_systems.multigrid import Marker, Multigrid
 from solvers.lagged import Lagged, LaggedFactors
+from solvers.rounded_product import RoundedProducts
 
 #: Names of the methods in messages.
 WORDS: dict[linear.FlowMethod, str] = {
@@ -72,6 +73,7 @@ class FlowSolver:
 
     def __init__(self, unknowns: Unknowns, sequence: SolverSequence, tolerance: float, *, steady: bool):
         self.sequence, self._unknowns, self._tolerance = sequence, unknowns, tolerance
+        self.products = RoundedProducts(tolerance)
         self._cycle = STEADY_CYCLE if steady else PETSc.PC.MGCycleType.V
         fresh = math.inf if steady else 1  # a steady flow changes too much from iterate to iterate
         self._krylov, self._direct = Lagged(fresh=fresh), LaggedFactors(sequence.comm, fresh=fresh)
@@ -104,10 +106,11 @@ class FlowSolver:
         """
         while self.sequence.current != "direct":
             try:
-                iterations = self._krylov.solve_again(matrix, b, x)
+                product = self.products.of(matrix)
+                iterations = self._krylov.solve_again(product, b, x)
                 if iterations is not None:
                     return iterations
-                return self._krylov.solve(self._create(matrix, held, near), matrix, b, x)
+                return self._krylov.solve(self._create(matrix, held, near), product, b, x, matrix)
             except linear.LinearSolveFailed as failure:
                 self.sequence.advance(failure)
         return self._direct.solve(matrix, b, x)
@@ -117,6 +120,5 @@ class FlowSolver:
         if method != "multigrid":
             return linear.flow_solver(comm, tolerance=self._tolerance, fill=method == "fill")
         ksp = linear.flexible_solver(comm, tolerance=self._tolerance)
-        ksp.setOperators(matrix)
-        ksp.setPC(self.multigrid.preconditioner(matrix, held, near))
+        ksp.setPC(self.multigrid.preconditioner(matrix, held, near, self.products.of(matrix)))
         return ksp

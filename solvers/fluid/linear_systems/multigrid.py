@@ -143,11 +143,14 @@ class Multigrid:
             self.levels.append(coarsen(comm, self.levels[-1], [next_one] * len(lattices)))
             self._interpolations.append(interpolation(comm, *self.levels[-2:]))
 
-    def preconditioner(self, matrix: PETSc.Mat, held: NDArray[np.bool_], near: Marker) -> PETSc.PC:
+    def preconditioner(
+        self, matrix: PETSc.Mat, held: NDArray[np.bool_], near: Marker, product: PETSc.Mat | None = None
+    ) -> PETSc.PC:
         """One cycle for a matrix; it does not follow later changes (collective).
 
         With first degree the next call overwrites it if the pattern of the matrix is the same: subdomains and patterns
-        of factors are found once. held: owned unknowns with rows of the identity; near: marks those near surfaces.
+        of factors are found once. held: owned unknowns with rows of the identity; near: marks those near surfaces;
+        product: the matrix that multiplies vectors, None: `matrix`.
         """
         matrices, interpolations = self._galerkin(matrix, held)
         cycle = self._cycle = self._cycle or self._new_cycle(interpolations)
@@ -162,8 +165,10 @@ class Multigrid:
                 smoother.setOperators(of)
             else:
                 smoother.getPC().setReusePreconditioner(False)
-                smoother.setOperators(of, decoupled(of, here.component_of()) if self._second else of)
-        cycle.setOperators(matrix)
+                multiplied = product or matrix if of is matrix else of
+                smoother.setOperators(multiplied, decoupled(of, here.component_of()) if self._second else of)
+        cycle.setUseAmat(True)  # PETSc gives the finest smoother the operators of the cycle
+        cycle.setOperators(product or matrix, matrix)
         cycle.setUp()
         for level in range(len(matrices)):
             smoother = cycle.getMGSmoother(level)
