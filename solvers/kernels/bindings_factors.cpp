@@ -32,20 +32,20 @@ void require(bool condition, const char* message) {
 }
 
 // Throws unless these are compressed rows of a matrix with so many columns.
-void require_rows(const Numbers& start, const Numbers& columns, std::size_t width) {
+void require_rows(const Numbers& start, const Numbers& columns, std::size_t width, const char* otherwise) {
     require(start.size() > 0 && start.data()[0] == 0, "no compressed rows");
     require(static_cast<std::size_t>(start.data()[start.size() - 1]) == columns.size(), "no compressed rows");
     for (std::size_t i = 1; i < start.size(); ++i) require(start.data()[i - 1] <= start.data()[i], "no compressed rows");
     for (std::size_t k = 0; k < columns.size(); ++k)
-        require(columns.data()[k] >= 0 && static_cast<std::size_t>(columns.data()[k]) < width, "no such column");
+        require(columns.data()[k] >= 0 && static_cast<std::size_t>(columns.data()[k]) < width, otherwise);
 }
 
 void require_square(const Numbers& start, const Numbers& columns) {
-    require_rows(start, columns, start.size() > 0 ? start.size() - 1 : 0);
+    require_rows(start, columns, start.size() > 0 ? start.size() - 1 : 0, "no square matrix");
 }
 
 void create_product(block_product::Product* self, const Numbers& start, const Numbers& columns, std::size_t width) {
-    require_rows(start, columns, width);
+    require_rows(start, columns, width, "no such column");
     new (self) block_product::Product(start.size() - 1, width, start.data(), columns.data());
 }
 

@@ -8,6 +8,7 @@ from petsc4py import PETSc
 from programs import on_processes
 from scipy import sparse
 
+from solvers import kernels
 from solvers.rounded_product import RoundedProducts
 
 PROGRAM = Path(__file__).parents[1] / "setups" / "rounded_product.py"
@@ -64,6 +65,20 @@ def test_tight_tolerances_and_other_blocks_have_the_matrix_itself():
     matrix, other = (blocked(size, np.ones((PATTERN.nnz, size, size))) for size in (4, 3))
     assert RoundedProducts(1e-8).of(matrix) is matrix
     assert RoundedProducts(1e-4).of(other) is other
+
+
+def test_mistakes():
+    start, columns = np.array([0, 1], dtype=np.int32), np.array([1], dtype=np.int32)
+    with pytest.raises(ValueError, match="no such column"):
+        kernels.BlockProduct(start, columns, 1)
+    product, blocks = kernels.BlockProduct(start, columns, 2), np.ones((1, 4, 4))
+    with pytest.raises(ValueError, match="each column needs a block"):
+        product.update(np.ones((1, 3, 3)), np.ones(4), np.ones(8))
+    with pytest.raises(ValueError, match="each row and column needs a scale"):
+        product.update(blocks, np.ones(4), np.ones(4))
+    product.update(blocks, np.ones(4), np.ones(8))
+    with pytest.raises(ValueError, match="vectors need a number for each row and column"):
+        product.add(np.ones(4), np.ones(4))
 
 
 @pytest.mark.parametrize("processes", [1, 2])
