@@ -332,7 +332,8 @@ def solve(
     """Solve matrix x = b (collective). Raises LinearSolveFailed.
 
     preconditioned_by: the matrix of an earlier solve whose preconditioner is reused; None: `matrix`. reduction: of the
-    residual that is good enough for a Krylov method, unless the tolerance of the solver costs few iterations.
+    residual that is good enough for a Krylov method; where that costs few iterations, its square, with which Newton's
+    method converges as with an exact solution.
     """
     if ksp.getOptionsPrefix() == "elastic_":
         ksp.setPC(_multigrid(ksp.comm))
@@ -345,9 +346,11 @@ def solve(
         unlocked.solve(ksp, b, x)
         ksp.setTolerances(rtol=tolerance)
         if ksp.getConvergedReason() > 0 and ksp.getIterationNumber() <= FEW:
+            ksp.setTolerances(rtol=max(tolerance, reduction**2))
             ksp.setInitialGuessNonzero(True)
             unlocked.solve(ksp, b, x)
             ksp.setInitialGuessNonzero(False)
+            ksp.setTolerances(rtol=tolerance)
     else:
         unlocked.solve(ksp, b, x)
     reason = ksp.getConvergedReason()

@@ -30,6 +30,7 @@ from solvers.structure.held import Held
 from solvers.structure.instant import Instant
 from solvers.structure.massless import mass_matrices
 from solvers.structure.rigid_modes import attach_rigid_modes
+from solvers.structure.solid_solver import SolidSolver
 from solvers.structure.supports import prescribe
 from solvers.structure.tangent import Tangent
 from solvers.structure.time_scheme import Statics, TimeScheme
@@ -67,20 +68,24 @@ class Structure:
         self._imposed: PETSc.Mat | None = None  #: tangent of the last iterate with its supports; None in contact
         self._assembled_tangent = Tangent(bodies)
         self._b, self._x = self.layout.vector(), self.layout.vector()
-        method = settings.linear
-        self._method = linear.choose(method, self.dim, self.dofs()) if isinstance(method, str) else method
-        self.constrained_solver = None if contact is None else self._create_solver(symmetric=False)
-
-    def _create_solver(self, *, symmetric: bool) -> PETSc.KSP:
-        make = linear.SOLVERS[self._method] if isinstance(self._method, str) else self._method
-        return make(self.comm, linear.Task(self.dim, self.dofs(), symmetric, self.settings.linear_tolerance))
+        self.solver = SolidSolver(self.comm, self.dim, self.dofs(), settings, contact=contact is not None)
 
     @cached_property
-    def linear_solver(self) -> PETSc.KSP:
-        """The linear solver away from contact."""
+    def _symmetric(self) -> bool:
+        """Whether tangents away from contact are symmetric."""
         # follower pressures have an unsymmetric boundary term, and the velocity of massless nodes has a rule of its own
         damped = self.constraint is not None and self.damping is not None
-        return self._create_solver(symmetric=not (damped or any(body.pressures for body in self.bodies)))
+        return not (damped or any(body.pressures for body in self.bodies))
+
+    @property
+    def linear_solver(self) -> PETSc.KSP:
+        """The present linear solver away from contact."""
+        return self.solver.current(symmetric=self._symmetric)
+
+    @property
+    def constrained_solver(self) -> PETSc.KSP:
+        """The present linear solver in contact."""
+        return self.solver.current(symmetric=False)
 
     def dofs(self) -> int:
         """Unknowns of all bodies on all processes, prescribed ones included."""
@@ -171,6 +176,7 @@ class Structure:
         self.rounding = self._tangent = self._imposed = (
             None  # not part of the saved state: a resumed run must start alike
         )
+        self.solver.begin_step()
         if self.constraint is not None:
             self.constraint.begin_step()
         self.target = self.held.displacement(t + dt)
@@ -261,10 +267,11 @@ class Structure:
         """One iteration of Newton's method; returns |du| / |u|. Raises StepFailed.
 
         keep: use the matrix and the factors of the last iterate, away from contact. reduction: of the residual of the
-        linear system that is good enough. It applies near contact, where the first iterates only find the active set;
+        linear system that is good enough. It applies in contact, where the first iterates only find the active set;
         elsewhere one exact solution may be all that is needed.
         """
-        change, taken, imposed = self.row_transformation(), None, self._imposed
+        change = self.row_transformation() if self._touching else None
+        taken, imposed = None, self._imposed
         self._x.array[:] = self.missing_displacement()
         self._b.array[:] = self.right_side()
         if keep and change is None and imposed is not None and not self.norm(self._x.array):
@@ -277,17 +284,23 @@ class Structure:
                     matrix, taken = transform_rows(matrix, self._b, change)
             matrix = self.held.impose(matrix, self._x, self._b)
         self._imposed = matrix if change is None else None
-        if self._method == "iterative":
-            attach_rigid_modes(matrix, self.bodies, self.now.u)
-        solver, enough = (self.linear_solver, 0.0) if change is None else (self.constrained_solver, reduction)
+        symmetric, enough = (self._symmetric, 0.0) if change is None else (False, reduction)
         try:
             with self.timer("solve"):
-                linear.solve(solver, matrix, self._b, self._x, reduction=enough)
+                self.solver.solve(matrix, self._b, self._x, self._attach_modes, symmetric=symmetric, reduction=enough)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         if taken is not None:
             self.recover(taken, gather(self.comm, self._x.array))
         return self.update(self._x.array)
+
+    @property
+    def _touching(self) -> bool:
+        """Whether multipliers are in contact at the present iterate."""
+        return self.constraint is not None and self.constraint.near and bool(self.constraint.active().any())
+
+    def _attach_modes(self, matrix: PETSc.Mat) -> None:
+        attach_rigid_modes(matrix, self.bodies, self.now.u)
 
     def linearise(self) -> PETSc.Mat:
         """The tangent at the present iterate without supports, and the rounding error; the next call overwrites it."""
@@ -379,6 +392,7 @@ class Structure:
         """The state that the next step starts from, by body."""
         state: State = {name: self.per_body(array) for name, array in vars(self.now).items()}
         state["energy"] = self.energy.save()
+        state["linear_solver"] = self.solver.position
         if self.constraint is not None:
             state["contact"] = self.constraint.save()
         return state
@@ -401,5 +415,6 @@ class Structure:
         for body, u in zip(self.bodies, self.split(self.now.u), strict=True):
             body.set_displacement(u)
         self.energy.restore(state["energy"])
+        self.solver.position = state["linear_solver"]
         if self.constraint is not None:
             self.constraint.restore(state["contact"])

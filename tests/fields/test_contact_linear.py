@@ -87,7 +87,7 @@ probes:
 def test_impact_on_two_processes(tmp_path):
     (tmp_path / "case.yaml").write_text(COLLISION)
     found = []
-    for method, processes in (("direct", 1), ("ilu", 1), ("ilu", 2)):
+    for method, processes in (("direct", 1), ("ilu", 1), ("ilu", 2), ("auto", 2)):
         out = tmp_path / f"{method}{processes}"
         change = [f"solver.linear.method={method}", "solver.linear.tolerance=1e-12", "output.fields_every=0"]
         run = fsci("run", tmp_path, "-o", out, *(w for c in change for w in ("--set", c)), processes=processes)

@@ -158,7 +158,7 @@ def test_solver_of_solids(dim, kind):
 
 
 def test_solution_that_is_good_enough(monkeypatch):
-    """A Krylov method stops at the reduction that is asked for, unless its own tolerance costs few iterations."""
+    """A Krylov method stops at the reduction that is asked for, or at its square if it takes few iterations."""
     A = sparse.diags([np.full(299, -1.0), np.full(300, 2.02), np.full(299, -1.0)], [-1, 0, 1], format="csr")
     matrix = PETSc.Mat().createAIJ((300, 300), csr=(A.indptr, A.indices, A.data), comm=PETSC_SELF)
     ksp = PETSc.KSP().create(PETSC_SELF)
@@ -177,7 +177,8 @@ def test_solution_that_is_good_enough(monkeypatch):
     assert 1e-9 < missed(1e-3) <= 1e-3
     assert missed(1e-10) <= 1e-9
     monkeypatch.setattr(linear, "FEW", 1000)
-    assert missed(1e-3) <= 1e-9
+    assert 1e-9 < missed(1e-3) <= 1e-6
+    assert missed(1e-5) <= 1e-9
     assert ksp.getTolerances()[0] == 1e-9
 
 

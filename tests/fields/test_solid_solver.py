@@ -1,0 +1,106 @@
+"""The linear solvers that `auto` tries near contact: incomplete factors where they are good, else the direct solver."""
+
+import numpy as np
+import pytest
+from contact_setup import make_body, make_contact, solve_step
+from mpi4py import MPI
+from structure_setup import constant
+
+from fsci import shapes
+from solvers.newton import Tolerance
+from solvers.solid_factors import SolidFactors
+from solvers.solver_settings import SolverSettings
+from solvers.structure import solid_solver
+from solvers.structure.body import Support
+from solvers.structure.elastic_constants import lame
+from solvers.structure.materials import NeoHooke
+
+ZERO = constant(0.0)
+COMM = MPI.COMM_SELF
+
+
+def pressed(method, *, size, cells):
+    """A block pressed onto the free end of a plate that is held on its left, or on its bottom if it is thick."""
+    material = NeoHooke(*lame(1000.0, 0.3))
+    side = "left" if size[2] < 1.0 else "bottom"
+    lower = make_body("lower", shapes.box(size, cells), material, supports=[Support(side, (ZERO,) * 3)])
+    place = (size[0] - 0.8, 0.3, size[2])
+    down = (ZERO, ZERO, lambda x, t: np.full(x.shape[1], -0.08 * t))
+    block = make_body("block", shapes.box((0.5, 0.5, 0.5), (4, 4, 4), place), material, supports=[Support("top", down)])
+    settings = SolverSettings(Tolerance(residual=1e-10), linear=method)
+    structure, contact = make_contact([lower, block], [(("block", "bottom"), ("lower", "top"))], settings=settings)
+    return structure, contact, solve_step(structure)
+
+
+@pytest.mark.parametrize(
+    ("size", "cells", "position"),
+    [((4.0, 1.1, 0.1), (24, 8, 1), 1), ((2.0, 1.1, 1.0), (8, 6, 4), 0)],
+    ids=["bent plate", "compact block"],
+)
+def test_auto_solves_as_the_direct_solver(size, cells, position):
+    """As many Newton steps, and the same results, whether the trial succeeds or not."""
+    direct, auto = (pressed(method, size=size, cells=cells) for method in ("direct", "auto"))
+    assert auto[2].iterations == direct[2].iterations
+    largest = np.abs(direct[0].now.u).max()
+    assert np.abs(auto[0].now.u - direct[0].now.u).max() < 1e-7 * largest
+    force = direct[1].resultant(0)
+    assert np.abs(auto[1].resultant(0) - force).max() < 1e-6 * np.abs(force).max()
+    solver = auto[0].solver
+    assert solver.sequence == ("ilu", "direct")
+    assert solver.position == position
+    kind = auto[0].constrained_solver.getPC().getType()
+    assert kind == ("lu" if position else "python")
+
+
+def test_the_choice_is_part_of_the_state():
+    structure, _, _ = pressed("auto", size=(2.0, 1.1, 1.0), cells=(4, 3, 2))
+    first = structure.save()
+    assert isinstance(structure.constrained_solver.getPC().getPythonContext(), SolidFactors)
+    structure.solver.position = 1
+    second = structure.save()
+    structure.restore(first)
+    assert structure.solver.position == 0
+    structure.restore(second)
+    assert structure.constrained_solver.getPC().getType() == "lu"
+
+
+def test_first_system_of_a_step_is_solved_to_the_square(monkeypatch):
+    """Those after it are solved as well as is asked for."""
+    seen = []
+    solve = solid_solver.linear.solve
+
+    def noted(*arguments, reduction):
+        seen.append(reduction)
+        solve(*arguments, reduction=reduction)
+
+    monkeypatch.setattr(solid_solver.linear, "solve", noted)
+    structure, _, info = pressed("auto", size=(2.0, 1.1, 1.0), cells=(4, 3, 2))
+    assert seen[:2] == [1e-6, 1e-3]
+    assert len(seen) == info.iterations
+    structure.begin_step(1.0, 1.0)
+    structure.solve()
+    assert seen[info.iterations] == 1e-6
+
+
+def test_tolerance_is_a_part_of_newtons():
+    """A direct solver is replaced by one as exact as Newton's method needs it."""
+    tolerances = []
+    for residual in (1e-6, 1e-8, 1e-11):
+        settings = SolverSettings(Tolerance(residual=residual))
+        solver = solid_solver.SolidSolver(COMM, 3, 3000, settings, contact=True)
+        tolerances.append(solver.current(symmetric=True).getTolerances()[0])
+    assert tolerances == pytest.approx([1e-8, 1e-10, 1e-12])
+    alone = solid_solver.SolidSolver(COMM, 3, 3000, SolverSettings(linear="ilu"), contact=True)
+    assert alone.current(symmetric=True).getTolerances()[0] == 1e-8
+
+
+def test_sequence_by_size():
+    def choose(method, dim, dofs, contact=True):
+        return solid_solver.choose(method, dim, dofs, contact=contact)
+
+    assert choose("auto", 3, 30_000) == ("ilu", "direct")
+    assert choose("auto", 3, 30_001) == ("ilu", "iterative")
+    assert choose("auto", 3, 30_000, contact=False) == ("direct",)
+    assert choose("auto", 2, 30_000) == ("direct",)
+    assert choose("ilu", 3, 100) == ("ilu",)
+    assert [solid_solver.iterations_allowed(n) for n in (600, 6_000, 10**6)] == [30, 120, 300]
