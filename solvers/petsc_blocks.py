@@ -94,6 +94,19 @@ def join_entries(matrices: Sequence[PETSc.Mat], out: PETSc.Mat) -> bool:
     return True
 
 
+def entry_rows(matrix: PETSc.Mat) -> tuple[NDArray[np.int32], NDArray[np.int32], Array]:
+    """(start, columns, values) of the owned rows; views of the matrix, not to be changed, if its type is seqaij."""
+    if matrix.getType() != PETSc.Mat.Type.SEQAIJ or not _available():
+        return matrix.getValuesCSR()
+    handle, values = ctypes.c_void_p(matrix.handle), ctypes.POINTER(ctypes.c_double)()
+    rows = _row_pointers(handle, blocks=False)
+    if rows is None or _library().MatSeqAIJGetArrayRead(handle, ctypes.byref(values)) != 0:
+        return matrix.getValuesCSR()
+    found = (*rows, _array(values, rows[1].shape))
+    _library().MatSeqAIJRestoreArrayRead(handle, ctypes.byref(values))  # sets the pointer to zero
+    return found
+
+
 @contextmanager
 def _entries(matrix: PETSc.Mat) -> Iterator[Array]:
     """A view of the entries of an assembled matrix of the type seqaij; PETSc notes that they may have changed."""
@@ -106,19 +119,26 @@ def _entries(matrix: PETSc.Mat) -> Iterator[Array]:
 
 def _rows(handle: ctypes.c_void_p, size: int) -> BlockRows | None:
     """A view of a matrix of the type seqbaij."""
+    rows, values = _row_pointers(handle, blocks=True), ctypes.POINTER(ctypes.c_double)()
+    if rows is None or _library().MatSeqBAIJGetArray(handle, ctypes.byref(values)) != 0:
+        return None
+    found = BlockRows(*rows, _array(values, (len(rows[1]), size, size)))
+    _library().MatSeqBAIJRestoreArray(handle, ctypes.byref(values))
+    return found
+
+
+def _row_pointers(
+    handle: ctypes.c_void_p, *, blocks: bool
+) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
+    """Views of (start, columns) of a matrix on one process; blocks: count rows and columns of blocks."""
     library, count, done = _library(), ctypes.c_int32(), ctypes.c_int()
     start, columns = ctypes.POINTER(ctypes.c_int32)(), ctypes.POINTER(ctypes.c_int32)()
     places = [ctypes.byref(place) for place in (count, start, columns, done)]
-    values = ctypes.POINTER(ctypes.c_double)()
-    if library.MatGetRowIJ(handle, 0, 0, 1, *places) != 0 or not done.value:
-        return None
-    if library.MatSeqBAIJGetArray(handle, ctypes.byref(values)) != 0:
+    if library.MatGetRowIJ(handle, 0, 0, int(blocks), *places) != 0 or not done.value:
         return None
     starts = _array(start, (count.value + 1,))
-    blocks = int(starts[-1])
-    found = BlockRows(starts, _array(columns, (blocks,)), _array(values, (blocks, size, size)))
-    library.MatRestoreRowIJ(handle, 0, 0, 1, *places)  # sets the pointers to zero
-    library.MatSeqBAIJRestoreArray(handle, ctypes.byref(values))
+    found = starts, _array(columns, (int(starts[-1]),))
+    library.MatRestoreRowIJ(handle, 0, 0, int(blocks), *places)  # sets the pointers to zero
     return found
 
 
@@ -138,6 +158,8 @@ def _library() -> Any:
         for name, places in (
             ("MatSeqAIJGetArray", 1),
             ("MatSeqAIJRestoreArray", 1),
+            ("MatSeqAIJGetArrayRead", 1),
+            ("MatSeqAIJRestoreArrayRead", 1),
             ("MatSeqBAIJGetArray", 1),
             ("MatSeqBAIJRestoreArray", 1),
             ("MatMPIBAIJGetSeqBAIJ", 3),

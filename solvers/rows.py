@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array
+from solvers.kernels import other_rows
+from solvers.petsc_blocks import entry_rows
 from solvers.sparse import Sparse, sparse, sparse_from_entries, stack
 
 
@@ -88,9 +90,10 @@ def transform_rows(
 
 
 def owned_rows(matrix: PETSc.Mat) -> Sparse:
-    """A copy of the rows of this process with ordered columns."""
-    indptr, indices, data = matrix.getValuesCSR()
-    return sparse((data, indices, indptr), (len(indptr) - 1, matrix.size[1])).ordered()
+    """The rows of this process with ordered columns; on one process a view of the matrix, not to be changed."""
+    indptr, indices, data = entry_rows(matrix)
+    rows = sparse((data, indices, indptr), (len(indptr) - 1, matrix.size[1]))
+    return rows if matrix.getType() == PETSc.Mat.Type.SEQAIJ else rows.ordered()
 
 
 def _on_all(comm: MPI.Comm, own: Sparse, start: int, rows: NDArray[np.int64]) -> Sparse:
@@ -104,7 +107,7 @@ def _on_all(comm: MPI.Comm, own: Sparse, start: int, rows: NDArray[np.int64]) ->
 
 
 def change_rows(matrix: PETSc.Mat, own: Sparse, b: PETSc.Vec, changes: RowChanges) -> PETSc.Mat:
-    """The changed matrix (collective). own: a copy of the rows of this process; b changes in place."""
+    """The changed matrix (collective). own: the rows of this process; b changes in place."""
     start, end = matrix.getOwnershipRange()
 
     def owned(rows: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -115,14 +118,13 @@ def change_rows(matrix: PETSc.Mat, own: Sparse, b: PETSc.Vec, changes: RowChange
     more = changes.added_rows[add]
     some = np.diff(more.indptr) > 0  # most nodes of the surfaces are not near
     new = stack([changes.replaced_rows[replace], more[some]])
-    changed = np.concatenate([replaced, added[some]])
-    before = own[changed]
-    before.data[: before.indptr[len(replaced)]] = 0.0
-    total = own.with_other_rows(changed, before + new.ordered())
+    changed = np.concatenate([replaced, added[some]]).astype(np.int32)
+    rows = own.indptr, own.indices, own.data
+    total = other_rows(*rows, changed, len(replaced), new.indptr, new.indices, new.data)
     right = b.array
     right[replaced] = changes.replaced_right[replace]
     right[added] += changes.added_right[add]
-    return distributed(total, matrix.getSizes(), matrix.comm)
+    return distributed(sparse(total, own.shape), matrix.getSizes(), matrix.comm)
 
 
 def distributed(own: Sparse, sizes, comm) -> PETSc.Mat:

@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from solvers import kernels
-from solvers.petsc_blocks import quick_to_multiply
+from solvers.petsc_blocks import entry_rows, quick_to_multiply
 from solvers.petsc_python import PythonContext
 
 #: Unknowns of a node.
@@ -24,14 +24,18 @@ class SolidFactors(PythonContext):
 
     def __init__(self) -> None:
         self._factors: kernels.BlockFactors | None = None
+        self._pattern: tuple[NDArray[np.int32], ...] = ()
         self._other: PETSc.PC | None = None
 
     def setUp(self, preconditioner: PETSc.PC) -> None:
         multiplied, matrix = preconditioner.getOperators()
         if multiplied.getType() == PETSc.Mat.Type.SEQAIJ:
             quick_to_multiply(multiplied)
-        start, columns, blocks = kernels.node_blocks(*matrix.getValuesCSR(), SIZE)
-        self._factors = kernels.BlockFactors(start, columns, SIZE, order_by_bandwidth(start, columns))
+        start, columns, blocks = kernels.node_blocks(*entry_rows(matrix), SIZE)
+        pattern = start, columns
+        if self._factors is None or not all(map(np.array_equal, pattern, self._pattern)):
+            self._factors = kernels.BlockFactors(*pattern, SIZE, order_by_bandwidth(*pattern))
+            self._pattern = pattern
         if not self._factors.update(blocks):
             self._factors, self._other = None, _of_entries(matrix)
 

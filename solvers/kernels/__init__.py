@@ -16,6 +16,7 @@ from ._kernels import (
     nodal_normals,
     nodal_tangents,
     node_blocks,
+    other_rows,
     spread_blocks,
     surface_rows,
 )

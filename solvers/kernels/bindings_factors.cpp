@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <numeric>
 #include <optional>
 #include <stdexcept>
@@ -16,6 +17,7 @@
 #include "block_factors.hpp"
 #include "block_product.hpp"
 #include "node_blocks.hpp"
+#include "other_rows.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -77,6 +79,13 @@ void create(factors::Factors* self, const Numbers& start, const Numbers& columns
     new (self) factors::Factors(rows, start.data(), columns.data(), size, nodes.data());
 }
 
+template <class... Shape>
+nb::object to_numpy(std::unique_ptr<double[]> values, Shape... shape) {
+    double* owned = values.release();
+    nb::capsule owner(owned, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+    return nb::cast(nb::ndarray<nb::numpy, double>(owned, {static_cast<std::size_t>(shape)...}, owner));
+}
+
 template <class T, class... Shape>
 nb::object to_numpy(std::vector<T> values, Shape... shape) {
     auto* owned = new std::vector<T>(std::move(values));
@@ -113,6 +122,29 @@ void spread(const Numbers& start, const Blocks& blocks, const Result& entries) {
     else node_blocks::spread<3>(nodes, start.data(), blocks.data(), entries.data());
 }
 
+nb::object other_rows(const Numbers& start, const Numbers& columns, const Vector& values, const Numbers& rows,
+                      std::size_t replaced, const Numbers& new_start, const Numbers& new_columns, const Vector& new_values) {
+    const std::size_t count = start.size() - 1;
+    require(start.size() > 0 && start.data()[0] == 0, "no compressed rows");
+    require(static_cast<std::size_t>(start.data()[count]) <= std::min(columns.size(), values.size()), "no compressed rows");
+    require(new_start.size() == rows.size() + 1 && new_start.data()[0] == 0, "each row needs its entries");
+    require(static_cast<std::size_t>(new_start.data()[rows.size()]) <= std::min(new_columns.size(), new_values.size()),
+            "each row needs its entries");
+    require(replaced <= rows.size(), "more rows to replace than there are");
+    for (std::size_t i = 0; i < rows.size(); ++i)
+        require(rows.data()[i] >= 0 && static_cast<std::size_t>(rows.data()[i]) < count, "no such row");
+    changed_rows::Matrix found;
+    {
+        nb::gil_scoped_release release;
+        const changed_rows::Rows before{start.data(), columns.data(), values.data()};
+        const changed_rows::Rows after{new_start.data(), new_columns.data(), new_values.data()};
+        found = changed_rows::change(count, before, rows.data(), rows.size(), replaced, after);
+    }
+    const std::size_t entries = found.columns.size();
+    return nb::make_tuple(to_numpy(std::move(found.values), entries), to_numpy(std::move(found.columns), entries),
+                          to_numpy(std::move(found.start), count + 1));
+}
+
 bool update(factors::Factors& self, const Blocks& values) {
     require(values.size() == self.values(), "each column needs a square block");
     nb::gil_scoped_release release;
@@ -145,6 +177,10 @@ void bind_factors(nb::module_& module) {
         .def("add", &add_product, "x"_a, "y"_a, "y += A x.");
     module.def("node_blocks", &collect, "start"_a, "columns"_a, "values"_a, "size"_a,
                "(start, columns, blocks (m, n, n), each transposed) of a matrix in compressed rows, n of which are a node's.");
+    module.def("other_rows", &other_rows, "start"_a, "columns"_a, "values"_a, "rows"_a, "replaced"_a, "new_start"_a,
+               "new_columns"_a, "new_values"_a,
+               "(values, columns, start) of a matrix in compressed rows, with increasing columns in each. The first\n"
+               "`replaced` of `rows`, each once, become the new ones, which need no order; to the others these are added.");
     module.def("spread_blocks", &spread, "start"_a, "blocks"_a, "entries"_a,
                "Write the entries of blocks, each transposed, in the order of compressed rows.");
 }

@@ -153,16 +153,17 @@ class FacetAssembly {
             const PlaneFrame<Slave> frame(slave_.x);
             scale_ = frame.area;
             if constexpr (derivatives) frame.area_slopes(scale_slopes_);
+            if (!may_be_near(first, last, ball, frame)) return;
             collect(first, last, ball, [&](const FacetNodes<Master>& master, const int* nodes, std::size_t number) {
                 if (frame.template apart<n, m>(slave_.x, master.x)) return;
                 Pair& pair = pairs_.emplace_back(master, frame, slave_.x, master.x);
-                if (!in_.elements) add_segments(pair, [](double, const auto&) { return true; });
+                if (!in_.elements) add_segments(pair, Everywhere{});
                 keep_if_met(nodes, number);
             });
         } else {
             collect(first, last, ball, [&](const FacetNodes<Master>& master, const int* nodes, std::size_t number) {
                 Pair& pair = pairs_.emplace_back(master, slave_.normal, slave_.x, master.x);
-                if (!in_.elements) add_segments(pair, [](double, const auto&) { return true; });
+                if (!in_.elements) add_segments(pair, Everywhere{});
                 keep_if_met(nodes, number);
             });
         }
@@ -174,7 +175,7 @@ class FacetAssembly {
     }
 
     template <typename Visit>
-    void collect(std::size_t first, std::size_t last, const FacetBall<Slave>& ball, Visit&& visit) {
+    void collect(std::size_t first, std::size_t last, const FacetBall<Slave>& ball, Visit&& visit) const {
         for (std::size_t p = first; p < last; ++p) {
             FacetNodes<Master> master;
             int nodes[m];
@@ -182,6 +183,26 @@ class FacetAssembly {
             if (!in_.is_kept(p) && !ball.sees(FacetBall<Master>(master.x), in_.reach, in_.facing)) continue;
             visit(master, nodes, p);
         }
+    }
+
+    // False only if `is_near` would be, for linear facets in 3D, before anything is integrated. The points of a pair lie on
+    // a line along the normal of the plane, at a distance of at least that between the nodes of both facets. Nodal normals
+    // have lengths of 1, and their means are shorter.
+    bool may_be_near(std::size_t first, std::size_t last, const FacetBall<Slave>& ball, const PlaneFrame<Slave>& frame) const {
+        if constexpr (Slave::order > 1 || Master::order > 1) return true;
+        double top = dot(frame.normal, slave_.x[0]), least = 1.0;
+        for (int i = 0; i < n; ++i) {
+            top = std::max(top, dot(frame.normal, slave_.x[i]));
+            least = std::min(least, dot(frame.normal, slave_.along ? slave_.along : slave_.normal[i]));
+        }
+        bool near = false;
+        collect(first, last, ball, [&](const FacetNodes<Master>& master, const int*, std::size_t number) {
+            if (near || frame.template apart<n, m>(slave_.x, master.x)) return;
+            double bottom = dot(frame.normal, master.x[0]);
+            for (int l = 1; l < m; ++l) bottom = std::min(bottom, dot(frame.normal, master.x[l]));
+            near = in_.is_kept(number) || !(least > 0.0) || (bottom - top) * least <= in_.near * (1.0 + 1e-9);
+        });
+        return near;
     }
 
     static double mean_gap(const Pair& pair) {
@@ -217,21 +238,29 @@ class FacetAssembly {
         }
     }
 
+    struct Everywhere {};
+
     // Adds the points of a pair for which wanted(gap, place on the slave) holds. The place is that in the plane in 3D.
     template <typename Wanted>
     void add_segments(Pair& pair, Wanted&& wanted) {
+        constexpr bool all = std::is_same_v<std::decay_t<Wanted>, Everywhere>;
         if constexpr (dim == 3)
             visit_cells(pair.geometry, [&](const auto& on_slave, const auto& on_master, const T& weight) {
-                double place[2] = {};
-                for (int i = 0; i < n; ++i)
-                    for (int a = 0; a < 2; ++a) place[a] += on_slave.N[i] * value_of(pair.geometry.slave[i][a]);
-                if (wanted(gap_at(on_slave, on_master, slave_, pair.nodes), place))
-                    pair.integrals.add(on_slave, on_master, weight, slave_, pair.nodes);
+                if constexpr (!all) {
+                    double place[2] = {};
+                    for (int i = 0; i < n; ++i)
+                        for (int a = 0; a < 2; ++a) place[a] += on_slave.N[i] * value_of(pair.geometry.slave[i][a]);
+                    if (!wanted(gap_at(on_slave, on_master, slave_, pair.nodes), place)) return;
+                }
+                pair.integrals.add(on_slave, on_master, weight, slave_, pair.nodes);
             });
         else
             visit_segment(pair.geometry, [&](const auto& point) {
-                const double xi = value_of(point.slave), eta = value_of(point.master);
-                if (wanted(gap_at(xi, eta, slave_, pair.nodes), &xi)) pair.integrals.add(point, pair.geometry, slave_);
+                if constexpr (!all) {
+                    const double xi = value_of(point.slave), eta = value_of(point.master);
+                    if (!wanted(gap_at(xi, eta, slave_, pair.nodes), &xi)) return;
+                }
+                pair.integrals.add(point, pair.geometry, slave_);
             });
     }
 
