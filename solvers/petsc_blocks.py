@@ -68,15 +68,18 @@ def quick_to_multiply(matrix: PETSc.Mat) -> PETSc.Mat:
     return matrix
 
 
-def has_entries_of(matrix: PETSc.Mat, rows: BlockRows) -> bool:
+def has_entries_of(matrix: PETSc.Mat, *parts: BlockRows) -> bool:
     """Whether an assembled matrix of the type seqaij has as many entries as full blocks."""
-    return matrix.getType() == PETSc.Mat.Type.SEQAIJ and int(matrix.getInfo()["nz_used"]) == rows.values.size
+    entries = sum(rows.values.size for rows in parts)
+    return matrix.getType() == PETSc.Mat.Type.SEQAIJ and int(matrix.getInfo()["nz_used"]) == entries
 
 
-def write_entries(matrix: PETSc.Mat, rows: BlockRows) -> None:
-    """Set the entries of a matrix with the pattern of full blocks."""
+def write_entries(matrix: PETSc.Mat, *parts: BlockRows, factor: float = 1.0) -> None:
+    """Set the entries of a matrix with the pattern of full blocks, or of several such ones on its diagonal."""
     with _entries(matrix) as entries:
-        kernels.spread_blocks(rows.start, rows.values, entries)
+        ends = np.cumsum([rows.values.size for rows in parts])
+        for rows, part in zip(parts, np.split(entries, ends[:-1]), strict=True):
+            kernels.spread_blocks(rows.start, rows.values, part, factor)
 
 
 def join_entries(matrices: Sequence[PETSc.Mat], out: PETSc.Mat) -> bool:

@@ -215,7 +215,7 @@ class Contact:
         near = [mortar.near(self.x, self.x_old, self._travel) for mortar in self._mortars]
         if not self._ties.pieces and all(len(facet_pairs) == 0 for facet_pairs, _ in near):
             return None
-        normals = find_normals(self.multipliers, self.x)
+        normals = find_normals(self.multipliers, self.x, self._near_nodes([pairs for pairs, _ in near]))
         pieces, met, work = [], bool(self._ties.pieces), np.zeros((2, self.comm.size))
         for index, (mortar, (facet_pairs, motion)) in enumerate(zip(self._mortars, near, strict=True)):
             if len(facet_pairs) == 0:
@@ -243,6 +243,18 @@ class Contact:
             tied = self._ties.slip(self.x, self._shared)
             self.slip = tied if self.slip is None or not self._sliding.mortars else self.slip.plus(tied)
         return terms
+
+    def _near_nodes(self, near: Sequence[NDArray[np.int32]]) -> list[NDArray[np.bool_] | None]:
+        """For each patch, mask of the nodes of slave facets that are near; None where a surface is tied."""
+        found: list[NDArray[np.bool_] | None] = []
+        tied = [mortar.patch for mortar, _ in self._ties.pieces]
+        for patch in self.multipliers.patches:
+            mask = np.zeros(len(patch.nodes), dtype=bool)
+            for mortar, facet_pairs in zip(self._mortars, near, strict=True):
+                if mortar.patch is patch:
+                    mask[mortar.facets[facet_pairs[:, 0]]] = True
+            found.append(None if any(patch is other for other in tied) else mask)
+        return found
 
     # ---------------------------------------------------------------------------- forces, laws and condensation
 

@@ -28,10 +28,14 @@ class SlavePatch:
     areas: Array  #: reference area around each node [m^(dim-1)], shape (n,)
     mask: Array | None  #: 0 for components that a plane of symmetry forbids, 1 for others, shape (n, dim)
 
-    def normals(self, x: Array) -> tuple[Array, Sparse]:
-        """Averaged unit normals at positions x [m] of its nodes, and their derivatives (dim * n, dim * n)."""
-        x = np.ascontiguousarray(x)
-        found, slopes = nodal_normals(x, self.facets, CELL_TYPES[self.facet_type].kernel, self.mask)
+    def normals(self, x: Array, near: NDArray[np.bool_] | None = None) -> tuple[Array, Sparse]:
+        """Averaged unit normals at positions x [m] of its nodes, and their derivatives (dim * n, dim * n).
+
+        near: mask of the nodes whose derivatives are computed, (n,); None: of all. Those of others are zero.
+        """
+        x, chosen = np.ascontiguousarray(x), None if near is None else near.astype(np.uint8)
+        kernel = CELL_TYPES[self.facet_type].kernel
+        found, slopes = nodal_normals(x, self.facets, kernel, self.mask, chosen=chosen)
         return found, sparse(slopes, (x.size, x.size))
 
     def basis(self) -> tuple[Sparse, Sparse]:

@@ -43,12 +43,17 @@ class Terms:
     dnormals: Sparse  #: shape (dim * C, dim * N)
 
 
-def find_normals(multipliers: Multipliers, x: Array) -> Normals:
-    """Normals of all patches at positions x [m] of all nodes, shape (N, dim)."""
+def find_normals(
+    multipliers: Multipliers, x: Array, near: Sequence[NDArray[np.bool_] | None] | None = None
+) -> Normals:
+    """Normals of all patches at positions x [m] of all nodes, shape (N, dim).
+
+    near: for each patch, mask of the nodes whose derivatives are computed; None: of all.
+    """
     (N, dim), C = x.shape, len(multipliers.node)
     values, slopes, of_patch = np.zeros((C, dim)), [], []
-    for patch in multipliers.patches:
-        normals, derivative = patch.normals(x[patch.nodes])
+    for patch, chosen in zip(multipliers.patches, near or [None] * len(multipliers.patches), strict=True):
+        normals, derivative = patch.normals(x[patch.nodes], chosen)
         values[patch.multipliers] = normals
         slopes.append((derivative, components(patch.multipliers, dim), components(patch.nodes, dim)))
         of_patch.append((normals, derivative))

@@ -110,7 +110,7 @@ nb::object collect(const Numbers& start, const Numbers& columns, const Vector& v
                           to_numpy(std::move(found.values), blocks, size, size));
 }
 
-void spread(const Numbers& start, const Blocks& blocks, const Result& entries) {
+void spread(const Numbers& start, const Blocks& blocks, const Result& entries, double factor) {
     require(start.size() > 0 && start.data()[0] == 0, "no compressed rows");
     for (std::size_t i = 1; i < start.size(); ++i) require(start.data()[i - 1] <= start.data()[i], "no compressed rows");
     require(static_cast<std::size_t>(start.data()[start.size() - 1]) == blocks.shape(0), "each column needs a block");
@@ -118,8 +118,8 @@ void spread(const Numbers& start, const Blocks& blocks, const Result& entries) {
     const std::size_t nodes = start.size() - 1, n = blocks.shape(1);
     require(n == blocks.shape(2) && (n == 2 || n == 3), "blocks must have 2 or 3 rows");
     nb::gil_scoped_release release;
-    if (n == 2) node_blocks::spread<2>(nodes, start.data(), blocks.data(), entries.data());
-    else node_blocks::spread<3>(nodes, start.data(), blocks.data(), entries.data());
+    if (n == 2) node_blocks::spread<2>(nodes, start.data(), blocks.data(), factor, entries.data());
+    else node_blocks::spread<3>(nodes, start.data(), blocks.data(), factor, entries.data());
 }
 
 nb::object other_rows(const Numbers& start, const Numbers& columns, const Vector& values, const Numbers& rows,
@@ -181,6 +181,6 @@ void bind_factors(nb::module_& module) {
                "new_columns"_a, "new_values"_a,
                "(values, columns, start) of a matrix in compressed rows, with increasing columns in each. The first\n"
                "`replaced` of `rows`, each once, become the new ones, which need no order; to the others these are added.");
-    module.def("spread_blocks", &spread, "start"_a, "blocks"_a, "entries"_a,
-               "Write the entries of blocks, each transposed, in the order of compressed rows.");
+    module.def("spread_blocks", &spread, "start"_a, "blocks"_a, "entries"_a, "factor"_a = 1.0,
+               "Write the entries of blocks, each transposed, times a factor in the order of compressed rows.");
 }

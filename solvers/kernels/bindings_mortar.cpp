@@ -71,12 +71,13 @@ void check_nodal(const std::string& name, const Reals& values, const Reals& x) {
 }
 
 nb::object py_nodal_normals(const Reals& x, const Facets& facets, const std::string& facet_type,
-                            const std::optional<Reals>& mask, bool derivatives) {
+                            const std::optional<Reals>& mask, bool derivatives, const std::optional<Flags>& chosen) {
     nb::object result;
     dispatch(facet_type, x.shape(1), [&](auto facet) {
         using Facet = decltype(facet);
         check_surface("surface", x, facets, Facet::nodes);
         if (mask) check_nodal("mask", *mask, x);
+        require(!chosen || chosen->shape(0) == x.shape(0), "chosen must have one entry for each node");
         const int n_nodes = static_cast<int>(x.shape(0));
         BlockRows<Facet::dim, Facet::dim> blocks;
         std::vector<double> normals;
@@ -84,7 +85,8 @@ nb::object py_nodal_normals(const Reals& x, const Facets& facets, const std::str
         {
             nb::gil_scoped_release release;
             normals = nodal_normals<Facet>(x.data(), n_nodes, facets.data(), facets.shape(0),
-                                           mask ? mask->data() : nullptr, derivatives ? &blocks : nullptr);
+                                           mask ? mask->data() : nullptr, derivatives ? &blocks : nullptr,
+                                           chosen ? chosen->data() : nullptr);
             if (derivatives) slopes = blocks.sum(n_nodes, n_nodes);
         }
         result = nb::make_tuple(to_numpy(std::move(normals), {x.shape(0), x.shape(1)}),
@@ -239,10 +241,10 @@ void bind_mortar(nb::module_& module) {
         .def_ro("dforce_dn", &MortarResult::dforce_dn, "the same with respect to the nodal normals; empty in 3D");
 
     module.def("nodal_normals", &py_nodal_normals, "x"_a, "facets"_a, "facet_type"_a, "mask"_a = nb::none(),
-               "derivatives"_a = true,
+               "derivatives"_a = true, "chosen"_a = nb::none(),
                "Averaged unit nodal normals (ns, dim) and dn/dx as (data, indices, indptr) or None.\n\n"
                "x: positions (ns, dim); facets: (k, nodes), oriented outward; mask: (ns, dim) of 0 and 1, components "
-               "to drop before normalising.");
+               "to drop before normalising; chosen: (ns,) of 0 and 1, nodes whose derivatives are wanted.");
     module.def("nodal_tangents", &py_nodal_tangents, "normals"_a,
                "Unit tangents (ns, dim - 1, dim) at unit normals (ns, dim), and dt/dn (ns, dim - 1, dim, dim).");
     module.def("basis_transformation", &py_basis_transformation, "facets"_a, "facet_type"_a, "n_nodes"_a,

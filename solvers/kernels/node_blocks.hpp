@@ -88,14 +88,14 @@ Blocks collect(std::size_t nodes, const Rows& A) {
     return found;
 }
 
-// The entries of blocks, given by columns of each, in the order of compressed rows: the inverse of `collect` for matrices
-// whose blocks are full.
+// The entries of blocks, given by columns of each, times a factor in the order of compressed rows: the inverse of `collect`
+// for matrices whose blocks are full.
 template <int n>
-void spread(std::size_t nodes, const std::int32_t* start, const double* blocks, double* entries) {
+void spread(std::size_t nodes, const std::int32_t* start, const double* blocks, double factor, double* entries) {
     for (std::size_t i = 0; i < nodes; ++i)
         for (int r = 0; r < n; ++r)
             for (std::int32_t k = start[i]; k < start[i + 1]; ++k)
-                for (int c = 0; c < n; ++c) *entries++ = blocks[static_cast<std::size_t>(k) * n * n + c * n + r];
+                for (int c = 0; c < n; ++c) *entries++ = factor * blocks[static_cast<std::size_t>(k) * n * n + c * n + r];
 }
 
 }  // namespace node_blocks

@@ -15,7 +15,7 @@
 
 namespace mortar {
 
-// The unit normal of a facet at its node j and its derivative slope[c][dim i + b] = dn_c/dx_ib.
+// The unit normal of a facet at its node j and, if wanted, its derivative slope[c][dim i + b] = dn_c/dx_ib.
 template <typename Facet>
 void facet_normal(const double (*x)[Facet::dim], int j, double* normal, double (*slope)[Facet::dim * Facet::nodes]) {
     constexpr int n = Facet::nodes, dim = Facet::dim;
@@ -29,6 +29,7 @@ void facet_normal(const double (*x)[Facet::dim], int j, double* normal, double (
         length = std::hypot(t[0], t[1]);
         normal[0] = t[1] / length;
         normal[1] = -t[0] / length;
+        if (!slope) return;
         for (int i = 0; i < n; ++i) {
             turned[0][2 * i + 1] = dN[0][i];
             turned[1][2 * i] = -dN[0][i];
@@ -40,6 +41,7 @@ void facet_normal(const double (*x)[Facet::dim], int j, double* normal, double (
         cross(u, v, normal);
         length = std::sqrt(dot(normal, normal));
         for (int c = 0; c < 3; ++c) normal[c] /= length;
+        if (!slope) return;
         for (int i = 0; i < n; ++i)
             for (int b = 0; b < 3; ++b) {  // e_b x (N,1 v - N,2 u)
                 const int c = (b + 1) % 3, d = (b + 2) % 3;
@@ -54,11 +56,12 @@ void facet_normal(const double (*x)[Facet::dim], int j, double* normal, double (
     }
 }
 
-// The normals n (nodes x dim) and, if wanted, dn/dx in blocks of dim x dim. Nodes without a facet, or whose facets
-// cancel, have normal zero.
+// The normals n (nodes x dim) and, if wanted, dn/dx in blocks of dim x dim, of the nodes that `chosen` marks or of all.
+// Nodes without a facet, or whose facets cancel, have normal zero.
 template <typename Facet>
 std::vector<double> nodal_normals(const double* x, int n_nodes, const std::int64_t* facets, std::size_t n_facets,
-                                  const double* mask, BlockRows<Facet::dim, Facet::dim>* derivative) {
+                                  const double* mask, BlockRows<Facet::dim, Facet::dim>* derivative,
+                                  const std::uint8_t* chosen = nullptr) {
     constexpr int n = Facet::nodes, dim = Facet::dim;
     std::vector<double> normals(static_cast<std::size_t>(n_nodes) * dim, 0.0), length(n_nodes, 0.0);
     double nodes[n][dim], unit[dim], slope[dim][dim * n];
@@ -69,7 +72,7 @@ std::vector<double> nodal_normals(const double* x, int n_nodes, const std::int64
     for (std::size_t f = 0; f < n_facets; ++f) {
         gather(facets + f * n);
         for (int j = 0; j < n; ++j) {
-            facet_normal<Facet>(nodes, j, unit, slope);
+            facet_normal<Facet>(nodes, j, unit, nullptr);
             for (int c = 0; c < dim; ++c) normals[facets[f * n + j] * dim + c] += unit[c];
         }
     }
@@ -90,7 +93,7 @@ std::vector<double> nodal_normals(const double* x, int n_nodes, const std::int64
         for (int i = 0; i < n; ++i) columns[i] = static_cast<int>(facets[f * n + i]);
         for (int j = 0; j < n; ++j) {
             const int node = columns[j];
-            if (length[node] == 0.0) continue;
+            if (length[node] == 0.0 || (chosen && !chosen[node])) continue;
             facet_normal<Facet>(nodes, j, unit, slope);
             const double* normal = normals.data() + static_cast<std::size_t>(node) * dim;
             double* block = derivative->add({&node, 1}, columns);

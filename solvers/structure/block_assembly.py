@@ -8,7 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from solvers import fem
-from solvers.petsc_blocks import block_rows, has_entries_of, write_entries
+from solvers.petsc_blocks import BlockRows, block_rows, has_entries_of, write_entries
 
 
 class BlockAssembly:
@@ -26,16 +26,24 @@ class BlockAssembly:
         """Overwrite the entries of a matrix of `fem.create_matrix`, without finishing it (collective)."""
         blocks = self.blocks
         if blocks is not None and (rows := block_rows(blocks)) is not None and has_entries_of(matrix, rows):
-            blocks.zeroEntries()
-            fem.assemble_matrix(blocks, self._form)
-            blocks.assemble()
-            write_entries(matrix, rows)
+            write_entries(matrix, self._filled(blocks, rows))
             return
         matrix.zeroEntries()
         fem.assemble_matrix(matrix, self._form)
         if blocks is None and matrix.getType() == PETSc.Mat.Type.SEQAIJ and matrix.getBlockSize() > 1:
             matrix.assemble()
             self.blocks = _of_blocks(matrix)
+
+    def assemble_blocks(self) -> BlockRows | None:
+        """The blocks alone, until the next assembly; None before there are any."""
+        rows = None if self.blocks is None else block_rows(self.blocks)
+        return None if rows is None else self._filled(self.blocks, rows)
+
+    def _filled(self, blocks: PETSc.Mat, rows: BlockRows) -> BlockRows:
+        blocks.zeroEntries()
+        fem.assemble_matrix(blocks, self._form)
+        blocks.assemble()
+        return rows
 
 
 def _of_blocks(matrix: PETSc.Mat) -> PETSc.Mat:

@@ -15,7 +15,7 @@ from solvers import fem
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
 from solvers.mesh import Mesh
-from solvers.petsc_blocks import quick_to_multiply
+from solvers.petsc_blocks import BlockRows, quick_to_multiply
 from solvers.structure import forms
 from solvers.structure.block_assembly import BlockAssembly
 from solvers.structure.element import Element
@@ -236,6 +236,15 @@ class Body:
         if self._spring_matrix is not None:
             matrix.axpy(1.0, self._spring_matrix.matrix, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         self.element.complete_tangent(matrix)
+
+    def tangent_blocks(self, t: float) -> BlockRows | None:
+        """The blocks of the tangent, until it is assembled again; None if it has terms besides those of the material."""
+        others = self._spring_matrix is not None or (self.pressures and not self.linear)
+        if others or self.formulation != "displacement":
+            return None
+        self._evaluate_loads(t)
+        self.element.linearise()
+        return self._tangent_assembly.assemble_blocks()
 
     def smallest_jacobian(self) -> tuple[float, str, tuple[float, ...]]:
         """(smallest det F at the cells' nodes, body name, reference position [m]) over all processes.

@@ -9,6 +9,7 @@ from petsc4py import PETSc
 
 from solvers.api import Array
 from solvers.blocks import block_diagonal
+from solvers.petsc_blocks import BlockRows, has_entries_of, write_entries
 from solvers.structure.body import Body
 from solvers.structure.instant import Moving
 from solvers.structure.time_scheme import TimeScheme
@@ -30,14 +31,28 @@ class Tangent:
 
     def assemble(self, structure: Moving, time: TimeScheme) -> PETSc.Mat:
         """The tangent without supports; the next call overwrites the matrix (collective)."""
-        self._assemble_bodies(structure.current.t)
-        self._combined = block_diagonal(self._matrices, self._combined)
         weight, added = time.force_weight, self._added(structure, time)
-        if weight != 1.0:
-            self._combined.scale(weight)
+        if self._combined is None or not self._write(self._combined, structure.current.t, weight):
+            self._assemble_bodies(structure.current.t)
+            self._combined = block_diagonal(self._matrices, self._combined)
+            if weight != 1.0:
+                self._combined.scale(weight)
         if added is not None:
             self._combined.axpy(1.0, added, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         return self._combined
+
+    def _write(self, matrix: PETSc.Mat, t: float, weight: float) -> bool:
+        """Write the weighted blocks of all bodies into the matrix, with the same entries; False if some has none."""
+        parts: list[BlockRows] = []
+        for body in self._bodies:
+            blocks = body.tangent_blocks(t)
+            if blocks is None:
+                return False
+            parts.append(blocks)
+        if not has_entries_of(matrix, *parts):
+            return False
+        write_entries(matrix, *parts, factor=weight)
+        return True
 
     def _assemble_bodies(self, t: float) -> None:
         for body, matrix in zip(self._bodies, self._matrices, strict=True):
