@@ -328,12 +328,13 @@ def solve(
     preconditioned_by: PETSc.Mat | None = None,
     *,
     reduction: float = 0.0,
+    squared: bool = False,
 ) -> None:
     """Solve matrix x = b (collective). Raises LinearSolveFailed.
 
     preconditioned_by: the matrix of an earlier solve whose preconditioner is reused; None: `matrix`. reduction: of the
-    residual that is good enough for a Krylov method; where that costs few iterations, its square, with which Newton's
-    method converges as with an exact solution.
+    residual that is good enough for a Krylov method. Where that costs few iterations, or if `squared`, it is solved to
+    the square, with which Newton's method converges as with an exact solution.
     """
     if ksp.getOptionsPrefix() == "elastic_":
         ksp.setPC(_multigrid(ksp.comm))
@@ -342,15 +343,15 @@ def solve(
     ksp.setOperators(matrix, preconditioned_by)
     tolerance = ksp.getTolerances()[0]
     if reduction > tolerance and ksp.getType() != PETSc.KSP.Type.PREONLY:
-        ksp.setTolerances(rtol=reduction)
+        exact = max(tolerance, reduction**2)
+        ksp.setTolerances(rtol=exact if squared else reduction)
         unlocked.solve(ksp, b, x)
-        ksp.setTolerances(rtol=tolerance)
-        if ksp.getConvergedReason() > 0 and ksp.getIterationNumber() <= FEW:
-            ksp.setTolerances(rtol=max(tolerance, reduction**2))
+        if not squared and ksp.getConvergedReason() > 0 and ksp.getIterationNumber() <= FEW:
+            ksp.setTolerances(rtol=exact)
             ksp.setInitialGuessNonzero(True)
             unlocked.solve(ksp, b, x)
             ksp.setInitialGuessNonzero(False)
-            ksp.setTolerances(rtol=tolerance)
+        ksp.setTolerances(rtol=tolerance)
     else:
         unlocked.solve(ksp, b, x)
     reason = ksp.getConvergedReason()

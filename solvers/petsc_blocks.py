@@ -130,9 +130,7 @@ def _rows(handle: ctypes.c_void_p, size: int) -> BlockRows | None:
     return found
 
 
-def _row_pointers(
-    handle: ctypes.c_void_p, *, blocks: bool
-) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
+def _row_pointers(handle: ctypes.c_void_p, *, blocks: bool) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
     """Views of (start, columns) of a matrix on one process; blocks: count rows and columns of blocks."""
     library, count, done = _library(), ctypes.c_int32(), ctypes.c_int()
     start, columns = ctypes.POINTER(ctypes.c_int32)(), ctypes.POINTER(ctypes.c_int32)()

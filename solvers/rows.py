@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from solvers.api import Array
 from solvers.kernels import other_rows
-from solvers.petsc_blocks import entry_rows
+from solvers.petsc_blocks import entry_rows, quick_to_multiply
 from solvers.sparse import Sparse, sparse, sparse_from_entries, stack
 
 
@@ -133,7 +133,7 @@ def distributed(own: Sparse, sizes, comm) -> PETSc.Mat:
     if comm.size == 1:
         matrix = PETSc.Mat().createAIJWithArrays(sizes, (indptr, indices, own.data), comm=comm)
         matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)  # a held dof may get a diagonal entry
-        return matrix
+        return quick_to_multiply(matrix)
     return PETSc.Mat().createAIJ(sizes, csr=(indptr, indices, own.data), comm=comm)
 
 

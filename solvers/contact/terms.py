@@ -43,9 +43,7 @@ class Terms:
     dnormals: Sparse  #: shape (dim * C, dim * N)
 
 
-def find_normals(
-    multipliers: Multipliers, x: Array, near: Sequence[NDArray[np.bool_] | None] | None = None
-) -> Normals:
+def find_normals(multipliers: Multipliers, x: Array, near: Sequence[NDArray[np.bool_] | None] | None = None) -> Normals:
     """Normals of all patches at positions x [m] of all nodes, shape (N, dim).
 
     near: for each patch, mask of the nodes whose derivatives are computed; None: of all.

@@ -238,7 +238,7 @@ class Body:
         self.element.complete_tangent(matrix)
 
     def tangent_blocks(self, t: float) -> BlockRows | None:
-        """The blocks of the tangent, until it is assembled again; None if it has terms besides those of the material."""
+        """The blocks of the tangent, until it is assembled again; None if it has terms besides the material's."""
         others = self._spring_matrix is not None or (self.pressures and not self.linear)
         if others or self.formulation != "displacement":
             return None

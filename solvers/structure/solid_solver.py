@@ -94,9 +94,9 @@ class SolidSolver:
         while True:
             if self.sequence[self.position] == "iterative":
                 attach_modes(matrix)
-            solver, to = self.current(symmetric=symmetric), reduction if self._last or self._tried else reduction**2
+            solver, trial = self.current(symmetric=symmetric), not (self._last or self._tried)
             try:
-                linear.solve(solver, matrix, b, x, reduction=to)
+                linear.solve(solver, matrix, b, x, reduction=reduction, squared=trial)
             except linear.LinearSolveFailed:
                 if self._last:
                     raise

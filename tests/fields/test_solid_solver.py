@@ -69,17 +69,17 @@ def test_first_system_of_a_step_is_solved_to_the_square(monkeypatch):
     seen = []
     solve = solid_solver.linear.solve
 
-    def noted(*arguments, reduction):
-        seen.append(reduction)
-        solve(*arguments, reduction=reduction)
+    def noted(*arguments, reduction, squared):
+        seen.append((reduction, squared))
+        solve(*arguments, reduction=reduction, squared=squared)
 
     monkeypatch.setattr(solid_solver.linear, "solve", noted)
     structure, _, info = pressed("auto", size=(2.0, 1.1, 1.0), cells=(4, 3, 2))
-    assert seen[:2] == [1e-6, 1e-3]
+    assert seen[:2] == [(1e-3, True), (1e-3, False)]
     assert len(seen) == info.iterations
     structure.begin_step(1.0, 1.0)
     structure.solve()
-    assert seen[info.iterations] == 1e-6
+    assert [squared for _, squared in seen[info.iterations :]].index(True) == 0
 
 
 def test_tolerance_is_a_part_of_newtons():

@@ -7,6 +7,7 @@ from scipy import sparse
 
 from solvers import kernels, linear
 from solvers.incomplete import Incomplete
+from solvers.petsc_blocks import entry_rows
 
 PETSC_SELF = PETSc.COMM_SELF
 
@@ -246,3 +247,69 @@ def test_arrays_of_other_sizes():
         factors.update(np.zeros((1, 4, 4)))
     with pytest.raises(ValueError, match="a number for each unknown"):
         factors.solve(np.zeros(4), np.zeros(8))
+
+
+def test_blocks_of_full_and_other_rows():
+    """Most rows of contact consist of full blocks, those of nodes in contact do not."""
+    rng = np.random.default_rng(7)
+    pattern = sparse.kron(sparse.random(8, 8, 0.3, random_state=rng) + sparse.eye(8), np.ones((3, 3)))
+    A = sparse.lil_matrix(pattern.multiply(rng.uniform(1.0, 2.0, (24, 24))))
+    A[4, 20], A[9:12, 9:12] = 3.0, 0.0  # an entry alone; a node without a block on the diagonal
+    A = A.tocsr()
+    A.eliminate_zeros()
+    A.sort_indices()
+    start, columns, blocks = kernels.node_blocks(A.indptr, A.indices, A.data, 3)
+    assert np.array_equal(
+        sparse.bsr_matrix((blocks.transpose(0, 2, 1), columns, start), shape=(24, 24)).toarray(), A.toarray()
+    )
+    assert all((np.diff(row) > 0).all() for row in np.split(columns, start[1:-1]))
+    assert all(i in columns[start[i] : start[i + 1]] for i in range(8))
+
+
+def test_other_rows():
+    """Rows are replaced, and added to, by rows whose columns have any order; the sum is that of arrays."""
+    rng = np.random.default_rng(3)
+    A = sparse.random(40, 40, 0.2, format="csr", random_state=rng)
+    new = sparse.random(6, 40, 0.3, format="csr", random_state=rng)
+    A.sort_indices()
+    for i in range(6):
+        own = slice(new.indptr[i], new.indptr[i + 1])
+        order = rng.permutation(own.stop - own.start)
+        new.indices[own], new.data[own] = new.indices[own][order], new.data[own][order]
+    rows = np.array([31, 0, 7, 39, 12, 8], dtype=np.int32)
+    before = A.copy()
+    values, columns, start = kernels.other_rows(A.indptr, A.indices, A.data, rows, 2, new.indptr, new.indices, new.data)
+    expected = A.toarray()
+    expected[rows[:2]] = 0.0
+    expected[rows] += new.toarray()
+    assert np.array_equal(sparse.csr_matrix((values, columns, start), shape=A.shape).toarray(), expected)
+    assert all((np.diff(row) > 0).all() for row in np.split(columns, start[1:-1]))
+    assert (A != before).nnz == 0
+
+
+@pytest.mark.parametrize(
+    ("rows", "replaced", "message"),
+    [([1, 40], 1, "no such row"), ([1, -1], 1, "no such row"), ([1, 2], 3, "more rows"), ([1], 1, "needs its entries")],
+)
+def test_other_rows_that_do_not_fit(rows, replaced, message):
+    A = sparse.random(40, 40, 0.2, format="csr", random_state=np.random.default_rng(3))
+    new = A[:2]
+    with pytest.raises(ValueError, match=message):
+        kernels.other_rows(
+            A.indptr, A.indices, A.data, np.array(rows, dtype=np.int32), replaced, new.indptr, new.indices, new.data
+        )
+
+
+def test_entries_of_a_matrix_are_seen_not_copied():
+    A = sparse.random(30, 30, 0.2, format="csr", random_state=np.random.default_rng(3))
+    A.sort_indices()
+    matrix = PETSc.Mat().createAIJ((30, 30), csr=(A.indptr, A.indices, A.data), comm=PETSC_SELF)
+    start, columns, values = entry_rows(matrix)
+    assert all(map(np.array_equal, (start, columns, values), (A.indptr, A.indices, A.data)))
+    before = matrix.stateGet()
+    entry_rows(matrix)
+    assert matrix.stateGet() == before  # else a solver would compute its factors again
+    matrix.scale(2.0)
+    assert np.array_equal(values, 2.0 * A.data)
+    dense = matrix.convert("dense")
+    assert np.array_equal(entry_rows(dense)[2], dense.getValuesCSR()[2])

@@ -361,3 +361,46 @@ def test_bad_input_is_refused_with_the_reason():
         with pytest.raises(ValueError, match=message):
             mortar(**(good | change))
     assert NODES["quad4"] == fs.shape[1]
+
+
+@pytest.mark.parametrize(
+    ("slave", "master"), [("quad4", "tri3"), ("tri3", "quad4"), ("quad9", "tri6"), ("line2", "line2")]
+)
+def test_only_slave_facets_near_the_master_take_part(slave, master):
+    """Those with a mean gap to some facet up to `near`; gaps and normals vary from facet to facet."""
+    rng = np.random.default_rng(12)
+    xs, fs = jittered(rng, slave, 4, 0.15)
+    xm, fm = jittered(rng, master, 5, 0.15, turned=True)
+    xm[:, -1] += 0.1 + 0.8 * xm[:, 0]
+    normals, _ = nodal_normals(xs, fs, slave)
+    normals += rng.uniform(-0.3, 0.3, normals.shape)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    gaps = {}
+    for pair in all_pairs(fs, fm):
+        alone = mortar(xs, fs, slave, xm, fm, master, normals, pair[None], derivatives=False)
+        if alone.used[0]:
+            gaps[tuple(pair)] = alone.gap.sum() / alone.D.sum()
+    least = np.sort(
+        [min(gap for pair, gap in gaps.items() if pair[0] == facet) for facet in {pair[0] for pair in gaps}]
+    )
+    limits = 0.5 * (least[1:] + least[:-1])
+    assert len(limits) > 2
+    for near in limits:
+        expected = {facet for (facet, _), gap in gaps.items() if gap <= near}
+        result = mortar(xs, fs, slave, xm, fm, master, normals, all_pairs(fs, fm), near=near)
+        found = set(all_pairs(fs, fm)[result.used.astype(bool), 0].tolist())
+        assert found == expected
+
+
+def test_derivatives_of_chosen_normals():
+    """Those of the other nodes are left out, and all normals are the same."""
+    rng = np.random.default_rng(4)
+    x, facets = jittered(rng, "quad4", 3, 0.1)
+    chosen = rng.integers(0, 2, len(x)).astype(np.uint8)
+    everywhere, there = (nodal_normals(x, facets, "quad4", chosen=which) for which in (None, chosen))
+    assert np.array_equal(there[0], everywhere[0])
+    whole = dense(everywhere[1], x.size, x.size)
+    whole[np.repeat(chosen == 0, 3)] = 0.0
+    assert np.array_equal(dense(there[1], x.size, x.size), whole)
+    with pytest.raises(ValueError, match="chosen must have"):
+        nodal_normals(x, facets, "quad4", chosen=chosen[1:])
