@@ -118,7 +118,7 @@ def build(mesh: Mesh) -> tuple[Structure, Contact]:
     corners = BLOCK * np.array([[-0.1, -0.1, 0], [1.1, -0.1, 0], [1.1, 1.1, 0], [-0.1, 1.1, 0]])
     plane = Surface("plane", corners, np.array([[0, 1, 2, 3]]), "quad", None)
     contact = Contact([Pair(slave, plane)], comm=MPI.COMM_SELF)
-    solver = SolverSettings(Tolerance(residual=1e-10), linear="ilu")
+    solver = SolverSettings(Tolerance(residual=1e-10))
     return Structure([body], settings=solver, contact=contact), contact
 
 
