@@ -25,8 +25,8 @@ class Linear(Section):
 
     method: Literal["auto", "direct", "iterative", "ilu"] = setting(
         "auto",
-        "direct, iterative (multigrid), ilu (incomplete factors); auto: direct in 2D and for small systems, with contact "
-        "in 3D ilu as long as it takes few iterations",
+        "direct, iterative (multigrid), ilu (incomplete factors); auto: direct in 2D and for small systems, with "
+        "contact in 3D ilu as long as it takes few iterations",
     )
     tolerance: Positive = setting(1e-8, "residual of iterative solvers, relative to the first", unit="1")
 
