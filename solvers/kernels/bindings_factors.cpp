@@ -123,10 +123,12 @@ void spread(const Numbers& start, const Blocks& blocks, const Result& entries, d
 }
 
 nb::object other_rows(const Numbers& start, const Numbers& columns, const Vector& values, const Numbers& rows,
-                      std::size_t replaced, const Numbers& new_start, const Numbers& new_columns, const Vector& new_values) {
+                      std::size_t replaced, const Numbers& new_start, const Numbers& new_columns,
+                      const Vector& new_values) {
     const std::size_t count = start.size() - 1;
     require(start.size() > 0 && start.data()[0] == 0, "no compressed rows");
-    require(static_cast<std::size_t>(start.data()[count]) <= std::min(columns.size(), values.size()), "no compressed rows");
+    require(static_cast<std::size_t>(start.data()[count]) <= std::min(columns.size(), values.size()),
+            "no compressed rows");
     require(new_start.size() == rows.size() + 1 && new_start.data()[0] == 0, "each row needs its entries");
     require(static_cast<std::size_t>(new_start.data()[rows.size()]) <= std::min(new_columns.size(), new_values.size()),
             "each row needs its entries");
@@ -180,7 +182,8 @@ void bind_factors(nb::module_& module) {
     module.def("other_rows", &other_rows, "start"_a, "columns"_a, "values"_a, "rows"_a, "replaced"_a, "new_start"_a,
                "new_columns"_a, "new_values"_a,
                "(values, columns, start) of a matrix in compressed rows, with increasing columns in each. The first\n"
-               "`replaced` of `rows`, each once, become the new ones, which need no order; to the others these are added.");
+               "`replaced` of `rows`, each once, become the new ones, whose columns need no order; to the others these\n"
+               "are added.");
     module.def("spread_blocks", &spread, "start"_a, "blocks"_a, "entries"_a, "factor"_a = 1.0,
                "Write the entries of blocks, each transposed, times a factor in the order of compressed rows.");
 }

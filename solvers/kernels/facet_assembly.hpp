@@ -185,10 +185,11 @@ class FacetAssembly {
         }
     }
 
-    // False only if `is_near` would be, for linear facets in 3D, before anything is integrated. The points of a pair lie on
-    // a line along the normal of the plane, at a distance of at least that between the nodes of both facets. Nodal normals
-    // have lengths of 1, and their means are shorter.
-    bool may_be_near(std::size_t first, std::size_t last, const FacetBall<Slave>& ball, const PlaneFrame<Slave>& frame) const {
+    // False only if `is_near` would be, for linear facets in 3D, before anything is integrated. The points of a pair lie
+    // on a line along the normal of the plane, at a distance of at least that between the nodes of both facets. Nodal
+    // normals have lengths of 1, and their means are shorter.
+    bool may_be_near(std::size_t first, std::size_t last, const FacetBall<Slave>& ball,
+                     const PlaneFrame<Slave>& frame) const {
         if constexpr (Slave::order > 1 || Master::order > 1) return true;
         double top = dot(frame.normal, slave_.x[0]), least = 1.0;
         for (int i = 0; i < n; ++i) {

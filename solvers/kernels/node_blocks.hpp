@@ -27,7 +27,8 @@ bool is_full(std::size_t node, const Rows& A) {
     if (size % n != 0) return false;
     for (int r = 1; r < n; ++r) {
         const std::int32_t other = A.start[node * n + r];
-        if (A.start[node * n + r + 1] - other != size || !std::equal(columns, columns + size, A.columns + other)) return false;
+        if (A.start[node * n + r + 1] - other != size) return false;
+        if (!std::equal(columns, columns + size, A.columns + other)) return false;
     }
     bool diagonal = false, full = true;
     for (std::int32_t k = 0; k < size; k += n) {
@@ -50,7 +51,8 @@ Blocks collect(std::size_t nodes, const Rows& A) {
     for (std::size_t i = 0; i < nodes; ++i) {
         full[i] = is_full<n>(i, A);
         if (full[i]) {
-            for (std::int32_t k = A.start[i * n]; k < A.start[i * n + 1]; k += n) found.columns.push_back(A.columns[k] / n);
+            for (std::int32_t k = A.start[i * n]; k < A.start[i * n + 1]; k += n)
+                found.columns.push_back(A.columns[k] / n);
         } else {
             const auto begin = found.columns.size();
             place[i] = 0;
@@ -88,14 +90,15 @@ Blocks collect(std::size_t nodes, const Rows& A) {
     return found;
 }
 
-// The entries of blocks, given by columns of each, times a factor in the order of compressed rows: the inverse of `collect`
-// for matrices whose blocks are full.
+// The entries of blocks, given by columns of each, times a factor in the order of compressed rows: the inverse of
+// `collect` for matrices whose blocks are full.
 template <int n>
 void spread(std::size_t nodes, const std::int32_t* start, const double* blocks, double factor, double* entries) {
     for (std::size_t i = 0; i < nodes; ++i)
         for (int r = 0; r < n; ++r)
             for (std::int32_t k = start[i]; k < start[i + 1]; ++k)
-                for (int c = 0; c < n; ++c) *entries++ = factor * blocks[static_cast<std::size_t>(k) * n * n + c * n + r];
+                for (int c = 0; c < n; ++c)
+                    *entries++ = factor * blocks[static_cast<std::size_t>(k) * n * n + c * n + r];
 }
 
 }  // namespace node_blocks

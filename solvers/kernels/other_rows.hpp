@@ -45,9 +45,11 @@ inline Matrix change(std::size_t count, const Rows& before, const std::int32_t* 
             end += size;
         } else {
             row.clear();
-            for (std::int32_t e = after.start[k]; e < after.start[k + 1]; ++e) row.emplace_back(after.columns[e], after.values[e]);
-            if (static_cast<std::size_t>(k) >= replaced)
-                for (std::int32_t e = begin; e < before.start[i + 1]; ++e) row.emplace_back(before.columns[e], before.values[e]);
+            const auto add = [&row](const Rows& from, std::int32_t first, std::int32_t last) {
+                for (std::int32_t e = first; e < last; ++e) row.emplace_back(from.columns[e], from.values[e]);
+            };
+            add(after, after.start[k], after.start[k + 1]);
+            if (static_cast<std::size_t>(k) >= replaced) add(before, begin, before.start[i + 1]);
             // stable: the sum of two entries does not depend on the library
             std::stable_sort(row.begin(), row.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
             const std::size_t first = end;
