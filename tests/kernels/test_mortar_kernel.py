@@ -404,3 +404,14 @@ def test_derivatives_of_chosen_normals():
     assert np.array_equal(dense(there[1], x.size, x.size), whole)
     with pytest.raises(ValueError, match="chosen must have"):
         nodal_normals(x, facets, "quad4", chosen=chosen[1:])
+
+
+@pytest.mark.parametrize("facet_type", TYPES_3D)
+def test_near_is_measured_along_the_normals(facet_type):
+    """A plane at a height h over another one with inclined normals n: the gap is h n_z everywhere."""
+    (xs, fs), (xm, fm) = patch(facet_type, 2), patch(facet_type, 3, turned=True)
+    xs, xm = flattened(xs), flattened(xm) + np.array([0.0, 0.0, 0.5])
+    normals = np.tile([0.0, 0.6, 0.8], (len(xs), 1))
+    for near, all_of_them in ((0.5 * 0.8 - 1e-6, False), (0.5 * 0.8 + 1e-6, True)):
+        result = mortar(xs, fs, facet_type, xm, fm, facet_type, normals, all_pairs(fs, fm), near=near)
+        assert (result.area > 0.0).all() == (result.area > 0.0).any() == all_of_them
