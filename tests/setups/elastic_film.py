@@ -4,9 +4,13 @@ Davis, Serayssol and Hinch (J. Fluid Mech. 163 (1986) 479) with the layer of rou
 
     dh/dt = div((h^3 + R^3) / (12 mu) grad p),  h = x + r^2 / (2 a) + w,  0 <= h, 0 <= P, h P = 0,
     w(r) = int 4 s K(m) / (pi E* (r + s)) (p + P)(s) ds,  m = 4 r s / (r + s)^2,
-    M dv/dt = int p + P - 6 pi mu a (Brenner's factor - a / x) v,  dx/dt = v,  M: mass of the ball and added mass.
+    M dv/dt + M' v^2 / 2 = int p + P - 6 pi mu a (Brenner's factor - a / x) v - B,  dx/dt = v,
+    B = 6 a^2 (pi rho mu)^(1/2) c int dv/ds / (t - s)^(1/2) ds.
 
-Inertia of the fluid counts as added mass only; there is no wake and no boundary layer.
+M(x): mass of the ball and added mass beside a wall (Lamb, Hydrodynamics, sections 98 and 138), both on request.
+B: history force (Basset) of boundary layers thinner than the ball. By potential flow it is proportional to int of the
+slip^2 over the walls: c = 1 far from the wall, and more beside it (`slip_at_walls`). There is no wake. The film itself
+has no inertia.
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from lubrication import sphere_drag
 from numpy.typing import NDArray
+from scipy.integrate import trapezoid
 from scipy.special import ellipk
 
 Array = NDArray[np.float64]
@@ -30,7 +35,8 @@ class Impact:
     modulus: float = 5e5 / (1 - 0.3**2)  #: E* = E / (1 - nu^2)
     roughness: float = 1e-3  #: R
     start: float = 0.05  #: gap at the start, where both velocities are read
-    added_mass: float = 0.0  #: over the mass of the displaced fluid
+    inertia: bool = False  #: added mass
+    history: float = 0.0  #: c
 
 
 def lost(start: float, end: float, roughness: float = 0.0) -> float:
@@ -44,6 +50,46 @@ def lost(start: float, end: float, roughness: float = 0.0) -> float:
         return float(np.log(start / end))
     assert end == 0.0
     return float(np.log1p((start / roughness) ** 3) / 3.0 + 1.5)
+
+
+def images(gap: float, a: float = 0.5) -> Array:
+    """Dipoles in a ball that moves towards a wall in potential flow: strength over the first, distance from the centre.
+
+    Each one's mirror image behind the wall, at the distance d, has an image of (a / d)^3 times its strength at a^2 / d.
+    """
+    strength, below, found = 1.0, 0.0, []
+    while strength > 1e-9:
+        found.append((strength, below))
+        d = 2.0 * (a + gap) - below
+        strength, below = strength * (a / d) ** 3, a * a / d
+    return np.array(found)
+
+
+def added_mass(gap: float) -> float:
+    """Of a ball that moves towards a wall, over the mass of the displaced fluid: 1/2 far away, 0.803 at contact."""
+    return float(0.5 * (3.0 * images(gap)[:, 0].sum() - 2.0))
+
+
+def slip_at_walls(gap: float, film: float = 0.0, a: float = 0.5) -> float:
+    """int of slip^2 over the ball and the wall in potential flow, over 6 pi a^2 v^2; without the film r < `film`."""
+
+    def flow(r: Array, z: Array) -> Array:
+        total = np.zeros((2, len(r)))
+        for strength, below in images(gap, a):
+            for place, sign in ((a + gap - below, 1.0), (below - a - gap, -1.0)):
+                y, far = z - place, r**2 + (z - place) ** 2
+                part = np.array([-3.0 * y * r / far**2.5, far**-1.5 - 3.0 * y**2 / far**2.5])
+                total += sign * strength * a**3 / 2.0 * part
+        return total
+
+    angle = np.linspace(1e-4, np.pi - 1e-4, 4001)
+    r, n = a * np.sin(angle), np.array([np.sin(angle), -np.cos(angle)])
+    relative = flow(r, a + gap + a * n[1]) + np.array([[0.0], [1.0]])
+    slip = (relative**2).sum(axis=0) - (relative * n).sum(axis=0) ** 2
+    ball = trapezoid(slip * 2.0 * np.pi * r * ((r > film) | (n[1] > 0.0)), a * angle)
+    r = np.geomspace(max(film, 1e-4), 20.0, 4001)
+    wall = trapezoid(flow(r, 0.0 * r)[0] ** 2 * 2.0 * np.pi * r, r)
+    return float((ball + wall) / (6.0 * np.pi * a**2))
 
 
 def rings(count: int = 100, end: float = 6.0, fine: float = 0.03) -> Array:
@@ -71,7 +117,7 @@ def rebound(ball: Impact, dt: float = 2.5e-4, count: int = 100, end: float = 1.0
 
     Motion by the trapezoidal rule, the film by backward Euler; Newton's method with active sets in each step.
     """
-    a, M = 0.5, np.pi / 6 * (ball.density + ball.added_mass)
+    a, displaced = 0.5, np.pi / 6
     mu, R = ball.density / (9 * ball.stokes), ball.roughness
     edges = rings(count)
     r, areas = (edges[1:] + edges[:-1]) / 2, np.pi * np.diff(edges**2)
@@ -79,11 +125,21 @@ def rebound(ball: Impact, dt: float = 2.5e-4, count: int = 100, end: float = 1.0
     widths = 2 * np.pi * edges[1:-1] / (12 * mu * np.diff(r))
     gaps = np.geomspace(1e-4, 0.2, 60)
     outer = 6 * np.pi * mu * a * np.array([sphere_drag(x / a) - a / x for x in gaps])
+    masses = displaced * np.array([ball.density + (added_mass(x) if ball.inertia else 0.0) for x in gaps])
+    basset, jumps = 6 * a**2 * np.sqrt(np.pi * mu) * ball.history, [0.0]
     p, P, x, v, force, t = np.zeros(n), np.zeros(n), ball.start, -1.0, 0.0, 0.0
+    if ball.inertia:
+        v *= displaced * ball.density / float(np.interp(x, gaps, masses))
+    jumps[0] = v
     h, steps = x + r**2 / (2 * a), [(0.0, x, v)]
     rim = np.pi * edges[-1] * h[-1] ** 3 / (6 * mu * (edges[-1] - r[-1]))  # p = 0 there
     while t < end and (v <= 0.0 or x < ball.start) and not (v < 0.0 < max(step[2] for step in steps)):
         before, x0, v0 = h, x, v
+        M, age = float(np.interp(x, gaps, masses)), np.arange(len(jumps), 0.0, -1.0)
+        # jumps of the steps before, their kernel averaged over this one
+        outside = basset * 2.0 / np.sqrt(dt) * float(np.array(jumps) @ (np.sqrt(age) - np.sqrt(age - 1.0)))
+        if ball.inertia:
+            outside += float(np.diff(np.interp([x - 1e-4, x + 1e-4], gaps, masses))[0]) / 2e-4 * v**2 / 2.0
         for iteration in range(60):
             h = x + r**2 / (2 * a) + A @ (p + P)
             middle = np.maximum((h[1:] + h[:-1]) / 2, 0.0)
@@ -99,7 +155,7 @@ def rebound(ball: Impact, dt: float = 2.5e-4, count: int = 100, end: float = 1.0
             closed = P > c * h
             of_film = areas * (h - before) / dt + L @ p
             of_contact = np.where(closed, -c * h, -P)
-            of_motion = M * (v - v0) / dt - (areas @ (p + P) + force) / 2 + D * (v + v0) / 2
+            of_motion = M * (v - v0) / dt - (areas @ (p + P) + force) / 2 + D * (v + v0) / 2 + outside
             by_h = np.diag(areas / dt) + S
             J = np.zeros((2 * n + 2, 2 * n + 2))
             J[:n, :n], J[:n, n : 2 * n], J[:n, 2 * n] = by_h @ A + L, by_h @ A, by_h.sum(axis=1)
@@ -117,10 +173,13 @@ def rebound(ball: Impact, dt: float = 2.5e-4, count: int = 100, end: float = 1.0
             raise ArithmeticError(f"no convergence at {t:g}")
         h, force, t = x + r**2 / (2 * a) + A @ (p + P), float(areas @ (p + P)), t + dt
         steps.append((t, x, v))
+        jumps.append(v - v0)
     return np.array(steps)
 
 
-def restitution(ball: Impact, **settings: float) -> float:
-    """Velocity back at the start over that before; 0 if the ball does not come back."""
+def restitution(ball: Impact, read: float = 0.05, **settings: float) -> float:
+    """Velocity at a gap after contact over that before; 0 if the ball does not come back to it."""
     x, v = rebound(ball, **settings)[:, 1:].T  # type: ignore[arg-type]
-    return float(np.interp(ball.start, x[-2:], v[-2:])) if x[-1] >= ball.start and v[-1] > 0 else 0.0
+    lowest = int(x.argmin())
+    before = float(np.interp(-read, -x[: lowest + 1], v[: lowest + 1]))
+    return -float(np.interp(read, x[lowest:], v[lowest:], right=0.0)) / before
