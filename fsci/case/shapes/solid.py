@@ -282,8 +282,9 @@ class Sphere(SolidBuiltIn):
 class Leaflet(SolidBuiltIn):
     """Leaflet of a valve in a tube about the z axis; surfaces inner, lips, outer, bottom, top, start, end.
 
-    Lips are the upright part of the inner surface, whole rows of cells. Its bottom, start and end are at the wall, its middle is on the x axis. The lips are half of the gap away from the
-    straight sides of its sector at the axis, nothing at the wall.
+    Lips are the upright part of the inner side, whole rows of cells. Bottom, start and end are at the wall, the middle
+    is on the x axis. The lips are half of the gap away from the straight sides of the sector at the axis, nothing at
+    the wall.
     """
 
     sides = ("inner", "lips", "outer", "bottom", "top", "start", "end")

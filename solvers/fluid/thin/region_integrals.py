@@ -64,7 +64,7 @@ def integral_from_0(points: Array, x: Array) -> Array:
     """int_0^x l_a of the Lagrange polynomials on some points, along one more axis."""
     powers = np.arange(len(points))
     coefficients = np.linalg.inv(points[:, None] ** powers) / (powers + 1)[:, None]
-    return np.cumprod(np.repeat(x[..., None], len(points), axis=-1), axis=-1) @ coefficients
+    return np.asarray(np.cumprod(np.repeat(x[..., None], len(points), axis=-1), axis=-1) @ coefficients)
 
 
 def _added(values: Array, owner: Indices, count: int) -> Array:
