@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,10 +31,13 @@ def leaflet(
     Below they go over into a pouch, a parabola from the lips down to the wall. Its edge at the wall is half of an
     ellipse, up to `post` below the lips, on a cylinder of `radius + thickness`.
 
-    `cells` counts them along the wall (even), through the thickness, and up. Surfaces inner (towards the inflow, and
-    towards the other leaflets at the lips), outer, bottom (at the wall), top, start and end (upright, at the wall).
+    `cells` counts them along the wall (even), through the thickness, and up, at least two: the lips are whole rows of
+    them. Surfaces inner (of the pouch, towards the inflow), lips (towards those of the other leaflets), outer, bottom
+    (at the wall), top, start and end (upright, at the wall).
     """
     around, through, up = cells
+    if up < 2:
+        raise ValueError(f"the number of cells up must be at least 2, got {up}")
     if around % 2:
         raise ValueError(f"the number of cells along the wall must be even, got {around}")
     if not lip + post < height:
@@ -46,6 +50,10 @@ def leaflet(
         lattice.line(up, order, ("bottom", "top")),
     )
 
+    rows = min(max(1, round(up * lip / height)), up - 1)  # of the lips
+    edge = 1 - rows / up  # the part of t below the lips
+    upright = np.flatnonzero(nodes.points[:, 2] > edge - 0.25 / (order * up))
+
     def place(depth: lattice.Array, s: lattice.Array, t: lattice.Array) -> list[lattice.Array]:
         side, share = np.sign(2 * s - 1), np.abs(2 * s - 1)
         x, y = _lips(share, thickness * depth + gap / 2 * (1 - share**2), radius, half)
@@ -56,7 +64,6 @@ def leaflet(
         out = thickness * (depth - 0.5) * (1 - share)
         at_wall = radius + thickness + out * np.sin(slope)
         wall = at_wall * np.cos(turn), at_wall * np.sin(turn), foot + out * np.cos(slope)
-        edge = (height - lip) / height  # the part of t below the lips
         p = np.minimum(t / edge, 1)
         middle = (foot + height - lip) / 2
         return [
@@ -69,7 +76,10 @@ def leaflet(
             ),
         ]
 
-    return lattice.mesh(nodes.mapped(place), cell)
+    whole = lattice.mesh(nodes.mapped(place), cell)
+    inner = whole.surfaces["inner"]
+    of_lips = np.isin(inner, upright).all(axis=1)
+    return replace(whole, surfaces=whole.surfaces | {"inner": inner[~of_lips], "lips": inner[of_lips]})
 
 
 def _lips(share: lattice.Array, distance: lattice.Array, radius: float, half: float) -> tuple[lattice.Array, ...]:

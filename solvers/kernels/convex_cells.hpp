@@ -79,6 +79,15 @@ inline Shape clipped(const Shape& shape, const Plane& plane, double sign) {
   return kept;
 }
 
+// Replaces a polygon by its part on one side of a plane. Returns whether there is one.
+inline bool clip(Shape& shape, const Plane& plane, double sign) {
+  std::size_t outside = 0;
+  for (const auto& x : shape) outside += sign * offset(plane, x) < 0.0;
+  if (outside == shape.size()) return false;
+  if (outside > 0) shape = clipped(shape, plane, sign);  // most polygons are on one side
+  return shape.size() >= 3;
+}
+
 inline Shape reversed(const Shape& shape) { return {shape.rbegin(), shape.rend()}; }
 
 // Between two parts, or at the boundary of the cell.
@@ -136,8 +145,7 @@ private:
     for (const int f : faces_of[part]) {
       const int plane = faces[f].plane;
       if (plane == number || (plane < 6 && lies_in(left, planes_[plane]))) return false;
-      left = clipped(left, planes_[plane], faces[f].below == part ? -1.0 : 1.0);
-      if (left.size() < 3) return false;
+      if (!clip(left, planes_[plane], faces[f].below == part ? -1.0 : 1.0)) return false;
     }
     return area(left) > no_area;
   }
@@ -217,13 +225,14 @@ private:
   // New corners where edges cross a plane, for all faces at these edges.
   void divide_edges(const std::vector<double>& d) {
     std::map<std::pair<int, int>, int> middle;
-    const std::size_t count = d.size();
     for (auto& face : faces) {
+      const auto [low, high] = std::minmax_element(face.loop.begin(), face.loop.end(), [&](int a, int b) { return d[a] < d[b]; });
+      if (!(d[*low] < 0.0 && d[*high] > 0.0)) continue;  // most faces are elsewhere
       std::vector<int> loop;
       for (std::size_t k = 0; k < face.loop.size(); ++k) {
         const int a = face.loop[k], b = face.loop[(k + 1) % face.loop.size()];
         loop.push_back(a);
-        if (static_cast<std::size_t>(std::max(a, b)) >= count || d[a] * d[b] >= 0.0) continue;
+        if (d[a] * d[b] >= 0.0) continue;
         const int below = d[a] < 0.0 ? a : b, above = a + b - below;
         const auto [at, is_new] = middle.try_emplace({below, above}, static_cast<int>(points_.size()));
         if (is_new) points_.push_back(between(points_[below], points_[above], d[below], d[above]));

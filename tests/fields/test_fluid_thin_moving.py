@@ -15,7 +15,7 @@ from solvers.fluid.background.grid import uniform
 from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.cutting.cut import off_boundary
-from solvers.fluid.thin.sheet_transfer import along_surface, transfer
+from solvers.fluid.thin.sheet_transfer import along_surface, sides_of, transfer
 from solvers.fluid.thin.sheets import find_sheets
 from solvers.fluid.thin.thin_bodies import THICK_IN_CONTACT, ThinBodies, may_be_thin
 
@@ -129,6 +129,11 @@ def polynomial(sheets, degree, nodes, side):
     return np.where(side > 0, 1.0 + x - 2.0 * y, -3.0 * x + y + 5.0)
 
 
+def between(old, new, degree, along):
+    """The transfer between the nodes of two sheets."""
+    return transfer(sides_of(old, degree, along), sides_of(new, degree, along))
+
+
 @pytest.mark.parametrize("degree", [1, 2])
 def test_each_side_keeps_its_values(degree):
     """Plates that turn and move by up to 1.4 cells in a step: linear functions on both sides stay what they are."""
@@ -145,7 +150,7 @@ def test_each_side_keeps_its_values(degree):
         nodes, side = sides(old, degree, first)
         values[nodes] = polynomial(old, degree, nodes, side)
         known = ~np.isnan(values)
-        matrix = transfer(old, new, degree, along_surface(facets, second, H))
+        matrix = between(old, new, degree, along_surface(facets, second, H))
         nodes, side = sides(new, degree, second)
         assert not abs(matrix)[nodes][:, ~known].sum()
         found = (matrix @ np.where(known, values, 0.0))[nodes]
@@ -165,7 +170,7 @@ def test_tip_that_goes_to_another_cell():
         first = turned(plate, rng.uniform(-0.2, 0.2)) + np.array([0.0, 0.52])
         second = first + rng.uniform(-0.05, 0.05, 2)
         old, new = (sheets_at(grid, facets, x) for x in (first, second))
-        matrix = transfer(old, new, 1, along_surface(facets, second, H)).tocsr()
+        matrix = between(old, new, 1, along_surface(facets, second, H)).tocsr()
         far = np.flatnonzero(np.linalg.norm(points[:, None] - first, axis=2).min(axis=1) > 2.0 * H)
         assert np.array_equal(matrix[far].indices, far), draw
 

@@ -251,8 +251,10 @@ def test_leaflet(cell, order):
     )
     assert len(facets) == len(boundary_facets(mesh))
 
-    x = mesh.points[np.unique(surface_facets(mesh, "inner"))]
-    lips = x[(x[:, 2] > height - lip - 1e-9) & (x[:, 1] > -1e-9)]
+    x = mesh.points[np.unique(surface_facets(mesh, "lips"))]
+    assert x[:, 2].min() == pytest.approx(height - lip, abs=1e-13)
+    assert mesh.points[np.unique(surface_facets(mesh, "inner"))][:, 2].max() == pytest.approx(height - lip, abs=1e-13)
+    lips = x[x[:, 1] > -1e-9]
     distance = np.sin(pi / 3) * lips[:, 0] - np.cos(pi / 3) * lips[:, 1]  # from the plane at 60 degrees
     assert distance.max() == pytest.approx(gap / 2, abs=1e-13)
     assert distance.min() == pytest.approx(0.0, abs=1e-13)
@@ -265,9 +267,23 @@ def test_leaflet(cell, order):
     assert distance.min() == pytest.approx(thickness, abs=1e-13)
 
 
+@pytest.mark.parametrize(("lip", "rows"), [(0.05, 1), (0.2, 1), (0.4, 2), (0.9, 4)])
+def test_lips_are_whole_rows_of_cells(lip, rows):
+    """The row nearest to the height of the lips; at least one, and one for the pouch."""
+    mesh = shapes.leaflet(1.0, 0.06, 1.0, lip, 0.05, (8, 1, 5))
+    facets = surface_facets(mesh, "lips")
+    assert len(facets) == 8 * rows
+    assert mesh.points[np.unique(facets)][:, 2].min() == pytest.approx(1.0 - lip, abs=1e-13)
+    assert len(surface_facets(mesh, "inner")) == 8 * (5 - rows)
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
-    [({"cells": (7, 1, 6)}, "must be even, got 7"), ({"lip": 1.1}, "lip and post, 1.1 and 0.2, must be lower")],
+    [
+        ({"cells": (7, 1, 6)}, "must be even, got 7"),
+        ({"cells": (8, 1, 1)}, "at least 2, got 1"),
+        ({"lip": 1.1}, "lip and post, 1.1 and 0.2, must be lower"),
+    ],
 )
 def test_leaflets_that_are_none(settings, message):
     sizes = {"radius": 1, "thickness": 0.06, "height": 1.2, "lip": 0.4, "post": 0.2, "cells": (8, 1, 6)}

@@ -280,13 +280,14 @@ class Sphere(SolidBuiltIn):
 
 
 class Leaflet(SolidBuiltIn):
-    """Leaflet of a valve in a tube about the z axis; surfaces inner, outer, bottom, top (upright lips), start, end.
+    """Leaflet of a valve in a tube about the z axis; surfaces inner, lips, outer, bottom, top, start, end.
 
-    Its bottom, start and end are at the wall, its middle is on the x axis. The lips are half of the gap away from the
-    straight sides of its sector at the axis, nothing at the wall.
+    Lips are the upright part of the inner side, whole rows of cells. Bottom, start and end are at the wall, the middle
+    is on the x axis. The lips are half of the gap away from the straight sides of the sector at the axis, nothing at
+    the wall.
     """
 
-    sides = ("inner", "outer", "bottom", "top", "start", "end")
+    sides = ("inner", "lips", "outer", "bottom", "top", "start", "end")
     shape: Literal["leaflet"] = setting(..., "kind of shape")
     radius: Positive = setting(
         ..., "radius at which the lips end; the edge below them is one thickness farther out", unit="m"
@@ -299,7 +300,7 @@ class Leaflet(SolidBuiltIn):
     post: Positive = setting(..., "height of the sides at the wall below the lips", unit="m")
     angle: Positive = setting(120.0, "angle of the sector, at most 180", unit="degrees")
     gap: NotNegative = setting(0.0, "distance at the axis between the lips of leaflets side by side", unit="m")
-    cells: Cells3 = setting(..., "number of cells along the wall (even), through the thickness, and up")
+    cells: Cells3 = setting(..., "number of cells along the wall (even), through the thickness, and up (at least 2)")
 
     @model_validator(mode="after")
     def _possible(self) -> Leaflet:
@@ -307,6 +308,8 @@ class Leaflet(SolidBuiltIn):
             raise fault(f"must be at most 180 degrees, not {self.angle:g}", "angle")
         if self.cells[0] % 2:
             raise fault(f"the number of cells along the wall must be even, not {self.cells[0]}", "cells", 0)
+        if self.cells[2] < 2:
+            raise fault(f"the number of cells up must be at least 2, not {self.cells[2]}", "cells", 2)
         if self.lip + self.post >= self.height:
             raise fault(f"'lip' and 'post' must be lower together than 'height', {self.height:g}", "lip")
         if self.wall + self.gap / 2 >= self.radius / 2:

@@ -47,14 +47,15 @@ def with_unions(grid: Grid, points: Array, moments, facets: Indices, x: Array, b
         return moments
     fraction, solid = moments.fraction.copy(), moments.solid.copy()
     weights = tensor_weights(len(points), 2)
-    parts = []
+    surfaces = []
     for row, regions in found.items():
         cell = moments.cells[row]
         fraction[cell] = 1.0 - sum(region.share for region in regions)
         solid[row] = weights - sum(region.integrals(points) for region in regions)
-        surface = np.concatenate([region.surface for region in regions if region.surface is not None])
-        parts.append(parts_of_facets(grid, cell, row, surface, facets, x, points))
-    new = joined_pieces(parts)
+        surfaces.append(np.concatenate([region.surface for region in regions if region.surface is not None]))
+    rows = np.repeat(np.array(list(found)), [len(surface) for surface in surfaces])
+    parts = parts_of_facets(grid, moments.cells[rows], rows, np.concatenate(surfaces), facets, x, points)
+    new = joined_pieces([parts])
     kept = ~np.isin(moments.piece_cell, list(found))
     pairs = (
         (moments.piece_cell, new.cell),

@@ -14,6 +14,8 @@ from solvers.fluid.background.box import Grid
 from solvers.gauss import gauss
 from solvers.lagrange import lagrange
 
+Indices = NDArray[np.int64]
+
 #: Distance from a plane of the grid, in cells, up to which a piece lies in it.
 FLUSH = 1e-6
 #: Share of a cell (of its face) below which fluid (surface) in it is rounding error of the geometry.
@@ -106,19 +108,26 @@ def joined_pieces(some: Sequence[Pieces]) -> Pieces:
     return Pieces(*(np.concatenate([getattr(pieces, name) for pieces in some])[order] for name in names))
 
 
-def parts_of_facets(
-    grid: Grid, number: int, row: int, parts: Array, facets: NDArray[np.int64], x: Array, points: Array
-) -> Pieces:
-    """Pieces in a cell of the box that are parts of facets, in 2D.
+def place_of(grid: Grid, cells: Indices) -> tuple[Array, Array]:
+    """(lowest corners, edges) [m] of cells of the box, shape (cells, dim)."""
+    index = np.unravel_index(cells, grid.shape, order="F")
+    low, high = (
+        np.stack([edge[i + side] for edge, i in zip(grid.edges, index, strict=True)], axis=1) for side in (0, 1)
+    )
+    return low, high - low
 
-    number: of the cell; row: among the cut cells; parts: (facet, begin, end) in reference coordinates of the cell,
-    shape (n, 5); x: vertices of the facets [m]; points: of the quadrature in one direction.
+
+def parts_of_facets(
+    grid: Grid, cell: Indices, row: Indices, parts: Array, facets: Indices, x: Array, points: Array
+) -> Pieces:
+    """Pieces in cells of the box that are parts of facets, in 2D.
+
+    cell: number in the box of that of each part; row: among the cut cells; parts: (facet, begin, end) in reference
+    coordinates of the cell, shape (n, 5); x: vertices of the facets [m]; points: of the quadrature in one direction.
     """
     facet, ends = parts[:, 0].astype(np.int64), parts[:, 1:].reshape(-1, 2, 2)
-    index = np.unravel_index(number, grid.shape, order="F")
-    low, high = (np.array([edge[i + side] for edge, i in zip(grid.edges, index, strict=True)]) for side in (0, 1))
-    size = high - low
-    corners = (x[facets[facet]] - low) / size
+    low, size = place_of(grid, cell)
+    corners = (x[facets[facet]] - low[:, None]) / size[:, None]
     nodes, weights = gauss(len(points) + 1)
     along = ends[:, 1] - ends[:, 0]
     at = ends[:, None, 0] + nodes[:, None] * along[:, None]
@@ -132,4 +141,4 @@ def parts_of_facets(
     mass = np.einsum("pgv,pgw,pg->pvw", vertex, vertex, weight)
     tangent = way * size
     normal = -np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.linalg.norm(tangent, axis=1)[:, None]
-    return Pieces(np.full(len(facet), row), facet, moments, mass, normal)
+    return Pieces(row, facet, moments, mass, normal)

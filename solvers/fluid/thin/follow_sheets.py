@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.exchanged import ExchangedFlow
 from solvers.fluid.thin.sheets import Sheets
-from solvers.fluid.thin.thin_bodies import carry
+from solvers.fluid.thin.thin_bodies import Carrying
 
 
 def follow_sheets(fluid: ExchangedFlow, sheets: Sheets | None, facets: NDArray[np.int64], motion: Motion) -> None:
@@ -29,11 +29,12 @@ def follow_sheets(fluid: ExchangedFlow, sheets: Sheets | None, facets: NDArray[n
         fluid.grid.sheets = sheets
         return
     fluid.discretise(sheets)
-    carrier = carry(old, now, fluid.unknowns, facets, motion.x)
+    carry = Carrying(fluid.unknowns, facets, motion.x)
+    carrier = carry(old, now)
     fluid.flow[:] = carrier.flow(flow)
     fluid.increment = carrier.flow(np.pad(increment, (0, old.local - old.owned)))[: fluid.unknowns.owned]
     if began is not None and began.unknowns is not old:
-        carrier = carry(began.unknowns, began.sheets, fluid.unknowns, facets, motion.x)
+        carrier = carry(began.unknowns, began.sheets)
     history = fluid.history
     history.past = [carrier.past(past) for past in (history.past if began is None else began.past)]
     history.forget_pressure(fluid.unknowns.local)

@@ -61,16 +61,18 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
             owner = next((c for c in cells_there if sheets.shares[c].has(facet)), None)
         target[piece] = -1 if owner is None or local[owner] < 0 else place[local[owner]]
 
-    def wet(surface: Array) -> Array:
-        return surface[counts[surface[:, 0].astype(int)]]
-
-    parts_of = parts_of_facets if grid.dim == 2 else parts_of_triangles
-    parts = [
-        parts_of(grid.grid, grid.numbers[cell], int(place[cell]), wet(surface), cut.facets, cut.motion.x, points)
+    touching = [
+        (place[cell], surface[counts[surface[:, 0].astype(int)]])
         for number, of_cell in sheets.shares.items()
         if (cell := local[number]) >= 0 and (surface := of_cell.surface) is not None
     ]
-    pieces = joined_pieces([selected(cut.pieces, target), *parts])
+    parts = [selected(cut.pieces, target)]
+    if touching:
+        row = np.repeat([row for row, _ in touching], [len(surface) for _, surface in touching])
+        surface = np.concatenate([surface for _, surface in touching])
+        parts_of = parts_of_facets if grid.dim == 2 else parts_of_triangles
+        there = grid.numbers[cells[row]]
+        parts.append(parts_of(grid.grid, there, row, surface, cut.facets, cut.motion.x, points))
     return replace(
         cut,
         uncut=cut.uncut[~(empty | new)[cut.uncut]],
@@ -82,7 +84,7 @@ def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np
         share=share,
         fluid=fluid,
         fraction=fraction,
-        pieces=pieces,
+        pieces=joined_pieces(parts),
     )
 
 

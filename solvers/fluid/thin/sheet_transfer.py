@@ -34,7 +34,7 @@ ALIKE = 0.05
 
 
 @dataclass(frozen=True)
-class _Sides:
+class Sides:
     """Cells with fluid, their nodes of one degree, and the facets that each can see."""
 
     sheets: Sheets
@@ -73,12 +73,12 @@ def along_surface(facets: Indices, x: Array, distance: float) -> sparse.csr_matr
     return sparse.csr_matrix(sparse.vstack(rows))
 
 
-def transfer(old: Sheets, new: Sheets, degree: int, along: sparse.csr_matrix) -> sparse.csr_matrix:
+def transfer(before: Sides, after: Sides) -> sparse.csr_matrix:
     """Values at the nodes of new sheets are this matrix times those of the old ones; rows without entries: unknown.
 
-    Nodes of one degree, by their numbers in the sheets; along: `along_surface` with the length of a cell.
+    Nodes of one degree, by their numbers in the sheets.
     """
-    before, after = (_sides(sheets, degree, along) for sheets in (old, new))
+    old, new, degree = before.sheets, after.sheets, after.degree
     numbers = np.flatnonzero(after.wet)
     places = new.on_lattice(numbers, degree)
     near = _near(old, degree) | _near(new, degree)
@@ -102,7 +102,8 @@ def transfer(old: Sheets, new: Sheets, degree: int, along: sparse.csr_matrix) ->
     return (direct + _continued_to(before, after.of_nodes[numbers[rest]], numbers[rest], places[rest], width)).tocsr()
 
 
-def _sides(sheets: Sheets, degree: int, along: sparse.csr_matrix) -> _Sides:
+def sides_of(sheets: Sheets, degree: int, along: sparse.csr_matrix) -> Sides:
+    """Sides of bodies around the nodes of this degree; along: `along_surface` with the length of a cell."""
     steps = np.array(list(product(range(degree + 1), repeat=sheets.grid.dim)))
     adjacent = neighbours_of(sheets)
     fluid = np.zeros(sheets.size, dtype=bool)
@@ -122,7 +123,7 @@ def _sides(sheets: Sheets, degree: int, along: sparse.csr_matrix) -> _Sides:
     entries = (nodes.ravel(), np.repeat(cells, nodes.shape[1]))
     shape = (sheets.node_count(degree), sheets.size)
     around = sparse.csr_matrix((np.ones(len(entries[0])), entries), shape=shape)
-    return _Sides(sheets, degree, cells, nodes, _unit(seen), _unit(around @ seen))
+    return Sides(sheets, degree, cells, nodes, _unit(seen), _unit(around @ seen))
 
 
 def _unit(rows: sparse.csr_matrix) -> sparse.csr_matrix:
@@ -146,7 +147,7 @@ def _dot(a: sparse.csr_matrix, b: sparse.csr_matrix) -> Array:
 
 
 def _continued_to(
-    sides: _Sides, seen: sparse.csr_matrix, numbers: Indices, places: Indices, rows: int
+    sides: Sides, seen: sparse.csr_matrix, numbers: Indices, places: Indices, rows: int
 ) -> sparse.csr_matrix:
     """Rows for nodes by the polynomial of that well-cut cell of their side which amplifies least."""
     sheets, degree, grid = sides.sheets, sides.degree, sides.sheets.grid

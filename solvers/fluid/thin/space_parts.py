@@ -191,13 +191,13 @@ def _divided(
         on_face.setdefault(face, []).append(region)
 
     outline_of = cache(lambda region: outline(regions.faces, regions.edges, region))
+    face_of = cache(lambda cell, axis, side: int(regions.lattice.face(np.array([cell]), axis, side)[0]))
 
     def other_side(cell: int, axis: int, side: int, x: Array) -> int:
         plane = [(axis + 1) % 3, (axis + 2) % 3]
         if of_cell[cell] >= 0:
             return int(of_cell[cell])
-        face = int(regions.lattice.face(np.array([cell]), axis, side)[0])
-        for region in on_face.get(face, ()):
+        for region in on_face.get(face_of(cell, axis, side), ()):
             beside = regions.of_face[region, 1 - side]
             if beside >= 0 and part[beside] >= 0 and contains(*outline_of(region), x[plane]):
                 return int(part[beside])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from solvers.fluid.cutting.cut import off_boundary
 from solvers.fluid.history import Past
 from solvers.fluid.thin.sheet_cycles import joined_in, recurring
 from solvers.fluid.thin.sheet_parts import AROUND
-from solvers.fluid.thin.sheet_transfer import along_surface, transfer
+from solvers.fluid.thin.sheet_transfer import along_surface, sides_of, transfer
 from solvers.fluid.thin.sheets import Sheets, find_sheets
 from solvers.fluid.thin.thickness import THIN, THIN_IF_MOVING
 from solvers.fluid.thin.thinness import cell_sizes_at, may_be_thin
@@ -140,20 +141,30 @@ class Began:
                 raise StepFailed("fluid", TOO_FAR)
 
 
-def carry(old: Unknowns, before: Sheets | None, new: Unknowns, facets: NDArray[np.int64], x: Array) -> Carrier:
-    """The transfer from old to new unknowns around facets with vertices now at x [m].
+class Carrying:
+    """Transfers to the unknowns of new sheets, around facets with vertices now at x [m].
 
-    before: sheets of the old ones, None: nodes of the box.
+    What the new sheets need for it is found once, for any number of transfers and, with `q1q1`, for velocity and
+    pressure, whose nodes are the same.
     """
-    after = new.grid.sheets
-    assert after is not None
-    cell = max(float(cell_sizes_at(edge, x[:, axis]).max()) for axis, edge in enumerate(after.grid.edges))
-    along, matrices = along_surface(facets, x, cell), []
-    for degree in (new.degree, 1):
+
+    def __init__(self, new: Unknowns, facets: NDArray[np.int64], x: Array):
+        after = new.grid.sheets
+        assert after is not None
+        self._new, self._after = new, after
+        cell = max(float(cell_sizes_at(edge, x[:, axis]).max()) for axis, edge in enumerate(after.grid.edges))
+        self._along = cache(lambda: along_surface(facets, x, cell))
+        self._sides = cache(lambda degree: sides_of(after, degree, self._along()))
+
+    def __call__(self, old: Unknowns, before: Sheets | None) -> Carrier:
+        """The transfer from old unknowns; before: their sheets, None: nodes of the box."""
+        degrees = (self._new.degree, 1)
+        matrices = {degree: self._matrix(before, degree) for degree in set(degrees)}
+        return Carrier(old, self._new, *(matrices[degree] for degree in degrees))
+
+    def _matrix(self, before: Sheets | None, degree: int) -> sparse.csr_matrix:
         if before is not None:
-            matrices.append(transfer(before, after, degree, along))
-            continue
-        count = after.node_count(degree)
-        entries = (np.ones(count), (np.arange(count), after.on_lattice(np.arange(count), degree)))
-        matrices.append(sparse.csr_matrix(entries, shape=(count, after.lattice_size(degree))))
-    return Carrier(old, new, *matrices)
+            return transfer(sides_of(before, degree, self._along()), self._sides(degree))
+        count = self._after.node_count(degree)
+        entries = (np.ones(count), (np.arange(count), self._after.on_lattice(np.arange(count), degree)))
+        return sparse.csr_matrix(entries, shape=(count, self._after.lattice_size(degree)))
