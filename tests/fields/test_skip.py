@@ -22,7 +22,6 @@ from solvers.contact.search import Search
 from solvers.fluid.background.grid import uniform
 from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.system import FlowSystem
-from solvers.structure.body import Body
 from solvers.structure.field import Structure
 from solvers.timing import Timer
 
@@ -198,7 +197,7 @@ def test_no_tangent_where_only_a_residual_is_needed(tmp_path, monkeypatch):
 
 def test_no_stiffness_where_only_a_residual_is_needed(tmp_path, monkeypatch):
     """Of a structure, too: a stiffness for each Newton step that keeps none, one residual more for each time step."""
-    calls = counted(monkeypatch, body__assemble_tangent=Body, structure__residual=Structure)
+    calls = counted(monkeypatch, structure__tangent=Structure, structure__residual=Structure)
     kept, advance = [], Structure.advance
 
     def recorded(self, *, keep=False, reduction=0.0):
@@ -208,7 +207,7 @@ def test_no_stiffness_where_only_a_residual_is_needed(tmp_path, monkeypatch):
     monkeypatch.setattr(Structure, "advance", recorded)
     iterations = iterations_of(written(tmp_path, BEAM, 0.2), 4)
     assert any(kept)
-    assert calls["body__assemble_tangent"] == sum(iterations) - sum(kept)
+    assert calls["structure__tangent"] == sum(iterations) - sum(kept)
     assert calls["structure__residual"] == sum(iterations) + len(iterations)
 
 
