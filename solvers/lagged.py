@@ -12,8 +12,8 @@ from solvers import linear
 class Lagged:
     """Solves with the preconditioner of an earlier matrix of the step while it is good enough.
 
-    The first `fresh` matrices of a step get their own preconditioners. The last of these is reused until a solve does
-    not converge within `patience` times the iterations that it took for its own matrix. Nothing is kept from step to
+    The first `fresh` matrices of a step get their own preconditioners. The last of these is reused until a solve fails
+    or takes more than `patience` times the iterations that it took for its own matrix. Nothing is kept from step to
     step, so that resumed runs give the same results.
     """
 
@@ -32,14 +32,14 @@ class Lagged:
         if kept is None or self.made < self.fresh:
             return None
         ksp, made_of, first = kept
-        if math.isfinite(self.patience):
-            ksp.setTolerances(max_it=math.ceil(self.patience * first))
         try:
             linear.solve(ksp, matrix, b, x, made_of)
         except linear.LinearSolveFailed:
             return None
-        self._kept = kept
-        return int(ksp.getIterationNumber())
+        iterations = int(ksp.getIterationNumber())
+        if iterations <= self.patience * first:
+            self._kept = kept
+        return iterations
 
     def solve(
         self, ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, entries: PETSc.Mat | None = None

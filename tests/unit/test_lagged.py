@@ -71,14 +71,15 @@ def test_singular_matrices_are_an_error() -> None:
         solve(factors, singular.tocsr())
 
 
-def test_a_preconditioner_that_no_longer_serves_costs_few_iterations() -> None:
-    """Twice as many as it took for its own matrix."""
+def test_a_preconditioner_that_no_longer_serves_is_discarded() -> None:
+    """After a solve that takes more than twice as many iterations as it took for its own matrix."""
     lagged, ksp = Lagged(), flexible_solver(PETSc.COMM_SELF, tolerance=1e-8)
     ksp.getPC().setType(PETSc.PC.Type.ILU)
     first = lagged.solve(ksp, *system((BASE + 0.5 * NEAR).tocsr()))
     again = lagged.solve_again(*system((BASE + 0.51 * NEAR).tocsr()))
     assert again is not None
     assert again <= 2 * first
-    assert lagged.solve_again(*system((BASE + 5.0 * NEAR).tocsr())) is None
-    assert ksp.getIterationNumber() == 2 * first
+    last = lagged.solve_again(*system((BASE + 5.0 * NEAR).tocsr()))
+    assert last is not None
+    assert last > 2 * first
     assert lagged.solve_again(*system(BASE)) is None
