@@ -1,5 +1,5 @@
-// Python names of block_factors.hpp, block_product.hpp and node_blocks.hpp: BlockFactors, BlockProduct, node_blocks,
-// spread_blocks.
+// Python names of block_factors.hpp, block_product.hpp, node_blocks.hpp and other_rows.hpp: BlockFactors, BlockProduct,
+// node_blocks, spread_blocks, other_rows.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 

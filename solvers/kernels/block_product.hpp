@@ -2,7 +2,6 @@
 // that the product is that of a matrix with rounded entries, whose difference to the given one does not depend on x.
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -16,7 +15,7 @@ typedef double Wide __attribute__((vector_size(32)));
 struct View {
     std::size_t rows;
     const std::int32_t *start, *columns;
-    factors::Column* blocks;  // of L A R, each by columns
+    factors::Column* blocks;     // of L A R, each by columns
     const double *left, *right;  // diagonals of L and R
     double* scaled;              // R^-1 x
 };

@@ -8,12 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "node_blocks.hpp"
+
 namespace changed_rows {
 
-struct Rows {
-    const std::int32_t *start, *columns;
-    const double* values;
-};
+using node_blocks::Rows;
 
 struct Matrix {
     std::vector<std::int32_t> start, columns;
