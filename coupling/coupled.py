@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from coupling.balance import Balance
 from coupling.interface import DrySide, Interface
 from coupling.ports import Flow, Solid, Start
+from coupling.sealing_layer import SealingLayer
 from solvers.api import Array, State
 
 
 class Coupled:
     """The two parts and their interface; all calls are collective."""
 
-    def __init__(self, flow: Flow, solid: Solid, dry_sides: Sequence[DrySide] = (), start: Start | None = None):
+    def __init__(
+        self,
+        flow: Flow,
+        solid: Solid,
+        dry_sides: Sequence[DrySide] = (),
+        start: Start | None = None,
+        layers: Mapping[str, SealingLayer] = {},
+    ):
         self.flow, self.solid, self.start = flow, solid, start
         self.notes: list[str] = []  #: notes to the user on the start
-        self.interface = Interface(solid, flow.scheme.times, dry_sides)
+        self.interface = Interface(solid, flow.scheme.times, dry_sides, layers)
         self.balance = Balance(flow, solid, self.interface)
 
     def initialise(self, t: float, dt: float, *, with_solid: bool = False) -> None:

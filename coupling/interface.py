@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupling.ports import Solid
+from coupling.sealing_layer import SealingLayer
 from solvers.api import Array, State
 from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.time_scheme import STEADY, Difference
@@ -37,9 +38,16 @@ class Interface:
     g = alpha d_{n+1} - sum_k beta_k d_{n-k}, so that fluid and surface sweep the same volume.
     """
 
-    def __init__(self, solid: Solid, times: int, dry_sides: Sequence[DrySide] = ()):
-        """times: count of earlier displacements in the difference formula."""
+    def __init__(
+        self,
+        solid: Solid,
+        times: int,
+        dry_sides: Sequence[DrySide] = (),
+        layers: Mapping[str, SealingLayer] = {},
+    ):
+        """times: count of earlier displacements in the difference formula; layers: of surfaces, by their names."""
         self.solid, self.surfaces, self.dry_sides = solid, list(solid.surfaces), list(dry_sides)
+        self.layers = dict(layers)
         self.points = np.concatenate(list(solid.surfaces.values()))
         self._ends = np.cumsum([len(points) for points in solid.surfaces.values()])[:-1]
         self.now = np.zeros_like(self.points)
@@ -93,7 +101,7 @@ class Interface:
 
     def _by_surface(self, x: Array, v: Array) -> dict[str, Motion]:
         parts = zip(self.surfaces, np.split(x, self._ends), np.split(v, self._ends), strict=True)
-        return {name: Motion(x, v) for name, x, v in parts}
+        return {name: Motion(self.layers[name].cover(x) if name in self.layers else x, v) for name, x, v in parts}
 
     def join(self, by_surface: dict[str, Array]) -> Array:
         """Values at all vertices from those of each surface."""

@@ -11,6 +11,7 @@ from coupling.elastic import Elastic
 from coupling.elastic_start import ElasticStart
 from coupling.interface import DrySide
 from coupling.ports import Start
+from coupling.sealing_layer import SealingLayer
 from coupling.wetted import immerse, wetted_surface
 from solvers.api import Array
 from solvers.fluid.background.grid import Grid
@@ -75,11 +76,16 @@ def couple_rigid(
     return coupled_bodies(Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=bodies.comm), bodies)
 
 
-def coupled_elastic(fluid: Fluid, elastic: Elastic, dry_sides: Sequence[DrySide] = ()) -> Coupled:
-    """A structure in a flow. There is a start (`coupling.start`) if the solid has inertia and the flow uses BDF2."""
+def coupled_elastic(
+    fluid: Fluid, elastic: Elastic, dry_sides: Sequence[DrySide] = (), layers: Mapping[str, SealingLayer] = {}
+) -> Coupled:
+    """A structure in a flow. There is a start (`coupling.start`) if the solid has inertia and the flow uses BDF2.
+
+    layers: on surfaces of bodies, by their names.
+    """
     inertia = not isinstance(elastic.structure.time, Statics)
     start = Start(FlowStart(fluid), ElasticStart(elastic)) if inertia and fluid.scheme.times > 1 else None
-    return Coupled(fluid, elastic, dry_sides, start)
+    return Coupled(fluid, elastic, dry_sides, start, layers)
 
 
 def coupled_bodies(fluid: Fluid, bodies: RigidBodies) -> Coupled:

@@ -127,8 +127,11 @@ def _contact(case: Case, contact: ContactSection) -> Iterator[Mistake]:
     if not contact.pairs and contact.bodies is None:
         missing: Keys = ("contact", "pairs") if "pairs" in contact.model_fields_set else ("contact",)
         yield missing, "'contact' needs 'pairs', or 'bodies: all' for automatic pairs"
-    if (contact.film.value or contact.film.closed != "dry") and case.fluid is None:
+    film = contact.film
+    if (film.value or film.seal or film.closed != "dry") and case.fluid is None:
         yield ("contact", "film"), "'film' describes the fluid between surfaces and needs the section 'fluid'"
+    elif film.seal and not case.elastic_bodies:
+        yield ("contact", "film", "seal"), "'seal' is a layer on elastic bodies, and there are none"
     for setting in ("friction", "reach"):
         if setting in contact.model_fields_set and contact.bodies is None:
             yield (

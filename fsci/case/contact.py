@@ -115,9 +115,9 @@ class ObstacleSection(Section):
 
 
 class FilmSection(Section):
-    """Flow of fluid between surfaces that touch or nearly do, by one of two numbers.
+    """Flow of fluid between surfaces that touch or nearly do: a layer with flow in it, or a tight one.
 
-    Bodies in contact pairs have a rough or porous layer on their whole surface; between two of them the layers add up.
+    Bodies in contact pairs have the layer with flow on their whole surface; between two of them the layers add up.
     """
 
     transmissivity: NotNegative | None = setting(
@@ -135,10 +135,19 @@ class FilmSection(Section):
         " seeping: fluid passes through it, too, in the layer; default: seeping with a layer, otherwise dry",
     )
 
+    seal: Positive | None = setting(
+        None,
+        "thickness of a tight layer on contact surfaces of elastic bodies, where the fluid ends: closes the slits that"
+        " contact of meshes leaves; default: none",
+        unit="m",
+    )
+
     @model_validator(mode="after")
     def _one_of_them(self) -> FilmSection:
         if self.transmissivity is not None and self.roughness is not None:
             raise fault("give either 'transmissivity' or 'roughness', not both", "roughness")
+        if self.seal and self.value:
+            raise fault("surfaces are either tight or let fluid pass: give 'seal', or 'transmissivity' or 'roughness'", "seal")
         if self.zone == "seeping" and not self.value:
             raise fault("fluid seeps in a layer: give 'transmissivity' or 'roughness'", "zone")
         return self

@@ -24,6 +24,19 @@ MISTAKES = [
         "15:9: 'film' describes the fluid between surfaces and needs the section 'fluid'",
         "{rough",
     ),
+    (
+        "  pairs:\n",
+        "  film: {seal: 1e-3}\n  pairs:\n",
+        "15:9: 'film' describes the fluid between surfaces and needs the section 'fluid'",
+        "{seal",
+    ),
+    ("  pairs:\n", "  film: {seal: 0}\n  pairs:\n", "15:16: 'seal' must be greater than 0, not 0", "0"),
+    (
+        "  pairs:\n",
+        "  film: {seal: 1e-3, roughness: 0.1}\n  pairs:\n",
+        "15:16: surfaces are either tight or let fluid pass: give 'seal', or 'transmissivity' or 'roughness'",
+        "1e-3",
+    ),
     ("body: block, on: top", "body: blok, on: top", "16:27: unknown body 'blok'; did you mean 'block'?", "blok"),
     (
         "body: block, on: top",
