@@ -6,11 +6,13 @@ thousandth of a facet remain. Hardly any fluid would pass them, but on a grid of
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coupling.wetted import WettedSurface
 from solvers.api import Array
 from solvers.tessellation import area_vectors
 
@@ -42,3 +44,9 @@ class SealingLayer:
         reach = np.minimum(area[some] / size[some], FARTHEST)
         way[some] = self.thickness * (reach / size[some])[:, None] * total[some]
         return x + way
+
+
+def sealing_layers(surfaces: Iterable[WettedSurface], thickness: float) -> dict[str, SealingLayer]:
+    """Layers [m] on the facets that take part in contact, by the names of surfaces that have any."""
+    marked = {s.name: s.facets[s.in_contact] for s in surfaces if s.in_contact is not None}
+    return {name: SealingLayer(facets, thickness) for name, facets in marked.items() if len(facets)}

@@ -160,7 +160,7 @@ def test_where_a_box_is_cut():
 
 
 def test_the_wall_of_a_tube_does_not_hide_what_is_in_it(tmp_path):
-    """Of a rigid body around the box of a flow the part in the box behind the slice remains; other bodies stay whole."""
+    """Of a rigid body around the flow the part in the box behind the slice remains; other bodies stay whole."""
     pyvista = import_pyvista()
     box = pyvista.ImageData(dimensions=(5, 5, 5)).cast_to_unstructured_grid()  # 4 x 4 x 4
     box.cell_data["fluid_fraction"] = np.ones(box.n_cells)
