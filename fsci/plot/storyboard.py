@@ -35,7 +35,8 @@ def plot_story(
     states = [plane_state([file for _, file in moment]) for moment in moments]
     flows = [bodies[0] for bodies, *_ in states]
     speeds = [flow.values for flow in flows if flow.values is not None]
-    bounds = np.array([body.surface.bounds for bodies, *_ in states for body in bodies if not reaches_around(body, bodies[0])])
+    shown = [body for bodies, *_ in states for body in bodies if not reaches_around(body, bodies[0])]
+    bounds = np.array([body.surface.bounds for body in shown])
     low, high = bounds[:, :4:2].min(axis=0), bounds[:, 1:4:2].max(axis=0)
     names, plane = states[0][1:]
     crop = CROP[not plane]
