@@ -61,7 +61,7 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
             "facet_assembly", "facet_ball", "hidden_masters", "integrals", "dual_basis", "normals", "facet_derivatives",
             "plane_frame", "clipping",
         )),
-        ("mortar_kernel", "mortar_derivatives", "contact_system"),
+        ("mortar_kernel", "nodal_normals", "mortar_derivatives", "contact_system"),
     ),
 }  # fmt: skip
 
