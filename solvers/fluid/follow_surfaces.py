@@ -18,8 +18,8 @@ from solvers.fluid.thin.follow_sheets import follow_sheets
 from solvers.timing import Timer
 
 
-class CutFlow(ExchangedFlow, Protocol):
-    """A flow on a grid that surfaces cut; `Fluid` is one."""
+class FlowAroundSurfaces(ExchangedFlow, Protocol):
+    """A flow whose grid is cut by surfaces that may move; `Fluid` is one."""
 
     timer: Timer
     surfaces: AllSurfaces
@@ -29,7 +29,7 @@ class CutFlow(ExchangedFlow, Protocol):
     steady_iteration: SteadyIteration
 
 
-def follow_surfaces(fluid: CutFlow, *, with_solid: bool) -> None:
+def follow_surfaces(fluid: FlowAroundSurfaces, *, with_solid: bool) -> None:
     """Cut the grid by the surfaces with their present motions, and set all that depends on the cut (collective).
 
     with_solid: see `Fluid.move`. Raises StepFailed if surfaces have moved too far in this step, or are close to coarse
@@ -48,7 +48,7 @@ def follow_surfaces(fluid: CutFlow, *, with_solid: bool) -> None:
         fluid.levels.hold(fluid.held, set_by_solids=with_solid and not fluid.settings.steady)
 
 
-def _cut(fluid: CutFlow) -> Cut:
+def _cut(fluid: FlowAroundSurfaces) -> Cut:
     facets, motion = fluid.surfaces.together(fluid.motions)
     follow_sheets(fluid, fluid.thin.sheets(facets, motion), facets, motion)
     if fluid.settings.steady and fluid.steady_iteration.scales_follow:
@@ -61,7 +61,7 @@ def _cut(fluid: CutFlow) -> Cut:
     return cut
 
 
-def _layers(fluid: CutFlow, motion: Motion) -> int:
+def _layers(fluid: FlowAroundSurfaces, motion: Motion) -> int:
     """Number of cell layers behind the surface that the next steps may uncover; none around thin bodies."""
     if fluid.thin.follows or fluid.settings.steady or all(body.rests for body in fluid.bodies):
         return 0
