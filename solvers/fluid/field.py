@@ -161,7 +161,7 @@ class Fluid:
         if self.following is not None:
             follow_bodies(self, self.following, t, dt)
         self.current = FlowStep(t + dt, dt, self.history.difference(dt))
-        if self._behind is not None:
+        if self._behind is not None:  # the first iterate is the history, which is bounded behind walls
             mask = self.unknowns.velocity_mask
             self.flow[mask] = self.history.past[0].velocity[mask]
         self.history.begin_step(self._present_pressure())

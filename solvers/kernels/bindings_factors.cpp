@@ -180,9 +180,9 @@ void bind_factors(nb::module_& module) {
                "(start, columns, blocks (m, n, n), each transposed) of a matrix in compressed rows, n of which are a node's.");
     module.def("changed_rows", &change, "start"_a, "columns"_a, "values"_a, "rows"_a, "replaced"_a, "new_start"_a,
                "new_columns"_a, "new_values"_a,
-               "(values, columns, start) of a matrix in compressed rows, with increasing columns in each. The first\n"
-               "`replaced` of `rows`, each once, become the new ones, whose columns need no order; to the others these\n"
-               "are added.");
+               "(values, columns, start) of a matrix in compressed rows, with increasing columns in each, after a change\n"
+               "of `rows`, each once. New rows, whose columns need no order, replace the first `replaced` of them and are\n"
+               "added to the others.");
     module.def("spread_blocks", &spread, "start"_a, "blocks"_a, "entries"_a, "factor"_a = 1.0,
                "Write the entries of blocks, each transposed, times a factor in the order of compressed rows.");
 }

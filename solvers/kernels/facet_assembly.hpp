@@ -32,7 +32,7 @@ struct MortarInput {
     double reach;   // facets farther apart than this do not see each other
     double near;    // slave facets with no master as near as this are left out
     double facing;  // facets see each other if the product of their normals is below
-    const std::uint8_t* kept;  // pairs for which none of the three is asked; may be null
+    const std::uint8_t* kept;  // pairs that take part whatever reach, near and facing are; may be null
     const double* along;       // fixed unit vector along which gaps are measured instead of the normals; may be null
 
     bool is_kept(std::size_t pair) const { return kept && kept[pair]; }

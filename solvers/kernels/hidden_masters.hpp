@@ -8,11 +8,13 @@
 
 namespace mortar {
 
-// Distance of a master behind another one, in diameters of the slave facet, from which on it is hidden by it. Bodies side
-// by side do not feel it from 0.005 to 5; with 0.002 Newton's method may jump between them (docs/verification_contact.md).
+// Distance between two masters, in diameters of the slave facet, from which on the nearer one hides the other. Results of
+// bodies side by side are the same from 0.005 to 5. With 0.002 Newton's method may jump between them
+// (docs/verification_contact.md).
 constexpr double thinnest_layer = 0.05;
 
-// Whether a pair's master also lies over this place of the slave, and before the gap by more than a layer.
+// Whether the master of a pair lies over this place of the slave, too, with a gap there that is smaller than the given one
+// by more than the thinnest layer.
 template <typename Slave, typename Master, bool derivatives>
 inline bool FacetAssembly<Slave, Master, derivatives>::is_nearer(const Pair& pair, double gap,
                                                                  const double* place) const {

@@ -24,10 +24,8 @@ class ConstrainedDofs:
         """Force [N] of the constraint at owned dofs; zero if it is not near."""
         found = np.zeros(self._layout.size)
         if self._constraint.near:
-            dofs, force = self._constraint.dofs(), self._constraint.force()
-            local = dofs - self._layout.start
-            mine = (local >= 0) & (local < self._layout.size) & (dofs >= 0)
-            found[local[mine]] = force[mine]
+            mine, numbers = self._layout.among_owned(self._constraint.dofs())
+            found[numbers] = self._constraint.force()[mine]
         return found
 
     def recover(self, taken: TakenRows, du: Array) -> None:
