@@ -11,7 +11,7 @@ from coupling.elastic import Elastic
 from coupling.elastic_start import ElasticStart
 from coupling.interface import DrySide
 from coupling.ports import Start
-from coupling.sealing_layer import SealingLayer
+from coupling.sealing_layer import SealingLayer, sealing_layers
 from coupling.wetted import immerse, wetted_surface
 from solvers.api import Array
 from solvers.fluid.background.grid import Grid
@@ -39,6 +39,7 @@ def couple(
     rigid_bodies: Sequence[ImmersedBody] = (),
     wetted: Mapping[str, Sequence[str]] = {},
     start: float = 0.0,
+    seal: float | None = None,
     solver: SolverSettings = SolverSettings(),
     timer: Timer | None = None,
 ) -> Coupled:
@@ -47,6 +48,7 @@ def couple(
     grid: the box of cells around the bodies. patches: conditions on the faces of the box. rigid_bodies: further bodies
     with prescribed motion. wetted: body -> names of its wetted surfaces. Without a name the whole surface is wetted,
     except parts in other bodies and, without contact, on the boundary of the box at the first time `start` [s].
+    seal: thickness of a tight layer on contact surfaces [m].
     """
     comm, bodies = structure.comm, structure.bodies
     surfaces = []
@@ -56,7 +58,8 @@ def couple(
         surfaces.append(wetted_surface(structure, index, skin))
     immersed = immerse([surface.at_start for surface in surfaces], rigid_bodies, _box(grid), start)
     fluid = Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=comm)
-    return coupled_elastic(fluid, Elastic(structure, surfaces))
+    layers = {} if seal is None else sealing_layers(surfaces, seal)
+    return coupled_elastic(fluid, Elastic(structure, surfaces), layers=layers)
 
 
 def couple_rigid(

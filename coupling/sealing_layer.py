@@ -1,27 +1,28 @@
-"""A tight layer on contact surfaces: fluid ends this far in front of the solid, so that closed contact has no slits.
+"""A tight layer on contact surfaces: the fluid ends in front of the solid, so that closed contact has no slits.
 
-Contact holds in the mean over facets. Between two curved surfaces, or along two edges, slits remain that are a thousandth of
-a facet high. In a flow of the size of the surfaces nothing passes them, but on a grid they join the fluid of both
-sides. Real seals have a soft or rough skin there.
+Contact conditions hold in the mean over facets. Between curved surfaces, or along two edges, slits of about a
+thousandth of a facet remain. Hardly any fluid would pass them, but on a grid of larger cells they connect both sides.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coupling.wetted import WettedSurface
 from solvers.api import Array
 from solvers.tessellation import area_vectors
 
-#: Vertices of edges sharper than 60 degrees move by twice the thickness; the layer is thinner than it should be there.
+#: Largest displacement of a vertex in thicknesses. At edges below 60 degrees the layer is thinner than elsewhere.
 FARTHEST = 2.0
 
 
 @dataclass(frozen=True)
 class SealingLayer:
-    """The layer of one body, of constant thickness, which moves with its facets."""
+    """The layer of one body. It has a constant thickness and moves with its facets."""
 
     facets: NDArray[np.int64]  #: that it lies on, vertices of segments or triangles, shape (m, dim)
     thickness: float  #: [m]
@@ -29,8 +30,8 @@ class SealingLayer:
     def cover(self, x: Array) -> Array:
         """Positions [m] of all vertices on the layer, from those on the solid, shape (n, dim).
 
-        With the area vectors a_f n_f of the facets around a vertex, S their sum and A = sum a_f, it moves by
-        thickness A S / |S|^2: by the thickness in front of a plane, and of both planes of an edge.
+        A vertex moves by thickness A S / |S|^2, with the sum S of the area vectors of the facets around it and the
+        sum A of their areas. Planes move by the thickness, also those that meet at an edge with equal facets.
         """
         vectors = area_vectors(x[self.facets])
         total, area = np.zeros_like(x), np.zeros(len(x))
@@ -43,3 +44,9 @@ class SealingLayer:
         reach = np.minimum(area[some] / size[some], FARTHEST)
         way[some] = self.thickness * (reach / size[some])[:, None] * total[some]
         return x + way
+
+
+def sealing_layers(surfaces: Iterable[WettedSurface], thickness: float) -> dict[str, SealingLayer]:
+    """Layers [m] on the facets that take part in contact, by the names of surfaces that have any."""
+    marked = {s.name: s.facets[s.in_contact] for s in surfaces if s.in_contact is not None}
+    return {name: SealingLayer(facets, thickness) for name, facets in marked.items() if len(facets)}

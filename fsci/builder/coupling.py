@@ -15,7 +15,7 @@ from coupling.interface import DrySide
 from coupling.monolithic import Monolithic
 from coupling.partitioned import FixedPointTolerance, Partitioned
 from coupling.parts import coupled_bodies, coupled_elastic
-from coupling.sealing_layer import SealingLayer
+from coupling.sealing_layer import sealing_layers
 from coupling.wetted import WettedSurface, immerse, wetted_surface
 from fsci.builder.dry_side import Closing
 from fsci.builder.fluid import build_fluid, build_rigid_bodies
@@ -47,8 +47,9 @@ def build_coupled(
     dry_sides = [_dry_side(s, c) for s, (_, c) in zip(surfaces, skins, strict=True) if c is not None]
     immersed += [ImmersedBody(_dry_surface(side), None, deforms=True) for side in dry_sides]
     fluid = build_fluid(case, comm, timer, immersed)
-    coupled = coupled_elastic(fluid, Elastic(structure, surfaces), dry_sides, _layers(case, surfaces))
-    return _scheme(case, coupled), fluid
+    seal = None if case.contact is None else case.contact.film.seal
+    layers = {} if seal is None else sealing_layers(surfaces, seal)
+    return _scheme(case, coupled_elastic(fluid, Elastic(structure, surfaces), dry_sides, layers)), fluid
 
 
 def build_coupled_rigid(
@@ -93,14 +94,6 @@ def _skin(case: Case, comm: MPI.Comm, body: Body) -> tuple[Skin, Closing | None]
         raise found
     require_inside_period(case, ("structure", "bodies", body.name), found[0].points)
     return found
-
-
-def _layers(case: Case, surfaces: Sequence[WettedSurface]) -> dict[str, SealingLayer]:
-    seal = None if case.contact is None else case.contact.film.seal
-    if seal is None:
-        return {}
-    touching = [(s.name, s.facets[s.in_contact]) for s in surfaces if s.in_contact is not None and s.in_contact.any()]
-    return {name: SealingLayer(facets, seal) for name, facets in touching}
 
 
 def _dry_side(surface: WettedSurface, closing: Closing) -> DrySide:

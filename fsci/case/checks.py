@@ -130,8 +130,6 @@ def _contact(case: Case, contact: ContactSection) -> Iterator[Mistake]:
     film = contact.film
     if (film.value or film.seal or film.closed != "dry") and case.fluid is None:
         yield ("contact", "film"), "'film' describes the fluid between surfaces and needs the section 'fluid'"
-    elif film.seal and not case.elastic_bodies:
-        yield ("contact", "film", "seal"), "'seal' is a layer on elastic bodies, and there are none"
     for setting in ("friction", "reach"):
         if setting in contact.model_fields_set and contact.bodies is None:
             yield (

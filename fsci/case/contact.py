@@ -115,9 +115,10 @@ class ObstacleSection(Section):
 
 
 class FilmSection(Section):
-    """Flow of fluid between surfaces that touch or nearly do: a layer with flow in it, or a tight one.
+    """Fluid between surfaces that touch or nearly do: a layer that lets it pass, or a tight one.
 
-    Bodies in contact pairs have the layer with flow on their whole surface; between two of them the layers add up.
+    A layer that lets fluid pass covers the whole surface of bodies in contact pairs; between two of them the layers add
+    up.
     """
 
     transmissivity: NotNegative | None = setting(
@@ -147,7 +148,9 @@ class FilmSection(Section):
         if self.transmissivity is not None and self.roughness is not None:
             raise fault("give either 'transmissivity' or 'roughness', not both", "roughness")
         if self.seal and self.value:
-            raise fault("surfaces are either tight or let fluid pass: give 'seal', or 'transmissivity' or 'roughness'", "seal")
+            raise fault(
+                "surfaces are either tight or let fluid pass: give 'seal', or 'transmissivity' or 'roughness'", "seal"
+            )
         if self.zone == "seeping" and not self.value:
             raise fault("fluid seeps in a layer: give 'transmissivity' or 'roughness'", "zone")
         return self

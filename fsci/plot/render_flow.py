@@ -43,18 +43,22 @@ def load_state(files: Sequence[Path], field: str) -> list[DrawnBody]:
     if is_flat(flow):
         return [plane_flow(flow, field), *parts]
     # The edges of elements would hide the flow around a body.
-    return _spatial_flow(flow, field, meshes[1:]) + [replace(part, edges=NO_LINES) for part in parts]
+    bodies = [replace(part, edges=NO_LINES) for part in _opened(parts, flow)]
+    return _spatial_flow(flow, field, [mesh for mesh in meshes[1:] if not _surrounds(mesh, flow)]) + bodies
 
 
 def load_meshes(files: Sequence[Path]) -> list[DrawnBody]:
     """The bodies with the edges of their elements, the cells of a flow: all of a plane one, the back faces of a box."""
     pyvista = import_pyvista()
-    parts = []
+    parts: list[DrawnBody] = []
+    flow = None
     for path in files:
         mesh = pyvista.read(path)
         if "fluid_fraction" not in mesh.cell_data:
-            parts += [replace(part, values=None) for part in _load_body(mesh, "")]
+            loaded = [replace(part, values=None) for part in _load_body(mesh, "")]
+            parts += loaded if flow is None else _opened(loaded, flow)
             continue
+        flow = mesh
         faces = mesh.extract_surface(algorithm="dataset_surface")
         box = mesh.outline()
         if not is_flat(mesh):
@@ -63,6 +67,26 @@ def load_meshes(files: Sequence[Path]) -> list[DrawnBody]:
         edges = segments(faces.extract_all_edges())
         parts.append(DrawnBody(box, edges, NO_LINES, None, line_colour="gray"))
     return parts
+
+
+def _surrounds(body: Any, flow: Any) -> bool:
+    """Whether a body reaches around the box of a flow in space, as the wall of a tube does."""
+    inner, outer = np.array(flow.bounds), np.array(body.bounds)
+    return not is_flat(flow) and bool(np.all(outer[::2] < inner[::2]) and np.all(inner[1::2] < outer[1::2]))
+
+
+def _opened(parts: Sequence[DrawnBody], flow: Any) -> list[DrawnBody]:
+    """Bodies in space, without the half in front of what surrounds the flow, and without what is outside of the box."""
+    found = []
+    for part in parts:
+        if _surrounds(part.surface, flow):
+            axis = "xyz".index(lengthwise(flow))
+            bounds = np.array(flow.bounds)
+            bounds[2 * axis + (ISOMETRIC[axis] > 0)] = flow.center[axis]
+            half = part.surface.clip_box(bounds, invert=False)
+            part = replace(part, surface=half.extract_surface(algorithm="dataset_surface"))
+        found.append(part)
+    return found
 
 
 def _on_back(faces: Any) -> NDArray[np.int64]:

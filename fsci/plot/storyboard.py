@@ -35,7 +35,8 @@ def plot_story(
     states = [plane_state([file for _, file in moment]) for moment in moments]
     flows = [bodies[0] for bodies, *_ in states]
     speeds = [flow.values for flow in flows if flow.values is not None]
-    bounds = np.array([body.surface.bounds for bodies, *_ in states for body in bodies])
+    shown = [body for bodies, *_ in states for body in bodies if not reaches_around(body, bodies[0])]
+    bounds = np.array([body.surface.bounds for body in shown])
     low, high = bounds[:, :4:2].min(axis=0), bounds[:, 1:4:2].max(axis=0)
     names, plane = states[0][1:]
     crop = CROP[not plane]
@@ -69,6 +70,12 @@ def plot_story(
         draw_colour_bar(figure, place, limits, "viridis", field_label("velocity", flows, units), extend="max")
         figure.savefig(path)
     return path
+
+
+def reaches_around(body: DrawnBody, flow: DrawnBody) -> bool:
+    """Whether a body reaches around the plane of the flow, as the wall of a tube does: what is outside is not shown."""
+    inner, outer = np.array(flow.surface.bounds)[:4], np.array(body.surface.bounds)[:4]
+    return bool(np.all(outer[::2] < inner[::2]) and np.all(inner[1::2] < outer[1::2]))
 
 
 def choose(count: int, needed: Sequence[int] = ()) -> list[int]:

@@ -13,7 +13,7 @@ from fsci.run.history import read_history
 
 RUN_CASES = Path(__file__).parents[1] / "setups" / "run_cases.py"
 CASES = sorted(path.parent for path in Path("cases").glob("*/case.yaml"))
-LONG = ("torus_wall_fine",)
+LONG = ("torus_wall_fine", "valve_3d")
 #: what makes the first steps quick without changing what they are about
 SMALLER = {
     "cylinder_2d1": [
@@ -101,7 +101,7 @@ def assert_same(folder, first, second):
 SHORT = ("csm1", "csm2", "cavity", "cook_membrane", "sealed_plate", "cylinder_nested")
 #: tests of their own run them to their end
 WHOLE = ("double_arch", "falling_sphere", "ironing", "piston_impact", "rebound_stokes", "sphere_tube", "two_tori")
-WHOLE += ("valve", "valve_thin")
+WHOLE += ("valve", "valve_thin", "valve_3d")
 #: earlier ends [s]: two of three maxima, one of four periods
 EARLIER = {"flap": 2.6, "cavity_flexible_bottom": 56.0}
 VERIFIED = [folder.name for folder in CASES if folder.name not in (*LONG, *WHOLE, "fsi3")]

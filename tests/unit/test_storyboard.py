@@ -10,7 +10,7 @@ import pytest
 from fsci.plot.picture import look_at, plot_run
 from fsci.plot.render import import_pyvista
 from fsci.plot.render_flow import connect, load_meshes, load_state, slice_plane
-from fsci.plot.storyboard import arrange, choose, plane_state
+from fsci.plot.storyboard import arrange, choose, plane_state, reaches_around
 from fsci.run.output import FieldWriter
 from solvers.api import Snapshot
 
@@ -157,3 +157,21 @@ def test_where_a_box_is_cut():
     assert slice_plane(box, [sphere]) == ("y", pytest.approx([2, 1, 4]))
     assert slice_plane(box, [half]) == ("y", pytest.approx([2, 0, 4], abs=1e-5))
     assert slice_plane(box, [half.translate((0, 1.8, 0))]) == ("y", pytest.approx([2, 2, 4]))
+
+
+def test_the_wall_of_a_tube_does_not_hide_what_is_in_it(tmp_path):
+    """Of a rigid body around the flow the part in the box behind the slice remains; other bodies stay whole."""
+    pyvista = import_pyvista()
+    box = pyvista.ImageData(dimensions=(5, 5, 5)).cast_to_unstructured_grid()  # 4 x 4 x 4
+    box.cell_data["fluid_fraction"] = np.ones(box.n_cells)
+    box.point_data["velocity"] = np.zeros((box.n_points, 3))
+    wall = pyvista.Cylinder(center=(2, 2, 2), direction=(0, 0, 1), radius=2.5, height=5).triangulate()
+    paths = [tmp_path / name for name in ("flow.vtu", "wall.vtu", "ball.vtu")]
+    for path, mesh in zip(paths, [box, wall, pyvista.Sphere(radius=1, center=(2, 2, 2))], strict=True):
+        mesh.cast_to_unstructured_grid().save(path)
+    for parts in (load_state(paths, "velocity"), load_meshes(paths)):
+        around, ball = (np.array(part.surface.bounds) for part in parts[-2:])
+        assert ball == pytest.approx([1, 3, 1, 3, 1, 3], abs=0.01)
+        assert around == pytest.approx([0, 4, 3.5, 4, 0, 4], abs=0.01)
+    flow, *bodies = plane_state(paths)[0]
+    assert [reaches_around(body, flow) for body in bodies] == [True, False]
