@@ -305,3 +305,35 @@ def test_two_processes(tmp_path, element):
         found.append([history[name][-1] for name in COLUMNS])
     assert np.allclose(found[1], found[0], rtol=1e-8, atol=1e-10)
     assert abs(found[0][-1]) < 1e-12
+
+
+PARTING = """\
+time: {step: 0.05, end: 0.2}
+fluid:
+  density: 1
+  viscosity: 0.1
+  scheme: SCHEME
+  grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
+  patches:
+    ends: {on: [x-, x+, y+], outflow: true}
+    bottom: {on: y-, no_slip: true}
+  bodies:
+    left: {mesh: {shape: rectangle, size: [0.03, 0.9], cells: [1, 9], origin: [0.913, -0.2]}}
+    right:
+      mesh: {shape: rectangle, size: [0.03, 0.9], cells: [1, 9], origin: [0.938, -0.2]}
+      motion: {displacement: ["0.4*max(t-0.1,0)", 0]}
+probes:
+  flow: {quantity: flow_rate, through: ends}
+"""
+
+
+@pytest.mark.parametrize("scheme", ["backward_euler", "bdf2"])
+def test_plates_that_lie_on_each_other_and_part(tmp_path, scheme):
+    """No fluid has been between them: it begins with their velocity. It comes in at the top, none through the box."""
+    (tmp_path / "case.yaml").write_text(PARTING.replace("SCHEME", scheme))
+    done = fsci("run", tmp_path, "-o", tmp_path / "out")
+    assert done.returncode == 0, done.stdout + done.stderr
+    history = read_history(tmp_path / "out" / "history.csv")
+    assert len(history["time"]) == 4  # no step is repeated
+    assert abs(history["flow"][-1]) < 1e-9
+    assert np.abs(history["fluid.mass"]).max() < 1e-9

@@ -20,6 +20,7 @@ class Carrier:
     new: Unknowns
     velocity: sparse.csr_matrix  #: of all nodes of the velocity, `FlowNodes.consecutive`, shape (new, old)
     pressure: sparse.csr_matrix
+    walls: Array | None = None  #: velocity [m/s] of surfaces beside nodes, shape (new, dim), nan where there is none
 
     def velocities(self, values: Array) -> Array:
         """Transferred values at local velocity dofs."""
@@ -32,13 +33,20 @@ class Carrier:
         return _carry(self.pressure, self.old.pressure, self.new.pressure, values, out, self.new)
 
     def past(self, past: Past) -> Past:
-        """Transferred velocities of an earlier time; found where all velocities exist that a value depends on."""
+        """Transferred velocities of an earlier time; found where all velocities exist that a value depends on.
+
+        Fluid between surfaces that have just parted was not there at that time: it has the velocity of these walls.
+        """
         unknown = (~past.found & self.old.velocity_mask).astype(float)
         known = np.diff(self.velocity.indptr) > 0
         lost, nodes = np.zeros(self.new.local), self.new.velocity
         found = _carry(abs(self.velocity), self.old.velocity, nodes, unknown, lost, self.new) == 0.0
         found[nodes.dofs] &= known[nodes.consecutive][:, None]
-        return Past(self.velocities(past.velocity), found)
+        velocity = self.velocities(past.velocity)
+        if self.walls is not None:
+            at = ~known[nodes.consecutive] & np.isfinite(self.walls[nodes.consecutive]).all(axis=1)
+            velocity[nodes.dofs[at]], found[nodes.dofs[at]] = self.walls[nodes.consecutive[at]], True
+        return Past(velocity, found)
 
 
 def _carry(

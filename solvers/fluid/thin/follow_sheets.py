@@ -29,7 +29,7 @@ def follow_sheets(fluid: ExchangedFlow, sheets: Sheets | None, facets: NDArray[n
         fluid.grid.sheets = sheets
         return
     fluid.discretise(sheets)
-    carry = Carrying(fluid.unknowns, facets, motion.x)
+    carry = Carrying(fluid.unknowns, facets, motion)
     carrier = carry(old, now)
     fluid.flow[:] = carrier.flow(flow)
     fluid.increment = carrier.flow(np.pad(increment, (0, old.local - old.owned)))[: fluid.unknowns.owned]

@@ -142,25 +142,31 @@ class Began:
 
 
 class Carrying:
-    """Transfers to the unknowns of new sheets, around facets with vertices now at x [m].
+    """Transfers to the unknowns of new sheets, around facets with this motion now.
 
     What the new sheets need for it is found once, for any number of transfers and, with `q1q1`, for velocity and
     pressure, whose nodes are the same.
     """
 
-    def __init__(self, new: Unknowns, facets: NDArray[np.int64], x: Array):
-        after = new.grid.sheets
+    def __init__(self, new: Unknowns, facets: NDArray[np.int64], motion: Motion):
+        after, x = new.grid.sheets, motion.x
         assert after is not None
-        self._new, self._after = new, after
+        self._new, self._after, self._of_facets = new, after, motion.v[facets].mean(axis=1)
         cell = max(float(cell_sizes_at(edge, x[:, axis]).max()) for axis, edge in enumerate(after.grid.edges))
         self._along = cache(lambda: along_surface(facets, x, cell))
         self._sides = cache(lambda degree: sides_of(after, degree, self._along()))
 
     def __call__(self, old: Unknowns, before: Sheets | None) -> Carrier:
         """The transfer from old unknowns; before: their sheets, None: nodes of the box."""
-        degrees = (self._new.degree, 1)
-        matrices = {degree: self._matrix(before, degree) for degree in set(degrees)}
-        return Carrier(old, self._new, *(matrices[degree] for degree in degrees))
+        degree = self._new.degree
+        matrices = {one: self._matrix(before, one) for one in {degree, 1}}
+        return Carrier(old, self._new, matrices[degree], matrices[1], self._walls())
+
+    def _walls(self) -> Array:
+        """Mean velocity of the facets that each node of the velocity sees, nan where it sees none."""
+        seen = self._sides(self._new.degree).of_nodes
+        with np.errstate(invalid="ignore"):
+            return np.asarray(seen @ self._of_facets) / np.asarray(seen.sum(axis=1))
 
     def _matrix(self, before: Sheets | None, degree: int) -> sparse.csr_matrix:
         if before is not None:
