@@ -41,8 +41,8 @@ MODULES        := .venv/modules.txt
 # DOLFINx was compiled against the numpy that came with it, and needs its generation.
 NUMPY_OF_DOLFINX := $(BIN)/python -c 'import numpy; print("numpy<2" if numpy.__version__ < "2" else "numpy")'
 KERNEL_SOURCES := $(wildcard solvers/kernels/CMakeLists.txt solvers/kernels/*.hpp solvers/kernels/*.cpp solvers/kernels/*.map)
-VERSION_TESTS  := fem versions lagged linear moments_kernel mortar_kernel mortar_derivatives structure_patch fluid_patch \
-  contact_patch contact_system contact_run contact_friction coupling_bar coupling_blocks coupled_run
+VERSION_TESTS  := fem versions lagged linear moments_kernel mortar_kernel nodal_normals mortar_derivatives structure_patch \
+  fluid_patch contact_patch contact_system contact_run contact_friction coupling_bar coupling_blocks coupled_run
 INSTALL        := $(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation
 
 .PHONY: setup demo test test-slow test-versions test-debian13 coverage lint bench docs links clean FORCE

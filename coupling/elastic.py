@@ -14,6 +14,7 @@ from coupling.wetted import WettedSurface
 from solvers.api import Array, State, StepInfo
 from solvers.rows import RowTransformation, TakenRows, gather_at
 from solvers.structure.field import Structure
+from solvers.structure.saved import from_bodies, per_body
 from solvers.vertices import VertexJacobian
 
 
@@ -166,12 +167,12 @@ class Elastic:
     def save(self) -> State:
         """All states have three displacements of the predictor, so that they have the same parts."""
         displacements = [*self.predictor.displacements, *[self.structure.now.u] * 3][:3]
-        by_name: State = {str(i): self.structure.per_body(u) for i, u in enumerate(displacements)}
+        by_name: State = {str(i): per_body(self.structure, u) for i, u in enumerate(displacements)}
         return self.structure.save() | {"predictor": by_name | {"times": list(self.predictor.times)}}
 
     def restore(self, state: State) -> None:
         self.structure.restore(state)
         saved, self.predictor.times = state["predictor"], list(state["predictor"]["times"])
         self.predictor.displacements = [
-            self.structure.from_bodies(saved[str(i)]) for i in range(len(self.predictor.times))
+            from_bodies(self.structure, saved[str(i)]) for i in range(len(self.predictor.times))
         ]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array
@@ -28,6 +29,12 @@ class Layout:
     def start(self) -> int:
         """Global number of the first owned dof (collective)."""
         return self.comm.exscan(self.size) or 0  # type: ignore[attr-defined]
+
+    def among_owned(self, dofs: NDArray[np.int64]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+        """(mask of the global dofs that this process owns, their numbers among the owned ones) (collective)."""
+        start = self.start
+        mine = (dofs >= start) & (dofs < start + self.size)
+        return mine, dofs[mine] - start
 
     def split(self, array: Array) -> list[Array]:
         """Views of the blocks of a concatenated owned array."""

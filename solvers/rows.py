@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array
-from solvers.kernels import other_rows
+from solvers.kernels import changed_rows
 from solvers.petsc_blocks import entry_rows, quick_to_multiply
 from solvers.sparse import Sparse, sparse, sparse_from_entries, stack
 
@@ -120,7 +120,7 @@ def change_rows(matrix: PETSc.Mat, own: Sparse, b: PETSc.Vec, changes: RowChange
     new = stack([changes.replaced_rows[replace], more[some]])
     changed = np.concatenate([replaced, added[some]]).astype(np.int32)
     rows = own.indptr, own.indices, own.data
-    total = other_rows(*rows, changed, len(replaced), new.indptr, new.indices, new.data)
+    total = changed_rows(*rows, changed, len(replaced), new.indptr, new.indices, new.data)
     right = b.array
     right[replaced] = changes.replaced_right[replace]
     right[added] += changes.added_right[add]

@@ -50,17 +50,18 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "mortar": (
         tuple(f"solvers/contact/{name}.py" for name in (
-            "mortar", "slip", "terms", "linearise", "condense", "directions", "merge", "law/coulomb", "law/friction",
-            "law/frictionless", "law/law", "law/tied",
+            "integration", "mortar", "slip", "terms", "linearise", "condense", "directions", "merge", "law/coulomb",
+            "law/friction", "law/frictionless", "law/law", "law/tied",
         )),
         ("contact_system", "contact_patch", "contact_friction", "friction_held", "contact_held", "contact_several",
          "sharp_edges", "tying", "search", "friction_patch", "constants", "self_contact"),
     ),
     "kernels": (
         tuple(f"solvers/kernels/{name}.hpp" for name in (
-            "facet_assembly", "integrals", "dual_basis", "normals", "facet_derivatives", "plane_frame", "clipping",
+            "facet_assembly", "facet_ball", "hidden_masters", "integrals", "dual_basis", "normals", "facet_derivatives",
+            "plane_frame", "clipping",
         )),
-        ("mortar_kernel", "mortar_derivatives", "contact_system"),
+        ("mortar_kernel", "nodal_normals", "mortar_derivatives", "contact_system"),
     ),
 }  # fmt: skip
 

@@ -95,7 +95,7 @@ def outlines(fluid: Fluid, dry_sides: Sequence[DrySide]) -> list[Snapshot]:
     for side in dry_sides:
         if len(edges) == 3:
             continue
-        wet = fluid.cut.motion.x[fluid.vertices_of([side.behind])]
+        wet = fluid.cut.motion.x[fluid.surfaces.vertices_of([side.behind])]
         closing = Closing(side.ends, np.clip(side.corners, low, high), side.facets)
         points, lines = closing.together(wet, surfaces[side.behind].facets)
         found.append(Snapshot(side.name, np.pad(points, ((0, 0), (0, 1))), lines, "line", {}))

@@ -15,16 +15,15 @@ from solvers.contact.constraints import Constraints
 from solvers.contact.directions import admissible, free_normals
 from solvers.contact.force import force_matrix, nodal_force
 from solvers.contact.friction_work import FrictionWork
+from solvers.contact.integration import Integration
 from solvers.contact.interface import ContactInterface, describe_interface
 from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
 from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import ActiveMultipliers, linearise
 from solvers.contact.pair import Pair
 from solvers.contact.redistribute import redistributed
-from solvers.contact.share import Shares
-from solvers.contact.slip import Sliding, Slip
-from solvers.contact.terms import Terms, find_normals, total_terms
-from solvers.contact.ties import Ties
+from solvers.contact.slip import Slip
+from solvers.contact.terms import Terms
 from solvers.rows import RowTransformation
 from solvers.sparse import Sparse, nothing
 
@@ -51,7 +50,7 @@ class Contact:
         keep_overlap: bool = False,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ):
-        self.comm, self.c_n = comm, c_n
+        self.c_n = c_n
         self.names = tuple(names) or tuple(f"pair{i}" for i in range(len(pairs)))
         self.interface: ContactInterface = describe_interface(pairs)
         self.pairs, self.nodes = self.interface.pairs, self.interface.nodes
@@ -72,14 +71,8 @@ class Contact:
         self._stiffness = np.zeros(count)
         self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
         self._shared: Sparse | None = None  # redistribution at the latest evaluation
-        self._shares = Shares(comm)
-        laws = [(mortar, self.interface.law_of(mortar.patch)) for mortar in self.interface.mortars]
-        self._mortars = [mortar for mortar, law in laws if not isinstance(law, Tied)]
         self._tied = np.isin(np.arange(count), [m for law, own in self.interface.laws if law == Tied() for m in own])
-        tied = [mortar for mortar, law in laws if isinstance(law, Tied)]
-        self._ties = Ties(tied, self.multipliers, self.nodes.points, self.interface.unmoved())
-        sliding = [mortar for mortar, law in laws if law.slips]
-        self._sliding = Sliding(sliding, self.multipliers, self._shares, (self.size, self.dim))
+        self._integration = Integration(self.interface, comm)
         self.slip: Slip | None = None  # at the latest evaluation
         self._weight = 1.0  # of the new contact force in the balance
         self.work = FrictionWork((count, self.dim))
@@ -87,8 +80,6 @@ class Contact:
         self.touched_at = np.full(len(self.pairs), np.inf)  #: time of the first contact of each pair [s], set by probes
         self.terms: Terms | None = None
         self._D, self._covers = np.zeros(count), np.zeros(count, dtype=bool)  # at the latest evaluation
-        self._travel = 0.0  # sum over evaluations of the largest motion of a node [m]
-        self._idle = False  # the latest evaluation found no facet pairs
         self._condensation: tuple[list[ActiveMultipliers], Linearised, Condensed] | None = None  # the latest
 
     # ------------------------------------------------------------------------------------------------- steps
@@ -99,7 +90,7 @@ class Contact:
         self._stiffness = np.divide(at_node, areas, out=np.zeros_like(areas), where=areas > 0.0)
         self.x = self.positions(u, t)
         self.x_old = self.x.copy()
-        self._search_anew()
+        self._integration.search_anew()
         self._constraints.start(self.x)
 
     def positions(self, u: Array, t: float) -> Array:
@@ -117,10 +108,7 @@ class Contact:
             self._kept = np.minimum(0.0, self._mean_gap)
         self._constraints.begin_step()
         self.active_set.begin_step()
-        self._shares.begin_step()
-        for mortar in self._mortars:
-            mortar.begin_step(self.active_set.active)
-        self._sliding.begin_step(self.x, self._travel)
+        self._integration.begin_step(self.x, self.active_set.active)
         self.slip = None
 
     def begin_solve(self) -> None:
@@ -129,7 +117,7 @@ class Contact:
 
     def end_step(self, weight: float) -> None:
         """Accept the step; weight: that of the contact force at its end in the balance."""
-        if self._sliding.mortars or self._ties.pieces:
+        if self._integration.has_slip:
             self.work.end_step(weight, *self._force_and_slip())
         self.slip = None
 
@@ -149,11 +137,11 @@ class Contact:
     def evaluate(self, u: Array, t: float) -> None:
         """Compute mortar terms and active set at displacements u [m], shape (N, dim), and the time t [s]."""
         x = self.positions(u, t)
-        self._travel += float(np.abs(x - self.x).max(initial=0.0))
+        self._integration.move(x - self.x)
         self.x, self.time = x, t
-        if self._idle and self._all_clear():
+        if self._integration.clear:
             return
-        self.terms = self._evaluate_mortars()
+        self.terms = self._integrate()
         status = np.full(len(self.z), OPEN, dtype=np.int8)
         self._gap = np.zeros(len(self.z)) if self.terms is None else self._redistributed(self.terms.gap)
         self._mean_gap = np.zeros(len(self.z))
@@ -165,17 +153,17 @@ class Contact:
             self._drop_dependent(status)
         self.active_set.choose(status, x[self.multipliers.node])
         self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
-        self._idle = self.terms is None
 
-    def _all_clear(self) -> bool:
-        """Whether no facets can be near: the clearance of the last search exceeds the motion since then."""
-        return not self._ties.pieces and all(self._travel < mortar.clear_until for mortar in self._mortars)
-
-    def _search_anew(self) -> None:
-        """Require a search in the next evaluation."""
-        self._idle, self._travel = False, 0.0
-        for mortar in self._mortars:
-            mortar.clear_until = -np.inf
+    def _integrate(self) -> Terms | None:
+        """Mortar terms, slip and multipliers with a constraint at the present positions; None if no facets are near."""
+        found = self._integration.integrate(self.x, self.x_old, self.z)
+        if found is None:
+            return None
+        constrained = self._constraints.choose(found.terms)
+        self._covers, self._shared = constrained.covers, constrained.shared
+        self._spans, self.merged = constrained.spans, constrained.merged
+        self.slip = self._integration.slip(self.x, found, self._shared)
+        return constrained.terms
 
     def point(self, which: NDArray[np.int64]) -> Point:
         """The arguments of a law for some multipliers."""
@@ -209,52 +197,6 @@ class Contact:
 
     def _redistributed(self, rows):
         return redistributed(rows, self._shared)
-
-    def _evaluate_mortars(self) -> Terms | None:
-        """Terms of all pairs; each process integrates its share of the slave facets. None if no facets are near."""
-        near = [mortar.near(self.x, self.x_old, self._travel) for mortar in self._mortars]
-        if not self._ties.pieces and all(len(facet_pairs) == 0 for facet_pairs, _ in near):
-            return None
-        normals = find_normals(self.multipliers, self.x, self._near_nodes([pairs for pairs, _ in near]))
-        pieces, met, work = [], bool(self._ties.pieces), np.zeros((2, self.comm.size))
-        for index, (mortar, (facet_pairs, motion)) in enumerate(zip(self._mortars, near, strict=True)):
-            if len(facet_pairs) == 0:
-                continue
-            at = normals.at(self.multipliers, mortar.patch)
-            mine = self._shares.mine(index, facet_pairs, len(mortar.facets))
-            found = mortar.evaluate(self.x, *at, mine, motion, self.z[mortar.patch.multipliers])
-            all_used = self._shares.together(found.used)
-            mortar.keep(all_used)
-            work += self._shares.measure(index, facet_pairs, all_used, len(mortar.facets))
-            met |= bool(self._shares.combine(index, found.area).any())
-            pieces.append((mortar, found))
-        self._shares.note(work)
-        if not met:
-            return None
-        pieces += self._ties.pieces if self.comm.rank == 0 else []
-        terms = total_terms(pieces, normals, self._shares, (len(self.pairs), len(self.z), self.size))
-        constrained = self._constraints.choose(terms)
-        terms, self._covers, self._shared = constrained.terms, constrained.covers, constrained.shared
-        self._spans, self.merged = constrained.spans, constrained.merged
-        if self._sliding.mortars:
-            used = [(mortar, found.used) for mortar, found in pieces]
-            self.slip = self._sliding.evaluate(self.x, normals, used, self._redistributed)
-        if self._ties.pieces:
-            tied = self._ties.slip(self.x, self._shared)
-            self.slip = tied if self.slip is None or not self._sliding.mortars else self.slip.plus(tied)
-        return terms
-
-    def _near_nodes(self, near: Sequence[NDArray[np.int32]]) -> list[NDArray[np.bool_] | None]:
-        """For each patch, mask of the nodes of slave facets that are near; None where a surface is tied."""
-        found: list[NDArray[np.bool_] | None] = []
-        tied = [mortar.patch for mortar, _ in self._ties.pieces]
-        for patch in self.multipliers.patches:
-            mask = np.zeros(len(patch.nodes), dtype=bool)
-            for mortar, facet_pairs in zip(self._mortars, near, strict=True):
-                if mortar.patch is patch:
-                    mask[mortar.facets[facet_pairs[:, 0]]] = True
-            found.append(None if any(patch is other for other in tied) else mask)
-        return found
 
     # ---------------------------------------------------------------------------- forces, laws and condensation
 
@@ -366,7 +308,7 @@ class Contact:
             "contact.active": float(len(set(self.multipliers.node[self.active_set.active & ~self._tied].tolist()))),
             "contact.changes": float(self.active_set.changes),
         }
-        if self._sliding.mortars:
+        if self._integration.slides:
             found["contact.sticking"] = float(np.sum((self.active_set.status == STICK) & ~self._tied))
             found["contact.friction"] = self.work.total + self.work.of_step(self._weight, *self._force_and_slip())
         for index, name in enumerate(self.names):
@@ -381,7 +323,7 @@ class Contact:
     @property
     def imbalance(self) -> dict[str, float]:
         """Imbalance of the contact work of the processes; see `Shares`."""
-        return self._shares.imbalance
+        return self._integration.shares.imbalance
 
     def mean_gap(self) -> Array:
         """Mean gap [m] at each multiplier, NaN where too little area is covered, shape (C,)."""
@@ -401,7 +343,7 @@ class Contact:
         }
 
     def restore(self, state: State) -> None:
-        self._search_anew()
+        self._integration.search_anew()
         self.z[:] = state["z"]
         self.x[:] = state["x"]
         self._mean_gap = state["mean_gap"].copy()

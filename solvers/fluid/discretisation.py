@@ -1,4 +1,4 @@
-"""The discretisation of a flow: grid, unknowns and equations, which change when thin bodies move to other cells."""
+"""The discretisation of a flow: grid, unknowns and equations, all made anew when its cells change."""
 
 from __future__ import annotations
 
@@ -12,10 +12,12 @@ from solvers.fluid.background.grid import DistributedGrid, Grid
 from solvers.fluid.background.nested import Nested
 from solvers.fluid.background.partition import partition
 from solvers.fluid.background.space import Unknowns
+from solvers.fluid.behind import BehindWalls
 from solvers.fluid.bodies.immersed import ImmersedBody
 from solvers.fluid.bodies.surface import by_facets, may_close, seeping
 from solvers.fluid.boundary.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.cutting.cut import Cutter
+from solvers.fluid.cutting.pressure_level import PressureLevels
 from solvers.fluid.films.film import films_of
 from solvers.fluid.films.gaps import gap_finder
 from solvers.fluid.flow_settings import FlowSettings
@@ -26,13 +28,15 @@ from solvers.solver_settings import SolverSettings
 
 @dataclass(frozen=True)
 class Discretisation:
-    """A distributed grid with unknowns, conditions on its boundary, the cutter, and the system of equations."""
+    """A distributed grid with unknowns, equations, and what belongs to these unknowns."""
 
     grid: DistributedGrid
     unknowns: Unknowns
     boundary: Boundary
     system: FlowSystem
     cutter: Cutter
+    levels: PressureLevels
+    behind: BehindWalls | None  #: bounds on second-degree velocities behind moving walls
     methods: tuple[linear.FlowMethod, ...]  #: linear solvers, the usual one first
 
 
@@ -81,4 +85,7 @@ def discretise(
     in_contact = any(surface.in_contact is not None and surface.in_contact.any() for surface in surfaces)
     unions = grid.dim == 2 and sheets is None and len(bodies) > 1 and not in_contact
     cutter = Cutter(distributed, system.weights.points, films, gaps, unions=unions)
-    return Discretisation(distributed, unknowns, boundary, system, cutter, methods)
+    levels = PressureLevels(system, bodies)
+    moved = not settings.steady and not all(body.rests for body in bodies)
+    behind = BehindWalls(unknowns) if moved and settings.degree == 2 and sheets is None else None
+    return Discretisation(distributed, unknowns, boundary, system, cutter, levels, behind, methods)

@@ -13,7 +13,6 @@ from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers import fem, linear
@@ -22,31 +21,29 @@ from solvers.fluid.background.following import Following
 from solvers.fluid.background.grid import Grid
 from solvers.fluid.background.space import set_velocity
 from solvers.fluid.balances import Balances
-from solvers.fluid.behind import BehindWalls
+from solvers.fluid.bodies.all_surfaces import AllSurfaces
 from solvers.fluid.bodies.fast_bodies import FastBodies
 from solvers.fluid.bodies.immersed import ImmersedBody, sheets_of
-from solvers.fluid.bodies.reach import require_finest, require_history, require_within_period, strip_layers
-from solvers.fluid.bodies.surface import Motion, together, vertex_ranges, wetness
+from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.boundary.patches import Patch, periodic_axes
 from solvers.fluid.closed_contact.zone_entries import with_zone
 from solvers.fluid.coupling_entries import InterfaceEntries, interface_entries
 from solvers.fluid.cutting.cut import Cut
-from solvers.fluid.cutting.pressure_level import PressureLevels
 from solvers.fluid.discretisation import discretise
 from solvers.fluid.flow_settings import FlowSettings
+from solvers.fluid.follow_surfaces import follow_surfaces
 from solvers.fluid.history import History
+from solvers.fluid.kept_tangent import KeptTangent
 from solvers.fluid.linear_systems.krylov import FlowSolver, SolverSequence
 from solvers.fluid.regrid import follow_bodies
 from solvers.fluid.saved import restore_state, saved_state
 from solvers.fluid.steady_iteration import SteadyIteration
 from solvers.fluid.system import FlowSystem
-from solvers.fluid.thin.follow_sheets import follow_sheets
 from solvers.fluid.thin.sheets import Sheets
 from solvers.fluid.thin.thin_bodies import Began, ThinBodies
 from solvers.fluid.time_scheme import STEADY, FlowStep
 from solvers.largest import position_of_largest
 from solvers.newton import converge
-from solvers.rounding import rounding_error
 from solvers.solver_settings import SolverSettings
 from solvers.timing import Timer
 
@@ -79,7 +76,7 @@ class Fluid:
         self.steady, self.scheme = settings.steady, settings.time  #: steps are steady states; the time scheme
         self.linear_tolerance = solver.linear_tolerance
         self.notes: list[str] = []  #: notes to the user on this step
-        self.renewals = 0  #: count of discretisations: one, and one for each change of cells by thin bodies
+        self.renewals = 0  #: count of discretisations: one, and one for each change of cells
         self.discretise(sheets)
         self.history = History(settings.time, self.unknowns.local)
         self.current = FlowStep(0.0, 0.0, STEADY)  #: the step that is computed now or was last
@@ -91,36 +88,27 @@ class Fluid:
         self.started = False  #: a step was accepted, hence forces exist
         self.smallest_cell = min(float(np.diff(edge).min()) for edge in grid.edges)
         self.motions: list[Motion] = []
-        surfaces = [body.surface for body in self.bodies]
-        self._wet, self._vertices = wetness(surfaces), vertex_ranges(surfaces)
-        self._wet_on_sheets = wetness(surfaces, unions=True)
+        self.surfaces = AllSurfaces([body.surface for body in self.bodies], self.dim)
         self._fast_bodies = FastBodies(grid)
         self.linear_iterations = 0  #: of the last linear system
         self.steady_iteration = SteadyIteration()
 
     def discretise(self, sheets: Sheets | None) -> None:
-        """Create grid, unknowns and equations, with separate cells for the fluid on each side of thin bodies."""
+        """Create grid, unknowns and equations; sheets: separate cells on each side of thin bodies, None: none."""
         settings = self.settings
         in_gaps = self.system.gaps if self.renewals else None
         parts = discretise(self.comm, self.box, sheets, settings, self._patches, self.bodies, self.solver)
         self.grid, self.unknowns, self.boundary = parts.grid, parts.unknowns, parts.boundary
-        self.system, self.cutter = parts.system, parts.cutter
+        self.system, self.cutter, self.levels, self._behind = parts.system, parts.cutter, parts.levels, parts.behind
         if in_gaps is not None and self.system.gaps is not None:
             self.system.gaps.memory = in_gaps.memory
         self.size = owned = self.unknowns.owned  #: unknowns that this process owns
         if not self.renewals or parts.methods != self.sequence.methods:
             self.sequence: SolverSequence = SolverSequence(self.comm, parts.methods, self.dofs(), self.notes.append)
         self.linear_solver = FlowSolver(self.unknowns, self.sequence, self.linear_tolerance, steady=settings.steady)
-        self.rounding: Array | None = None  #: rounding error of `residual_rows`; None before this step linearises
-        self._prepared: PETSc.Mat | None = None  #: tangent at the present iterate, if it is assembled already
-        self._tangent: PETSc.Mat | None = None  #: that of the last iterate
+        self._tangent = KeptTangent(self.system)
         self.held = np.zeros(owned, dtype=bool)  #: owned dofs with rows of the identity
-        self._held_in_tangent = self.held  #: those of the last tangent
-        self.levels = PressureLevels(self.system, self.bodies)
-        moved = not settings.steady and not all(body.rests for body in self.bodies)
-        bounds = moved and settings.degree == 2 and sheets is None
-        self._behind: BehindWalls | None = BehindWalls(self.unknowns) if bounds else None
-        self.residual_rows, self.increment, self._diagonal = (np.zeros(owned) for _ in range(3))
+        self.residual_rows, self.increment = np.zeros(owned), np.zeros(owned)
         self._balances: Balances | None = None
         self.renewals += 1
 
@@ -173,7 +161,7 @@ class Fluid:
         if self.following is not None:
             follow_bodies(self, self.following, t, dt)
         self.current = FlowStep(t + dt, dt, self.history.difference(dt))
-        if self._behind is not None:
+        if self._behind is not None:  # the first iterate is the history, which is bounded behind walls
             mask = self.unknowns.velocity_mask
             self.flow[mask] = self.history.past[0].velocity[mask]
         self.history.begin_step(self._present_pressure())
@@ -185,9 +173,7 @@ class Fluid:
         self.prescribe(self.current.t)
         self.steady_iteration.begin()
         self._improved = False
-        self.rounding = self._prepared = self._tangent = (
-            None  # not part of the saved state: a resumed run must start alike
-        )
+        self._tangent.begin_step()
         self.linear_solver.begin_step()
         self.notes.clear()
         if not self._coupled:
@@ -213,15 +199,10 @@ class Fluid:
 
         with_pressure: the pressure, too, for first degree. With second degree, that of films follows their height.
         """
-        self.increment = np.zeros(self.unknowns.owned)
-        if self.steady or len(self.history.steps) < 2:
-            return
-        change, continued = self.history.extrapolation(self.current.dt)
-        continued[self.boundary.dofs] = False
         before = self.flow[: self.unknowns.owned].copy()
-        self.flow[continued] += change[continued]
-        if with_pressure and self.settings.degree == 1:
-            self.flow[:] += self.current.dt / self.history.steps[0] * self.history.pressure_change
+        if not self.steady:
+            first_degree, fixed = self.settings.degree == 1, self.boundary.dofs
+            self.history.extrapolate(self.flow, self.current.dt, fixed, with_pressure=with_pressure and first_degree)
         self.increment = self.flow[: self.unknowns.owned] - before
 
     def has_films(self) -> bool:
@@ -234,36 +215,10 @@ class Fluid:
         coupled: motions of the bodies that another field moves, by name; the others move as prescribed.
         with_solid: a monolithic scheme solves the equations of these bodies too, which determine the pressure level of
         closed pockets.
-        Raises StepFailed if surfaces left the strip of cells that have a velocity from earlier steps.
+        Raises StepFailed, see `follow_surfaces`.
         """
-        motions = [coupled[b.surface.name] if b.motion is None else b.motion(self.current.t) for b in self.bodies]
-        self.motions = motions
-        with self.timer("cut"):
-            facets, motion = together([body.surface for body in self.bodies], motions, self.dim)
-            follow_sheets(self, self.thin.sheets(facets, motion), facets, motion)
-            if self.settings.steady and self.steady_iteration.scales_follow:
-                # roots belong to the final position of the bodies, not to the initial one
-                self.cutter.begin_step()
-                self.system.forget_roots()
-            wet = self._wet if self.grid.sheets is None else self._wet_on_sheets
-            cut = self.cutter(facets, motion, self._layers(motion), wet)
-            require_finest(self.cutter, self.comm)
-        with self.timer("weights"):
-            self.system.set_cut(cut)
-            require_history(self.unknowns, cut, self.history.missing(self.current.difference))
-            require_within_period(self.unknowns, cut)
-            self.flow[~self.system.active_dofs] = 0.0
-            if self.unknowns.hanging is not None:
-                self.unknowns.share(self.system.flow)
-            self.held = self.system.held()
-            self.levels.hold(self.held, set_by_solids=with_solid and not self.settings.steady)
-
-    def _layers(self, motion: Motion) -> int:
-        """Number of cell layers behind the surface that the next steps may uncover; none around thin bodies."""
-        if self.thin.follows or self.settings.steady or all(body.rests for body in self.bodies):
-            return 0
-        times = self.settings.time.times
-        return strip_layers(self.grid, motion, times * self.current.dt, self.smallest_cell)
+        self.motions = [coupled[b.surface.name] if b.motion is None else b.motion(self.current.t) for b in self.bodies]
+        follow_surfaces(self, with_solid=with_solid)
 
     def solve(self) -> StepInfo:
         """Newton's method to the tolerance. Raises StepFailed."""
@@ -287,7 +242,7 @@ class Fluid:
         found = self.system.active_dofs | self.system.dofs_of(self.cut.contact_cells)
         velocity = self.velocity()
         if self._behind is not None:
-            velocity = self._behind.bounded(velocity, self.cut, self._wet)
+            velocity = self._behind.bounded(velocity, self.cut, self.surfaces.wet)
         self.history.end_step(self.current.dt, velocity, found, self._present_pressure())
         self.forget_step()
         self.started = True
@@ -321,9 +276,7 @@ class Fluid:
 
         keep: use the tangent of the last iterate if the same unknowns are held and the flow is unsteady.
         """
-        if self._tangent is None or not (keep and self.keeps_tangent()):
-            self._tangent = self._prepared or self.linearise()
-        matrix, self._prepared = self._tangent, None
+        matrix = self._tangent.of_increment(self.linearise, keep=keep and self.keeps_tangent())
         b, x = matrix.createVecs()
         b.array[:] = self.right_side()
         try:
@@ -337,19 +290,13 @@ class Fluid:
 
     def keeps_tangent(self) -> bool:
         """Whether the last tangent has its rows of the identity where this iterate has them (collective)."""
-        same = self.comm.allreduce(bool(np.array_equal(self.held, self._held_in_tangent)), op=MPI.LAND)
-        return same and not self.steady
+        return self.comm.allreduce(self._tangent.holds(self.held), op=MPI.LAND) and not self.steady
 
     def linearise(self) -> PETSc.Mat:
         """The tangent at the present iterate; held rows are those of the identity. The next call overwrites it."""
-        self._held_in_tangent = self.held.copy()
         with self.timer("assembly"):
             picard = self.settings.steady and self.settings.convection and self.steady_iteration.far
-            matrix = self.system.tangent(self.held, picard=picard)
-        self._diagonal = np.abs(matrix.getDiagonal().array)
-        # an entry is a sum over the 2^dim cells at a node, whose terms may cancel
-        self.rounding = 2.0**self.dim * rounding_error(matrix, self.rounded())
-        return matrix
+            return self._tangent.linearise(self.held, self.rounded(), picard=picard)
 
     def right_side(self) -> Array:
         """Right-hand side for the increment of owned dofs: minus the residual."""
@@ -363,8 +310,8 @@ class Fluid:
         """Add an increment of the owned dofs; returns its norm relative to that of the flow."""
         self.increment, self._improved = increment.copy(), True
         self._add(self.increment)
-        size = self._norm(self._diagonal * self.flow[: self.unknowns.owned])
-        return self._norm(self._diagonal * self.increment) / size if size > 0.0 else 0.0
+        size = self._norm(self._tangent.diagonal * self.flow[: self.unknowns.owned])
+        return self._norm(self._tangent.diagonal * self.increment) / size if size > 0.0 else 0.0
 
     def multigrid(self, matrix: PETSc.Mat) -> PETSc.PC:
         """A multigrid cycle for the tangent; the next call overwrites it (collective)."""
@@ -397,15 +344,11 @@ class Fluid:
 
     def add_rounding(self, error: Array) -> None:
         """Add rounding errors at owned dofs that another field causes in these equations; call it after `linearise`."""
-        assert self.rounding is not None
-        self.rounding = self.rounding + error
+        self._tangent.add_rounding(error)
 
     def round_off(self) -> float:
         """Norm [N] of the rounding error of the residual, at the iterate that this step linearised last."""
-        if self.rounding is None:
-            self._prepared = self.linearise()
-        assert self.rounding is not None
-        return self._norm(np.where(self.held, 0.0, self.rounding))
+        return self._norm(np.where(self.held, 0.0, self._tangent.rounding_error(self.linearise)))
 
     def worst(self) -> tuple[float, ...] | None:
         """Position [m] of the node with the largest momentum residual (collective)."""
@@ -415,21 +358,15 @@ class Fluid:
 
     # ---------------------------------------------------------------------------------------------- reactions
 
-    def vertices_of(self, names: Sequence[str]) -> NDArray[np.int64]:
-        """Numbers of the vertices of some bodies among those of all, in the order of the names."""
-        parts = [self._vertices[name] for name in names]
-        return np.concatenate([np.arange(part.start, part.stop, dtype=np.int64) for part in parts])
-
     def force(self) -> dict[str, Array]:
         """Force [N] (per depth in 2D) of the fluid on the vertices of each body, shape (n, dim) (collective)."""
-        total = self.system.surface_force()
-        return {name: total[part] for name, part in self._vertices.items()}
+        return self.surfaces.by_name(self.system.surface_force())
 
     def interface_entries(self, surfaces: Sequence[str]) -> InterfaceEntries:
         """Derivatives of rows and force by the motion of some bodies (collective)."""
         mark = np.pad(self.held.astype(float), (0, self.unknowns.local - self.unknowns.owned))
         held = fem.share_owned(self.unknowns.space, mark) > 0.5  # of ghosts too
-        operator, vertices = self.system.interface, self.vertices_of(surfaces)
+        operator, vertices = self.system.interface, self.surfaces.vertices_of(surfaces)
         alpha, shape = self.current.difference.alpha, self.system.shape_derivatives(improved=self._improved)
         found = interface_entries(operator, self.unknowns, self.flow, alpha, held, vertices, shape)
         zone = self.system.zone

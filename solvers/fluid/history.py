@@ -66,10 +66,20 @@ class History:
         """Keep the pressure [Pa] at the beginning of a step, at local dofs, zero where there is none."""
         self._pressure = pressure
 
-    def extrapolation(self, dt: float) -> tuple[Array, Mask]:
-        """Change of the velocity [m/s] in a next step of length dt [s], by the last one, and where both have one."""
+    def extrapolate(self, flow: Array, dt: float, fixed: NDArray[np.int64], *, with_pressure: bool) -> None:
+        """Predictor: extrapolate linearly from the last two steps, where both have a velocity.
+
+        flow: velocity [m/s] and pressure [Pa] at local dofs, changes in place; dt: length of the next step [s]; fixed:
+        dofs that keep their velocity.
+        """
+        if len(self.steps) < 2:
+            return
         old, older = self.past[:2]
-        return dt / self.steps[0] * (old.velocity - older.velocity), old.found & older.found
+        continued = old.found & older.found
+        continued[fixed] = False
+        flow[continued] += (dt / self.steps[0] * (old.velocity - older.velocity))[continued]
+        if with_pressure:
+            flow += dt / self.steps[0] * self.pressure_change
 
     def forget_pressure(self, size: int) -> None:
         """Drop the pressure of earlier unknowns, because there are others: `size` local dofs."""

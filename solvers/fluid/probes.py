@@ -236,7 +236,7 @@ class Forces:
         """Probe of the force [N] on a body (None: on all), or of its moment [N m] about a point (None: the origin)."""
         fluid = self.fluid
         names = [body] if body is not None else [b.surface.name for b in fluid.bodies]
-        vertices = fluid.vertices_of(names)
+        vertices = fluid.surfaces.vertices_of(names)
         centre = np.zeros(fluid.dim) if about is None else np.asarray(about, dtype=float)
 
         def measure() -> dict[str, float]:

@@ -335,7 +335,7 @@ class FlowSystem:
         penalty = self.matrix.penalty
         return rows.copy() if penalty is None else rows + penalty.times(self.flow.x.array[:owned])
 
-    def tangent(self, identity: Array, *, picard: bool) -> PETSc.Mat:
+    def tangent(self, identity: NDArray[np.bool_], *, picard: bool) -> PETSc.Mat:
         """d(residual)/d(flow), with rows of the identity at the marked owned dofs; the next call overwrites it.
 
         picard: u . grad u is linearised without its second term, about the velocity of `set_scales`.

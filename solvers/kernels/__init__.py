@@ -8,6 +8,7 @@ from ._kernels import (
     Moments,
     MortarResult,
     basis_transformation,
+    changed_rows,
     coarse_pattern,
     coarse_product,
     divide_cells,
@@ -16,7 +17,6 @@ from ._kernels import (
     nodal_normals,
     nodal_tangents,
     node_blocks,
-    other_rows,
     spread_blocks,
     surface_rows,
 )

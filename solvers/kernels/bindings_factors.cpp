@@ -1,5 +1,5 @@
-// Python names of block_factors.hpp, block_product.hpp, node_blocks.hpp and other_rows.hpp: BlockFactors, BlockProduct,
-// node_blocks, spread_blocks, other_rows.
+// Python names of block_factors.hpp, block_product.hpp, changed_rows.hpp and node_blocks.hpp: BlockFactors,
+// BlockProduct, changed_rows, node_blocks, spread_blocks.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
@@ -16,8 +16,8 @@
 
 #include "block_factors.hpp"
 #include "block_product.hpp"
+#include "changed_rows.hpp"
 #include "node_blocks.hpp"
-#include "other_rows.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -122,9 +122,8 @@ void spread(const Numbers& start, const Blocks& blocks, const Result& entries, d
     else node_blocks::spread<3>(nodes, start.data(), blocks.data(), factor, entries.data());
 }
 
-nb::object other_rows(const Numbers& start, const Numbers& columns, const Vector& values, const Numbers& rows,
-                      std::size_t replaced, const Numbers& new_start, const Numbers& new_columns,
-                      const Vector& new_values) {
+nb::object change(const Numbers& start, const Numbers& columns, const Vector& values, const Numbers& rows,
+                  std::size_t replaced, const Numbers& new_start, const Numbers& new_columns, const Vector& new_values) {
     const std::size_t count = start.size() - 1;
     require(start.size() > 0 && start.data()[0] == 0, "no compressed rows");
     require(static_cast<std::size_t>(start.data()[count]) <= std::min(columns.size(), values.size()),
@@ -179,11 +178,11 @@ void bind_factors(nb::module_& module) {
         .def("add", &add_product, "x"_a, "y"_a, "y += A x.");
     module.def("node_blocks", &collect, "start"_a, "columns"_a, "values"_a, "size"_a,
                "(start, columns, blocks (m, n, n), each transposed) of a matrix in compressed rows, n of which are a node's.");
-    module.def("other_rows", &other_rows, "start"_a, "columns"_a, "values"_a, "rows"_a, "replaced"_a, "new_start"_a,
+    module.def("changed_rows", &change, "start"_a, "columns"_a, "values"_a, "rows"_a, "replaced"_a, "new_start"_a,
                "new_columns"_a, "new_values"_a,
-               "(values, columns, start) of a matrix in compressed rows, with increasing columns in each. The first\n"
-               "`replaced` of `rows`, each once, become the new ones, whose columns need no order; to the others these\n"
-               "are added.");
+               "(values, columns, start) of a matrix in compressed rows, with increasing columns in each, after a change\n"
+               "of `rows`, each once. New rows, whose columns need no order, replace the first `replaced` of them and are\n"
+               "added to the others.");
     module.def("spread_blocks", &spread, "start"_a, "blocks"_a, "entries"_a, "factor"_a = 1.0,
                "Write the entries of blocks, each transposed, times a factor in the order of compressed rows.");
 }

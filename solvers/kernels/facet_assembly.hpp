@@ -17,6 +17,7 @@
 
 #include "block_rows.hpp"
 #include "dual_basis.hpp"
+#include "facet_ball.hpp"
 #include "integrals.hpp"
 
 namespace mortar {
@@ -31,15 +32,11 @@ struct MortarInput {
     double reach;   // facets farther apart than this do not see each other
     double near;    // slave facets with no master as near as this are left out
     double facing;  // facets see each other if the product of their normals is below
-    const std::uint8_t* kept;  // pairs for which none of the three is asked; may be null
+    const std::uint8_t* kept;  // pairs that take part whatever reach, near and facing are; may be null
     const double* along;       // fixed unit vector along which gaps are measured instead of the normals; may be null
 
     bool is_kept(std::size_t pair) const { return kept && kept[pair]; }
 };
-
-// Distance of a master behind another one, in diameters of the slave facet, from which on it is hidden by it. Bodies side
-// by side do not feel it from 0.005 to 5; with 0.002 Newton's method may jump between them (docs/verification_contact.md).
-constexpr double thinnest_layer = 0.05;
 
 // Sums over facets. Column nodes: the slave's, then the master's; those of d*_normal: the slave's.
 template <int dim>
@@ -52,39 +49,6 @@ struct MortarSums {
 
     MortarSums(int n_slave, int n_master, std::size_t n_facets, std::size_t n_pairs)
         : diagonal(n_slave), gap(n_slave), area(n_facets), force(dim * (n_slave + n_master)), used(n_pairs) {}
-};
-
-// Centre, unit normal there and radius of a facet.
-template <typename Facet>
-struct FacetBall {
-    double centre[3] = {}, normal[3] = {}, radius = 0.0;
-
-    explicit FacetBall(const double (*x)[Facet::dim]) {
-        constexpr int dim = Facet::dim;
-        if constexpr (dim == 3) {
-            const Shape<Facet> shape(Facet::centre);
-            const SurfacePoint<Facet> point(shape.N, shape.dN, x);
-            std::copy_n(point.x, 3, centre);
-            cross(point.tangent[0], point.tangent[1], normal);
-        } else {
-            const FieldPoint<Facet, double> point(x, Facet::centre[0]);
-            std::copy_n(point.value, 2, centre);
-            normal[0] = point.slope[1];
-            normal[1] = -point.slope[0];
-        }
-        const double length = std::sqrt(dot(normal, normal));
-        for (double& component : normal) component /= length;
-        for (int i = 0; i < Facet::nodes; ++i) {
-            double square = 0.0;
-            for (int c = 0; c < dim; ++c) square += (x[i][c] - centre[c]) * (x[i][c] - centre[c]);
-            radius = std::max(radius, std::sqrt(square));
-        }
-    }
-    template <typename Other>
-    bool sees(const FacetBall<Other>& other, double reach, double facing) const {
-        const double r[3] = {other.centre[0] - centre[0], other.centre[1] - centre[1], other.centre[2] - centre[2]};
-        return dot(normal, other.normal) < facing && std::sqrt(dot(r, r)) <= radius + other.radius + reach;
-    }
 };
 
 template <typename Slave, typename Master, bool derivatives>
@@ -265,70 +229,9 @@ class FacetAssembly {
             });
     }
 
-    // Whether a pair's master also lies over this place of the slave, and before the gap by more than a layer.
-    bool is_nearer(const Pair& pair, double gap, const double* place) const {
-        if constexpr (dim == 3) {
-            double nodes[m][2], x[1][2] = {{place[0], place[1]}}, on_plane[n][2], x_s[1][2] = {{place[0], place[1]}};
-            for (int l = 0; l < m; ++l)
-                for (int a = 0; a < 2; ++a) nodes[l][a] = value_of(pair.geometry.master[l][a]);
-            for (int i = 0; i < n; ++i)
-                for (int a = 0; a < 2; ++a) on_plane[i][a] = value_of(pair.geometry.slave[i][a]);
-            PointOn<Master, double> on_master;
-            PointOn<Slave, double> on_slave;
-            bool found;
-            MapBack<Master, double>(nodes).find(x, 1, &on_master, &found);
-            if (!found || !Master::inside(on_master.xi, 0.0)) return false;
-            MapBack<Slave, double>(on_plane).find(x_s, 1, &on_slave, &found);
-            return found && gap_at(on_slave, on_master, slave_, pair.nodes) < gap - thinnest_layer * 2.0 * radius_;
-        } else {
-            T eta = 0.0;
-            if (!pair.geometry.project_to_master(T(*place), eta)) return false;
-            const double at = value_of(eta);
-            return Master::inside(&at, 0.0) && gap_at(*place, at, slave_, pair.nodes) < gap - thinnest_layer * 2.0 * radius_;
-        }
-    }
-
-    // Facets that have a node in common lie side by side; others may lie behind each other if their boxes overlap.
-    bool may_hide(const Pair& a, const Pair& b) const {
-        for (int l : a.place)
-            if (std::find(std::begin(b.place), std::end(b.place), l) != std::end(b.place)) return false;
-        if constexpr (dim == 3)
-            for (int axis = 0; axis < 2; ++axis) {
-                double low[2], high[2];
-                for (int side = 0; side < 2; ++side) {
-                    const Pair& pair = side ? b : a;
-                    low[side] = high[side] = value_of(pair.geometry.master[0][axis]);
-                    for (int l = 1; l < m; ++l) {
-                        low[side] = std::min(low[side], value_of(pair.geometry.master[l][axis]));
-                        high[side] = std::max(high[side], value_of(pair.geometry.master[l][axis]));
-                    }
-                }
-                if (high[0] <= low[1] + slack || high[1] <= low[0] + slack) return false;
-            }
-        return true;
-    }
-
-    // Of masters behind each other the first one that the slave meets counts, point by point. Masters at nearly the same
-    // place (bodies side by side that bulge into each other) both count: to choose between them would be arbitrary, and
-    // the choice would change from iterate to iterate.
-    void hide_behind_each_other() {
-        std::vector<std::vector<std::size_t>> rivals(pairs_.size());
-        for (std::size_t p = 0; p < pairs_.size(); ++p)
-            for (std::size_t q = 0; q < p; ++q)
-                if (may_hide(pairs_[p], pairs_[q])) {
-                    rivals[p].push_back(q);
-                    rivals[q].push_back(p);
-                }
-        for (std::size_t p = 0; p < pairs_.size(); ++p) {
-            if (rivals[p].empty()) continue;
-            pairs_[p].integrals = {};
-            add_segments(pairs_[p], [&](double gap, const double* place) {
-                return std::none_of(rivals[p].begin(), rivals[p].end(),
-                                    [&](std::size_t q) { return is_nearer(pairs_[q], gap, place); });
-            });
-        }
-        std::erase_if(pairs_, [](const Pair& pair) { return value_of(pair.integrals.cover) == 0.0; });
-    }
+    bool is_nearer(const Pair& pair, double gap, const double* place) const;  // hidden_masters.hpp
+    bool may_hide(const Pair& a, const Pair& b) const;                        // hidden_masters.hpp
+    void hide_behind_each_other();                                            // hidden_masters.hpp
 
     // Every fixed point goes to the first master that it meets.
     void add_element_points(const std::vector<RulePoint>& rule) {

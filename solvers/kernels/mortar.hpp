@@ -6,6 +6,7 @@
 
 #include "facet_assembly.hpp"
 #include "facet_derivatives.hpp"
+#include "hidden_masters.hpp"
 #include "normals.hpp"
 
 namespace mortar {

@@ -16,20 +16,21 @@ from solvers import linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.blocks import Layout, block_diagonal
 from solvers.constraint import Constraint
-from solvers.distributed import Nodal
 from solvers.largest import position_of_largest
 from solvers.newton import converge
 from solvers.rounding import rounding_error
-from solvers.rows import RowTransformation, TakenRows, gather, gather_at, transform_rows
+from solvers.rows import RowTransformation, TakenRows, gather, transform_rows
 from solvers.solver_settings import SolverSettings
 from solvers.step import Step
 from solvers.structure.body import Body
+from solvers.structure.constrained_dofs import ConstrainedDofs
 from solvers.structure.deformation import flown_off, inverted, largest_extent
 from solvers.structure.energy import EnergyBalance
 from solvers.structure.held import Held
 from solvers.structure.instant import Instant
 from solvers.structure.massless import mass_matrices
 from solvers.structure.rigid_modes import attach_rigid_modes
+from solvers.structure.saved import restore_state, saved_state
 from solvers.structure.solid_solver import SolidSolver
 from solvers.structure.supports import prescribe
 from solvers.structure.tangent import Tangent
@@ -56,6 +57,7 @@ class Structure:
         self.timer, self.constraint = timer or Timer(), contact
         self.dim = bodies[0].dim
         self.layout = Layout(comm, [body.size for body in bodies])
+        self._constrained = None if contact is None else ConstrainedDofs(self.layout, contact)
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
         self.current = Step(0.0, 0.0)  #: the present step, or the last one
@@ -127,9 +129,9 @@ class Structure:
                 body.move_mass(moved)  # gravity acts on the moved mass
         self.current = Step(t, dt)
         self._assemble_bodies()
-        if self.constraint is not None:
-            stiffness = self._assembled_tangent.diagonal(t)
-            self.constraint.start(self.at_constraint(self.now.u), self.at_constraint(stiffness), t)
+        if self.constraint is not None and self._constrained is not None:
+            at_nodes, stiffness = self._constrained.at_nodes, self._assembled_tangent.diagonal(t)
+            self.constraint.start(at_nodes(self.now.u), at_nodes(stiffness), t)
         self.time.start(self, t, dt)
         self.energy.start(*self._energies())
 
@@ -232,21 +234,9 @@ class Structure:
             loads[:] = body.external_force(self.current.t)
 
     def _assemble_constraint(self) -> None:
-        if self.constraint is None:
-            return
-        self.constraint.evaluate(self.at_constraint(self.now.u), self.current.t)
-        self.now.constraint[:] = 0.0
-        if not self.constraint.near:
-            return
-        dofs, force = self.constraint.dofs(), self.constraint.force()
-        local = dofs - self.layout.start
-        mine = (local >= 0) & (local < self.layout.size) & (dofs >= 0)
-        self.now.constraint[local[mine]] = force[mine]
-
-    def at_constraint(self, owned: Array) -> Array:
-        """Values at the nodes of the constraint, shape (N, dim), from those at owned dofs (collective)."""
-        assert self.constraint is not None
-        return gather_at(self.comm, owned, self.layout.start, self.constraint.dofs())
+        if self.constraint is not None and self._constrained is not None:
+            self.constraint.evaluate(self._constrained.at_nodes(self.now.u), self.current.t)
+            self.now.constraint[:] = self._constrained.force()
 
     def residual(self) -> float:
         """Norm [N] of the balance at the free dofs and of the residual of the constraint."""
@@ -336,11 +326,9 @@ class Structure:
 
     def recover(self, taken: TakenRows, du: Array) -> None:
         """Compute the multipliers from the rows before the transformation and the increment of all unknowns."""
-        assert self.constraint is not None
+        assert self._constrained is not None
         with self.timer("contact"):
-            dofs = self.constraint.dofs().ravel()
-            at_nodes = np.where(dofs >= 0, du[np.maximum(dofs, 0)], 0.0)
-            self.constraint.recover(taken.balance(du, len(dofs)), at_nodes)
+            self._constrained.recover(taken, du)
 
     def update(self, increment: Array) -> float:
         """Add an increment of the owned dofs; returns |du| / |u|."""
@@ -390,31 +378,8 @@ class Structure:
 
     def save(self) -> State:
         """The state that the next step starts from, by body."""
-        state: State = {name: self.per_body(array) for name, array in vars(self.now).items()}
-        state["energy"] = self.energy.save()
-        state["linear_solver"] = self.solver.position
-        if self.constraint is not None:
-            state["contact"] = self.constraint.save()
-        return state
-
-    def per_body(self, array: Array) -> State:
-        """Nodal values by body, from an array of owned dofs."""
-        return {
-            body.name: Nodal(part.reshape(-1, self.dim).copy(), body.nodes[: body.owned])
-            for body, part in zip(self.bodies, self.split(array), strict=True)
-        }
-
-    def from_bodies(self, state: State) -> Array:
-        """An array of owned dofs, from nodal values by body."""
-        return np.concatenate([state[body.name].values.ravel() for body in self.bodies])
+        return saved_state(self)
 
     def restore(self, state: State) -> None:
         """Restore a saved state."""
-        for name, array in vars(self.now).items():
-            array[:] = self.from_bodies(state[name])
-        for body, u in zip(self.bodies, self.split(self.now.u), strict=True):
-            body.set_displacement(u)
-        self.energy.restore(state["energy"])
-        self.solver.position = state["linear_solver"]
-        if self.constraint is not None:
-            self.constraint.restore(state["contact"])
+        restore_state(self, state)

@@ -55,9 +55,8 @@ def massless_dofs(structure: Moving) -> list[NDArray[np.bool_]]:
 
 def _owned(structure: Moving, dofs: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Mask of the owned dofs of the structure that are among these global ones."""
-    local = dofs[dofs >= 0] - structure.layout.start
     among = np.zeros(structure.layout.size, dtype=bool)
-    among[local[(local >= 0) & (local < structure.layout.size)]] = True
+    among[structure.layout.among_owned(dofs)[1]] = True
     return among
 
 

@@ -147,7 +147,7 @@ def test_two_processes(tmp_path):
     [
         ("{roughness: -1}", "'roughness' must be at least 0, not -1"),
         ("{transmissivity: 1e-7, roughness: 0.01}", "give either 'transmissivity' or 'roughness', not both"),
-        ("{thickness: 1}", "unknown setting 'thickness' (available: transmissivity, roughness, zone)"),
+        ("{thickness: 1}", "unknown setting 'thickness' (available: transmissivity, roughness, zone, seal)"),
     ],
 )
 def test_mistakes(film, message, tmp_path):

@@ -2,42 +2,24 @@
 
 import numpy as np
 import pytest
-from contact_setup import make_body, make_contact, solve_step
+from pressed_block import assert_same_results, press_block
 from programs import fsci
-from structure_setup import constant
 
 from fsci import shapes
 from fsci.run.history import read_history
 from solvers import linear, newton
-from solvers.newton import Tolerance
 from solvers.solid_factors import SolidFactors
-from solvers.solver_settings import SolverSettings
-from solvers.structure.body import Support
-from solvers.structure.elastic_constants import lame
-from solvers.structure.materials import NeoHooke
-
-ZERO = constant(0.0)
 
 
-def pressed_blocks(method):
-    """A block pressed into a larger one in one step: (structure, contact, info)."""
-    settings = SolverSettings(Tolerance(residual=1e-10), linear=method)
-    material = NeoHooke(*lame(1000.0, 0.3))
-    lower = make_body("lower", shapes.box((2, 2, 1), (8, 8, 4)), material, supports=[Support("bottom", (ZERO,) * 3)])
-    down = (ZERO, ZERO, constant(-0.08))
-    upper = shapes.box((1, 1, 1), (5, 5, 5), (0.5, 0.5, 1.0))
-    upper_body = make_body("upper", upper, material, supports=[Support("top", down)])
-    structure, contact = make_contact([lower, upper_body], [(("upper", "bottom"), ("lower", "top"))], settings=settings)
-    return structure, contact, solve_step(structure)
+def pressed(method):
+    """A block in the middle of a larger one that is held on its bottom."""
+    block, plate = shapes.box((1, 1, 1), (5, 5, 5), (0.5, 0.5, 1.0)), shapes.box((2, 2, 1), (8, 8, 4))
+    return press_block(method, block, plate, held="bottom")
 
 
 def test_static_contact():
-    direct, ilu = (pressed_blocks(method) for method in ("direct", "ilu"))
-    assert direct[2].iterations == ilu[2].iterations
-    size = np.abs(direct[0].now.u).max()
-    assert np.abs(ilu[0].now.u - direct[0].now.u).max() < 1e-6 * size
-    force = direct[1].resultant(0)
-    assert np.abs(ilu[1].resultant(0) - force).max() < 1e-6 * np.abs(force).max()
+    direct, ilu = (pressed(method) for method in ("direct", "ilu"))
+    assert_same_results(ilu, direct, displacement=1e-6)
     used = ilu[0].constrained_solver
     assert isinstance(used.getPC().getPythonContext(), SolidFactors)
     assert 0 < used.getIterationNumber() < 100
@@ -53,10 +35,10 @@ def test_early_systems_are_solved_inexactly(monkeypatch):
 
     solve = linear.solve
     monkeypatch.setattr(linear, "solve", counted)
-    inexact, iterations = pressed_blocks("ilu"), sum(counts)
+    inexact, iterations = pressed("ilu"), sum(counts)
     counts.clear()
     monkeypatch.setattr(newton, "ENOUGH", 0.0)
-    exact = pressed_blocks("ilu")
+    exact = pressed("ilu")
     assert inexact[2].iterations == exact[2].iterations
     assert iterations < 0.75 * sum(counts)
     force = exact[1].resultant(0)

@@ -266,7 +266,7 @@ def test_blocks_of_full_and_other_rows():
     assert all(i in columns[start[i] : start[i + 1]] for i in range(8))
 
 
-def test_other_rows():
+def test_changed_rows():
     """Rows are replaced, and added to, by rows whose columns have any order; the sum is that of arrays."""
     rng = np.random.default_rng(3)
     A = sparse.random(40, 40, 0.2, format="csr", random_state=rng)
@@ -278,7 +278,9 @@ def test_other_rows():
         new.indices[own], new.data[own] = new.indices[own][order], new.data[own][order]
     rows = np.array([31, 0, 7, 39, 12, 8], dtype=np.int32)
     before = A.copy()
-    values, columns, start = kernels.other_rows(A.indptr, A.indices, A.data, rows, 2, new.indptr, new.indices, new.data)
+    values, columns, start = kernels.changed_rows(
+        A.indptr, A.indices, A.data, rows, 2, new.indptr, new.indices, new.data
+    )
     expected = A.toarray()
     expected[rows[:2]] = 0.0
     expected[rows] += new.toarray()
@@ -291,11 +293,11 @@ def test_other_rows():
     ("rows", "replaced", "message"),
     [([1, 40], 1, "no such row"), ([1, -1], 1, "no such row"), ([1, 2], 3, "more rows"), ([1], 1, "needs its entries")],
 )
-def test_other_rows_that_do_not_fit(rows, replaced, message):
+def test_changed_rows_that_do_not_fit(rows, replaced, message):
     A = sparse.random(40, 40, 0.2, format="csr", random_state=np.random.default_rng(3))
     new = A[:2]
     with pytest.raises(ValueError, match=message):
-        kernels.other_rows(
+        kernels.changed_rows(
             A.indptr, A.indices, A.data, np.array(rows, dtype=np.int32), replaced, new.indptr, new.indices, new.data
         )
 

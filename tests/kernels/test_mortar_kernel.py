@@ -4,11 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
-from mortar_surfaces import DIM, NODES, TYPES_2D, TYPES_3D, all_pairs, dense, patch, rotation
+from mortar_surfaces import DIM, NODES, TYPES_2D, TYPES_3D, all_pairs, dense, jittered, patch, rotation
 from scipy.sparse import csr_matrix
 from scipy.spatial import ConvexHull
 
-from solvers.kernels import basis_transformation, mortar, nodal_normals, nodal_tangents
+from solvers.kernels import basis_transformation, mortar, nodal_normals
 
 MIXES = [*itertools.product(TYPES_3D, TYPES_3D), *itertools.product(TYPES_2D, TYPES_2D)]
 METHODS = ("segments", "elements")
@@ -19,12 +19,6 @@ def integrate(xs, fs, slave, xm, fm, master, z=None, **settings):
     normals, _ = nodal_normals(xs, fs, slave, derivatives=False)
     result = mortar(xs, fs, slave, xm, fm, master, normals, all_pairs(fs, fm), z, **settings)
     return result, dense(result.M, len(xs), len(xm))
-
-
-def jittered(rng, facet_type, n, amount, **settings):
-    """A patch whose nodes are moved at random by `amount` cells."""
-    x, facets = patch(facet_type, n, **settings)
-    return x + rng.uniform(-amount, amount, x.shape) / n, facets
 
 
 def flattened(x):
@@ -296,49 +290,6 @@ def test_tri6_transformation():
     np.testing.assert_array_equal(dense(identity, 9, 9), np.eye(9))
 
 
-@pytest.mark.parametrize("facet_type", [*TYPES_2D, *TYPES_3D])
-def test_normals_of_a_plane_and_a_sphere(facet_type):
-    dim = DIM[facet_type]
-    rotate = rotation(np.random.default_rng(9), dim)
-    x, facets = patch(facet_type, 2)
-    normals, _ = nodal_normals(x @ rotate.T, facets, facet_type)
-    np.testing.assert_allclose(normals, np.tile(rotate[:, -1], (len(x), 1)), atol=1e-14)
-
-    errors = []
-    for n in (4, 8):
-        x, facets = patch(facet_type, n)
-        x[:, -1] = 1.0
-        inner = np.all(np.abs(x[:, :-1]) < 0.4, axis=1)
-        x /= np.linalg.norm(x, axis=1)[:, None]
-        errors.append(np.abs(nodal_normals(x, facets, facet_type)[0] - x)[inner].max())
-    assert errors[1] < 0.4 * errors[0] < 0.01
-
-
-def test_masked_normals_lie_in_the_symmetry_plane():
-    x, facets = patch("quad4", 2)
-    x[:, 2] = 0.3 * x[:, 0] + 0.2 * x[:, 1] ** 2
-    mask = np.ones_like(x)
-    on_plane = x[:, 0] < -0.4
-    mask[on_plane, 0] = 0.0
-    normals, _ = nodal_normals(x, facets, "quad4", mask)
-    plain, _ = nodal_normals(x, facets, "quad4")
-    assert not normals[on_plane, 0].any()
-    np.testing.assert_array_equal(normals[~on_plane], plain[~on_plane])
-    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0)
-
-
-def test_tangents_complete_the_normal_to_a_right_handed_frame():
-    rng = np.random.default_rng(10)
-    n = rng.normal(size=(20, 3))
-    n = np.vstack([n / np.linalg.norm(n, axis=1)[:, None], [[0, 0, 1.0], [0, 0, -1.0]]])
-    t, _ = nodal_tangents(n)
-    frame = np.concatenate([n[:, None], t], axis=1)
-    np.testing.assert_allclose(frame @ frame.transpose(0, 2, 1), np.tile(np.eye(3), (len(n), 1, 1)), atol=1e-14)
-    np.testing.assert_allclose(np.linalg.det(frame), 1.0)
-    t, _ = nodal_tangents(np.array([[0.6, 0.8]]))
-    np.testing.assert_allclose(t, [[[-0.8, 0.6]]])
-
-
 def test_bad_input_is_refused_with_the_reason():
     xs, fs = patch("quad4", 2)
     xm, fm = patch("quad4", 2, turned=True)
@@ -390,20 +341,6 @@ def test_only_slave_facets_near_the_master_take_part(slave, master):
         result = mortar(xs, fs, slave, xm, fm, master, normals, all_pairs(fs, fm), near=near)
         found = set(all_pairs(fs, fm)[result.used.astype(bool), 0].tolist())
         assert found == expected
-
-
-def test_derivatives_of_chosen_normals():
-    """Those of the other nodes are left out, and all normals are the same."""
-    rng = np.random.default_rng(4)
-    x, facets = jittered(rng, "quad4", 3, 0.1)
-    chosen = rng.integers(0, 2, len(x)).astype(np.uint8)
-    everywhere, there = (nodal_normals(x, facets, "quad4", chosen=which) for which in (None, chosen))
-    assert np.array_equal(there[0], everywhere[0])
-    whole = dense(everywhere[1], x.size, x.size)
-    whole[np.repeat(chosen == 0, 3)] = 0.0
-    assert np.array_equal(dense(there[1], x.size, x.size), whole)
-    with pytest.raises(ValueError, match="chosen must have"):
-        nodal_normals(x, facets, "quad4", chosen=chosen[1:])
 
 
 @pytest.mark.parametrize("facet_type", TYPES_3D)

@@ -49,6 +49,12 @@ def patch(facet_type, n, *, size=1.0, turned=False):
     return x, np.ascontiguousarray(facets[:, TURNED[facet_type]] if turned else facets)
 
 
+def jittered(rng, facet_type, n, amount, **settings):
+    """A patch whose nodes are moved at random by `amount` cells."""
+    x, facets = patch(facet_type, n, **settings)
+    return x + rng.uniform(-amount, amount, x.shape) / n, facets
+
+
 def all_pairs(fs, fm):
     """Every slave facet with every master facet, sorted by slave facet."""
     i, j = np.meshgrid(np.arange(len(fs)), np.arange(len(fm)), indexing="ij")

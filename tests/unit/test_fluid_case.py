@@ -1,49 +1,19 @@
-"""The section `fluid` of a case: each mistake with its message, the text it points at, warnings, what grids become."""
+"""The section `fluid` of a case: each mistake with its message, the text it points at, and warnings."""
 
-import re
 import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from case_mistakes import assert_located, load, refused
 from case_text import with_section, without
+from channel_case import ALONE, CASE, RESTING
 
-from fsci.case import CaseError, load_case
-from fsci.case.grid import GridSection
+from fsci.case import load_case
 from fsci.check.check import summary
-from fsci.check.meshes import check_meshes
-from fsci.meshes.nested import read_grid
 
 ROUGH = Path(__file__).parents[2] / "cases/torus_rough/case.yaml"
 
-CASE = """\
-title: channel
-time: {step: 0.01, end: 1}
-fluid:
-  density: 1.2
-  viscosity: 1e-3
-  grid: {from: [0, 0], to: [4, 1], cells: [40, 10]}
-  patches:
-    inlet: {on: x-, velocity: ["4*y*(1 - y)", 0]}
-    outlet: {on: x+, outflow: true}
-    walls: {on: [y-, y+], no_slip: true}
-  bodies:
-    cylinder:
-      mesh: {shape: disc, radius: 0.2, cells: [40, 1], translate: [1, 0.5]}
-      motion: {displacement: [0, "0.1*sin(t)"], rotation: {centre: [1, 0.5], angle: 90*t}}
-probes:
-  force: {quantity: force}
-  wake: {quantity: velocity, at: [2, 0.5]}
-  dp: {quantity: pressure, at: [0, 0.5], minus: [4, 0.5]}
-  out: {quantity: flow_rate, through: outlet}
-verify:
-  - {value: force.x, statistic: max, reference: 1, relative: 0.1}
-"""
-ALONE = without(without(CASE, "probes"), "verify")
-RESTING = without(ALONE, "fluid", "bodies", "cylinder", "motion")
-GRID = "cells: [40, 10]"
 KINDS = "'velocity', 'no_slip', 'slip', 'symmetry', 'slip_length', 'traction', 'pressure', 'outflow' or 'periodic'"
 FACES = "'x-', 'x+', 'y-', 'y+', 'z-' or 'z+'"
 
@@ -68,89 +38,6 @@ MISTAKES = [
         "5:12: 'gravity' must have 2 entries in 2D, not 3",
         "[0, 0",
     ),
-    # grid
-    ("to: [4, 1]", "to: [4, 1, 1]", "6:28: 'to' must have 2 entries like 'from', not 3", "[4"),
-    ("to: [4, 1]", "to: [-4, 1]", "6:29: entry 1 of 'to' must be greater than that of 'from', 0, not -4", "-4"),
-    (GRID, "cells: [40]", "6:43: 'cells' must have 2 or 3 entries, not 1", "[40]"),
-    (GRID, "cells: [40, 10, 10]", "6:43: 'cells' must have 2 entries like 'from', not 3", "[40"),
-    (GRID, "cells: [40, 0]", "6:48: entry 2 of 'cells' must be at least 1, not 0", "0]"),
-    (", " + GRID, "", "6:9: the direction x needs a number of cells in 'cells', or stretches in 'x'", "{from"),
-    (GRID, GRID + ", z: [{to: 1, cells: 2}]", "6:56: 'from' has 2 entries: a grid in 2D has no 'z'", "[{to"),
-    (
-        GRID,
-        GRID + ", x: [{to: 4, cells: 2}]",
-        "6:44: 'x' has stretches: write null here, not 40",
-        "40",
-    ),
-    (
-        GRID,
-        "cells: [null, 10], x: [{to: 3, cells: 2}]",
-        "6:64: 'to' must be 4 like entry 1 of the grid's 'to', not 3",
-        "3",
-    ),
-    (
-        GRID,
-        "cells: [null, 10], x: [{to: 3, cells: 2}, {to: 2, cells: 1}]",
-        "6:83: 'to' must be greater than 3, where this stretch begins, not 2",
-        "2",
-    ),
-    (GRID, "cells: [40, 2e5]", "6:9: 200000 cells along y are too many: 100000 are the most", "{from"),
-    (
-        "to: [4, 1]",
-        "to: [5e-324, 1]",
-        "6:9: the cells along x are smaller than rounding errors of their coordinates",
-        "{from",
-    ),
-    (
-        GRID,
-        "cells: [null, 10], x: [{to: 4, cells: 2, ratio: 1e9}]",
-        "6:84: 'ratio' must be from 1e-06 to 1e+06, not 1e+09",
-        "1e9",
-    ),
-    (
-        GRID,
-        GRID + ", refine: [{level: 1}]",
-        "6:62: a refinement needs either 'box' or 'around'",
-        "{level",
-    ),
-    (
-        GRID,
-        GRID + ", refine: [{box: [[0, 0], [1, 1]], around: cylinder}]",
-        "6:62: a refinement needs either 'box' or 'around'",
-        "{box",
-    ),
-    (
-        GRID,
-        GRID + ", refine: [{around: cylinder, level: 11}]",
-        "6:88: 'level' must be at most 10, not 11",
-        "11",
-    ),
-    (
-        GRID,
-        GRID + ", refine: [{around: cylinder, level: 10}]",
-        "6:61: if all of its cells were of the finest level there would be 4.2e+08: 1e+08 are the most",
-        "[{around",
-    ),
-    (
-        GRID,
-        GRID + ", refine: [{around: cylindre}]",
-        "6:71: there is no body 'cylindre'; did you mean 'cylinder'?",
-        "cylindre",
-    ),
-    (
-        GRID,
-        GRID + ", refine: [{box: [[1, 0], [1, 1]]}]",
-        "6:78: entry 1 of entry 2 of 'box' must be greater than that of the lowest corner, 1, not 1",
-        "1, 1",
-    ),
-    (GRID, GRID + ", refine: [{box: [[0, 0]]}]", "6:68: 'box' must have 2 entries, not 1", "[[0"),
-    (
-        GRID,
-        GRID + ", refine: [{box: [[0, 0, 0], [1, 1, 1]]}]",
-        "6:69: entry 1 of 'box' must have 2 entries like 'from', not 3",
-        "[0, 0, 0]",
-    ),
-    (GRID, GRID + ", refine: [{box: [[5, 0], [6, 1]]}]", "6:68: 'box' is outside of the grid", "[[5"),
     # patches
     ("on: x-", "on: left", f"8:17: 'on' must be {FACES}, not 'left'", "left"),
     ("on: x-", "on: [x-, z-]", "8:22: a box in 2D has no face 'z-'", "z-"),
@@ -348,42 +235,12 @@ def test_a_flow_that_nothing_drives():
     )
 
 
-def test_refined_grids():
-    refined = RESTING.replace(GRID, GRID + ", refine: [{around: cylinder, level: 2}]")
-    text = summary(load(refined))
-    grid = read_grid(load(refined))
-    assert set(grid.width) == {1, 2, 4}
-    assert f"40 x 10 cells, in parts halved 2 times: {len(grid.first):,} in all" in text
-    assert f"{3 * grid.unknowns(1):,} with" in text
-    coarse = refined.replace("level: 2", "layers: 2")
-    message = "body 'cylinder' comes within 3 cells of cells that are not of the finest level, 1: refine around it, "
-    message += "or in a box over all of its way"
-    with pytest.raises(CaseError, match=f"case.yaml:6:61: {message}"):
-        read_grid(load(coarse))
-    assert [str(p).splitlines()[0] for p in check_meshes(load(coarse)).problems] == [f"case.yaml:6:61: {message}"]
-    ends = "ends: {on: [x-, x+], periodic: true}"
-    periodic = re.sub(r"inlet: .*\n    outlet: .*", ends, refined)
-    message = "6:61: a grid with periodic patches cannot be refined: use stretches"
-    assert_located(periodic, refused(periodic), message, "[{around")
-
-
 def test_a_steady_flow_without_a_velocity_of_its_own():
     patches = "  patches:\n    all: {on: [x-, x+, y-, y+], periodic: true}\n  scheme: steady\n"
     periodic = without(with_section(ALONE, patches, "fluid", "patches"), "fluid", "bodies")
     assert str(refused(periodic).problems[0]).startswith(
         "case.yaml:9:11: a steady flow that is periodic in all directions does not determine its mean velocity"
     )
-
-
-def test_edges_of_a_graded_grid():
-    """Equal cells, and cells that grow by the same factor from the first to the last."""
-    stretches = [{"to": 1, "cells": 2}, {"to": 3, "cells": 3, "ratio": 4}, {"to": 4, "cells": 1, "ratio": 7}]
-    grid = GridSection.model_validate({"from": [0, -1], "to": [4, 1], "cells": [None, 4], "x": stretches})
-    x, y = grid.planes
-    assert grid.shape == (6, 4)
-    assert np.allclose(y, [-1, -0.5, 0, 0.5, 1], atol=0)
-    assert np.allclose(np.diff(x), [0.5, 0.5, 2 / 7, 4 / 7, 8 / 7, 1])
-    assert (x[2], x[5], x[6]) == (1.0, 3.0, 4.0)
 
 
 def test_check_of_a_fluid_needs_no_finite_elements():

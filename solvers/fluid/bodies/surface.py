@@ -84,12 +84,6 @@ def by_facets(surfaces: Sequence[ImmersedSurface], numbers: Sequence[float]) -> 
     return np.concatenate([np.full(len(s.facets), number) for s, number in zip(surfaces, numbers, strict=True)])
 
 
-def vertex_ranges(surfaces: Sequence[ImmersedSurface]) -> dict[str, slice]:
-    """Range of the vertices of each surface among those of all, by name."""
-    starts = offsets(surfaces)
-    return {surface.name: slice(a, b) for surface, a, b in zip(surfaces, starts, starts[1:], strict=False)}
-
-
 def offsets(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.int64]:
     """Index of the first vertex of each surface among those of all, and at the end their count."""
     return np.concatenate([[0], np.cumsum([s.vertices for s in surfaces])]).astype(np.int64)

@@ -19,8 +19,8 @@ struct Matrix {
     std::unique_ptr<double[]> values;
 };
 
-// The matrix `before` of `count` rows with increasing columns. `after` has a row for each of `changed`; the first
-// `replaced` of them replace rows, the others are added. Entries of one place add up.
+// Changes the matrix `before` of `count` rows with increasing columns. `after` has a row for each of `changed`; the first
+// `replaced` of them replace rows, the others are added to rows. Entries at the same place are summed.
 inline Matrix change(std::size_t count, const Rows& before, const std::int32_t* changed, std::size_t n_changed,
                      std::size_t replaced, const Rows& after) {
     std::vector<std::int32_t> by_row(count, -1);

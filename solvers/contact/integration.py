@@ -1,0 +1,144 @@
+"""Mortar integration of all pairs: the facets that are near each other, their integrals, and the slip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.contact.interface import ContactInterface
+from solvers.contact.law.tied import Tied
+from solvers.contact.mortar import Mortar
+from solvers.contact.redistribute import redistributed
+from solvers.contact.share import Shares
+from solvers.contact.slip import Sliding, Slip
+from solvers.contact.terms import Normals, Terms, find_normals, total_terms
+from solvers.contact.ties import Ties
+from solvers.sparse import Sparse
+
+
+@dataclass(frozen=True)
+class Integrals:
+    """The integrals at one iterate."""
+
+    terms: Terms
+    normals: Normals
+    used: tuple[tuple[Mortar, NDArray[np.int32]], ...]  #: facet pairs of each mortar that contributed
+
+
+class Integration:
+    """Integrates the mortars of an interface; each process takes its share of the slave facets. Calls are collective.
+
+    As long as surfaces have moved less than the clearance that the last search found, nothing is searched again.
+    """
+
+    def __init__(self, interface: ContactInterface, comm: MPI.Comm):
+        self._interface, self._multipliers = interface, interface.multipliers
+        self.shares = Shares(comm)
+        laws = [(mortar, interface.law_of(mortar.patch)) for mortar in interface.mortars]
+        self._mortars = [mortar for mortar, law in laws if not isinstance(law, Tied)]
+        tied = [mortar for mortar, law in laws if isinstance(law, Tied)]
+        self._ties = Ties(tied, self._multipliers, interface.nodes.points, interface.unmoved())
+        sliding = [mortar for mortar, law in laws if law.slips]
+        N, dim = interface.nodes.points.shape
+        self._sliding = Sliding(sliding, self._multipliers, self.shares, (N, dim))
+        self._travel = 0.0  # sum over iterates of the largest motion of a node [m]
+        self._nothing_near = False  # the latest integration found no facet pairs
+
+    @property
+    def slides(self) -> bool:
+        """Whether any law depends on the slip of the step."""
+        return bool(self._sliding.mortars)
+
+    @property
+    def has_slip(self) -> bool:
+        """Whether any law depends on a slip: that of the step, or that of ties since the start."""
+        return self.slides or bool(self._ties.pieces)
+
+    def search_anew(self) -> None:
+        """Require a search in the next integration."""
+        self._nothing_near, self._travel = False, 0.0
+        for mortar in self._mortars:
+            mortar.clear_until = -np.inf
+
+    def begin_step(self, x: Array, active: NDArray[np.bool_]) -> None:
+        """Begin a step at the positions x [m], shape (N, dim); active: mask of the multipliers in contact, (C,)."""
+        self.shares.begin_step()
+        for mortar in self._mortars:
+            mortar.begin_step(active)
+        self._sliding.begin_step(x, self._travel)
+
+    def move(self, dx: Array) -> None:
+        """Note that the nodes have moved by dx [m] since the latest iterate, shape (N, dim)."""
+        self._travel += float(np.abs(dx).max(initial=0.0))
+
+    @property
+    def clear(self) -> bool:
+        """Whether the latest integration found no facet pairs, and the motion since then leaves some clearance."""
+        apart = not self._ties.pieces and all(self._travel < mortar.clear_until for mortar in self._mortars)
+        return self._nothing_near and apart
+
+    def integrate(self, x: Array, x_old: Array, z: Array) -> Integrals | None:
+        """The integrals at the positions x [m], None if no facets are near.
+
+        x, x_old: now and at the start of the step, shape (N, dim); z: multipliers [Pa], shape (C, dim).
+        """
+        found = self._sum(x, x_old, z)
+        self._nothing_near = found is None
+        return found
+
+    def _sum(self, x: Array, x_old: Array, z: Array) -> Integrals | None:
+        near = [mortar.near(x, x_old, self._travel) for mortar in self._mortars]
+        if not self._ties.pieces and all(len(facet_pairs) == 0 for facet_pairs, _ in near):
+            return None
+        shares = self.shares
+        normals = find_normals(self._multipliers, x, self._near_nodes([pairs for pairs, _ in near]))
+        pieces, met, work = [], bool(self._ties.pieces), np.zeros((2, shares.comm.size))
+        for index, (mortar, (facet_pairs, motion)) in enumerate(zip(self._mortars, near, strict=True)):
+            if len(facet_pairs) == 0:
+                continue
+            at = normals.at(self._multipliers, mortar.patch)
+            mine = shares.mine(index, facet_pairs, len(mortar.facets))
+            found = mortar.evaluate(x, *at, mine, motion, z[mortar.patch.multipliers])
+            all_used = shares.together(found.used)
+            mortar.keep(all_used)
+            work += shares.measure(index, facet_pairs, all_used, len(mortar.facets))
+            met |= bool(shares.combine(index, found.area).any())
+            pieces.append((mortar, found))
+        shares.note(work)
+        if not met:
+            return None
+        pieces += self._ties.pieces if shares.comm.rank == 0 else []
+        terms = total_terms(pieces, normals, shares, (len(self._interface.pairs), len(z), len(x)))
+        return Integrals(terms, normals, tuple((mortar, found.used) for mortar, found in pieces))
+
+    def _near_nodes(self, near: Sequence[NDArray[np.int32]]) -> list[NDArray[np.bool_] | None]:
+        """For each patch, mask of the nodes of slave facets that are near; None where a surface is tied."""
+        found: list[NDArray[np.bool_] | None] = []
+        tied = [mortar.patch for mortar, _ in self._ties.pieces]
+        for patch in self._multipliers.patches:
+            mask = np.zeros(len(patch.nodes), dtype=bool)
+            for mortar, facet_pairs in zip(self._mortars, near, strict=True):
+                if mortar.patch is patch:
+                    mask[mortar.facets[facet_pairs[:, 0]]] = True
+            found.append(None if any(patch is other for other in tied) else mask)
+        return found
+
+    def slip(self, x: Array, integrals: Integrals, shared: Sparse | None) -> Slip | None:
+        """The slip at the positions x [m] of these integrals; None if no law depends on it.
+
+        shared: redistribution from multipliers with a constraint to those without, (C, C).
+        """
+        slip = None
+        if self.slides:
+            rule = partial(redistributed, shares=shared)
+            slip = self._sliding.evaluate(x, integrals.normals, integrals.used, rule)
+        if self._ties.pieces:
+            tied = self._ties.slip(x, shared)
+            slip = tied if slip is None else slip.plus(tied)
+        return slip

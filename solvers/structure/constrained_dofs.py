@@ -1,0 +1,35 @@
+"""The nodes of a constraint among the dofs of a structure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solvers.api import Array
+from solvers.blocks import Layout
+from solvers.constraint import Constraint
+from solvers.rows import TakenRows, gather_at
+
+
+class ConstrainedDofs:
+    """Moves values between the owned dofs of a structure and the nodes of its constraint, (N, dim) on all processes."""
+
+    def __init__(self, layout: Layout, constraint: Constraint):
+        self._layout, self._constraint = layout, constraint
+
+    def at_nodes(self, owned: Array) -> Array:
+        """Values at the nodes, shape (N, dim), from those at owned dofs (collective)."""
+        return gather_at(self._layout.comm, owned, self._layout.start, self._constraint.dofs())
+
+    def force(self) -> Array:
+        """Force [N] of the constraint at owned dofs; zero if it is not near."""
+        found = np.zeros(self._layout.size)
+        if self._constraint.near:
+            mine, numbers = self._layout.among_owned(self._constraint.dofs())
+            found[numbers] = self._constraint.force()[mine]
+        return found
+
+    def recover(self, taken: TakenRows, du: Array) -> None:
+        """Compute the multipliers from the rows before the transformation and the increment of all unknowns."""
+        dofs = self._constraint.dofs().ravel()
+        at_nodes = np.where(dofs >= 0, du[np.maximum(dofs, 0)], 0.0)
+        self._constraint.recover(taken.balance(du, len(dofs)), at_nodes)

@@ -1,0 +1,55 @@
+"""The state of a structure that a next step starts from: nodal values by body, energies, contact."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from solvers.api import Array, State
+from solvers.distributed import Nodal
+from solvers.structure.energy import EnergyBalance
+from solvers.structure.instant import Moving
+from solvers.structure.solid_solver import SolidSolver
+
+
+class Saved(Moving, Protocol):
+    """A structure with all that its state consists of; `Structure` is one."""
+
+    energy: EnergyBalance
+    solver: SolidSolver
+
+
+def saved_state(structure: Saved) -> State:
+    """The state, by body."""
+    state: State = {name: per_body(structure, array) for name, array in vars(structure.now).items()}
+    state["energy"] = structure.energy.save()
+    state["linear_solver"] = structure.solver.position
+    if structure.constraint is not None:
+        state["contact"] = structure.constraint.save()
+    return state
+
+
+def restore_state(structure: Saved, state: State) -> None:
+    """Set what `saved_state` returned."""
+    for name, array in vars(structure.now).items():
+        array[:] = from_bodies(structure, state[name])
+    for body, u in zip(structure.bodies, structure.layout.split(structure.now.u), strict=True):
+        body.set_displacement(u)
+    structure.energy.restore(state["energy"])
+    structure.solver.position = state["linear_solver"]
+    if structure.constraint is not None:
+        structure.constraint.restore(state["contact"])
+
+
+def per_body(structure: Moving, array: Array) -> State:
+    """Nodal values by body, from an array of owned dofs."""
+    return {
+        body.name: Nodal(part.reshape(-1, body.dim).copy(), body.nodes[: body.owned])
+        for body, part in zip(structure.bodies, structure.layout.split(array), strict=True)
+    }
+
+
+def from_bodies(structure: Moving, state: State) -> Array:
+    """An array of owned dofs, from nodal values by body."""
+    return np.concatenate([state[body.name].values.ravel() for body in structure.bodies])
