@@ -22,7 +22,7 @@ from fsci.bench.table import Row
 from fsci.builder.build import build
 from fsci.case.load import load_case
 from solvers import fem, linear, unlocked
-from solvers.fluid import field as flow_field
+from solvers.fluid import kept_tangent
 from solvers.fluid.cutting.cut import Cutter
 from solvers.fluid.cutting.weights import Weights
 from solvers.fluid.field import Fluid
@@ -45,7 +45,7 @@ PARTS: dict[str, list[tuple[Any, str]]] = {
     "matrix": [
         (FlowSystem, "tangent"),
         (FlowSystem, "_follow"),
-        (flow_field, "rounding_error"),
+        (kept_tangent, "rounding_error"),
         (monolithic, "rounding_error"),
         (Monolithic, "blocks"),
         (Fluid, "linearise"),
