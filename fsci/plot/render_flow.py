@@ -44,7 +44,7 @@ def load_state(files: Sequence[Path], field: str) -> list[DrawnBody]:
         return [plane_flow(flow, field), *parts]
     # The edges of elements would hide the flow around a body.
     bodies = [replace(part, edges=NO_LINES) for part in _opened(parts, flow)]
-    return _spatial_flow(flow, field, [mesh for mesh in meshes[1:] if not _surrounds(mesh, flow)]) + bodies
+    return _spatial_flow(flow, field, [mesh for mesh in meshes[1:] if not surrounds(mesh, flow)]) + bodies
 
 
 def load_meshes(files: Sequence[Path]) -> list[DrawnBody]:
@@ -69,17 +69,17 @@ def load_meshes(files: Sequence[Path]) -> list[DrawnBody]:
     return parts
 
 
-def _surrounds(body: Any, flow: Any) -> bool:
-    """Whether a body reaches around the box of a flow in space, as the wall of a tube does."""
-    inner, outer = np.array(flow.bounds), np.array(body.bounds)
-    return not is_flat(flow) and bool(np.all(outer[::2] < inner[::2]) and np.all(inner[1::2] < outer[1::2]))
+def surrounds(body: Any, flow: Any) -> bool:
+    """Whether a body reaches around the box of a flow, or around a plane of it, as the wall of a tube does."""
+    (low, high), (first, last) = (np.array(mesh.bounds).reshape(3, 2).T for mesh in (flow, body))
+    return bool(np.all(((first < low) & (high < last))[low < high]))
 
 
 def _opened(parts: Sequence[DrawnBody], flow: Any) -> list[DrawnBody]:
     """Bodies in space, without the half in front of what surrounds the flow, and without what is outside of the box."""
     found = []
     for part in parts:
-        if _surrounds(part.surface, flow):
+        if surrounds(part.surface, flow):
             axis = "xyz".index(lengthwise(flow))
             bounds = np.array(flow.bounds)
             bounds[2 * axis + (ISOMETRIC[axis] > 0)] = flow.center[axis]

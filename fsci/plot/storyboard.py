@@ -11,7 +11,16 @@ import numpy as np
 
 from fsci.plot.curves import DOTS, STYLE, label
 from fsci.plot.render import Array, DrawnBody, Pixels, View, import_pyvista, render
-from fsci.plot.render_flow import NO_LINES, fill_lines, is_flat, load_state, plane_flow, segments, slice_plane
+from fsci.plot.render_flow import (
+    NO_LINES,
+    fill_lines,
+    is_flat,
+    load_state,
+    plane_flow,
+    segments,
+    slice_plane,
+    surrounds,
+)
 from fsci.plot.scene import draw_colour_bar, field_label
 
 PANELS = 6  #: at most
@@ -35,8 +44,9 @@ def plot_story(
     states = [plane_state([file for _, file in moment]) for moment in moments]
     flows = [bodies[0] for bodies, *_ in states]
     speeds = [flow.values for flow in flows if flow.values is not None]
-    shown = [body for bodies, *_ in states for body in bodies if not reaches_around(body, bodies[0])]
-    bounds = np.array([body.surface.bounds for body in shown])
+    surfaces = [[body.surface for body in bodies] for bodies, *_ in states]
+    shown = [surface for flow, *others in surfaces for surface in (flow, *others) if not surrounds(surface, flow)]
+    bounds = np.array([surface.bounds for surface in shown])
     low, high = bounds[:, :4:2].min(axis=0), bounds[:, 1:4:2].max(axis=0)
     names, plane = states[0][1:]
     crop = CROP[not plane]
@@ -70,12 +80,6 @@ def plot_story(
         draw_colour_bar(figure, place, limits, "viridis", field_label("velocity", flows, units), extend="max")
         figure.savefig(path)
     return path
-
-
-def reaches_around(body: DrawnBody, flow: DrawnBody) -> bool:
-    """Whether a body reaches around the plane of the flow, as the wall of a tube does: what is outside is not shown."""
-    inner, outer = np.array(flow.surface.bounds)[:4], np.array(body.surface.bounds)[:4]
-    return bool(np.all(outer[::2] < inner[::2]) and np.all(inner[1::2] < outer[1::2]))
 
 
 def choose(count: int, needed: Sequence[int] = ()) -> list[int]:

@@ -9,8 +9,8 @@ import pytest
 
 from fsci.plot.picture import look_at, plot_run
 from fsci.plot.render import import_pyvista
-from fsci.plot.render_flow import connect, load_meshes, load_state, slice_plane
-from fsci.plot.storyboard import arrange, choose, plane_state, reaches_around
+from fsci.plot.render_flow import connect, load_meshes, load_state, slice_plane, surrounds
+from fsci.plot.storyboard import arrange, choose, plane_state
 from fsci.run.output import FieldWriter
 from solvers.api import Snapshot
 
@@ -174,4 +174,4 @@ def test_the_wall_of_a_tube_does_not_hide_what_is_in_it(tmp_path):
         assert ball == pytest.approx([1, 3, 1, 3, 1, 3], abs=0.01)
         assert around == pytest.approx([0, 4, 3.5, 4, 0, 4], abs=0.01)
     flow, *bodies = plane_state(paths)[0]
-    assert [reaches_around(body, flow) for body in bodies] == [True, False]
+    assert [surrounds(body.surface, flow.surface) for body in bodies] == [True, False]
