@@ -66,7 +66,7 @@ class InterfaceTerms:
         moments = pieces.moments[mine][:, rule.order]
         self.n, self.penalty, self.mass_of_pieces = pieces.normal[mine], penalty[mine], pieces.mass[mine]
         self.full_penalty = self.penalty  #: P, where `penalty` becomes P R
-        self.facet, self.corners = facet, cut.facets[facet]
+        self.cell, self.facet, self.corners = cells, facet, cut.facets[facet]
         self.x = cut.motion.x[self.corners]
         self.sizes = grid.sizes[cells]
         self.u, self.p = unknowns.cell_velocity[cells], unknowns.cell_pressure[cells]

@@ -23,7 +23,7 @@ from solvers.fluid.cutting.cut import off_boundary
 from solvers.fluid.history import Past
 from solvers.fluid.thin.sheet_cycles import joined_in, recurring
 from solvers.fluid.thin.sheet_parts import AROUND
-from solvers.fluid.thin.sheet_transfer import along_surface, sides_of, transfer
+from solvers.fluid.thin.sheet_transfer import Sides, along_surface, sides_of, transfer
 from solvers.fluid.thin.sheets import Sheets, find_sheets
 from solvers.fluid.thin.thickness import THIN, THIN_IF_MOVING
 from solvers.fluid.thin.thinness import cell_sizes_at, may_be_thin
@@ -151,10 +151,11 @@ class Carrying:
     def __init__(self, new: Unknowns, facets: NDArray[np.int64], motion: Motion):
         after, x = new.grid.sheets, motion.x
         assert after is not None
-        self._new, self._after, self._of_facets = new, after, motion.v[facets].mean(axis=1)
+        self._new, self._after = new, after
         cell = max(float(cell_sizes_at(edge, x[:, axis]).max()) for axis, edge in enumerate(after.grid.edges))
         self._along = cache(lambda: along_surface(facets, x, cell))
         self._sides = cache(lambda degree: sides_of(after, degree, self._along()))
+        self._walls = cache(lambda: _seen(self._sides(new.degree), motion.v[facets].mean(axis=1)))
 
     def __call__(self, old: Unknowns, before: Sheets | None) -> Carrier:
         """The transfer from old unknowns; before: their sheets, None: nodes of the box."""
@@ -162,15 +163,15 @@ class Carrying:
         matrices = {one: self._matrix(before, one) for one in {degree, 1}}
         return Carrier(old, self._new, matrices[degree], matrices[1], self._walls())
 
-    def _walls(self) -> Array:
-        """Mean velocity of the facets that each node of the velocity sees, nan where it sees none."""
-        seen = self._sides(self._new.degree).of_nodes
-        with np.errstate(invalid="ignore"):
-            return np.asarray(seen @ self._of_facets) / np.asarray(seen.sum(axis=1))
-
     def _matrix(self, before: Sheets | None, degree: int) -> sparse.csr_matrix:
         if before is not None:
             return transfer(sides_of(before, degree, self._along()), self._sides(degree))
         count = self._after.node_count(degree)
         entries = (np.ones(count), (np.arange(count), self._after.on_lattice(np.arange(count), degree)))
         return sparse.csr_matrix(entries, shape=(count, self._after.lattice_size(degree)))
+
+
+def _seen(sides: Sides, of_facets: Array) -> Array:
+    """Weighted mean of values of the facets that each node sees, nan where it sees none."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(sides.of_nodes @ of_facets) / np.asarray(sides.of_nodes.sum(axis=1))
