@@ -31,15 +31,15 @@ FRICTION_COLUMNS = ("contact.sticking", "contact.friction")
 class Check(Section):
     """A reference value for a result of the run; exactly one of `relative` and `absolute` is its tolerance.
 
-    With the largest and smallest value M and m in the window, mean is (M + m)/2 and amplitude (M - m)/2. M is reached
-    at `time_of_max` [s]. All values in the window must be finite, for `final` only the last one: the time of the first
-    contact is nan before.
+    With the largest and smallest value M and m in the window, mean is (M + m)/2, amplitude (M - m)/2 and max_abs the
+    larger of |M| and |m|. M is reached at `time_of_max` [s]. All values in the window must be finite, for `final` only
+    the last one: the time of the first contact is nan before.
     """
 
     value: Text = setting(
         ..., "column of history.csv: of a probe such as A.y, iterations, residual, structure.energy or fluid.mass"
     )
-    statistic: Literal["final", "min", "max", "time_of_max", "mean", "amplitude", "frequency"] = setting(
+    statistic: Literal["final", "min", "max", "max_abs", "time_of_max", "mean", "amplitude", "frequency"] = setting(
         "final", "how one number is computed from the values of the column"
     )
     start: Number | None = setting(

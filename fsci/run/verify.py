@@ -141,6 +141,7 @@ STATISTICS = {
     "final": lambda time, values: float(values[-1]),
     "min": lambda time, values: float(values.min()),
     "max": lambda time, values: float(values.max()),
+    "max_abs": lambda time, values: float(np.abs(values).max()),
     "time_of_max": lambda time, values: peak(time, values)[0],
     "mean": mean,
     "amplitude": amplitude,

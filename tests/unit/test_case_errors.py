@@ -93,8 +93,8 @@ MISTAKES = [
     (
         "statistic: min,",
         "statistic: minimum,",
-        "19:31: 'statistic' must be 'final', 'min', 'max', 'time_of_max', 'mean', 'amplitude' or 'frequency', "
-        "not 'minimum'; "
+        "19:31: 'statistic' must be 'final', 'min', 'max', 'max_abs', 'time_of_max', 'mean', 'amplitude' "
+        "or 'frequency', not 'minimum'; "
         "did you mean 'min'?",
         "minimum",
     ),

@@ -64,10 +64,13 @@ def test_time_of_the_maximum():
 
 def test_final_min_max_are_samples():
     history = {"time": np.array([1.0, 2.0, 3.0, 4.0]), "u": np.array([0.0, 3.0, 2.9, -1.0])}
+    history["low"] = -history["u"]
     checks = [
         check("u", "final", -1, absolute=0),
         check("u", "min", -1, absolute=0),
         check("u", "max", 3, absolute=0),
+        check("u", "max_abs", 3, absolute=0),
+        check("low", "max_abs", 3, absolute=0),
     ]
     assert all(result["ok"] for result in evaluate(history, checks))
 
