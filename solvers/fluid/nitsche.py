@@ -56,17 +56,20 @@ def penalties(
     speed: Array,
     g: Array,
     reduced: Array | float = 1.0,
+    least: Array | float = 0.0,
 ) -> Array:
     """P = s I + s_n n n^T of pieces [Pa s/m], shape (pieces, dim, dim).
 
-    s = gamma mu C_T / (r h) + rho max(0, -g . n), s_n = rho (gamma_b |a| + gamma_t h alpha) with
-    h = (sum n_i^2 / h_i^2)^(-1/2), the length of a cell along the normal, r: `reduced`, in gaps of less than a cell.
+    s = mu max(gamma C_T / (r h), c) + rho max(0, -g . n), s_n = rho (gamma_b |a| + gamma_t h alpha) with
+    h = (sum n_i^2 / h_i^2)^(-1/2), the length of a cell along the normal, r: `reduced`, in gaps of less than a cell, c:
+    `least` [1/m], in films.
     flow: mu [Pa s], rho [kg/m^3], alpha [1/s]; n, edge lengths of the cells [m], g [m/s]: (pieces, dim);
     speed: |a| [m/s], (pieces,).
     """
     (mu, rho, alpha), dim = flow, n.shape[1]
     h = 1.0 / np.linalg.norm(n / sizes, axis=1)
-    s = factors.nitsche * mu * TRACE[dim, degree] / (reduced * h) + rho * np.maximum(0.0, -np.einsum("pi,pi->p", g, n))
+    viscous = np.maximum(factors.nitsche * TRACE[dim, degree] / (reduced * h), least)
+    s = mu * viscous + rho * np.maximum(0.0, -np.einsum("pi,pi->p", g, n))
     normal = rho * (factors.convection * speed + factors.mass * h * alpha)
     return s[:, None, None] * np.eye(dim) + normal[:, None, None] * n[:, :, None] * n[:, None, :]
 

@@ -30,7 +30,7 @@ from solvers.fluid.cut_shape import CutDerivatives, FlowTerms, cut_derivatives
 from solvers.fluid.cutting.cut import Cut
 from solvers.fluid.cutting.pieces import Pieces
 from solvers.fluid.cutting.weights import Weights
-from solvers.fluid.films.film import film_cells
+from solvers.fluid.films.film import coercive, film_cells
 from solvers.fluid.films.film_shape import FilmDerivatives, FilmFlow, film_derivatives
 from solvers.fluid.films.gap_terms import GapTerms
 from solvers.fluid.flow_settings import FlowSettings
@@ -300,15 +300,14 @@ class FlowSystem:
         settings, cells = self.settings, cut.cut[pieces.cell]
         g = cut.motion.v[cut.facets[pieces.facet]].mean(axis=1)
         flow = settings.viscosity, settings.density, float(self._alpha.value)
-        speeds = self.speed[cells], g * settings.convection
+        speeds, sizes = (self.speed[cells], g * settings.convection), self.grid.sizes[cells]
+        reduced = 1.0 if self.gaps is None else self.gaps.lengths(cells)
+        least: Array | float = 0.0
+        if cut.creeping is not None:
+            volume, area = cut.fraction[cells] * sizes.prod(axis=1), pieces.area.sum(axis=1)
+            least = coercive(cut.creeping[self.grid.numbers[cells]], pieces.cell, volume, area)
         return nitsche.penalties(
-            flow,
-            settings.penalties,
-            settings.degree,
-            pieces.normal,
-            self.grid.sizes[cells],
-            *speeds,
-            1.0 if self.gaps is None else self.gaps.lengths(cells),
+            flow, settings.penalties, settings.degree, pieces.normal, sizes, *speeds, reduced, least
         )
 
     # --------------------------------------------------------------------------------------- residual and tangent

@@ -163,7 +163,7 @@ def drags_of_films():
     return [drag_ratio(2, gap * 0.1, 0.1, "q2q1") for gap in (0.2, 0.1, 0.05)]
 
 
-@pytest.mark.parametrize(("name", "value"), [("SHARE", 3e-4), ("SHARE", 3e-6), ("LEAST", 1e-2), ("LEAST", 1e-4)])
+@pytest.mark.parametrize(("name", "value"), [("SHARE", 3e-4), ("SHARE", 3e-7), ("LEAST", 1e-2), ("LEAST", 1e-4)])
 def test_how_far_the_penalty_steps_back_in_films(monkeypatch, name, value):
     """Down to a tenth of a cell the same to 0.4 %, to a twentieth to 1.6 %, over three decades of both."""
     wanted = drags_of_films()
@@ -181,8 +181,8 @@ def drags_in_gaps():
 @pytest.mark.parametrize(
     ("module", "name", "value", "same"),
     [
-        (film, "SHARE", 3e-2, 0.01),
-        (film, "SHARE", 3e-5, 0.002),
+        (gaps, "SHARE", 3e-2, 0.01),
+        (gaps, "SHARE", 3e-5, 0.002),
         (film, "LEAST", 1e-2, 0.002),
         (gaps, "KINK", 0.3, 0.006),
         (gaps, "KINK", 3e-4, 0.006),

@@ -178,3 +178,25 @@ def film_cells(
         return None
     owned = cells[cells < grid.owned]
     return owned[:0] if creeping is None else owned[creeping[grid.numbers[owned]]]
+
+
+def film_height(factor: Array, penalty: float) -> Array:
+    """g / h of films for their factors, h the longest edge of the cell; penalty: gamma."""
+    height: Array = (12.0 * penalty * factor / SHARE) ** (1.0 / 3.0)
+    return height
+
+
+def coercive(films: NDArray[np.bool_], cell: NDArray[np.int64], volume: Array, area: Array) -> Array:
+    """Least Nitsche penalty over the viscosity [1/m], 4 |Gamma_K| / |K in fluid| in films, by pieces.
+
+    Where the extension penalty steps back, only the fluid of a cell itself bounds the traction on its surface. In a
+    film of height g = |K in fluid| / |Gamma_K| u_y is linear, u_y^2 <= 4/g int u_y^2 dy at a wall, so that Nitsche's
+    method is coercive from 4/g on. (Where that is more than the penalty of other cells, below 0.03 h, the extension
+    penalty adds 0.1 of the film's friction and more.) With a smaller penalty the flow's matrix gets negative
+    eigenvalues in cells with slivers, and Newton's method meets iterates where it is singular.
+    films: pieces in cells with creeping flow; cell: number of their cells; volume: of fluid in the cell [m^dim];
+    area: of each piece [m^(dim-1)].
+    Source: Dolbow, Harari, Int. J. Numer. Meth. Engng 78 (2009) 229-252.
+    """
+    surface = np.bincount(cell, area)[cell]
+    return np.where(films, 4.0 * surface / np.where(films, volume, 1.0), 0.0)

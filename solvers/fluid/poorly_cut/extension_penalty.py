@@ -3,9 +3,12 @@
     s(u, v) = sum_i d_i (c_i u) (c_i v),   d_i = gamma w_i phi V / h^2 (velocity),  d_i = gamma w_i V / phi (pressure),
 
 with phi = mu + rho |a| h + rho alpha h^2, V the volume of a cell at the node, and w_i between 1 (hardly any fluid in
-the cells of the node) and 0 (a well-cut cell). The penalty does not lock: it is zero for polynomials. Nodes whose cells
-have no fluid are no unknowns, so that they do not amplify rounding errors. Their velocity is that of the extension,
-which later steps use as history. Their pressure is not used.
+the cells of the node) and 0 (a well-cut cell). In films of height g the penalty is reduced (`films.film`), and phi is
+that of their friction and acceleration, mu + rho alpha g^2 / 10: they have no convection, and |a| behind a wall is
+(h / g)^2 times that in the film.
+The penalty does not lock: it is zero for polynomials. Nodes whose cells have no fluid are no unknowns, so that they do
+not amplify rounding errors. Their velocity is that of the extension, which later steps use as history. Their pressure
+is not used.
 Source: Badia, Neiva, Verdugo, Comput. Methods Appl. Mech. Engrg. 388 (2022) 114232.
 """
 
@@ -20,6 +23,7 @@ from solvers.api import Array
 from solvers.fluid.background.directory import Directory
 from solvers.fluid.background.space import FlowNodes, Unknowns
 from solvers.fluid.cutting.cut import Cut
+from solvers.fluid.films.film import film_height
 from solvers.fluid.linear_systems.matrix import Pattern
 from solvers.fluid.poorly_cut.extension import NEAR, Extension
 from solvers.fluid.poorly_cut.ghost import Scales
@@ -39,7 +43,8 @@ class ExtensionPenalty:
         self._comm = unknowns.grid.comm
         self._lattices = [self._lattice(unknowns.velocity, unknowns.degree), self._lattice(unknowns.pressure, 1)]
         self._entries: tuple[Numbers, Numbers] = (np.empty(0, dtype=np.int64),) * 2
-        self._scales, self._weight = np.zeros((2, unknowns.owned))
+        self._weight, self._film = np.zeros(unknowns.owned), np.ones(unknowns.owned)  #: w_i, and factor of films
+        self._scales: Scales | None = None
         #: owned dofs of nodes without fluid, and those that are penalised
         self.outside, self.dependent = np.zeros((2, unknowns.owned), dtype=bool)
         self.undetermined = np.zeros(unknowns.local, dtype=bool)
@@ -72,7 +77,7 @@ class ExtensionPenalty:
         free = np.ones(unknowns.local, dtype=bool)
         free[prescribed] = False
         parts = [self._find(cut, free, *lattice) for lattice in self._lattices]
-        self._weight *= self._film(cut)[: unknowns.owned]
+        self._film = self._factor_of_films(cut)[: unknowns.owned]
         self.undetermined[:] = fem.share_owned(unknowns.space, self.undetermined.astype(float)) > 0.5
         rows, columns, data = (np.concatenate(some) for some in zip(*parts, strict=True))
         outside = self.outside[rows - unknowns.global_dofs[0]] if len(rows) else np.zeros(0, dtype=bool)
@@ -86,7 +91,7 @@ class ExtensionPenalty:
         same = all(map(np.array_equal, before, self._entries))
         return self._comm.allreduce(int(same)) < self._comm.size
 
-    def _film(self, cut: Cut) -> Array:
+    def _factor_of_films(self, cut: Cut) -> Array:
         """Smallest factor of films in the cells of each local dof."""
         unknowns, factor = self.unknowns, np.ones(self.unknowns.local)
         if cut.film is not None:
@@ -115,19 +120,28 @@ class ExtensionPenalty:
         return rows[kept], columns[kept], np.broadcast_to(entries.data[:, None], kept.shape)[kept]
 
     def set_scales(self, scales: Scales) -> None:
-        unknowns, self.stale = self.unknowns, True
+        self._scales, self.stale = scales, True
+
+    def penalties(self) -> Array:
+        """d_i at owned dofs."""
+        unknowns, scales, found = self.unknowns, self._scales, np.zeros(self.unknowns.owned)
+        if scales is None:
+            return found
         speeds = (scales.speed, scales.speed[unknowns.at_pressure])
         for nodes, speed in zip((unknowns.velocity, unknowns.pressure), speeds, strict=True):
-            dofs, own = nodes.dofs[: nodes.owned], slice(nodes.owned)
-            h, volume = nodes.sizes[own].min(axis=1), nodes.sizes[own].prod(axis=1)
-            phi = scales.viscosity + scales.density * (speed[own] * h + scales.alpha * h**2)
+            dofs, sizes = nodes.dofs[: nodes.owned], nodes.sizes[: nodes.owned]
+            h, volume, film = sizes.min(axis=1), sizes.prod(axis=1), self._film[dofs[:, 0]]
+            phi = scales.viscosity + scales.density * (speed[: nodes.owned] * h + scales.alpha * h**2)
+            g = film_height(film, self.factor) * sizes.max(axis=1)
+            phi = np.where(film < 1.0, scales.viscosity + scales.density * scales.alpha * g**2 / 10.0, phi)
             scale = phi * volume / h**2 if nodes is unknowns.velocity else volume / phi
-            self._scales[dofs] = self.factor * scale[:, None]
+            found[dofs] = (self.factor * film * scale)[:, None]
+        return self._weight * found
 
     def _product(self) -> tuple[Numbers, Numbers, Array]:
         """S by compressed owned rows (collective)."""
         scaled, d = self._distance.copy(), self._distance.createVecLeft()
-        d.array[:] = self._weight * self._scales
+        d.array[:] = self.penalties()
         scaled.diagonalScale(L=d)
         product = self._distance.transposeMatMult(scaled)
         rows = product.getValuesCSR()
