@@ -3,9 +3,10 @@
     s(u, v) = sum_i d_i (c_i u) (c_i v),   d_i = gamma w_i phi V / h^2 (velocity),  d_i = gamma w_i V / phi (pressure),
 
 with phi = mu + rho |a| h + rho alpha h^2, V the volume of a cell at the node, and w_i between 1 (hardly any fluid in
-the cells of the node) and 0 (a well-cut cell). In films of height g the penalty is reduced (`films.film`), and phi is
-that of their friction and acceleration, mu + rho alpha g^2 / 10: they have no convection, and |a| behind a wall is
-(h / g)^2 times that in the film.
+the cells of the node) and 0 (a well-cut cell). In films of height g the penalty is reduced (`films.film`), and that of
+the velocity has the scale of their friction and acceleration, mu + rho alpha g^2 / 10, instead of phi: they have no
+convection, and |a| behind a wall is (h / g)^2 times that in the film. That of the pressure keeps 1 / phi, which is less
+than with the film's scale.
 The penalty does not lock: it is zero for polynomials. Nodes whose cells have no fluid are no unknowns, so that they do
 not amplify rounding errors. Their velocity is that of the extension, which later steps use as history. Their pressure
 is not used.
@@ -132,9 +133,12 @@ class ExtensionPenalty:
             dofs, sizes = nodes.dofs[: nodes.owned], nodes.sizes[: nodes.owned]
             h, volume, film = sizes.min(axis=1), sizes.prod(axis=1), self._film[dofs[:, 0]]
             phi = scales.viscosity + scales.density * (speed[: nodes.owned] * h + scales.alpha * h**2)
-            g = film_height(film, self.factor) * sizes.max(axis=1)
-            phi = np.where(film < 1.0, scales.viscosity + scales.density * scales.alpha * g**2 / 10.0, phi)
-            scale = phi * volume / h**2 if nodes is unknowns.velocity else volume / phi
+            if nodes is unknowns.pressure:
+                scale = volume / phi
+            else:
+                g = film_height(film, self.factor) * sizes.max(axis=1)
+                of_film = scales.viscosity + scales.density * scales.alpha * g**2 / 10.0
+                scale = np.where(film < 1.0, of_film, phi) * volume / h**2
             found[dofs] = (self.factor * film * scale)[:, None]
         return self._weight * found
 
