@@ -7,9 +7,8 @@ sides of thin bodies have unknowns of their own, and a wedge between two of them
 1,000 times the velocity of the flow, and Newton's method goes to and fro. With the penalty k mu / g, as in
 `films.gaps`, the form is positive at any height.
 
-It acts in the cells in which bodies touched when the step began, and in those of the film around that are lower than a
-cell. Before contact it does not act: a film leaves by the slip that the lower penalty allows, because linear velocities
-have no other flow through it.
+It acts in the cells in which bodies touched when the step began, and in those around them. Before contact it does not
+act: a film leaves by the slip that the lower penalty allows, because linear velocities have no other flow through it.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ def beside_contact(grid: DistributedGrid, cut: Cut) -> Array | None:
     """min(g, h) / h in the local cells, at least `LEAST`, and 1 away from contact; None if no contact is closed.
 
     g = 2 |K| / (A - |int n|) with the fluid |K| of a cell and its surface, of the area A: the height of a film, or the
-    mean one of a wedge, and infinite at a plane. h: shortest edge of the cell. Collective.
+    mean one of a wedge, and infinite at a plane. h: shortest edge of the cell.
     """
     assert grid.sheets is not None
     if not len(grid.sheets.closed):
@@ -38,20 +37,16 @@ def beside_contact(grid: DistributedGrid, cut: Cut) -> Array | None:
     net = np.stack([np.bincount(pieces.cell, area * n, count) for n in pieces.normal.T], axis=1)
     facing = np.bincount(pieces.cell, area, count) - np.linalg.norm(net, axis=1)
     twice, h = 2.0 * cut.fraction[cut.cut] * sizes.prod(axis=1), sizes.min(axis=1)
-    narrow = facing * h > twice
-    numbers = grid.numbers[cut.cut]
-    narrow[narrow] = _around(grid, numbers[narrow])
+    narrow = (facing * h > twice) & _around(grid)[grid.numbers[cut.cut]]
     found = np.ones(len(grid.numbers))
     found[cut.cut[narrow]] = np.maximum(twice[narrow] / (facing * h)[narrow], LEAST)
     return found
 
 
-def _around(grid: DistributedGrid, narrow: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which of these cells of the box are connected with cells in which bodies touch, by such cells (collective)."""
+def _around(grid: DistributedGrid) -> NDArray[np.bool_]:
+    """Mask of the cells of the box in which bodies touched, and of those that share a node with one."""
     assert grid.sheets is not None
-    closed, film = grid.sheets.closed, np.zeros(grid.grid.size, dtype=bool)
-    for some in (closed, *grid.comm.allgather(narrow)):
-        film[some] = True
-    parts, _ = ndimage.label(film.reshape(grid.grid.shape, order="F"), np.ones((3,) * grid.dim))
-    part = parts.ravel(order="F")
-    return np.isin(part[narrow], part[closed])
+    closed = np.zeros(grid.grid.size, dtype=bool)
+    closed[grid.sheets.closed] = True
+    box = closed.reshape(grid.grid.shape, order="F")
+    return ndimage.binary_dilation(box, np.ones((3,) * grid.dim)).ravel(order="F")
