@@ -57,13 +57,14 @@ def _on_surfaces(fluid: Fluid, nodal: Array, least: float) -> float:
     sure = area > SLIVER * np.linalg.norm(area_vectors(at.x), axis=1)
     mean = np.einsum("pav,pa->p", at.psi[sure], nodal[at.p[sure]]) / area[sure]
     found = float(mean.max(initial=least))
+    steps = fem.node_steps(grid.domain, 1)
     low, size = place_of(grid.grid, grid.numbers[at.cell])  # of nested cells, surfaces cut the finest ones only
     for piece in np.argsort(-bound):
         if bound[piece] <= found:
             break
         corners = clipped((at.x[piece] - low[piece]) / size[piece])
         if len(corners):
-            shapes, _ = fem.tabulate_lagrange(grid.domain, 1, corners)
+            shapes = np.where(steps == 1, corners[:, None], 1.0 - corners[:, None]).prod(axis=2)
             found = max(found, float((shapes @ nodal[at.p[piece]]).max()))
     return found
 
