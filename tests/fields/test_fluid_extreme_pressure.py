@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from fluid_setup import block, body, field, loop, make_fluid, turned, wall
+from lubrication import approaching
 
 from solvers.fluid.background.grid import uniform
 from solvers.fluid.background.nested import RefinedBox, refined
@@ -65,6 +66,20 @@ def test_below_a_wall_in_space(angle):
     assert extremes(fluid) == pytest.approx((0.62, 0.0), abs=1e-9)
     fluid = with_pressure(grid, [wall_at], lambda x: x[0], "q1q1")
     assert extremes(fluid) == pytest.approx((0.62 / np.cos(angle), 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize(("gap", "bound"), [(0.05, 0.12), (0.02, 0.05)])
+def test_in_the_film_of_a_rough_cylinder(gap, bound):
+    """The largest pressure is that of the film equation, up to its own error of the order of the gap over the radius.
+
+    T p' = -mu V x with T = g^3 / 12 + kappa and g = gap + x^2 / 2 for the radius 1. On one cell across the gap a node
+    in the cylinder has 1.29 times this pressure.
+    """
+    kappa, x = 0.05**3 / 12.0, np.linspace(0.0, 3.0, 30001)
+    slope = x / ((gap + x**2 / 2.0) ** 3 / 12.0 + kappa)
+    film = float(slope.sum() * x[1])  # the trapezoidal rule: the ends have nothing to speak of
+    fluid = approaching(2, gap, 0.05, "q1q1", transmissivity=kappa, narrow_gaps=True)
+    assert extremes(fluid)[0] == pytest.approx(film, rel=bound)
 
 
 def test_parts_of_facets_in_a_cell():
