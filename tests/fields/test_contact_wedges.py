@@ -50,17 +50,17 @@ def test_mean_height_of_a_wedge():
 WALLS = [[1, 0, 0], [-1, 0, 0]], [H**2, H**2], 0.2
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_the_film_around_contact(dim):
-    """Cells 6 to 9 are narrow, bodies touch in 7: it acts in the cells around, not farther."""
+@pytest.mark.parametrize(("dim", "around"), [(2, 0.2), (3, 1.0)])
+def test_the_film_around_contact(dim, around):
+    """Cells 6 to 9 are narrow, bodies touch in 7: in 2D it acts in the cells around, too, not farther."""
     areas = [H ** (dim - 1)] * 2
     found = beside_contact(*wedge(WALLS[0], areas, WALLS[2], [7], dim, (6, 7, 8, 9)))
-    assert found == pytest.approx([1, 0.2, 0.2, 0.2, 1, 1, 1], rel=1e-12)
+    assert found == pytest.approx([1, around, 0.2, around, 1, 1, 1], rel=1e-12)
 
 
 def test_a_film_beside_a_closed_cell():
     """A cell in which bodies touch may have no narrow part of its own."""
-    assert beside_contact(*wedge(*WALLS, [9]))[3] == pytest.approx(0.2)
+    assert beside_contact(*wedge(WALLS[0], [H, H], 0.2, [9], 2))[3] == pytest.approx(0.2)
 
 
 def test_where_it_does_not_act():

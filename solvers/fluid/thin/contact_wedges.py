@@ -7,8 +7,9 @@ sides of thin bodies have unknowns of their own, and a wedge between two of them
 1,000 times the velocity of the flow, and Newton's method goes to and fro. With the penalty k mu / g, as in
 `films.gaps`, the form is positive at any height.
 
-It acts in the cells in which bodies touched when the step began, and in those around them. Before contact it does not
-act: a film leaves by the slip that the lower penalty allows, because linear velocities have no other flow through it.
+It acts in the cells in which bodies touched when the step began, in 2D also in those around them. Before contact it
+does not act: a film leaves by the slip that the lower penalty allows, because linear velocities have no other flow
+through it.
 """
 
 from __future__ import annotations
@@ -44,9 +45,14 @@ def beside_contact(grid: DistributedGrid, cut: Cut) -> Array | None:
 
 
 def _around(grid: DistributedGrid) -> NDArray[np.bool_]:
-    """Mask of the cells of the box in which bodies touched, and of those that share a node with one."""
+    """Mask of the cells of the box in which bodies touched, and in 2D of those that share a node with one.
+
+    Flaps in 2D fail without the cells around; in 3D they were not needed, and with them `valve_3d` repeats a step.
+    """
     assert grid.sheets is not None
     closed = np.zeros(grid.grid.size, dtype=bool)
     closed[grid.sheets.closed] = True
-    box = closed.reshape(grid.grid.shape, order="F")
-    return ndimage.binary_dilation(box, np.ones((3,) * grid.dim)).ravel(order="F")
+    if grid.dim == 2:
+        box = closed.reshape(grid.grid.shape, order="F")
+        return ndimage.binary_dilation(box, np.ones((3, 3))).ravel(order="F")
+    return closed
