@@ -102,6 +102,14 @@ def _parser() -> argparse.ArgumentParser:
         help="draw only the output nearest to this time; may be repeated",
     )
     plot.add_argument("--movie", action="store_true", help="make an animation too")
+    plot.add_argument(
+        "--mirror",
+        dest="mirrors",
+        metavar="PLANE",
+        action="append",
+        default=[],
+        help="draw both sides of a plane of symmetry, of which one was computed: --mirror y=0; may be repeated",
+    )
 
     report = command(_report, "write one page of a run: pictures, curves, balances, verification, time")
     results(report)
@@ -240,7 +248,9 @@ def _plot(options: argparse.Namespace) -> int:
     if not options.out.is_dir():
         return _fail(f"fsci plot: there is no folder '{options.out}'")
     try:
-        files = plot_run(options.out, movie=options.movie, field=options.field, times=options.times)
+        files = plot_run(
+            options.out, movie=options.movie, field=options.field, times=options.times, mirrors=options.mirrors
+        )
     except (ValueError, RuntimeError) as error:
         return _fail(f"fsci plot: {error}")
     print("\n".join(str(path) for path in files))

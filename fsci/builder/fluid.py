@@ -24,6 +24,7 @@ from solvers.fluid.background.grid import Grid
 from solvers.fluid.bodies.immersed import ImmersedBody, rigid_body
 from solvers.fluid.bodies.inside import PointInBody
 from solvers.fluid.boundary.patches import Patch, UncoveredFaces
+from solvers.fluid.extreme_pressure import extreme_pressure
 from solvers.fluid.field import Fluid
 from solvers.fluid.flow_settings import FlowSettings
 from solvers.solver_settings import SolverSettings
@@ -154,6 +155,8 @@ def build_probes(case: Case, fluid: Fluid) -> Callable[[], Numbers]:
                 found[name] = probes.difference(found[name], _at(case, fluid, name, "minus"))
         elif patch := settings.on or settings.through:
             found[name] = probes.on_patch(fluid, settings.quantity, patch)
+        elif settings.quantity == "pressure":
+            found[name] = extreme_pressure(fluid, settings.extreme or "largest")
         elif settings.quantity in ("force", "moment"):
             found[name] = forces.probe(settings.quantity, settings.body, settings.about)
         elif settings.reference is not None:

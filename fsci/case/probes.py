@@ -68,7 +68,7 @@ column NAME. In 2D everything is per unit of depth.
     through: Text | None = setting(None, "name of a patch of the fluid")
     pair: Name | None = setting(None, "name of a contact pair")
     extreme: Literal["largest", "least"] | None = setting(
-        None, "of all slave nodes of the pair; default: the least gap, the largest pressure"
+        None, "of all slave nodes of the pair, or of all fluid; default: the least gap, the largest pressure"
     )
     reference: Reference | None = setting(None, "reference values of drag and lift coefficients")
     about: NumberVector | None = setting(None, "point that a moment is about; default: the origin", unit="m")
@@ -116,8 +116,9 @@ column NAME. In 2D everything is per unit of depth.
         raise fault(f"quantity '{self.quantity}' {wanted}", self.place or "quantity")
 
     def _check_extreme(self) -> None:
-        if self.extreme is not None and self.place != "pair":
-            raise fault("'extreme' applies to the nodes of a contact pair: give 'pair'", "extreme")
+        of_fluid = self.quantity == "pressure" and self.place == ""
+        if self.extreme is not None and self.place != "pair" and not of_fluid:
+            raise fault("'extreme' applies to the nodes of a contact pair, or to the pressure of all fluid", "extreme")
         if self.extreme is not None and self.at is not None:
             raise fault("give either 'at' or 'extreme', not both", "extreme")
         for key in ("at", "extreme"):

@@ -57,7 +57,14 @@ _ALL = (
     Quantity("traction", _FORCE, "vector", ("on",), meaning="integral of P N over the reference surface"),
     Quantity("area", (2, 0, 0), "one", ("on",)),
     Quantity("gap", _LENGTH, "one", ("pair",), meaning="distance of the slave nodes to the master"),
-    Quantity("pressure", _STRESS, "one", ("pair",), ("at", "on"), meaning="of a patch the mean over its area"),
+    Quantity(
+        "pressure",
+        _STRESS,
+        "one",
+        ("pair",),
+        ("at", "on", WHOLE),
+        meaning="of a patch the mean over its area, of all fluid the `extreme`",
+    ),
     Quantity(
         "first_contact", (0, 0, 1), "one", ("pair",), meaning="time of the end of the first step with contact, else nan"
     ),

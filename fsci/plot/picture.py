@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from fsci.plot.curves import DOTS, plot_convergence, plot_history
+from fsci.plot.mirror import Mirror, read_plane
 from fsci.plot.movie import plot_movie
 from fsci.plot.render import ISOMETRIC, Array, import_pyvista, load_body
 from fsci.plot.render_flow import is_flow, load_meshes, load_state
@@ -37,23 +39,33 @@ class Labels:
     quantities: Mapping[str, str] = field(default_factory=dict)  #: probe -> its quantity
 
 
-def plot_run(out: Path, *, movie: bool = False, field: str | None = None, times: Sequence[float] = ()) -> list[Path]:
+def plot_run(
+    out: Path,
+    *,
+    movie: bool = False,
+    field: str | None = None,
+    times: Sequence[float] = (),
+    mirrors: Sequence[str] = (),
+) -> list[Path]:
     """Draws the states, the probes and the convergence of the run in folder `out` into out/pictures.
 
     `field` is what colours show: a point field (a vector's magnitude) or a component such as velocity.x; by default the
     displacement, of a flow velocity and pressure. `movie` adds an animation of all output times. With `times` only the
-    states nearest to them are drawn. Returns the files; raises ValueError if no body has the field.
+    states nearest to them are drawn. `mirrors` are planes of symmetry such as y=0, of which one side was computed: both
+    are drawn. Returns the files; raises ValueError if no body has the field, or a body is on both sides of a plane.
     """
-    drawn = _plot(Path(out), movie, field, times)
+    planes = [read_plane(text) for text in mirrors]
+    with tempfile.TemporaryDirectory() as folder:
+        drawn = _plot(Path(out), movie, field, times, Mirror(planes, Path(folder)))
     list_pictures(Path(out) / "pictures", drawn)
     return drawn
 
 
-def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float]) -> list[Path]:
+def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float], mirror: Mirror) -> list[Path]:
     labels = read_labels(out)
     folder = out / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
-    moments: list[Moment] = list(zip(*read_series(out / "fields"), strict=False))
+    moments: list[Moment] = list(zip(*read_series(out / "fields", mirror), strict=False))
     flow = bool(moments) and is_flow(moments[-1][0][1])
     names = (field,) if field else FLUID_FIELDS if flow else STRUCTURE_FIELDS
     if times:
@@ -67,7 +79,7 @@ def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float]) -> 
         ]
     drawn = []
     if moments:
-        failed = [] if field else plot_failed(out, folder, names, labels)
+        failed = [] if field else plot_failed(out, folder, names, labels, mirror)
         shown = [name for name in names if not (failed and at_rest(moments[-1], name))]
         drawn += [plot_state(folder / f"final_{name}.png", moments[-1], name, labels) for name in shown] + failed
         if not field:
@@ -99,9 +111,9 @@ def plot_more(folder: Path, moments: Sequence[Moment], labels: Labels, *, flow: 
     return drawn
 
 
-def plot_failed(out: Path, folder: Path, names: Sequence[str], labels: Labels) -> list[Path]:
+def plot_failed(out: Path, folder: Path, names: Sequence[str], labels: Labels, mirror: Mirror) -> list[Path]:
     """Pictures of the iterate that failed, of a run that ended with a failed step."""
-    series = read_series(out / "failure" / "fields")
+    series = read_series(out / "failure" / "fields", mirror)
     if not series:
         return []
     moment = tuple(part[-1] for part in series)
@@ -116,9 +128,9 @@ def at_rest(moment: Moment, name: str) -> bool:
     return not any(np.nan_to_num(each).any() for each in values)
 
 
-def read_series(folder: Path) -> list[Series]:
-    """The files of all parts; those of a flow come first, so that bodies are drawn on top of it."""
-    found = [series for path in sorted(folder.glob("*.pvd")) if (series := read_collection(path))]
+def read_series(folder: Path, mirror: Mirror) -> list[Series]:
+    """The files of all whole parts; those of a flow come first, so that bodies are drawn on top of it."""
+    found = [mirror.whole(series) for path in sorted(folder.glob("*.pvd")) if (series := read_collection(path))]
     return sorted(found, key=lambda series: not is_flow(series[-1][1]))
 
 

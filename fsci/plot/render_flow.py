@@ -193,12 +193,14 @@ def slice_plane(mesh: Any, bodies: Sequence[Any]) -> tuple[str, Array]:
     normal = lengthwise(mesh)
     axis = "xyz".index(normal)
     low, high = mesh.bounds[2 * axis : 2 * axis + 2]
+    inside = 1e-6 * (high - low)
     origin = np.array(mesh.center)
+    # A plane in faces of cells cuts the cells of one side, or none, as rounding decides.
+    origin[axis] += inside
     ends = np.array([body.bounds[2 * axis : 2 * axis + 2] for body in bodies]).reshape(-1, 2)
     if len(ends) and not np.any((ends[:, 0] < origin[axis]) & (origin[axis] < ends[:, 1])):
-        first, last, inside = ends[:, 0].min(), ends[:, 1].max(), 1e-6 * (high - low)
+        first, last = ends[:, 0].min(), ends[:, 1].max()
         at_low, at_high = first <= low + inside, last >= high - inside
-        # A plane in the side itself cuts no cell.
         origin[axis] = (first + last) / 2 if at_low == at_high else low + inside if at_low else high - inside
     return normal, origin
 

@@ -142,8 +142,14 @@ def test_resume_and_plot(calls, capsys):
     assert calls == [
         ("resume", (Path("out"), []), {}),
         ("resume", (Path("out"), [("time.end", "2")]), {}),
-        ("plot", (Path("out"),), {"movie": True, "field": "velocity", "times": [0.5, 1.0]}),
+        ("plot", (Path("out"),), {"movie": True, "field": "velocity", "times": [0.5, 1.0], "mirrors": []}),
     ]
+
+
+def test_plot_of_both_sides(calls):
+    Path("out").mkdir()
+    assert execute(["plot", "out", "--mirror", "x=0", "--mirror", "y=1"]) == 0
+    assert calls[0][2]["mirrors"] == ["x=0", "y=1"]
 
 
 def test_plot_without_results(calls, capsys):

@@ -29,7 +29,7 @@ def test_processes_agree(tmp_path, dim, element, boxes):
         on_processes(processes, PROGRAM, dim, element, out, *boxes)
     for box in boxes:
         one, *others = (np.load(tmp_path / str(processes) / f"{box}.npz") for processes in (1, 2, 3))
-        for name in ("velocity", "pressure", "disc", "brick"):
+        for name in ("velocity", "pressure", "extremes", "disc", "brick"):
             for other in others:
                 assert np.abs(other[name] - one[name]).max() < 1e-8 * np.abs(one[name]).max(), (box, name)
 

@@ -11,6 +11,7 @@ from solvers.distributed import Nodal, gather_nodal
 from solvers.fluid.background.grid import uniform
 from solvers.fluid.background.nested import RefinedBox, RefinedSurface, refined
 from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.extreme_pressure import extreme_pressure
 from solvers.fluid.probes import mass_balance
 
 
@@ -70,9 +71,10 @@ def main(dim, element, box, out):
         step(fluid, 0.03 * number, 0.03)
     force = fluid.force()
     balance = mass_balance(fluid)()["fluid.mass"]
+    extremes = [extreme_pressure(fluid, which)()[""] for which in ("largest", "least")]
     found = everything(fluid)
     if fluid.comm.rank == 0:
-        np.savez(out, velocity=found[0], pressure=found[1], balance=balance, **force)
+        np.savez(out, velocity=found[0], pressure=found[1], balance=balance, extremes=extremes, **force)
 
 
 if __name__ == "__main__":

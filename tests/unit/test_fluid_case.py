@@ -147,7 +147,7 @@ MISTAKES = [
     (
         "{quantity: force}",
         "{quantity: force, extreme: least}",
-        "16:37: 'extreme' applies to the nodes of a contact pair: give 'pair'",
+        "16:37: 'extreme' applies to the nodes of a contact pair, or to the pressure of all fluid",
         "least",
     ),
     ("{quantity: force}", "{quantity: mass}", "16:21: quantity 'mass' needs the section 'structure'", "mass"),

@@ -10,7 +10,7 @@ import pytest
 from fsci.plot.picture import look_at, plot_run
 from fsci.plot.render import import_pyvista
 from fsci.plot.render_flow import connect, load_meshes, load_state, slice_plane, surrounds
-from fsci.plot.storyboard import arrange, choose, plane_state
+from fsci.plot.storyboard import arrange, boundary, choose, plane_state
 from fsci.run.output import FieldWriter
 from solvers.api import Snapshot
 
@@ -149,14 +149,25 @@ def test_specks_of_streamlines_are_left_out():
 
 
 def test_where_a_box_is_cut():
-    """In the middle if a body is there, else in the side that a part of a symmetric body lies in, or through bodies."""
+    """In the middle if a body is there, else in the side that a part of a symmetric body lies in, or through bodies.
+
+    The middle is a plane of the grid: the cut is 1e-6 of the box beside it, and is that of all cells there.
+    """
     box = import_pyvista().ImageData(dimensions=(5, 5, 9))  # 4 x 4 x 8
     sphere = import_pyvista().Sphere(radius=0.5, center=(1.0, 1.0, 4.0))
     half = sphere.clip("y", origin=(1.0, 1.0, 4.0), invert=False).translate((0, -1, 0))
-    assert slice_plane(box, []) == ("y", pytest.approx([2, 2, 4]))
+    assert slice_plane(box, []) == ("y", pytest.approx([2, 2 + 4e-6, 4], abs=1e-9))
     assert slice_plane(box, [sphere]) == ("y", pytest.approx([2, 1, 4]))
     assert slice_plane(box, [half]) == ("y", pytest.approx([2, 0, 4], abs=1e-5))
-    assert slice_plane(box, [half.translate((0, 1.8, 0))]) == ("y", pytest.approx([2, 2, 4]))
+    assert slice_plane(box, [half.translate((0, 1.8, 0))]) == ("y", pytest.approx([2, 2 + 4e-6, 4], abs=1e-9))
+
+
+def test_a_cut_in_a_plane_of_rounded_nodes_has_no_cracks():
+    grid = import_pyvista().ImageData(dimensions=(5, 5, 9)).cast_to_unstructured_grid()
+    grid.points[:, 1] += 1e-13 * np.random.default_rng(3).uniform(-1, 1, grid.n_points)
+    normal, origin = slice_plane(grid, [])
+    assert len(boundary(grid.slice(normal=normal, origin=grid.center))) > 24
+    assert len(boundary(grid.slice(normal=normal, origin=origin))) == 24
 
 
 def test_the_wall_of_a_tube_does_not_hide_what_is_in_it(tmp_path):

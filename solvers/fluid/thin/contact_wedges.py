@@ -7,14 +7,16 @@ sides of thin bodies have unknowns of their own, and a wedge between two of them
 1,000 times the velocity of the flow, and Newton's method goes to and fro. With the penalty k mu / g, as in
 `films.gaps`, the form is positive at any height.
 
-It acts in 3D, in cells in which bodies touched when the step began. Before, a film leaves by the slip that the lower
-penalty allows: linear velocities have no other flow through it. In 2D only the cell of the contact itself is one of
-these, not the rest of the wedge, and with the penalty there alone flaps repeat steps that they do not repeat without.
+It acts in the cells in which bodies touched when the step began, in 2D also in those around them. Before contact it
+does not act: a film leaves by the slip that the lower penalty allows, because linear velocities have no other flow
+through it.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
 
 from solvers.api import Array
 from solvers.fluid.background.grid import DistributedGrid
@@ -29,15 +31,28 @@ def beside_contact(grid: DistributedGrid, cut: Cut) -> Array | None:
     mean one of a wedge, and infinite at a plane. h: shortest edge of the cell.
     """
     assert grid.sheets is not None
-    if grid.dim == 2 or not len(grid.sheets.closed):
+    if not len(grid.sheets.closed):
         return None
     pieces, sizes, count = cut.pieces, grid.sizes[cut.cut], len(cut.cut)
     area = pieces.area.sum(axis=1)
     net = np.stack([np.bincount(pieces.cell, area * n, count) for n in pieces.normal.T], axis=1)
     facing = np.bincount(pieces.cell, area, count) - np.linalg.norm(net, axis=1)
     twice, h = 2.0 * cut.fraction[cut.cut] * sizes.prod(axis=1), sizes.min(axis=1)
-    closed = np.isin(grid.numbers[cut.cut], grid.sheets.closed)
+    narrow = (facing * h > twice) & _around(grid)[grid.numbers[cut.cut]]
     found = np.ones(len(grid.numbers))
-    narrow = closed & (facing * h > twice)
     found[cut.cut[narrow]] = np.maximum(twice[narrow] / (facing * h)[narrow], LEAST)
     return found
+
+
+def _around(grid: DistributedGrid) -> NDArray[np.bool_]:
+    """Mask of the cells of the box in which bodies touched, and in 2D of those that share a node with one.
+
+    Flaps in 2D fail without the cells around; in 3D they were not needed, and with them `valve_3d` repeats a step.
+    """
+    assert grid.sheets is not None
+    closed = np.zeros(grid.grid.size, dtype=bool)
+    closed[grid.sheets.closed] = True
+    if grid.dim == 2:
+        box = closed.reshape(grid.grid.shape, order="F")
+        return ndimage.binary_dilation(box, np.ones((3, 3))).ravel(order="F")
+    return closed

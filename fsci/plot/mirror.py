@@ -1,0 +1,94 @@
+"""Scenes with planes of symmetry, of which one side is computed, drawn whole: each part with its reflection.
+
+The reflection in the plane x_a = c has x_a' = 2 c - x_a. Component a of a vector changes its sign, and so does
+a component ab of a tensor with b other than a.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fsci.plot.render import import_pyvista
+from fsci.run.output import Series
+
+AXES = "xyz"
+ROUNDING = 1e-6  #: part of a mesh, relative to its size, that may be beyond the plane
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The plane x_axis = at."""
+
+    axis: int
+    at: float  #: [length]
+
+    @property
+    def name(self) -> str:
+        return f"{AXES[self.axis]}={self.at:g}"
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """Planes of symmetry, and the folder into which whole parts are written."""
+
+    planes: Sequence[Plane]
+    folder: Path
+
+    def whole(self, series: Series) -> Series:
+        """The VTU files of a part with their reflections; raises ValueError if a part is on both sides of a plane."""
+        if not self.planes:
+            return series
+        folder = Path(tempfile.mkdtemp(dir=self.folder))
+        for _, file in series:
+            mesh = import_pyvista().read(file)
+            for plane in self.planes:
+                mesh = with_reflection(mesh, plane)
+            mesh.save(folder / file.name)
+        return [(time, folder / file.name) for time, file in series]
+
+
+def read_plane(text: str) -> Plane:
+    """The plane that a text like y=0 names; raises ValueError for any other."""
+    axis, equals, at = text.partition("=")
+    try:
+        if len(axis.strip()) == 1 and equals and np.isfinite(float(at)):
+            return Plane(AXES.index(axis.strip()), float(at))
+    except ValueError:
+        pass
+    raise ValueError(f"a plane is an axis and a coordinate, such as y=0, not '{text}'")
+
+
+def with_reflection(mesh: Any, plane: Plane) -> Any:
+    """A mesh and its reflection as one mesh, joined at the nodes in the plane."""
+    low, high = mesh.bounds[2 * plane.axis : 2 * plane.axis + 2]
+    if min(high - plane.at, plane.at - low) > ROUNDING * mesh.length:
+        raise ValueError(f"a part lies on both sides of {plane.name}, from {low:.6g} to {high:.6g}")
+    return mesh.merge(reflection(mesh, plane), merge_points=True, tolerance=1e-9 * mesh.length)
+
+
+def reflection(mesh: Any, plane: Plane) -> Any:
+    """The mesh on the other side of the plane."""
+    from vtkmodules.vtkFiltersGeneral import vtkReflectionFilter
+
+    reflect = vtkReflectionFilter()
+    reflect.SetInputData(mesh)
+    reflect.SetPlane(vtkReflectionFilter.USE_X + plane.axis)
+    reflect.SetCenter(plane.at)
+    reflect.CopyInputOff()
+    reflect.FlipAllInputArraysOff()
+    reflect.Update()
+    found = import_pyvista().wrap(reflect.GetOutput())
+    for data in (found.point_data, found.cell_data):
+        for name in data.keys():
+            values, component = data[name], name.rpartition("_")[2]
+            if values.ndim == 2 and values.shape[1] == 3:
+                data[name] = np.where(np.arange(3) == plane.axis, -values, values)
+            elif len(component) == 2 and set(component) <= set(AXES) and component.count(AXES[plane.axis]) == 1:
+                data[name] = -values
+    return found

@@ -1,0 +1,74 @@
+"""Scenes with planes of symmetry are drawn whole."""
+
+import numpy as np
+import pytest
+
+from fsci.plot.mirror import Mirror, Plane, read_plane, with_reflection
+from fsci.plot.render import import_pyvista
+
+
+def block(low=(0.0, 0.0, 0.0), high=(1.0, 2.0, 1.0)):
+    """2 x 4 x 2 cells with fields that are symmetric about y = 2: v_y and s_xy are odd there."""
+    pyvista = import_pyvista()
+    ends = zip(low, high, (3, 5, 3), strict=True)
+    mesh = pyvista.RectilinearGrid(*(np.linspace(a, b, n) for a, b, n in ends)).cast_to_unstructured_grid()
+    mesh.point_data.update(fields(mesh.points))
+    return mesh
+
+
+def fields(points):
+    x, y, z = points.T
+    odd = (y - 2) * (1 + x + z)
+    return {"v": np.stack([x, odd, z * (y - 2) ** 2], axis=1), "p": (y - 2) ** 2 + x, "s_xy": odd, "s_yy": x + z}
+
+
+def test_fields_on_the_other_side():
+    """Both sides have the fields of the whole scene; at its nodes in the plane they are joined."""
+    whole = with_reflection(block(), Plane(1, 2.0))
+    assert whole.n_points == 3 * 9 * 3
+    assert whole.n_cells == 2 * 2 * 4 * 2
+    assert whole.volume == pytest.approx(4.0)
+    assert whole.extract_surface(algorithm="dataset_surface").area == pytest.approx(2 * (1 + 4 + 4))
+    for name, expected in fields(whole.points).items():
+        np.testing.assert_allclose(whole.point_data[name], expected, atol=1e-12, err_msg=name)
+    assert np.all(whole.compute_cell_sizes().cell_data["Volume"] > 0)
+
+
+def test_two_planes():
+    whole = with_reflection(with_reflection(block(), Plane(1, 2.0)), Plane(0, 0.0))
+    assert whole.bounds == pytest.approx((-1, 1, 0, 4, 0, 1))
+    assert whole.n_points == 5 * 9 * 3
+
+
+def test_files_of_a_series(tmp_path):
+    """Series with files of the same name, as those of a failed step have, are kept apart."""
+    found = []
+    mirror = Mirror([Plane(1, 2.0)], tmp_path)
+    for number, high in enumerate((1.0, 3.0)):
+        file = tmp_path / str(number) / "block_000003.vtu"
+        file.parent.mkdir()
+        block(high=(high, 2.0, 1.0)).save(file)
+        found += mirror.whole([(0.5, file)])
+    assert [time for time, _ in found] == [0.5, 0.5]
+    assert [import_pyvista().read(file).volume for _, file in found] == pytest.approx([4.0, 12.0])
+
+
+def test_without_planes_files_are_those_of_the_run(tmp_path):
+    series = [(0.0, tmp_path / "block_000000.vtu")]
+    assert Mirror((), tmp_path).whole(series) is series
+
+
+@pytest.mark.parametrize(("text", "plane"), [("y=0", Plane(1, 0.0)), (" z = -1.5", Plane(2, -1.5))])
+def test_names_of_planes(text, plane):
+    assert read_plane(text) == plane
+
+
+@pytest.mark.parametrize("text", ["y", "y=", "=0", "w=0", "xy=0", "y=nan", "y=middle"])
+def test_what_is_no_plane(text):
+    with pytest.raises(ValueError, match=f"a plane is an axis and a coordinate, such as y=0, not '{text}'"):
+        read_plane(text)
+
+
+def test_a_part_on_both_sides():
+    with pytest.raises(ValueError, match=r"a part lies on both sides of y=0\.5, from 0 to 2"):
+        with_reflection(block(), Plane(1, 0.5))
