@@ -237,10 +237,10 @@ def test_least_penalty_of_nitsche_in_films():
     assert found == pytest.approx([20.0, 20.0, 4e3, 0.0])
 
 
-def test_penalty_has_the_scale_of_the_film():
-    """gamma eps (g/h)^3 / (12 gamma) (mu + rho alpha g^2 / 10) at nodes with hardly any fluid, in cells of 0.1.
+def test_penalty_in_films_has_no_convection():
+    """gamma eps (g/h)^3 / (12 gamma) (mu + rho alpha h^2) at nodes with hardly any fluid, in cells of 0.1.
 
-    The velocity of the past is 1e4 there: neither it nor the inertia of a whole cell counts. They are 1e3 and 10 mu.
+    The velocity of the past is 1e4 there, with which rho |a| h would be 1e3 mu; rho alpha h^2 is 10 mu.
     """
     gap, alpha = 0.02, 1e3
     penalty = scene(
@@ -251,5 +251,5 @@ def test_penalty_has_the_scale_of_the_film():
     penalty.set_scales(Scales(1.0, 1.0, alpha, np.full(len(unknowns.grid.numbers), 1e4), fast))
     nodes = unknowns.velocity
     above = np.flatnonzero(np.linalg.norm(nodes.points - [0.3, 0.1], axis=1) < 1e-9)
-    wanted = Penalties().extension * expected(gap) * (1.0 + alpha * gap**2 / 10.0)
+    wanted = Penalties().extension * expected(gap) * (1.0 + alpha * H**2)
     assert penalty.penalties()[nodes.dofs[above]] == pytest.approx(wanted, rel=1e-6)

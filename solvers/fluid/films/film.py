@@ -180,12 +180,6 @@ def film_cells(
     return owned[:0] if creeping is None else owned[creeping[grid.numbers[owned]]]
 
 
-def film_height(factor: Array, penalty: float) -> Array:
-    """g / h of films for their factors, h the longest edge of the cell; penalty: gamma."""
-    height: Array = (12.0 * penalty * factor / SHARE) ** (1.0 / 3.0)
-    return height
-
-
 def coercive(films: NDArray[np.bool_], cell: NDArray[np.int64], volume: Array, area: Array) -> Array:
     """Least Nitsche penalty over the viscosity [1/m], 4 |Gamma_K| / |K in fluid| in films, by pieces.
 

@@ -3,10 +3,8 @@
     s(u, v) = sum_i d_i (c_i u) (c_i v),   d_i = gamma w_i phi V / h^2 (velocity),  d_i = gamma w_i V / phi (pressure),
 
 with phi = mu + rho |a| h + rho alpha h^2, V the volume of a cell at the node, and w_i between 1 (hardly any fluid in
-the cells of the node) and 0 (a well-cut cell). In films of height g the penalty is reduced (`films.film`), and that of
-the velocity has the scale of their friction and acceleration, mu + rho alpha g^2 / 10, instead of phi: they have no
-convection, and |a| behind a wall is (h / g)^2 times that in the film. That of the pressure keeps 1 / phi, which is less
-than with the film's scale.
+the cells of the node) and 0 (a well-cut cell). In films the penalty is reduced (`films.film`), and phi has no
+convection, because they are creeping flow: |a| at nodes behind a wall is (h / g)^2 times that in the film.
 The penalty does not lock: it is zero for polynomials. Nodes whose cells have no fluid are no unknowns, so that they do
 not amplify rounding errors. Their velocity is that of the extension, which later steps use as history. Their pressure
 is not used.
@@ -24,7 +22,6 @@ from solvers.api import Array
 from solvers.fluid.background.directory import Directory
 from solvers.fluid.background.space import FlowNodes, Unknowns
 from solvers.fluid.cutting.cut import Cut
-from solvers.fluid.films.film import film_height
 from solvers.fluid.linear_systems.matrix import Pattern
 from solvers.fluid.poorly_cut.extension import NEAR, Extension
 from solvers.fluid.poorly_cut.ghost import Scales
@@ -132,13 +129,9 @@ class ExtensionPenalty:
         for nodes, speed in zip((unknowns.velocity, unknowns.pressure), speeds, strict=True):
             dofs, sizes = nodes.dofs[: nodes.owned], nodes.sizes[: nodes.owned]
             h, volume, film = sizes.min(axis=1), sizes.prod(axis=1), self._film[dofs[:, 0]]
-            phi = scales.viscosity + scales.density * (speed[: nodes.owned] * h + scales.alpha * h**2)
-            if nodes is unknowns.pressure:
-                scale = volume / phi
-            else:
-                g = film_height(film, self.factor) * sizes.max(axis=1)
-                of_film = scales.viscosity + scales.density * scales.alpha * g**2 / 10.0
-                scale = np.where(film < 1.0, of_film, phi) * volume / h**2
+            convection = np.where(film < 1.0, 0.0, speed[: nodes.owned] * h)
+            phi = scales.viscosity + scales.density * (convection + scales.alpha * h**2)
+            scale = phi * volume / h**2 if nodes is unknowns.velocity else volume / phi
             found[dofs] = (self.factor * film * scale)[:, None]
         return self._weight * found
 
