@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,19 @@ State = dict[str, Any]
 
 
 @dataclass(frozen=True)
+class Finding:
+    """Something that cannot be right in the state at the end of a step."""
+
+    kind: str  #: one word: overlap, passage, pocket, mass, ...
+    body: str  #: name of the body, pocket or field
+    value: float  #: how large it is, in the unit that the message has
+    message: str  #: what is wrong, where, and what helps
+    #: the state means nothing, so the step fails; "repeat": a smaller step may help; "end": it cannot
+    worthless: Literal["", "repeat", "end"] = ""
+    where: tuple[float, ...] | None = None  #: a point [m]
+
+
+@dataclass(frozen=True)
 class StepInfo:
     """Iterations, residuals and notes of one accepted time step."""
 
@@ -23,6 +36,7 @@ class StepInfo:
     residuals: tuple[float, ...]  #: residual norm of each iteration, first to last
     numbers: Mapping[str, float] = field(default_factory=dict)  #: further columns for history.csv
     notes: tuple[str, ...] = ()  #: notes to the user
+    findings: tuple[Finding, ...] = ()  #: of sentinels
 
 
 @dataclass(frozen=True)
@@ -43,7 +57,7 @@ class StepFailed(Exception):
     """A time step without a solution: field, reason, iteration, position and residuals.
 
     where: a point [m], such as that of the largest residual or of an inverted element, or None; history: the residual
-    norms so far.
+    norms so far; finding: that of the sentinel which rejected the solution.
     """
 
     def __init__(
@@ -54,9 +68,10 @@ class StepFailed(Exception):
         iteration: int = 0,
         where: tuple[float, ...] | None = None,
         history: tuple[float, ...] = (),
+        finding: Finding | None = None,
     ):
         place = "" if where is None else " near (" + ", ".join(f"{c:.6g}" for c in where) + ")"
-        super().__init__(f"{field}: {reason} at iteration {iteration}{place}")
+        super().__init__(f"{field}: {reason}" if finding else f"{field}: {reason} at iteration {iteration}{place}")
         self.field, self.reason, self.iteration, self.where, self.history = (
             field,
             reason,
@@ -64,6 +79,12 @@ class StepFailed(Exception):
             where,
             history,
         )
+        self.finding = finding
+
+    @property
+    def hopeless(self) -> bool:
+        """Whether a smaller step cannot help."""
+        return self.finding is not None and self.finding.worthless == "end"
 
 
 class Stateful(Protocol):
@@ -77,3 +98,15 @@ class Scheme(Stateful, Protocol):
     """Takes one time step from t to t + dt for all fields of a case; raises StepFailed. A single field is a scheme."""
 
     def step(self, t: float, dt: float) -> StepInfo: ...
+
+
+class Sentinel(Stateful, Protocol):
+    """Looks at the state at the end of each step for what no residual tells."""
+
+    def start(self, t: float) -> None:
+        """Keep what it needs of the initial state at t [s]."""
+        ...
+
+    def look(self, t: float, dt: float) -> Sequence[Finding]:
+        """What is wrong at the end t [s] of a step of length dt [s]: the same on every process."""
+        ...

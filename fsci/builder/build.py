@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from fsci.builder.columns import Numbers
 from fsci.case import Case
-from solvers.api import Scheme, Snapshot
+from solvers.api import Scheme, Sentinel, Snapshot
 from solvers.timing import Timer
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ class Simulation:
     balances: Callable[[], Numbers]  #: column -> value
     dofs: dict[str, int]
     notes: list[str] = field(default_factory=list)  #: notes to the user on changes of meshes, on rank 0
+    sentinels: dict[str, Sentinel] = field(default_factory=dict)  #: by a name in the saved state
     imbalance: Callable[[], Numbers] = dict  #: of contact work, with facets dealt out evenly and as it was
 
 

@@ -47,6 +47,7 @@ def report(out: Path, summary: Mapping[str, Any], drawn: Sequence[Path]) -> str:
             paragraph(status, "status ok" if status == "finished" else "status bad"),
             paragraph(str(summary["message"])),
             section("Why it failed", _failure(out, summary)),
+            section("Warnings", _warnings(summary)),
             section("Run", _run(summary)),
             section("Verification", _verification(summary)),
             section("Pictures", pictures(file for file in drawn if file not in curves)),
@@ -71,6 +72,14 @@ def _run(summary: Mapping[str, Any]) -> str:
         ("versions", ", ".join(f"{name} {version}" for name, version in summary["versions"].items())),
     ]
     return table(("", ""), rows)
+
+
+def _warnings(summary: Mapping[str, Any]) -> str:
+    rows = [
+        (found["kind"], found["body"], _number(found["time"]), _number(found["value"]), found["message"])
+        for found in summary["warnings"]
+    ]
+    return table(("kind", "body", "first at", "largest", "message"), rows)
 
 
 def _failure(out: Path, summary: Mapping[str, Any]) -> str:

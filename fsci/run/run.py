@@ -25,6 +25,7 @@ from fsci.run.results_folder import keep_case, prepare_folder
 from fsci.run.stop import StopWatch
 from fsci.run.summary import RunRecord, memory_mb, shares, summarize, write_summary
 from fsci.run.verify import evaluate
+from fsci.run.watch import Watched
 from solvers.api import State, StepFailed, StepInfo
 
 if TYPE_CHECKING:
@@ -128,6 +129,7 @@ class Run:
         try:
             with self.record.timer("start"):
                 simulation.initialise(self.case.time.start, self.case.time.step)
+                self.scheme.start(self.case.time.start)
         except StepFailed as failure:
             if self.case.contact is None:
                 raise self.case.error(("structure",), str(failure)) from None
@@ -144,11 +146,11 @@ class Run:
             self.clock.restore(state["clock"])
             with self.record.timer("start"):
                 try:
-                    restored = scatter(self.comm, state["scheme"], simulation.scheme.save())
+                    restored = scatter(self.comm, state["scheme"], self.scheme.save())
                 except KeyError as missing:
                     reason = f"the checkpoint has no entry {missing}: another version of fsci wrote it"
                     raise OSError(f"{reason}; run the case again") from None
-                simulation.scheme.restore(restored)
+                self.scheme.restore(restored)
             if self.root:
                 (self.out / "STOP").unlink(missing_ok=True)
                 self.history = HistoryWriter(self.out / "history.csv", resume_after=self.clock.step)
@@ -169,6 +171,7 @@ class Run:
 
         with self.record.timer("start"):
             self.simulation = build(self.case, self.comm, self.record.timer)
+        self.scheme = Watched(self.simulation.scheme, self.simulation.sentinels, self.record.timer)
         return self.simulation
 
     # -------------------------------------------------------------------------------------------------- loop
@@ -224,15 +227,15 @@ class Run:
         while True:
             try:
                 dt = clock.dt
-                info = self.simulation.scheme.step(clock.time, dt)
+                info = self.scheme.step(clock.time, dt)
                 break
             except StepFailed as failure:
-                if not clock.halve():
+                if failure.hopeless or not clock.halve():
                     self._keep_failure(failure)
-                    self.simulation.scheme.restore(self.state)
+                    self.scheme.restore(self.state)
                     raise
-                self.simulation.scheme.restore(self.state)
-                self.state = self.simulation.scheme.save()
+                self.scheme.restore(self.state)
+                self.state = self.scheme.save()
                 self.record.retry()
                 self.monitor.retry(failure, clock.dt)
         with self.stop.files:
@@ -249,7 +252,7 @@ class Run:
         from solvers.distributed import gather
 
         with self.record.timer("checkpoint"):
-            self.state = self.simulation.scheme.save()
+            self.state = self.scheme.save()
             clock = self.clock
             self.good = {"scheme": gather(self.comm, self.state), "clock": clock.save()}
             self.good_at = {"step": clock.step, "time": clock.time, "title": self.case.title}
@@ -266,6 +269,8 @@ class Run:
             self.monitor.step(clock.step, clock.time, dt, info, wall)
             for note in info.notes:
                 self.monitor.say(note)
+            for finding in self.record.warn(clock.time, info.findings):
+                self.monitor.warn(finding.message)
 
     # ------------------------------------------------------------------------------------------------- files
 
@@ -306,6 +311,8 @@ class Run:
 
     def _fail(self, failure: StepFailed) -> int:
         clock = self.clock
+        if failure.finding is not None:
+            self.record.warn(clock.time + clock.dt, [failure.finding])
         if self.root:
             with self.stop.files:
                 state = self.good | {"clock": clock.save(), "record": self.record.save()}
@@ -369,6 +376,8 @@ class Run:
         missed = any(not result["ok"] for result in results)
         if status == "finished":
             message = f"finished in {self.record.wall():.3g} s; results in {self.out}"
+            if count := len(self.record.warnings):
+                message += f"; {count} warning{'s' * (count > 1)} above and in summary.json"
             message += "; the verification failed" if missed else ""
             self.monitor.say(f"time: {shares(self.record.wall(), self.record.timer.seconds)}")
         self.monitor.finish(message, ok=status == "finished" and not missed)

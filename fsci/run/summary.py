@@ -15,8 +15,17 @@ import numpy as np
 
 from fsci.run.history import History
 from fsci.run.output import write_text
-from solvers.api import State, StepInfo
+from solvers.api import Finding, State, StepInfo
 from solvers.timing import Timer
+
+
+@dataclass
+class Warned:
+    """What a sentinel has found: the time of its first message [s], and the largest value since."""
+
+    time: float
+    value: float
+    message: str
 
 
 @dataclass
@@ -26,6 +35,7 @@ class RunRecord:
     residual_steps: Collection[int] = ()  #: steps whose residuals summary.json keeps
     residuals: dict[int, list[float]] = field(default_factory=dict)  #: step -> residual norms, first to last
     retried: int = 0  #: attempts that failed and were repeated with a smaller step
+    warnings: dict[tuple[str, str], Warned] = field(default_factory=dict)  #: by kind and body
     timer: Timer = field(default_factory=Timer)
     begin: float = field(default_factory=time.perf_counter)
     earlier: float = 0.0  #: wall time of the run before it was resumed [s]
@@ -39,6 +49,22 @@ class RunRecord:
         """Notes a failed attempt."""
         self.retried += 1
 
+    def warn(self, time: float, findings: Sequence[Finding]) -> list[Finding]:
+        """Notes findings; returns those of a kind and body that were not found before."""
+        new = []
+        for finding in findings:
+            known = self.warnings.get((finding.kind, finding.body))
+            if known is None:
+                self.warnings[finding.kind, finding.body] = Warned(time, finding.value, finding.message)
+                new.append(finding)
+            else:
+                known.value = max(known.value, finding.value, key=abs)
+        return new
+
+    def warned(self) -> list[dict[str, Any]]:
+        """The warnings as plain data."""
+        return [{"kind": kind, "body": body, **vars(known)} for (kind, body), known in self.warnings.items()]
+
     def wall(self) -> float:
         """Wall time since the run began [s], without the pauses between stop and resume."""
         return self.earlier + time.perf_counter() - self.begin
@@ -48,6 +74,7 @@ class RunRecord:
         return {
             "retried": self.retried,
             "residuals": {str(step): norms for step, norms in self.residuals.items()},
+            "warnings": [[kind, body, *vars(known).values()] for (kind, body), known in self.warnings.items()],
             "seconds": dict(self.timer.seconds),
             "wall": self.wall(),
         }
@@ -56,6 +83,7 @@ class RunRecord:
         """Inverse of save."""
         self.retried = state["retried"]
         self.residuals = {int(step): norms for step, norms in state["residuals"].items()}
+        self.warnings = {(kind, body): Warned(*known) for kind, body, *known in state["warnings"]}
         self.timer.seconds = dict(state["seconds"])
         self.earlier = state["wall"]
 
@@ -110,6 +138,7 @@ def summarize(
             for name, values in columns.items()
             if name in balances
         },
+        "warnings": record.warned(),
         "verify": [dict(result) for result in verify],
         "units": dict(units or {}),
         **({"contact": {"imbalance": dict(imbalance)}} if imbalance else {}),

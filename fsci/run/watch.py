@@ -1,0 +1,45 @@
+"""A scheme whose steps sentinels look at before they are accepted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from solvers.api import Scheme, Sentinel, State, StepFailed, StepInfo
+from solvers.timing import Timer
+
+SENTINELS = "sentinels"  #: name of their states beside those of the scheme
+
+
+class Watched:
+    """Takes the steps of another scheme. Worthless results fail, other findings go with the step's information."""
+
+    def __init__(self, scheme: Scheme, sentinels: Mapping[str, Sentinel], timer: Timer):
+        """sentinels: by a name in the saved state."""
+        self._scheme, self._sentinels, self._timer = scheme, dict(sentinels), timer
+
+    def start(self, t: float) -> None:
+        """Show the initial state at t [s] to the sentinels."""
+        for sentinel in self._sentinels.values():
+            sentinel.start(t)
+
+    def step(self, t: float, dt: float) -> StepInfo:
+        """One step from t to t + dt. Raises StepFailed."""
+        info = self._scheme.step(t, dt)
+        with self._timer("sentinels"):
+            found = tuple(finding for sentinel in self._sentinels.values() for finding in sentinel.look(t + dt, dt))
+        for finding in found:
+            if finding.worthless:
+                raise StepFailed(
+                    finding.kind, finding.message, where=finding.where, history=info.residuals, finding=finding
+                )
+        return replace(info, findings=(*info.findings, *found)) if found else info
+
+    def save(self) -> State:
+        states = {name: sentinel.save() for name, sentinel in self._sentinels.items()}
+        return self._scheme.save() | {SENTINELS: states}
+
+    def restore(self, state: State) -> None:
+        self._scheme.restore({name: value for name, value in state.items() if name != SENTINELS})
+        for name, sentinel in self._sentinels.items():
+            sentinel.restore(state[SENTINELS][name])
