@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from math import ceil
 
 from fsci.case import Case
 from fsci.case.contact import PairSection
@@ -12,6 +11,7 @@ from fsci.case.mesh import Mesh
 from fsci.case.shapes import Shape
 from fsci.case.structure import StructureSection
 from fsci.meshes.nested import cells_of, fluid_dofs
+from fsci.run.clock import number_of_steps, shared
 from solvers.mesh import Mesh as BodyMesh
 
 Row = tuple[str, str]
@@ -23,10 +23,11 @@ def summary(case: Case, meshes: Mapping[str, BodyMesh] = {}, pairs: Mapping[str,
     `meshes`: of elastic bodies, by name, as far as they were read; `pairs`: also those that the case does not name.
     """
     time = case.time
-    steps = number_of_steps(case)
+    step = shared(time.end - time.start, time.step)
+    steps = number_of_steps(time.end - time.start, time.step)
     rows = [
         ("title", case.title),
-        ("time", f"{time.start:g} to {time.end:g} {case.units.time}, {_count(steps, 'step')} of {time.step:g}"),
+        ("time", f"{time.start:g} to {time.end:g} {case.units.time}, {_count(steps, 'step')} of {step:.6g}"),
     ]
     if case.structure is not None:
         rows += _structure(case, case.structure, meshes)
@@ -74,10 +75,6 @@ def structure_dofs(structure: StructureSection, meshes: Mapping[str, BodyMesh]) 
         else:
             return None
     return total
-
-
-def number_of_steps(case: Case) -> int:
-    return ceil((case.time.end - case.time.start) / case.time.step - 1e-9)
 
 
 def _fluid(case: Case, fluid: FluidSection) -> Iterator[Row]:

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import floor
 
 from solvers.api import State
+
+#: Share of a step below which what is left at the end is no step of its own: difference formulas over steps of such
+#: different lengths divide by the short one.
+LEAST = 0.1
 
 
 @dataclass
 class Clock:
-    """Counts time in ticks: a nominal step has 2^halvings of them. All steps of one level have the same size."""
+    """Counts time in ticks: a nominal step has 2^halvings of them. All steps of one level have the same size.
+
+    A rest shorter than a tenth of a step is shared by the steps before it: all nominal ones, or the last halved one.
+    """
 
     start: float
     end: float
-    nominal: float  #: step size of the case [s]
+    given: float  #: step size of the case [s]
     halvings: int  #: how often a step may be halved
     recover_after: int  #: accepted steps after which a halved step is doubled
     tick: int = 0
@@ -21,15 +29,23 @@ class Clock:
     accepted: int = 0  #: accepted steps since the level changed
     step: int = 0  #: accepted steps
 
+    def __post_init__(self) -> None:
+        self.nominal = shared(self.end - self.start, self.given)  #: size of a step that was not halved [s]
+
     @property
     def ticks(self) -> int:
         """Ticks of the present step."""
         return 2 ** (self.halvings - self.level)
 
+    @property
+    def size(self) -> float:
+        """Size [s] of the steps of the present level."""
+        return self.nominal / 2**self.level
+
     def at(self, tick: int) -> float:
         """Time [s] of a tick; the last step ends at `end` exactly."""
         time = self.start + self.nominal * (tick / 2**self.halvings)
-        return self.end if time >= self.end - 1e-9 * self.nominal else time
+        return self.end if self.end - time < LEAST * self.size else time
 
     @property
     def time(self) -> float:
@@ -39,9 +55,9 @@ class Clock:
     @property
     def dt(self) -> float:
         """Size [s] of the next step."""
-        size = self.nominal / 2**self.level
         left = self.end - self.time
-        return size if left >= size * (1.0 - 1e-9) else left
+        last = self.at(self.tick + self.ticks) == self.end
+        return left if last and abs(left - self.size) > 1e-9 * self.size else self.size
 
     @property
     def done(self) -> bool:
@@ -69,11 +85,28 @@ class Clock:
 
     def save(self) -> State:
         count = {"tick": self.tick, "level": self.level, "accepted": self.accepted, "step": self.step}
-        return count | {"time": self.time}
+        grid = {"start": self.start, "nominal": self.nominal, "given": self.given, "end": self.end}
+        return count | grid | {"time": self.time}
 
     def restore(self, state: State) -> None:
-        """Restore a saved clock; with another step size, it continues from the saved time."""
-        self.tick, self.level = state["tick"], min(state["level"], self.halvings)
+        """Restore a saved clock; with another step size or end, it begins to count at the saved time."""
         self.accepted, self.step = state["accepted"], state["step"]
-        if self.time != state["time"]:
+        self.level = min(state["level"], self.halvings)
+        if (state["given"], state["end"]) == (self.given, self.end):
+            self.start, self.nominal, self.tick = state["start"], state["nominal"], state["tick"]
+        if self.time != state["time"]:  # also if steps may be halved less often, which changes the ticks
             self.start, self.tick, self.level, self.accepted = state["time"], 0, 0, 0
+            self.nominal = shared(self.end - self.start, self.given)
+
+
+def shared(length: float, step: float) -> float:
+    """The step [s] nearest to a given one with which a length [s] has no last step shorter than a tenth of it."""
+    count = floor(length / step * (1.0 + 1e-9))
+    rest = length - count * step
+    return length / count if count and abs(rest) > 1e-9 * step and rest < LEAST * step else step
+
+
+def number_of_steps(length: float, step: float) -> int:
+    """Steps in a length of time [s] if none is halved."""
+    count, rest = divmod(length / shared(length, step), 1.0)
+    return int(count) + (rest > 1e-9 * max(count, 1.0))

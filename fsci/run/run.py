@@ -128,7 +128,7 @@ class Run:
         """Set the state at the first time. Raises CaseError if it cannot be computed: a smaller step would not help."""
         try:
             with self.record.timer("start"):
-                simulation.initialise(self.case.time.start, self.case.time.step)
+                simulation.initialise(self.case.time.start, self.clock.nominal)
                 self.scheme.start(self.case.time.start)
         except StepFailed as failure:
             if self.case.contact is None:
@@ -140,17 +140,15 @@ class Run:
         from solvers.distributed import scatter
 
         with self._shown():
-            simulation = self._build()
-            self.record.restore(state["record"])
-            self._initialise(simulation)
-            self.clock.restore(state["clock"])
+            self._initialise(self._build())
             with self.record.timer("start"):
                 try:
-                    restored = scatter(self.comm, state["scheme"], self.scheme.save())
+                    self.record.restore(state["record"])
+                    self.clock.restore(state["clock"])
+                    self.scheme.restore(scatter(self.comm, state["scheme"], self.scheme.save()))
                 except KeyError as missing:
                     reason = f"the checkpoint has no entry {missing}: another version of fsci wrote it"
                     raise OSError(f"{reason}; run the case again") from None
-                self.scheme.restore(restored)
             if self.root:
                 (self.out / "STOP").unlink(missing_ok=True)
                 self.history = HistoryWriter(self.out / "history.csv", resume_after=self.clock.step)

@@ -84,7 +84,8 @@ class RunRecord:
         self.retried = state["retried"]
         self.residuals = {int(step): norms for step, norms in state["residuals"].items()}
         self.warnings = {(kind, body): Warned(*known) for kind, body, *known in state["warnings"]}
-        self.timer.seconds = dict(state["seconds"])
+        now = self.timer.seconds
+        self.timer.seconds = {name: now.get(name, 0.0) + state["seconds"].get(name, 0.0) for name in state["seconds"] | now}
         self.earlier = state["wall"]
 
 

@@ -2,9 +2,10 @@
 
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
-from fsci.run.clock import Clock
+from fsci.run.clock import Clock, number_of_steps
 
 
 def clock(end, step, *, start=0.0, halvings=4, recover_after=5):
@@ -100,10 +101,57 @@ def test_halving_the_last_partial_step():
 
 
 def test_halvings_that_do_not_shorten_the_last_step():
-    run = clock(1.0, 0.99, halvings=1)
+    run = clock(1.0, 0.8, halvings=1)
     run.accept()
-    assert run.dt == pytest.approx(0.01)
+    assert run.dt == pytest.approx(0.2)
     assert not run.halve()
+
+
+@pytest.mark.parametrize("step", [0.0333333, 0.0999, 0.95, 0.33])
+def test_a_short_rest_is_shared_by_the_steps_before_it(step):
+    """What is left after the whole steps is less than a tenth of one: all steps are a little longer."""
+    sizes = [size for _, size in steps(clock(1.0, step))]
+    assert len(sizes) == int(1.0 / step) == number_of_steps(1.0, step)
+    assert sizes == pytest.approx([1.0 / len(sizes)] * len(sizes), rel=1e-12)
+
+
+@pytest.mark.parametrize("start", [0.0, 1e6])
+@pytest.mark.parametrize("level", [0, 1, 2, 3, 4])
+def test_no_step_is_much_shorter_than_the_one_before_it(start, level):
+    """Whatever is left: halved steps end as whole ones do."""
+    for rest in np.linspace(0.0, 1.0, 41):
+        run = clock(start + 3.0 + rest, 1.0, start=start, recover_after=100)
+        for _ in range(level):
+            run.halve()
+        sizes = [size for _, size in steps(run)]
+        assert min(sizes) > 0.0999 * max(sizes)
+        assert sum(sizes) == pytest.approx(3.0 + rest, rel=1e-9)
+        assert level or number_of_steps(run.end - run.start, 1.0) == len(sizes)
+        assert run.time == start + 3.0 + rest
+
+
+def test_a_resumed_run_keeps_the_shared_steps():
+    """Twice resumed: the ticks count from the same time with the same size."""
+    straight, resumed = clock(1.0, 0.33), clock(1.0, 0.33)
+    for _ in range(2):
+        straight.accept()
+        resumed.accept()
+        other = clock(1.0, 0.33)
+        other.restore(resumed.save())
+        resumed = other
+    assert steps(resumed) == steps(straight)
+
+
+def test_a_later_end_changes_what_is_shared():
+    """The rest of the first end was shared; the steps from there to the later end share their own."""
+    run = clock(1.0, 0.33)
+    steps(run)
+    longer = clock(2.0, 0.33)
+    longer.restore(run.save())
+    again = clock(2.0, 0.33)
+    again.restore(longer.save())
+    assert steps(longer) == steps(again)
+    assert longer.time == 2.0
 
 
 def test_recovery_waits_for_the_coarse_grid():
