@@ -11,7 +11,6 @@ from fsci.case.mesh import Mesh
 from fsci.case.shapes import Shape
 from fsci.case.structure import StructureSection
 from fsci.meshes.nested import cells_of, fluid_dofs
-from fsci.run.clock import number_of_steps, shared
 from solvers.mesh import Mesh as BodyMesh
 
 Row = tuple[str, str]
@@ -23,11 +22,12 @@ def summary(case: Case, meshes: Mapping[str, BodyMesh] = {}, pairs: Mapping[str,
     `meshes`: of elastic bodies, by name, as far as they were read; `pairs`: also those that the case does not name.
     """
     time = case.time
-    step = shared(time.end - time.start, time.step)
-    steps = number_of_steps(time.end - time.start, time.step)
     rows = [
         ("title", case.title),
-        ("time", f"{time.start:g} to {time.end:g} {case.units.time}, {_count(steps, 'step')} of {step:.6g}"),
+        (
+            "time",
+            f"{time.start:g} to {time.end:g} {case.units.time}, {_count(time.steps, 'step')} of {time.shared_step:.6g}",
+        ),
     ]
     if case.structure is not None:
         rows += _structure(case, case.structure, meshes)

@@ -15,7 +15,6 @@ from pathlib import Path
 from fsci.case import Case
 from fsci.check.check import structure_dofs
 from fsci.meshes.nested import fluid_dofs
-from fsci.run.clock import number_of_steps
 from solvers.mesh import Mesh
 
 Point = tuple[float, float, float]  #: unknowns, seconds of a step, memory [MB]
@@ -63,8 +62,7 @@ def in_words(case: Case, meshes: Mapping[str, Mesh]) -> str:
     structure = None if case.structure is None else structure_dofs(case.structure, meshes)
     dimension = next((mesh.points.shape[1] for mesh in meshes.values()), None)
     cost = estimate(case, structure, costs(), dimension)
-    steps = number_of_steps(case.time.end - case.time.start, case.time.step)
-    return "" if cost is None else describe_cost(cost, steps)
+    return "" if cost is None else describe_cost(cost, case.time.steps)
 
 
 def costs() -> Table:

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import floor
 
+from fsci.case.time import LEAST, shared
 from solvers.api import State
-
-#: Share of a step below which what is left at the end is no step of its own: difference formulas over steps of such
-#: different lengths divide by the short one.
-LEAST = 0.1
 
 
 @dataclass
@@ -97,16 +93,3 @@ class Clock:
         if self.time != state["time"]:  # also if steps may be halved less often, which changes the ticks
             self.start, self.tick, self.level, self.accepted = state["time"], 0, 0, 0
             self.nominal = shared(self.end - self.start, self.given)
-
-
-def shared(length: float, step: float) -> float:
-    """The step [s] nearest to a given one with which a length [s] has no last step shorter than a tenth of it."""
-    count = floor(length / step * (1.0 + 1e-9))
-    rest = length - count * step
-    return length / count if count and abs(rest) > 1e-9 * step and rest < LEAST * step else step
-
-
-def number_of_steps(length: float, step: float) -> int:
-    """Steps in a length of time [s] if none is halved."""
-    count, rest = divmod(length / shared(length, step), 1.0)
-    return int(count) + (rest > 1e-9 * max(count, 1.0))

@@ -85,7 +85,9 @@ class RunRecord:
         self.residuals = {int(step): norms for step, norms in state["residuals"].items()}
         self.warnings = {(kind, body): Warned(*known) for kind, body, *known in state["warnings"]}
         now = self.timer.seconds
-        self.timer.seconds = {name: now.get(name, 0.0) + state["seconds"].get(name, 0.0) for name in state["seconds"] | now}
+        self.timer.seconds = {
+            name: now.get(name, 0.0) + state["seconds"].get(name, 0.0) for name in state["seconds"] | now
+        }
         self.earlier = state["wall"]
 
 

@@ -5,7 +5,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fsci.run.clock import Clock, number_of_steps
+from fsci.case.time import number_of_steps
+from fsci.run.clock import Clock
 
 
 def clock(end, step, *, start=0.0, halvings=4, recover_after=5):
