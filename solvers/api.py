@@ -15,6 +15,10 @@ Array = NDArray[np.float64]
 State = dict[str, Any]
 
 
+#: What helps against a result that means nothing: a smaller step may, or cannot; empty: the result has a meaning.
+Helps = Literal["", "repeat", "end"]
+
+
 @dataclass(frozen=True)
 class Finding:
     """Something that cannot be right in the state at the end of a step."""
@@ -23,8 +27,8 @@ class Finding:
     body: str  #: name of the body, pocket or field
     value: float  #: how large it is, in the unit that the message has
     message: str  #: what is wrong, where, and what helps
-    #: the state means nothing, so the step fails; "repeat": a smaller step may help; "end": it cannot
-    worthless: Literal["", "repeat", "end"] = ""
+    #: not empty: the state means nothing, so the step fails
+    worthless: Helps = ""
     where: tuple[float, ...] | None = None  #: a point [m]
 
 

@@ -52,6 +52,7 @@ def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
 
 def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
+    from fsci.builder.sentinels import build_sentinels
     from fsci.builder.structure import build_bodies, build_probes, build_structure
     from solvers.structure.snapshot import snapshots
 
@@ -66,6 +67,7 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         balances=lambda: {"structure.energy": structure.energy.error},
         dofs={"structure": structure.dofs()},
         notes=_notes(bodies),
+        sentinels=build_sentinels(case, comm, structure=structure, contact=contact),
         imbalance=lambda: {} if contact is None else contact.imbalance,
     )
 
@@ -91,6 +93,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder import structure as build_structure
     from fsci.builder.coupling import build_coupled, start
     from fsci.builder.dry_side import outlines
+    from fsci.builder.sentinels import build_sentinels
     from solvers.fluid.probes import mass_balance
     from solvers.fluid.snapshot import snapshots as of_fluid
     from solvers.structure.snapshot import snapshots as of_structure
@@ -115,6 +118,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         balances=lambda: {"structure.energy": structure.energy.error, **mass(), **coupled.balance.numbers()},
         dofs={"fluid": fluid.dofs(), "structure": structure.dofs()},
         notes=_notes(bodies),
+        sentinels=build_sentinels(case, comm, structure=structure, contact=contact, given=fluid.bodies),
         imbalance=lambda: {} if contact is None else contact.imbalance,
     )
 
@@ -123,6 +127,7 @@ def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder import fluid as build_fluid
     from fsci.builder import rigid as build_rigid
     from fsci.builder.coupling import build_coupled_rigid, start
+    from fsci.builder.sentinels import build_sentinels
     from solvers.fluid.probes import mass_balance
     from solvers.fluid.snapshot import snapshots
 
@@ -137,6 +142,7 @@ def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         probes=lambda: {column: value for measure in probes for column, value in measure().items()},
         balances=lambda: {**mass(), **scheme.coupled.balance.numbers()},
         dofs={"fluid": fluid.dofs(), "rigid": bodies.unknowns},
+        sentinels=build_sentinels(case, comm, rigid=bodies, given=fluid.bodies),
     )
 
 

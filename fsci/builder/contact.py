@@ -58,7 +58,7 @@ def _obstacle(case: Case, comm: MPI.Comm, name: str) -> Surface:
     if error is not None:
         raise error
     points, facets, facet_type = comm.bcast(found, root=0)
-    return Surface(name, points, facets, facet_type, None, motion=_motion(case, name, points))
+    return Surface(name, points, facets, facet_type, None, motion=motion_of_obstacle(case, name, points))
 
 
 def _rigid_mesh(case: Case, name: str) -> tuple[Array, NDArray[np.int64], str]:
@@ -74,7 +74,7 @@ def _rigid_mesh(case: Case, name: str) -> tuple[Array, NDArray[np.int64], str]:
     return points, facets, CELL_TYPES[mesh.cell_type].facet
 
 
-def _motion(case: Case, name: str, points: Array) -> Callable[[float], Array] | None:
+def motion_of_obstacle(case: Case, name: str, points: Array) -> Callable[[float], Array] | None:
     """A function: time [s] -> positions of the points [m]; None if they are at rest."""
     assert case.contact is not None
     if name in case.contact.obstacles:

@@ -12,7 +12,7 @@ import numpy as np
 
 from solvers.api import Array
 from solvers.contact.contact import Contact
-from solvers.contact.distance import distances
+from solvers.distance import distances
 
 Probe = Callable[[], dict[str, float]]
 

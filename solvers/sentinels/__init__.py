@@ -1,0 +1,1 @@
+"""Sentinels: what they look for in accepted steps stands in no residual."""

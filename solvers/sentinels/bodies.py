@@ -1,0 +1,76 @@
+"""Bodies as sentinels see them: closed surfaces that move, with the size and the bend of their facets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.tessellation import area_vectors, unit_normals
+
+Indices = NDArray[np.int64]
+
+#: Angle between facets from which their edge is one of the body, not of its approximation [rad].
+SHARP = np.pi / 3
+
+#: Distance, relative to the thickness, that Newton's tolerance and rounding leave between surfaces that touch.
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class MovingBody:
+    """The whole surface of one body."""
+
+    name: str
+    facets: Indices  #: vertices of segments or triangles, (m, dim), with the solid on their left or behind them
+    positions: Callable[[float], Array]  #: time [s] -> positions of the vertices [m], (n, dim), on all processes
+    free: bool  #: elastic, or a rigid body that the flow moves; else rigid and at rest or driven
+
+
+class Measures:
+    """Sizes of a body at the start, from the corners of its facets, shape (m, dim, dim) [m]."""
+
+    def __init__(self, facets: Indices, corners: Array):
+        self._facets, self._corners = facets, corners
+        edges = np.roll(corners, -1, axis=1) - corners
+        self.edge: Array = np.linalg.norm(edges, axis=2).max(axis=1)  #: longest edge of each facet [m]
+
+    @cached_property
+    def thickness(self) -> float:
+        """Two times volume over area [m]: the thickness of a plate, the radius of a disc."""
+        areas = area_vectors(self._corners)
+        dim = areas.shape[1]
+        middles = self._corners.mean(axis=1) - self._corners.mean(axis=(0, 1))
+        volume = abs(float(np.einsum("md,md->", middles, areas))) / dim
+        return 2.0 * volume / float(np.linalg.norm(areas, axis=1).sum())
+
+    @cached_property
+    def bends(self) -> tuple[Array, Array]:
+        """Largest angle [rad] to a neighbour by facet, (m,): over smooth edges, over sharp ones (0 without)."""
+        normals = unit_normals(self._corners)
+        facets, dim = self._facets, self._facets.shape[1]
+        edges = facets.T.reshape(-1, 1) if dim == 2 else np.concatenate([facets[:, [k, (k + 1) % 3]] for k in range(3)])
+        owner, edges = np.tile(np.arange(len(facets)), dim), np.sort(edges, axis=1)
+        order = np.lexsort(edges.T)
+        same = (edges[order][1:] == edges[order][:-1]).all(axis=1)
+        i, j = owner[order][:-1][same], owner[order][1:][same]
+        angle = np.arccos(np.clip(np.einsum("ed,ed->e", normals[i], normals[j]), -1.0, 1.0))
+        smooth, sharp = np.zeros(len(facets)), np.zeros(len(facets))
+        for target, kept in ((smooth, angle < SHARP), (sharp, angle >= SHARP)):
+            np.maximum.at(target, i[kept], angle[kept])
+            np.maximum.at(target, j[kept], angle[kept])
+        return smooth, sharp
+
+    @cached_property
+    def sagitta(self) -> Array:
+        """Height [m] of the arcs that the facets replace, (m,)."""
+        return arc_height(self.edge, self.bends[0])
+
+
+def arc_height(chord: Array, angle: Array) -> Array:
+    """Height c/2 tan(angle/4) [m] of an arc with a chord c [m] over which the tangent turns by an angle [rad]."""
+    return 0.5 * chord * np.tan(np.minimum(angle, np.pi) / 4.0)

@@ -1,0 +1,230 @@
+"""The sentinel of bodies that overlap: moved into each other at the end of a step, or through each other within one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array, Finding, Helps, State
+from solvers.penetration import depths, inside
+from solvers.sentinels.bodies import ROUNDING, Measures, MovingBody, arc_height
+
+#: Samples per edge of a facet at most: of a facet larger than so many thicknesses of the other body.
+MOST = 64
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """A pair of bodies between which contact is computed."""
+
+    pairs: tuple[str, ...]  #: names of pairs
+    slave: str  #: name of the slave's body
+    facets: Mapping[str, NDArray[np.bool_]]  #: body -> facets on surfaces of a pair; absent: all
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Points on the facets of one body that are looked for in another one."""
+
+    facet: NDArray[np.int64]  #: (k,)
+    weights: Array  #: of the corners of the facet, (k, dim)
+    allowed: NDArray[np.bool_]  #: points that were in the other body at the start, where no pair is
+
+
+class Overlaps:
+    """Looks for points of the surface of one body in another one, unless both are rigid with a prescribed motion.
+
+    What was in the other body at the start may stay there, except on surfaces of a pair. Facets replace arcs: a
+    point counts from the depth on that exceeds the height of the arcs of both facets. In contact, the gap is zero in
+    the mean over a facet of the slave, so there the arcs are those of both surfaces over such a facet, edges included.
+    """
+
+    def __init__(
+        self, bodies: Sequence[MovingBody], meetings: Mapping[frozenset[str], Meeting], tied: set[frozenset[str]]
+    ):
+        """meetings: by the names of both bodies; tied: bodies that are tied to each other."""
+        self._bodies, self._meetings = list(bodies), dict(meetings)
+        self._pairs = [
+            (i, j)
+            for i, j in combinations(range(len(bodies)), 2)
+            if (bodies[i].free or bodies[j].free) and frozenset((bodies[i].name, bodies[j].name)) not in tied
+        ]
+        self._samples: dict[tuple[int, int], Samples] = {}
+
+    def start(self, t: float) -> None:
+        """Keep the positions and what overlaps at the time t [s]."""
+        self._before, self._time = self._positions(t), t
+        corners = [x[body.facets] for body, x in zip(self._bodies, self._before, strict=True)]
+        self._measures = [Measures(b.facets, c) for b, c in zip(self._bodies, corners, strict=True)]
+        self._samples.clear()
+        self._start = self._before
+
+    def _positions(self, t: float) -> list[Array]:
+        return [body.positions(t) for body in self._bodies]
+
+    def look(self, t: float, dt: float) -> list[Finding]:
+        """Overlaps at the end t [s] of a step, and passages within it."""
+        now, before = self._positions(t), self._before
+        overlapping = {pair: finding for pair in self._near(now, now) if (finding := self._overlap(*pair, now))}
+        passed = [self._passage(*pair, before, now) for pair in self._near(before, now) if pair not in overlapping]
+        self._before, self._time = now, t
+        return [*overlapping.values(), *(finding for finding in passed if finding)]
+
+    def _near(self, before: Sequence[Array], now: Sequence[Array]) -> Iterator[tuple[int, int]]:
+        """Pairs of bodies whose boxes over the step overlap."""
+        if not self._pairs:
+            return
+        low = np.array([np.minimum(a.min(axis=0), b.min(axis=0)) for a, b in zip(before, now, strict=True)])
+        high = np.array([np.maximum(a.max(axis=0), b.max(axis=0)) for a, b in zip(before, now, strict=True)])
+        i, j = np.array(self._pairs).T
+        near = ((low[i] < high[j]) & (low[j] < high[i])).all(axis=1)
+        yield from (self._pairs[k] for k in np.flatnonzero(near))
+
+    # ------------------------------------------------------------------------------------------------------ overlaps
+
+    def _overlap(self, i: int, j: int, now: Sequence[Array]) -> Finding | None:
+        depth, where, facet = self._deepest(i, j, now)
+        if depth == 0.0:
+            return None
+        meeting = self._meeting(i, j)
+        worthless = depth > facet
+        names, place = self._names(i, j), place_of(where)
+        message = f"{names} overlap by {depth:.3g} {place}: "
+        if meeting is None:
+            message += "no pair of contact names them, so nothing holds them apart; give them a pair"
+        else:
+            message += f"contact ({', '.join(meeting.pairs)}) does not hold them apart; take a smaller 'step' or a "
+            message += "finer slave surface, and begin without overlap"
+        helps: Helps = "" if not worthless else "end" if meeting is None else "repeat"
+        return Finding("overlap", names, depth, message, helps, where)
+
+    def _deepest(self, i: int, j: int, x: Sequence[Array]) -> tuple[float, tuple[float, ...], float]:
+        """(depth of the deepest point of one body in the other [m], the point [m], edge of the smaller facet [m])."""
+        return max((self._deep(a, b, x) for a, b in ((i, j), (j, i))), key=lambda one: one[0])
+
+    def _deep(self, a: int, b: int, x: Sequence[Array]) -> tuple[float, tuple[float, ...], float]:
+        """The deepest point of body a in body b; a depth of zero if there is none."""
+        nothing: tuple[float, tuple[float, ...], float] = (0.0, (), 0.0)
+        mine, other = x[a][self._bodies[a].facets], x[b][self._bodies[b].facets]
+        low, high = x[b].min(axis=0), x[b].max(axis=0)
+        reached = ((mine.min(axis=1) < high) & (mine.max(axis=1) > low)).all(axis=1)
+        if not reached.any():
+            return nothing
+        samples = self._samples_of(a, b)
+        chosen = np.flatnonzero(reached[samples.facet] & ~samples.allowed)
+        points = np.einsum("kv,kvd->kd", samples.weights[chosen], mine[samples.facet[chosen]])
+        within = ((points > low) & (points < high)).all(axis=1)
+        chosen, points = chosen[within], points[within]
+        if not len(points):
+            return nothing
+        lowest, highest = points.min(axis=0), points.max(axis=0)
+        near = ((other.min(axis=1) <= highest) & (other.max(axis=1) >= lowest)).all(axis=1)
+        solid = inside(points, other)
+        if not solid.any():
+            return nothing
+        chosen, points = chosen[solid], points[solid]
+        facet = samples.facet[chosen]
+        depth = depths(points, other, self._tolerance(a, b, facet, near))
+        k = int(depth.argmax())
+        if depth[k] == 0.0:
+            return nothing
+        edges = self._measures[b].edge
+        smaller = min(float(self._measures[a].edge[facet[k]]), float(edges[near].min() if near.any() else edges.min()))
+        return float(depth[k]), tuple(points[k].tolist()), smaller
+
+    def _tolerance(self, a: int, b: int, facet: NDArray[np.int64], near: NDArray[np.bool_]) -> Array:
+        """Depth [m] up to which points on facets of body a are on the surface of body b; near: facets of b there."""
+        mine, other = self._measures[a], self._measures[b]
+        thickness = min(mine.thickness, other.thickness)
+        near = near if near.any() else np.ones_like(near)
+        meeting = self._meeting(a, b)
+        if meeting is None:
+            return ROUNDING * thickness + mine.sagitta[facet] + other.sagitta[near].max()
+        slave_is_a = meeting.slave == self._bodies[a].name
+        chord = mine.edge[facet] if slave_is_a else np.full(len(facet), other.edge[near].max())
+        chord = np.minimum(chord, thickness)
+        turn = chord * (mine.bends[0] / mine.edge)[facet] + mine.bends[1][facet]
+        turn = turn + chord * (other.bends[0] / other.edge)[near].max() + other.bends[1][near].max()
+        return ROUNDING * thickness + arc_height(chord, turn)
+
+    def _samples_of(self, a: int, b: int) -> Samples:
+        """Points on facets of body a, not farther apart than body b is thick."""
+        if (a, b) not in self._samples:
+            facet, weights = lattice(
+                self._measures[a].edge / self._measures[b].thickness, self._bodies[a].facets.shape[1]
+            )
+            x = np.einsum("kv,kvd->kd", weights, self._start[a][self._bodies[a].facets][facet])
+            allowed = inside(x, self._start[b][self._bodies[b].facets])
+            if (meeting := self._meeting(a, b)) is not None:
+                on_pair = meeting.facets.get(self._bodies[a].name)
+                allowed &= np.zeros(len(x), dtype=bool) if on_pair is None else ~on_pair[facet]
+            self._samples[a, b] = Samples(facet, weights, allowed)
+        return self._samples[a, b]
+
+    # ------------------------------------------------------------------------------------------------------ passages
+
+    def _passage(self, i: int, j: int, before: Sequence[Array], now: Sequence[Array]) -> Finding | None:
+        """Bodies that pass through each other between two states without overlap, on straight ways."""
+        moved = [float(np.linalg.norm(now[k] - before[k], axis=1).max()) for k in (i, j)]
+        thickness = min(self._measures[k].thickness for k in (i, j))
+        count = int(np.ceil(2.0 * sum(moved) / thickness))
+        if count < 2:
+            return None
+        shares = np.arange(1, count) / count
+        low, high = (
+            [(1.0 - shares)[:, None] * end(before[k], axis=0) + shares[:, None] * end(now[k], axis=0) for k in (i, j)]
+            for end in (np.min, np.max)
+        )
+        met = ((low[0] < high[1]) & (low[1] < high[0])).all(axis=1)
+        for share in shares[met]:
+            x = [np.empty(0)] * len(now)
+            for k in (i, j):
+                x[k] = (1.0 - share) * before[k] + share * now[k]
+            depth, where, facet = self._deepest(i, j, x)
+            if depth > facet:
+                names = self._names(i, j)
+                message = f"{names} pass through each other within the step {place_of(where)}; take a smaller 'step'"
+                return Finding("passage", names, sum(moved), message, "repeat", where)
+        return None
+
+    def _meeting(self, a: int, b: int) -> Meeting | None:
+        return self._meetings.get(frozenset((self._bodies[a].name, self._bodies[b].name)))
+
+    def _names(self, i: int, j: int) -> str:
+        return f"{self._bodies[i].name} and {self._bodies[j].name}"
+
+    # ---------------------------------------------------------------------------------------------------------- state
+
+    def save(self) -> State:
+        return {"time": self._time}
+
+    def restore(self, state: State) -> None:
+        """Continue with bodies that have been restored already."""
+        self._time = state["time"]
+        self._before = self._positions(self._time)
+
+
+def lattice(sizes: Array, corners: int) -> tuple[NDArray[np.int64], Array]:
+    """(facet, weights of its corners) of points on facets with ceil(size) intervals on each edge."""
+    counts = np.clip(np.ceil(sizes), 1, MOST).astype(np.int64)
+    facets, weights = [], []
+    for count in np.unique(counts).tolist():
+        if corners == 2:
+            first = np.arange(count) / count  # the other end belongs to the next facet
+            own = np.stack([1.0 - first, first], axis=1)
+        else:
+            i, j = np.nonzero(np.add.outer(np.arange(count + 1), np.arange(count + 1)) <= count)
+            own = np.stack([i, j, count - i - j], axis=1) / count
+        chosen = np.flatnonzero(counts == count)
+        facets.append(np.repeat(chosen, len(own)))
+        weights.append(np.tile(own, (len(chosen), 1)))
+    return np.concatenate(facets), np.concatenate(weights)
+
+
+def place_of(where: Sequence[float]) -> str:
+    """A place in a message."""
+    return "at (" + ", ".join(f"{c:.4g}" for c in where) + ")"

@@ -1,0 +1,110 @@
+"""The sentinel of bodies that pass through walls of the fluid's box, or leave it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array, Finding, State
+from solvers.sentinels.bodies import ROUNDING, Measures, MovingBody, arc_height
+from solvers.sentinels.overlaps import place_of
+
+
+@dataclass(frozen=True)
+class Wall:
+    """One face of the box, or the part of it that a patch has."""
+
+    name: str  #: of the patch
+    face: str  #: x-, x+, y-, ...
+    position: float  #: coordinate of the face [m]
+    within: Callable[[Array], NDArray[np.bool_]] | None = None  #: points of the face, (dim, n), that are on the patch
+
+    def depth(self, x: Array) -> Array:
+        """How far points (n, dim) are behind the face [m], zero beside the patch."""
+        axis = "xyz".index(self.face[0])
+        behind = self.position - x[:, axis] if self.face[1] == "-" else x[:, axis] - self.position
+        if self.within is not None:
+            on_face = x.T.copy()
+            on_face[axis] = self.position
+            behind = np.where(self.within(on_face), behind, 0.0)
+        return np.maximum(behind, 0.0)
+
+
+class Walls:
+    """Looks for vertices of elastic and free bodies behind faces that hold the fluid.
+
+    A body that reaches through a face at the start may do so all the time, and so may its vertices on the face. Contact
+    with an obstacle at the wall lets vertices pass by the height of the arcs that facets replace, edges included.
+    """
+
+    def __init__(self, bodies: Sequence[MovingBody], walls: Sequence[Wall], box: tuple[Array, Array]):
+        """box: lowest and highest corner [m]."""
+        self._bodies, self._walls, self._box = [body for body in bodies if body.free], list(walls), box
+
+    def start(self, t: float) -> None:
+        """Keep what is on and behind the faces at the time t [s]."""
+        self._allowed, self._tolerance, self._edge, self._within = [], [], [], []
+        for body in self._bodies:
+            x = body.positions(t)
+            measures = Measures(body.facets, x[body.facets])
+            rounding = ROUNDING * measures.thickness
+            heights = arc_height(measures.edge, measures.bends[0] + measures.bends[1])
+            self._tolerance.append(rounding + _at_vertices(heights, body.facets, len(x)))
+            self._edge.append(_at_vertices(measures.edge, body.facets, len(x)))
+            self._allowed.append([self._allow(wall, x, rounding) for wall in self._walls])
+            self._within.append(self._meets_box(x))
+
+    def _allow(self, wall: Wall, x: Array, rounding: float) -> NDArray[np.bool_]:
+        """Vertices that may pass the wall: all of a body that does at the start, else those on it."""
+        axis, sign = "xyz".index(wall.face[0]), 1.0 if wall.face[1] == "+" else -1.0
+        ahead = sign * (wall.position - x[:, axis])
+        through = (wall.depth(x) > rounding).any() and (ahead > rounding).any()
+        return np.full(len(x), True) if through else ahead <= rounding
+
+    def _meets_box(self, x: Array) -> bool:
+        low, high = self._box
+        return bool(((x.max(axis=0) > low) & (x.min(axis=0) < high)).all())
+
+    def look(self, t: float, dt: float) -> list[Finding]:
+        """Walls that bodies have passed at the end t [s] of a step, and bodies that have left the box."""
+        found = []
+        for k, body in enumerate(self._bodies):
+            x = body.positions(t)
+            through = [self._through(k, number, x) for number in range(len(self._walls))]
+            found += [finding for finding in through if finding]
+            if self._within[k] and not self._meets_box(x):
+                message = f"{body.name} has left the box of the fluid; what follows has no meaning for it"
+                found.append(Finding("outside", body.name, 1.0, message))
+        return found
+
+    def _through(self, k: int, number: int, x: Array) -> Finding | None:
+        wall, name = self._walls[number], self._bodies[k].name
+        depth = np.where(self._allowed[k][number], 0.0, wall.depth(x))
+        wrong = depth > self._tolerance[k]
+        if not wrong.any():
+            return None
+        deepest = int(np.where(wrong, depth, 0.0).argmax())
+        where = tuple(x[deepest].tolist())
+        message = (
+            f"{name} has passed through the face {wall.face} of the box (patch {wall.name}) by {depth[deepest]:.3g} "
+            f"{place_of(where)}: nothing holds it there; put an obstacle along the face and give both a pair of contact"
+        )
+        worthless = depth[deepest] > self._edge[k][deepest]
+        return Finding("wall", name, float(depth[deepest]), message, "end" if worthless else "", where)
+
+    def save(self) -> State:
+        return {}
+
+    def restore(self, state: State) -> None:
+        """It keeps nothing from step to step."""
+
+
+def _at_vertices(values: Array, facets: NDArray[np.int64], count: int) -> Array:
+    """The largest value of the facets at each vertex."""
+    found = np.zeros(count)
+    for corner in facets.T:
+        np.maximum.at(found, corner, values)
+    return found
