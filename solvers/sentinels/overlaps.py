@@ -16,6 +16,11 @@ from solvers.sentinels.bodies import ROUNDING, Measures, MovingBody, arc_height
 #: Samples per edge of a facet at most: of a facet larger than so many thicknesses of the other body.
 MOST = 64
 
+#: Share of the thickness of the thinner body, or the edge of a facet if that is less, from which depth on an overlap
+#: means nothing. A body that passes through a plate has points in its middle, one half of the thickness deep; states
+#: within a step are half a thickness apart, so that one of them has a point deeper than a quarter.
+SHARE = 0.25
+
 
 @dataclass(frozen=True)
 class Meeting:
@@ -87,11 +92,11 @@ class Overlaps:
     # ------------------------------------------------------------------------------------------------------ overlaps
 
     def _overlap(self, i: int, j: int, now: Sequence[Array]) -> Finding | None:
-        depth, where, facet = self._deepest(i, j, now)
+        depth, where, limit = self._deepest(i, j, now)
         if depth == 0.0:
             return None
         meeting = self._meeting(i, j)
-        worthless = depth > facet
+        worthless = depth > limit
         names, place = self._names(i, j), place_of(where)
         message = f"{names} overlap by {depth:.3g} {place}: "
         if meeting is None:
@@ -103,7 +108,7 @@ class Overlaps:
         return Finding("overlap", names, depth, message, helps, where)
 
     def _deepest(self, i: int, j: int, x: Sequence[Array]) -> tuple[float, tuple[float, ...], float]:
-        """(depth of the deepest point of one body in the other [m], the point [m], edge of the smaller facet [m])."""
+        """(depth of the deepest point of one body in the other [m], the point [m], depth that means nothing [m])."""
         return max((self._deep(a, b, x) for a, b in ((i, j), (j, i))), key=lambda one: one[0])
 
     def _deep(self, a: int, b: int, x: Sequence[Array]) -> tuple[float, tuple[float, ...], float]:
@@ -133,8 +138,9 @@ class Overlaps:
         if depth[k] == 0.0:
             return nothing
         edges = self._measures[b].edge
-        smaller = min(float(self._measures[a].edge[facet[k]]), float(edges[near].min() if near.any() else edges.min()))
-        return float(depth[k]), tuple(points[k].tolist()), smaller
+        smaller = min(self._measures[a].edge[facet[k]], edges[near].min() if near.any() else edges.min())
+        limit = min(float(smaller), SHARE * min(self._measures[k].thickness for k in (a, b)))
+        return float(depth[k]), tuple(points[k].tolist()), limit
 
     def _tolerance(self, a: int, b: int, facet: NDArray[np.int64], near: NDArray[np.bool_]) -> Array:
         """Depth [m] up to which points on facets of body a are on the surface of body b; near: facets of b there."""
@@ -171,7 +177,7 @@ class Overlaps:
         """Bodies that pass through each other between two states without overlap, on straight ways."""
         moved = [float(np.linalg.norm(now[k] - before[k], axis=1).max()) for k in (i, j)]
         thickness = min(self._measures[k].thickness for k in (i, j))
-        count = int(np.ceil(2.0 * sum(moved) / thickness))
+        count = int(np.ceil(0.5 * sum(moved) / (SHARE * thickness)))
         if count < 2:
             return None
         shares = np.arange(1, count) / count
@@ -184,8 +190,8 @@ class Overlaps:
             x = [np.empty(0)] * len(now)
             for k in (i, j):
                 x[k] = (1.0 - share) * before[k] + share * now[k]
-            depth, where, facet = self._deepest(i, j, x)
-            if depth > facet:
+            depth, where, limit = self._deepest(i, j, x)
+            if depth > limit and self._deepest(i, j, before)[0] == 0.0:
                 names = self._names(i, j)
                 message = f"{names} pass through each other within the step {place_of(where)}; take a smaller 'step'"
                 return Finding("passage", names, sum(moved), message, "repeat", where)
