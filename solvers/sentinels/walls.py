@@ -36,8 +36,8 @@ class Wall:
 class Walls:
     """Looks for vertices of elastic and free bodies behind faces that hold the fluid.
 
-    A body that reaches through a face at the start may do so all the time, and so may its vertices on the face. Contact
-    with an obstacle at the wall lets vertices pass by the height of the arcs that facets replace, edges included.
+    A body that reaches through a face at the start may do so all the time. Contact with an obstacle at the wall lets
+    vertices pass by the height of the arcs that facets replace, edges included.
     """
 
     def __init__(self, bodies: Sequence[MovingBody], walls: Sequence[Wall], box: tuple[Array, Array]):
@@ -54,15 +54,8 @@ class Walls:
             heights = arc_height(measures.edge, measures.bends[0] + measures.bends[1])
             self._tolerance.append(rounding + _at_vertices(heights, body.facets, len(x)))
             self._edge.append(_at_vertices(measures.edge, body.facets, len(x)))
-            self._allowed.append([self._allow(wall, x, rounding) for wall in self._walls])
+            self._allowed.append([bool((wall.depth(x) > rounding).any()) for wall in self._walls])
             self._within.append(self._meets_box(x))
-
-    def _allow(self, wall: Wall, x: Array, rounding: float) -> NDArray[np.bool_]:
-        """Vertices that may pass the wall: all of a body that does at the start, else those on it."""
-        axis, sign = "xyz".index(wall.face[0]), 1.0 if wall.face[1] == "+" else -1.0
-        ahead = sign * (wall.position - x[:, axis])
-        through = (wall.depth(x) > rounding).any() and (ahead > rounding).any()
-        return np.full(len(x), True) if through else ahead <= rounding
 
     def _meets_box(self, x: Array) -> bool:
         low, high = self._box
@@ -82,9 +75,9 @@ class Walls:
 
     def _through(self, k: int, number: int, x: Array) -> Finding | None:
         wall, name = self._walls[number], self._bodies[k].name
-        depth = np.where(self._allowed[k][number], 0.0, wall.depth(x))
+        depth = wall.depth(x)
         wrong = depth > self._tolerance[k]
-        if not wrong.any():
+        if self._allowed[k][number] or not wrong.any():
             return None
         deepest = int(np.where(wrong, depth, 0.0).argmax())
         where = tuple(x[deepest].tolist())

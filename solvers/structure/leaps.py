@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from mpi4py import MPI
 
 from solvers.api import Array, Finding, State
 from solvers.structure.field import Structure
@@ -31,7 +30,7 @@ class Leaps:
         structure, comm = self._structure, self._structure.comm
         low = np.array([body.points.min(axis=1, initial=np.inf) for body in structure.bodies])
         high = np.array([body.points.max(axis=1, initial=-np.inf) for body in structure.bodies])
-        high, low = comm.allreduce(high, op=MPI.MAX), comm.allreduce(low, op=MPI.MIN)
+        high, low = np.max(comm.allgather(high), axis=0), np.min(comm.allgather(low), axis=0)
         self._sizes = (high - low).max(axis=1)
         ones = np.ones(structure.layout.size)
         self._counts = self._sums(ones)[:, 0]
@@ -57,7 +56,7 @@ class Leaps:
         if (ways <= self._sizes).all():
             return []
         held = [float(np.abs(part).max(initial=0.0)) for part in structure.split(structure.held.part(moved))]
-        asked = structure.comm.allreduce(np.array(held), op=MPI.MAX) + self._driven()
+        asked = np.max(structure.comm.allgather(held), axis=0) + self._driven()
         if self._masses is not None:
             asked = asked + self._lengths(structure.old.v) / self._counts * dt
             asked = asked + self._lengths(structure.now.external) / self._masses * dt**2

@@ -103,7 +103,9 @@ def test_what_overlaps_at_the_start_may_stay_but_nothing_more():
     """A flag that begins in a cylinder, and then its free end comes back to it."""
     points, facets = block(2, cells=8)
     flag = moving("flag", points * np.array([2.0, 0.1]), facets, [(0.0, 0.45)] * 3)
-    cylinder = moving("cylinder", points - np.array([0.9, 0.0]), facets, [(0.0, 0.0), (0.05, 0.0), (0.4, 0.0)], free=False)
+    cylinder = moving(
+        "cylinder", points - np.array([0.9, 0.0]), facets, [(0.0, 0.0), (0.05, 0.0), (0.4, 0.0)], free=False
+    )
     sentinel = watch([flag, cylinder])
     assert sentinel.look(0.0, 1.0) == []
     (found,) = sentinel.look(2.0, 1.0)
