@@ -15,22 +15,37 @@ CHUNK = 4_000_000
 def inside(points: Array, corners: Array) -> NDArray[np.bool_]:
     """Which points, shape (n, dim), are in the solid that facets enclose, with corners (m, dim, dim), positions in [m].
 
-    A ray along x from the point crosses the surface an odd number of times, counted with the direction of each facet.
-    A facet has the lower ends of its edges and not the upper ones, so that each point of the surface is in one facet.
+    A ray along an axis from the point crosses the surface an odd number of times, counted with the direction of each
+    facet. A facet has the lower ends of its edges and not the upper ones, so that each point is in one facet.
     """
     found = np.zeros(len(points), dtype=bool)
     if not len(points) or not len(corners):
         return found
+    axis, met = _fewest(points, corners)
+    points, corners = np.roll(points, -axis, axis=1), np.roll(corners[met], -axis, axis=2)
+    if axis == 1 and points.shape[1] == 2:
+        corners = corners[:, ::-1]  # x and y are exchanged, a reflection
     low, high = corners.min(axis=1), corners.max(axis=1)
     for part in np.array_split(np.arange(len(points)), 1 + len(points) * len(corners) // CHUNK):
         x = points[part]
-        near = (high[:, 0] > x[:, :1]) & ((low[:, 1] <= x[:, 1:2]) & (high[:, 1] > x[:, 1:2]))
+        near = (high[:, 0] > x[:, :1]) & (low[:, 1] <= x[:, 1:2]) & (high[:, 1] > x[:, 1:2])
         if points.shape[1] == 3:
             near &= (low[:, 2] <= x[:, 2:]) & (high[:, 2] >= x[:, 2:])
         point, facet = np.nonzero(near)
-        crossed = _crossings(x[point], corners[facet])
-        found[part] = np.bincount(point, crossed, len(part)) > 0.5
+        found[part] = np.bincount(point, _crossings(x[point], corners[facet]), len(part)) > 0.5
     return found
+
+
+def _fewest(points: Array, corners: Array) -> tuple[int, NDArray[np.bool_]]:
+    """The axis along which rays from all points meet the boxes of the fewest facets, and the mask of these."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    above, below = corners.max(axis=1) >= low, corners.min(axis=1) <= high
+    masks = []
+    for axis in range(len(low)):
+        others = [other for other in range(len(low)) if other != axis]
+        masks.append(above.all(axis=1) & below[:, others].all(axis=1))
+    axis = int(np.argmin([mask.sum() for mask in masks]))
+    return axis, masks[axis]
 
 
 def _crossings(x: Array, corners: Array) -> Array:

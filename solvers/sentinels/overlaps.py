@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array, Finding, Helps, State
+from solvers.contact.search import Search
 from solvers.penetration import depths, inside
 from solvers.sentinels.bodies import ROUNDING, Measures, MovingBody, arc_height
 
@@ -20,6 +21,9 @@ MOST = 64
 #: means nothing. A body that passes through a plate has points in its middle, one half of the thickness deep; states
 #: within a step are half a thickness apart, so that one of them has a point deeper than a quarter.
 SHARE = 0.25
+
+Depth = tuple[float, tuple[float, ...], float]  #: depth [m], the point [m], depth from which on it means nothing [m]
+NOT_AT_ALL: Depth = (0.0, (), 0.0)
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,10 @@ class Samples:
     facet: NDArray[np.int64]  #: (k,)
     weights: Array  #: of the corners of the facet, (k, dim)
     allowed: NDArray[np.bool_]  #: points that were in the other body at the start, where no pair is
+
+    def at(self, chosen: NDArray[np.int64], corners: Array) -> Array:
+        """Positions [m] of some of them, for corners (m, dim, dim) of the facets."""
+        return np.einsum("kv,kvd->kd", self.weights[chosen], corners[self.facet[chosen]])
 
 
 class Overlaps:
@@ -59,6 +67,7 @@ class Overlaps:
             if (bodies[i].free or bodies[j].free) and frozenset((bodies[i].name, bodies[j].name)) not in tied
         ]
         self._samples: dict[tuple[int, int], Samples] = {}
+        self._searches = {(i, j): Search(bodies[i].facets, bodies[j].facets) for i, j in self._pairs}
 
     def start(self, t: float) -> None:
         """Keep the positions and what overlaps at the time t [s]."""
@@ -107,46 +116,39 @@ class Overlaps:
         helps: Helps = "" if not worthless else "end" if meeting is None else "repeat"
         return Finding("overlap", names, depth, message, helps, where)
 
-    def _deepest(self, i: int, j: int, x: Sequence[Array]) -> tuple[float, tuple[float, ...], float]:
-        """(depth of the deepest point of one body in the other [m], the point [m], depth that means nothing [m])."""
-        return max((self._deep(a, b, x) for a, b in ((i, j), (j, i))), key=lambda one: one[0])
+    def _deepest(self, i: int, j: int, x: Sequence[Array]) -> Depth:
+        """The deepest point of one body in the other, where their surfaces cross."""
+        meet = self._searches[i, j].pairs(x[i], x[j], 0.0)
+        if not len(meet):
+            return NOT_AT_ALL
+        near = {i: np.unique(meet[:, 0]), j: np.unique(meet[:, 1])}
+        if all(self._deep(a, b, x, near[a], near[b])[0] == 0.0 for a, b in ((i, j), (j, i))):
+            return NOT_AT_ALL
+        facets = {k: np.arange(len(self._bodies[k].facets)) for k in (i, j)}
+        return max((self._deep(a, b, x, facets[a], near[b]) for a, b in ((i, j), (j, i))), key=lambda one: one[0])
 
-    def _deep(self, a: int, b: int, x: Sequence[Array]) -> tuple[float, tuple[float, ...], float]:
-        """The deepest point of body a in body b; a depth of zero if there is none."""
-        nothing: tuple[float, tuple[float, ...], float] = (0.0, (), 0.0)
+    def _deep(self, a: int, b: int, x: Sequence[Array], facets: NDArray[np.int64], near: NDArray[np.int64]) -> Depth:
+        """The deepest point of some facets of body a in body b; near: facets of b where the surfaces cross."""
         mine, other = x[a][self._bodies[a].facets], x[b][self._bodies[b].facets]
-        low, high = x[b].min(axis=0), x[b].max(axis=0)
-        reached = ((mine.min(axis=1) < high) & (mine.max(axis=1) > low)).all(axis=1)
-        if not reached.any():
-            return nothing
         samples = self._samples_of(a, b)
-        chosen = np.flatnonzero(reached[samples.facet] & ~samples.allowed)
-        points = np.einsum("kv,kvd->kd", samples.weights[chosen], mine[samples.facet[chosen]])
-        within = ((points > low) & (points < high)).all(axis=1)
-        chosen, points = chosen[within], points[within]
-        if not len(points):
-            return nothing
-        lowest, highest = points.min(axis=0), points.max(axis=0)
-        near = ((other.min(axis=1) <= highest) & (other.max(axis=1) >= lowest)).all(axis=1)
-        solid = inside(points, other)
-        if not solid.any():
-            return nothing
+        chosen = np.flatnonzero(np.isin(samples.facet, facets) & ~samples.allowed)
+        points = samples.at(chosen, mine)
+        solid = ((points > x[b].min(axis=0)) & (points < x[b].max(axis=0))).all(axis=1)
+        solid[solid] = inside(points[solid], other)
         chosen, points = chosen[solid], points[solid]
+        if not len(points):
+            return NOT_AT_ALL
         facet = samples.facet[chosen]
         depth = depths(points, other, self._tolerance(a, b, facet, near))
         k = int(depth.argmax())
-        if depth[k] == 0.0:
-            return nothing
-        edges = self._measures[b].edge
-        smaller = min(self._measures[a].edge[facet[k]], edges[near].min() if near.any() else edges.min())
-        limit = min(float(smaller), SHARE * min(self._measures[k].thickness for k in (a, b)))
+        edge = min(self._measures[a].edge[facet[k]], self._measures[b].edge[near].min())
+        limit = min(float(edge), SHARE * min(self._measures[k].thickness for k in (a, b)))
         return float(depth[k]), tuple(points[k].tolist()), limit
 
-    def _tolerance(self, a: int, b: int, facet: NDArray[np.int64], near: NDArray[np.bool_]) -> Array:
+    def _tolerance(self, a: int, b: int, facet: NDArray[np.int64], near: NDArray[np.int64]) -> Array:
         """Depth [m] up to which points on facets of body a are on the surface of body b; near: facets of b there."""
         mine, other = self._measures[a], self._measures[b]
         thickness = min(mine.thickness, other.thickness)
-        near = near if near.any() else np.ones_like(near)
         meeting = self._meeting(a, b)
         if meeting is None:
             return ROUNDING * thickness + mine.sagitta[facet] + other.sagitta[near].max()
@@ -179,6 +181,8 @@ class Overlaps:
         thickness = min(self._measures[k].thickness for k in (i, j))
         count = int(np.ceil(0.5 * sum(moved) / (SHARE * thickness)))
         if count < 2:
+            return None
+        if not len(self._searches[i, j].pairs(now[i], now[j], 0.0, before[i], before[j])):
             return None
         shares = np.arange(1, count) / count
         low, high = (

@@ -15,7 +15,9 @@ fluid:
   grid: {from: [-1, 0], to: [1, 1.5], cells: [16, 12]}
   patches: {walls: {on: [x-, x+, y-], no_slip: true}, top: {on: y+, traction: [0, 0]}}
   bodies:
-    disc: {mesh: {shape: disc, radius: 0.25, cells: [24, 1], translate: [0.03, 0.5]}, free: {density: 5, gravity: [0, -8]}}
+    disc:
+      mesh: {shape: disc, radius: 0.25, cells: [24, 1], translate: [0.03, 0.5]}
+      free: {density: 5, gravity: [0, -8]}
 coupling: {}
 output: {fields_every: 0}
 """
