@@ -6,46 +6,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.distance import distances
-
-#: Points and facets that are compared at once.
-CHUNK = 4_000_000
+from solvers.contact.search import Search
+from solvers.distance import distances_in_pairs
 
 
 def inside(points: Array, corners: Array) -> NDArray[np.bool_]:
     """Which points, shape (n, dim), are in the solid that facets enclose, with corners (m, dim, dim), positions in [m].
 
-    A ray along an axis from the point crosses the surface an odd number of times, counted with the direction of each
-    facet. A facet has the lower ends of its edges and not the upper ones, so that each point is in one facet.
+    A ray along x from the point crosses the surface an odd number of times, counted with the direction of each facet.
+    A facet has the lower ends of its edges and not the upper ones, so that each point of the surface is in one facet.
     """
-    found = np.zeros(len(points), dtype=bool)
-    if not len(points) or not len(corners):
-        return found
-    axis, met = _fewest(points, corners)
-    points, corners = np.roll(points, -axis, axis=1), np.roll(corners[met], -axis, axis=2)
-    if axis == 1 and points.shape[1] == 2:
-        corners = corners[:, ::-1]  # x and y are exchanged, a reflection
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    for part in np.array_split(np.arange(len(points)), 1 + len(points) * len(corners) // CHUNK):
-        x = points[part]
-        near = (high[:, 0] > x[:, :1]) & (low[:, 1] <= x[:, 1:2]) & (high[:, 1] > x[:, 1:2])
-        if points.shape[1] == 3:
-            near &= (low[:, 2] <= x[:, 2:]) & (high[:, 2] >= x[:, 2:])
-        point, facet = np.nonzero(near)
-        found[part] = np.bincount(point, _crossings(x[point], corners[facet]), len(part)) > 0.5
-    return found
-
-
-def _fewest(points: Array, corners: Array) -> tuple[int, NDArray[np.bool_]]:
-    """The axis along which rays from all points meet the boxes of the fewest facets, and the mask of these."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    above, below = corners.max(axis=1) >= low, corners.min(axis=1) <= high
-    masks = []
-    for axis in range(len(low)):
-        others = [other for other in range(len(low)) if other != axis]
-        masks.append(above.all(axis=1) & below[:, others].all(axis=1))
-    axis = int(np.argmin([mask.sum() for mask in masks]))
-    return axis, masks[axis]
+    (count, dim), size = points.shape, len(corners)
+    if not count or not size:
+        return np.zeros(count, dtype=bool)
+    ends = points.copy()
+    ends[:, 0] = np.maximum(points[:, 0], corners[:, :, 0].max())
+    rays = np.arange(count)[:, None] + count * np.array([0, 1, 1][:dim])
+    search = Search(rays, np.arange(size * dim).reshape(size, dim))
+    ray, facet = search.pairs(np.concatenate([points, ends]), corners.reshape(-1, dim), 0.0).T
+    return np.bincount(ray, _crossings(points[ray], corners[facet]), count) > 0.5
 
 
 def _crossings(x: Array, corners: Array) -> Array:
@@ -80,22 +59,23 @@ def _at_height(a: Array, b: Array, height: Array, along: int, wanted: int) -> Ar
 
 def depths(points: Array, corners: Array, tolerance: Array) -> Array:
     """Depth [m] below the surface of points (n, dim) in the solid; zero for those within their tolerance (n,) of it."""
-    found = np.zeros(len(points))
-    if not len(points):
-        return found
-    widest = float(tolerance.max())
-    low, high = points.min(axis=0) - widest, points.max(axis=0) + widest
-    near = ((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)
-    deep = _distances(points, corners[near]) > tolerance
-    if deep.any():
-        found[deep] = _distances(points[deep], corners)
+    found = _distances(points, corners, tolerance)
+    deep = np.flatnonzero(found > tolerance)
+    found[found <= tolerance] = 0.0
+    if len(deep):
+        flat = corners.reshape(-1, corners.shape[2])
+        nearest = np.array([np.linalg.norm(flat - point, axis=1).min() for point in points[deep]])
+        found[deep] = _distances(points[deep], corners, nearest)
     return found
 
 
-def _distances(points: Array, corners: Array) -> Array:
-    """Distances [m] of points to the nearest facet; infinite without one."""
-    if not len(corners):
-        return np.full(len(points), np.inf)
-    count, dim = corners.shape[:2]
-    numbers = np.arange(count * dim).reshape(count, dim)
-    return distances(points, corners.reshape(-1, dim), numbers, "line" if dim == 2 else "triangle")
+def _distances(points: Array, corners: Array, reach: Array) -> Array:
+    """Distances [m] of points to the nearest facet that is not farther than their reach [m]; infinite without one."""
+    found = np.full(len(points), np.inf)
+    if not len(points):
+        return found
+    size, dim = corners.shape[:2]
+    search = Search(np.repeat(np.arange(len(points))[:, None], dim, axis=1), np.arange(size * dim).reshape(size, dim))
+    point, facet = search.pairs(points, corners.reshape(-1, dim), reach).T
+    np.minimum.at(found, point, distances_in_pairs(points[point], corners[facet]))
+    return found

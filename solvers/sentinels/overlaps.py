@@ -41,7 +41,16 @@ class Samples:
 
     facet: NDArray[np.int64]  #: (k,)
     weights: Array  #: of the corners of the facet, (k, dim)
-    allowed: NDArray[np.bool_]  #: points that were in the other body at the start, where no pair is
+    paired: NDArray[np.bool_]  #: points on surfaces of a pair
+    vertex: NDArray[np.int64]  #: number of the vertex that a point is, else a number of its own
+
+    def on(self, facets: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Those on some facets, each vertex once."""
+        if len(facets) < self.facet.max() + 1:
+            chosen = np.flatnonzero(np.isin(self.facet, facets))
+        else:
+            chosen = np.arange(len(self.facet))
+        return chosen[np.unique(self.vertex[chosen], return_index=True)[1]]
 
     def at(self, chosen: NDArray[np.int64], corners: Array) -> Array:
         """Positions [m] of some of them, for corners (m, dim, dim) of the facets."""
@@ -131,7 +140,7 @@ class Overlaps:
         """The deepest point of some facets of body a in body b; near: facets of b where the surfaces cross."""
         mine, other = x[a][self._bodies[a].facets], x[b][self._bodies[b].facets]
         samples = self._samples_of(a, b)
-        chosen = np.flatnonzero(np.isin(samples.facet, facets) & ~samples.allowed)
+        chosen = samples.on(facets)
         points = samples.at(chosen, mine)
         solid = ((points > x[b].min(axis=0)) & (points < x[b].max(axis=0))).all(axis=1)
         solid[solid] = inside(points[solid], other)
@@ -140,6 +149,10 @@ class Overlaps:
             return NOT_AT_ALL
         facet = samples.facet[chosen]
         depth = depths(points, other, self._tolerance(a, b, facet, near))
+        deep = np.flatnonzero(depth)
+        at_start = self._start[a][self._bodies[a].facets], self._start[b][self._bodies[b].facets]
+        began = inside(samples.at(chosen[deep], at_start[0]), at_start[1])
+        depth[deep[began & ~samples.paired[chosen[deep]]]] = 0.0
         k = int(depth.argmax())
         edge = min(self._measures[a].edge[facet[k]], self._measures[b].edge[near].min())
         limit = min(float(edge), SHARE * min(self._measures[k].thickness for k in (a, b)))
@@ -154,10 +167,9 @@ class Overlaps:
             return ROUNDING * thickness + mine.sagitta[facet] + other.sagitta[near].max()
         slave_is_a = meeting.slave == self._bodies[a].name
         chord = mine.edge[facet] if slave_is_a else np.full(len(facet), other.edge[near].max())
-        chord = np.minimum(chord, thickness)
         turn = chord * (mine.bends[0] / mine.edge)[facet] + mine.bends[1][facet]
         turn = turn + chord * (other.bends[0] / other.edge)[near].max() + other.bends[1][near].max()
-        return ROUNDING * thickness + arc_height(chord, turn)
+        return ROUNDING * thickness + np.minimum(arc_height(chord, turn), SHARE * thickness)
 
     def _samples_of(self, a: int, b: int) -> Samples:
         """Points on facets of body a, not farther apart than body b is thick."""
@@ -165,12 +177,14 @@ class Overlaps:
             facet, weights = lattice(
                 self._measures[a].edge / self._measures[b].thickness, self._bodies[a].facets.shape[1]
             )
-            x = np.einsum("kv,kvd->kd", weights, self._start[a][self._bodies[a].facets][facet])
-            allowed = inside(x, self._start[b][self._bodies[b].facets])
+            whole = weights.max(axis=1) == 1.0
+            vertex = -1 - np.arange(len(facet))
+            vertex[whole] = self._bodies[a].facets[facet[whole], weights[whole].argmax(axis=1)]
+            paired = np.zeros(len(facet), dtype=bool)
             if (meeting := self._meeting(a, b)) is not None:
                 on_pair = meeting.facets.get(self._bodies[a].name)
-                allowed &= np.zeros(len(x), dtype=bool) if on_pair is None else ~on_pair[facet]
-            self._samples[a, b] = Samples(facet, weights, allowed)
+                paired = np.ones_like(paired) if on_pair is None else on_pair[facet]
+            self._samples[a, b] = Samples(facet, weights, paired, vertex)
         return self._samples[a, b]
 
     # ------------------------------------------------------------------------------------------------------ passages

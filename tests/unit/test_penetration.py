@@ -7,7 +7,7 @@ import pytest
 
 from solvers.fluid.bodies.inside import winding
 from solvers.fluid.bodies.surface import Motion
-from solvers.penetration import _fewest, depths, inside
+from solvers.penetration import depths, inside
 
 
 def polygon(count, radius=1.0):
@@ -63,16 +63,6 @@ def test_rays_through_vertices_and_edges_count_once(surface):
         found = inside(middle, surface)
         on_surface = ((middle == 0.0) | (middle == 1.0)).any(axis=1)
         assert np.array_equal(found[~on_surface], expected[~on_surface])
-
-
-@pytest.mark.parametrize("surface", [polygon(17), turned(box(), 4), turned(torus(), 4)])
-def test_a_point_alone(surface):
-    """The ray takes the axis along which it meets the fewest facets: all of them, over many points."""
-    flat = surface.reshape(-1, surface.shape[-1])
-    points = np.random.default_rng(5).uniform(flat.min(axis=0), flat.max(axis=0), size=(100, surface.shape[-1]))
-    alone = [bool(inside(point[None], surface)[0]) for point in points]
-    assert alone == inside(points, surface).tolist()
-    assert {_fewest(point[None], surface)[0] for point in points} == set(range(surface.shape[-1]))
 
 
 def test_two_bodies_of_one_surface():
