@@ -243,6 +243,7 @@ def _resume(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError
     from fsci.plot.picture import plot_run
 
     if not options.out.is_dir():
@@ -251,27 +252,35 @@ def _plot(options: argparse.Namespace) -> int:
         files = plot_run(
             options.out, movie=options.movie, field=options.field, times=options.times, mirrors=options.mirrors
         )
-    except (ValueError, RuntimeError) as error:
+    except CaseError as error:
+        return _fail(str(error))
+    except (OSError, ValueError, RuntimeError) as error:
         return _fail(f"fsci plot: {error}")
     print("\n".join(str(path) for path in files))
     return 0
 
 
 def _report(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError
     from fsci.report.report import write_report
 
     try:
         print(write_report(options.out))
+    except CaseError as error:
+        return _fail(str(error))
     except (OSError, ValueError, RuntimeError) as error:
         return _fail(f"fsci report: {error}")
     return 0
 
 
 def _explain(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError
     from fsci.explain.explain import explain
 
     try:
         print(explain(options.out, options.replay))
+    except CaseError as error:
+        return _fail(str(error))
     except (OSError, ValueError) as error:
         return _fail(f"fsci explain: {error}")
     return 0

@@ -1,40 +1,83 @@
-"""The case of a resumed run: which settings may change."""
+"""The case of a resumed run: what differs from the case of its checkpoint, and which settings may."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 
 from fsci.case.case import Case
 from fsci.case.errors import CaseError, Place, Problem
-from fsci.case.load import load_case
+from fsci.case.settings import Settings, differences, in_words, settings_of
 
-#: Settings, or sections of them, that the state of a run does not depend on.
+Keys = tuple[str | int, ...]
+
+#: Settings, or sections of them, with which a state keeps its meaning: it has the same unknowns in the same order, and
+#: the same kinds of values. These are loads, motions, materials, probes, outputs, tolerances. A star is any name.
 CHANGEABLE = (
     "title",
+    "units",
     "time.end",
     "time.step",
     "time.retry",
+    "curves",
+    "structure.dynamics.*",
+    *(
+        f"structure.bodies.*.{name}"
+        for name in (
+            *("material", "supports", "springs", "gravity", "body_force", "tractions", "pressures", "line_forces"),
+            *("point_forces", "slip_length"),
+        )
+    ),
+    *(f"fluid.{name}" for name in ("density", "viscosity", "gravity", "body_force", "dynamics")),
+    *(f"fluid.patches.*.{name}" for name in ("velocity", "traction", "pressure", "slip_length")),
+    *(f"fluid.bodies.*.{name}" for name in ("motion.*", "slip_length")),
+    *(f"fluid.bodies.*.free.{name}" for name in ("density", "gravity", "springs", "held")),
+    *(f"contact.{name}" for name in ("friction", "pairs.*.friction", "obstacles.*.motion", "c_n")),
+    *(f"coupling.{name}" for name in ("relaxation", "reuse", "tolerance", "tolerance_absolute", "max_iterations")),
+    "probes",
     "output",
-    "solver",
     "verify",
-    "coupling.relaxation",
-    "coupling.tolerance",
-    "coupling.tolerance_absolute",
-    "coupling.max_iterations",
+    "solver",
 )
 
+#: Why others stay, by the last name of the setting.
+_REASONS = {
+    "start": "the run has begun at that time",
+    **dict.fromkeys(
+        ("initial_displacement", "initial_velocity", "initial_spin"), "it counts at the start only, which is over"
+    ),
+}
+_REASON = "the state of the run belongs to it"
+_ANEW = "change it back, or compute the case anew with fsci run"
 
-def resumed_case(folder: Path, changes: Sequence[tuple[str, str]] = ()) -> Case:
-    """The case of a results folder with changes as of `load_case`; raises CaseError for settings that must stay."""
-    fixed = [change for change in changes if not _changeable(change[0])]
-    if fixed:
-        allowed = ", ".join(CHANGEABLE)
-        raise CaseError(
-            Problem(place(change), f"'{change[0]}' cannot change when a run is resumed; what can: {allowed}")
-            for change in fixed
-        )
-    return load_case(folder / "case.yaml", changes)
+
+def changed(case: Case, before: Settings) -> list[str]:
+    """A line for each setting that differs from those of the checkpoint: old value -> new value.
+
+    Raises CaseError for those that must stay, with all of them.
+    """
+    found = list(differences(before, settings_of(case)))
+    problems = [
+        problem
+        for keys, old, new in found
+        if not may_change(keys)
+        for problem in case.error(keys, _refusal(keys, old, new)).problems
+    ]
+    if problems:
+        raise CaseError(problems)
+    return [f"{_dotted(keys)}: {in_words(old)} -> {in_words(new)}" for keys, old, new in found]
+
+
+def may_change(keys: Keys) -> bool:
+    """Whether a run may be resumed with another value of this setting."""
+    return any(_matches(keys, pattern.split(".")) for pattern in CHANGEABLE)
+
+
+def meshes_changed(case: Case, before: dict[str, str], now: dict[str, str]) -> Iterator[Problem]:
+    """Problems of the meshes, by the sections that they belong to, that are others than those of the checkpoint."""
+    for section in before.keys() & now.keys():
+        if before[section] != now[section]:
+            keys = (*section.split("."), "mesh")
+            yield from case.error(keys, _refusal(keys, before[section], now[section])).problems
 
 
 def end_error(case: Case, changes: Sequence[tuple[str, str]], reached: float) -> CaseError | None:
@@ -42,13 +85,19 @@ def end_error(case: Case, changes: Sequence[tuple[str, str]], reached: float) ->
     ends = [change for change in changes if change[0] == "time.end"]
     if not ends or case.time.end > reached:
         return None
-    return CaseError([Problem(place(ends[-1]), f"'end' must be later than {reached:g}, the time of the checkpoint")])
+    place = Place(f"--set {ends[-1][0]}={ends[-1][1]}")
+    return CaseError([Problem(place, f"'end' must be later than {reached:g}, the time of the checkpoint")])
 
 
-def place(change: tuple[str, str]) -> Place:
-    """Position of a change on the command line."""
-    return Place(f"--set {change[0]}={change[1]}")
+def _refusal(keys: Keys, old: object, new: object) -> str:
+    reason = _REASONS.get(str(keys[-1]), _REASON)
+    was = f"{_dotted(keys)} was {in_words(old)}, is {in_words(new)}"
+    return f"{was}: it cannot change when a run is resumed, {reason}; {_ANEW}"
 
 
-def _changeable(dotted: str) -> bool:
-    return any(dotted == name or dotted.startswith(f"{name}.") for name in CHANGEABLE)
+def _dotted(keys: Keys) -> str:
+    return ".".join(map(str, keys))
+
+
+def _matches(keys: Keys, pattern: Sequence[str]) -> bool:
+    return len(keys) >= len(pattern) and all(word in ("*", key) for key, word in zip(keys, pattern, strict=False))

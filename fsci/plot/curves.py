@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fsci.case.quantities import QUANTITIES
+from fsci.run.files import replacing
 from fsci.run.history import COLUMNS, History
 
 SIZE = (8.0, 5.0)  #: of a picture in inches; 1600 x 1000 pixels
@@ -67,6 +68,8 @@ NEGLIGIBLE, SMALL = (
     0.05,
 )  #: ranges of components in parts of the largest one that get no axis, an axis of their own
 
+SUPERSCRIPTS = str.maketrans("0123456789", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
+
 #: (length, mass, time) -> the names of the units of force, energy, stress and power
 DERIVED = {
     ("m", "kg", "s"): ("N", "J", "Pa", "W"),
@@ -94,7 +97,18 @@ def label(text: str, quantity: str, units: Mapping[str, str]) -> str:
 
 def raised(name: str, power: int) -> str:
     """A unit to a positive power."""
-    return name if power == 1 else f"{name}$^{power}$"
+    return name if power == 1 else name + str(power).translate(SUPERSCRIPTS)
+
+
+def literal(text: str) -> str:
+    """A text that matplotlib draws as it stands: it reads what is between two dollar signs as a formula."""
+    return text.replace("$", r"\$")
+
+
+def save_figure(figure: Any, path: Path) -> None:
+    """Write a figure as PNG; a file that is there is replaced."""
+    with replacing(path) as unfinished:
+        figure.savefig(unfinished, format="png")
 
 
 def plot_history(folder: Path, history: History, quantities: Mapping[str, str], units: Mapping[str, str]) -> list[Path]:
@@ -164,16 +178,16 @@ def plot_panels(
         for axes, (beside, curves) in zip(rows, panels.items(), strict=True):
             scaled = logarithmic and any(np.any(values > 0) for values in curves.values())
             for index, (name, values) in enumerate(curves.items()):
-                style = {"color": COLOURS[index % len(COLOURS)], "marker": marker, "label": name}
+                style = {"color": COLOURS[index % len(COLOURS)], "marker": marker, "label": literal(name)}
                 steps = {"drawstyle": "steps-post"} if beside == NODES else {}
                 axes.plot(time, np.where(values > 0, values, np.nan) if scaled else values, **style, **steps)
             if scaled:
                 axes.set_yscale("log")
-            axes.set_title(beside, loc="left", fontsize=STYLE["font.size"])
+            axes.set_title(literal(beside), loc="left", fontsize=STYLE["font.size"])
             if len(curves) > 1:
                 add_legend(axes)
-        rows[-1].set_xlabel(below)
-        figure.savefig(path)
+        rows[-1].set_xlabel(literal(below))
+        save_figure(figure, path)
     return path
 
 
@@ -198,13 +212,13 @@ def plot_curves(path: Path, time: Any, curves: Mapping[str, Any], below: str, be
         marker = "o" if len(time) < 30 else ""
         for index, (name, values) in enumerate(curves.items()):
             axes = panels[index if apart else 0]
-            axes.plot(time, values, color=COLOURS[index % len(COLOURS)], marker=marker, label=name)
-        panels[-1].set_xlabel(below)
-        figure.supylabel(beside, fontsize=STYLE["font.size"])
+            axes.plot(time, values, color=COLOURS[index % len(COLOURS)], marker=marker, label=literal(name))
+        panels[-1].set_xlabel(literal(below))
+        figure.supylabel(literal(beside), fontsize=STYLE["font.size"])
         if len(curves) > 1:
             for axes in panels:
                 add_legend(axes)
-        figure.savefig(path)
+        save_figure(figure, path)
     return path
 
 
@@ -219,10 +233,10 @@ def plot_convergence(path: Path, residuals: Mapping[str, Sequence[float]]) -> Pa
         axes = figure.subplots()
         for index, (step, norms) in enumerate(residuals.items()):
             colour = COLOURS[index % len(COLOURS)]
-            axes.semilogy(range(len(norms)), norms, marker="o", color=colour, label=f"step {step}")
+            axes.semilogy(range(len(norms)), norms, marker="o", color=colour, label=literal(f"step {step}"))
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_xlabel("Newton iteration")
         axes.set_ylabel("residual norm")
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=6, borderaxespad=0.2)
-        figure.savefig(path)
+        save_figure(figure, path)
     return path

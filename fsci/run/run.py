@@ -7,21 +7,25 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fsci.case import Case, CaseError
-from fsci.case.resume import end_error, resumed_case
+from fsci.case import Case, CaseError, load_case
+from fsci.case.resume import changed, end_error, meshes_changed
+from fsci.case.settings import settings_of
 from fsci.run.checkpoint import read_checkpoint, write_checkpoint
 from fsci.run.clock import Clock
+from fsci.run.files import make_folder, require_own, write_text
 from fsci.run.history import HistoryWriter, read_history
+from fsci.run.kept_case import keep_case, kept_case
+from fsci.run.lock import Lock
 from fsci.run.memory import require_memory
 from fsci.run.monitor import Monitor
-from fsci.run.output import FieldWriter, write_text
-from fsci.run.processes import describe
-from fsci.run.results_folder import keep_case, prepare_folder
+from fsci.run.output import FieldWriter
+from fsci.run.processes import describe, on_first
+from fsci.run.results_folder import prepare_folder
 from fsci.run.stop import StopWatch
 from fsci.run.summary import RunRecord, memory_mb, shares, summarize, write_summary
 from fsci.run.verify import evaluate
@@ -48,16 +52,9 @@ def run_case(case: Case, out: Path, *, force: bool = False) -> int:
 
     comm = MPI.COMM_WORLD
     require_memory(case, comm)
-    refused: CaseError | None = None
-    if comm.rank == 0:
-        try:
-            prepare_folder(case, out, force=force)
-        except CaseError as error:
-            refused = error
-    refused = comm.bcast(refused)
-    if refused is not None:
-        raise refused
-    return Run(case, out, comm).from_start()
+    lock = on_first(comm, lambda: prepare_folder(case, out, force=force))
+    with closing(lock) if lock else nullcontext():
+        return Run(kept_case(case, out), out, comm, lock=lock).from_start()
 
 
 def resume_run(out: Path, changes: Sequence[tuple[str, str]] = ()) -> int:
@@ -68,22 +65,14 @@ def resume_run(out: Path, changes: Sequence[tuple[str, str]] = ()) -> int:
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD
-    case = resumed_case(out, changes)
-    checkpoint: Any = None
-    if comm.rank == 0:
-        try:
-            checkpoint = read_checkpoint(out / "checkpoint")
-        except FileNotFoundError as error:
-            checkpoint = error
-    checkpoint = comm.bcast(checkpoint)
-    if isinstance(checkpoint, Exception):
-        raise checkpoint
-    state, _ = checkpoint
-    if (early := end_error(case, changes, state["clock"]["time"])) is not None:
-        raise early
-    if changes and comm.rank == 0:
-        write_text(out / "case.yaml", case.dump())
-    return Run(case, out, comm).from_checkpoint(state)
+    on_first(comm, lambda: require_own(out))
+    case = load_case(out / "case.yaml", changes)
+    lock = on_first(comm, lambda: Lock(out))
+    with closing(lock) if lock else nullcontext():
+        state, _ = comm.bcast(on_first(comm, lambda: read_checkpoint(out / "checkpoint")))
+        if (early := end_error(case, changes, state["clock"]["time"])) is not None:
+            raise early
+        return Run(case, out, comm, lock=lock).from_checkpoint(state)
 
 
 @dataclass
@@ -99,6 +88,8 @@ class Run:
     state: State = field(default_factory=dict)  #: after the last accepted step
     good: State = field(default_factory=dict)  #: the same as a checkpoint keeps it, whole on rank 0
     good_at: State = field(default_factory=dict)  #: its step and time
+    lock: Lock | None = None  #: of the folder, on rank 0
+    before: State = field(default_factory=dict)  #: settings and meshes of the checkpoint, if the run is resumed
 
     def __post_init__(self) -> None:
         time = self.case.time
@@ -138,6 +129,8 @@ class Run:
         from solvers.distributed import scatter
 
         with self._shown():
+            self.before = json.loads(_entry(state, "case"))
+            changes = changed(self.case, self.before["settings"])
             simulation = self._build()
             self.record.restore(state["record"])
             self._initialise(simulation)
@@ -146,10 +139,12 @@ class Run:
                 try:
                     restored = scatter(self.comm, state["scheme"], simulation.scheme.save())
                 except KeyError as missing:
-                    reason = f"the checkpoint has no entry {missing}: another version of fsci wrote it"
-                    raise OSError(f"{reason}; run the case again") from None
+                    raise _of_another_version(missing) from None
                 simulation.scheme.restore(restored)
+            for change in changes:
+                self.monitor.say(f"changed: {change}")
             if self.root:
+                keep_case(self.case, self.out)
                 (self.out / "STOP").unlink(missing_ok=True)
                 self.history = HistoryWriter(self.out / "history.csv", resume_after=self.clock.step)
                 self.fields = FieldWriter.resume(self.out / "fields", self.clock.time)
@@ -169,7 +164,14 @@ class Run:
 
         with self.record.timer("start"):
             self.simulation = build(self.case, self.comm, self.record.timer)
+        on_first(self.comm, self._require_meshes)
+        self._described = json.dumps({"settings": settings_of(self.case), "meshes": self.case.meshes})
         return self.simulation
+
+    def _require_meshes(self) -> None:
+        """Raises CaseError if the checkpoint is of other meshes."""
+        if problems := list(meshes_changed(self.case, self.before.get("meshes", {}), self.case.meshes)):
+            raise CaseError(problems)
 
     # -------------------------------------------------------------------------------------------------- loop
 
@@ -184,16 +186,20 @@ class Run:
                 return self._loop()
             except OSError as error:
                 raise OSError(error.errno, f"{describe(error)}. {self._rescue()}") from error
+            except Exception as error:
+                error.add_note(self._rescue())
+                raise
 
     def _rescue(self) -> str:
         """Try to write the state of the last accepted step after other files could not be written."""
         if not self.root:
             return "The last good state is on process 0."
         step, own = self.good_at["step"], self.out / "checkpoint"
-        for folder in (own, Path(tempfile.gettempdir()) / f"fsci_{self.out.resolve().name}_{os.getpid()}"):
+        for place in (lambda: own, lambda: Path(tempfile.mkdtemp(prefix=f"fsci_{self.out.resolve().name}_"))):
             try:
+                folder = place()
                 path = write_checkpoint(folder, self.good | {"record": self.record.save()}, self.good_at)
-            except OSError:
+            except (OSError, MemoryError, CaseError):
                 continue
             where = "" if folder == own else f"; move it into {own}"
             return f"The state after step {step} is in {path}{where}; continue with fsci resume."
@@ -251,7 +257,7 @@ class Run:
         with self.record.timer("checkpoint"):
             self.state = self.simulation.scheme.save()
             clock = self.clock
-            self.good = {"scheme": gather(self.comm, self.state), "clock": clock.save()}
+            self.good = {"scheme": gather(self.comm, self.state), "clock": clock.save(), "case": self._described}
             self.good_at = {"step": clock.step, "time": clock.time, "title": self.case.title}
 
     def _note(self, dt: float, info: StepInfo, before: float) -> None:
@@ -288,6 +294,7 @@ class Run:
         if not self.root:
             return
         folder = self.out / "failure"
+        make_folder(folder)
         FieldWriter(folder / "fields").write(self.clock.step + 1, self.clock.time + self.clock.dt, snapshots)
         keep_case(self.case, folder)
         what = {
@@ -334,6 +341,8 @@ class Run:
             code = self._summarize("stopped", message, memory_mb())
         finally:
             self.monitor.close()
+            if self.lock is not None:
+                self.lock.close()
             sys.stdout.flush()
             if self.comm.size > 1:
                 self.comm.Abort(code)
@@ -373,3 +382,16 @@ class Run:
             self.monitor.say(f"time: {shares(self.record.wall(), self.record.timer.seconds)}")
         self.monitor.finish(message, ok=status == "finished" and not missed)
         return {"finished": FAILED if missed else FINISHED, "stopped": STOPPED, "failed": FAILED}[status]
+
+
+def _entry(state: State, name: str) -> Any:
+    """An entry of a checkpoint. Raises OSError if another version of fsci wrote it."""
+    try:
+        return state[name]
+    except KeyError as missing:
+        raise _of_another_version(missing) from None
+
+
+def _of_another_version(missing: KeyError) -> OSError:
+    reason = f"the checkpoint has no entry {missing}: another version of fsci wrote it"
+    return OSError(f"{reason}; run the case again")
