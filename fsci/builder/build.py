@@ -34,6 +34,7 @@ class Simulation:
     balances: Callable[[], Numbers]  #: column -> value
     dofs: dict[str, int]
     notes: list[str] = field(default_factory=list)  #: notes to the user on changes of meshes, on rank 0
+    take_materials: Callable[[], None] = lambda: None  #: go on from a restored state with other materials
     imbalance: Callable[[], Numbers] = dict  #: of contact work, with facets dealt out evenly and as it was
 
 
@@ -65,6 +66,7 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         balances=lambda: {"structure.energy": structure.energy.error},
         dofs={"structure": structure.dofs()},
         notes=_notes(bodies),
+        take_materials=structure.take_materials,
         imbalance=lambda: {} if contact is None else contact.imbalance,
     )
 
@@ -114,6 +116,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         balances=lambda: {"structure.energy": structure.energy.error, **mass(), **coupled.balance.numbers()},
         dofs={"fluid": fluid.dofs(), "structure": structure.dofs()},
         notes=_notes(bodies),
+        take_materials=structure.take_materials,
         imbalance=lambda: {} if contact is None else contact.imbalance,
     )
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from fsci.case.case import Case
 from fsci.case.errors import CaseError, Place, Problem
+from fsci.case.fluid import KINDS
 from fsci.case.settings import Settings, differences, in_words, settings_of
 
 Keys = tuple[str | int, ...]
@@ -28,8 +31,8 @@ CHANGEABLE = (
         )
     ),
     *(f"fluid.{name}" for name in ("density", "viscosity", "gravity", "body_force", "dynamics")),
-    *(f"fluid.patches.*.{name}" for name in ("velocity", "traction", "pressure", "slip_length")),
-    *(f"fluid.bodies.*.{name}" for name in ("motion.*", "slip_length")),
+    *(f"fluid.patches.*.{kind}" for kind in KINDS if kind != "periodic"),
+    *(f"fluid.bodies.*.{name}" for name in ("motion", "slip_length")),
     *(f"fluid.bodies.*.free.{name}" for name in ("density", "gravity", "springs", "held")),
     *(f"contact.{name}" for name in ("friction", "pairs.*.friction", "obstacles.*.motion", "c_n")),
     *(f"coupling.{name}" for name in ("relaxation", "reuse", "tolerance", "tolerance_absolute", "max_iterations")),
@@ -50,26 +53,33 @@ _REASON = "the state of the run belongs to it"
 _ANEW = "change it back, or compute the case anew with fsci run"
 
 
-def changed(case: Case, before: Settings) -> list[str]:
-    """A line for each setting that differs from those of the checkpoint: old value -> new value.
+@dataclass(frozen=True)
+class Change:
+    """A setting that differs from that of the checkpoint."""
 
-    Raises CaseError for those that must stay, with all of them.
-    """
-    found = list(differences(before, settings_of(case)))
-    problems = [
-        problem
-        for keys, old, new in found
-        if not may_change(keys)
-        for problem in case.error(keys, _refusal(keys, old, new)).problems
-    ]
-    if problems:
-        raise CaseError(problems)
-    return [f"{_dotted(keys)}: {in_words(old)} -> {in_words(new)}" for keys, old, new in found]
+    keys: Keys
+    old: Any  #: None: it was not set
+    new: Any
+
+    def __str__(self) -> str:
+        return f"{_dotted(self.keys)}: {in_words(self.old)} -> {in_words(self.new)}"
+
+    def concerns(self, *patterns: str) -> bool:
+        """Whether it is one of these settings, or within one of these sections; a star is any name."""
+        return any(_matches(self.keys, pattern.split(".")) for pattern in patterns)
 
 
-def may_change(keys: Keys) -> bool:
-    """Whether a run may be resumed with another value of this setting."""
-    return any(_matches(keys, pattern.split(".")) for pattern in CHANGEABLE)
+def changed(case: Case, before: Settings) -> list[Change]:
+    """The settings that differ from those of the checkpoint. Raises CaseError with all that must stay."""
+    found = [Change(*difference) for difference in differences(before, settings_of(case))]
+    fixed = [change for change in found if not change.concerns(*CHANGEABLE)]
+    if fixed:
+        raise CaseError(
+            problem
+            for change in fixed
+            for problem in case.error(change.keys, _refusal(change.keys, change.old, change.new)).problems
+        )
+    return found
 
 
 def meshes_changed(case: Case, before: dict[str, str], now: dict[str, str]) -> Iterator[Problem]:

@@ -68,9 +68,9 @@ def in_words(value: Any) -> str:
 
 
 def _text(value: Any) -> str:
+    if value in _NONE:
+        return "not set"
     match value:
-        case None | {}:
-            return "not set"
         case bool():
             return "true" if value else "false"
         case int() | float():

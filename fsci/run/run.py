@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Any
 from fsci.case import Case, CaseError, load_case
 from fsci.case.resume import changed, end_error, meshes_changed
 from fsci.case.settings import settings_of
-from fsci.run.checkpoint import read_checkpoint, write_checkpoint
+from fsci.run.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from fsci.run.clock import Clock
-from fsci.run.files import make_folder, require_own, write_text
+from fsci.run.files import LOCK, make_folder, require_own, write_text
 from fsci.run.history import HistoryWriter, read_history
+from fsci.run.jump import require_continuous
 from fsci.run.kept_case import keep_case, kept_case
 from fsci.run.lock import Lock
 from fsci.run.memory import require_memory
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
 
 FINISHED, FAILED, BAD_CASE, STOPPED = 0, 1, 2, 3  #: exit codes
 
+#: Settings that decide where rigid bodies are, and those that decide which forces and energies a state has.
+MOVING = ("fluid.bodies.*.motion", "curves", "time.step")
+MATERIALS = ("structure.bodies.*.material", "structure.bodies.*.springs")
 
 _NO_START = (
     "contact surfaces have no mass in dynamics, and no equilibrium was found for the loads and the overlap at the "
@@ -67,12 +71,19 @@ def resume_run(out: Path, changes: Sequence[tuple[str, str]] = ()) -> int:
     comm = MPI.COMM_WORLD
     on_first(comm, lambda: require_own(out))
     case = load_case(out / "case.yaml", changes)
-    lock = on_first(comm, lambda: Lock(out))
+    lock = on_first(comm, lambda: _lock_to_resume(out))
     with closing(lock) if lock else nullcontext():
         state, _ = comm.bcast(on_first(comm, lambda: read_checkpoint(out / "checkpoint")))
         if (early := end_error(case, changes, state["clock"]["time"])) is not None:
             raise early
         return Run(case, out, comm, lock=lock).from_checkpoint(state)
+
+
+def _lock_to_resume(out: Path) -> Lock:
+    """The lock of a folder. Raises FileNotFoundError for one that no run has written, which stays as it is."""
+    if not (out / LOCK).exists() and not list_checkpoints(out / "checkpoint"):
+        raise FileNotFoundError(f"no usable checkpoint in {out / 'checkpoint'}")
+    return Lock(out)
 
 
 @dataclass
@@ -131,6 +142,8 @@ class Run:
         with self._shown():
             self.before = json.loads(_entry(state, "case"))
             changes = changed(self.case, self.before["settings"])
+            if any(change.concerns(*MOVING) for change in changes):
+                on_first(self.comm, lambda: require_continuous(self.case, state))
             simulation = self._build()
             self.record.restore(state["record"])
             self._initialise(simulation)
@@ -141,6 +154,8 @@ class Run:
                 except KeyError as missing:
                     raise _of_another_version(missing) from None
                 simulation.scheme.restore(restored)
+            if any(change.concerns(*MATERIALS) for change in changes):
+                self.simulation.take_materials()
             for change in changes:
                 self.monitor.say(f"changed: {change}")
             if self.root:

@@ -260,7 +260,6 @@ def test_resume_with_other_settings(case, tmp_path):
             ("time.start", "0.1"),
             "--set time.start=0.1: time.start was 0, is 0.1: it cannot change when a run is resumed",
         ),
-        (("structure.plane", "stress"), "--set structure.plane=stress: plane stress needs the law"),
         (
             ("structure.bodies.beam.element", "mixed"),
             "--set structure.bodies.beam.element=mixed: structure.bodies.beam.",
