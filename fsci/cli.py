@@ -217,7 +217,7 @@ def _run(options: argparse.Namespace) -> int:
         with ending_together(MPI.COMM_WORLD, CaseError):
             return int(run_case(case, out, force=options.force))
     except CaseError as error:
-        return _fail(str(error)) if first else 2
+        return _fail(_with_notes(error)) if first else 2
     except (OSError, MemoryError, KeyboardInterrupt) as error:
         return _broken("run", error)
 
@@ -233,7 +233,7 @@ def _resume(options: argparse.Namespace) -> int:
         with ending_together(MPI.COMM_WORLD, CaseError, FileNotFoundError):
             return int(resume_run(options.out, options.overrides))
     except CaseError as error:
-        return _fail(str(error)) if MPI.COMM_WORLD.rank == 0 else 2
+        return _fail(_with_notes(error)) if MPI.COMM_WORLD.rank == 0 else 2
     except FileNotFoundError as error:
         if MPI.COMM_WORLD.rank == 0:
             print(f"fsci resume: {error}", file=sys.stderr)
@@ -322,6 +322,11 @@ def _schema(options: argparse.Namespace) -> int:
 
     print(reference_markdown() if options.markdown else json_schema())
     return 0
+
+
+def _with_notes(error: Exception) -> str:
+    """Its text, and below it what the run has to say about its state."""
+    return "\n".join([str(error), *getattr(error, "__notes__", ())])
 
 
 def _fail(message: str) -> int:

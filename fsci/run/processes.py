@@ -51,7 +51,7 @@ def on_first(comm: Any, call: Callable[[], T]) -> T | None:
 def describe(error: BaseException) -> str:
     """The message for the user: that of a disk or memory error, else the traceback."""
     if isinstance(error, MemoryError):
-        return "there is not enough memory"
+        return ". ".join(["there is not enough memory", *getattr(error, "__notes__", ())])
     if isinstance(error, KeyboardInterrupt):
         return "stopped before the first step"
     if isinstance(error, OSError):

@@ -206,13 +206,14 @@ class Run:
                 raise
 
     def _rescue(self) -> str:
-        """Try to write the state of the last accepted step after other files could not be written."""
+        """Try to write the state of the last accepted step after an error; what to say about it."""
         if not self.root:
-            return "The last good state is on process 0."
+            return "Process 0 writes the state of the last good step if it can; continue with fsci resume."
         step, own = self.good_at["step"], self.out / "checkpoint"
-        for place in (lambda: own, lambda: Path(tempfile.mkdtemp(prefix=f"fsci_{self.out.resolve().name}_"))):
+        elsewhere = f"fsci_{self.out.resolve().name}_"
+        for folder_of in (lambda: own, lambda: Path(tempfile.mkdtemp(prefix=elsewhere))):
             try:
-                folder = place()
+                folder = folder_of()
                 path = write_checkpoint(folder, self.good | {"record": self.record.save()}, self.good_at)
             except (OSError, MemoryError, CaseError):
                 continue
