@@ -68,8 +68,6 @@ NEGLIGIBLE, SMALL = (
     0.05,
 )  #: ranges of components in parts of the largest one that get no axis, an axis of their own
 
-SUPERSCRIPTS = str.maketrans("0123456789", "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
-
 #: (length, mass, time) -> the names of the units of force, energy, stress and power
 DERIVED = {
     ("m", "kg", "s"): ("N", "J", "Pa", "W"),
@@ -80,8 +78,8 @@ DERIVED = {
 
 
 def label(text: str, quantity: str, units: Mapping[str, str]) -> str:
-    """A text with the unit of a quantity in brackets, or without a unit for unknown quantities."""
-    text = text.replace("von_mises", "von Mises stress").replace("_", " ")
+    """A text for matplotlib with the unit of a quantity in brackets, or without a unit for unknown quantities."""
+    text = literal(text.replace("von_mises", "von Mises stress").replace("_", " "))
     powers = POWERS.get(quantity, (0, 0, 0))
     if not any(powers):
         return text
@@ -97,7 +95,7 @@ def label(text: str, quantity: str, units: Mapping[str, str]) -> str:
 
 def raised(name: str, power: int) -> str:
     """A unit to a positive power."""
-    return name if power == 1 else name + str(power).translate(SUPERSCRIPTS)
+    return name if power == 1 else f"{name}$^{power}$"
 
 
 def literal(text: str) -> str:
@@ -183,10 +181,10 @@ def plot_panels(
                 axes.plot(time, np.where(values > 0, values, np.nan) if scaled else values, **style, **steps)
             if scaled:
                 axes.set_yscale("log")
-            axes.set_title(literal(beside), loc="left", fontsize=STYLE["font.size"])
+            axes.set_title(beside, loc="left", fontsize=STYLE["font.size"])
             if len(curves) > 1:
                 add_legend(axes)
-        rows[-1].set_xlabel(literal(below))
+        rows[-1].set_xlabel(below)
         save_figure(figure, path)
     return path
 
@@ -213,8 +211,8 @@ def plot_curves(path: Path, time: Any, curves: Mapping[str, Any], below: str, be
         for index, (name, values) in enumerate(curves.items()):
             axes = panels[index if apart else 0]
             axes.plot(time, values, color=COLOURS[index % len(COLOURS)], marker=marker, label=literal(name))
-        panels[-1].set_xlabel(literal(below))
-        figure.supylabel(literal(beside), fontsize=STYLE["font.size"])
+        panels[-1].set_xlabel(below)
+        figure.supylabel(beside, fontsize=STYLE["font.size"])
         if len(curves) > 1:
             for axes in panels:
                 add_legend(axes)
@@ -233,7 +231,7 @@ def plot_convergence(path: Path, residuals: Mapping[str, Sequence[float]]) -> Pa
         axes = figure.subplots()
         for index, (step, norms) in enumerate(residuals.items()):
             colour = COLOURS[index % len(COLOURS)]
-            axes.semilogy(range(len(norms)), norms, marker="o", color=colour, label=literal(f"step {step}"))
+            axes.semilogy(range(len(norms)), norms, marker="o", color=colour, label=f"step {step}")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_xlabel("Newton iteration")
         axes.set_ylabel("residual norm")

@@ -158,8 +158,8 @@ def lay_out(scene: Scene, dots: int) -> tuple[Any, Any, Any]:
         image = axes.imshow(np.full((1, 1, 3), 255), extent=extent, interpolation="none", aspect="auto")
         if scene.flat:
             axes.spines[:].set_visible(True)
-            axes.set_xlabel(literal(label("x", "displacement", scene.units)))
-            axes.set_ylabel(literal(label("y", "displacement", scene.units)))
+            axes.set_xlabel(label("x", "displacement", scene.units))
+            axes.set_ylabel(label("y", "displacement", scene.units))
             axes.locator_params(nbins=6)
         else:
             axes.set_axis_off()
@@ -182,7 +182,7 @@ def draw_colour_bar(
         ScalarMappable(Normalize(*limits), colours),
         cax=figure.add_axes(place),
         orientation="vertical" if upright else "horizontal",
-        label=literal(label),
+        label=label,
         extend=extend,
         extendfrac=0.03,
     )

@@ -67,12 +67,12 @@ def plot_story(
             axes.spines[:].set_visible(True)
             axes.xaxis.set_major_locator(MaxNLocator(max(2, round(width / 0.7)), steps=[1, 2, 5, 10]))
             axes.yaxis.set_major_locator(MaxNLocator(max(2, round(height / 0.5)), steps=[1, 2, 5, 10]))
-            axes.set_title(literal(f"t = {moment[0][0]:.3g} {units['time']}"), fontsize=STYLE["font.size"], pad=5)
+            axes.set_title(f"t = {moment[0][0]:.3g} {units['time']}", fontsize=STYLE["font.size"], pad=5)
             axes.tick_params(labelleft=column == 0, labelbottom=index + columns >= len(states))
             if column == 0:
-                axes.set_ylabel(literal(label(names[1], "displacement", units)))
+                axes.set_ylabel(label(names[1], "displacement", units))
             if index + columns >= len(states):
-                axes.set_xlabel(literal(label(names[0], "displacement", units)))
+                axes.set_xlabel(label(names[0], "displacement", units))
         figure.suptitle(literal(f"{title}, {plane} {units['length']}" if plane else title), y=1 - 0.1 / total, va="top")
         tall = min(total - BELOW - TITLE - HEAD, 4.0)
         middle = BELOW + (total - BELOW - TITLE - HEAD) / 2
