@@ -217,7 +217,7 @@ def _run(options: argparse.Namespace) -> int:
         with ending_together(MPI.COMM_WORLD, CaseError):
             return int(run_case(case, out, force=options.force))
     except CaseError as error:
-        return _fail(str(error)) if first else 2
+        return _fail(_with_notes(error)) if first else 2
     except (OSError, MemoryError, KeyboardInterrupt) as error:
         return _broken("run", error)
 
@@ -233,7 +233,7 @@ def _resume(options: argparse.Namespace) -> int:
         with ending_together(MPI.COMM_WORLD, CaseError, FileNotFoundError):
             return int(resume_run(options.out, options.overrides))
     except CaseError as error:
-        return _fail(str(error)) if MPI.COMM_WORLD.rank == 0 else 2
+        return _fail(_with_notes(error)) if MPI.COMM_WORLD.rank == 0 else 2
     except FileNotFoundError as error:
         if MPI.COMM_WORLD.rank == 0:
             print(f"fsci resume: {error}", file=sys.stderr)
@@ -243,6 +243,7 @@ def _resume(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError
     from fsci.plot.picture import plot_run
 
     if not options.out.is_dir():
@@ -251,27 +252,35 @@ def _plot(options: argparse.Namespace) -> int:
         files = plot_run(
             options.out, movie=options.movie, field=options.field, times=options.times, mirrors=options.mirrors
         )
-    except (ValueError, RuntimeError) as error:
+    except CaseError as error:
+        return _fail(str(error))
+    except (OSError, ValueError, RuntimeError) as error:
         return _fail(f"fsci plot: {error}")
     print("\n".join(str(path) for path in files))
     return 0
 
 
 def _report(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError
     from fsci.report.report import write_report
 
     try:
         print(write_report(options.out))
+    except CaseError as error:
+        return _fail(str(error))
     except (OSError, ValueError, RuntimeError) as error:
         return _fail(f"fsci report: {error}")
     return 0
 
 
 def _explain(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError
     from fsci.explain.explain import explain
 
     try:
         print(explain(options.out, options.replay))
+    except CaseError as error:
+        return _fail(str(error))
     except (OSError, ValueError) as error:
         return _fail(f"fsci explain: {error}")
     return 0
@@ -313,6 +322,11 @@ def _schema(options: argparse.Namespace) -> int:
 
     print(reference_markdown() if options.markdown else json_schema())
     return 0
+
+
+def _with_notes(error: Exception) -> str:
+    """Its text, and below it what the run has to say about its state."""
+    return "\n".join([str(error), *getattr(error, "__notes__", ())])
 
 
 def _fail(message: str) -> int:

@@ -35,6 +35,7 @@ class Simulation:
     dofs: dict[str, int]
     notes: list[str] = field(default_factory=list)  #: notes to the user on changes of meshes, on rank 0
     sentinels: dict[str, Sentinel] = field(default_factory=dict)  #: by a name in the saved state
+    take_materials: Callable[[], None] = lambda: None  #: go on from a restored state with other materials
     imbalance: Callable[[], Numbers] = dict  #: of contact work, with facets dealt out evenly and as it was
 
 
@@ -68,6 +69,7 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         dofs={"structure": structure.dofs()},
         notes=_notes(bodies),
         sentinels=build_sentinels(case, comm, structure=structure, contact=contact),
+        take_materials=structure.take_materials,
         imbalance=lambda: {} if contact is None else contact.imbalance,
     )
 
@@ -119,6 +121,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         dofs={"fluid": fluid.dofs(), "structure": structure.dofs()},
         notes=_notes(bodies),
         sentinels=build_sentinels(case, comm, structure=structure, contact=contact, given=fluid.bodies),
+        take_materials=structure.take_materials,
         imbalance=lambda: {} if contact is None else contact.imbalance,
     )
 

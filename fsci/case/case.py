@@ -44,12 +44,14 @@ class Case(Section):
     solver: Solver = setting(Solver, "how equations are solved")
 
     _document: Document = PrivateAttr()
+    _places: Document | None = PrivateAttr(default=None)  # whose positions messages give; None: those of the document
     _warnings: tuple[str, ...] = PrivateAttr(default=())
+    _meshes: dict[str, str] = PrivateAttr(default_factory=dict)
 
     @property
     def path(self) -> Path:
         """The case file, as the user gave it."""
-        return self._document.path
+        return (self._places or self._document).path
 
     @property
     def folder(self) -> Path:
@@ -60,6 +62,11 @@ class Case(Section):
     def warnings(self) -> tuple[str, ...]:
         """Warnings about implausible settings, with their positions."""
         return self._warnings
+
+    @property
+    def meshes(self) -> dict[str, str]:
+        """Section of a body or obstacle -> checksum of its mesh, of all meshes that this process has read."""
+        return self._meshes
 
     @property
     def elastic_bodies(self) -> dict[str, BodySection]:
@@ -88,8 +95,14 @@ class Case(Section):
         meshes: list[Any] = [body.mesh for body in self.elastic_bodies.values()]
         return next((mesh.dimension for mesh in meshes if isinstance(mesh, Shape)), None)
 
+    def with_places_of(self, other: Case) -> Case:
+        """The same case, whose messages give positions in the file of another one of the same settings."""
+        case = self.model_copy()
+        case._places = other._document
+        return case
+
     def place(self, *keys: str | int) -> Place:
-        return self._document.place(keys)
+        return (self._places or self._document).place(keys)
 
     def locate(self, *keys: str | int) -> str:
         """Position of a setting, as case.yaml:12:5; that of the nearest section around it if it is not in the file."""
@@ -97,7 +110,7 @@ class Case(Section):
 
     def error(self, keys: tuple[str | int, ...], message: str) -> CaseError:
         """An error about a setting, with its position and line."""
-        return CaseError([self._document.problem(self.place(*keys), message)])
+        return CaseError([(self._places or self._document).problem(self.place(*keys), message)])
 
     def dump(self, changes: Iterable[tuple[str, str]] = ()) -> str:
         """The YAML text of the case with overrides applied, then `changes` of the same form; comments stay."""

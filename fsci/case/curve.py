@@ -11,9 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, PrivateAttr, ValidationInfo, model_validator
 
+from fsci.case.plain_file import Unreadable, read_file
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import EntryCount, Name, Number, Switch, Text
 from fsci.expression import RESERVED
+
+#: Size [bytes] of a file of points. It has a million of them, more than a run has time steps, and is read in a second.
+MOST_BYTES = 30_000_000
 
 Array = NDArray[np.float64]
 Point = Annotated[tuple[Number, ...], EntryCount(2, 2)]
@@ -52,6 +56,11 @@ class Curve(Section):
             raise fault(f"must be greater than {late[0]:g}, the one before, not {late[1]:g}", "table", row, 0)
         return self
 
+    @property
+    def points(self) -> Array:
+        """Times and values, shape (n, 2)."""
+        return self._points
+
     def __call__(self, t: ArrayLike) -> Array:
         """Values at the times t, of the same shape."""
         times, values = self._points.T
@@ -73,35 +82,54 @@ def _not_later(points: Array) -> tuple[float, float] | None:
 
 def _read_csv(folder: Path, name: str) -> Array:
     try:
-        lines = (folder / name).read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
-        raise fault(f": '{name}' cannot be read: {reason}", "csv") from None
-    rows: list[tuple[float, float]] = []
-    headings = 0
-    for number, line in enumerate(lines, 1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        row = _numbers(line)
-        if row is None and not rows and not headings:
-            headings = 1
-        elif row is None:
-            raise fault(f": '{name}', line {number}: two numbers are expected, not '{line.strip()[:40]}'", "csv")
-        else:
-            rows.append(row)
+        raw = read_file(folder / name, MOST_BYTES)
+        lines = raw.decode("utf-8-sig").splitlines()
+    except Unreadable as error:
+        raise fault(f": '{name}' {error}", "csv") from None
+    except ValueError:
+        raise fault(f": '{name}' cannot be read: it is not UTF-8 text", "csv") from None
+    rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and line.lstrip()[0] != "#"]
+    if rows and not _is_number(_words(rows[0][1])[0]):  # a heading
+        del rows[0]
     if len(rows) < 2:
         raise fault(f": '{name}' has {len(rows)} points, at least 2 are needed", "csv")
-    return np.array(rows)
+    if (points := _table([line for _, line in rows])) is not None:
+        return points
+    for number, line in rows:
+        if _numbers(line) is None:
+            raise fault(f": '{name}', line {number}: two numbers are expected, not '{line.strip()[:40]}'", "csv")
+    return np.array([_numbers(line) for _, line in rows])
+
+
+def _table(lines: list[str]) -> Array | None:
+    """The numbers of lines that all have one separator, read at once; None for others, and for what is no table."""
+    separator = next((mark for mark in ",;" if mark in lines[0]), None)
+    try:
+        table = np.loadtxt(lines, delimiter=separator, comments=None, ndmin=2)
+    except ValueError:
+        return None
+    return table if table.shape[1] == 2 and np.isfinite(table).all() else None
 
 
 def _numbers(line: str) -> tuple[float, float] | None:
     """Both numbers of a line; None if it has others."""
-    words = re.split(r"\s*[,;]\s*|\s+", line.strip())
     try:
-        first, second = map(float, words)
+        first, second = map(float, _words(line))
     except ValueError:
         return None
     return (first, second) if np.isfinite([first, second]).all() else None
+
+
+def _words(line: str) -> list[str]:
+    return re.split(r"\s*[,;]\s*|\s+", line.strip())
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _callable(name: str) -> str:

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import io
+import json
+from collections import Counter
+from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ruamel.yaml import YAML
+from ruamel.yaml.anchor import Anchor
+from ruamel.yaml.comments import merge_attrib
+
 from fsci.case.errors import CaseError, Place, Problem
+from fsci.case.plain_file import Unreadable, read_file
 from fsci.case.yaml_text import Keys, Parsed, parse_yaml
 
 
@@ -50,21 +58,74 @@ class Document:
         return Problem(place, message, line)
 
     def dump(self) -> str:
-        """The text of the case with its overrides; comments stay."""
+        """The text of the case with its overrides; comments stay, as far as the text then means these settings."""
         if not self.overrides:
             return self.text
-        from ruamel.yaml import YAML
+        for write in (_with_comments, _plainly):
+            text = write(self)
+            if _same(parse_yaml(text, str(self.path)).data, self.data):
+                return text
+        raise AssertionError("settings in plain YAML mean the same")
 
-        yaml = YAML()
-        yaml.preserve_quotes = True
-        yaml.width = 4096  # no line is broken that was not
-        data = yaml.load(self.text)
-        for dotted, text in self.overrides:
-            *_, (inner, last) = _steps(data, dotted)
-            inner[last] = YAML().load(text)
-        stream = io.StringIO()
-        yaml.dump(data, stream)
-        return stream.getvalue()
+
+def _with_comments(document: Document) -> str:
+    yaml = YAML()
+    yaml.preserve_quotes = True
+    yaml.width = 4096  # no line is broken that was not
+    data = yaml.load(document.text)
+    for dotted, text in document.overrides:
+        _unshare(data, dotted)
+        *_, (inner, last) = _steps(data, dotted)
+        inner[last] = YAML().load(text)
+    return _written(yaml, data)
+
+
+def _unshare(data: Any, dotted: str) -> None:
+    """Replace the sections around a setting that others share, by an alias or by `<<`, with copies of their own."""
+    shared = _uses(data)
+    for word in dotted.split(".")[:-1]:
+        key: Any = int(word) if isinstance(data, list) else word
+        inner = data[key] if isinstance(data, list) else data.get(key)
+        if not isinstance(inner, dict | list):
+            return
+        if shared[id(inner)] > 1:
+            data[key] = inner = deepcopy(inner)
+            for node in _nodes(inner):
+                node.__dict__.pop(Anchor.attrib, None)
+            shared = Counter()  # all of the copy is its own
+        data = inner
+
+
+def _uses(data: Any) -> Counter[int]:
+    """How often each section and list, by its identity, is part of the data."""
+    return Counter(id(node) for node in _nodes(data))
+
+
+def _nodes(data: Any) -> Iterator[Any]:
+    if isinstance(data, dict | list):
+        yield data
+        for value in data.values() if isinstance(data, dict) else data:
+            yield from _nodes(value)
+        for other in getattr(data, merge_attrib, ()):  # as many as `<<` names
+            yield other[1] if isinstance(other, tuple) else other
+
+
+def _plainly(document: Document) -> str:
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style, yaml.sort_base_mapping_type_on_output = False, False  # type: ignore[assignment]
+    yaml.width = 4096
+    return _written(yaml, document.data)
+
+
+def _written(yaml: Any, data: Any) -> str:
+    stream = io.StringIO()
+    yaml.dump(data, stream)
+    return stream.getvalue()
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Equal in types and values, whatever the order of settings; a number that is none equals itself."""
+    return json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)
 
 
 #: Size [bytes] of a case file: the reader takes a minute for more.
@@ -74,22 +135,14 @@ MOST_BYTES = 1_000_000
 def read_document(path: Path) -> Document:
     """Read a case file; raises CaseError."""
     try:
-        if path.exists() and not path.is_file() and not path.is_dir():
-            raise CaseError([Problem(Place(str(path)), "is not a file")])
-        with path.open("rb") as file:
-            raw = file.read(MOST_BYTES + 1)
-        if len(raw) > MOST_BYTES:
-            raise CaseError([Problem(Place(str(path)), f"the file is larger than {MOST_BYTES // 1_000_000} MB")])
+        raw = read_file(path, MOST_BYTES)
         text = raw.decode("utf-8-sig").replace("\r\n", "\n")
-    except (OSError, ValueError) as error:
-        place, reason = Place(str(path)), "cannot be read"
-        if isinstance(error, UnicodeDecodeError):
-            before = error.object[: error.start].decode("utf-8")
-            place = Place(str(path), before.count("\n") + 1, len(before) - before.rfind("\n"))
-            reason = "the file is not UTF-8 text"
-        elif isinstance(error, OSError):
-            reason += f": {error.strerror}"
-        raise CaseError([Problem(place, reason)]) from None
+    except Unreadable as error:
+        raise CaseError([Problem(Place(str(path)), str(error))]) from None
+    except UnicodeDecodeError as error:
+        before = error.object[: error.start].decode("utf-8")
+        place = Place(str(path), before.count("\n") + 1, len(before) - before.rfind("\n"))
+        raise CaseError([Problem(place, "the file is not UTF-8 text")]) from None
     return Document(path, text, parsed=parse_yaml(text, str(path)))
 
 

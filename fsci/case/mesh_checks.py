@@ -62,10 +62,12 @@ def length_mistakes(vector: tuple[object, ...] | None, dimension: int | None, ke
 def _file(mesh: FileMesh, folder: Path, keys: Keys) -> Iterator[Mistake]:
     path = folder / mesh.file
     try:
-        found = path.is_file()
+        found, exists = path.is_file(), path.exists()
     except (OSError, ValueError):  # a name too long, or with a zero byte
-        found = False
-    if not found:
+        found = exists = False
+    if exists and not found:
+        yield (*keys, "file"), f"mesh file '{mesh.file}' is not a file"
+    elif not found:
         yield (*keys, "file"), f"mesh file '{mesh.file}' not found in {folder.absolute()}"
     if path.suffix != ".geo":
         for name in ("order", "parameters"):

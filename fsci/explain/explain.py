@@ -14,6 +14,7 @@ from fsci.explain import advice
 from fsci.explain.place import describe, nearest_node
 from fsci.explain.replay import write_replay
 from fsci.explain.residuals import convergence_of, curve
+from fsci.run.files import require_own
 from fsci.run.history import read_history
 from fsci.run.summary import shares
 from solvers.counted import counted
@@ -26,6 +27,7 @@ def explain(out: Path, replay: Path | None = None) -> str:
 
     Raises FileNotFoundError if no run has ended there, ValueError for a replay of a run that did not fail.
     """
+    require_own(out)
     path = out / "summary.json"
     if not path.is_file():
         raise FileNotFoundError(f"'{out}' has no summary.json: no run has ended there")

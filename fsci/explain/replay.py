@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import shutil
 from pathlib import Path
 from typing import Any
 
 from fsci.case import load_case
 from fsci.run.checkpoint import list_checkpoints
-from fsci.run.output import write_text
-from fsci.run.results_folder import MARKER, MARKER_TEXT, keep_case
+from fsci.run.files import MARKER, copy_file, write_text
+from fsci.run.kept_case import keep_case
+from fsci.run.results_folder import MARKER_TEXT
 
 
 def write_replay(failure: Path, folder: Path, what: dict[str, Any]) -> Path:
@@ -34,5 +34,5 @@ def write_replay(failure: Path, folder: Path, what: dict[str, Any]) -> Path:
     write_text(folder / "case.yaml", case.dump([(name, json.dumps(value)) for name, value in changes.items()]))
     write_text(folder / MARKER, MARKER_TEXT)
     (folder / "checkpoint").mkdir()
-    shutil.copyfile(checkpoints[0], folder / "checkpoint" / checkpoints[0].name)
+    copy_file(checkpoints[0], folder / "checkpoint" / checkpoints[0].name)
     return folder

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import chdir, nullcontext, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from io import StringIO
@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.meshes.scripts import RefusedScript, require_harmless
+from fsci.meshes.parts import beside
+from fsci.meshes.scripts import GMSH, SCRIPTS, RefusedScript, require_harmless
 from fsci.meshes.serendipity import FULL, complete
 from solvers.cell_types import CELL_TYPES, reference_nodes
 from solvers.mesh import Mesh
@@ -27,9 +28,6 @@ Indices = NDArray[np.int64]
 
 #: Types of cells that a mesh may have.
 MESHED = tuple(name for name, cell_type in CELL_TYPES.items() if cell_type.facet)
-
-#: Endings of gmsh's scripts.
-SCRIPTS = (".geo", ".geo_unrolled")
 
 
 class MeshError(Exception):
@@ -76,8 +74,8 @@ def read_mesh(path: Path, order: int | None = None, parameters: Mapping[str, flo
     would do more than make a mesh.
     """
     if not path.is_file():
-        raise MeshError(f"there is no mesh file {path}")
-    if path.suffix in (*SCRIPTS, ".msh"):
+        raise MeshError(f"{path} is not a file" if path.exists() else f"there is no mesh file {path}")
+    if path.suffix in GMSH:
         try:
             require_harmless(path)
         except RefusedScript as refused:
@@ -323,8 +321,9 @@ def _read_meshio(path: Path) -> Content:
     import meshio
 
     printed = StringIO()
+    path = path.absolute()
     try:
-        with redirect_stdout(printed), redirect_stderr(printed):
+        with redirect_stdout(printed), redirect_stderr(printed), chdir(path.parent) if beside(path) else nullcontext():
             mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio prints and exits when no reader takes the file
         reason = printed.getvalue().strip() or str(error) or type(error).__name__

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fsci.case import Case
 from fsci.case.checks import load_vectors
 from fsci.case.structure import NO_MIXED_SIMPLICES
+from fsci.meshes.checksum import mesh_checksum
 from fsci.meshes.locations import find_locations
 from fsci.meshes.mesh import MeshError, build_mesh, extract_region, require_surface
 from solvers.mesh import Mesh
@@ -45,6 +46,7 @@ def read_body(case: Case, name: str) -> Mesh:
                 surface_facets(mesh, surface)
     except (MeshError, ValueError) as error:
         raise case.error(keys, str(error)) from None
+    case.meshes[f"structure.bodies.{name}"] = mesh_checksum(mesh)
     _check_lengths(case, name, mesh.points.shape[1])
     _require_mass(case, name, mesh)
     find_locations(case, name, mesh)
@@ -124,6 +126,7 @@ def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int6
             raise MeshError("these surfaces do not enclose the body: name all of them")
     except (MeshError, ValueError) as error:
         raise case.error(keys, str(error)) from None
+    case.meshes[f"fluid.bodies.{name}"] = mesh_checksum(mesh)
     return mesh, mesh.points[nodes], facets
 
 
@@ -142,6 +145,7 @@ def read_obstacle(case: Case, name: str) -> Mesh:
             surface_facets(mesh, surface)
     except (MeshError, ValueError) as error:
         raise case.error(keys, str(error)) from None
+    case.meshes[f"contact.obstacles.{name}"] = mesh_checksum(mesh)
     return mesh
 
 

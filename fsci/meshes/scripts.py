@@ -25,6 +25,10 @@ READS = {"Include", "Merge", "MergeWithBoundingBox"}
 #: Formats that gmsh recognises by their endings and reads without its parser.
 GEOMETRY = {".stl", ".brep", ".brp", ".step", ".stp", ".iges", ".igs", ".xao", ".vtk", ".unv", ".med", ".bdf", ".ply"}
 
+#: Endings of scripts, and of the files that gmsh reads here.
+SCRIPTS = (".geo", ".geo_unrolled")
+GMSH = (*SCRIPTS, ".msh")
+
 #: Characters of a text; gmsh's parser ends longer ones in the middle, after 1023.
 LONGEST_TEXT = 1000
 
@@ -52,13 +56,15 @@ def require_harmless(path: Path) -> None:
 
 def _check(path: Path, seen: set[Path], *, script: bool) -> None:
     """A file with those that it reads; a `script` is parsed whatever it begins with."""
-    if path in seen or not path.is_file():
+    if path in seen or not path.exists():
         return
+    if not path.is_file():
+        raise RefusedScript(f"{path.name} is not a file")
     seen.add(path)
     _check(path.with_name(path.name + ".opt"), seen, script=True)
     if path.suffix.lower() == ".gz":
         raise RefusedScript(f"{path.name}: gmsh runs a program to read a compressed file: unpack it")
-    if not script and (path.suffix.lower() in GEOMETRY or _is_mesh(path)):
+    if not script and (path.suffix.lower() in GEOMETRY or is_mesh(path)):
         return
     text = path.read_bytes().decode("latin-1")
     tokens = list(_tokens(path, text))
@@ -67,7 +73,8 @@ def _check(path: Path, seen: set[Path], *, script: bool) -> None:
             _check_word(path, tokens, index, seen)
 
 
-def _is_mesh(path: Path) -> bool:
+def is_mesh(path: Path) -> bool:
+    """Whether it is a mesh in gmsh's own format."""
     with path.open("rb") as file:
         return file.read(1) == b"$"
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fsci.case.quantities import QUANTITIES
+from fsci.run.files import replacing
 from fsci.run.history import COLUMNS, History
 
 SIZE = (8.0, 5.0)  #: of a picture in inches; 1600 x 1000 pixels
@@ -77,8 +78,8 @@ DERIVED = {
 
 
 def label(text: str, quantity: str, units: Mapping[str, str]) -> str:
-    """A text with the unit of a quantity in brackets, or without a unit for unknown quantities."""
-    text = text.replace("von_mises", "von Mises stress").replace("_", " ")
+    """A text for matplotlib with the unit of a quantity in brackets, or without a unit for unknown quantities."""
+    text = literal(text.replace("von_mises", "von Mises stress").replace("_", " "))
     powers = POWERS.get(quantity, (0, 0, 0))
     if not any(powers):
         return text
@@ -95,6 +96,17 @@ def label(text: str, quantity: str, units: Mapping[str, str]) -> str:
 def raised(name: str, power: int) -> str:
     """A unit to a positive power."""
     return name if power == 1 else f"{name}$^{power}$"
+
+
+def literal(text: str) -> str:
+    """A text that matplotlib draws as it stands: it reads what is between two dollar signs as a formula."""
+    return text.replace("$", r"\$")
+
+
+def save_figure(figure: Any, path: Path) -> None:
+    """Write a figure as PNG; a file that is there is replaced."""
+    with replacing(path) as unfinished:
+        figure.savefig(unfinished, format="png")
 
 
 def plot_history(folder: Path, history: History, quantities: Mapping[str, str], units: Mapping[str, str]) -> list[Path]:
@@ -164,7 +176,7 @@ def plot_panels(
         for axes, (beside, curves) in zip(rows, panels.items(), strict=True):
             scaled = logarithmic and any(np.any(values > 0) for values in curves.values())
             for index, (name, values) in enumerate(curves.items()):
-                style = {"color": COLOURS[index % len(COLOURS)], "marker": marker, "label": name}
+                style = {"color": COLOURS[index % len(COLOURS)], "marker": marker, "label": literal(name)}
                 steps = {"drawstyle": "steps-post"} if beside == NODES else {}
                 axes.plot(time, np.where(values > 0, values, np.nan) if scaled else values, **style, **steps)
             if scaled:
@@ -173,7 +185,7 @@ def plot_panels(
             if len(curves) > 1:
                 add_legend(axes)
         rows[-1].set_xlabel(below)
-        figure.savefig(path)
+        save_figure(figure, path)
     return path
 
 
@@ -198,13 +210,13 @@ def plot_curves(path: Path, time: Any, curves: Mapping[str, Any], below: str, be
         marker = "o" if len(time) < 30 else ""
         for index, (name, values) in enumerate(curves.items()):
             axes = panels[index if apart else 0]
-            axes.plot(time, values, color=COLOURS[index % len(COLOURS)], marker=marker, label=name)
+            axes.plot(time, values, color=COLOURS[index % len(COLOURS)], marker=marker, label=literal(name))
         panels[-1].set_xlabel(below)
         figure.supylabel(beside, fontsize=STYLE["font.size"])
         if len(curves) > 1:
             for axes in panels:
                 add_legend(axes)
-        figure.savefig(path)
+        save_figure(figure, path)
     return path
 
 
@@ -224,5 +236,5 @@ def plot_convergence(path: Path, residuals: Mapping[str, Sequence[float]]) -> Pa
         axes.set_xlabel("Newton iteration")
         axes.set_ylabel("residual norm")
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=6, borderaxespad=0.2)
-        figure.savefig(path)
+        save_figure(figure, path)
     return path

@@ -9,6 +9,7 @@ from typing import Any
 from fsci.plot.render import DrawnBody, Pixels
 from fsci.plot.render_flow import load_state
 from fsci.plot.scene import animate, compose
+from fsci.run.files import replacing
 
 FRAMES = 200  #: at most; of a longer series every second, third, ... time is shown
 DOTS = 120  #: pixels per inch: 960 x 600
@@ -37,4 +38,6 @@ def write_gif(path: Path, frames: Iterable[Pixels]) -> None:
     images: list[Any] = [Image.fromarray(pixels) for pixels in frames]
     palette = images[-1].quantize(256, method=Image.Quantize.MAXCOVERAGE)  # keeps white white
     images = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    images[0].save(path, save_all=True, append_images=images[1:], duration=MILLISECONDS, loop=0)
+    options: Any = {"save_all": True, "append_images": images[1:], "duration": MILLISECONDS, "loop": 0}
+    with replacing(path) as unfinished:
+        images[0].save(unfinished, format="GIF", **options)

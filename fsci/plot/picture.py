@@ -10,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from fsci.plot.curves import DOTS, plot_convergence, plot_history
+from fsci.plot.curves import DOTS, plot_convergence, plot_history, save_figure
 from fsci.plot.mirror import Mirror, read_plane
 from fsci.plot.movie import plot_movie
 from fsci.plot.render import ISOMETRIC, Array, import_pyvista, load_body
 from fsci.plot.render_flow import is_flow, load_meshes, load_state
 from fsci.plot.scene import compose, draw
 from fsci.plot.storyboard import choose, plot_story
+from fsci.run.files import make_folder, require_own
 from fsci.run.history import read_history
 from fsci.run.output import Series, read_collection
 from fsci.run.results_folder import list_pictures
@@ -54,6 +55,7 @@ def plot_run(
     states nearest to them are drawn. `mirrors` are planes of symmetry such as y=0, of which one side was computed: both
     are drawn. Returns the files; raises ValueError if no body has the field, or a body is on both sides of a plane.
     """
+    require_own(out)
     planes = [read_plane(text) for text in mirrors]
     with tempfile.TemporaryDirectory() as folder:
         drawn = _plot(Path(out), movie, field, times, Mirror(planes, Path(folder)))
@@ -64,7 +66,7 @@ def plot_run(
 def _plot(out: Path, movie: bool, field: str | None, times: Sequence[float], mirror: Mirror) -> list[Path]:
     labels = read_labels(out)
     folder = out / "pictures"
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     moments: list[Moment] = list(zip(*read_series(out / "fields", mirror), strict=False))
     flow = bool(moments) and is_flow(moments[-1][0][1])
     names = (field,) if field else FLUID_FIELDS if flow else STRUCTURE_FIELDS
@@ -140,14 +142,14 @@ def plot_state(path: Path, moment: Moment, name: str, labels: Labels) -> Path:
     state = load_state([file for _, file in moment], name)
     crop = CROP if is_flow(first) else 0.0
     scene = compose([state], name, labels.title, labels.units, crop=crop)
-    draw(scene, state, time, dots=DOTS).savefig(path)
+    save_figure(draw(scene, state, time, dots=DOTS), path)
     return path
 
 
 def plot_mesh(path: Path, moment: Moment, labels: Labels) -> Path:
     """Draws the elements of all bodies and the cells of a flow."""
     state = load_meshes([file for _, file in moment])
-    draw(compose([state], None, labels.title, labels.units), state, moment[0][0], dots=DOTS).savefig(path)
+    save_figure(draw(compose([state], None, labels.title, labels.units), state, moment[0][0], dots=DOTS), path)
     return path
 
 
@@ -159,7 +161,7 @@ def plot_pressure(path: Path, moment: Moment, labels: Labels) -> Path:
     towards = np.sum([np.sum(body.surface.point_data["contact_traction"], axis=0) for body in bodies], axis=0)
     away = look_at(-towards)
     scene = compose([bodies], PRESSURE, labels.title, labels.units, away=away, colours="Reds")
-    draw(scene, bodies, moment[0][0], dots=DOTS).savefig(path)
+    save_figure(draw(scene, bodies, moment[0][0], dots=DOTS), path)
     return path
 
 
@@ -181,10 +183,14 @@ def has_contact(moment: Moment) -> bool:
 
 def read_labels(out: Path) -> Labels:
     """Reads title, units and probes from the copy of the case that a run keeps."""
-    from ruamel.yaml import YAML
+    from ruamel.yaml import YAML, YAMLError
 
     path = out / "case.yaml"
-    case = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8")) if path.exists() else {}
-    quantities = {name: probe["quantity"] for name, probe in (case.get("probes") or {}).items()}
-    default = Labels(case.get("title") or out.resolve().name)
-    return Labels(default.title, {**default.units, **(case.get("units") or {})}, quantities)
+    try:
+        case = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8")) if path.exists() else {}
+        quantities = {name: str(probe["quantity"]) for name, probe in (case.get("probes") or {}).items()}
+        units = {**Labels("").units, **(case.get("units") or {})}
+        title = str(case.get("title") or out.resolve().name)
+    except (YAMLError, ValueError, AttributeError, KeyError, TypeError):
+        raise ValueError(f"{path} is not the case of a run: fsci check {path} says what is wrong with it") from None
+    return Labels(title, units, quantities)

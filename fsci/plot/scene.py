@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fsci.plot.curves import SIZE, STYLE, label
+from fsci.plot.curves import SIZE, STYLE, label, literal
 from fsci.plot.render import ISOMETRIC, Array, DrawnBody, Pixels, View, axes_of_view, frame, render
 
 Rectangle = tuple[float, float, float, float]  #: left, bottom, width, height in parts of the figure
@@ -120,7 +120,7 @@ def draw(scene: Scene, bodies: list[DrawnBody], time: float, *, dots: int) -> An
     """The figure of one state, at `dots` pixels per inch."""
     figure, image, title = lay_out(scene, dots)
     image.set_data(render_into(scene, bodies, dots))
-    title.set_text(headline(scene, time))
+    title.set_text(literal(headline(scene, time)))
     return figure
 
 
@@ -138,7 +138,7 @@ def animate(scene: Scene, states: Iterable[tuple[float, list[DrawnBody]]], *, do
     for time, bodies in states:
         canvas.restore_region(still)
         image.set_data(render_into(scene, bodies, dots))
-        title.set_text(headline(scene, time))
+        title.set_text(literal(headline(scene, time)))
         for artist in moving:
             image.axes.draw_artist(artist)
         yield np.array(canvas.buffer_rgba())[..., :3]

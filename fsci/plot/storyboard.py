@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fsci.plot.curves import DOTS, STYLE, label
+from fsci.plot.curves import DOTS, STYLE, label, literal, save_figure
 from fsci.plot.render import Array, DrawnBody, Pixels, View, import_pyvista, render
 from fsci.plot.render_flow import (
     NO_LINES,
@@ -73,12 +73,12 @@ def plot_story(
                 axes.set_ylabel(label(names[1], "displacement", units))
             if index + columns >= len(states):
                 axes.set_xlabel(label(names[0], "displacement", units))
-        figure.suptitle(f"{title}, {plane} {units['length']}" if plane else title, y=1 - 0.1 / total, va="top")
+        figure.suptitle(literal(f"{title}, {plane} {units['length']}" if plane else title), y=1 - 0.1 / total, va="top")
         tall = min(total - BELOW - TITLE - HEAD, 4.0)
         middle = BELOW + (total - BELOW - TITLE - HEAD) / 2
         place = ((WIDTH - BAR + 0.2) / WIDTH, (middle - tall / 2) / total, 0.14 / WIDTH, tall / total)
         draw_colour_bar(figure, place, limits, "viridis", field_label("velocity", flows, units), extend="max")
-        figure.savefig(path)
+        save_figure(figure, path)
     return path
 
 

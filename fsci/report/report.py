@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fsci.report.html import bars, folded, heading, page, paragraph, pictures, preformatted, section, table
-from fsci.run.output import write_text
+from fsci.run.files import require_own, write_text
 
 NAME = "report.html"
 LOG_LINES = 40  #: of the log that are shown
@@ -21,6 +21,7 @@ def write_report(out: Path) -> Path:
     """
     from fsci.plot.picture import plot_run
 
+    require_own(out)
     summary = read_summary(out)
     drawn = plot_run(out)
     write_text(out / NAME, report(out, summary, drawn))

@@ -19,6 +19,7 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 
+from fsci.run.files import make_folder, replacing
 from solvers.api import State
 
 KEEP = 2  #: checkpoints kept
@@ -34,10 +35,9 @@ def write_checkpoint(folder: Path, state: State, meta: State) -> Path:
     import h5py
 
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     step = int(meta["step"])
     path = folder / f"checkpoint_{step:06d}.h5"
-    unfinished = path.with_name(path.name + ".tmp")
     buffer = io.BytesIO()  # HDF5 may crash when the disk is full
     with h5py.File(buffer, "w", userblock_size=USER_BLOCK) as file:
         write_tree(file.create_group("state", track_order=True), state)
@@ -46,18 +46,17 @@ def write_checkpoint(folder: Path, state: State, meta: State) -> Path:
         seal = seal_of(len(content) - USER_BLOCK, zlib.crc32(content[USER_BLOCK:]))
         content[: len(seal)] = seal
         try:
-            with unfinished.open("wb") as raw:
-                raw.write(content)
-                raw.flush()
-                os.fsync(raw.fileno())
+            with replacing(path) as unfinished:
+                with unfinished.open("wb") as raw:
+                    raw.write(content)
+                    raw.flush()
+                    os.fsync(raw.fileno())
+                for later in list_checkpoints(folder):
+                    if step_of(later) > step:
+                        later.unlink()
         except OSError as error:
-            unfinished.unlink(missing_ok=True)
             raise OSError(error.errno, f"cannot write a checkpoint: {error.strerror}", str(path)) from error
 
-    for later in list_checkpoints(folder):
-        if step_of(later) > step:
-            later.unlink()
-    os.replace(unfinished, path)
     sync_folder(folder)
     for old in [*list_checkpoints(folder)[KEEP:], *folder.glob("checkpoint_*.h5.tmp")]:
         old.unlink()
@@ -133,12 +132,14 @@ def write_tree(group: Any, tree: State) -> None:
 
 
 def read_tree(group: Any) -> State:
-    """Inverse of write_tree."""
+    """Inverse of write_tree. Raises OSError for a link, which may lead to another file."""
     import h5py
 
     tree: State = {}
-    for key, item in group.items():
-        name = unquote(key)
+    for key in group:
+        if not isinstance(group.get(key, getlink=True), h5py.HardLink) or getattr(group[key], "external", None):
+            raise OSError(f"the checkpoint has a link, {group.name}/{key}: a run did not write it; remove the file")
+        name, item = unquote(key), group[key]
         if isinstance(item, h5py.Group):
             tree[name] = read_tree(item)
         elif h5py.check_string_dtype(item.dtype):

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TextIO
 
+from fsci.run.files import open_to_append
 from solvers.api import StepFailed, StepInfo
 
 ACTIVE = "contact.active"  #: the number of StepInfo that counts active contact nodes
@@ -37,7 +38,7 @@ class Monitor:
         self.enabled = enabled
         self.stream = stream or sys.stdout
         self.live = live and self.stream.isatty()
-        self.log = log.open("a", encoding="utf-8") if enabled and log else None
+        self.log = open_to_append(log) if enabled and log else None
         self.progress: Any = None  # rich's progress bar, on a terminal
         self.lines = 0
         self.columns: Collection[str] = ()

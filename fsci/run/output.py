@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +11,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fsci.run.files import make_folder, refused, replacing, write_text
 from solvers.api import Snapshot
 
 Series = list[tuple[float, Path]]  #: (time, VTU file) of each output, in order of time
@@ -25,7 +26,7 @@ class FieldWriter:
 
     def __init__(self, folder: Path):
         self.folder = Path(folder)
-        self.folder.mkdir(parents=True, exist_ok=True)
+        make_folder(self.folder)
         self.series: dict[str, Series] = {}
         self._lines: dict[str, list[str]] = {}  # of the collections: made once, they are written at every output
 
@@ -40,7 +41,7 @@ class FieldWriter:
             writer._lines[listed.stem] = [data_set(*entry) for entry in kept]
             write_collection(listed, kept)
             for later, path in entries:
-                if later > time:
+                if later > time:  # `read_collection` knows it to be an output in this folder
                     path.unlink(missing_ok=True)
         return writer
 
@@ -68,9 +69,8 @@ def write_vtu(path: Path, snapshot: Snapshot) -> None:
         point_data={name: pad(values) for name, values in snapshot.point_data.items()},
         cell_data={name: [pad(values)] for name, values in snapshot.cell_data.items()},
     )
-    unfinished = path.with_name(path.name + ".tmp")
-    meshio.write(unfinished, mesh, file_format="vtu", binary=True, compression="zlib")
-    os.replace(unfinished, path)
+    with replacing(path) as unfinished:
+        meshio.write(unfinished, mesh, file_format="vtu", binary=True, compression="zlib")
 
 
 def write_collection(path: Path, series: Series) -> None:
@@ -90,16 +90,21 @@ def collection(lines: Sequence[str]) -> str:
 
 
 def read_collection(path: Path) -> Series:
-    """Reads a ParaView collection."""
-    entries = ET.parse(path).getroot().iter("DataSet")
-    return [(float(entry.attrib["timestep"]), path.parent / entry.attrib["file"]) for entry in entries]
+    """Reads a ParaView collection. Raises CaseError if it names a file that no run has written beside it."""
+    try:
+        entries = [(float(entry.attrib["timestep"]), entry.attrib["file"]) for entry in ET.parse(path).iter("DataSet")]
+    except (ET.ParseError, KeyError, ValueError):
+        raise refused(path, "is not a list of outputs as runs write them: remove it") from None
+    for _, name in entries:
+        if not is_output_of(path.stem, name):
+            own = f"a run lists only its own files here, {path.stem}_000001.vtu and so on"
+            raise refused(path, f"names the file '{name}': {own}; remove this line, or the whole file")
+    return [(time, path.parent / name) for time, name in entries]
 
 
-def write_text(path: Path, text: str) -> None:
-    """Replaces a file whole or not at all."""
-    unfinished = path.with_name(path.name + ".tmp")
-    unfinished.write_text(text, encoding="utf-8")
-    os.replace(unfinished, path)
+def is_output_of(part: str, name: str) -> bool:
+    """Whether this is the name of a file that `FieldWriter` writes for a body or the fluid."""
+    return re.fullmatch(rf"{re.escape(part)}_\d{{6,}}\.vtu", name) is not None
 
 
 def pad(values: ArrayLike) -> NDArray[np.float64]:

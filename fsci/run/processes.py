@@ -5,9 +5,13 @@ from __future__ import annotations
 import sys
 import time
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
+
+from fsci.case import CaseError
+
+T = TypeVar("T")
 
 #: Time [s] within which a failure of all processes has reached all of them.
 PATIENCE = 5.0
@@ -30,10 +34,24 @@ def ending_together(comm: Any, *shared: type[Exception]) -> Iterator[None]:
         comm.Abort(1)
 
 
+def on_first(comm: Any, call: Callable[[], T]) -> T | None:
+    """The result on the first process, None on the others; its CaseError or OSError on all of them (collective)."""
+    result, error = None, None
+    if comm.rank == 0:
+        try:
+            result = call()
+        except (CaseError, OSError) as raised:
+            error = raised
+    error = comm.bcast(error, root=0)
+    if error is not None:
+        raise error
+    return result
+
+
 def describe(error: BaseException) -> str:
     """The message for the user: that of a disk or memory error, else the traceback."""
     if isinstance(error, MemoryError):
-        return "there is not enough memory"
+        return ". ".join(["there is not enough memory", *getattr(error, "__notes__", ())])
     if isinstance(error, KeyboardInterrupt):
         return "stopped before the first step"
     if isinstance(error, OSError):

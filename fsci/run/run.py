@@ -7,21 +7,26 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fsci.case import Case, CaseError
-from fsci.case.resume import end_error, resumed_case
-from fsci.run.checkpoint import read_checkpoint, write_checkpoint
+from fsci.case import Case, CaseError, load_case
+from fsci.case.resume import changed, end_error, meshes_changed
+from fsci.case.settings import settings_of
+from fsci.run.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from fsci.run.clock import Clock
+from fsci.run.files import LOCK, make_folder, require_own, write_text
 from fsci.run.history import HistoryWriter, read_history
+from fsci.run.jump import require_continuous
+from fsci.run.kept_case import keep_case, kept_case
+from fsci.run.lock import Lock
 from fsci.run.memory import require_memory
 from fsci.run.monitor import Monitor
-from fsci.run.output import FieldWriter, write_text
-from fsci.run.processes import describe
-from fsci.run.results_folder import keep_case, prepare_folder
+from fsci.run.output import FieldWriter
+from fsci.run.processes import describe, on_first
+from fsci.run.results_folder import prepare_folder
 from fsci.run.stop import StopWatch
 from fsci.run.summary import RunRecord, memory_mb, shares, summarize, write_summary
 from fsci.run.verify import evaluate
@@ -33,6 +38,9 @@ if TYPE_CHECKING:
 
 FINISHED, FAILED, BAD_CASE, STOPPED = 0, 1, 2, 3  #: exit codes
 
+#: Settings that decide where rigid bodies are, and those that decide which forces and energies a state has.
+MOVING = ("fluid.bodies.*.motion", "curves", "time.step")
+MATERIALS = ("structure.bodies.*.material", "structure.bodies.*.springs")
 
 _NO_START = (
     "contact surfaces have no mass in dynamics, and no equilibrium was found for the loads and the overlap at the "
@@ -49,16 +57,9 @@ def run_case(case: Case, out: Path, *, force: bool = False) -> int:
 
     comm = MPI.COMM_WORLD
     require_memory(case, comm)
-    refused: CaseError | None = None
-    if comm.rank == 0:
-        try:
-            prepare_folder(case, out, force=force)
-        except CaseError as error:
-            refused = error
-    refused = comm.bcast(refused)
-    if refused is not None:
-        raise refused
-    return Run(case, out, comm).from_start()
+    lock = on_first(comm, lambda: prepare_folder(case, out, force=force))
+    with closing(lock) if lock else nullcontext():
+        return Run(kept_case(case, out), out, comm, lock=lock).from_start()
 
 
 def resume_run(out: Path, changes: Sequence[tuple[str, str]] = ()) -> int:
@@ -69,22 +70,21 @@ def resume_run(out: Path, changes: Sequence[tuple[str, str]] = ()) -> int:
     from mpi4py import MPI
 
     comm = MPI.COMM_WORLD
-    case = resumed_case(out, changes)
-    checkpoint: Any = None
-    if comm.rank == 0:
-        try:
-            checkpoint = read_checkpoint(out / "checkpoint")
-        except FileNotFoundError as error:
-            checkpoint = error
-    checkpoint = comm.bcast(checkpoint)
-    if isinstance(checkpoint, Exception):
-        raise checkpoint
-    state, _ = checkpoint
-    if (early := end_error(case, changes, state["clock"]["time"])) is not None:
-        raise early
-    if changes and comm.rank == 0:
-        write_text(out / "case.yaml", case.dump())
-    return Run(case, out, comm).from_checkpoint(state)
+    on_first(comm, lambda: require_own(out))
+    case = load_case(out / "case.yaml", changes)
+    lock = on_first(comm, lambda: _lock_to_resume(out))
+    with closing(lock) if lock else nullcontext():
+        state, _ = comm.bcast(on_first(comm, lambda: read_checkpoint(out / "checkpoint")))
+        if (early := end_error(case, changes, state["clock"]["time"])) is not None:
+            raise early
+        return Run(case, out, comm, lock=lock).from_checkpoint(state)
+
+
+def _lock_to_resume(out: Path) -> Lock:
+    """The lock of a folder. Raises FileNotFoundError for one that no run has written, which stays as it is."""
+    if not (out / LOCK).exists() and not list_checkpoints(out / "checkpoint"):
+        raise FileNotFoundError(f"no usable checkpoint in {out / 'checkpoint'}")
+    return Lock(out)
 
 
 @dataclass
@@ -100,6 +100,8 @@ class Run:
     state: State = field(default_factory=dict)  #: after the last accepted step
     good: State = field(default_factory=dict)  #: the same as a checkpoint keeps it, whole on rank 0
     good_at: State = field(default_factory=dict)  #: its step and time
+    lock: Lock | None = None  #: of the folder, on rank 0
+    before: State = field(default_factory=dict)  #: settings and meshes of the checkpoint, if the run is resumed
 
     def __post_init__(self) -> None:
         time = self.case.time
@@ -140,6 +142,10 @@ class Run:
         from solvers.distributed import scatter
 
         with self._shown():
+            self.before = json.loads(_entry(state, "case"))
+            changes = changed(self.case, self.before["settings"])
+            if any(change.concerns(*MOVING) for change in changes):
+                on_first(self.comm, lambda: require_continuous(self.case, state))
             self._initialise(self._build())
             with self.record.timer("start"):
                 try:
@@ -147,9 +153,13 @@ class Run:
                     self.clock.restore(state["clock"])
                     self.scheme.restore(scatter(self.comm, state["scheme"], self.scheme.save()))
                 except KeyError as missing:
-                    reason = f"the checkpoint has no entry {missing}: another version of fsci wrote it"
-                    raise OSError(f"{reason}; run the case again") from None
+                    raise _of_another_version(missing) from None
+            if any(change.concerns(*MATERIALS) for change in changes):
+                self.simulation.take_materials()
+            for change in changes:
+                self.monitor.say(f"changed: {change}")
             if self.root:
+                keep_case(self.case, self.out)
                 (self.out / "STOP").unlink(missing_ok=True)
                 self.history = HistoryWriter(self.out / "history.csv", resume_after=self.clock.step)
                 self.fields = FieldWriter.resume(self.out / "fields", self.clock.time)
@@ -170,7 +180,14 @@ class Run:
         with self.record.timer("start"):
             self.simulation = build(self.case, self.comm, self.record.timer)
         self.scheme = Watched(self.simulation.scheme, self.simulation.sentinels, self.record.timer)
+        on_first(self.comm, self._require_meshes)
+        self._described = json.dumps({"settings": settings_of(self.case), "meshes": self.case.meshes})
         return self.simulation
+
+    def _require_meshes(self) -> None:
+        """Raises CaseError if the checkpoint is of other meshes."""
+        if problems := list(meshes_changed(self.case, self.before.get("meshes", {}), self.case.meshes)):
+            raise CaseError(problems)
 
     # -------------------------------------------------------------------------------------------------- loop
 
@@ -185,16 +202,21 @@ class Run:
                 return self._loop()
             except OSError as error:
                 raise OSError(error.errno, f"{describe(error)}. {self._rescue()}") from error
+            except Exception as error:
+                error.add_note(self._rescue())
+                raise
 
     def _rescue(self) -> str:
-        """Try to write the state of the last accepted step after other files could not be written."""
+        """Try to write the state of the last accepted step after an error; what to say about it."""
         if not self.root:
-            return "The last good state is on process 0."
+            return "Process 0 writes the state of the last good step if it can; continue with fsci resume."
         step, own = self.good_at["step"], self.out / "checkpoint"
-        for folder in (own, Path(tempfile.gettempdir()) / f"fsci_{self.out.resolve().name}_{os.getpid()}"):
+        elsewhere = f"fsci_{self.out.resolve().name}_"
+        for folder_of in (lambda: own, lambda: Path(tempfile.mkdtemp(prefix=elsewhere))):
             try:
+                folder = folder_of()
                 path = write_checkpoint(folder, self.good | {"record": self.record.save()}, self.good_at)
-            except OSError:
+            except (OSError, MemoryError, CaseError):
                 continue
             where = "" if folder == own else f"; move it into {own}"
             return f"The state after step {step} is in {path}{where}; continue with fsci resume."
@@ -252,7 +274,7 @@ class Run:
         with self.record.timer("checkpoint"):
             self.state = self.scheme.save()
             clock = self.clock
-            self.good = {"scheme": gather(self.comm, self.state), "clock": clock.save()}
+            self.good = {"scheme": gather(self.comm, self.state), "clock": clock.save(), "case": self._described}
             self.good_at = {"step": clock.step, "time": clock.time, "title": self.case.title}
 
     def _note(self, dt: float, info: StepInfo, before: float) -> None:
@@ -291,6 +313,7 @@ class Run:
         if not self.root:
             return
         folder = self.out / "failure"
+        make_folder(folder)
         FieldWriter(folder / "fields").write(self.clock.step + 1, self.clock.time + self.clock.dt, snapshots)
         keep_case(self.case, folder)
         what = {
@@ -339,6 +362,8 @@ class Run:
             code = self._summarize("stopped", message, memory_mb())
         finally:
             self.monitor.close()
+            if self.lock is not None:
+                self.lock.close()
             sys.stdout.flush()
             if self.comm.size > 1:
                 self.comm.Abort(code)
@@ -380,3 +405,16 @@ class Run:
             self.monitor.say(f"time: {shares(self.record.wall(), self.record.timer.seconds)}")
         self.monitor.finish(message, ok=status == "finished" and not missed)
         return {"finished": FAILED if missed else FINISHED, "stopped": STOPPED, "failed": FAILED}[status]
+
+
+def _entry(state: State, name: str) -> Any:
+    """An entry of a checkpoint. Raises OSError if another version of fsci wrote it."""
+    try:
+        return state[name]
+    except KeyError as missing:
+        raise _of_another_version(missing) from None
+
+
+def _of_another_version(missing: KeyError) -> OSError:
+    reason = f"the checkpoint has no entry {missing}: another version of fsci wrote it"
+    return OSError(f"{reason}; run the case again")

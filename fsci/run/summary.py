@@ -6,15 +6,16 @@ import json
 import math
 import platform
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fsci.run.files import write_text
 from fsci.run.history import History
-from fsci.run.output import write_text
 from solvers.api import Finding, State, StepInfo
 from solvers.timing import Timer
 
@@ -132,12 +133,12 @@ def summarize(
         "wall": {"total": record.wall(), **record.timer.seconds},
         "memory_mb": memory,
         "probes": {
-            name: {"final": values[-1], "min": values.min(), "max": values.max()}
+            name: {"final": values[-1], "min": _of_numbers(np.min, values), "max": _of_numbers(np.max, values)}
             for name, values in columns.items()
             if name in probes
         },
         "balances": {
-            name: {"final": values[-1], "max_abs": np.abs(values).max()}
+            name: {"final": values[-1], "max_abs": _of_numbers(np.max, np.abs(values))}
             for name, values in columns.items()
             if name in balances
         },
@@ -146,6 +147,12 @@ def summarize(
         "units": dict(units or {}),
         **({"contact": {"imbalance": dict(imbalance)}} if imbalance else {}),
     }
+
+
+def _of_numbers(statistic: Callable[[Any], float], values: NDArray[np.float64]) -> float:
+    """A statistic of the steps that have a value: a probe that was added later has none in earlier ones."""
+    known = values[~np.isnan(values)]
+    return float(statistic(known)) if len(known) else math.nan
 
 
 def shares(total: float, parts: Mapping[str, float]) -> str:

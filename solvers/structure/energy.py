@@ -27,6 +27,12 @@ class EnergyBalance:
         self.damping += damping
         self.kinetic, self.internal, self.friction = kinetic, internal, friction
 
+    def revalue(self, kinetic: float, internal: float) -> None:
+        """Count a change of energies [J] at one time, by other materials or springs, as if it had been at the start."""
+        self.initial += kinetic - self.kinetic + internal - self.internal
+        self.kinetic, self.internal = kinetic, internal
+        self.largest = max(self.largest, kinetic + internal)
+
     def warning(self) -> str:
         """A warning when the energy of moving bodies exceeds its bound for the first time, else an empty text."""
         before, self.largest = self.largest, max(self.largest, self.kinetic + self.internal)

@@ -141,6 +141,13 @@ class Structure:
         friction = 0.0 if self.constraint is None else self.constraint.friction_work
         return self.time.kinetic_energy(self), internal, friction
 
+    def take_materials(self) -> None:
+        """Go on from the restored state with other materials and springs: present forces and energies are theirs."""
+        for body, internal in zip(self.bodies, self.split(self.now.internal), strict=True):
+            internal[:] = body.internal_force()
+        kinetic, stored, _ = self._energies()
+        self.energy.revalue(kinetic, stored)
+
     @contextmanager
     def by(self, time: TimeScheme, held: Held, t: float, dt: float) -> Iterator[None]:
         """A step to the same time t by another scheme and other supports, for the start; the caller solves it."""

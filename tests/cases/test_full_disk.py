@@ -47,6 +47,7 @@ def test_full_disk(tmp_path, full_disk, monkeypatch, capfd):
 
 
 def test_full_disk_without_space_for_a_checkpoint(tmp_path, full_disk, monkeypatch, capfd):
+    (tmp_path / "elsewhere").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "elsewhere"))
     original = write_checkpoint
 

@@ -86,17 +86,6 @@ def test_another_run_removes_only_what_the_last_one_wrote(case, tmp_path):
     assert [name for name in FOREIGN if "/" in name and not (out / name).exists()] == []
 
 
-def test_links_are_replaced_not_followed(case, tmp_path):
-    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere.yaml"
-    prepare_folder(case, out)
-    elsewhere.write_text("mine")
-    (out / "case.yaml").unlink()
-    (out / "case.yaml").symlink_to(elsewhere)
-    prepare_folder(case, out)
-    assert elsewhere.read_text() == "mine"
-    assert (out / "case.yaml").read_text() == BLOCK
-
-
 def test_a_file_instead_of_a_folder(case, tmp_path):
     (tmp_path / "out").write_text("mine")
     with pytest.raises(CaseError, match="cannot write here: File exists"):

@@ -48,7 +48,7 @@ def test_a_number_whose_square_overflows(tmp_path):
 
 
 def test_a_long_file(tmp_path):
-    assert "the file is larger than 1 MB" in message(tmp_path, "# " + "x" * 1_100_000)
+    assert "case.yaml: is larger than 1 MB" in message(tmp_path, "# " + "x" * 1_100_000)
 
 
 def test_a_pipe_is_not_waited_for(tmp_path):

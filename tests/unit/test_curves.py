@@ -1,5 +1,8 @@
 """Section `curves`: values between points, files, messages, and that results folders have all they need."""
 
+import os
+import time
+
 import numpy as np
 import pytest
 from case_mistakes import first_lines, refused
@@ -61,6 +64,38 @@ def test_files_of_curves_are_kept(case, tmp_path):
     prepare_folder(load_case(case), out)
     assert (out / "curves" / "inflow" / "inflow.csv").read_text() == CSV
     assert load_case(out).curves["inflow"](0.5) == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize(
+    "text", ["0,1\n1;2\n2 3\n", "0, 1\n1, 2\n2, 3\n", "t\n0\t1\n1\t2\n2\t3", "# a\nt v\n0 1\n\n1 2\n2 3\n"]
+)
+def test_separators(case, text):
+    """Any in each line; tables with one and the same are read at once."""
+    (case.parent / "data" / "inflow.csv").write_text(text)
+    assert load_case(case).curves["inflow"].points.tolist() == [[0, 1], [1, 2], [2, 3]]
+
+
+def test_a_large_file_is_read_quickly(case):
+    times = np.arange(200_000) * 1e-3
+    text = "\n".join(f"{t!r},{t + 1!r}" for t in times.tolist())
+    (case.parent / "data" / "inflow.csv").write_text(text)
+    begin = time.perf_counter()
+    points = load_case(case).curves["inflow"].points
+    assert time.perf_counter() - begin < 4.0, "line by line it takes 4 s on a machine where this takes 0.4 s"
+    assert np.array_equal(points, np.stack([times, times + 1], axis=1))
+
+
+@pytest.mark.parametrize("name", ["/dev/zero", "/dev/stdin", "pipe", "folder", "../data"])
+def test_what_is_not_a_file_is_not_read(case, name):
+    os.mkfifo("pipe")
+    os.mkdir("folder")
+    error = refused(CASE.replace("../data/inflow.csv", name))
+    assert first_lines(error)[0] == f"case.yaml:5:17: 'csv': '{name}' is not a file"
+
+
+def test_the_largest_file(case, monkeypatch):
+    monkeypatch.setattr("fsci.case.curve.MOST_BYTES", 10)
+    assert first_lines(refused(CASE))[0] == "case.yaml:5:17: 'csv': '../data/inflow.csv' is larger than 1e-05 MB"
 
 
 def test_curves_in_flows_motions_and_obstacles(tmp_path):
@@ -129,6 +164,11 @@ def test_message(case, old, new, message):
         ("t, v\n0, 1\n", "'../data/inflow.csv' has 1 points, at least 2 are needed"),
         ("0, 1\n1, 2, 3\n", "'../data/inflow.csv', line 2: two numbers are expected, not '1, 2, 3'"),
         ("0, 1\n1, nan\n", "'../data/inflow.csv', line 2: two numbers are expected, not '1, nan'"),
+        ("nan, 0\n0, 1\n1, 1\n", "'../data/inflow.csv', line 1: two numbers are expected, not 'nan, 0'"),
+        ("t, v\n0, 1\n\n1, -inf\n2, 1\n", "'../data/inflow.csv', line 4: two numbers are expected, not '1, -inf'"),
+        ("0, 1\n1, 1e999\n", "'../data/inflow.csv', line 2: two numbers are expected, not '1, 1e999'"),
+        ("0, 1, 2\n1, 2\n2, 3\n", "'../data/inflow.csv', line 1: two numbers are expected, not '0, 1, 2'"),
+        ("0, 1\n1, 2 # end\n", "'../data/inflow.csv', line 2: two numbers are expected, not '1, 2 # end'"),
         ("0 1\n2 1\n1 3\n", "'../data/inflow.csv' must have increasing times, not go from 2 to 1"),
     ],
 )

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from fsci.case import CaseError
 from fsci.run.history import HistoryWriter, read_history
 
 
@@ -51,10 +52,49 @@ def test_resume_drops_later_steps_and_a_half_written_line(tmp_path):
 
     resumed = HistoryWriter(path, resume_after=3)
     assert read_history(path)["step"].tolist() == [1, 2, 3]
-    with pytest.raises(ValueError, match="B"):
-        resumed.write(4, 0.4, 0.1, 3, 0.0, {"B": 1.0})
     resumed.write(4, 0.35, 0.05, 3, 0.0, {"A": 40.0})
     assert read_history(path)["A"].tolist() == [1, 2, 3, 40]
+    with pytest.raises(ValueError, match="B"):
+        resumed.write(5, 0.4, 0.05, 3, 0.0, {"B": 1.0})
+
+
+@pytest.mark.parametrize("kept", [0, 2])
+def test_a_resumed_run_may_have_other_columns(tmp_path, kept):
+    """New ones are the last, and nan before; those that are gone are nan from then on, and may come back."""
+    path = tmp_path / "history.csv"
+    first = HistoryWriter(path)
+    for step in (1, 2):
+        first.write(step, 0.1 * step, 0.1, 3, 0.0, {"A": 1.0, "B": 2.0})
+    second = HistoryWriter(path, resume_after=kept)
+    for step in (kept + 1, kept + 2):
+        second.write(step, 0.1 * step, 0.1, 3, 0.0, {"C": 3.0, "B": 2.0})
+    with pytest.raises(ValueError, match="columns A"):
+        second.write(kept + 3, 1.0, 0.1, 3, 0.0, {"A": 1.0, "C": 3.0, "B": 2.0})
+    assert list(read_history(path))[5:] == ["A", "B", "C"]
+    third = HistoryWriter(path, resume_after=kept + 2)
+    third.write(kept + 3, 1.0, 0.1, 3, 0.0, {"A": 1.0, "C": 3.0})
+    history, gone = read_history(path), [math.nan, math.nan]
+    assert history["step"].tolist() == list(range(1, kept + 4))
+    assert np.array_equal(history["A"], [1.0] * kept + gone + [1.0], equal_nan=True)
+    assert np.array_equal(history["B"], [2.0] * (kept + 2) + [math.nan], equal_nan=True)
+    assert np.array_equal(history["C"], [math.nan] * kept + [3.0] * 3, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("step,time\n", "line 1 is not that of a history: it begins with step, time, dt, iterations, wall"),
+        ("step,time,dt,iterations,wall,../../x\n", "line 1 is not that of a history: '../../x' is not the name of a"),
+        ("step,time,dt,iterations,wall,a\n1,1,1,1,1\n", "is not the history of a run: "),
+        ("step,time,dt,iterations,wall\n1,1,1,1,x\n", "is not the history of a run: "),
+    ],
+)
+def test_what_is_no_history_is_named(tmp_path, text, message):
+    path = tmp_path / "history.csv"
+    path.write_text(text)
+    with pytest.raises(CaseError) as caught:
+        read_history(path)
+    assert str(caught.value).startswith(f"{path}: {message}")
 
 
 def test_a_new_run_replaces_the_file_and_a_missing_one_may_be_resumed(tmp_path):

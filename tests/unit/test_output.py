@@ -105,6 +105,6 @@ def test_resume_drops_what_is_later(tmp_path):
 
 
 def test_names_survive_xml(tmp_path):
-    path = tmp_path / "odd.pvd"
+    path = tmp_path / 'a&b<"c>.pvd'
     write_collection(path, [(1e-300, tmp_path / 'a&b<"c>_000001.vtu')])
     assert read_collection(path) == [(1e-300, tmp_path / 'a&b<"c>_000001.vtu')]
