@@ -33,9 +33,13 @@ def cell_facets(mesh: Mesh) -> Indices:
 
 def boundary_facets(mesh: Mesh) -> Indices:
     """The facets of one cell only, with all their nodes, outward oriented, shape (k, nodes per facet)."""
-    facets = cell_facets(mesh)
-    ids = _row_ids(_sorted_corners(mesh, facets))
+    facets, ids = cell_facets(mesh), facet_ids(mesh)
     return facets[np.bincount(ids)[ids] == 1]
+
+
+def facet_ids(mesh: Mesh) -> Indices:
+    """A number for every facet of `cell_facets`, equal where corners are the same, shape (cells * facets per cell,)."""
+    return _row_ids(_sorted_corners(mesh, cell_facets(mesh)))
 
 
 def find_facets(mesh: Mesh, corners: Indices) -> Indices:
@@ -90,10 +94,12 @@ def _sorted_corners(mesh: Mesh, facets: Indices) -> Indices:
 
 
 def _row_ids(rows: Indices) -> Indices:
-    """A number for every row, equal where rows are equal, shape (rows,)."""
-    ids = rows[:, 0]
+    """A number for every row of numbers from 0 on, equal where rows are equal, shape (rows,)."""
+    ids, size = rows[:, 0], int(rows[:, 0].max(initial=0)) + 1
     for column in rows.T[1:]:
-        # two columns at a time: a product of two counts never leaves 64 bits, a product of four would
-        column = column - column.min(initial=0)
-        ids = np.unique(ids * (column.max(initial=0) + 1) + column, return_inverse=True)[1]
-    return ids
+        count = int(column.max(initial=0)) + 1
+        if size * count > 2**62:  # smaller numbers for the columns so far: products stay within 64 bits
+            ids = np.unique(ids, return_inverse=True)[1]
+            size = int(ids.max(initial=0)) + 1
+        ids, size = ids * count + column, size * count
+    return np.unique(ids, return_inverse=True)[1]

@@ -13,9 +13,12 @@ from numpy.typing import NDArray
 
 from fsci.case import Case
 from fsci.case.checks import load_vectors
+from fsci.case.mesh import FileMesh
+from fsci.case.mesh import Mesh as MeshSection
 from fsci.case.structure import NO_MIXED_SIMPLICES
 from fsci.meshes.locations import find_locations
 from fsci.meshes.mesh import MeshError, build_mesh, extract_region, require_surface
+from fsci.meshes.valid import BadMesh, require_valid
 from solvers.mesh import Mesh
 from solvers.mesh_topology import surface_facets
 from solvers.tessellation import is_closed, tessellate
@@ -35,6 +38,7 @@ def read_body(case: Case, name: str) -> Mesh:
         if settings.region is not None:
             keys = ("structure", "bodies", name, "region")
             mesh = extract_region(mesh, settings.region)
+        _require_valid(settings.mesh, mesh, parts_meet=_meets_itself(case, name))
         _require_dimension(case, name, mesh)
         if settings.element == "mixed" and mesh.cell_type[:4] in ("tria", "tetr"):
             keys = ("structure", "bodies", name, "element")
@@ -49,6 +53,21 @@ def read_body(case: Case, name: str) -> Mesh:
     _require_mass(case, name, mesh)
     find_locations(case, name, mesh)
     return mesh
+
+
+def _require_valid(settings: MeshSection, mesh: Mesh, *, parts_meet: bool = False) -> None:
+    """Raises MeshError for a mesh with wrong cells."""
+    try:
+        require_valid(mesh, parts_meet=parts_meet)
+    except BadMesh as error:
+        source = settings.file if isinstance(settings, FileMesh) else settings.shape
+        raise MeshError(f"{source}: {error}") from None
+
+
+def _meets_itself(case: Case, name: str) -> bool:
+    """Whether surfaces of a body are in contact with each other."""
+    pairs = () if case.contact is None else case.contact.pairs.values()
+    return any({side.body for _, side in pair.sides} == {name} for pair in pairs)
 
 
 def _require_dimension(case: Case, name: str, mesh: Mesh) -> None:
@@ -116,6 +135,7 @@ def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int6
         mesh = build_mesh(settings.mesh, case.folder)
         if mesh.points.shape[1] != dim:
             raise MeshError(f"the mesh is {mesh.points.shape[1]}D, but the grid is {dim}D")
+        _require_valid(settings.mesh, mesh)
         keys = (*base, "on")
         for surface in settings.on or ():
             require_surface(mesh, surface)
@@ -130,14 +150,15 @@ def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int6
 def read_obstacle(case: Case, name: str) -> Mesh:
     """The mesh of an obstacle, with the surface that the case names. Raises CaseError."""
     assert case.contact is not None
-    settings = case.contact.obstacles[name]
+    obstacle = case.contact.obstacles[name]
     keys: Keys = ("contact", "obstacles", name, "mesh")
     try:
-        mesh = build_mesh(settings.mesh, case.folder)
+        mesh = build_mesh(obstacle.mesh, case.folder)
         if case.dimension not in (None, mesh.points.shape[1]):
             raise MeshError(f"the mesh is {mesh.points.shape[1]}D, but the bodies are {case.dimension}D")
+        _require_valid(obstacle.mesh, mesh, parts_meet=True)
         keys = ("contact", "obstacles", name, "on")
-        for surface in settings.on:
+        for surface in obstacle.on:
             require_surface(mesh, surface)
             surface_facets(mesh, surface)
     except (MeshError, ValueError) as error:
