@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fsci.case.case import Case
+from fsci.case.jumps import jump_warnings
 from fsci.case.material import Material
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import flow_warnings
@@ -31,6 +32,7 @@ def warnings(case: Case) -> Iterator[tuple[Keys, str]]:
         yield from _locking(body, (*keys, "mesh"))
         if isinstance(body.mesh, Shape) and (ratio := body.mesh.aspect) > 50:
             yield (*keys, "mesh", "cells"), f"the cells are {ratio:.0f} times longer than wide"
+    yield from jump_warnings(case)
     if case.fluid is not None:
         yield from flow_warnings(case, case.fluid)
 

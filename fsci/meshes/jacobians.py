@@ -142,8 +142,8 @@ def _bernstein(points: Array, exponents: Indices, degree: int, simplex: bool) ->
     if simplex:
         powers = np.concatenate([degree - exponents.sum(axis=1, keepdims=True), exponents], axis=1)
         share = np.concatenate([1.0 - points.sum(axis=1, keepdims=True), points], axis=1)
-        factor = [factorial(degree) / np.prod([factorial(int(k)) for k in row]) for row in powers]
-        return np.asarray(np.array(factor) * np.prod(share[:, None, :] ** powers, axis=2))
+        shares = np.array([factorial(degree) / np.prod([factorial(int(k)) for k in row]) for row in powers])
+        return np.asarray(shares * np.prod(share[:, None, :] ** powers, axis=2))
     factor = np.array([np.prod([comb(degree, int(k)) for k in row]) for row in exponents])
     x = points[:, None, :]
     return np.asarray(factor * np.prod(x**exponents * (1.0 - x) ** (degree - exponents), axis=2))
@@ -156,6 +156,7 @@ def _halves(dim: int, simplex: bool) -> tuple[list[Array], list[Array]]:
         return starts, [0.5 * np.eye(dim)] * len(starts)
     corners = np.concatenate([np.zeros((1, dim)), np.eye(dim)])
     middle = 0.5 * (corners[:, None] + corners[None])
+    parts: list[tuple[Array, ...]]
     if dim == 2:
         parts = [(middle[i, i], middle[i, j], middle[i, k]) for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
         parts.append((middle[1, 2], middle[2, 0], middle[0, 1]))

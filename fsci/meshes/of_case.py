@@ -16,6 +16,7 @@ from fsci.case.checks import load_vectors
 from fsci.case.mesh import FileMesh
 from fsci.case.mesh import Mesh as MeshSection
 from fsci.case.structure import NO_MIXED_SIMPLICES
+from fsci.meshes.finite_values import require_finite
 from fsci.meshes.locations import find_locations
 from fsci.meshes.mesh import MeshError, build_mesh, extract_region, require_surface
 from fsci.meshes.valid import BadMesh, require_valid
@@ -51,7 +52,7 @@ def read_body(case: Case, name: str) -> Mesh:
         raise case.error(keys, str(error)) from None
     _check_lengths(case, name, mesh.points.shape[1])
     _require_mass(case, name, mesh)
-    find_locations(case, name, mesh)
+    require_finite(case, name, mesh, find_locations(case, name, mesh))
     return mesh
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from fsci.case import Case, CaseError
 from fsci.case.resume import end_error, resumed_case
+from fsci.run.cause import with_cause
 from fsci.run.checkpoint import read_checkpoint, write_checkpoint
 from fsci.run.clock import Clock
 from fsci.run.history import HistoryWriter, read_history
@@ -226,11 +227,12 @@ class Run:
                 dt = clock.dt
                 info = self.simulation.scheme.step(clock.time, dt)
                 break
-            except StepFailed as failure:
+            except StepFailed as failed:
+                failure = with_cause(failed, self.case, clock.time, self.comm)
                 if not clock.halve():
                     self._keep_failure(failure)
                     self.simulation.scheme.restore(self.state)
-                    raise
+                    raise failure from None
                 self.simulation.scheme.restore(self.state)
                 self.state = self.simulation.scheme.save()
                 self.record.retry()

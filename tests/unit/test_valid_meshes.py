@@ -9,7 +9,6 @@ from case_mistakes import load, refused
 
 from fsci import shapes
 from fsci.check.meshes import check_meshes
-from fsci.cli import execute
 from fsci.meshes.folds import folded
 from fsci.meshes.jacobians import inverted
 from fsci.meshes.of_case import read_body
@@ -279,7 +278,7 @@ def test_collapsed_cells():
 def test_parts_that_touch():
     """Blocks side by side without common nodes, and a disc in a ring whose facets cross each other."""
     block = shapes.rectangle((1, 1), (3, 3))
-    points = np.concatenate([block.points, block.points + [1, 0.1]])
+    points = np.concatenate([block.points, block.points + np.array([1, 0.1])])
     require_valid(Mesh(points, np.concatenate([block.cells, block.cells + len(block.points)]), "quad"))
     disc, ring = shapes.disc(1, (24, 3)), shapes.ring(1, 1.3, (36, 2))
     points = np.concatenate([disc.points, ring.points])
@@ -289,7 +288,7 @@ def test_parts_that_touch():
 def test_regions_of_two_bodies_may_overlap():
     """Each body is checked by itself: a press fit in one file."""
     one = shapes.rectangle((1, 1), (3, 3))
-    points = np.pad(np.concatenate([one.points, one.points + [0.8, 0]]), ((0, 0), (0, 1)))
+    points = np.pad(np.concatenate([one.points, one.points + np.array([0.8, 0])]), ((0, 0), (0, 1)))
     cells = np.concatenate([one.cells, one.cells + len(one.points)])
     regions = {"first": [np.arange(9)], "second": [np.arange(9, 18)]}
     meshio.Mesh(points, [("quad", cells)], cell_sets=regions).write("m.inp")
