@@ -85,7 +85,7 @@ def _patch(fluid: FluidSection, name: str, times: Array) -> Iterator[Mistake]:
         if keys[3] == "where" or not formula.uses - {"t"}:
             continue
         for face in patch.on:
-            x = _nodes(fluid, name, face) if keys[3] == "velocity" else face_middles(fluid, patch, face)
+            x = _nodes(fluid, name, face) if keys[3] == "velocity" else _chosen(patch, face_middles(fluid, face))
             if (found := first_not_finite(formula, x, times)) is not None:
                 yield keys, f"{subject(keys)}: {found}"
                 break
@@ -128,21 +128,23 @@ def _nodes(fluid: FluidSection, name: str, face: str) -> Array:
     for other in (face for patch in later for face in patch.on):
         ends.setdefault(other[0], []).append(-1 if other[1] == "+" else 0)
     planes = [np.delete(plane, ends.get(axis, [])) for axis, plane in zip("xyz", fluid.grid.planes, strict=False)]
-    whole = fluid.grid.planes["xyz".index(face[0])]
-    return _on_face(fluid.patches[name], face, planes, whole)
+    return _chosen(fluid.patches[name], _on_face(fluid, face, planes))
 
 
-def face_middles(fluid: FluidSection, patch: PatchSection, face: str) -> Array:
-    """Middles of the cells' faces on a face of the box where the patch is on it, (dim, n)."""
-    middles = [0.5 * (plane[1:] + plane[:-1]) for plane in fluid.grid.planes]
-    return _on_face(patch, face, middles, fluid.grid.planes["xyz".index(face[0])])
+def face_middles(fluid: FluidSection, face: str) -> Array:
+    """Middles of the cells' faces on a face of the box, (dim, n), the last axis fastest."""
+    return _on_face(fluid, face, [0.5 * (plane[1:] + plane[:-1]) for plane in fluid.grid.planes])
 
 
-def _on_face(patch: PatchSection, face: str, lines: list[Array], whole: Array) -> Array:
-    """Crossings of lines in a face of the box, where the patch is on it, (dim, n); of many every so many."""
+def _on_face(fluid: FluidSection, face: str, lines: list[Array]) -> Array:
+    """Crossings of lines in a face of the box."""
     axis, side = "xyz".index(face[0]), -1 if face[1] == "+" else 0
-    parts = [whole[[side]] if i == axis else line for i, line in enumerate(lines)]
-    x = np.stack([part.ravel() for part in np.meshgrid(*parts, indexing="ij")])
+    parts = [fluid.grid.planes[axis][[side]] if i == axis else line for i, line in enumerate(lines)]
+    return np.stack([part.ravel() for part in np.meshgrid(*parts, indexing="ij")])
+
+
+def _chosen(patch: PatchSection, x: Array) -> Array:
+    """The points where the patch is; of many every so many."""
     if patch.where is not None:
         x = x[:, patch.where(x, 0.0) > 0.0]
     return x[:, :: max(x.shape[1] // MOST_POINTS, 1)]

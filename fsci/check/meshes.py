@@ -20,6 +20,7 @@ from fsci.case.errors import Problem
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import fast_body, thin_body
 from fsci.case.rigid_motion import rigid_motion
+from fsci.meshes.enclosed import require_outlet
 from fsci.meshes.nested import read_grid
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body, require_inside_period, slave_surfaces
 from solvers.fluid.bodies.inside import PointInBody, require_outside
@@ -81,6 +82,8 @@ def check_meshes(case: Case) -> Findings:
         _rigid(case, found)
         if case.fluid.grid.refine and not found.problems:
             found.attempt(partial(read_grid, case))
+        if not found.problems:
+            found.attempt(partial(require_outlet, case))
     return found
 
 
