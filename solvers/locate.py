@@ -31,12 +31,12 @@ def locate(mesh: Mesh, point: Array) -> tuple[int, Array] | None:
     near = np.flatnonzero(((low - margin <= 0.0) & (high + margin >= 0.0)).all(axis=1))
     if not len(near):
         return None
-    reference, missed = pull_back(mesh.cell_type, nodes[near])
+    reference, missed = _pull_back(mesh.cell_type, nodes[near])
     best = int(np.argmin(missed))
     return (int(near[best]), reference[best]) if missed[best] <= TOLERANCE else None
 
 
-def pull_back(cell_type: str, nodes: Array) -> tuple[Array, Array]:
+def _pull_back(cell_type: str, nodes: Array) -> tuple[Array, Array]:
     """(reference coordinates of the point of each cell near the origin, its distance from the origin).
 
     Newton's iterates are clipped to the cell. The distance vanishes if the origin is in the cell, else it is of the

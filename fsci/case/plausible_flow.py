@@ -33,8 +33,7 @@ def flow_warnings(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]
     """Paths of settings with a warning about each."""
     density = fluid.density * case.units.density
     if not DENSITIES[0] <= density <= DENSITIES[1]:
-        unit = f"{case.units.mass}/{case.units.length}^3"
-        value = f"{fluid.density:g} {unit} is {density:.3g} kg/m^3"
+        value = in_si(fluid.density, case.units.density, f"{case.units.mass}/{case.units.length}^3", "kg/m^3")
         yield ("fluid", "density"), f"implausible density: {value}; check 'units'"
     if case.coupling is None and not _driven(fluid):
         yield ("fluid", "patches"), "nothing drives the flow: no velocity, traction, pressure, force or moving body"
@@ -49,6 +48,11 @@ def flow_warnings(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]
         if crossed > MOST_CELLS_PER_STEP:
             message = f"the flow crosses {crossed:.0f} cells in a time step here; take a smaller 'step'"
             yield ("fluid", "patches", name), message
+
+
+def in_si(value: float, factor: float, unit: str, si: str) -> str:
+    """A value in the units of the case, and in SI where these are others."""
+    return f"{value:g} {si}" if factor == 1.0 else f"{value:g} {unit}, which is {value * factor:.3g} {si}"
 
 
 def _slips(case: Case, fluid: FluidSection) -> bool:

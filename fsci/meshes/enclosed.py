@@ -108,7 +108,7 @@ class Places:
     def _most_volume(self, name: str) -> float:
         """The volume of a body is not larger: of a built-in shape by its extents, which need not be read."""
         mesh = self.case.elastic_bodies[name].mesh if name in self.case.elastic_bodies else self.fluid.bodies[name].mesh
-        return float(np.prod(mesh.extents)) if isinstance(mesh, Shape) else np.inf
+        return float(np.linalg.norm(mesh.extents)) ** mesh.dimension if isinstance(mesh, Shape) else np.inf
 
 
 def _closed_box(case: Case, fluid: FluidSection, places: Places) -> None:
@@ -159,7 +159,9 @@ def _pockets(case: Case, fluid: FluidSection, places: Places) -> None:
             flows = {name: _flow(fluid, name, t, labels == part) for name in inlets}
             net, gross = (sum(values) for values in zip(*flows.values(), strict=True))
             if abs(net) > max(UNBALANCED * gross, largest * (1.0 + 1e-9)):
-                parts = {("fluid", "patches", name): flow for name, (flow, _) in flows.items()}
+                parts: dict[tuple[str, ...], float] = {
+                    ("fluid", "patches", name): flow for name, (flow, _) in flows.items()
+                }
                 largest, error = abs(net), _unbalanced(case, parts, net, t)
         if error is not None:
             raise error

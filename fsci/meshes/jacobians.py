@@ -63,11 +63,16 @@ def middle_maps(mesh: Mesh) -> tuple[Array, Array]:
     x = mesh.points[mesh.cells]
     values, gradients = shape_functions(mesh.cell_type, CELL_TYPES[mesh.cell_type].middle[None])
     jacobian = _jacobians(x, gradients)[:, 0]
+    return np.einsum("a,cai->ci", values[0], x), inverses(jacobian)
+
+
+def inverses(jacobian: Array) -> Array:
+    """Inverses of matrices (n, dim, dim), infinite where there are none."""
     determinant = _determinant(jacobian)
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = _adjugate(jacobian) / determinant[:, None, None]
     inverse[determinant == 0.0] = np.inf
-    return np.einsum("a,cai->ci", values[0], x), inverse
+    return np.asarray(inverse)
 
 
 def _rounding(x: Array) -> Array:

@@ -5,8 +5,11 @@ Nothing here needs a finite element.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import wraps
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +29,42 @@ from solvers.tessellation import is_closed, tessellate
 
 Array = NDArray[np.float64]
 Keys = tuple[str | int, ...]
+T = TypeVar("T")
 
 VECTORS = ("gravity", "body_force", "initial_displacement", "initial_velocity")
 
 
+_READ: ContextVar[dict[Any, Any] | None] = ContextVar("meshes that are read once", default=None)
+
+
+@contextmanager
+def reading_once() -> Iterator[None]:
+    """Within it, each mesh of a case is read and checked once."""
+    token = _READ.set({})
+    try:
+        yield
+    finally:
+        _READ.reset(token)
+
+
+def _once(read: Callable[[Case, str], T]) -> Callable[[Case, str], T]:
+    """A function whose results are kept within `reading_once`: of a mesh that it raises nothing for."""
+
+    @wraps(read)
+    def reading(case: Case, name: str) -> T:
+        kept = _READ.get()
+        if kept is None:
+            return read(case, name)
+        # pairs that are found later name surfaces that have to be there
+        key = (read.__name__, name, None if case.contact is None else id(case.contact))
+        if key not in kept:
+            kept[key] = read(case, name), case.contact
+        return kept[key][0]  # type: ignore[no-any-return]
+
+    return reading
+
+
+@_once
 def read_body(case: Case, name: str) -> Mesh:
     """The mesh of an elastic body, or its region, with everything in it that the case names. Raises CaseError."""
     settings = case.elastic_bodies[name]
@@ -57,12 +92,12 @@ def read_body(case: Case, name: str) -> Mesh:
 
 
 def _require_valid(settings: MeshSection, mesh: Mesh, *, parts_meet: bool = False) -> None:
-    """Raises MeshError for a mesh with wrong cells."""
-    try:
-        require_valid(mesh, parts_meet=parts_meet)
-    except BadMesh as error:
-        source = settings.file if isinstance(settings, FileMesh) else settings.shape
-        raise MeshError(f"{source}: {error}") from None
+    """Raises MeshError for a mesh of a file with wrong cells."""
+    if isinstance(settings, FileMesh):
+        try:
+            require_valid(mesh, parts_meet=parts_meet)
+        except BadMesh as error:
+            raise MeshError(f"{settings.file}: {error}") from None
 
 
 def _meets_itself(case: Case, name: str) -> bool:
@@ -126,6 +161,7 @@ def _check_lengths(case: Case, name: str, dim: int) -> None:
             raise case.error(keys, f"'{keys[-1]}' has {len(vector)} entries, but the mesh is of {dim} dimensions")
 
 
+@_once
 def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int64]]:
     """(mesh, points [m], segments or triangles) of a rigid body's closed surface. Raises CaseError."""
     assert case.fluid is not None
@@ -148,6 +184,7 @@ def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int6
     return mesh, mesh.points[nodes], facets
 
 
+@_once
 def read_obstacle(case: Case, name: str) -> Mesh:
     """The mesh of an obstacle, with the surface that the case names. Raises CaseError."""
     assert case.contact is not None
