@@ -106,22 +106,23 @@ def _check(case: Case) -> Findings:
 
 def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...] | None) -> None:
     """Bodies in the wrong place, or that nothing holds; chosen: bodies whose pairs the program finds."""
+    rigid = {} if case.fluid is None else case.fluid.bodies
+    for name in case.elastic_bodies:
+        if name not in found.meshes and (mesh := found.attempt(partial(read_body, case, name))) is not None:
+            found.meshes[name] = mesh
+    read = {name: found.attempt(partial(read_rigid_body, case, name)) for name in rigid}
+    if found.problems:
+        return
     bodies = []
     for name in case.elastic_bodies:
         keys: Keys = ("structure", "bodies", name)
-        mesh = found.meshes[name] if name in found.meshes else read_body(case, name)
-        if (warning := free_motions(case, name, mesh)) is not None:
+        bodies.append(placed(name, keys, found.meshes[name], elastic=True, moves=True))
+        if (warning := free_motions(case, name, found.meshes[name])) is not None:
             found.warnings.append(f"{case.place(*keys)}: {warning}")
-        bodies.append(placed(name, keys, mesh, elastic=True, moves=True))
-        found.meshes[name] = mesh
-    if case.fluid is not None:
-        for name, rigid in case.fluid.bodies.items():
-            mesh = read_rigid_body(case, name)[0]
-            bodies.append(placed(name, ("fluid", "bodies", name), mesh, elastic=False, moves=rigid.free is not None))
-        said = list(around_box(case, bodies))
-    else:
-        said = []
-    said += pair_sizes(bodies, found.pairs)
+    for name, body in rigid.items():
+        mesh = read[name][0]  # type: ignore[index]
+        bodies.append(placed(name, ("fluid", "bodies", name), mesh, elastic=False, moves=body.free is not None))
+    said = [*pair_sizes(bodies, found.pairs), *around_box(case, bodies)]
     found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in said]
     for only_note, keys, text in overlaps(case, bodies, found.pairs):
         (found.notes if only_note else found.warnings).append(f"{case.place(*keys)}: {text}")

@@ -67,8 +67,8 @@ def overlaps(case: Case, bodies: list[Placed], pairs: dict[str, PairSection]) ->
         pair = _pair(pairs, first.name, second.name)
         how = f"{depth:.3g} {case.units.length} deep"
         if pair is not None:
-            end = "which are tied" if pairs[pair].tied else "which contact has to push apart at once"
-            yield True, second.keys, f"bodies '{first.name}' and '{second.name}' of pair '{pair}' overlap, {how}, {end}"
+            names = f"bodies '{first.name}' and '{second.name}' of pair '{pair}'"
+            yield True, second.keys, f"{names} overlap, {how}, which contact has to push apart at once"
         else:
             remedy = "move one of them, or make their surfaces a pair of contact"
             yield False, second.keys, f"bodies '{first.name}' and '{second.name}' overlap, {how}: {remedy}"
@@ -83,7 +83,8 @@ def _pair(pairs: dict[str, PairSection], first: str, second: str) -> str | None:
 
 def around_box(case: Case, bodies: list[Placed]) -> Iterator[Said]:
     """Bodies that move freely beyond the box or a plane of symmetry, and bodies of another unit than the box."""
-    assert case.fluid is not None
+    if case.fluid is None:
+        return
     low, high = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
     symmetric = [face for patch in case.fluid.patches.values() if patch.symmetry for face in patch.on]
     dry = () if case.coupling is None else case.coupling.dry_side

@@ -22,7 +22,7 @@ from fsci.case.structure import NO_MIXED_SIMPLICES
 from fsci.meshes.finite_values import require_finite
 from fsci.meshes.locations import find_locations
 from fsci.meshes.mesh import MeshError, build_mesh, extract_region, require_surface
-from fsci.meshes.valid import BadMesh, require_valid
+from fsci.meshes.valid import BadMesh, require_positive, require_valid
 from solvers.mesh import Mesh
 from solvers.mesh_topology import surface_facets
 from solvers.tessellation import is_closed, tessellate
@@ -92,12 +92,15 @@ def read_body(case: Case, name: str) -> Mesh:
 
 
 def _require_valid(settings: MeshSection, mesh: Mesh, *, parts_meet: bool = False) -> None:
-    """Raises MeshError for a mesh of a file with wrong cells."""
-    if isinstance(settings, FileMesh):
-        try:
+    """Raises MeshError for a mesh with wrong cells. Those of built-in shapes may be too coarse for their curvature."""
+    try:
+        if isinstance(settings, FileMesh):
             require_valid(mesh, parts_meet=parts_meet)
-        except BadMesh as error:
-            raise MeshError(f"{settings.file}: {error}") from None
+        else:
+            require_positive(mesh, "take more cells, or other ones: 'order: 1', or no simplices")
+    except BadMesh as error:
+        source = settings.file if isinstance(settings, FileMesh) else settings.shape
+        raise MeshError(f"{source}: {error}") from None
 
 
 def _meets_itself(case: Case, name: str) -> bool:

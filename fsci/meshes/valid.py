@@ -29,17 +29,22 @@ def require_valid(mesh: Mesh, *, parts_meet: bool = False) -> None:
     largest = float(np.abs(mesh.points).max())
     flat = np.flatnonzero(~(EPS * largest * inverse_sizes(mesh) < STRAIN_OF_ROUNDING))
     _refuse(mesh, flat, "flat: it is so thin that rounding of its nodes' positions strains it; merge its nodes")
-    wrong = inverted(mesh)
-    if CELL_TYPES[mesh.cell_type].degree == 1:
-        remedy = "move the node that lies across its neighbours, or make the mesh anew"
-        _refuse(mesh, wrong, f"concave or twisted: its Jacobian determinant changes its sign; {remedy}")
-    remedy = "put its mid nodes near the middle of its edges (gmsh: Mesh.HighOrderOptimize = 2), or refine it there"
-    _refuse(mesh, wrong, f"turned inside out in a part: its Jacobian determinant changes its sign; {remedy}")
+    remedy = "move the node that lies across its neighbours, or make the mesh anew"
+    if CELL_TYPES[mesh.cell_type].degree == 2:
+        remedy = "put its mid nodes near the middle of its edges (gmsh: Mesh.HighOrderOptimize = 2), or refine it there"
+    require_positive(mesh, remedy)
     ids = facet_ids(mesh)
     if len(pairs := folded(mesh, ids)):
         raise BadMesh(_covers(mesh, *pairs[0].tolist()))
     if not parts_meet and (pair := covering(mesh, ids)) is not None:
         raise BadMesh(_covers(mesh, *pair))
+
+
+def require_positive(mesh: Mesh, remedy: str) -> None:
+    """Raises BadMesh with the first cell whose Jacobian determinant is negative somewhere."""
+    first_order = CELL_TYPES[mesh.cell_type].degree == 1
+    what = "concave or twisted" if first_order else "turned inside out in a part"
+    _refuse(mesh, inverted(mesh), f"{what}: its Jacobian determinant changes its sign; {remedy}")
 
 
 def _refuse(mesh: Mesh, cells: NDArray[np.int64], what: str) -> None:

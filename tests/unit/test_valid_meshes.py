@@ -265,6 +265,17 @@ def test_built_in_shapes(order):
                 require_valid(shape(order=order, cell=cell))
 
 
+def test_a_built_in_shape_that_is_too_coarse():
+    """Second-order tetrahedra in the thick wall of a ball: their mid nodes on the sphere lie across."""
+    shape = "{shape: hollow_sphere, inner_radius: 0.05, outer_radius: 1, cells: [6, 1], order: 2, cell: tet}"
+    text = CASE.replace("{file: m.vtu}", shape).replace("{at: [0, 0], disp", "{on: inner, disp")
+    text = text.replace("[0, 0]", "[0, 0, 0]")
+    error = refused(text, lambda loaded: run_case(loaded, loaded.folder / "out"))
+    words = "case.yaml:5:13: hollow_sphere: cell 7 at (-0.576398, -0.26753, -0.405415) (and 119 more) is turned inside"
+    assert str(error).startswith(words), str(error)
+    assert [str(problem) for problem in check_meshes(load(text)).problems] == [str(error)]
+
+
 def test_collapsed_cells():
     """Quadrilaterals with a node twice are triangles; quarter points have a zero determinant at a corner."""
     points = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=float)
