@@ -15,8 +15,7 @@ from solvers.api import StepFailed
 Array = NDArray[np.float64]
 ValueAndRate = Callable[[float], tuple[float, float]]  #: t -> (value, its rate)
 
-#: Differences of fourth order: from two points before to two after, and from here to four points after.
-CENTRAL = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12.0
+#: The difference of fourth order from here to four points after.
 FORWARD = np.array([-25.0, 48.0, -36.0, 16.0, -3.0]) / 12.0
 
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
@@ -77,10 +76,16 @@ def differentiated(formula: Expression, dt: float) -> ValueAndRate:
         if formula.constant is not None:
             return float(formula.constant), 0.0
         values = formula.at_times(t + h * np.arange(-2, 3))
-        if np.isfinite(values).all():
-            return float(values[2]), float(CENTRAL @ values / h)
-        values = formula.at_times(t + h * np.arange(5))  # one that begins here, as t**1.5 at 0
-        return float(values[0]), float(FORWARD @ values / h)
+        if not np.isfinite(values).all():
+            return one_sided(t)
+        back2, back, here, on, on2 = values
+        return float(here), float((8.0 * (on - back) - (on2 - back2)) / (12.0 * h))
+
+    def one_sided(t: float) -> tuple[float, float]:
+        """Of a formula that begins or ends here, as t**1.5 at 0."""
+        after, before = formula.at_times(t + h * np.arange(5)), formula.at_times(t - h * np.arange(5))
+        rate = FORWARD @ after if np.isfinite(after).all() else -(FORWARD @ before)
+        return float(after[0]), float(rate / h)
 
     return value_and_rate
 

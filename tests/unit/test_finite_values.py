@@ -131,10 +131,11 @@ def test_formulas_without_a_value_where_none_is_needed(case, old, new):
 
 
 def test_a_motion_that_begins_with_the_run():
-    """Its rate at the start needs no times before."""
+    """Its rate at the start needs no times before, and at the end none after."""
     value, rate = differentiated(Expression.parse("t**1.5"), 0.1)(0.0)
     assert (value, rate) == (0.0, pytest.approx(0.0, abs=0.02))
     assert differentiated(Expression.parse("sqrt(1 - t) + 0*sqrt(t)"), 0.1)(0.0)[1] == pytest.approx(-0.5, rel=1e-9)
+    assert differentiated(Expression.parse("t**2 + 0*sqrt(1 - t)"), 0.1)(1.0) == (1.0, pytest.approx(2.0, rel=1e-9))
 
 
 def test_a_step_names_the_setting(capfd):
