@@ -21,8 +21,17 @@ def signed_volumes(mesh: Mesh) -> NDArray[np.float64]:
     corners = corners - corners[:, :1]
     # the cell is the sum of the simplices between its first corner and its facets
     simplices = [list(simplex) for facet in shape.facets for simplex in _simplices(facet)]
-    determinants = sum(np.linalg.det(corners[:, simplex]) for simplex in simplices)
+    determinants = sum(determinant(corners[:, simplex]) for simplex in simplices)
     return np.asarray(determinants / factorial(mesh.points.shape[1]))
+
+
+def determinant(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Determinants of matrices (..., dim, dim), 2 or 3 wide: faster than LAPACK's."""
+    m = np.moveaxis(matrices, (-2, -1), (0, 1))
+    if len(m) == 2:
+        return np.asarray(m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0])
+    minors = [m[1, i] * m[2, j] - m[1, j] * m[2, i] for i, j in ((1, 2), (2, 0), (0, 1))]
+    return np.asarray(m[0, 0] * minors[0] + m[0, 1] * minors[1] + m[0, 2] * minors[2])
 
 
 def cell_facets(mesh: Mesh) -> Indices:

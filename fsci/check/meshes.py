@@ -21,7 +21,7 @@ from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import fast_body, thin_body
 from fsci.case.rigid_motion import rigid_motion
 from fsci.check.held import free_motions
-from fsci.check.scene import around_box, overlaps, pair_sizes, placed
+from fsci.check.scene import Placed, around_box, overlaps, pair_sizes
 from fsci.meshes.enclosed import require_outlet
 from fsci.meshes.nested import read_grid
 from fsci.meshes.of_case import (
@@ -116,12 +116,12 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
     bodies = []
     for name in case.elastic_bodies:
         keys: Keys = ("structure", "bodies", name)
-        bodies.append(placed(name, keys, found.meshes[name], elastic=True, moves=True))
+        bodies.append(Placed(name, keys, True, True, found.meshes[name]))
         if (warning := free_motions(case, name, found.meshes[name])) is not None:
             found.warnings.append(f"{case.place(*keys)}: {warning}")
     for name, body in rigid.items():
         mesh = read[name][0]  # type: ignore[index]
-        bodies.append(placed(name, ("fluid", "bodies", name), mesh, elastic=False, moves=body.free is not None))
+        bodies.append(Placed(name, ("fluid", "bodies", name), body.free is not None, False, mesh))
     said = [*pair_sizes(bodies, found.pairs), *around_box(case, bodies)]
     found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in said]
     for only_note, keys, text in overlaps(case, bodies, found.pairs):

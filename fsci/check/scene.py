@@ -37,23 +37,15 @@ class Placed:
     keys: Keys
     moves: bool  #: freely: it is elastic, or a free rigid body
     elastic: bool
-    x: Array  #: points of its surface [m]
-    facets: NDArray[np.int64]
+    mesh: Mesh
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        return self.mesh.points.min(axis=0), self.mesh.points.max(axis=0)
 
     @property
     def extent(self) -> float:
-        return float(np.ptp(self.x, axis=0).max())
-
-    @property
-    def facet(self) -> float:
-        """Mean length of the edges of its facets [m]."""
-        corners = self.x[self.facets]
-        return float(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1).mean())
-
-
-def placed(name: str, keys: Keys, mesh: Mesh, *, moves: bool, elastic: bool) -> Placed:
-    facets, nodes = tessellate(mesh)
-    return Placed(name, keys, moves, elastic, mesh.points[nodes], facets)
+        return float(np.ptp(self.mesh.points, axis=0).max())
 
 
 def overlaps(case: Case, bodies: list[Placed], pairs: dict[str, PairSection]) -> Iterator[tuple[bool, Keys, str]]:
@@ -61,8 +53,8 @@ def overlaps(case: Case, bodies: list[Placed], pairs: dict[str, PairSection]) ->
     for first, second in combinations(bodies, 2):
         if not (first.moves and second.moves):
             continue
-        depth = max(deepest(a.x, b.x, b.facets) for a, b in ((first, second), (second, first)))
-        if depth <= CROSSING * min(first.facet, second.facet):
+        depth = _depth(first, second)
+        if depth == 0.0:
             continue
         pair = _pair(pairs, first.name, second.name)
         how = f"{depth:.3g} {case.units.length} deep"
@@ -72,6 +64,20 @@ def overlaps(case: Case, bodies: list[Placed], pairs: dict[str, PairSection]) ->
         else:
             remedy = "move one of them, or make their surfaces a pair of contact"
             yield False, second.keys, f"bodies '{first.name}' and '{second.name}' overlap, {how}: {remedy}"
+
+
+def _depth(first: Placed, second: Placed) -> float:
+    """How deep the nodes of one surface lie in the other body [m]; 0 if facets that touch may cross as much."""
+    (low, high), (other_low, other_high) = first.box, second.box
+    if (low >= other_high).any() or (other_low >= high).any():
+        return 0.0
+    surfaces = [
+        (body.mesh.points[nodes], facets) for body in (first, second) for facets, nodes in [tessellate(body.mesh)]
+    ]
+    (x, facets), (y, others) = surfaces
+    depth = max(deepest(x, y, others), deepest(y, x, facets))
+    size = min(float(np.linalg.norm(p[f][:, 1] - p[f][:, 0], axis=1).mean()) for p, f in surfaces)
+    return depth if depth > CROSSING * size else 0.0
 
 
 def _pair(pairs: dict[str, PairSection], first: str, second: str) -> str | None:
@@ -93,7 +99,7 @@ def around_box(case: Case, bodies: list[Placed]) -> Iterator[Said]:
         if ratio >= OTHER_UNIT or 1.0 / ratio >= OTHER_UNIT:
             yield body.keys, _sizes("the body is", ratio, "the box")
             continue
-        x_low, x_high = body.x.min(axis=0), body.x.max(axis=0)
+        x_low, x_high = body.box
         if not body.moves or (x_high <= low).any() or (x_low >= high).any() or body.name in dry:
             continue
         for face in symmetric:

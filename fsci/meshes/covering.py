@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.meshes.boxes import in_boxes
-from fsci.meshes.jacobians import inverse_sizes, inverses, middle_maps
+from fsci.meshes.jacobians import inverses
 from solvers.cell_types import CELL_TYPES
 from solvers.locate import shape_functions
 from solvers.mesh import Mesh
@@ -30,17 +30,17 @@ DISTORTION = 0.5
 NEWTON_STEPS = 5
 
 
-def covering(mesh: Mesh, ids: Indices) -> tuple[int, int] | None:
-    """Two cells that cover each other, or None; ids: `facet_ids` of the mesh."""
+def covering(mesh: Mesh, ids: Indices, maps: tuple[Array, Array]) -> tuple[int, int] | None:
+    """Two cells that cover each other, or None; ids: `facet_ids` of the mesh, maps: its `middle_maps`."""
     points, owners, nodes = _points(mesh, ids)
     which, cells = in_boxes(points, *_boxes(mesh))
     apart = owners[which] != cells
     corner = np.flatnonzero(which < len(nodes))
     apart[corner[(mesh.cells[cells[corner]] == nodes[which[corner], None]).any(axis=1)]] = False
     which, cells = which[apart], cells[apart]
-    size = 1.0 / inverse_sizes(mesh)
+    size = 1.0 / np.linalg.norm(maps[1], axis=(1, 2))
     least = CROSSING * np.minimum(size[cells], size[owners[which]]) / size[cells]
-    reference = _linearised(mesh, points[which], cells)
+    reference = _linearised(mesh, maps, points[which], cells)
     near = _depth(mesh.cell_type, reference) > (least if _affine(mesh) else -DISTORTION)
     which, cells, least, reference = which[near], cells[near], least[near], reference[near]
     if not _affine(mesh):
@@ -55,9 +55,9 @@ def _affine(mesh: Mesh) -> bool:
     return CELL_TYPES[mesh.cell_type].shape.simplex and CELL_TYPES[mesh.cell_type].degree == 1
 
 
-def _linearised(mesh: Mesh, points: Array, cells: Indices) -> Array:
+def _linearised(mesh: Mesh, maps: tuple[Array, Array], points: Array, cells: Indices) -> Array:
     """Reference coordinates of points in cells (n,), by the Jacobian in the middle of the cells."""
-    start, inverse = middle_maps(mesh)
+    start, inverse = maps
     middle = CELL_TYPES[mesh.cell_type].middle
     return middle + np.einsum("nij,nj->ni", inverse[cells], points - start[cells])
 

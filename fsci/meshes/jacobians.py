@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from solvers.cell_types import CELL_TYPES
 from solvers.locate import shape_functions
 from solvers.mesh import Mesh
+from solvers.mesh_topology import determinant
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -50,14 +51,6 @@ def inverted(mesh: Mesh) -> Indices:
     return np.concatenate([np.empty(0, dtype=np.int64), *found])
 
 
-def inverse_sizes(mesh: Mesh) -> Array:
-    """Frobenius norm of the inverse Jacobian in the middle of each cell [1/m], about 1 over its least extent (cells,).
-
-    Infinite where the determinant is zero.
-    """
-    return np.asarray(np.linalg.norm(middle_maps(mesh)[1], axis=(1, 2)))
-
-
 def middle_maps(mesh: Mesh) -> tuple[Array, Array]:
     """(middles of the cells [m] (cells, dim), inverse Jacobians there (cells, dim, dim)), infinite without volume."""
     x = mesh.points[mesh.cells]
@@ -68,10 +61,10 @@ def middle_maps(mesh: Mesh) -> tuple[Array, Array]:
 
 def inverses(jacobian: Array) -> Array:
     """Inverses of matrices (n, dim, dim), infinite where there are none."""
-    determinant = _determinant(jacobian)
+    size = determinant(jacobian)
     with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = _adjugate(jacobian) / determinant[:, None, None]
-    inverse[determinant == 0.0] = np.inf
+        inverse = _adjugate(jacobian) / size[:, None, None]
+    inverse[size == 0.0] = np.inf
     return np.asarray(inverse)
 
 
@@ -108,21 +101,23 @@ def _jacobians(x: Array, gradients: Array) -> Array:
 
 
 def _determinants(x: Array, gradients: Array) -> Array:
-    return _determinant(_jacobians(x, gradients))
-
-
-def _determinant(j: Array) -> Array:
-    if j.shape[-1] == 2:
-        return j[..., 0, 0] * j[..., 1, 1] - j[..., 0, 1] * j[..., 1, 0]
-    return np.einsum("...i,...i->...", j[..., 0, :], np.cross(j[..., 1, :], j[..., 2, :]))
+    return determinant(_jacobians(x, gradients))
 
 
 def _adjugate(j: Array) -> Array:
     """The inverse times the determinant."""
     if j.shape[-1] == 2:
         return np.stack([j[..., 1, 1], -j[..., 0, 1], -j[..., 1, 0], j[..., 0, 0]], axis=-1).reshape(j.shape)
-    rows = [np.cross(j[..., (i + 1) % 3, :], j[..., (i + 2) % 3, :]) for i in range(3)]
-    return np.stack(rows, axis=-1)
+    m, after = np.moveaxis(j, (-2, -1), (0, 1)), (1, 2, 0)
+    entries = [
+        [
+            m[after[k], after[i]] * m[after[after[k]], after[after[i]]]
+            - m[after[k], after[after[i]]] * m[after[after[k]], after[i]]
+            for k in range(3)
+        ]
+        for i in range(3)
+    ]
+    return np.moveaxis(np.array(entries), (0, 1), (-2, -1))
 
 
 @cache

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fsci.meshes.covering import covering
 from fsci.meshes.folds import folded
-from fsci.meshes.jacobians import EPS, inverse_sizes, inverted
+from fsci.meshes.jacobians import EPS, inverted, middle_maps
 from solvers.cell_types import CELL_TYPES
 from solvers.mesh import Mesh
 from solvers.mesh_topology import facet_ids
@@ -27,7 +27,8 @@ def require_valid(mesh: Mesh, *, parts_meet: bool = False) -> None:
     `parts_meet`: parts of the mesh may overlap at the start, which their contact resolves.
     """
     largest = float(np.abs(mesh.points).max())
-    flat = np.flatnonzero(~(EPS * largest * inverse_sizes(mesh) < STRAIN_OF_ROUNDING))
+    maps = middle_maps(mesh)
+    flat = np.flatnonzero(~(EPS * largest * np.linalg.norm(maps[1], axis=(1, 2)) < STRAIN_OF_ROUNDING))
     _refuse(mesh, flat, "flat: it is so thin that rounding of its nodes' positions strains it; merge its nodes")
     remedy = "move the node that lies across its neighbours, or make the mesh anew"
     if CELL_TYPES[mesh.cell_type].degree == 2:
@@ -36,7 +37,7 @@ def require_valid(mesh: Mesh, *, parts_meet: bool = False) -> None:
     ids = facet_ids(mesh)
     if len(pairs := folded(mesh, ids)):
         raise BadMesh(_covers(mesh, *pairs[0].tolist()))
-    if not parts_meet and (pair := covering(mesh, ids)) is not None:
+    if not parts_meet and (pair := covering(mesh, ids, maps)) is not None:
         raise BadMesh(_covers(mesh, *pair))
 
 
