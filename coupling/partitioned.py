@@ -90,7 +90,7 @@ class Partitioned:
                 return history, newton
             if not math.isfinite(residual) or len(history) == self.tolerance.max_iterations:
                 taken = counted(len(history), "iteration")
-                reason = f"the coupling iteration did not converge in {taken} (residual {residual:.3g} m)"
+                reason = f"the coupling iteration did not converge in {taken} (residual {residual:.3g})"
                 raise StepFailed("coupling", reason, iteration=len(history), history=tuple(history))
             before = np.concatenate([d.ravel(), levels])
             now = CouplingIterate(before, np.append(found, levels + squeezed), coupled.solid.touching())

@@ -12,7 +12,7 @@ Truth values are the numbers 1 and 0.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import reduce
@@ -86,17 +86,32 @@ class ExpressionError(ValueError):
 
 
 @dataclass(frozen=True)
+class Miss:
+    """A point and a time at which an expression has no finite value."""
+
+    value: float  #: infinite or not a number
+    t: float  #: [s]
+    x: tuple[float, ...]  #: [m]
+
+
+@dataclass(frozen=True)
 class Expression:
     """A formula of x, y, z and t that can be evaluated at many points at once."""
 
     text: str
     uses: frozenset[str]  #: the variables it contains
     _value: Node = field(repr=False, compare=False)
+    _missed: list[Miss] = field(default_factory=list, repr=False, compare=False)
 
     @staticmethod
     def parse(text: str | float, functions: Mapping[str, Callable[..., Any]] | None = None) -> Expression:
         """Read text (or a number) that may call `functions` of one argument too; raises ExpressionError."""
         return _Parser(str(text), functions or {}).expression()
+
+    @property
+    def missed(self) -> Miss | None:
+        """The latest call that gave no finite value, or None."""
+        return self._missed[0] if self._missed else None
 
     @property
     def constant(self) -> float | None:
@@ -108,12 +123,16 @@ class Expression:
         x = np.asarray(x, dtype=float)
         places = (*x, *[np.zeros(x.shape[1])] * (3 - len(x)))
         value = self._evaluate(dict(zip(VARIABLES, (*places, np.float64(t)), strict=True)))
-        return np.array(np.broadcast_to(value, x.shape[1:]), dtype=float)
+        result = np.array(np.broadcast_to(value, x.shape[1:]), dtype=float)
+        if not np.isfinite(result).all():
+            first = int(np.flatnonzero(~np.isfinite(result))[0])
+            self._missed[:] = [Miss(float(result[first]), float(t), tuple(x[:, first].tolist()))]
+        return result
 
-    def at_times(self, t: ArrayLike) -> Array:
-        """Values of a formula of t alone, of the shape of t."""
+    def at_times(self, t: ArrayLike, x: Sequence[float] = ()) -> Array:
+        """Values at a point x [m] and the times t, of the shape of t; without a point of a formula of t alone."""
         t = np.asarray(t, dtype=float)
-        return np.array(np.broadcast_to(self._evaluate({"t": t}), t.shape), dtype=float)
+        return np.array(np.broadcast_to(self._evaluate({"t": t, **dict(zip("xyz", x, strict=False))}), t.shape), float)
 
     def _evaluate(self, values: Values) -> Any:
         # The branch that `where` does not take may divide by zero.

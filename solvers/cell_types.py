@@ -57,6 +57,11 @@ class CellType:
         return np.array([corners[list(group)].mean(axis=0) for group in self.nodes])
 
     @cached_property
+    def middle(self) -> NDArray[np.float64]:
+        """The middle of the unit cell, shape (dim,)."""
+        return np.asarray(self.reference_nodes[: self.corners].mean(axis=0))
+
+    @cached_property
     def facets(self) -> tuple[Group, ...]:
         """Local nodes of every facet, outward oriented, in the order of the facet's type."""
         return tuple(self._nodes_of(CELL_TYPES[self.facet], facet) for facet in self.shape.facets)

@@ -44,7 +44,7 @@ def _pull_back(cell_type: str, nodes: Array) -> tuple[Array, Array]:
     """
     inside = _clip(cell_type, np.full((len(nodes), nodes.shape[2]), 1.0 / 3.0))
     for _ in range(NEWTON_STEPS):
-        values, gradients = _shape_functions(cell_type, inside)
+        values, gradients = shape_functions(cell_type, inside)
         x = np.einsum("ca,cai->ci", values, nodes)
         jacobian = np.einsum("caj,cai->cij", gradients, nodes)
         step = np.einsum("cij,cj->ci", np.linalg.pinv(jacobian), -x)
@@ -53,7 +53,7 @@ def _pull_back(cell_type: str, nodes: Array) -> tuple[Array, Array]:
         inside = new
         if done:
             break
-    values, _ = _shape_functions(cell_type, inside)
+    values, _ = shape_functions(cell_type, inside)
     return inside, np.linalg.norm(np.einsum("ca,cai->ci", values, nodes), axis=1)
 
 
@@ -73,8 +73,11 @@ def _exponents(cell_type: str) -> Array:
     return powers[powers.sum(axis=1) <= degree] if simplex else powers
 
 
-def _shape_functions(cell_type: str, reference: Array) -> tuple[Array, Array]:
-    """Lagrange functions (points, nodes) and their gradients (points, nodes, dim), nodes in the order of VTK."""
+def shape_functions(cell_type: str, reference: Array) -> tuple[Array, Array]:
+    """Lagrange functions (points, nodes) and their gradients (points, nodes, dim), nodes in the order of VTK.
+
+    reference: points in the unit cell, shape (points, dim).
+    """
     powers = _exponents(cell_type)
     inverse = np.linalg.inv(np.prod(reference_nodes(cell_type)[:, None, :] ** powers, axis=2))
     factors = reference[:, None, :] ** powers

@@ -27,4 +27,5 @@ class Mesh:
     )  #: in space: name -> nodes of lines, shape (lines, 2 or 3): both ends, then the middle
     nodes: dict[str, NDArray[np.int64]] = field(default_factory=dict)  #: name of points -> their nodes
     unmoved: NDArray[np.float64] | None = None  #: positions [m] before nodes of tied surfaces moved, (n, dim)
+    numbers: NDArray[np.int64] | None = None  #: of the cells in the file, from 1 on; None: they are all, in their order
     note: str = ""  #: note to the user on changes when the mesh was read

@@ -139,7 +139,7 @@ def converge(system: System, tolerance: Tolerance, unmoved: float = 0.0) -> Step
         elif iterate.settled and _accepted(iterate, max(unmoved, *history), system.round_off(), tolerance):
             return StepInfo(iterate.number, tuple(history))
         elif iterate.number == tolerance.max_iterations:
-            reason = f"Newton did not converge in {counted(iterate.number, 'iteration')} (residual {history[-1]:.3g} N)"
+            reason = f"Newton did not converge in {counted(iterate.number, 'iteration')} (residual {history[-1]:.3g})"
         else:
             continue
         raise StepFailed(system.name, reason, iteration=iterate.number, where=system.worst(), history=tuple(history))

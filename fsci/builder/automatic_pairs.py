@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from mpi4py import MPI
@@ -41,6 +42,10 @@ class Candidate:
     extent: float  #: of the body [m]
 
     @property
+    def name(self) -> str:
+        return next(iter(self.side.values()))
+
+    @property
     def rigid(self) -> bool:
         return "obstacle" in self.side
 
@@ -70,20 +75,28 @@ def find_pairs(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, PairSection]
     assert case.contact is not None
     found = dict(case.contact.pairs)
     named = [{_owner(side) for _, side in pair.sides} for pair in found.values()]
-    candidates = [_body(case, name, mesh) for name, mesh in meshes.items()]
-    candidates += [_obstacle(case, name) for name in case.contact.obstacles]
-    candidates += [_rigid_body(case, name) for name in ({} if case.fluid is None else case.fluid.bodies)]
-    for i, first in enumerate(candidates):
-        for second in candidates[i + 1 :]:
-            names = {*first.side.values(), *second.side.values()}
-            if first.rigid or not first.faces or not second.faces or names in named:
-                continue
-            reach = case.contact.reach
-            near = min(first.extent, second.extent) if reach is None else reach
-            for pair in meeting(first.faces, second.faces, near):
-                name, settings = _pair(case, (first, second), pair)
-                found[name] = settings
+    for first, second in combinations(candidates(case, meshes), 2):
+        if first.rigid or not first.faces or not second.faces or {first.name, second.name} in named:
+            continue
+        for pair in meeting(first.faces, second.faces, near(case, first, second)):
+            name, settings = _pair(case, (first, second), pair)
+            found[name] = settings
     return found
+
+
+def candidates(case: Case, meshes: Mapping[str, Mesh]) -> list[Candidate]:
+    """Bodies with these meshes, obstacles and rigid bodies, in this order."""
+    assert case.contact is not None
+    found = [_body(case, name, mesh) for name, mesh in meshes.items()]
+    found += [_obstacle(case, name) for name in case.contact.obstacles]
+    return found + [_rigid_body(case, name) for name in ({} if case.fluid is None else case.fluid.bodies)]
+
+
+def near(case: Case, first: Candidate, second: Candidate) -> float:
+    """Distance [m] up to which surfaces of two bodies are a pair."""
+    assert case.contact is not None
+    reach = case.contact.reach
+    return min(first.extent, second.extent) if reach is None else reach
 
 
 def _pair(case: Case, bodies: tuple[Candidate, Candidate], pair: tuple[Face, Face]) -> tuple[str, PairSection]:

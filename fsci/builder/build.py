@@ -45,6 +45,11 @@ def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         from fsci.builder.automatic_pairs import with_pairs
 
         case = with_pairs(case, comm)
+    if case.fluid is not None:
+        from fsci.builder.fluid import on_first
+        from fsci.meshes.enclosed import require_outlet
+
+        on_first(comm, partial(require_outlet, case))
     if case.coupling is not None:
         return _coupled_rigid(case, comm, timer) if case.rigid else _coupled(case, comm, timer)
     if case.fluid is not None:

@@ -16,7 +16,7 @@ from fsci.case import Case
 from fsci.case.contact import FilmSection
 from fsci.case.fluid import FluidSection
 from fsci.case.probes import Reference
-from fsci.case.rigid_motion import rigid_motion
+from fsci.case.rigid_motion import finite, rigid_motion
 from fsci.meshes.nested import following, read_grid
 from fsci.meshes.of_case import read_rigid_body, require_inside_period
 from solvers.fluid import probes
@@ -134,7 +134,7 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> ImmersedBody:
     if movement is None:
         require_inside_period(case, ("fluid", "bodies", name), points)
         return rigid_body(name, points, facets)
-    moved = rigid_motion(points, movement, case.time.start, case.time.step)
+    moved = finite(rigid_motion(points, movement, case.time.start, case.time.step), name)
     require_inside_period(case, ("fluid", "bodies", name), moved(case.time.start)[0])
     return rigid_body(name, points, facets, moved)
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, PrivateAttr, ValidationInfo, model_validator
 
+from fsci.case.errors import distinct
 from fsci.case.plain_file import Unreadable, read_file
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import EntryCount, Name, Number, Switch, Text
@@ -48,12 +49,14 @@ class Curve(Section):
         if self.csv is not None:
             self._points = _read_csv((info.context or {}).get("folder", Path()), self.csv)
             if (late := _not_later(self._points)) is not None:
-                raise fault(f": '{self.csv}' must have increasing times, not go from {late[0]:g} to {late[1]:g}", "csv")
+                before, after = distinct(*late)
+                raise fault(f": '{self.csv}' must have increasing times, not go from {before} to {after}", "csv")
             return self
         self._points = np.array(self.table)
         if (late := _not_later(self._points)) is not None:
             row = int(np.flatnonzero(np.diff(self._points[:, 0]) <= 0.0)[0]) + 1
-            raise fault(f"must be greater than {late[0]:g}, the one before, not {late[1]:g}", "table", row, 0)
+            words = "must be greater than {}, the one before, not {}".format(*distinct(*late))
+            raise fault(words, "table", row, 0)
         return self
 
     @property

@@ -61,6 +61,12 @@ def did_you_mean(word: str, options: Iterable[str]) -> str:
     return f" (available: {', '.join(names) or 'none'})"
 
 
+def distinct(a: float, b: float) -> tuple[str, str]:
+    """Two numbers in as few digits as tell them apart, six at least."""
+    pairs = ((f"{a:.{digits}g}", f"{b:.{digits}g}") for digits in range(6, 18))
+    return next((pair for pair in pairs if pair[0] != pair[1] or a == b), (repr(a), repr(b)))
+
+
 def listed(words: Sequence[str], last: str = "or") -> str:
     """'a', 'b' or 'c'."""
     quoted = [f"'{word}'" for word in words]

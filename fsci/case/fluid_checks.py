@@ -9,7 +9,7 @@ import numpy as np
 from fsci.case.case import Case
 from fsci.case.errors import did_you_mean, listed
 from fsci.case.fluid import FACES, FluidSection, RigidBodySection
-from fsci.case.free_body import PLANE, Free
+from fsci.case.free_body import HELD, PLANE, Free
 from fsci.case.mesh_checks import Mistake, axis_mistakes, length_mistakes, mesh_mistakes, surface_mistakes
 from fsci.case.yaml_text import Keys
 
@@ -115,6 +115,23 @@ def _free(case: Case, fluid: FluidSection, free: Free, keys: Keys) -> Iterator[M
         wanted = "1 entry" if spins == 1 else f"{spins} entries"
         given = len(free.initial_spin)
         yield (*keys, "initial_spin"), f"'initial_spin' must have {wanted} in {dimension}D, not {given}"
+    else:
+        yield from _held_but_moving(free, dimension, keys)
+
+
+def _held_but_moving(free: Free, dimension: int, keys: Keys) -> Iterator[Mistake]:
+    """A body does not begin to move in a way that is held."""
+    held = {way for word in free.held for way in HELD[word]}
+    turns = ("rotation_z",) if dimension == 2 else HELD["rotation"]
+    starts = (("initial_velocity", "xyz", free.initial_velocity), ("initial_spin", turns, free.initial_spin))
+    for setting, ways, values in starts:
+        for i, (way, value) in enumerate(zip(ways, values or (), strict=False)):
+            if way in held and value != 0.0:
+                word = next(word for word in free.held if way in HELD[word])
+                yield (
+                    (*keys, setting, i),
+                    f"the body begins to move in a way that is held: remove '{word}' from 'held', or give 0 here",
+                )
 
 
 def _motion(fluid: FluidSection, body: RigidBodySection, keys: Keys) -> Iterator[Mistake]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
+from fsci.case.errors import distinct
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import Count, EntryCount, Name, Number, NumberVector, Positive
 
@@ -54,7 +55,10 @@ class Refinement(Section):
             for axis, (low, high) in enumerate(zip(*self.box, strict=False)):
                 if low >= high:
                     raise fault(
-                        f"must be greater than that of the lowest corner, {low:g}, not {high:g}", "box", 1, axis
+                        "must be greater than that of the lowest corner, {}, not {}".format(*distinct(low, high)),
+                        "box",
+                        1,
+                        axis,
                     )
         return self
 
@@ -127,7 +131,8 @@ class GridSection(Section):
             raise fault("'from' has 2 entries: a grid in 2D has no 'z'", "z")
         for axis, (low, high) in enumerate(zip(self.start, self.to, strict=True)):
             if low >= high:
-                raise fault(f"must be greater than that of 'from', {low:g}, not {high:g}", "to", axis)
+                words = "must be greater than that of 'from', {}, not {}".format(*distinct(low, high))
+                raise fault(words, "to", axis)
             self._check_direction(axis)
         for axis, (count, name) in enumerate(zip(self.shape, "xyz", strict=False)):
             if count > MOST_CELLS:
@@ -149,11 +154,13 @@ class GridSection(Section):
         before = self.start[axis]
         for number, stretch in enumerate(stretches):
             if stretch.to <= before:
-                end = f"must be greater than {before:g}, where this stretch begins, not {stretch.to:g}"
+                words = "must be greater than {}, where this stretch begins, not {}"
+                end = words.format(*distinct(before, stretch.to))
                 raise fault(end, name, number, "to")
             before = stretch.to
         if before != self.to[axis]:
-            end = f"must be {self.to[axis]:g} like entry {axis + 1} of the grid's 'to', not {before:g}"
+            to, ends = distinct(self.to[axis], before)
+            end = f"must be {to} like entry {axis + 1} of the grid's 'to', not {ends}"
             raise fault(end, name, len(stretches) - 1, "to")
 
     @property

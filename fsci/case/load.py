@@ -12,6 +12,7 @@ from fsci.case.checks import mistakes
 from fsci.case.curve import functions
 from fsci.case.document import override, read_document
 from fsci.case.errors import CaseError
+from fsci.case.expressions import value_mistakes
 from fsci.case.messages import problems
 from fsci.case.plausible import warnings
 from fsci.case.probe_checks import field_of
@@ -33,7 +34,8 @@ def load_case(path: str | Path, overrides: Iterable[tuple[str, str]] = ()) -> Ca
     except ValidationError as error:
         raise CaseError(problems(error, document)) from None
     case._document = document
-    found = [document.problem(document.place(keys), message) for keys, message in mistakes(case)]
+    wrong = list(mistakes(case)) or value_mistakes(case)
+    found = [document.problem(document.place(keys), message) for keys, message in wrong]
     if found:
         raise CaseError(found)
     case._warnings = tuple(f"{document.place(keys)}: {message}" for keys, message in warnings(case))

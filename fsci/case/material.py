@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from fsci.case.errors import distinct
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import NotNegativeFormula, PoissonFormula, PositiveFormula, SpaceFormula, chosen, value_of
 from fsci.expression import Expression
@@ -48,7 +49,8 @@ class ElasticSection(Section):
         if self.lmbda is not None and self.mu is not None:
             lmbda, mu = self.lmbda.constant, self.mu.constant
             if lmbda is not None and mu is not None and lmbda <= -2 * mu / 3:
-                raise fault(f"must be greater than -2/3 mu, {-2 * mu / 3:g}, not {lmbda:g}", "lambda")
+                words = "must be greater than -2/3 mu, {}, not {}".format(*distinct(-2 * mu / 3, lmbda))
+                raise fault(words, "lambda")
         for name in ("nu", "lambda"):
             value = settings[name]
             if self.law == "coup_neo_hooke" and value and value.constant is not None and value.constant < 0:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fsci.case.case import Case
+from fsci.case.errors import distinct
+from fsci.case.jumps import jump_warnings
 from fsci.case.material import Material
 from fsci.case.mesh import FileMesh
-from fsci.case.plausible_flow import flow_warnings
+from fsci.case.plausible_flow import flow_warnings, in_si
 from fsci.case.shapes import Shape
 from fsci.case.structure import BodySection
 from fsci.case.yaml_text import Keys
@@ -24,13 +26,15 @@ def warnings(case: Case) -> Iterator[tuple[Keys, str]]:
     """Paths of settings with a warning about each."""
     span = case.time.end - case.time.start
     if case.time.step > span * (1 + 1e-12):
-        yield ("time", "step"), f"the step {case.time.step:g} is longer than the run, {span:g}"
+        step, whole = distinct(case.time.step, span)
+        yield ("time", "step"), f"the step {step} is longer than the run, {whole}"
     for name, body in case.elastic_bodies.items():
         keys: Keys = ("structure", "bodies", name)
         yield from _material(case, body.material, (*keys, "material"))
         yield from _locking(body, (*keys, "mesh"))
         if isinstance(body.mesh, Shape) and (ratio := body.mesh.aspect) > 50:
             yield (*keys, "mesh", "cells"), f"the cells are {ratio:.0f} times longer than wide"
+    yield from jump_warnings(case)
     if case.fluid is not None:
         yield from flow_warnings(case, case.fluid)
 
@@ -55,17 +59,17 @@ def _material(case: Case, material: Material, keys: Keys) -> Iterator[tuple[Keys
     units = case.units
     density = None if material.density is None else material.density.constant
     if density and not DENSITIES[0] <= density * units.density <= DENSITIES[1]:
-        unit = f"{units.mass}/{units.length}^3"
-        value = f"{density:g} {unit} is {density * units.density:.3g} kg/m^3"
+        value = in_si(density, units.density, f"{units.mass}/{units.length}^3", "kg/m^3")
         yield (*keys, "density"), f"implausible density: {value}; check 'units'"
     constants = _constants(material)
     if constants is None:
         return
     # Rounded as it is printed: the conversion through Lame's constants has rounding errors.
-    E = float(f"{young(*constants) * units.stress:.3g}")
-    if not STIFFNESSES[0] <= E <= STIFFNESSES[1]:
+    E = float(f"{young(*constants):.3g}")
+    if not STIFFNESSES[0] <= float(f"{E * units.stress:.3g}") <= STIFFNESSES[1]:
         key = "E" if getattr(material, "E", None) is not None else "law"
-        yield (*keys, key), f"implausible stiffness: Young's modulus is {E:.3g} Pa; check 'units'"
+        value = in_si(E, units.stress, f"{units.mass}/({units.length} {units.time}^2)", "Pa")
+        yield (*keys, key), f"implausible stiffness: Young's modulus {value}; check 'units'"
 
 
 def _constants(material: Material) -> tuple[float, float] | None:

@@ -26,6 +26,8 @@ NO_SLIP_IN_THE_LAYER = (
     "the shear of a film that closes jumps to zero without slip, and Newton's method may fail in contact; "
     "give the bodies a 'slip_length' as large as the roughness"
 )
+#: Thicknesses of a boundary layer, L / sqrt(Re), in the smallest cell above which `check` warns.
+MOST_LAYERS_PER_CELL = 10.0
 DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
 
 
@@ -33,9 +35,10 @@ def flow_warnings(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]
     """Paths of settings with a warning about each."""
     density = fluid.density * case.units.density
     if not DENSITIES[0] <= density <= DENSITIES[1]:
-        unit = f"{case.units.mass}/{case.units.length}^3"
-        value = f"{fluid.density:g} {unit} is {density:.3g} kg/m^3"
+        value = in_si(fluid.density, case.units.density, f"{case.units.mass}/{case.units.length}^3", "kg/m^3")
         yield ("fluid", "density"), f"implausible density: {value}; check 'units'"
+    else:
+        yield from _reynolds(case, fluid)
     if case.coupling is None and not _driven(fluid):
         yield ("fluid", "patches"), "nothing drives the flow: no velocity, traction, pressure, force or moving body"
     yield from _thin_bodies(case, fluid)
@@ -49,6 +52,11 @@ def flow_warnings(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]
         if crossed > MOST_CELLS_PER_STEP:
             message = f"the flow crosses {crossed:.0f} cells in a time step here; take a smaller 'step'"
             yield ("fluid", "patches", name), message
+
+
+def in_si(value: float, factor: float, unit: str, si: str) -> str:
+    """A value in the units of the case, and in SI where these are others."""
+    return f"{value:g} {si}" if factor == 1.0 else f"{value:g} {unit}, which is {value * factor:.3g} {si}"
 
 
 def _slips(case: Case, fluid: FluidSection) -> bool:
@@ -129,11 +137,35 @@ def _driven(fluid: FluidSection) -> bool:
     return any(loads) or moved or any(p.velocity or p.traction or p.pressure for p in fluid.patches.values())
 
 
+def _reynolds(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
+    """Cells much larger than boundary layers, by the velocities prescribed on patches."""
+    if fluid.flow == "stokes":
+        return
+    speed = max((_largest(case, fluid, patch)[0] for patch in fluid.patches.values()), default=0.0)
+    width = float((np.array(fluid.grid.to) - np.array(fluid.grid.start)).min())
+    reynolds = fluid.density * speed * width / fluid.viscosity
+    layer = width / np.sqrt(max(reynolds, 1.0))
+    cell = float(fluid.grid.smallest.min())
+    if cell > MOST_LAYERS_PER_CELL * layer:
+        length = case.units.length
+        yield (
+            ("fluid", "grid"),
+            f"the Reynolds number is {reynolds:.2g} (velocity {speed:.3g}, width of the box {width:.3g} {length}): "
+            f"boundary layers are about {layer:.2g} {length} thick, the smallest cells {cell:.2g} {length}: forces and "
+            "separation are those of the grid, and there is no model of turbulence; refine the grid, or check 'units'",
+        )
+
+
 def _cells_per_step(case: Case, fluid: FluidSection, patch: PatchSection) -> float:
-    """Largest |u_i| dt / h_i of the velocity prescribed on a patch, over its nodes and some times of the run."""
+    """Largest |u_i| dt / h_i of the velocity prescribed on a patch."""
+    return _largest(case, fluid, patch)[1] * case.time.step
+
+
+def _largest(case: Case, fluid: FluidSection, patch: PatchSection) -> tuple[float, float]:
+    """Largest |u_i| and |u_i| / h_i prescribed on a patch, over its nodes and some times of the run."""
     if patch.velocity is None:
-        return 0.0
-    edges, largest = fluid.grid.planes, 0.0
+        return 0.0, 0.0
+    edges, fastest, largest = fluid.grid.planes, 0.0, 0.0
     cells = [np.pad(np.diff(edge), 1, mode="edge") for edge in edges]
     sizes = [np.minimum(h[1:], h[:-1]) for h in cells]
     times = np.linspace(case.time.start, case.time.end, 5)
@@ -146,5 +178,6 @@ def _cells_per_step(case: Case, fluid: FluidSection, patch: PatchSection) -> flo
         for t in times:
             speed = np.abs([component(x, t) for component in patch.velocity])[:, inside]
             with np.errstate(over="ignore"):
-                largest = max(largest, float(np.nanmax(speed / h[:, inside], initial=0.0)) * case.time.step)
-    return largest
+                largest = max(largest, float(np.nanmax(speed / h[:, inside], initial=0.0)))
+            fastest = max(fastest, float(np.nanmax(speed, initial=0.0)))
+    return fastest, largest

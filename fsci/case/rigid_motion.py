@@ -10,9 +10,13 @@ from numpy.typing import NDArray
 from fsci.case.fluid import Movement, Turn
 from fsci.expression import Expression
 from fsci.rotation import rotation_matrix
+from solvers.api import StepFailed
 
 Array = NDArray[np.float64]
 ValueAndRate = Callable[[float], tuple[float, float]]  #: t -> (value, its rate)
+
+#: The difference of fourth order from here to four points after.
+FORWARD = np.array([-25.0, 48.0, -36.0, 16.0, -3.0]) / 12.0
 
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
@@ -42,6 +46,18 @@ def rigid_motion(points: Array, movement: Movement, start: float, dt: float) -> 
     return motion
 
 
+def finite(motion: Callable[[float], tuple[Array, Array]], name: str) -> Callable[[float], tuple[Array, Array]]:
+    """The motion of a body; a call raises StepFailed, on all processes alike, where it is not finite."""
+
+    def moved(t: float) -> tuple[Array, Array]:
+        x, v = motion(t)
+        if not (np.isfinite(x).all() and np.isfinite(v).all()):
+            raise StepFailed("fluid", f"the motion of body '{name}' is not a number at t = {t:.6g}")
+        return x, v
+
+    return moved
+
+
 def _angle(turn: Turn, start: float, dt: float) -> ValueAndRate:
     if turn.angular_velocity is not None:
         return integrated(turn.angular_velocity, start, dt)
@@ -59,8 +75,17 @@ def differentiated(formula: Expression, dt: float) -> ValueAndRate:
     def value_and_rate(t: float) -> tuple[float, float]:
         if formula.constant is not None:
             return float(formula.constant), 0.0
-        back2, back, here, on, on2 = formula.at_times(t + h * np.arange(-2, 3))
+        values = formula.at_times(t + h * np.arange(-2, 3))
+        if not np.isfinite(values).all():
+            return one_sided(t)
+        back2, back, here, on, on2 = values
         return float(here), float((8.0 * (on - back) - (on2 - back2)) / (12.0 * h))
+
+    def one_sided(t: float) -> tuple[float, float]:
+        """Of a formula that begins or ends here, as t**1.5 at 0."""
+        after, before = formula.at_times(t + h * np.arange(5)), formula.at_times(t - h * np.arange(5))
+        rate = FORWARD @ after if np.isfinite(after).all() else -(FORWARD @ before)
+        return float(after[0]), float(rate / h)
 
     return value_and_rate
 

@@ -7,6 +7,7 @@ from math import floor
 
 from pydantic import model_validator
 
+from fsci.case.errors import distinct
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import Count, CountOrZero, Number, Positive
 
@@ -43,7 +44,8 @@ class Time(Section):
     @model_validator(mode="after")
     def _ordered(self) -> Time:
         if self.end <= self.start:
-            raise fault(f"must be later than 'start', {self.start:g}, not {self.end:g}", "end")
+            start, end = distinct(self.start, self.end)
+            raise fault(f"must be later than 'start', {start}, not {end}", "end")
         if self.step < 1e3 * sys.float_info.epsilon * max(abs(self.start), abs(self.end)):
             raise fault(f"must be larger: at {self.end:g} a step of {self.step:g} is lost in rounding", "step")
         return self

@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import model_validator
 
+from fsci.case.errors import distinct
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import NotNegative, Number, Switch, Text
 
@@ -59,7 +60,8 @@ class Check(Section):
         if self.relative is not None and self.absolute is not None:
             raise fault("give either 'relative' or 'absolute', not both", "absolute")
         if self.start is not None and self.end is not None and self.end < self.start:
-            raise fault(f"must not be before 'from', {self.start:g}, not {self.end:g}", "to")
+            start, end = distinct(self.start, self.end)
+            raise fault(f"must not be before 'from', {start}, not {end}", "to")
         if self.relative is None and self.absolute is None:
             raise fault("a check needs a tolerance: 'relative' or 'absolute'")
         if self.relative is not None and self.reference == 0:

@@ -50,7 +50,9 @@ def _structure(case: Case, structure: StructureSection, meshes: Mapping[str, Bod
     if structure.dynamics is not None:
         rho_inf = structure.dynamics.rho_inf
         motion = "generalised-alpha" + ("" if rho_inf is None else f", rho_inf {rho_inf:g}")
-    yield "structure", motion + (f", plane {structure.plane}" if case.dimension != 3 else "")
+    # a mesh file in space is known only by its mesh
+    dimension = next((mesh.points.shape[1] for mesh in meshes.values()), case.dimension)
+    yield "structure", motion + (f", plane {structure.plane}" if dimension == 2 else "")
     for name, body in structure.bodies.items():
         text = f"{_name(body.mesh)}, {body.material.law}"
         if isinstance(body.mesh, Shape):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,18 @@ from fsci.case.errors import Problem
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import fast_body, thin_body
 from fsci.case.rigid_motion import rigid_motion
+from fsci.check.held import free_motions
+from fsci.check.scene import Placed, around_box, overlaps, pair_sizes
+from fsci.meshes.enclosed import require_outlet
 from fsci.meshes.nested import read_grid
-from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body, require_inside_period, slave_surfaces
+from fsci.meshes.of_case import (
+    read_body,
+    read_obstacle,
+    read_rigid_body,
+    reading_once,
+    require_inside_period,
+    slave_surfaces,
+)
 from solvers.fluid.bodies.inside import PointInBody, require_outside
 from solvers.fluid.bodies.surface import ImmersedSurface, Motion
 from solvers.locate import locate
@@ -63,7 +73,13 @@ class Findings:
 
 def check_meshes(case: Case) -> Findings:
     """All of it."""
+    with reading_once():
+        return _check(case)
+
+
+def _check(case: Case) -> Findings:
     found = Findings()
+    chosen = None if case.contact is None else case.contact.bodies
     if case.contact is not None:
         from fsci.builder.automatic_pairs import with_pairs
 
@@ -81,7 +97,41 @@ def check_meshes(case: Case) -> Findings:
         _rigid(case, found)
         if case.fluid.grid.refine and not found.problems:
             found.attempt(partial(read_grid, case))
+        if not found.problems:
+            found.attempt(partial(require_outlet, case))
+    if not found.problems:
+        _scene(case, found, chosen)
     return found
+
+
+def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...] | None) -> None:
+    """Bodies in the wrong place, or that nothing holds; chosen: bodies whose pairs the program finds."""
+    rigid = {} if case.fluid is None else case.fluid.bodies
+    for name in case.elastic_bodies:
+        if name not in found.meshes and (mesh := found.attempt(partial(read_body, case, name))) is not None:
+            found.meshes[name] = mesh
+    read = {name: found.attempt(partial(read_rigid_body, case, name)) for name in rigid}
+    if found.problems:
+        return
+    bodies = []
+    for name in case.elastic_bodies:
+        keys: Keys = ("structure", "bodies", name)
+        bodies.append(Placed(name, keys, True, True, found.meshes[name]))
+        if (warning := free_motions(case, name, found.meshes[name])) is not None:
+            found.warnings.append(f"{case.place(*keys)}: {warning}")
+    for name, body in rigid.items():
+        mesh = read[name][0]  # type: ignore[index]
+        bodies.append(Placed(name, ("fluid", "bodies", name), body.free is not None, False, mesh))
+    said = [*pair_sizes(bodies, found.pairs), *around_box(case, bodies)]
+    found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in said]
+    for only_note, keys, text in overlaps(case, bodies, found.pairs):
+        (found.notes if only_note else found.warnings).append(f"{case.place(*keys)}: {text}")
+    if chosen is not None:
+        from fsci.check.far_pairs import far_pairs
+
+        names = case.elastic_bodies if chosen == "all" else chosen
+        meshes = {name: found.meshes[name] for name in names}
+        found.notes += [f"{case.place('contact')}: {text}" for text in far_pairs(case, meshes, found.pairs)]
 
 
 def _elastic(case: Case, found: Findings) -> None:

@@ -89,12 +89,12 @@ def read_mesh(path: Path, order: int | None = None, parameters: Mapping[str, flo
     else:
         content = _read_meshio(path)
     try:
-        return _mesh(content)
+        return _mesh(content, scripted=path.suffix in SCRIPTS)
     except MeshError as error:
         raise MeshError(f"{path.name}: {error}") from None
 
 
-def _mesh(content: Content) -> Mesh:
+def _mesh(content: Content, *, scripted: bool) -> Mesh:
     content, note = _completed(content)
     dim = max((block.dim for block in content.blocks), default=0)
     if dim < 2:
@@ -106,10 +106,13 @@ def _mesh(content: Content) -> Mesh:
     cell_type = types[0]
 
     cells = np.concatenate([block.nodes for block in content.blocks if block.dim == dim])
-    cells, place = _once(cells)
-    used, numbers = np.unique(cells, return_inverse=True)
-    mesh = Mesh(_positions(content.points[used], dim), numbers.reshape(cells.shape), cell_type)
-    mesh = replace(mesh, cells=_positive(mesh))
+    given = len(cells)
+    cells, place, kept = _once(cells)
+    used, nodes = np.unique(cells, return_inverse=True)
+    _require_positions(content.points, used)
+    mesh = Mesh(_positions(content.points[used], dim), nodes.reshape(cells.shape), cell_type)
+    cells, turned = _positive(mesh)
+    mesh = replace(mesh, cells=cells, numbers=kept + 1 if len(kept) < given else None)
 
     index = np.full(len(content.points), -1)
     index[used] = np.arange(len(used))
@@ -119,7 +122,7 @@ def _mesh(content: Content) -> Mesh:
         surfaces=_surfaces(content, mesh, index),
         lines=_lines(content, index) if dim == 3 else {},
         nodes=_nodes(content, index),
-        note=note,
+        note="; ".join(filter(None, (note, "" if scripted else turned))),
     )
 
 
@@ -134,11 +137,23 @@ def _completed(content: Content) -> tuple[Content, str]:
     return replace(content, points=points, blocks=blocks), note
 
 
-def _once(cells: Indices) -> tuple[Indices, Indices]:
-    """(distinct cells, index of each given cell among them): some formats repeat a cell for each of its groups."""
+def _once(cells: Indices) -> tuple[Indices, Indices, Indices]:
+    """(distinct cells, index of each given cell among them, the given ones that are kept).
+
+    Some formats repeat a cell for each of its groups.
+    """
     _, first, same = np.unique(np.sort(cells, axis=1), axis=0, return_index=True, return_inverse=True)
     kept = np.sort(first)
-    return cells[kept], np.searchsorted(kept, first[same])
+    return cells[kept], np.searchsorted(kept, first[same]), kept
+
+
+def _require_positions(points: NDArray[np.float64], used: Indices) -> None:
+    """Nodes of cells are somewhere."""
+    wrong = used[~np.isfinite(points[used]).all(axis=1)]
+    if len(wrong):
+        others = f" (and of {len(wrong) - 1:,} more)" if len(wrong) > 1 else ""
+        place = ", ".join(f"{x:g}" for x in points[wrong[0]])
+        raise MeshError(f"the position of node {wrong[0] + 1}{others} is not finite: ({place}); correct the file")
 
 
 def _positions(points: NDArray[np.float64], dim: int) -> NDArray[np.float64]:
@@ -149,12 +164,18 @@ def _positions(points: NDArray[np.float64], dim: int) -> NDArray[np.float64]:
     return np.ascontiguousarray(points[:, :dim], dtype=float)
 
 
-def _positive(mesh: Mesh) -> Indices:
-    """The cells, those of negative volume turned inside out: files number them either way."""
+def _positive(mesh: Mesh) -> tuple[Indices, str]:
+    """The cells, those of negative volume turned inside out, with a note to the user: files number them either way."""
     volumes = signed_volumes(mesh)
     if (volumes == 0).any():
         raise MeshError(f"cells without volume: {np.count_nonzero(volumes == 0)}")
-    return np.where(volumes[:, None] > 0, mesh.cells, mesh.cells[:, CELL_TYPES[mesh.cell_type].mirror])
+    inside_out = volumes < 0.0
+    if not inside_out.any():
+        return mesh.cells, ""
+    count = "its cells" if inside_out.all() else f"{np.count_nonzero(inside_out):,} of its {len(inside_out):,} cells"
+    order = "clockwise" if mesh.points.shape[1] == 2 else "inside out"
+    cells = np.where(inside_out[:, None], mesh.cells[:, CELL_TYPES[mesh.cell_type].mirror], mesh.cells)
+    return cells, f"{count} are numbered {order}: they were turned round"
 
 
 def _regions(content: Content, dim: int, place: Indices) -> dict[str, Indices]:

@@ -75,7 +75,8 @@ def extract_region(mesh: Mesh, name: str) -> Mesh:
     """The cells of a region as a mesh of its own, with its share of the surfaces and of other regions."""
     chosen = require_region(mesh, name)
     used, cells = np.unique(mesh.cells[chosen], return_inverse=True)
-    part = Mesh(mesh.points[used], cells.reshape(len(chosen), -1), mesh.cell_type, note=mesh.note)
+    numbers = chosen + 1 if mesh.numbers is None else mesh.numbers[chosen]
+    part = Mesh(mesh.points[used], cells.reshape(len(chosen), -1), mesh.cell_type, numbers=numbers, note=mesh.note)
 
     index = np.full(len(mesh.points), -1)
     index[used] = np.arange(len(used))

@@ -41,7 +41,7 @@ def following(case: Case) -> Following | None:
     ]
     if not bodies or case.fluid.scheme == "steady":
         return None
-    surfaces = {name: _surface(case, name) for name in resting}
+    surfaces = {name: body_surface(case, name) for name in resting}
     regions = [_region(part, surfaces) for part in section.refine if part.around is None or part.around in resting]
     return Following(Grid(section.planes), regions, bodies)
 
@@ -69,7 +69,7 @@ def _refined(case: Case, grid: Grid) -> Nested:
 
     assert case.fluid is not None
     section = case.fluid.grid
-    surfaces = {name: _surface(case, name) for name in [*case.fluid.bodies, *case.elastic_bodies]}
+    surfaces = {name: body_surface(case, name) for name in [*case.fluid.bodies, *case.elastic_bodies]}
     nested = refined(grid, [_region(refinement, surfaces) for refinement in section.refine])
     assert isinstance(nested, Nested)
     for name, (points, facets) in surfaces.items():
@@ -93,7 +93,7 @@ def _region(refinement: Refinement, surfaces: dict[str, Surface]) -> RefinedRegi
     return RefinedSurface(*surfaces[refinement.around], refinement.layers, refinement.level)
 
 
-def _surface(case: Case, name: str) -> Surface:
+def body_surface(case: Case, name: str) -> Surface:
     """Points [m] and facets of a body at its start."""
     if name in case.elastic_bodies:
         mesh = read_body(case, name)

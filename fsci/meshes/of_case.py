@@ -5,28 +5,67 @@ Nothing here needs a finite element.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import wraps
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fsci.case import Case
 from fsci.case.checks import load_vectors
+from fsci.case.mesh import FileMesh
+from fsci.case.mesh import Mesh as MeshSection
 from fsci.case.structure import NO_MIXED_SIMPLICES
 from fsci.meshes.checksum import mesh_checksum
+from fsci.meshes.finite_values import require_finite
 from fsci.meshes.locations import find_locations
 from fsci.meshes.mesh import MeshError, build_mesh, extract_region, require_surface
+from fsci.meshes.valid import BadMesh, require_positive, require_valid
 from solvers.mesh import Mesh
 from solvers.mesh_topology import surface_facets
 from solvers.tessellation import is_closed, tessellate
 
 Array = NDArray[np.float64]
 Keys = tuple[str | int, ...]
+T = TypeVar("T")
 
 VECTORS = ("gravity", "body_force", "initial_displacement", "initial_velocity")
 
 
+_READ: ContextVar[dict[Any, Any] | None] = ContextVar("meshes that are read once", default=None)
+
+
+@contextmanager
+def reading_once() -> Iterator[None]:
+    """Within it, each mesh of a case is read and checked once."""
+    token = _READ.set({})
+    try:
+        yield
+    finally:
+        _READ.reset(token)
+
+
+def _once(read: Callable[[Case, str], T]) -> Callable[[Case, str], T]:
+    """A function whose results are kept within `reading_once`: of a mesh that it raises nothing for."""
+
+    @wraps(read)
+    def reading(case: Case, name: str) -> T:
+        kept = _READ.get()
+        if kept is None:
+            return read(case, name)
+        # pairs that are found later name surfaces that have to be there
+        key = (read.__name__, name, None if case.contact is None else id(case.contact))
+        if key not in kept:
+            kept[key] = read(case, name), case.contact
+        return kept[key][0]  # type: ignore[no-any-return]
+
+    return reading
+
+
+@_once
 def read_body(case: Case, name: str) -> Mesh:
     """The mesh of an elastic body, or its region, with everything in it that the case names. Raises CaseError."""
     settings = case.elastic_bodies[name]
@@ -36,6 +75,7 @@ def read_body(case: Case, name: str) -> Mesh:
         if settings.region is not None:
             keys = ("structure", "bodies", name, "region")
             mesh = extract_region(mesh, settings.region)
+        _require_valid(settings.mesh, mesh, parts_meet=_meets_itself(case, name))
         _require_dimension(case, name, mesh)
         if settings.element == "mixed" and mesh.cell_type[:4] in ("tria", "tetr"):
             keys = ("structure", "bodies", name, "element")
@@ -49,8 +89,26 @@ def read_body(case: Case, name: str) -> Mesh:
     case.meshes[f"structure.bodies.{name}"] = mesh_checksum(mesh)
     _check_lengths(case, name, mesh.points.shape[1])
     _require_mass(case, name, mesh)
-    find_locations(case, name, mesh)
+    require_finite(case, name, mesh, find_locations(case, name, mesh))
     return mesh
+
+
+def _require_valid(settings: MeshSection, mesh: Mesh, *, parts_meet: bool = False) -> None:
+    """Raises MeshError for a mesh with wrong cells. Those of built-in shapes may be too coarse for their curvature."""
+    try:
+        if isinstance(settings, FileMesh):
+            require_valid(mesh, parts_meet=parts_meet)
+        else:
+            require_positive(mesh, "take more cells, or other ones: 'order: 1', or no simplices")
+    except BadMesh as error:
+        source = settings.file if isinstance(settings, FileMesh) else settings.shape
+        raise MeshError(f"{source}: {error}") from None
+
+
+def _meets_itself(case: Case, name: str) -> bool:
+    """Whether surfaces of a body are in contact with each other."""
+    pairs = () if case.contact is None else case.contact.pairs.values()
+    return any({side.body for _, side in pair.sides} == {name} for pair in pairs)
 
 
 def _require_dimension(case: Case, name: str, mesh: Mesh) -> None:
@@ -108,6 +166,7 @@ def _check_lengths(case: Case, name: str, dim: int) -> None:
             raise case.error(keys, f"'{keys[-1]}' has {len(vector)} entries, but the mesh is of {dim} dimensions")
 
 
+@_once
 def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int64]]:
     """(mesh, points [m], segments or triangles) of a rigid body's closed surface. Raises CaseError."""
     assert case.fluid is not None
@@ -118,6 +177,7 @@ def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int6
         mesh = build_mesh(settings.mesh, case.folder)
         if mesh.points.shape[1] != dim:
             raise MeshError(f"the mesh is {mesh.points.shape[1]}D, but the grid is {dim}D")
+        _require_valid(settings.mesh, mesh)
         keys = (*base, "on")
         for surface in settings.on or ():
             require_surface(mesh, surface)
@@ -130,17 +190,19 @@ def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int6
     return mesh, mesh.points[nodes], facets
 
 
+@_once
 def read_obstacle(case: Case, name: str) -> Mesh:
     """The mesh of an obstacle, with the surface that the case names. Raises CaseError."""
     assert case.contact is not None
-    settings = case.contact.obstacles[name]
+    obstacle = case.contact.obstacles[name]
     keys: Keys = ("contact", "obstacles", name, "mesh")
     try:
-        mesh = build_mesh(settings.mesh, case.folder)
+        mesh = build_mesh(obstacle.mesh, case.folder)
         if case.dimension not in (None, mesh.points.shape[1]):
             raise MeshError(f"the mesh is {mesh.points.shape[1]}D, but the bodies are {case.dimension}D")
+        _require_valid(obstacle.mesh, mesh, parts_meet=True)
         keys = ("contact", "obstacles", name, "on")
-        for surface in settings.on:
+        for surface in obstacle.on:
             require_surface(mesh, surface)
             surface_facets(mesh, surface)
     except (MeshError, ValueError) as error:

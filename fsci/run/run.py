@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from fsci.case import Case, CaseError, load_case
 from fsci.case.resume import changed, end_error, meshes_changed
 from fsci.case.settings import settings_of
+from fsci.run.cause import with_cause
 from fsci.run.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from fsci.run.clock import Clock
 from fsci.run.files import LOCK, make_folder, require_own, write_text
@@ -249,11 +250,12 @@ class Run:
                 dt = clock.dt
                 info = self.scheme.step(clock.time, dt)
                 break
-            except StepFailed as failure:
+            except StepFailed as failed:
+                failure = with_cause(failed, self.case, clock.time, self.comm)
                 if failure.hopeless or not clock.halve():
                     self._keep_failure(failure)
                     self.scheme.restore(self.state)
-                    raise
+                    raise failure from None
                 self.scheme.restore(self.state)
                 self.state = self.scheme.save()
                 self.record.retry()

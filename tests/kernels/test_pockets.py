@@ -41,8 +41,10 @@ def check(comm):
     for shape, periodic in SHAPES:
         grid = DistributedGrid(comm, uniform([0.0] * len(shape), [1.0] * len(shape), shape))
         index = np.stack(np.unravel_index(grid.numbers, shape, order="F"), axis=1)
-        for share in (0.15, 0.3, 0.45):
+        for share in (0.0, 0.15, 0.3, 0.45):
             active, is_open = (rng.random(shape) < chance for chance in (share, 0.04))
+            if share == 0.3:  # bodies cover the cells of some processes
+                active[: shape[0] // 2] = False
             is_open &= active
             here = active[tuple(index.T)]
             cut = SimpleNamespace(
@@ -66,8 +68,9 @@ def test_pockets_are_the_closed_parts():
     check(MPI.COMM_SELF)
 
 
-def test_pockets_on_three_processes():
-    on_processes(3, __file__)
+@pytest.mark.parametrize("processes", [2, 3, 4])
+def test_pockets_on_several_processes(processes):
+    on_processes(processes, __file__)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -180,12 +180,12 @@ TRIANGLES = (
         (
             "units={length: mm, mass: t}",
             "{path}:7:37",
-            "implausible stiffness: Young's modulus is 2.1e+17 Pa; check 'units'",
+            "implausible stiffness: Young's modulus 2.1e+11 t/(mm s^2), which is 2.1e+17 Pa; check 'units'",
         ),
         (
             "structure.bodies.block.material.density=7.85e-9",
             "--set structure.bodies.block.material.density=7.85e-9",
-            "implausible density: 7.85e-09 kg/m^3 is 7.85e-09 kg/m^3; check 'units'",
+            "implausible density: 7.85e-09 kg/m^3; check 'units'",
         ),
         (
             "structure.bodies.block.mesh.cells=[1, 1, 100]",

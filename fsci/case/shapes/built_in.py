@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import prod
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
+from fsci.case.errors import distinct
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import Count, EntryCount, Number, NumberVector, OneOrMany, Order
 
@@ -128,4 +129,5 @@ def require_part(angle: float, cells: tuple[int, ...]) -> None:
 
 def require_wall(inner_radius: float, outer_radius: float) -> None:
     if outer_radius <= inner_radius:
-        raise fault(f"must be greater than 'inner_radius', {inner_radius:g}, not {outer_radius:g}", "outer_radius")
+        inner, outer = distinct(inner_radius, outer_radius)
+        raise fault(f"must be greater than 'inner_radius', {inner}, not {outer}", "outer_radius")

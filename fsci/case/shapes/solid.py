@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import model_validator
 
+from fsci.case.errors import distinct
 from fsci.case.section import fault, setting
 from fsci.case.shapes.built_in import (
     Cells2,
@@ -161,10 +162,7 @@ class SolidTorus(SolidBuiltIn):
     @model_validator(mode="after")
     def _possible(self) -> SolidTorus:
         if self.minor_radius >= self.major_radius:
-            raise fault(
-                f"must be less than 'major_radius', {self.major_radius:g}, not {self.minor_radius:g}",
-                "minor_radius",
-            )
+            raise fault(_less_than_major(self.major_radius, self.minor_radius), "minor_radius")
         require_part(self.angle, self.cells)
         require_around(self.cells, 1, disc=True)
         return self
@@ -198,10 +196,7 @@ class HollowTorus(SolidBuiltIn):
     def _possible(self) -> HollowTorus:
         require_wall(self.inner_radius, self.outer_radius)
         if self.outer_radius >= self.major_radius:
-            raise fault(
-                f"must be less than 'major_radius', {self.major_radius:g}, not {self.outer_radius:g}",
-                "outer_radius",
-            )
+            raise fault(_less_than_major(self.major_radius, self.outer_radius), "outer_radius")
         require_around(self.cells, 0)
         require_around(self.cells, 1)
         return self
@@ -331,3 +326,7 @@ class Leaflet(SolidBuiltIn):
 
 
 SolidShape = Box | Beam | Cylinder | Tube | SolidTorus | HollowTorus | HollowSphere | Sphere | Leaflet
+
+
+def _less_than_major(major: float, other: float) -> str:
+    return "must be less than 'major_radius', {}, not {}".format(*distinct(major, other))

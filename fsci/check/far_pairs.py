@@ -1,0 +1,80 @@
+"""Bodies that move towards each other but are no pair, because they are farther apart than `reach`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsci.builder.automatic_pairs import Candidate, candidates, near
+from fsci.builder.facing import meeting
+from fsci.case import Case
+from fsci.case.contact import PairSection
+from fsci.expression import Expression
+from solvers.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+
+def far_pairs(case: Case, meshes: Mapping[str, Mesh], pairs: Mapping[str, PairSection]) -> Iterator[str]:
+    """Notes on bodies, with obstacles and rigid bodies, among those whose pairs the program finds."""
+    known = [{side.body or side.obstacle for _, side in pair.sides} for pair in pairs.values()]
+    for first, second in combinations(candidates(case, meshes), 2):
+        if first.rigid or not first.faces or not second.faces or {first.name, second.name} in known:
+            continue
+        if not meeting(first.faces, second.faces, np.inf) or not _approach(case, first, second):
+            continue
+        reach = near(case, first, second)
+        apart = f"{_distance(first, second):.3g} {case.units.length}"
+        yield (
+            f"'{first.name}' and '{second.name}' move towards each other, but are farther apart ({apart}) than 'reach' "
+            f"({reach:.3g} {case.units.length}): they are no pair of contact"
+        )
+
+
+def _approach(case: Case, first: Candidate, second: Candidate) -> bool:
+    """Whether a motion of one of them leads to the other."""
+    away = _middle(second) - _middle(first)
+    own, other = _motions(case, first.name, len(away)), _motions(case, second.name, len(away))
+    return any(v @ away > 0.0 for v in own) or any(v @ away < 0.0 for v in other)
+
+
+def _middle(candidate: Candidate) -> Array:
+    return np.asarray(np.concatenate([face.middles for face in candidate.faces]).mean(axis=0))
+
+
+def _distance(first: Candidate, second: Candidate) -> float:
+    """Between the middles of the nearest facets."""
+    a, b = (np.concatenate([face.middles for face in side.faces]) for side in (first, second))
+    a, b = a[:: max(len(a) // 1000, 1)], b[:: max(len(b) // 1000, 1)]
+    return float(np.linalg.norm(a[:, None] - b[None], axis=2).min())
+
+
+def _motions(case: Case, name: str, dim: int) -> list[Array]:
+    """Directions into which a body is driven: initial velocity, gravity, and the way of supports or of the obstacle."""
+    begin, end = case.time.start, case.time.end
+    if name in case.elastic_bodies:
+        body = case.elastic_bodies[name]
+        vectors: list[Sequence[Any] | None] = [body.initial_velocity, body.gravity]
+        found = [_values(vector, end, dim) for vector in vectors if vector is not None]
+        for support in body.supports:
+            if isinstance(support.displacement, tuple):
+                found.append(_values(support.displacement, end, dim) - _values(support.displacement, begin, dim))
+        return found
+    motion = None
+    if case.contact is not None and name in case.contact.obstacles:
+        motion = case.contact.obstacles[name].motion
+    elif case.fluid is not None and (moved := case.fluid.bodies[name].motion) is not None:
+        if moved.velocity is not None:
+            return [_values(moved.velocity, end, dim)]
+        motion = moved.displacement
+    return [] if motion is None else [_values(motion, end, dim) - _values(motion, begin, dim)]
+
+
+def _values(vector: Sequence[Expression | None], t: float, dim: int) -> Array:
+    """A vector at the origin; free components are zero."""
+    at = np.zeros((dim, 1))
+    return np.array([0.0 if component is None else float(component(at, t)[0]) for component in vector])

@@ -1,0 +1,103 @@
+"""Rigid motions of bodies that nothing holds: static equilibrium does not determine them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsci.case import Case
+from fsci.meshes.locations import find_locations
+from solvers.cell_types import CELL_TYPES
+from solvers.mesh import Mesh
+from solvers.mesh_topology import surface_facets
+from solvers.tessellation import area_vectors, tessellate
+
+Array = NDArray[np.float64]
+
+#: Size of a motion at the supports, relative to that of the body, below which they do not hold it.
+FREE = 1e-6
+
+
+def free_motions(case: Case, name: str, mesh: Mesh) -> str | None:
+    """The warning about a static body whose supports and springs leave a rigid motion free; None if they leave none.
+
+    A pair of contact may hold a body; which motions depends on the solution.
+    """
+    assert case.structure is not None
+    pairs = {} if case.contact is None else case.contact.pairs
+    if case.structure.dynamics is not None or case.coupling is not None:
+        return None
+    if any(name == side.body for pair in pairs.values() for _, side in pair.sides):
+        return None
+    dim = mesh.points.shape[1]
+    centre = mesh.points.mean(axis=0)
+    extent = float(np.ptp(mesh.points, axis=0).max())
+    conditions = [row for rows in _conditions(case, name, mesh, centre, extent) for row in rows]
+    modes = dim + (1 if dim == 2 else 3)
+    matrix = np.array(conditions).reshape(-1, modes)
+    names = [*(f"translation along {axis}" for axis in "xyz"[:dim]), *_rotations(dim)]
+    free = modes - int(np.linalg.matrix_rank(matrix, tol=FREE * max(len(matrix), 1) ** 0.5)) if len(matrix) else modes
+    if not free:
+        return None
+    alone = [word for word, column in zip(names, matrix.T, strict=True) if np.abs(column).max(initial=0.0) < FREE]
+    # a rotation about another point than the centre, or a translation along no axis
+    words = [*alone, *(["a combination of translation and rotation"] if free > len(alone) else [])]
+    return f"no support, spring or pair holds {_listed(words)} of the body, which static equilibrium does not determine"
+
+
+def _rotations(dim: int) -> list[str]:
+    return ["rotation"] if dim == 2 else [f"rotation about {axis}" for axis in "xyz"]
+
+
+def _listed(words: list[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _conditions(case: Case, name: str, mesh: Mesh, centre: Array, extent: float) -> list[Array]:
+    """Work of unit forces along the held directions in the rigid motions, (conditions, motions) of each support."""
+    body, dim = case.elastic_bodies[name], mesh.points.shape[1]
+    locations = find_locations(case, name, mesh)
+    found = []
+    for kind in ("supports", "springs"):
+        for index, entry in enumerate(getattr(body, kind)):
+            for place in locations[kind, index]:
+                points, normals = _points(mesh, place)
+                for directions in _directions(entry, points, normals, dim):
+                    arms = (points - centre) / extent
+                    if dim == 2:
+                        turns = (arms[:, 0] * directions[:, 1] - arms[:, 1] * directions[:, 0])[:, None]
+                    else:
+                        turns = np.cross(arms, directions)
+                    found.append(np.concatenate([directions, turns], axis=1))
+    return found
+
+
+def _points(mesh: Mesh, place: Any) -> tuple[Array, Array | None]:
+    """(points, their normals) of a surface, by its facets, or of nodes."""
+    if not isinstance(place, str):
+        return mesh.points[np.unique(place)], None
+    simplices, nodes = tessellate(mesh, [place])
+    x = mesh.points[nodes][simplices]
+    along = area_vectors(x)
+    size = np.linalg.norm(along, axis=1, keepdims=True)
+    normals = np.divide(along, size, out=np.zeros_like(along), where=size > 0.0)
+    corners = CELL_TYPES[CELL_TYPES[mesh.cell_type].facet].corners
+    ends = mesh.points[np.unique(surface_facets(mesh, place)[:, :corners])]
+    # the nodes of a plane surface, whose normal is that of its facets; of a curved one the middles of its facets
+    if np.abs(normals - normals[0]).max() < FREE:
+        return ends, np.broadcast_to(normals[0], ends.shape)
+    return x.mean(axis=1), normals
+
+
+def _directions(entry: Any, points: Array, normals: Array | None, dim: int) -> list[Array]:
+    """Directions in which an entry holds its points, each (n, dim)."""
+    displacement = getattr(entry, "displacement", None)
+    if getattr(entry, "symmetry", False) or getattr(entry, "normal", False):
+        return [] if normals is None else [normals]
+    if entry.direction is not None:
+        direction = np.array(entry.direction, dtype=float)
+        return [np.broadcast_to(direction / np.linalg.norm(direction), points.shape)]
+    held = [i for i in range(dim) if not isinstance(displacement, tuple) or displacement[i] is not None]
+    return [np.broadcast_to(np.eye(dim)[i], points.shape) for i in held]

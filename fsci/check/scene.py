@@ -1,0 +1,135 @@
+"""Warnings about bodies in the wrong place or of the wrong size, by their meshes.
+
+Fixed and driven rigid bodies may overlap anything and reach beyond the box: the fluid is outside of their union.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fsci.case import Case
+from fsci.case.contact import PairSection
+from fsci.check.penetration import deepest
+from solvers.mesh import Mesh
+from solvers.tessellation import tessellate
+
+Array = NDArray[np.float64]
+Keys = tuple[str | int, ...]
+Said = tuple[Keys, str]
+
+#: Overlap of surfaces, in their smaller facets, that is none: facets of touching curved surfaces cross by this much.
+CROSSING = 0.1
+
+#: Ratio of sizes from which on a mesh is probably in another unit, of which 1000 is the most frequent.
+OTHER_UNIT = 300.0
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A body at the start."""
+
+    name: str
+    keys: Keys
+    moves: bool  #: freely: it is elastic, or a free rigid body
+    elastic: bool
+    mesh: Mesh
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        return self.mesh.points.min(axis=0), self.mesh.points.max(axis=0)
+
+    @property
+    def extent(self) -> float:
+        return float(np.ptp(self.mesh.points, axis=0).max())
+
+
+def overlaps(case: Case, bodies: list[Placed], pairs: dict[str, PairSection]) -> Iterator[tuple[bool, Keys, str]]:
+    """(only a note, path, text) of bodies that overlap at the start."""
+    for first, second in combinations(bodies, 2):
+        if not (first.moves and second.moves):
+            continue
+        depth = _depth(first, second)
+        if depth == 0.0:
+            continue
+        pair = _pair(pairs, first.name, second.name)
+        how = f"{depth:.3g} {case.units.length} deep"
+        if pair is not None:
+            names = f"bodies '{first.name}' and '{second.name}' of pair '{pair}'"
+            yield True, second.keys, f"{names} overlap, {how}, which contact has to push apart at once"
+        else:
+            remedy = "move one of them, or make their surfaces a pair of contact"
+            yield False, second.keys, f"bodies '{first.name}' and '{second.name}' overlap, {how}: {remedy}"
+
+
+def _depth(first: Placed, second: Placed) -> float:
+    """How deep the nodes of one surface lie in the other body [m]; 0 if facets that touch may cross as much."""
+    (low, high), (other_low, other_high) = first.box, second.box
+    if (low >= other_high).any() or (other_low >= high).any():
+        return 0.0
+    surfaces = [
+        (body.mesh.points[nodes], facets) for body in (first, second) for facets, nodes in [tessellate(body.mesh)]
+    ]
+    (x, facets), (y, others) = surfaces
+    depth = max(deepest(x, y, others), deepest(y, x, facets))
+    size = min(float(np.linalg.norm(p[f][:, 1] - p[f][:, 0], axis=1).mean()) for p, f in surfaces)
+    return depth if depth > CROSSING * size else 0.0
+
+
+def _pair(pairs: dict[str, PairSection], first: str, second: str) -> str | None:
+    for name, pair in pairs.items():
+        if {first, second} == {side.body or side.obstacle for _, side in pair.sides}:
+            return name
+    return None
+
+
+def around_box(case: Case, bodies: list[Placed]) -> Iterator[Said]:
+    """Bodies that move freely beyond the box or a plane of symmetry, and bodies of another unit than the box."""
+    if case.fluid is None:
+        return
+    low, high = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
+    symmetric = [face for patch in case.fluid.patches.values() if patch.symmetry for face in patch.on]
+    dry = () if case.coupling is None else case.coupling.dry_side
+    for body in bodies:
+        ratio = body.extent / float((high - low).max())
+        if ratio >= OTHER_UNIT or 1.0 / ratio >= OTHER_UNIT:
+            yield body.keys, _sizes("the body is", ratio, "the box")
+            continue
+        x_low, x_high = body.box
+        if not body.moves or (x_high <= low).any() or (x_low >= high).any() or body.name in dry:
+            continue
+        for face in symmetric:
+            axis = "xyz".index(face[0])
+            beyond = low[axis] - x_low[axis] if face[1] == "-" else x_high[axis] - high[axis]
+            if beyond <= 1e-6 * body.extent:
+                continue
+            counts = "it counts with all of its mass, but only with the part of the fluid's force inside of the box"
+            remedy = "cut the mesh there" if not body.elastic else "cut the mesh there and give it 'symmetry: true'"
+            length = f"{beyond:.3g} {case.units.length}"
+            yield body.keys, f"the body reaches {length} beyond the plane of symmetry '{face}': {counts}; {remedy}"
+
+
+def pair_sizes(bodies: list[Placed], pairs: dict[str, PairSection]) -> Iterator[Said]:
+    """Elastic bodies of a pair with sizes that differ as units do."""
+    by_name = {body.name: body for body in bodies if body.elastic}
+    done: set[frozenset[str]] = set()
+    for pair in pairs.values():
+        names = [side.body for _, side in pair.sides]
+        if None in names or len(set(names)) < 2 or frozenset(map(str, names)) in done:
+            continue
+        done.add(frozenset(map(str, names)))
+        if not all(name in by_name for name in names):
+            continue
+        first, second = (by_name[str(name)] for name in names)
+        ratio = first.extent / second.extent
+        if ratio >= OTHER_UNIT or 1.0 / ratio >= OTHER_UNIT:
+            yield first.keys, _sizes("the body is", ratio, f"body '{second.name}', which it may touch")
+
+
+def _sizes(subject: str, ratio: float, other: str) -> str:
+    factor, word = (ratio, "larger") if ratio > 1.0 else (1.0 / ratio, "smaller")
+    return f"{subject} {factor:,.4g} times {word} than {other}: is its mesh in another unit, such as mm instead of m?"

@@ -1,0 +1,296 @@
+"""What `fsci check` says of bodies in the wrong place, of the wrong size, or that nothing holds."""
+
+from pathlib import Path
+
+import meshio  # noqa: TID253
+import numpy as np
+import pytest
+from case_mistakes import load
+from case_text import without
+
+from fsci import shapes
+from fsci.case import load_case
+from fsci.case.errors import distinct
+from fsci.check.check import summary
+from fsci.check.meshes import check_meshes
+from fsci.check.penetration import deepest
+from solvers.tessellation import tessellate
+
+CASES = Path(__file__).parents[2] / "cases"
+
+
+def warnings(text):
+    """Warnings and notes, without the path of the case."""
+    case = load(text)
+    found = check_meshes(case)
+    assert found.problems == []
+    return [*case.warnings, *found.warnings], found.notes
+
+
+# --- overlaps
+
+TWO = """\
+time: {step: 1, end: 1}
+structure:
+  bodies:
+    lower:
+      mesh: {shape: rectangle, size: [1, 1], cells: [4, 4]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3}
+      supports: [{on: bottom, displacement: [0, 0]}]
+    upper:
+      mesh: {shape: rectangle, size: [1, 1], cells: [4, 4], origin: [0, 0.7]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3}
+      supports: [{on: top, displacement: [0, 0]}]
+"""
+PAIR = "contact: {pairs: {p: {slave: {body: upper, on: bottom}, master: {body: lower, on: top}}}}\n"
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_bodies_that_overlap():
+    words = "move one of them, or make their surfaces a pair of contact"
+    assert warnings(TWO) == ([f"case.yaml:8:5: bodies 'lower' and 'upper' overlap, 0.3 m deep: {words}"], [])
+    words = "bodies 'lower' and 'upper' of pair 'p' overlap, 0.3 m deep, which contact has to push apart at once"
+    assert warnings(TWO + PAIR) == ([], [f"case.yaml:8:5: {words}"])
+
+
+@pytest.mark.usefixtures("in_new_folder")
+@pytest.mark.parametrize("origin", ["1", "1.2", "1 - 1e-12"])
+def test_bodies_side_by_side(origin):
+    assert warnings(TWO.replace("0.7", origin)) == ([], [])
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_curved_surfaces_that_touch():
+    """Facets that do not match cross each other by a part of their length."""
+    disc = TWO.replace("rectangle, size: [1, 1], cells: [4, 4]}", "disc, radius: 1, cells: [24, 3]}").replace(
+        "bottom", "outer"
+    )
+    ring = "ring, inner_radius: 1, outer_radius: 1.2, cells: [36, 1]}"
+    text = disc.replace("rectangle, size: [1, 1], cells: [4, 4], origin: [0, 0.7]}", ring).replace(
+        "on: top", "on: outer"
+    )
+    assert warnings(text) == ([], [])
+    assert "overlap, 0.05" in str(
+        warnings(text.replace("inner_radius: 1,", "inner_radius: 0.95,").replace("[36, 1]", "[96, 4]"))[0]
+    )
+
+
+def test_depth():
+    """Of points in discs, balls, boxes and rings, against formulas."""
+    bodies = [
+        (shapes.disc(1, (96, 4)), lambda p: 1 - np.linalg.norm(p, axis=1)),
+        (shapes.sphere(1, (12, 2)), lambda p: 1 - np.linalg.norm(p, axis=1)),
+        (
+            shapes.ring(0.5, 1, (96, 4)),
+            lambda p: np.minimum(1 - np.linalg.norm(p, axis=1), np.linalg.norm(p, axis=1) - 0.5),
+        ),
+        (shapes.box((1, 1, 1), (3, 3, 3)), lambda p: np.minimum(p, 1 - p).min(axis=1)),
+        (shapes.rectangle((1, 1), (3, 3)), lambda p: np.minimum(p, 1 - p).min(axis=1)),
+    ]
+    rng = np.random.default_rng(3)
+    for mesh, depth in bodies:
+        facets, nodes = tessellate(mesh)
+        x = mesh.points[nodes]
+        for _ in range(20):
+            points = rng.uniform(-1.1, 1.1, (5, x.shape[1]))
+            exact = max(depth(points).max(), 0.0)
+            assert deepest(points, x, facets) == pytest.approx(exact, abs=0.01)
+        assert deepest(x, x, facets) < 1e-9  # on the surface
+        assert deepest(x, x + 2.0, facets) == 0.0
+
+
+# --- bodies that nothing holds
+
+LOOSE = """\
+time: {step: 1, end: 1}
+structure:
+  bodies:
+    a:
+      mesh: {shape: rectangle, size: [2, 1], cells: [4, 2]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3}
+      supports: []
+"""
+SOLID = LOOSE.replace("rectangle, size: [2, 1], cells: [4, 2]", "box, size: [2, 1, 1], cells: [4, 2, 2]")
+
+HELD = [
+    (LOOSE, "[]", "translation along x, translation along y and rotation"),
+    (LOOSE, "[{on: left, displacement: [0, null]}]", "translation along y"),
+    (LOOSE, "[{on: bottom, symmetry: true}]", "translation along x"),
+    (LOOSE, "[{at: [0, 0], displacement: [0, 0]}]", "a combination of translation and rotation"),
+    (LOOSE, "[{on: left, direction: [1, 0]}, {on: bottom, normal: true}]", None),
+    (LOOSE, "[{on: left, displacement: [0, 0]}]", None),
+    (LOOSE, "[{at: [0, 0], displacement: [0, 0]}, {at: [2, 0], displacement: [null, 0]}]", None),
+    (SOLID, "[{on: left, symmetry: true}, {on: bottom, symmetry: true}]", "translation along {}"),
+    (SOLID, "[{on: left, symmetry: true}, {on: bottom, symmetry: true}, {on: front, symmetry: true}]", None),
+    (SOLID, "[{on: left, displacement: [0, 0, 0]}]", None),
+]
+
+
+@pytest.mark.usefixtures("in_new_folder")
+@pytest.mark.parametrize(("text", "supports", "motions"), HELD, ids=[f"{m[1]} {m[2]}" for m in HELD])
+def test_static_bodies(text, supports, motions):
+    said, _ = warnings(text.replace("supports: []", f"supports: {supports}"))
+    if motions is None:
+        assert said == []
+    else:
+        start, _, _ = motions.partition("{}")
+        assert len(said) == 1
+        assert said[0].startswith(f"case.yaml:4:5: no support, spring or pair holds {start}")
+        assert said[0].endswith("of the body, which static equilibrium does not determine")
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_what_holds_besides_supports():
+    assert warnings(LOOSE.replace("supports: []", "springs: [{on: left, stiffness: 5}]")) == ([], [])
+    assert warnings(
+        LOOSE.replace("nu: 0.3}", "nu: 0.3, density: 1}").replace("  bodies", "  dynamics: {}\n  bodies")
+    ) == ([], [])
+    contact = (
+        "contact: {obstacles: {o: {mesh: {shape: rectangle, size: [4, 1], cells: [1, 1], origin: [-1, -1]}, on: top}}, "
+    )
+    assert warnings(LOOSE + contact + "pairs: {p: {slave: {body: a, on: bottom}, master: {obstacle: o}}}}\n") == (
+        [],
+        [],
+    )
+
+
+# --- the box, planes of symmetry, units
+
+FREE = """\
+time: {step: 0.1, end: 0.2}
+fluid:
+  density: 1
+  viscosity: 0.1
+  grid: {from: [0, 0], to: [1, 1], cells: [16, 16]}
+  patches: {plane: {on: x-, symmetry: true}, walls: {on: [x+, y-], no_slip: true}, top: {on: y+, outflow: true}}
+  bodies:
+    a:
+      mesh: {shape: disc, radius: 0.3, cells: [24, 1], translate: [0.1, 0.5]}
+      free: {density: 2}
+coupling: {}
+"""
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_bodies_beyond_a_plane_of_symmetry():
+    [said], _ = warnings(FREE)
+    assert said.startswith(
+        "case.yaml:8:5: the body reaches 0.2 m beyond the plane of symmetry 'x-': it counts with all of its"
+    )
+    driven = without(FREE, "coupling").replace("free: {density: 2}", "motion: {displacement: [0, 0.1*t]}")
+    for text in (FREE.replace("0.1, 0.5]", "0.4, 0.5]"), FREE.replace("symmetry: true", "slip: true"), driven):
+        assert warnings(text) == ([], [])
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_meshes_in_other_units():
+    [said] = [
+        line
+        for line in warnings(FREE.replace("radius: 0.3", "radius: 300").replace("[0.1, 0.5]", "[-299.9, 0.5]"))[0]
+        if "unit" in line
+    ]
+    words = "the body is 600 times larger than the box: is its mesh in another unit, such as mm instead of m?"
+    assert said == f"case.yaml:8:5: {words}"
+    assert "times smaller than the box" in str(
+        warnings(FREE.replace("radius: 0.3", "radius: 3e-4").replace("0.1, 0", "0.5, 0"))[0]
+    )
+    upper = TWO.replace(
+        "size: [1, 1], cells: [4, 4], origin: [0, 0.7]", "size: [1000, 1000], cells: [4, 4], origin: [0, 1]"
+    )
+    assert "the body is 1,000 times larger than body 'lower'" in str(warnings(upper + PAIR)[0])
+
+
+# --- pairs that are not made
+
+FLYING = """\
+time: {step: 0.02, end: 2}
+structure:
+  dynamics: {}
+  bodies:
+    a: &a
+      mesh: {shape: disc, radius: 0.5, cells: [24, 2]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3, density: 1}
+      initial_velocity: [1, 0]
+    b: {<<: *a, mesh: {shape: disc, radius: 0.5, cells: [24, 2], translate: [2.6, 0]}, initial_velocity: [-1, 0]}
+contact:
+  bodies: all
+  obstacles:
+    bottom: {on: top, mesh: {shape: rectangle, size: [6, 0.1], cells: [1, 1], origin: [-2, -0.61]}}
+"""
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_bodies_out_of_reach():
+    said, notes = warnings(FLYING)
+    assert said == []
+    words = "'a' and 'b' move towards each other, but are farther apart (1.62 m) than 'reach' (1.41 m)"
+    assert notes == [f"case.yaml:10:1: {words}: they are no pair of contact"]
+    for text in (
+        FLYING.replace("bodies: all", "bodies: all\n  reach: 2"),
+        FLYING.replace("[1, 0]", "[-1, 0]").replace(
+            "initial_velocity: [-1, 0]}\ncontact", "initial_velocity: [1, 0]}\ncontact"
+        ),
+    ):
+        assert warnings(text)[1] == []
+    falling = FLYING.replace("initial_velocity: [1, 0]", "gravity: [0, -1]").replace(
+        "initial_velocity: [-1, 0]", "gravity: [0, -1]"
+    )
+    assert warnings(falling)[1] == []  # towards the obstacle, which is a pair
+    high = falling.replace("-0.61]", "-9]")
+    with_pair = high.replace("cells: [24, 2]}\n", "cells: [24, 2], translate: [1.2, 0]}\n")
+    assert "'a' and 'bottom' move towards each other" in str(warnings(with_pair)[1])
+
+
+# --- the flow
+
+CHANNEL = """\
+time: {step: 0.001, end: 0.01}
+fluid:
+  density: 1
+  viscosity: 1e-6
+  grid: {from: [0, 0], to: [2, 1], cells: [16, 8]}
+  patches: {in: {on: x-, velocity: [1, 0]}, out: {on: x+, outflow: true}, walls: {on: [y-, y+], no_slip: true}}
+"""
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_cells_against_the_reynolds_number():
+    [said], _ = warnings(CHANNEL)
+    words = "the Reynolds number is 1e+06 (velocity 1, width of the box 1 m): boundary layers are about 0.001 m thick"
+    assert said.startswith(f"case.yaml:5:9: {words}, the smallest cells 0.12 m: forces")
+    for text in (CHANNEL.replace("1e-6", "1e-3"), CHANNEL.replace("viscosity", "flow: stokes\n  viscosity")):
+        assert warnings(text) == ([], [])
+
+
+# --- messages
+
+
+def test_numbers_that_are_compared_differ():
+    assert distinct(1.0, 2.0) == ("1", "2")
+    assert distinct(7.8e-6, 7.8e-6 * (1 + 1e-9)) == ("7.8e-06", "7.80000001e-06")
+    assert distinct(0.3, 0.1 + 0.2) == ("0.29999999999999999", "0.30000000000000004")
+    assert distinct(0.5, 0.5) == ("0.5", "0.5")
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_solids_in_space_are_not_plane():
+    box = shapes.box((1, 1, 1), (2, 2, 2))
+    meshio.Mesh(box.points, [("hexahedron", box.cells)]).write("m.vtu")
+    case = load(LOOSE.replace("{shape: rectangle, size: [2, 1], cells: [4, 2]}", "{file: m.vtu}"))
+    assert "plane" not in summary(case, check_meshes(case).meshes)
+    case = load(LOOSE)
+    assert "static, plane strain" in summary(case, check_meshes(case).meshes)
+
+
+#: Warnings of the project's cases, by the ends of their texts: thin bodies.
+THIN = {"hydrostatic_contact": 1, "piston_impact": 1, "torus_wall": 1, "valve": 2, "valve_3d": 3, "valve_thin": 2}
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in CASES.iterdir() if (path / "case.yaml").exists()))
+def test_cases_that_are_right(name):
+    case = load_case(CASES / name)
+    found = check_meshes(case)
+    assert (found.problems, found.notes) == ([], [])
+    said = [*case.warnings, *found.warnings]
+    assert all("thick" in line for line in said), said
+    assert len(said) == THIN.get(name, 0)
