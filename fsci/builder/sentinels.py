@@ -19,7 +19,7 @@ from solvers.api import Sentinel
 from solvers.fluid.bodies.immersed import ImmersedBody
 from solvers.sentinels.bodies import MovingBody
 from solvers.sentinels.overlaps import Meeting, Overlaps
-from solvers.sentinels.walls import Wall, Walls
+from solvers.sentinels.walls import BoxWalls, Wall
 from solvers.tessellation import tessellate
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def build_sentinels(
         found["overlaps"] = Overlaps([*bodies, *rest], meetings, tied)
     if case.fluid is not None and bodies:
         box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
-        found["walls"] = Walls(bodies, walls, box)
+        found["walls"] = BoxWalls(bodies, walls, box)
     if structure is not None and contact is not None:
         from solvers.structure.leaps import Leaps
 

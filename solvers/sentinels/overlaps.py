@@ -76,6 +76,10 @@ class Overlaps:
             if (bodies[i].free or bodies[j].free) and frozenset((bodies[i].name, bodies[j].name)) not in tied
         ]
         self._samples: dict[tuple[int, int], Samples] = {}
+        self._start: list[Array] = []  # positions [m] at the start
+        self._before: list[Array] = []  # positions [m] at the end of the last step
+        self._time = 0.0  # of these [s]
+        self._measures: list[Measures] = []
         self._searches = {(i, j): Search(bodies[i].facets, bodies[j].facets) for i, j in self._pairs}
 
     def start(self, t: float) -> None:

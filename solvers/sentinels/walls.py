@@ -33,7 +33,7 @@ class Wall:
         return np.maximum(behind, 0.0)
 
 
-class Walls:
+class BoxWalls:
     """Looks for vertices of elastic and free bodies behind faces that hold the fluid.
 
     A body that reaches through a face at the start may do so all the time. Contact with an obstacle at the wall lets
@@ -43,10 +43,15 @@ class Walls:
     def __init__(self, bodies: Sequence[MovingBody], walls: Sequence[Wall], box: tuple[Array, Array]):
         """box: lowest and highest corner [m]."""
         self._bodies, self._walls, self._box = [body for body in bodies if body.free], list(walls), box
+        self._allowed: list[list[bool]] = []  # by body and wall
+        self._tolerance: list[Array] = []  # at the vertices of each body [m]
+        self._edge: list[Array] = []  # longest edge at them [m]
+        self._within: list[bool] = []  # bodies that are in the box at the start
 
     def start(self, t: float) -> None:
         """Keep what is on and behind the faces at the time t [s]."""
-        self._allowed, self._tolerance, self._edge, self._within = [], [], [], []
+        for kept in (self._allowed, self._tolerance, self._edge, self._within):
+            kept.clear()
         for body in self._bodies:
             x = body.positions(t)
             measures = Measures(body.facets, x[body.facets])

@@ -24,6 +24,8 @@ class Leaps:
     def __init__(self, structure: Structure, driven: Callable[[], float]):
         """driven: the largest way of an obstacle in the step [m]."""
         self._structure, self._driven = structure, driven
+        self._sizes = self._counts = np.zeros(0)  # largest extent [m] and number of nodes, by body
+        self._masses: Array | None = None  # [kg], in dynamics
 
     def start(self, t: float) -> None:
         """Sizes [m], numbers of nodes and masses [kg] of the bodies."""
@@ -34,7 +36,6 @@ class Leaps:
         self._sizes = (high - low).max(axis=1)
         ones = np.ones(structure.layout.size)
         self._counts = self._sums(ones)[:, 0]
-        self._masses: Array | None = None
         if not isinstance(structure.time, Statics):
             self._masses = self._sums(times(structure.mass, ones))[:, 0]
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from test_sentinel_overlaps import block, circle, moving, ring_facets
 
-from solvers.sentinels.walls import Wall, Walls
+from solvers.sentinels.walls import BoxWalls, Wall
 
 BOX = np.array([-2.0, 0.0]), np.array([2.0, 4.0])
 FLOOR = Wall("w", "y-", 0.0)
 
 
 def watch(bodies, walls=(FLOOR,), box=BOX):
-    sentinel = Walls(bodies, walls, box)
+    sentinel = BoxWalls(bodies, walls, box)
     sentinel.start(0.0)
     return sentinel
 
