@@ -7,23 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fsci.case import Case
 from fsci.case.contact import PairSection
-from fsci.check.penetration import deepest
 from solvers.mesh import Mesh
+from solvers.sentinels.bodies import MovingBody
+from solvers.sentinels.overlaps import Overlaps
 from solvers.tessellation import tessellate
 
 Array = NDArray[np.float64]
 Keys = tuple[str | int, ...]
 Said = tuple[Keys, str]
-
-#: Overlap of surfaces, in their smaller facets, that is none: facets of touching curved surfaces cross by this much.
-CROSSING = 0.1
 
 #: Ratio of sizes from which on a mesh is probably in another unit, of which 1000 is the most frequent.
 OTHER_UNIT = 300.0
@@ -50,12 +47,11 @@ class Placed:
 
 def overlaps(case: Case, bodies: list[Placed], pairs: dict[str, PairSection]) -> Iterator[tuple[bool, Keys, str]]:
     """(only a note, path, text) of bodies that overlap at the start."""
-    for first, second in combinations(bodies, 2):
-        if not (first.moves and second.moves):
-            continue
-        depth = _depth(first, second)
-        if depth == 0.0:
-            continue
+    by_name = {body.name: body for body in bodies if body.moves}
+    found = Overlaps([_at_rest(body) for body in by_name.values()], {}, set())
+    found.start(case.time.start)
+    for one, other, depth in found.overlapping():
+        first, second = by_name[one], by_name[other]
         pair = _pair(pairs, first.name, second.name)
         how = f"{depth:.3g} {case.units.length} deep"
         if pair is not None:
@@ -66,18 +62,9 @@ def overlaps(case: Case, bodies: list[Placed], pairs: dict[str, PairSection]) ->
             yield False, second.keys, f"bodies '{first.name}' and '{second.name}' overlap, {how}: {remedy}"
 
 
-def _depth(first: Placed, second: Placed) -> float:
-    """How deep the nodes of one surface lie in the other body [m]; 0 if facets that touch may cross as much."""
-    (low, high), (other_low, other_high) = first.box, second.box
-    if (low >= other_high).any() or (other_low >= high).any():
-        return 0.0
-    surfaces = [
-        (body.mesh.points[nodes], facets) for body in (first, second) for facets, nodes in [tessellate(body.mesh)]
-    ]
-    (x, facets), (y, others) = surfaces
-    depth = max(deepest(x, y, others), deepest(y, x, facets))
-    size = min(float(np.linalg.norm(p[f][:, 1] - p[f][:, 0], axis=1).mean()) for p, f in surfaces)
-    return depth if depth > CROSSING * size else 0.0
+def _at_rest(body: Placed) -> MovingBody:
+    facets, nodes = tessellate(body.mesh)
+    return MovingBody(body.name, facets, lambda t: body.mesh.points[nodes], free=True)
 
 
 def _pair(pairs: dict[str, PairSection], first: str, second: str) -> str | None:

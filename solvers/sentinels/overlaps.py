@@ -137,11 +137,31 @@ class Overlaps:
         near = {i: np.unique(meet[:, 0]), j: np.unique(meet[:, 1])}
         if all(self._deep(a, b, x, near[a], near[b])[0] == 0.0 for a, b in ((i, j), (j, i))):
             return NOT_AT_ALL
-        facets = {k: np.arange(len(self._bodies[k].facets)) for k in (i, j)}
-        return max((self._deep(a, b, x, facets[a], near[b]) for a, b in ((i, j), (j, i))), key=lambda one: one[0])
+        return max((self._deep(a, b, x, None, near[b]) for a, b in ((i, j), (j, i))), key=lambda one: one[0])
 
-    def _deep(self, a: int, b: int, x: Sequence[Array], facets: NDArray[np.int64], near: NDArray[np.int64]) -> Depth:
-        """The deepest point of some facets of body a in body b; near: facets of b where the surfaces cross."""
+    def overlapping(self) -> Iterator[tuple[str, str, float]]:
+        """(name, name, depth [m]) of bodies that overlap at the start, also where one is whole in the other."""
+        for i, j in self._near(self._start, self._start):
+            found = [self._deep(a, b, self._start, None, None, at_start=True) for a, b in ((i, j), (j, i))]
+            if (depth := max(found)[0]) > 0.0:
+                yield self._bodies[i].name, self._bodies[j].name, depth
+
+    def _deep(
+        self,
+        a: int,
+        b: int,
+        x: Sequence[Array],
+        facets: NDArray[np.int64] | None,
+        near: NDArray[np.int64] | None,
+        *,
+        at_start: bool = False,
+    ) -> Depth:
+        """The deepest point of facets of body a in body b; near: facets of b where the surfaces cross; None: all.
+
+        at_start: points count that were in body b at the start.
+        """
+        facets = np.arange(len(self._bodies[a].facets)) if facets is None else facets
+        near = np.arange(len(self._bodies[b].facets)) if near is None else near
         mine, other = x[a][self._bodies[a].facets], x[b][self._bodies[b].facets]
         samples = self._samples_of(a, b)
         chosen = samples.on(facets)
@@ -153,10 +173,11 @@ class Overlaps:
             return NOT_AT_ALL
         facet = samples.facet[chosen]
         depth = depths(points, other, self._tolerance(a, b, facet, near))
-        deep = np.flatnonzero(depth)
-        at_start = self._start[a][self._bodies[a].facets], self._start[b][self._bodies[b].facets]
-        began = inside(samples.at(chosen[deep], at_start[0]), at_start[1])
-        depth[deep[began & ~samples.paired[chosen[deep]]]] = 0.0
+        if not at_start:
+            deep = np.flatnonzero(depth)
+            first = self._start[a][self._bodies[a].facets], self._start[b][self._bodies[b].facets]
+            began = inside(samples.at(chosen[deep], first[0]), first[1])
+            depth[deep[began & ~samples.paired[chosen[deep]]]] = 0.0
         k = int(depth.argmax())
         edge = min(self._measures[a].edge[facet[k]], self._measures[b].edge[near].min())
         limit = min(float(edge), SHARE * min(self._measures[k].thickness for k in (a, b)))

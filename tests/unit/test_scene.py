@@ -13,7 +13,7 @@ from fsci.case import load_case
 from fsci.case.errors import distinct
 from fsci.check.check import summary
 from fsci.check.meshes import check_meshes
-from fsci.check.penetration import deepest
+from solvers.penetration import depths, inside
 from solvers.tessellation import tessellate
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -94,9 +94,12 @@ def test_depth():
         for _ in range(20):
             points = rng.uniform(-1.1, 1.1, (5, x.shape[1]))
             exact = max(depth(points).max(), 0.0)
-            assert deepest(points, x, facets) == pytest.approx(exact, abs=0.01)
-        assert deepest(x, x, facets) < 1e-9  # on the surface
-        assert deepest(x, x + 2.0, facets) == 0.0
+            found = points[inside(points, x[facets])]
+            depth_found = depths(found, x[facets], np.zeros(len(found))).max(initial=0.0)
+            assert depth_found == pytest.approx(exact, abs=0.01)
+        on_surface = depths(x, x[facets], np.zeros(len(x)))
+        assert on_surface.max() < 1e-9
+        assert not inside(x - 3.0, x[facets]).any()
 
 
 # --- bodies that nothing holds

@@ -150,6 +150,19 @@ def test_facets_of_a_shaft_that_turns_in_a_bush(inner, outer):
         assert bool(found) == (larger > 0.0)
 
 
+@pytest.mark.parametrize(
+    ("size", "at", "depth"), [(0.2, 0.35, 0.45), (0.2, 0.9, 0.1), (0.2, 1.0, 0.0), (0.2, 1.5, 0.0)]
+)
+def test_overlap_at_the_start(size, at, depth):
+    """Also of a body that is whole in another one, where no surfaces cross."""
+    points, facets = block(2)
+    large = moving("large", points, facets, [(0.0, 0.0)])
+    small = moving("small", size * points, facets, [(at, at)])
+    found = list(watch([large, small]).overlapping())
+    assert [pair[:2] for pair in found] == [("large", "small")] * (depth > 0.0)
+    assert [pair[2] for pair in found] == pytest.approx([depth] * (depth > 0.0), abs=1e-6)
+
+
 def test_a_resumed_sentinel_sees_the_same():
     points, facets = block(2)
     wall = moving("wall", points * np.array([0.02, 1.0]), facets, [(0.0, 0.0)] * 3, free=False)
