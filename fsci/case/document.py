@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from copy import deepcopy
@@ -78,7 +79,8 @@ def _with_comments(document: Document) -> str:
     yaml.preserve_quotes = True
     yaml.width = 4096  # no line is broken that was not
     try:
-        data = yaml.load(document.text)
+        with warnings.catch_warnings(action="ignore"):  # of anchors of one name, which YAML allows
+            data = yaml.load(document.text)
         for dotted, text in document.overrides:
             _unshare(data, dotted)
             *_, (inner, last) = _steps(data, dotted)
