@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from copy import deepcopy
@@ -11,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
+from ruamel.yaml import YAML, YAMLError
 from ruamel.yaml.anchor import Anchor
 from ruamel.yaml.comments import merge_attrib
 
@@ -61,23 +62,32 @@ class Document:
         """The text of the case with its overrides; comments stay, as far as the text then means these settings."""
         if not self.overrides:
             return self.text
-        for write in (_with_comments, _plainly):
-            text = write(self)
-            if _same(parse_yaml(text, str(self.path)).data, self.data):
-                return text
-        raise AssertionError("settings in plain YAML mean the same")
+        return next(text for write in (_with_comments, _plainly) if (text := write(self)) and self._is(text))
+
+    def _is(self, text: str) -> bool:
+        """Whether a text has the settings of this case, in whatever order; a number that is none equals itself."""
+        try:
+            other = parse_yaml(text, str(self.path)).data
+        except CaseError:
+            return False
+        return json.dumps(other, sort_keys=True) == json.dumps(self.data, sort_keys=True)
 
 
 def _with_comments(document: Document) -> str:
+    """The text with its comments. Anchors may get in the way: then it is empty, or has other settings."""
     yaml = YAML()
     yaml.preserve_quotes = True
     yaml.width = 4096  # no line is broken that was not
-    data = yaml.load(document.text)
-    for dotted, text in document.overrides:
-        _unshare(data, dotted)
-        *_, (inner, last) = _steps(data, dotted)
-        inner[last] = YAML().load(text)
-    return _written(yaml, data)
+    try:
+        with warnings.catch_warnings(action="ignore"):  # of anchors of one name, which YAML allows
+            data = yaml.load(document.text)
+        for dotted, text in document.overrides:
+            _unshare(data, dotted)
+            *_, (inner, last) = _steps(data, dotted)
+            inner[last] = YAML().load(text)
+        return _written(yaml, data)
+    except (YAMLError, LookupError, TypeError, ValueError, AttributeError):
+        return ""
 
 
 def _unshare(data: Any, dotted: str) -> None:
@@ -111,6 +121,7 @@ def _nodes(data: Any) -> Iterator[Any]:
 
 
 def _plainly(document: Document) -> str:
+    """The settings alone."""
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style, yaml.sort_base_mapping_type_on_output = False, False  # type: ignore[assignment]
     yaml.width = 4096
@@ -121,11 +132,6 @@ def _written(yaml: Any, data: Any) -> str:
     stream = io.StringIO()
     yaml.dump(data, stream)
     return stream.getvalue()
-
-
-def _same(one: Any, other: Any) -> bool:
-    """Equal in types and values, whatever the order of settings; a number that is none equals itself."""
-    return json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)
 
 
 #: Size [bytes] of a case file: the reader takes a minute for more.

@@ -83,7 +83,7 @@ def label(text: str, quantity: str, units: Mapping[str, str]) -> str:
     powers = POWERS.get(quantity, (0, 0, 0))
     if not any(powers):
         return text
-    base = (units["length"], units["mass"], units["time"])
+    base = (literal(units["length"]), literal(units["mass"]), literal(units["time"]))
     for named, derived in zip(((1, 1, -2), (2, 1, -2), (-1, 1, -2), (2, 1, -3)), DERIVED.get(base, ()), strict=False):
         if powers == named:
             return f"{text} [{derived}]"

@@ -189,7 +189,7 @@ def read_labels(out: Path) -> Labels:
     try:
         case = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8")) if path.exists() else {}
         quantities = {name: str(probe["quantity"]) for name, probe in (case.get("probes") or {}).items()}
-        units = {**Labels("").units, **(case.get("units") or {})}
+        units = {name: str(unit) for name, unit in {**Labels("").units, **(case.get("units") or {})}.items()}
         title = str(case.get("title") or out.resolve().name)
     except (YAMLError, ValueError, AttributeError, KeyError, TypeError):
         raise ValueError(f"{path} is not the case of a run: fsci check {path} says what is wrong with it") from None

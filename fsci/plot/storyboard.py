@@ -67,7 +67,7 @@ def plot_story(
             axes.spines[:].set_visible(True)
             axes.xaxis.set_major_locator(MaxNLocator(max(2, round(width / 0.7)), steps=[1, 2, 5, 10]))
             axes.yaxis.set_major_locator(MaxNLocator(max(2, round(height / 0.5)), steps=[1, 2, 5, 10]))
-            axes.set_title(f"t = {moment[0][0]:.3g} {units['time']}", fontsize=STYLE["font.size"], pad=5)
+            axes.set_title(literal(f"t = {moment[0][0]:.3g} {units['time']}"), fontsize=STYLE["font.size"], pad=5)
             axes.tick_params(labelleft=column == 0, labelbottom=index + columns >= len(states))
             if column == 0:
                 axes.set_ylabel(label(names[1], "displacement", units))

@@ -39,13 +39,13 @@ def results(tmp_path_factory):
 @pytest.fixture
 def out(results, tmp_path):
     shutil.copytree(results, tmp_path / "out")
-    (tmp_path / "home").mkdir()
-    (tmp_path / "home" / "victim").write_text(SECRET)
+    (tmp_path / "user").mkdir()
+    (tmp_path / "user" / "victim").write_text(SECRET)
     return tmp_path / "out"
 
 
 def assert_untouched(out):
-    home = out.parent / "home"
+    home = out.parent / "user"
     assert [path.name for path in home.iterdir()] == ["victim"]
     assert (home / "victim").read_text() == SECRET
 
@@ -61,7 +61,7 @@ def instead(path, target, make=os.symlink):
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("name", NAMES)
 def test_links_are_refused(out, name, command, capsys):
-    instead(out / name, out.parent / "home" / "victim")
+    instead(out / name, out.parent / "user" / "victim")
     verb, *options = COMMANDS[command]
     assert execute([verb, str(out), *options]) == 2
     assert f"{out / name}: is a link, and no link in a results folder is followed" in capsys.readouterr().err
@@ -71,7 +71,7 @@ def test_links_are_refused(out, name, command, capsys):
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("name", FOLDERS)
 def test_folders_that_are_links_are_refused(out, name, command, capsys):
-    instead(out / name, out.parent / "home")
+    instead(out / name, out.parent / "user")
     verb, *options = COMMANDS[command]
     assert execute([verb, str(out), *options]) == 2
     assert f"{out / name}: is a link" in capsys.readouterr().err
@@ -80,7 +80,7 @@ def test_folders_that_are_links_are_refused(out, name, command, capsys):
 
 @pytest.mark.parametrize("name", [*NAMES, *FOLDERS])
 def test_a_new_run_follows_none(out, results, name, capsys):
-    target = out.parent / "home" if name in FOLDERS else out.parent / "home" / "victim"
+    target = out.parent / "user" if name in FOLDERS else out.parent / "user" / "victim"
     instead(out / name, target)
     assert execute(["run", str(results.parent), "-o", str(out)]) == 2
     assert "is a link" in capsys.readouterr().err
@@ -108,13 +108,13 @@ def test_hard_links_are_not_written_into(out):
 
 def test_the_folder_itself_may_be_a_link_and_so_may_files_of_the_user(out):
     (out.parent / "link").symlink_to(out)
-    (out / "notes.txt").symlink_to(out.parent / "home" / "victim")
+    (out / "notes.txt").symlink_to(out.parent / "user" / "victim")
     assert execute(["resume", str(out.parent / "link"), "--set", "time.end=1.2"]) == 0
     assert execute(["report", str(out.parent / "link")]) == 0
     assert (out / "notes.txt").is_symlink()
 
 
-NAMES_OF_FILES = ["../../home/victim", "../history.csv", "@/home/victim", "other_000001.vtu", "plate_000001.vtu/../x"]
+NAMES_OF_FILES = ["../../user/victim", "../history.csv", "@/user/victim", "other_000001.vtu", "plate_000001.vtu/../x"]
 
 
 @pytest.mark.parametrize("name", NAMES_OF_FILES)
@@ -138,7 +138,7 @@ def test_lists_of_pictures_name_no_other_files(out, results):
     mine = [out / "pictures" / "notes.txt", out / "thesis.png"]
     for path in mine:
         path.write_text("mine")
-    (out / "pictures" / ".fsci-pictures").write_text("../../home/victim\n../thesis.png\nnotes.txt\n")
+    (out / "pictures" / ".fsci-pictures").write_text("../../user/victim\n../thesis.png\nnotes.txt\n")
     assert execute(["run", str(results.parent), "-o", str(out)]) == 0
     assert all(path.exists() for path in mine)
     assert_untouched(out)
@@ -151,7 +151,7 @@ def test_checkpoints_have_no_links(out, capsys):
 
     (path,) = (out / "checkpoint").glob("*.h5")
     with h5py.File(path, "r+") as file:
-        file["state/more"] = h5py.ExternalLink(str(out.parent / "home" / "victim"), "x")
+        file["state/more"] = h5py.ExternalLink(str(out.parent / "user" / "victim"), "x")
     with path.open("r+b") as file:
         file.write(checksum(path).ljust(USER_BLOCK, b"\0"))
     assert execute(["resume", str(out), "--set", "time.end=1.2"]) == 1

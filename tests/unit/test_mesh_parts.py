@@ -51,7 +51,10 @@ TREES = {
     "DOLFIN": ({"a.xml": "", "a_regions.xml": "", "b.xml": ""}, ["a.xml", "a_regions.xml"]),
     "another format": ({"a.vtk": '"b" c', "b": "", "c": ""}, ["a.vtk"]),
     "a name that is too long": ({"a.geo": f'x = "{"y" * 5000}";'}, ["a.geo"]),
-    "names in other alphabets": ({"a.geo": 'Include "größe.txt";', "größe.txt": ""}, ["a.geo", "größe.txt"]),
+    "names in other alphabets": (
+        {"a.geo": 'Include "gr\u00f6\u00dfe.txt";', "gr\u00f6\u00dfe.txt": ""},
+        ["a.geo", "gr\u00f6\u00dfe.txt"],
+    ),
 }
 
 
