@@ -52,6 +52,13 @@ def run_times(case: Case, most: int) -> Array:
     return np.minimum(time.start + chosen * time.step, time.end)
 
 
+def needs_start(case: Case, keys: Keys) -> bool:
+    """Whether a run evaluates a formula at its first time, too: motions, and in dynamics loads, not a patch's value."""
+    dynamic = case.structure is not None and case.structure.dynamics is not None
+    moves = bool({"motion", "displacement"} & set(keys)) and not {"velocity", "angular_velocity"} & set(keys)
+    return moves or (dynamic and keys[0] == "structure")
+
+
 def not_finite(formula: Expression, value: float, t: float, point: Array | None = None) -> str:
     """What is said of a formula without a finite value."""
     what = "not a number" if np.isnan(value) else "infinite"
@@ -65,8 +72,7 @@ def value_mistakes(case: Case) -> Iterator[Mistake]:
     times = run_times(case, MOST_TIMES)
     for keys, formula in expressions(case):
         if formula.uses == {"t"}:
-            # the first time is not one of those at which loads of statics act, and sin(t)/t has none there
-            of_run = times if keys[-2] in ("displacement", "motion") or keys[-1] == "angle" else times[1:]
+            of_run = times if needs_start(case, keys) else times[1:]
             values = formula.at_times(of_run)
             wrong = np.flatnonzero(~np.isfinite(values))
             if len(wrong):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.case import Case
-from fsci.case.expressions import FEW_TIMES, MOST_POINTS, expressions, first_not_finite, run_times
+from fsci.case.expressions import FEW_TIMES, MOST_POINTS, expressions, first_not_finite, needs_start, run_times
 from fsci.case.messages import subject
 from fsci.expression import Expression
 from fsci.meshes.locations import Locations
@@ -26,8 +26,9 @@ AT_NODES = ("initial_displacement", "initial_velocity", "supports", "point_force
 
 def require_finite(case: Case, name: str, mesh: Mesh, locations: Locations) -> None:
     """Raises CaseError for the first formula of position that is infinite or not a number."""
-    times = run_times(case, FEW_TIMES)[1:]
+    whole = run_times(case, FEW_TIMES)
     for keys, formula, x in _formulas(case, name, mesh, locations):
+        times = whole if needs_start(case, keys) else whole[1:]
         if formula.uses - {"t"} and (found := first_not_finite(formula, x, times)) is not None:
             raise case.error(keys, f"{subject(keys)}: {found}")
 
