@@ -91,7 +91,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder import structure as build_structure
     from fsci.builder.coupling import build_coupled, start
     from fsci.builder.dry_side import outlines
-    from solvers.fluid.probes import mass_balance
+    from fsci.builder.watch_flow import WatchedFlow
     from solvers.fluid.snapshot import snapshots as of_fluid
     from solvers.structure.snapshot import snapshots as of_structure
 
@@ -100,7 +100,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     structure = build_structure.build_structure(case, comm, bodies, contact, timer)
     scheme, fluid = build_coupled(case, comm, bodies, structure, timer)
     coupled = scheme.coupled
-    mass = mass_balance(fluid)
+    watched = WatchedFlow(fluid)
     probes = [build_structure.build_probes(case, structure), build_fluid.build_probes(case, fluid)]
 
     def snapshots() -> list[Snapshot]:
@@ -112,7 +112,8 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         initialise=partial(start, case, scheme, fluid),
         snapshots=snapshots,
         probes=lambda: {column: value for measure in probes for column, value in measure().items()},
-        balances=lambda: {"structure.energy": structure.energy.error, **mass(), **coupled.balance.numbers()},
+        balances=lambda: {"structure.energy": structure.energy.error, **watched.numbers(), **coupled.balance.numbers()},
+        sentinels=watched.sentinels,
         dofs={"fluid": fluid.dofs(), "structure": structure.dofs()},
         notes=_notes(bodies),
         imbalance=lambda: {} if contact is None else contact.imbalance,
@@ -123,35 +124,38 @@ def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder import fluid as build_fluid
     from fsci.builder import rigid as build_rigid
     from fsci.builder.coupling import build_coupled_rigid, start
-    from solvers.fluid.probes import mass_balance
+    from fsci.builder.watch_flow import WatchedFlow
     from solvers.fluid.snapshot import snapshots
 
     bodies = build_rigid.build_free_bodies(case, comm, timer)
     scheme, fluid = build_coupled_rigid(case, comm, bodies, timer)
-    mass = mass_balance(fluid)
+    watched = WatchedFlow(fluid)
     probes = [build_rigid.build_probes(case, bodies), build_fluid.build_probes(case, fluid)]
     return Simulation(
         scheme=scheme,
         initialise=partial(start, case, scheme, fluid),
         snapshots=lambda: snapshots(fluid),
         probes=lambda: {column: value for measure in probes for column, value in measure().items()},
-        balances=lambda: {**mass(), **scheme.coupled.balance.numbers()},
+        balances=lambda: {**watched.numbers(), **scheme.coupled.balance.numbers()},
+        sentinels=watched.sentinels,
         dofs={"fluid": fluid.dofs(), "rigid": bodies.unknowns},
     )
 
 
 def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder.fluid import build_fluid, build_probes, build_rigid_bodies
-    from solvers.fluid.probes import mass_balance
+    from fsci.builder.watch_flow import WatchedFlow
     from solvers.fluid.snapshot import snapshots
 
     fluid = build_fluid(case, comm, timer, build_rigid_bodies(case, comm))
+    watched = WatchedFlow(fluid)
     return Simulation(
         scheme=fluid,
         initialise=fluid.initialise,
         snapshots=lambda: snapshots(fluid),
         probes=build_probes(case, fluid),
-        balances=mass_balance(fluid),
+        balances=watched.numbers,
+        sentinels=watched.sentinels,
         dofs={"fluid": fluid.dofs()},
     )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import ufl
 from numpy.typing import NDArray
@@ -12,20 +14,29 @@ from solvers.fluid import forms
 from solvers.fluid.system import FlowSystem
 
 
-def leak(system: FlowSystem) -> float:
-    """Flow rate [m^3/s] through the surfaces of bodies: sum over facets in cells of |int (u - g) . n ds| (collective).
+@dataclass(frozen=True)
+class Crossing:
+    """Flow rates [m^3/s] at the pieces of surface in the cells of this process."""
+
+    cell: NDArray[np.int32]
+    swept: Array  #: int g . n, n out of the fluid
+    leak: float  #: sum over facets in cells of |int (u - g) . n|
+
+
+def crossing(system: FlowSystem) -> Crossing:
+    """What passes through the surfaces of bodies, and what they displace.
 
     With Nitsche's method the velocity differs from that of the surface by the discretisation error. Where both sides of
-    a thin body share unknowns, this is the flow through the body. Pieces of one facet in one cell are added up first:
-    where bodies touch, rounding decides how many there are.
+    a thin body share unknowns, this is the flow through the body. Pieces of one facet in one cell are added up before
+    absolute values are taken: where bodies touch, rounding decides how many there are.
     """
     assert system.cut is not None
     at = system.interface
     u, g = system.flow.x.array[at.u], system.cut.motion.v[at.corners]
-    through = np.einsum("pav,pa->p", at.fields[..., 0], np.einsum("pai,pi->pa", u, at.n))
-    through -= np.einsum("pvw,pw->p", at.mass_of_pieces, np.einsum("pwi,pi->pw", g, at.n))
+    swept = np.einsum("pvw,pw->p", at.mass_of_pieces, np.einsum("pwi,pi->pw", g, at.n))
+    net = np.einsum("pav,pa->p", at.fields[..., 0], np.einsum("pai,pi->pa", u, at.n)) - swept
     _, of_piece = np.unique(np.stack([at.cell, at.facet]), axis=1, return_inverse=True)
-    return system.grid.comm.allreduce(float(np.abs(np.bincount(of_piece.ravel(), through)).sum()))
+    return Crossing(at.cell, swept, float(np.abs(np.bincount(of_piece.ravel(), net)).sum()))
 
 
 def seepage(system: FlowSystem) -> float:
