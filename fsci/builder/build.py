@@ -64,6 +64,7 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         snapshots=lambda: snapshots(structure, _contact_fields(contact)),
         probes=build_probes(case, structure),
         balances=lambda: {"structure.energy": structure.energy.error},
+        sentinels={"energy": structure.energy_sentinel},
         dofs={"structure": structure.dofs()},
         notes=_notes(bodies),
         imbalance=lambda: {} if contact is None else contact.imbalance,
@@ -113,7 +114,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         snapshots=snapshots,
         probes=lambda: {column: value for measure in probes for column, value in measure().items()},
         balances=lambda: {"structure.energy": structure.energy.error, **watched.numbers(), **coupled.balance.numbers()},
-        sentinels=watched.sentinels,
+        sentinels={**watched.sentinels, "energy": structure.energy_sentinel, "interface": coupled.sentinel},
         dofs={"fluid": fluid.dofs(), "structure": structure.dofs()},
         notes=_notes(bodies),
         imbalance=lambda: {} if contact is None else contact.imbalance,
@@ -137,7 +138,7 @@ def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         snapshots=lambda: snapshots(fluid),
         probes=lambda: {column: value for measure in probes for column, value in measure().items()},
         balances=lambda: {**watched.numbers(), **scheme.coupled.balance.numbers()},
-        sentinels=watched.sentinels,
+        sentinels={**watched.sentinels, "interface": scheme.coupled.sentinel},
         dofs={"fluid": fluid.dofs(), "rigid": bodies.unknowns},
     )
 

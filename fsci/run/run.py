@@ -16,6 +16,7 @@ from fsci.case import Case, CaseError
 from fsci.case.resume import end_error, resumed_case
 from fsci.run.checkpoint import read_checkpoint, write_checkpoint
 from fsci.run.clock import Clock
+from fsci.run.finite import not_numbers
 from fsci.run.history import HistoryWriter, read_history
 from fsci.run.memory import require_memory
 from fsci.run.monitor import Monitor
@@ -269,7 +270,7 @@ class Run:
             self.monitor.step(clock.step, clock.time, dt, info, wall)
             for note in info.notes:
                 self.monitor.say(note)
-            for finding in self.record.warn(clock.time, info.findings):
+            for finding in self.record.warn(clock.time, [*info.findings, *not_numbers(self.case, numbers)]):
                 self.monitor.warn(finding.message)
 
     # ------------------------------------------------------------------------------------------------- files

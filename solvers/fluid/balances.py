@@ -60,8 +60,10 @@ class Balances:
         )
         self._inner = self._over_fluid(everywhere, in_film)
 
-    def __call__(self, held: NDArray[np.bool_]) -> tuple[Array, float]:
-        """(force [N] of the fluid on all bodies together, shape (dim,); power [W] lost by the method) (collective).
+    def __call__(self, held: NDArray[np.bool_]) -> tuple[Array, float, float]:
+        """(force [N] on all bodies together, (dim,); power [W] lost by the method, and that of walls and patches).
+
+        Collective.
 
         held: owned dofs whose rows are not solved for.
         Force: that on walls and patches, minus int rho (u_t + u . grad u) - f, plus the force in closed contact, which
@@ -71,11 +73,13 @@ class Balances:
         """
         system, dofs = self.system, self.system.unknowns.velocity.dofs
         assert system.cut is not None
-        rows = self._outer_rows(held) - self._inner_rows()
+        outer = self._outer_rows(held)
+        rows = outer - self._inner_rows()
         force, closed = system.grid.comm.allreduce(rows[dofs].sum(axis=0)), system.zone_force()
         given = system.grid.comm.allreduce(float((rows * system.flow.x.array)[dofs].sum()))
         of_flow = system.surface_force() - closed
-        return force + closed.sum(axis=0), given - float((of_flow * system.cut.motion.v).sum())
+        outside = system.grid.comm.allreduce(float((outer * system.flow.x.array)[dofs].sum()))
+        return force + closed.sum(axis=0), given - float((of_flow * system.cut.motion.v).sum()), outside
 
     def _outer_rows(self, held: NDArray[np.bool_]) -> Array:
         """Forces [N] on the fluid from walls and patches at local dofs; contributions to ghosts are not added up."""

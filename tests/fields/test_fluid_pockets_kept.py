@@ -77,7 +77,7 @@ def test_a_ring_that_is_squeezed_by_its_data_is_found():
         return points * (1 - 0.05 * t), -0.05 * points
 
     fluid = make_fluid(uniform([-1, -1], [1, 1], [24, 24]), [TIGHT, OPEN], [ring(0.5, 0.75, squeezed)], mu=0.1, dt=0.1)
-    sentinel, (found,) = look_at(fluid, 2, 0.1)
+    _, (found,) = look_at(fluid, 2, 0.1)
     assert (found.kind, found.body) == ("pocket", "pocket_1")
     assert found.value == pytest.approx(0.99**2 - 1, rel=1e-9)
     assert found.where == pytest.approx((0.0, 0.0), abs=1e-9)
@@ -187,7 +187,8 @@ def test_pockets_that_join_and_part_have_their_sum(monkeypatch):
     scene.start("aaaa....bbbb")
     found, columns = scene.look("aaaaaaaabbbb".replace("b", "a"), 7.9)
     assert found == {"pocket_1": -0.0125}
-    assert columns[0] == 7.9 and np.isnan(columns[1])
+    assert columns[0] == 7.9
+    assert np.isnan(columns[1])
     assert scene.look("aaaaa..bbbbb", 3.0, 5.0)[0] == {}
     assert scene.look("aaaaa..bbbbb", 3.0, 4.9)[0] == {"pocket_1": -0.0125}
 
@@ -196,7 +197,8 @@ def test_a_pocket_of_which_a_part_opens_is_a_new_one(monkeypatch):
     scene = Scene(monkeypatch)
     scene.start("aaaaaaaa....")
     found, columns = scene.look("aaa..OOO....", 2.0)
-    assert found == {} and np.isnan(columns).all()
+    assert found == {}
+    assert np.isnan(columns).all()
     assert scene.look("aaa..OOO....", 1.9)[0] == {"pocket_2": -0.05}
 
 

@@ -123,8 +123,8 @@ class Pockets:
         number = pocket.name.rpartition("_")[2]
         message = (
             f"closed pocket {number} of the fluid, around ({place}), has {pocket.volume:.5g} {unit} instead of "
-            f"{pocket.due[0]:.5g} since it closed at t = {pocket.since:.4g} ({change:+.2%}): fluid was lost or made. If "
-            "rigid bodies squeeze it, give it an open patch; else take a smaller 'step' or finer cells at its walls"
+            f"{pocket.due[0]:.5g} since it closed at t = {pocket.since:.4g} ({change:+.2%}): fluid was lost or made. "
+            "If rigid bodies squeeze it, give it an open patch; else take a smaller 'step' or finer cells at its walls"
         )
         return Finding("pocket", pocket.name, change, message, where=where)
 

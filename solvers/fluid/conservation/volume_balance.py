@@ -77,8 +77,7 @@ class VolumeBalance:
         fluid = self._fluid
         patches = {name: self._rate([name]) for name in self._patches}
         periodic = sum(abs(self._rate([name])) for name in self._periods)
-        rows = np.where(fluid.unknowns.velocity_mask[: fluid.size], 0.0, fluid.residual_rows)
-        unsolved = fluid.comm.allreduce(float(np.abs(rows).sum()))
+        _, unsolved = fluid.unsolved()
         if not fluid.bodies:
             return FlowRates(patches, periodic, np.array([sum(patches.values())]), 0.0, 0.0, unsolved)
         found, regions = crossing(fluid.system), self._regions.now()

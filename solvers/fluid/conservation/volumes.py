@@ -1,7 +1,7 @@
 """The sentinel of volumes: the fluid loses none, and none passes through walls.
 
-Volumes that have passed since the start are compared, not rates: a flow that starts, rests or turns has rates near zero,
-and errors of the discretisation that change their sign pass nothing.
+Volumes that have passed since the start are compared, not rates. A flow that starts, rests or turns has rates near
+zero, and errors that change their sign pass nothing.
 """
 
 from __future__ import annotations
