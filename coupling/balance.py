@@ -31,10 +31,14 @@ class Balance:
     def __init__(self, flow: Flow, solid: Solid, interface: Interface) -> None:
         self._flow, self._solid, self._interface = flow, solid, interface
         self.force = 0.0  #: |b - m| / |m| of the last step, dimensionless
+        self.unsolved = 0.0  #: sum of |residual| of the momentum of the fluid [N]
         self.momentum = 0.0  #: |force on all bodies - that by the balance of momentum of the fluid| [N]
         self.power = 0.0  #: power of the fluid on the solid [W]
+        self.supplied = 0.0  #: power of walls and patches on the fluid [W]
         self.loss = 0.0  #: power that the fluid loses by the method [W]
         self.work = 0.0  #: work of b minus that of f, sum over all steps [J]
+        self.last_works = (0.0, 0.0)  #: work of b and that of f in the last step [J]
+        self.load = 0.0  #: sum of the magnitudes of the forces of the fluid on all vertices [N]
         self.given: Array  #: generalised force of the fluid at the end of the last step, see `Solid.reduced`
 
     def start(self) -> None:
@@ -52,11 +56,14 @@ class Balance:
         taken = solid.taken()
         size = float(np.linalg.norm(mean))
         self.force = float(np.linalg.norm(taken - mean)) / size if size > 0.0 else 0.0
-        of_fluid, self.loss = flow.balances()
+        of_fluid, self.loss, self.supplied = flow.balances()
         total = sum(force.sum(axis=0) for force in by_surface.values())
+        self.load = float(sum(np.linalg.norm(force, axis=1).sum() for force in by_surface.values()))
+        self.unsolved = flow.unsolved()[0]
         self.momentum = float(np.linalg.norm(total - of_fluid))
         self.power = float((at_vertices * interface.velocity(interface.now)).sum())
-        self.work += float((taken * solid.moved()).sum()) - dt * self.power
+        self.last_works = float((taken * solid.moved()).sum()), dt * self.power
+        self.work += self.last_works[0] - self.last_works[1]
 
     def numbers(self) -> dict[str, float]:
         """Columns of the history."""

@@ -223,8 +223,12 @@ class Flow(Part, Protocol):
         """Derivatives of its rows and of its force by the motion of these surfaces."""
         ...
 
-    def balances(self) -> tuple[Array, float]:
-        """(force [N] on all bodies by the balance of momentum, shape (dim,); power [W] lost by the method)."""
+    def balances(self) -> tuple[Array, float, float]:
+        """(force [N] on all bodies by the balance of momentum, (dim,); power [W] lost by the method; of patches)."""
+        ...
+
+    def unsolved(self) -> tuple[float, float]:
+        """Sums of |residual|: of the momentum [N] and of the continuity equations [m^3/s]."""
         ...
 
     sequence: SolverSequence  #: linear solvers, from fast to robust

@@ -55,6 +55,11 @@ class Constraint(Stateful, Protocol):
         """Energy that friction has dissipated since the start [J]."""
         ...
 
+    @property
+    def obstacle_work(self) -> Array:
+        """(work of moved obstacles on the bodies since the start, by how much it may be wrong) [J]."""
+        ...
+
     def evaluate(self, u: Array, t: float) -> None:
         """Compute gaps and active set at the displacements u [m] of an iterate, shape (N, dim), and the time t [s]."""
         ...

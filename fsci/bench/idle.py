@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,10 +11,12 @@ from time import process_time
 import numpy as np
 from mpi4py import MPI
 
-from fsci.bench.small import BLOCK, FLOW, POST
+from fsci.bench.small import BLOCK, DISC, FLOW, POST
 from fsci.bench.table import Row
 from fsci.builder.build import Simulation, build
 from fsci.case import load_case
+from fsci.run.watch import Watched
+from solvers.api import Scheme
 from solvers.timing import Timer
 
 STEPS = 60
@@ -52,6 +54,13 @@ OUTSIDE = """\
     disc: {mesh: {shape: disc, radius: 0.2, cells: [16, 2], translate: [5, 5]}}
 """
 
+MOVED = """\
+  bodies:
+    disc:
+      mesh: {shape: disc, radius: 0.2, cells: [16, 2], translate: [0.78, 0.51]}
+      motion: {displacement: ["0.1*sin(t)", 0]}
+"""
+
 #: name -> (scene, the part that it does not use)
 SCENES = {
     "block, a pair that never meets": (BLOCK.replace("0.001", "50"), "contact"),
@@ -61,25 +70,45 @@ SCENES = {
 }
 
 
+#: name -> scene with sentinels
+WATCHED = {
+    "block, sentinels": BLOCK,
+    "flow around a disc, sentinels": FLOW + DISC,
+    "flow with a moved disc, sentinels": FLOW + MOVED,
+    "post in a flow, sentinels": FLOW + POST,
+}
+
+
 def run() -> list[Row]:
     """Milliseconds of the processor per time step with and without the part, and their ratio."""
-    return [measure(name, text, part) for name, (text, part) in SCENES.items()]
+    rows = [measure(name, text, part) for name, (text, part) in SCENES.items()]
+    return rows + [measure_sentinels(name, text) for name, text in WATCHED.items()]
 
 
 def measure(name: str, text: str, part: str, steps: int = STEPS) -> Row:
+    """The row of a scene with and without a part of its text."""
+    return _measure(name, [_simulation(scene) for scene in (text, text.split(f"{part}:")[0])], steps)
+
+
+def measure_sentinels(name: str, text: str, steps: int = STEPS) -> Row:
+    """The row of a scene with and without sentinels; both compute the columns of the history."""
+    return _measure(name, [_simulation(text, watched=watched) for watched in (True, False)], steps)
+
+
+def _measure(name: str, both: Sequence[tuple[Simulation, Scheme, Timer, float]], steps: int) -> Row:
     """Medians over the steps, which the two scenes take by turns: others who use the machine disturb both.
 
     The last column is the largest difference of a part of the time, such as assembly, over the whole time.
     """
-    both = [_simulation(scene) for scene in (text, text.split(f"{part}:")[0])]
     spent, newton = np.zeros((2, steps)), np.zeros((2, steps))
     parts: dict[str, np.ndarray] = {}
     for number in range(steps):
         for which in (0, 1) if number % 2 else (1, 0):
-            simulation, timer, dt = both[which]
+            simulation, scheme, timer, dt = both[which]
             timer.seconds.clear()
             begin = process_time()
-            newton[which, number] = simulation.scheme.step(number * dt, dt).iterations
+            newton[which, number] = scheme.step(number * dt, dt).iterations
+            simulation.balances()
             spent[which, number] = process_time() - begin
             for kind, seconds in timer.seconds.items():
                 parts.setdefault(kind, np.zeros((2, steps)))[which, number] = seconds
@@ -111,11 +140,13 @@ class ProcessorTimer(Timer):
             self.seconds[name] = self.seconds.get(name, 0.0) + process_time() - begin
 
 
-def _simulation(text: str) -> tuple[Simulation, Timer, float]:
+def _simulation(text: str, *, watched: bool = False) -> tuple[Simulation, Scheme, Timer, float]:
     timer = ProcessorTimer()
     with TemporaryDirectory() as folder:
         (Path(folder) / "case.yaml").write_text("title: a scene\n" + text)
         case = load_case(Path(folder), [])
         simulation = build(case, MPI.COMM_WORLD, timer)
+    scheme = Watched(simulation.scheme, simulation.sentinels if watched else {}, timer)
     simulation.initialise(0.0, case.time.step)
-    return simulation, timer, case.time.step
+    scheme.start(0.0)
+    return simulation, scheme, timer, case.time.step

@@ -73,7 +73,10 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         balances=lambda: {"structure.energy": structure.energy.error},
         dofs={"structure": structure.dofs()},
         notes=_notes(bodies),
-        sentinels=build_sentinels(case, comm, structure=structure, contact=contact),
+        sentinels={
+            **build_sentinels(case, comm, structure=structure, contact=contact),
+            "energy": structure.energy_sentinel,
+        },
         take_materials=structure.take_materials,
         imbalance=lambda: {} if contact is None else contact.imbalance,
     )
@@ -101,7 +104,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder.coupling import build_coupled, start
     from fsci.builder.dry_side import outlines
     from fsci.builder.sentinels import build_sentinels
-    from solvers.fluid.probes import mass_balance
+    from fsci.builder.watch_flow import WatchedFlow
     from solvers.fluid.snapshot import snapshots as of_fluid
     from solvers.structure.snapshot import snapshots as of_structure
 
@@ -110,7 +113,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     structure = build_structure.build_structure(case, comm, bodies, contact, timer)
     scheme, fluid = build_coupled(case, comm, bodies, structure, timer)
     coupled = scheme.coupled
-    mass = mass_balance(fluid)
+    watched = WatchedFlow(fluid)
     probes = [build_structure.build_probes(case, structure), build_fluid.build_probes(case, fluid)]
 
     def snapshots() -> list[Snapshot]:
@@ -122,10 +125,15 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         initialise=partial(start, case, scheme, fluid),
         snapshots=snapshots,
         probes=lambda: {column: value for measure in probes for column, value in measure().items()},
-        balances=lambda: {"structure.energy": structure.energy.error, **mass(), **coupled.balance.numbers()},
+        balances=lambda: {"structure.energy": structure.energy.error, **watched.numbers(), **coupled.balance.numbers()},
         dofs={"fluid": fluid.dofs(), "structure": structure.dofs()},
         notes=_notes(bodies),
-        sentinels=build_sentinels(case, comm, structure=structure, contact=contact, given=fluid.bodies),
+        sentinels={
+            **build_sentinels(case, comm, structure=structure, contact=contact, given=fluid.bodies),
+            **watched.sentinels,
+            "energy": structure.energy_sentinel,
+            "interface": coupled.sentinel,
+        },
         take_materials=structure.take_materials,
         imbalance=lambda: {} if contact is None else contact.imbalance,
     )
@@ -136,36 +144,42 @@ def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder import rigid as build_rigid
     from fsci.builder.coupling import build_coupled_rigid, start
     from fsci.builder.sentinels import build_sentinels
-    from solvers.fluid.probes import mass_balance
+    from fsci.builder.watch_flow import WatchedFlow
     from solvers.fluid.snapshot import snapshots
 
     bodies = build_rigid.build_free_bodies(case, comm, timer)
     scheme, fluid = build_coupled_rigid(case, comm, bodies, timer)
-    mass = mass_balance(fluid)
+    watched = WatchedFlow(fluid)
     probes = [build_rigid.build_probes(case, bodies), build_fluid.build_probes(case, fluid)]
     return Simulation(
         scheme=scheme,
         initialise=partial(start, case, scheme, fluid),
         snapshots=lambda: snapshots(fluid),
         probes=lambda: {column: value for measure in probes for column, value in measure().items()},
-        balances=lambda: {**mass(), **scheme.coupled.balance.numbers()},
+        balances=lambda: {**watched.numbers(), **scheme.coupled.balance.numbers()},
         dofs={"fluid": fluid.dofs(), "rigid": bodies.unknowns},
-        sentinels=build_sentinels(case, comm, rigid=bodies, given=fluid.bodies),
+        sentinels={
+            **build_sentinels(case, comm, rigid=bodies, given=fluid.bodies),
+            **watched.sentinels,
+            "interface": scheme.coupled.sentinel,
+        },
     )
 
 
 def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder.fluid import build_fluid, build_probes, build_rigid_bodies
-    from solvers.fluid.probes import mass_balance
+    from fsci.builder.watch_flow import WatchedFlow
     from solvers.fluid.snapshot import snapshots
 
     fluid = build_fluid(case, comm, timer, build_rigid_bodies(case, comm))
+    watched = WatchedFlow(fluid)
     return Simulation(
         scheme=fluid,
         initialise=fluid.initialise,
         snapshots=lambda: snapshots(fluid),
         probes=build_probes(case, fluid),
-        balances=mass_balance(fluid),
+        balances=watched.numbers,
+        sentinels=watched.sentinels,
         dofs={"fluid": fluid.dofs()},
     )
 

@@ -19,6 +19,7 @@ from fsci.run.cause import with_cause
 from fsci.run.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from fsci.run.clock import Clock
 from fsci.run.files import LOCK, make_folder, require_own, write_text
+from fsci.run.finite import not_numbers
 from fsci.run.history import HistoryWriter, read_history
 from fsci.run.jump import require_continuous
 from fsci.run.kept_case import keep_case, kept_case
@@ -291,7 +292,7 @@ class Run:
             self.monitor.step(clock.step, clock.time, dt, info, wall)
             for note in info.notes:
                 self.monitor.say(note)
-            for finding in self.record.warn(clock.time, info.findings):
+            for finding in self.record.warn(clock.time, [*info.findings, *not_numbers(self.case, numbers)]):
                 self.monitor.warn(finding.message)
 
     # ------------------------------------------------------------------------------------------------- files

@@ -24,6 +24,7 @@ from fsci.stress.judge import (
     missing_warning,
     other_bits,
     out_of_balance,
+    warnings_of,
 )
 from fsci.stress.mutants import run_mutant
 from fsci.stress.program import Ended, run, run_killed
@@ -43,6 +44,7 @@ class Outcome:
     verdict: Verdict
     reason: str
     seconds: float
+    warnings: tuple[str, ...] = ()  #: of sentinels, in the scene's own frame
 
 
 def stress(seeds: Sequence[int], say: Callable[[str], None], keep: Path | None = None) -> list[Outcome]:
@@ -52,6 +54,8 @@ def stress(seeds: Sequence[int], say: Callable[[str], None], keep: Path | None =
         outcome = judge(seed, keep)
         if outcome.verdict == "wrong":
             say(f"{seed} {outcome.scene}, {outcome.twin}: {outcome.reason}")
+        for warning in outcome.warnings:
+            say(f"{seed} {outcome.scene} warns of {warning}")
         outcomes.append(outcome)
     return outcomes
 
@@ -67,14 +71,19 @@ def judge(seed: int, keep: Path | None = None) -> Outcome:
             found = Outcome(seed, "mutant", "none", {}, verdict, words or (ended.message if ended.code else ""), 0.0)
         else:
             one = draw(seed)
-            found = Outcome(seed, one.scene.name, one.how, one.scene.parameters, *_judge(one, Path(folder)), 0.0)
+            first, judged = _judge(one, Path(folder))
+            found = Outcome(seed, one.scene.name, one.how, one.scene.parameters, *judged, 0.0, warnings_of(first))
         if keep is not None and found.verdict == "wrong":
             _keep(Path(folder), keep / str(seed))
     return Outcome(**{**asdict(found), "seconds": round(time.perf_counter() - begin, 2)})
 
 
-def _judge(one: Draw, folder: Path) -> tuple[Verdict, str]:
+def _judge(one: Draw, folder: Path) -> tuple[Ended, tuple[Verdict, str]]:
     first = run(folder / "run", one.case(Frame()))
+    return first, _verdict(one, first, folder)
+
+
+def _verdict(one: Draw, first: Ended, folder: Path) -> tuple[Verdict, str]:
     if words := failure_of(first):
         return "wrong", words
     if first.code:

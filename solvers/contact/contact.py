@@ -20,6 +20,7 @@ from solvers.contact.interface import ContactInterface, describe_interface
 from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
 from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import ActiveMultipliers, linearise
+from solvers.contact.obstacle_work import ObstacleWork
 from solvers.contact.pair import Pair
 from solvers.contact.redistribute import redistributed
 from solvers.contact.slip import Slip
@@ -76,6 +77,11 @@ class Contact:
         self.slip: Slip | None = None  # at the latest evaluation
         self._weight = 1.0  # of the new contact force in the balance
         self.work = FrictionWork((count, self.dim))
+        parts = zip(self.interface.surfaces, self.nodes.of_surface, strict=True)
+        obstacles = [numbers for surface, numbers in parts if surface.motion is not None]
+        self._of_obstacles = ObstacleWork(
+            np.unique(np.concatenate([np.empty(0, dtype=np.int64), *obstacles])), self.dim
+        )
         self.time = np.nan  #: of the latest evaluation [s]
         self.touched_at = np.full(len(self.pairs), np.inf)  #: time of the first contact of each pair [s], set by probes
         self.terms: Terms | None = None
@@ -119,12 +125,18 @@ class Contact:
         """Accept the step; weight: that of the contact force at its end in the balance."""
         if self._integration.has_slip:
             self.work.end_step(weight, *self._force_and_slip())
+        self._of_obstacles.end_step(self.force(), self.x - self.x_old)
         self.slip = None
 
     @property
     def friction_work(self) -> float:
         """Energy that friction has dissipated since the start [J]."""
         return self.work.total
+
+    @property
+    def obstacle_work(self) -> Array:
+        """(work of moved obstacles on the bodies since the start, by how much it may be wrong) [J]."""
+        return np.array([self._of_obstacles.total, self._of_obstacles.doubt])
 
     def _force_and_slip(self) -> tuple[Array, Array]:
         """(force [N], slip in this step [m]) along the surface for multipliers in contact, shapes (C, dim)."""
@@ -340,6 +352,7 @@ class Contact:
             "status": self.active_set.status.copy(),
             "touched_at": self.touched_at.copy(),
             "work": self.work.save(),
+            "obstacle_work": self._of_obstacles.save(),
         }
 
     def restore(self, state: State) -> None:
@@ -350,3 +363,4 @@ class Contact:
         self.active_set.status = state["status"].copy()
         self.touched_at[:] = state["touched_at"]
         self.work.restore(state["work"])
+        self._of_obstacles.restore(state["obstacle_work"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import ufl
 from numpy.typing import NDArray
@@ -12,20 +14,29 @@ from solvers.fluid import forms
 from solvers.fluid.system import FlowSystem
 
 
-def leak(system: FlowSystem) -> float:
-    """Flow rate [m^3/s] through the surfaces of bodies: sum over facets in cells of |int (u - g) . n ds| (collective).
+@dataclass(frozen=True)
+class Crossing:
+    """Flow rates [m^3/s] at the pieces of surface in the cells of this process."""
+
+    cell: NDArray[np.int32]
+    swept: Array  #: int g . n, n out of the fluid
+    leak: float  #: sum over facets in cells of |int (u - g) . n|
+
+
+def crossing(system: FlowSystem) -> Crossing:
+    """What passes through the surfaces of bodies, and what they displace.
 
     With Nitsche's method the velocity differs from that of the surface by the discretisation error. Where both sides of
-    a thin body share unknowns, this is the flow through the body. Pieces of one facet in one cell are added up first:
-    where bodies touch, rounding decides how many there are.
+    a thin body share unknowns, this is the flow through the body. Pieces of one facet in one cell are added up before
+    absolute values are taken: where bodies touch, rounding decides how many there are.
     """
     assert system.cut is not None
     at = system.interface
     u, g = system.flow.x.array[at.u], system.cut.motion.v[at.corners]
-    through = np.einsum("pav,pa->p", at.fields[..., 0], np.einsum("pai,pi->pa", u, at.n))
-    through -= np.einsum("pvw,pw->p", at.mass_of_pieces, np.einsum("pwi,pi->pw", g, at.n))
+    swept = np.einsum("pvw,pw->p", at.mass_of_pieces, np.einsum("pwi,pi->pw", g, at.n))
+    net = np.einsum("pav,pa->p", at.fields[..., 0], np.einsum("pai,pi->pa", u, at.n)) - swept
     _, of_piece = np.unique(np.stack([at.cell, at.facet]), axis=1, return_inverse=True)
-    return system.grid.comm.allreduce(float(np.abs(np.bincount(of_piece.ravel(), through)).sum()))
+    return Crossing(at.cell, swept, float(np.abs(np.bincount(of_piece.ravel(), net)).sum()))
 
 
 def seepage(system: FlowSystem) -> float:
@@ -49,8 +60,10 @@ class Balances:
         )
         self._inner = self._over_fluid(everywhere, in_film)
 
-    def __call__(self, held: NDArray[np.bool_]) -> tuple[Array, float]:
-        """(force [N] of the fluid on all bodies together, shape (dim,); power [W] lost by the method) (collective).
+    def __call__(self, held: NDArray[np.bool_]) -> tuple[Array, float, float]:
+        """(force [N] on all bodies together, (dim,); power [W] lost by the method, and that of walls and patches).
+
+        Collective.
 
         held: owned dofs whose rows are not solved for.
         Force: that on walls and patches, minus int rho (u_t + u . grad u) - f, plus the force in closed contact, which
@@ -60,11 +73,13 @@ class Balances:
         """
         system, dofs = self.system, self.system.unknowns.velocity.dofs
         assert system.cut is not None
-        rows = self._outer_rows(held) - self._inner_rows()
+        outer = self._outer_rows(held)
+        rows = outer - self._inner_rows()
         force, closed = system.grid.comm.allreduce(rows[dofs].sum(axis=0)), system.zone_force()
         given = system.grid.comm.allreduce(float((rows * system.flow.x.array)[dofs].sum()))
         of_flow = system.surface_force() - closed
-        return force + closed.sum(axis=0), given - float((of_flow * system.cut.motion.v).sum())
+        outside = system.grid.comm.allreduce(float((outer * system.flow.x.array)[dofs].sum()))
+        return force + closed.sum(axis=0), given - float((of_flow * system.cut.motion.v).sum()), outside
 
     def _outer_rows(self, held: NDArray[np.bool_]) -> Array:
         """Forces [N] on the fluid from walls and patches at local dofs; contributions to ghosts are not added up."""

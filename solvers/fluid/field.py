@@ -372,10 +372,19 @@ class Fluid:
         zone = self.system.zone
         return found if zone is None else with_zone(found, zone, self.unknowns, self.flow, vertices)
 
-    def balances(self) -> tuple[Array, float]:
-        """(force [N] on all bodies by the balance of momentum, (dim,); power [W] lost by the method) (collective)."""
+    def balances(self) -> tuple[Array, float, float]:
+        """(force [N] on all bodies by the balance of momentum, (dim,); power [W] lost by the method, power of patches).
+
+        Collective.
+        """
         self._balances = self._balances or Balances(self.system)
         return self._balances(self.held)
+
+    def unsolved(self) -> tuple[float, float]:
+        """Sums of |residual|: of the momentum [N] and of the continuity equations [m^3/s] (collective)."""
+        size, in_momentum = np.abs(self.residual_rows), self.unknowns.velocity_mask[: self.size]
+        force, rate = self.comm.allreduce(np.array([size[in_momentum].sum(), size[~in_momentum].sum()]))
+        return float(force), float(rate)
 
     # ---------------------------------------------------------------------------------------- save and restore
 

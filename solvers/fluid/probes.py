@@ -7,17 +7,17 @@ all extensive quantities are per depth.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 import ufl
+from numpy.typing import NDArray
 
 from solvers import fem
 from solvers.api import Array
 from solvers.fluid import forms
 from solvers.fluid.background.nested import Nested
 from solvers.fluid.background.space import FlowNodes
-from solvers.fluid.balances import leak, seepage
 from solvers.fluid.bodies.inside import INSIDE, require_outside, winding
 from solvers.fluid.boundary.covered_faces import CoveredFaces, covered_faces
 from solvers.fluid.field import Fluid
@@ -158,8 +158,15 @@ def on_patch(fluid: Fluid, quantity: str, patch: str) -> Probe:
     return probe
 
 
-def flow_rate(fluid: Fluid) -> Callable[[Sequence[str]], float]:
-    """A function: names of patches -> flow rate [m^3/s] out of the box through them (collective)."""
+class FlowRate(Protocol):
+    def __call__(self, patches: Sequence[str], among: NDArray[np.bool_] | None = None) -> float: ...
+
+
+def flow_rate(fluid: Fluid) -> FlowRate:
+    """A function: names of patches -> flow rate [m^3/s] out of the box through them (collective).
+
+    Its second argument is a mask of the local cells whose faces count; None: all.
+    """
 
     def integral() -> fem.Integral:
         domain, u = fluid.grid.domain, fluid.unknowns.parts(fluid.system.flow)[0]
@@ -171,16 +178,21 @@ def flow_rate(fluid: Fluid) -> Callable[[Sequence[str]], float]:
     def outflow(part: CoveredFaces) -> Array:
         return part.outward(part.velocity(fluid.flow))
 
-    def rate(patches: Sequence[str]) -> float:
-        facets, covered = _facets(fluid, patches)
+    def rate(patches: Sequence[str], among: NDArray[np.bool_] | None = None) -> float:
+        facets, covered = _facets(fluid, patches, among)
         whole = fem.assemble_scalar(latest().on(exterior_facet=facets), fluid.comm)
         return whole + fluid.comm.allreduce(sum(float((p.weights * outflow(p)).sum()) for p in covered))
 
     return rate
 
 
-def _facets(fluid: Fluid, patches: Sequence[str]) -> tuple[np.ndarray, list[CoveredFaces]]:
-    """(sorted local facets of patches that are wet, those that bodies cover in part); of a period those at its end."""
+def _facets(
+    fluid: Fluid, patches: Sequence[str], among: NDArray[np.bool_] | None = None
+) -> tuple[np.ndarray, list[CoveredFaces]]:
+    """(sorted local facets of patches that are wet, those that bodies cover in part); of a period those at its end.
+
+    among: mask of the local cells whose faces count.
+    """
     boundary, grid, cut = fluid.boundary, fluid.grid, fluid.cut
     chosen = [i for i, patch in enumerate(boundary.patches) if patch.name in patches]
     facets = np.concatenate([boundary.facets[i][boundary.at_end[i]] for i in chosen])
@@ -189,33 +201,10 @@ def _facets(fluid: Fluid, patches: Sequence[str]) -> tuple[np.ndarray, list[Cove
     facets, cells = facets[order], cells[order]
     wet = np.zeros(len(grid.numbers), dtype=bool)
     wet[np.concatenate([cut.uncut, cut.cut])] = True
+    if among is not None:
+        wet &= among
     free, covered = covered_faces(grid, fluid.unknowns, cut, fluid.unknowns.degree + 1, facets, cells)
     return facets[wet[cells] & free], [part.only(wet) for part in covered]
-
-
-def mass_balance(fluid: Fluid) -> Callable[[], dict[str, float]]:
-    """Probe of the balance of volume (collective).
-
-    fluid.mass [m^3/s]: flow rate out of the box, plus the volume that bodies leave per time. It is the discrete
-    continuity equation tested with q = 1, and zero up to the tolerance of the solver.
-    fluid.leak, with bodies: the flow rate through their surfaces, a discretisation error. fluid.seepage: that through
-    closed contact.
-    """
-    rate = flow_rate(fluid)
-    everywhere = [patch.name for patch in fluid.boundary.patches if not patch.record.periodic]
-
-    def balance() -> dict[str, float]:
-        cut = fluid.cut
-        mine = cut.cut[cut.pieces.cell] < fluid.grid.owned
-        swept = cut.pieces.moments[mine].sum(axis=1)
-        g, n = cut.motion.v[cut.facets[cut.pieces.facet[mine]]], cut.pieces.normal[mine]
-        into_bodies = fluid.comm.allreduce(float(np.einsum("pv,pvi,pi->", swept, g, n)))
-        passing = {"fluid.leak": leak(fluid.system)} if fluid.bodies else {}
-        if fluid.system.seeping is not None:
-            passing["fluid.seepage"] = seepage(fluid.system)
-        return {"fluid.mass": rate(everywhere) + into_bodies, **passing}
-
-    return balance
 
 
 # ---------------------------------------------------------------------------------------------------------- bodies

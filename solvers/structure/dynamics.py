@@ -136,10 +136,11 @@ class Dynamics:
         share = self.scheme.alpha_m
         return times(structure.mass, (1.0 - share) * structure.now.a + share * structure.old.a)
 
-    def averaged_forces(self, structure: Moving) -> tuple[Array, Array]:
-        alpha, now, old = self.scheme.alpha_f, structure.now, structure.old
-        external = (1.0 - alpha) * now.external + alpha * old.external
-        return external, _damping_force(structure, (1.0 - alpha) * now.v + alpha * old.v)
+    def averaged(self, before: Array, after: Array) -> Array:
+        return (1.0 - self.scheme.alpha_f) * after + self.scheme.alpha_f * before
+
+    def damping_force(self, structure: Moving) -> Array:
+        return _damping_force(structure, self.averaged(structure.old.v, structure.now.v))
 
     def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat:
         """mass_factor M + damping_factor C; in columns of massless dofs (1 - alpha_f) / dt C."""
@@ -158,6 +159,18 @@ class Dynamics:
         now = structure.now
         dynamic = times(structure.mass, now.a) + _damping_force(structure, now.v)
         return dynamic + now.internal - now.external - now.constraint
+
+    def support_forces(self, structure: Moving) -> tuple[Array, Array]:
+        """The balance of the step at both ends; at massless dofs the static balances at its ends."""
+        found = (structure.residual_force.copy(), structure.residual_force.copy())
+        for force, at in zip(found, (structure.old, structure.now), strict=True):
+            static = _own_forces(structure, at) - at.surface
+            force[structure.massless] = static[structure.massless]
+        return found
+
+    @property
+    def dissipates(self) -> bool:
+        return (self.scheme.alpha_m, self.scheme.alpha_f) != (0.5, 0.5)
 
     def kinetic_energy(self, structure: Moving) -> float:
         v = structure.now.v

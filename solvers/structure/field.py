@@ -25,7 +25,7 @@ from solvers.step import Step
 from solvers.structure.body import Body
 from solvers.structure.constrained_dofs import ConstrainedDofs
 from solvers.structure.deformation import flown_off, inverted, largest_extent
-from solvers.structure.energy import EnergyBalance
+from solvers.structure.energy import EnergyBalance, EnergySentinel
 from solvers.structure.held import Held
 from solvers.structure.instant import Instant
 from solvers.structure.massless import mass_matrices
@@ -62,6 +62,7 @@ class Structure:
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
         self.current = Step(0.0, 0.0)  #: the present step, or the last one
         self.energy = EnergyBalance()
+        self.energy_sentinel = EnergySentinel(self.energy, dissipates=time.dissipates or contact is not None)
         self.residual_force = np.zeros(self.layout.size)  #: residual of the balance, at held dofs the reaction [N]
         self.target = np.zeros(self.layout.size)
         self.increment = np.zeros(self.layout.size)
@@ -173,8 +174,7 @@ class Structure:
         self.begin_step(t, dt)
         info = self.solve()
         self.end_step()
-        warning = "" if self.constraint is None else self.energy.warning()
-        return replace(info, notes=(*info.notes, warning)) if warning else info
+        return info
 
     def begin_step(self, t: float, dt: float) -> None:
         """Store the state at t [s] and predict that at t + dt."""
@@ -219,12 +219,27 @@ class Structure:
 
     def end_step(self) -> None:
         """Accept the step."""
+        pushed = np.zeros(2)
         if self.constraint is not None:
+            pushed -= self.constraint.obstacle_work
             self.constraint.end_step(self.time.force_weight)
-        du = self.now.u - self.old.u
-        external, damping = self.time.averaged_forces(self)
-        work = self.dot(external, du) + self.dot(self.residual_force, self.held.part(du))
-        self.energy.add_step(work, self.dot(damping, du), *self._energies())
+            pushed += self.constraint.obstacle_work
+        du, now, old, averaged = self.now.u - self.old.u, self.now, self.old, self.time.averaged
+        at_supports, (before, after) = self.held.part(du), self.time.support_forces(self)
+        parts = [
+            averaged(old.loads, now.loads) @ du,
+            averaged(old.surface, now.surface) @ du,
+            0.5 * (before + after) @ at_supports,
+            self.time.damping_force(self) @ du,
+            0.5 * (now.loads - old.loads) @ du,
+            0.5 * (now.surface - old.surface) @ du,
+            0.5 * (after - before) @ at_supports,
+            self.held.free_part(self.residual_force) @ du,
+        ]
+        *works, damping, of_loads, of_surface, of_supports, unsolved = self.comm.allreduce(np.array(parts)).tolist()
+        works.append(float(pushed[0]))
+        doubt = sum(map(abs, (of_loads, of_surface, of_supports, unsolved, float(pushed[1]))))
+        self.energy.add_step(works, damping, *self._energies(), doubt)
 
     def split(self, array: Array) -> list[Array]:
         """Views of the parts of an array of owned dofs, by body."""

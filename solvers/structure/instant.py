@@ -53,6 +53,7 @@ class Moving(Protocol):
     constraint: Constraint | None
     now: Instant
     old: Instant
+    residual_force: Array
     current: Step
 
     @property

@@ -70,12 +70,25 @@ class TimeScheme(Protocol):
         """The out-of-balance force [N] at the present time, which supports carry."""
         ...
 
-    def averaged_forces(self, structure: Moving) -> tuple[Array, Array]:
-        """(external, damping) force [N] in the balance of the step."""
+    def averaged(self, before: Array, after: Array) -> Array:
+        """The mean of loads [N] at both ends of the step that does work in it."""
+        ...
+
+    def damping_force(self, structure: Moving) -> Array:
+        """The force of damping [N] in the balance of the step."""
+        ...
+
+    def support_forces(self, structure: Moving) -> tuple[Array, Array]:
+        """Forces [N] of supports at both ends of the step, whose mean does work on its displacement."""
         ...
 
     def kinetic_energy(self, structure: Moving) -> float:
         """v.M v / 2 [J]."""
+        ...
+
+    @property
+    def dissipates(self) -> bool:
+        """Whether it loses energy by the user's choice."""
         ...
 
 
@@ -83,6 +96,7 @@ class Statics:
     """f_int(u) = f_ext(t): every time step is a load step."""
 
     force_weight = 1.0
+    dissipates = True  #: a state without equilibrium nearby jumps to another one
 
     def massless(self, structure: Moving) -> NDArray[np.int64]:
         return np.empty(0, dtype=np.int64)
@@ -110,9 +124,15 @@ class Statics:
     def reaction(self, structure: Moving) -> Array:
         return structure.now.internal - structure.now.external - structure.now.constraint
 
-    def averaged_forces(self, structure: Moving) -> tuple[Array, Array]:
-        external = 0.5 * (structure.now.external + structure.old.external)
-        return external, np.zeros_like(external)
+    def support_forces(self, structure: Moving) -> tuple[Array, Array]:
+        old = structure.old
+        return old.internal - old.external - old.constraint, self.reaction(structure)
+
+    def averaged(self, before: Array, after: Array) -> Array:
+        return 0.5 * (before + after)
+
+    def damping_force(self, structure: Moving) -> Array:
+        return np.zeros(structure.layout.size)
 
     def kinetic_energy(self, structure: Moving) -> float:
         return 0.0

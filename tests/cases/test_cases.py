@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from programs import on_processes, run_whole
+from programs import on_processes, run_whole, warnings_of
 
 from fsci.case import load_case
 from fsci.case.verify import FIELD_COLUMNS
@@ -65,12 +65,13 @@ BATCHES += [QUICK[i : i + BATCH] for i in range(0, len(QUICK), BATCH)]
     ],
 )
 def test_first_steps(folders, tmp_path):
-    """Three steps; probes, forces and balances of 1 and 2 processes agree."""
+    """Three steps; probes, forces and balances of 1 and 2 processes agree, and no sentinel finds anything."""
     for processes in (1, 2):
         commands = tmp_path / f"{processes}.json"
         commands.write_text(json.dumps([first_steps(folder, tmp_path / str(processes)) for folder in folders]))
         on_processes(processes, RUN_CASES, commands, timeout=600)
     for folder in folders:
+        assert [warnings_of(tmp_path / str(n) / folder.name) for n in (1, 2)] == [[], []], folder.name
         assert_same(folder, *(read_history(tmp_path / str(n) / folder.name / "history.csv") for n in (1, 2)))
 
 

@@ -11,7 +11,9 @@ from solvers.fluid.balances import Balances
 from solvers.fluid.boundary.covered_faces import CoveredFaces
 from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.boundary.wet_faces import wet_face
-from solvers.fluid.probes import flow_rate, mass_balance
+from solvers.fluid.conservation.regions import RegionsOfCut
+from solvers.fluid.conservation.volume_balance import VolumeBalance
+from solvers.fluid.probes import flow_rate
 from solvers.gauss import gauss
 
 MU = 0.7
@@ -86,7 +88,7 @@ def test_flow_rate_beside_a_corner_that_has_left(element):
     assert fluid.grid.sheets is not None
     covered = wet_face(fluid.grid.grid, "x+", gauss(3)[0], fluid.cut.facets, fluid.cut.motion).weights
     assert flow_rate(fluid)(["out"]) == pytest.approx(1.0 - 0.2 * (1.0 - covered.sum()), abs=1e-11)
-    assert mass_balance(fluid)()["fluid.mass"] == pytest.approx(0.0, abs=1e-11)
+    assert VolumeBalance(fluid, RegionsOfCut(fluid)).numbers()["fluid.mass"] == pytest.approx(0.0, abs=1e-11)
 
 
 @pytest.mark.parametrize("side", [0, 1])

@@ -9,7 +9,8 @@ from fluid_setup import step
 from mpi4py import MPI
 from programs import on_processes
 
-from solvers.fluid.probes import mass_balance
+from solvers.fluid.conservation.regions import RegionsOfCut
+from solvers.fluid.conservation.volume_balance import VolumeBalance
 
 PROGRAM = Path(__file__).parents[1] / "setups" / "fluid_parallel.py"
 
@@ -86,7 +87,7 @@ def test_a_restored_state_gives_the_same_step():
 def test_no_fluid_is_lost(closed):
     """What flows out of the box is what the moving body displaces; in a closed box data decide, to O(h^2)."""
     fluid = scene(2, "q1q1", MPI.COMM_SELF, "closed" if closed else "channel")
-    balance = mass_balance(fluid)
+    balance = VolumeBalance(fluid, RegionsOfCut(fluid)).numbers
     step(fluid, 0.0, 0.03)
     assert abs(balance()["fluid.mass"]) < (2e-3 if closed else 1e-10)
     assert len(everything(fluid)) == 2

@@ -9,7 +9,9 @@ from solvers.fluid.background.grid import Grid, uniform
 from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.boundary.wet_faces import wet_face
-from solvers.fluid.probes import mass_balance, on_patch
+from solvers.fluid.conservation.regions import RegionsOfCut
+from solvers.fluid.conservation.volume_balance import VolumeBalance
+from solvers.fluid.probes import on_patch
 
 POINTS = np.polynomial.legendre.leggauss(3)[0] / 2.0 + 0.5
 
@@ -105,7 +107,7 @@ def test_rates_of_a_body_that_leaves(element):
     rate, pressure, balance = (
         on_patch(fluid, "flow_rate", "out"),
         on_patch(fluid, "pressure", "out"),
-        mass_balance(fluid),
+        VolumeBalance(fluid, RegionsOfCut(fluid)).numbers,
     )
     for number in range(8):
         step(fluid, 0.05 * number, 0.05)
@@ -129,4 +131,4 @@ def test_a_sphere_in_an_inlet():
         initial_velocity=field(1, 0, 0), comm=MPI.COMM_SELF,
     )  # fmt: skip
     step(fluid, 0.0, 0.02)
-    assert abs(mass_balance(fluid)()["fluid.mass"]) < 1e-9
+    assert abs(VolumeBalance(fluid, RegionsOfCut(fluid)).numbers()["fluid.mass"]) < 1e-9

@@ -11,8 +11,9 @@ from solvers.distributed import Nodal, gather_nodal
 from solvers.fluid.background.grid import uniform
 from solvers.fluid.background.nested import RefinedBox, RefinedSurface, refined
 from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.conservation.regions import RegionsOfCut
+from solvers.fluid.conservation.volume_balance import VolumeBalance
 from solvers.fluid.extreme_pressure import extreme_pressure
-from solvers.fluid.probes import mass_balance
 
 
 def scene(dim, element, comm, box="channel"):
@@ -70,7 +71,7 @@ def main(dim, element, box, out):
     for number in range(4):
         step(fluid, 0.03 * number, 0.03)
     force = fluid.force()
-    balance = mass_balance(fluid)()["fluid.mass"]
+    balance = VolumeBalance(fluid, RegionsOfCut(fluid)).numbers()["fluid.mass"]
     extremes = [extreme_pressure(fluid, which)()[""] for which in ("largest", "least")]
     found = everything(fluid)
     if fluid.comm.rank == 0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -36,13 +37,20 @@ def fsci(*arguments, processes: int = 1, timeout: float = 600.0) -> subprocess.C
 
 
 def run_whole(name: str, folder, *changes: str, processes: int = 1, timeout: float = 1200.0) -> str:
-    """Run a case to its end, without fields; returns its output. None of the numbers that it verifies is missed."""
+    """Run a case to its end, without fields; returns its output. It verifies all numbers, and sentinels are silent."""
     words = [word for change in ("output.fields_every=0", *changes) for word in ("--set", change)]
     run = fsci("run", f"cases/{name}", "-o", folder, *words, processes=processes, timeout=timeout)
     assert run.returncode == 0, run.stdout[-3000:]
     assert "verify ok" in run.stdout
     assert "MISSED" not in run.stdout
+    assert warnings_of(folder) == []
     return run.stdout
+
+
+def warnings_of(out) -> list[dict]:
+    """What the sentinels of a run have found."""
+    found: list[dict] = json.loads((Path(out) / "summary.json").read_text())["warnings"]
+    return found
 
 
 def on_processes(processes: int, *program, timeout: float = 600.0) -> subprocess.CompletedProcess[str]:

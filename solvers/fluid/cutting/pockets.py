@@ -35,10 +35,7 @@ def find_pockets(
     vertex are connected, because they share unknowns, also across `periodic` axes.
     """
     own = cut.active[cut.active < grid.owned]
-    if grid.joined:
-        labels, count = connected_cells(grid, own)
-    else:
-        labels, count = _join(grid, *_label(grid, own), periodic)
+    labels, count = regions(grid, own, periodic)
     at_elastic = elastic[cut.facets[cut.pieces.facet]].any(axis=1)
     marks = np.zeros((3, count + 1), dtype=np.int64)  # open cells, elastic pieces, cells of each part
     np.add.at(marks[0], labels[is_open], 1)
@@ -48,6 +45,18 @@ def find_pockets(
     closed = [part for part in range(1, count + 1) if not marks[0, part]]
     largest = max(closed, key=lambda part: marks[2, part], default=0)
     return [Pocket(labels == part, part == largest, bool(marks[1, part])) for part in closed]
+
+
+def regions(
+    grid: DistributedGrid, own: NDArray[np.int32], periodic: Sequence[int] = ()
+) -> tuple[NDArray[np.int64], int]:
+    """Connected parts of sorted owned cells: (part of each local cell, from 1 on, 0 for others; count) (collective).
+
+    Cells that share a vertex are connected. The parts have the same numbers on any number of processes.
+    """
+    if grid.joined:
+        return connected_cells(grid, own)
+    return _join(grid, *_label(grid, own), periodic)
 
 
 def _label(grid: DistributedGrid, own: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

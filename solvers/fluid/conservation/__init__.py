@@ -1,0 +1,1 @@
+"""What the fluid conserves: volumes of closed pockets, flow through walls, and the sentinels that look at them."""
