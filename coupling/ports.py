@@ -224,7 +224,7 @@ class Flow(Part, Protocol):
         ...
 
     def balances(self) -> tuple[Array, float, float]:
-        """(force [N] on all bodies by the balance of momentum, (dim,); power [W] lost by the method, power of patches)."""
+        """(force [N] on all bodies by the balance of momentum, (dim,); power [W] lost by the method; of patches)."""
         ...
 
     def unsolved(self) -> tuple[float, float]:

@@ -48,9 +48,9 @@ class InterfaceSentinel:
             found.append(Finding("energy", "interface", balance.work, message))
         if self._missed > max(SHARE * self._impulse, self._unsolved):
             message = (
-                f"the forces of the fluid on the bodies differ from its balance of momentum by {balance.momentum:.3g} N, "
-                f"{self._missed:.3g} of {self._impulse:.3g} N s so far: forces are not reliable. Take a smaller "
-                "tolerance of Newton's method, or finer cells"
+                "the forces of the fluid on the bodies differ from its balance of momentum by "
+                f"{balance.momentum:.3g} N, {self._missed:.3g} of {self._impulse:.3g} N s so far: forces are not "
+                "reliable. Take a smaller tolerance of Newton's method, or finer cells"
             )
             found.append(Finding("momentum", "fluid", balance.momentum, message))
         return found
