@@ -27,7 +27,7 @@ class Coupled:
         self.notes: list[str] = []  #: notes to the user on the start
         self.interface = Interface(solid, flow.scheme.times, dry_sides, layers)
         self.balance = Balance(flow, solid, self.interface)
-        self.sentinel = InterfaceSentinel(self.balance, steady=flow.steady)
+        self.sentinel = InterfaceSentinel(self.balance, solid, steady=flow.steady)
 
     def initialise(self, t: float, dt: float, *, with_solid: bool = False) -> None:
         """Set both parts to the first time, and cut the flow by the solid; with_solid: see `Flow.move`."""

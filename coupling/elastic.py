@@ -103,6 +103,9 @@ class Elastic:
     def moved(self) -> Array:
         return self.at_vertices(self.structure.now.u - self.structure.old.u).ravel()
 
+    def exchanged(self) -> float:
+        return self.structure.energy.exchanged
+
     def at_vertices(self, owned: Array) -> Array:
         """Values at the vertices from those at owned dofs of the structure, shape (n, dim)."""
         return gather_at(self.comm, owned, self.structure.layout.start, self.dofs)

@@ -136,6 +136,10 @@ class Solid(Part, Protocol):
         """Displacement of the last step, on which `taken` does work, shape (m,)."""
         ...
 
+    def exchanged(self) -> float:
+        """Energy [J] that has changed its form or its body so far: half of the sum of all |changes| and works."""
+        ...
+
     def row_transformation(self) -> RowTransformation | None:
         """The transformation of its rows that eliminates contact multipliers; None if no surfaces are near."""
         ...

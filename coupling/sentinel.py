@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from coupling.balance import Balance
+from coupling.ports import Solid
 from solvers.api import Finding, State
 
 #: Share of the energy and of the impulse that have passed above which there is a warning.
@@ -19,9 +20,9 @@ SHARE = 0.05
 class InterfaceSentinel:
     """Implements `Sentinel`."""
 
-    def __init__(self, balance: Balance, *, steady: bool):
+    def __init__(self, balance: Balance, solid: Solid, *, steady: bool):
         """steady: nothing moves, so that no energy passes."""
-        self._balance, self._steady = balance, steady
+        self._balance, self._solid, self._steady = balance, solid, steady
         #: energy that has passed at surfaces or at walls and patches, whichever is more, sum over steps [J]
         self._passed = 0.0
         self._impulse = 0.0  #: of the fluid on all vertices, sum of absolute values [N s]
@@ -39,18 +40,19 @@ class InterfaceSentinel:
         self._impulse += dt * balance.load
         self._missed += dt * balance.momentum
         self._unsolved += dt * balance.unsolved
-        if not self._steady and balance.work - last > SHARE * self._passed:
+        exchanged = max(self._passed, self._solid.exchanged())
+        if not self._steady and balance.work - last > SHARE * exchanged:
             message = (
                 f"at the surfaces in the fluid {balance.work:.3g} J were made of nothing, "
-                f"{balance.work / self._passed:.0%} of the energy that has passed between fluid and bodies: the step "
+                f"{balance.work / exchanged:.0%} of the energy that the scene has exchanged: the step "
                 "does not resolve how they move; take a smaller 'step', or 'scheme: bdf2' with smooth starts"
             )
             found.append(Finding("energy", "interface", balance.work, message))
         if self._missed > max(SHARE * self._impulse, self._unsolved):
             message = (
                 "the forces of the fluid on the bodies differ from its balance of momentum by "
-                f"{balance.momentum:.3g} N, {self._missed:.3g} of {self._impulse:.3g} N s so far: forces are not reliable. Take a smaller "
-                "tolerance of Newton's method, or finer cells"
+                f"{balance.momentum:.3g} N, {self._missed:.3g} of {self._impulse:.3g} N s so far: forces are not "
+                "reliable. Take a smaller tolerance of Newton's method, or finer cells"
             )
             found.append(Finding("momentum", "fluid", balance.momentum, message))
         return found

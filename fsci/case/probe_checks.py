@@ -157,6 +157,7 @@ def verify_mistakes(case: Case) -> Iterator[Mistake]:
     for i, check in enumerate(case.verify):
         keys: Keys = ("verify", i)
         found_later = case.contact is not None and case.contact.bodies is not None and check.value[:8] == "contact."
+        found_later |= case.fluid is not None and check.value.startswith("fluid.pocket_")
         if check.value not in columns and not found_later:
             hint = did_you_mean(check.value, columns)
             yield (*keys, "value"), f"there is no value '{check.value}'{hint}"

@@ -70,6 +70,7 @@ class RigidBodies:
             free[index, body.held_components] = False
         self._free = free[:, self.components].ravel()
         self.balance = np.zeros(self.unknowns)
+        self._exchanged = 0.0  # [J]
         self._noise: Array | None = None  #: rounding errors of the balance; None before this step linearises
 
     # ------------------------------------------------------------------------------------------------- steps
@@ -142,6 +143,15 @@ class RigidBodies:
 
     def end_step(self) -> None:
         """Accept the step; with contact, velocities and rates of momentum are those after the impact."""
+        self._end_contact()
+        for body, now, old in zip(self.bodies, self.now, self.old, strict=True):
+            self._exchanged += abs(motion.kinetic_energy(body, now) - motion.kinetic_energy(body, old))
+
+    def exchanged(self) -> float:
+        """Sum of all changes of kinetic energy [J]: what others have given and taken."""
+        return self._exchanged
+
+    def _end_contact(self) -> None:
         self.balance = self._own_balance()
         if self.contact is None or not self.contact.active.any():
             return
@@ -365,10 +375,10 @@ class RigidBodies:
 
     def save(self) -> State:
         parts = {body.name: now.arrays() for body, now in zip(self.bodies, self.now, strict=True)}
-        return {"bodies": parts, "on_surface": self.on_surface.copy()}
+        return {"bodies": parts, "on_surface": self.on_surface.copy(), "exchanged": self._exchanged}
 
     def restore(self, state: State) -> None:
         self.now = [
             RigidInstant(**{k: a.copy() for k, a in state["bodies"][body.name].items()}) for body in self.bodies
         ]
-        self.on_surface = state["on_surface"].copy()
+        self.on_surface, self._exchanged = state["on_surface"].copy(), state["exchanged"]

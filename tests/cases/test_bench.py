@@ -171,6 +171,12 @@ def test_idle_row():
     assert row["ratio"] == pytest.approx(row["with [ms]"] / row["without [ms]"])
 
 
+def test_idle_row_of_sentinels():
+    """They change no Newton step."""
+    row = idle.measure_sentinels("flow", idle.WATCHED["flow with a moved disc, sentinels"], steps=10)
+    assert row["newton with"] == row["newton without"]
+
+
 @pytest.mark.slow
 def test_schemes_of_coupling_find_the_same_flag():
     """FSI1 on half the cells: Aitken's, the quasi-Newton and the monolithic scheme have one error."""

@@ -56,7 +56,7 @@ def test_settings_in_backticks_exist(page):
     for text in in_backticks(page):
         section, dot, rest = text.partition(".")
         if dot and section in SECTIONS and re.fullmatch(r"[\w.]+", rest) and not rest.endswith(SUFFIXES):
-            column = text in COLUMNS or re.fullmatch(r"contact\.\w+\.[xyz]", text)
+            column = text in COLUMNS or re.fullmatch(r"contact\.\w+\.[xyz]|fluid\.pocket_\d", text)
             assert has_setting(text.split("."), SCHEMA) or column, text
         value = parsed(text) if re.match(r"\w+: ", text) else None
         if isinstance(value, dict):

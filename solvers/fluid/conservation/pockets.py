@@ -28,7 +28,7 @@ CHANGE = 0.005
 
 
 @dataclass
-class Pocket:
+class WatchedPocket:
     """A pocket with the volume that it should have."""
 
     name: str
@@ -46,7 +46,7 @@ class Pockets:
         self._fluid, self._regions, self._rate = fluid, regions, flow_rate(fluid)
         self._given = [patch.name for patch in fluid.boundary.patches if patch.record.value == "velocity"]
         self._wet = fluid.surfaces.wet
-        self._pockets: list[Pocket] = []
+        self._pockets: list[WatchedPocket] = []
         self._columns = 0  #: pockets at the start
         self._count = 0  #: pockets so far
 
@@ -79,7 +79,7 @@ class Pockets:
     def _add(self, t: float, volume: float, cells: Indices, surface: Indices | None = None) -> None:
         self._count += 1
         due = [volume] * max(1, self._fluid.settings.time.times)
-        self._pockets.append(Pocket(_name(self._count), t, volume, cells, due, surface))
+        self._pockets.append(WatchedPocket(_name(self._count), t, volume, cells, due, surface))
 
     def _cells_in(self, cavity: Cavity, found: Regions) -> Indices:
         """Numbers in the box of cells full of fluid in a cavity (collective).
@@ -114,7 +114,7 @@ class Pockets:
         own = overlaps(self._fluid, found, [pocket.cells for pocket in self._pockets])
         return [-self._rate(self._given, np.append(row, False)[found.of_cell]) for row in own]
 
-    def _finding(self, pocket: Pocket) -> Finding | None:
+    def _finding(self, pocket: WatchedPocket) -> Finding | None:
         change = pocket.volume / pocket.due[0] - 1.0 if pocket.due[0] > 0.0 else 0.0
         if abs(change) <= CHANGE:
             return None
@@ -128,7 +128,7 @@ class Pockets:
         )
         return Finding("pocket", pocket.name, change, message, where=where)
 
-    def _middle(self, pocket: Pocket) -> tuple[float, ...]:
+    def _middle(self, pocket: WatchedPocket) -> tuple[float, ...]:
         low, size = place_of(self._fluid.grid.grid, pocket.cells)
         return tuple((low + 0.5 * size).mean(axis=0).tolist())
 
@@ -185,7 +185,7 @@ class Pockets:
         surfaces = iter(_unpacked(state["surfaces"]))
         numbers = zip(*(state[name] for name in ("names", "since", "volume", "due", "is_cavity")), strict=True)
         self._pockets = [
-            Pocket(name, since, volume, cells, list(due), next(surfaces) if is_cavity else None)
+            WatchedPocket(name, since, volume, cells, list(due), next(surfaces) if is_cavity else None)
             for (name, since, volume, due, is_cavity), cells in zip(numbers, _unpacked(state["cells"]), strict=True)
         ]
 
