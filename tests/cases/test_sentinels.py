@@ -91,7 +91,9 @@ fluid:
     outlet: {on: x+, outflow: true}
     walls: {on: [y-, y+], no_slip: true}
   bodies:
-    wall: {mesh: {shape: rectangle, size: [0.4, 1.3], cells: [2, 4], origin: [0.93, -0.15]}}
+    gate:
+      mesh: {shape: rectangle, size: [0.4, 1.3], cells: [2, 4], origin: [0.93, 0.3]}
+      motion: {displacement: [0, "-2.25*t"]}
 probes:
   q: {quantity: flow_rate, through: outlet}
   inside: {quantity: pressure, at: [0.5, 0.5]}
@@ -100,11 +102,12 @@ output: {fields_every: 0}
 
 
 def test_inflow_that_cannot_leave_is_reported(tmp_path):
+    """A gate closes the channel in the second step."""
     run(tmp_path, CHANNEL)
     (found,) = warnings_of(tmp_path / "out")
-    assert (found["kind"], found["body"], found["time"]) == ("mass", "fluid", 0.1)
+    assert (found["kind"], found["body"], found["time"]) == ("mass", "fluid", 0.2)
     assert "has no open patch" in found["message"]
-    run(tmp_path / "open", CHANNEL.replace("[0.4, 1.3]", "[0.4, 0.6]"))
+    run(tmp_path / "open", CHANNEL.replace("-2.25*t", "-1*t"))
     assert warnings_of(tmp_path / "open" / "out") == []
 
 
