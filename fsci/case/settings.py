@@ -80,5 +80,5 @@ def _text(value: Any) -> str:
         case dict() if next(iter(value)).isdigit():
             return _text(list(value.values()))
         case dict():
-            return f"{{{', '.join(f'{name}: {_text(inner)}' for name, inner in value.items() if inner is not None)}}}"
+            return f"{{{', '.join(f'{name}: {_text(inner)}' for name, inner in value.items() if inner not in _NONE)}}}"
     return str(value)

@@ -29,6 +29,7 @@ COPIES = ("meshes", "curves")  #: folders of files that the case names and that 
 UNFINISHED = ".tmp"  #: ending of the names of files that are being written
 
 _LINK = "is a link, and no link in a results folder is followed: put the file itself here, or remove the link"
+_FILE, _FOLDER = "is a folder, not a file: remove it", "is a file, not a folder: remove it"
 _SPECIAL = "is neither a file nor a folder: remove it"
 
 
@@ -48,6 +49,8 @@ def require_own(out: Path) -> None:
         name = entry.name.removesuffix(UNFINISHED)
         if name in (*FILES, *FOLDERS, *COPIES, MARKER, LOCK):
             _require_plain(entry)
+            if entry.is_dir() != (entry.name in (*FOLDERS, *COPIES)):
+                raise refused(Path(entry.path), _FILE if entry.is_dir() else _FOLDER)
 
 
 def _require_plain(entry: os.DirEntry[str]) -> None:

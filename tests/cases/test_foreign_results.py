@@ -96,6 +96,18 @@ def test_pipes_do_not_make_it_wait(out, name):
         assert f"{out / name}: is neither a file nor a folder: remove it" in done.stderr
 
 
+def test_folders_called_like_files(out, capsys):
+    for name in (".fsci-lock", "report.html.tmp", "STOP"):
+        (out / name).unlink(missing_ok=True)
+        (out / name).mkdir()
+        assert execute(["resume", str(out), "--set", "time.end=2"]) == 2
+        assert capsys.readouterr().err == f"{out / name}: is a folder, not a file: remove it\n"
+        (out / name).rmdir()
+    (out / "pictures").write_text("a picture")
+    assert execute(["plot", str(out)]) == 2
+    assert capsys.readouterr().err == f"{out / 'pictures'}: is a file, not a folder: remove it\n"
+
+
 def test_hard_links_are_not_written_into(out):
     for end, name in enumerate(("log.txt", "history.csv", "summary.json", "fields/plate.pvd"), 2):
         shutil.copy(out / name, out.parent / "copy")
