@@ -59,7 +59,8 @@ def test_a_rotation(tmp_path):
 @pytest.mark.parametrize("speed", ["1e12", "1e200"])
 def test_a_body_that_is_gone(speed, tmp_path):
     """As an iterate that diverges: no more layers of cells than there are, and a run that ends."""
-    (tmp_path / "case.yaml").write_text(CASE.replace("SPEED", speed))
+    opened = CASE.replace("x+, y-", "y-").replace("  bodies:", "    out: {on: x+, outflow: true}\n  bodies:")
+    (tmp_path / "case.yaml").write_text(opened.replace("SPEED", speed))
     assert run_case(load_case(tmp_path / "case.yaml", [("time.retry.halvings", "0")]), tmp_path / "out") in (0, FAILED)
 
 
