@@ -251,11 +251,8 @@ def _has_period(case: Case) -> bool:
 
 
 def _against_grid(case: Case, found: Findings, keys: Keys, mesh: Mesh, *, moves: bool) -> None:
-    """Warnings about the size and the position of a body in the flow."""
+    """Warnings about the size of a body in the flow."""
     assert case.fluid is not None
-    low, high = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
-    if (mesh.points.max(axis=0) <= low).any() or (mesh.points.min(axis=0) >= high).any():
-        found.warnings.append(f"{case.place(*keys)}: the body is outside of the fluid's box")
     if keys[-1] in (case.coupling.dry_side if case.coupling is not None else ()):
         return
     if warning := thin_body(case, case.fluid, thickness(mesh), _length(mesh), moves=moves):

@@ -87,7 +87,10 @@ def around_box(case: Case, bodies: list[Placed]) -> Iterator[Said]:
             yield body.keys, _sizes("the body is", ratio, "the box")
             continue
         x_low, x_high = body.box
-        if not body.moves or (x_high <= low).any() or (x_low >= high).any() or body.name in dry:
+        outside = bool((x_high <= low).any() or (x_low >= high).any())
+        if outside and not _driven(case, body.name):
+            yield body.keys, "the body is outside of the fluid's box"
+        if not body.moves or outside or body.name in dry:
             continue
         for face in symmetric:
             axis = "xyz".index(face[0])
@@ -98,6 +101,12 @@ def around_box(case: Case, bodies: list[Placed]) -> Iterator[Said]:
             remedy = "cut the mesh there" if not body.elastic else "cut the mesh there and give it 'symmetry: true'"
             length = f"{beyond:.3g} {case.units.length}"
             yield body.keys, f"the body reaches {length} beyond the plane of symmetry '{face}': {counts}; {remedy}"
+
+
+def _driven(case: Case, name: str) -> bool:
+    """Whether a rigid body has a prescribed motion, which may bring it into the box."""
+    body = None if case.fluid is None else case.fluid.bodies.get(name)
+    return body is not None and body.motion is not None
 
 
 def pair_sizes(bodies: list[Placed], pairs: dict[str, PairSection]) -> Iterator[Said]:

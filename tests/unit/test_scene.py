@@ -102,6 +102,32 @@ def test_depth():
         assert not inside(x - 3.0, x[facets]).any()
 
 
+# --- bodies outside of the box
+
+OUTSIDE = """\
+time: {step: 0.1, end: 0.2}
+fluid:
+  density: 1
+  viscosity: 0.1
+  grid: {from: [0, 0], to: [2, 1], cells: [40, 20]}
+  patches: {a: {on: [x-, x+], outflow: true}, w: {on: [y-, y+], no_slip: true}}
+  bodies:
+    rest: {mesh: {shape: disc, radius: 0.2, cells: [16, 1], translate: [5, 5]}}
+    driven: {mesh: {shape: disc, radius: 0.2, cells: [16, 1], translate: [-0.5, 0.5]}, motion: {displacement: [t, 0]}}
+    free: {mesh: {shape: disc, radius: 0.2, cells: [16, 1], translate: [1, 5]}, free: {density: 2}}
+coupling: {}
+"""
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_bodies_outside_of_the_box():
+    """One that is driven may come in."""
+    found = [f"case.yaml:{line}:11: the body is outside of the fluid's box" for line in (8, 10)]
+    assert warnings(OUTSIDE) == (found, [])
+    inside_of_it = OUTSIDE.replace("[5, 5]", "[0.5, 0.5]").replace("[1, 5]", "[1.5, 0.5]")
+    assert warnings(inside_of_it) == ([], [])
+
+
 # --- bodies that nothing holds
 
 LOOSE = """\
