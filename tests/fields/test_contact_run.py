@@ -106,7 +106,8 @@ def test_resume_is_bitwise(text, end, tmp_path, plate, collision):
         assert np.array_equal(whole[name], resumed[name]), name
     (one, _), (two, _) = (read_checkpoint(folder / "checkpoint") for folder in (straight, out))
     contacts = [state["scheme"]["contact"] for state in (one, two)]
-    for first, second in (contacts, [contact.pop("work") for contact in contacts]):
+    works = [[contact.pop(name) for contact in contacts] for name in ("work", "obstacle_work")]
+    for first, second in (contacts, *works):
         for name, value in first.items():
             assert np.array_equal(value, second[name]), name
     for name in ("u", "v", "a"):
