@@ -67,7 +67,8 @@ def _label(grid: DistributedGrid, own: NDArray[np.int32]) -> tuple[NDArray[np.in
     low, shape, indices = grid.window
     window = np.zeros(int(np.prod(shape)), dtype=bool)
     window[indices[own]] = True
-    found, count = ndimage.label(window.reshape(shape), np.ones((3,) * grid.dim)) if len(own) else (window, 0)
+    none = np.zeros(len(window), dtype=np.int64), 0
+    found, count = ndimage.label(window.reshape(shape), np.ones((3,) * grid.dim)) if len(own) else none
     found = found.ravel()
     labels = np.zeros(len(grid.numbers), dtype=np.int64)
     labels[own] = found[indices[own]]
