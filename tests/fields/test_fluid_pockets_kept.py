@@ -12,6 +12,7 @@ from solvers.fluid.conservation import pockets as module
 from solvers.fluid.conservation.cavities import enclosed, find_cavities
 from solvers.fluid.conservation.pockets import Pockets
 from solvers.fluid.conservation.regions import Regions, RegionsOfCut
+from solvers.fluid.cutting.pockets import regions
 
 TIGHT = Patch("walls", ("x-", "x+", "y-", "y+"), "no_slip")
 OPEN = Patch("open", ("x+",), "outflow")
@@ -83,6 +84,13 @@ def test_a_ring_that_is_squeezed_by_its_data_is_found():
     assert found.where == pytest.approx((0.0, 0.0), abs=1e-9)
     assert "closed pocket 1 of the fluid, around (" in found.message
     assert "has 0.76977 m^2 instead of 0.7854 since it closed at t = 0 (-1.99%)" in found.message
+
+
+def test_a_process_whose_cells_are_all_solid():
+    grid = make_fluid(uniform([0, 0], [1, 1], [4, 4]), [TIGHT]).grid
+    labels, count = regions(grid, np.empty(0, dtype=np.int32))
+    assert count == 0
+    assert not labels.any()
 
 
 def piston(speed):
