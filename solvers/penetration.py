@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.contact.search import Search
 from solvers.distance import distances_in_pairs
+from solvers.search import Search
 
 
 def inside(points: Array, corners: Array) -> NDArray[np.bool_]:

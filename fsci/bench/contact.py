@@ -14,9 +14,9 @@ from fsci.bench.program import run_case
 from fsci.bench.search import measure_search
 from fsci.bench.table import Row
 from solvers.cell_types import CELL_TYPES
-from solvers.contact.search import Search
 from solvers.kernels import mortar, nodal_normals
 from solvers.mesh_topology import surface_facets
+from solvers.search import Search
 
 TORI = Path(__file__).parents[2] / "cases" / "two_tori"
 

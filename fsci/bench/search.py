@@ -8,8 +8,8 @@ from time import perf_counter
 import numpy as np
 
 from solvers.api import Array
-from solvers.contact.search import Facets
 from solvers.kernels import KdopTree3
+from solvers.search import Facets
 
 
 def measure_search(facets: int) -> dict[str, float]:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from solvers.contact.contact import Contact
     from solvers.contact.results import PartFields
     from solvers.structure.body import Body
+    from solvers.structure.field import Structure
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
         case = with_pairs(case, comm)
     if case.fluid is not None:
-        from fsci.builder.fluid import on_first
+        from fsci.builder.on_first import on_first
         from fsci.meshes.enclosed import require_outlet
 
         on_first(comm, partial(require_outlet, case))
@@ -58,7 +59,6 @@ def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
 
 def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
-    from fsci.builder.sentinels import build_sentinels
     from fsci.builder.structure import build_bodies, build_probes, build_structure
     from solvers.structure.snapshot import snapshots
 
@@ -74,12 +74,21 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         dofs={"structure": structure.dofs()},
         notes=_notes(bodies),
         sentinels={
-            **build_sentinels(case, comm, structure=structure, contact=contact),
+            **_of_bodies(case, comm, structure, contact),
             "energy": structure.energy_sentinel,
         },
         take_materials=structure.take_materials,
         imbalance=lambda: {} if contact is None else contact.imbalance,
     )
+
+
+def _of_bodies(case: Case, comm: MPI.Comm, structure: Structure, contact: Contact | None) -> dict[str, Sentinel]:
+    """Sentinels of a structure; one body alone has nothing to meet."""
+    if contact is None and len(structure.bodies) == 1:
+        return {}
+    from fsci.builder.sentinels import build_sentinels
+
+    return build_sentinels(case, comm, structure=structure, contact=contact)
 
 
 def _contact(case: Case, comm: MPI.Comm, bodies: list[Body]) -> Contact | None:

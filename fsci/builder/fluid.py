@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fsci.builder.columns import Numbers, columns
+from fsci.builder.on_first import on_first
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.contact import FilmSection
@@ -111,20 +111,6 @@ def _with_layer(case: Case, body: ImmersedBody) -> ImmersedBody:
 def read_surface(case: Case, name: str, comm: MPI.Comm) -> tuple[Array, NDArray[np.int64]]:
     """Points [m] and facets of a rigid body, whole on every process. Raises CaseError (collective)."""
     return on_first(comm, lambda: read_rigid_body(case, name)[1:])
-
-
-def on_first(comm: MPI.Comm, read: Callable[[], Any]) -> Any:
-    """The result of reading on the first process, or its exception, on every process (collective)."""
-    found: Any = None
-    if comm.rank == 0:
-        try:
-            found = read()
-        except Exception as raised:  # raised on every process below
-            found = raised
-    found = comm.bcast(found, root=0)
-    if isinstance(found, Exception):
-        raise found
-    return found
 
 
 def _body(case: Case, name: str, comm: MPI.Comm) -> ImmersedBody:

@@ -10,13 +10,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fsci.builder.contact import motion_of_obstacle
-from fsci.builder.fluid import on_first
+from fsci.builder.on_first import on_first
 from fsci.case import Case
 from fsci.case.fluid import PatchSection
 from fsci.meshes.of_case import read_obstacle
 from solvers.api import Sentinel
-from solvers.fluid.bodies.immersed import ImmersedBody
 from solvers.sentinels.bodies import MovingBody
 from solvers.sentinels.overlaps import Meeting, Overlaps
 from solvers.sentinels.walls import BoxWalls, Wall
@@ -24,6 +22,7 @@ from solvers.tessellation import tessellate
 
 if TYPE_CHECKING:
     from solvers.contact.contact import Contact
+    from solvers.fluid.bodies.immersed import ImmersedBody
     from solvers.rigid.field import RigidBodies
     from solvers.structure.field import Structure
 
@@ -106,7 +105,11 @@ def _positions_of(motion: Callable[[float], Any]) -> Callable[[float], Array]:
 
 
 def _obstacles(case: Case, comm: MPI.Comm) -> Iterator[MovingBody]:
-    for name in {} if case.contact is None else case.contact.obstacles:
+    if case.contact is None:
+        return
+    from fsci.builder.contact import motion_of_obstacle
+
+    for name in case.contact.obstacles:
         facets, _, points = on_first(comm, partial(_obstacle, case, name))
         motion = motion_of_obstacle(case, name, points) or partial(_at_rest, points)
         yield MovingBody(name, facets, motion, free=False)

@@ -88,8 +88,10 @@ class Clock:
         """Restore a saved clock; with another step size or end, it begins to count at the saved time."""
         self.accepted, self.step = state["accepted"], state["step"]
         self.level = min(state["level"], self.halvings)
-        if (state["given"], state["end"]) == (self.given, self.end):
-            self.start, self.nominal, self.tick = state["start"], state["nominal"], state["tick"]
-        if self.time != state["time"]:  # also if steps may be halved less often, which changes the ticks
+        self.start, self.tick = state["start"], state["tick"]
+        same = (state["given"], state["end"]) == (self.given, self.end)
+        self.nominal = state["nominal"] if same else shared(self.end - self.start, self.given)
+        # the last step may have been shorter or longer; halvings change the ticks
+        if abs(self.time - state["time"]) > 1e-9 * self.size:
             self.start, self.tick, self.level, self.accepted = state["time"], 0, 0, 0
             self.nominal = shared(self.end - self.start, self.given)

@@ -77,11 +77,7 @@ class Contact:
         self.slip: Slip | None = None  # at the latest evaluation
         self._weight = 1.0  # of the new contact force in the balance
         self.work = FrictionWork((count, self.dim))
-        parts = zip(self.interface.surfaces, self.nodes.of_surface, strict=True)
-        obstacles = [numbers for surface, numbers in parts if surface.motion is not None]
-        self._of_obstacles = ObstacleWork(
-            np.unique(np.concatenate([np.empty(0, dtype=np.int64), *obstacles])), self.dim
-        )
+        self._of_obstacles = ObstacleWork(np.flatnonzero(self.nodes.dofs[:, 0] < 0), self.dim)
         self.time = np.nan  #: of the latest evaluation [s]
         self.touched_at = np.full(len(self.pairs), np.inf)  #: time of the first contact of each pair [s], set by probes
         self.terms: Terms | None = None

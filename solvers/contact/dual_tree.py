@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
-from solvers.contact.search import OPPOSED
+from solvers.search import OPPOSED
 from solvers.tessellation import unit_normals
 
 #: Two normals whose product with a common unit vector exceeds this are not opposed: cos(2 a) = OPPOSED.

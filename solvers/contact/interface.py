@@ -14,9 +14,9 @@ from solvers.contact.law.law import Law
 from solvers.contact.mortar import FacetSearch, Mortar, join_masters
 from solvers.contact.pair import Pair
 from solvers.contact.patch import Multipliers, SlavePatch, number_multipliers
-from solvers.contact.search import Search
 from solvers.contact.self_search import SelfSearch
 from solvers.contact.surface import ContactNodes, Surface, longest_edge, number_nodes
+from solvers.search import Search
 from solvers.sparse import Sparse, sparse
 
 #: T with N~ = N T over all nodes, and its inverse.

@@ -13,9 +13,9 @@ from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
 from solvers.contact.blocks import expand
 from solvers.contact.patch import SlavePatch
-from solvers.contact.search import OPPOSED
 from solvers.contact.surface import Surface
 from solvers.kernels import MortarResult, mortar
+from solvers.search import OPPOSED
 from solvers.sparse import Sparse, nothing, sparse, stack
 
 #: Largest distance to a master at which slave facets take part, relative to the longest edge; the motion is added.

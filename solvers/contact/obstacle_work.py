@@ -12,7 +12,7 @@ class ObstacleWork:
     """Work on the bodies, summed over steps, by the mean of the forces at both ends of each."""
 
     def __init__(self, nodes: NDArray[np.int64], dim: int):
-        """nodes: those of the moved obstacles."""
+        """nodes: those of the obstacles, which may begin to move when a run is resumed."""
         self._nodes = nodes
         self._force = np.zeros((len(nodes), dim))  # on the obstacles at the end of the last step [N]
         self.total = 0.0  #: [J]

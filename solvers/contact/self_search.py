@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from solvers.api import Array, StepFailed
 from solvers.contact.dual_tree import DualTree
 from solvers.contact.roles import MASTER, SLAVE, choose_roles
-from solvers.contact.search import OPPOSED, Search
+from solvers.search import OPPOSED, Search
 
 Indices = NDArray[np.int64]
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array, Finding, Helps, State
-from solvers.contact.search import Search
 from solvers.penetration import depths, inside
+from solvers.search import Search
 from solvers.sentinels.bodies import ROUNDING, Measures, MovingBody, arc_height
 
 #: Samples per edge of a facet at most: of a facet larger than so many thicknesses of the other body.

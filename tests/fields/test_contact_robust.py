@@ -10,7 +10,7 @@ from test_contact_patch import check, deformation
 
 import solvers.contact.mortar
 import solvers.contact.patch
-import solvers.contact.search
+import solvers.search
 from fsci import shapes
 from solvers.contact.surface import Surface
 from solvers.generalised_alpha import GeneralisedAlpha
@@ -157,6 +157,6 @@ def test_a_pair_that_never_meets_costs_nothing(monkeypatch):
     monkeypatch.setattr(solvers.contact.mortar, "mortar", forbidden)
     monkeypatch.setattr(solvers.contact.patch, "nodal_normals", forbidden)
     monkeypatch.setattr(contact, "condense", forbidden)
-    monkeypatch.setattr(solvers.contact.search, "update", forbidden)
+    monkeypatch.setattr(solvers.search, "update", forbidden)
     assert max(steps(structure, 3, 0.1)) <= 1
     assert not contact.near

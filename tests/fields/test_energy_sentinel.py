@@ -41,10 +41,11 @@ def test_losses_count_if_nothing_chosen_explains_them():
     assert kinds(balance(lost), dissipates=True) == []
 
 
-def interface(steps, **settings):
+def interface(steps, *, exchanged=0.0, **settings):
     """Findings of the last step; steps: (work taken by the solid, work of the fluid, momentum missed)."""
     balance = SimpleNamespace(work=0.0, load=1.0, unsolved=1e-12, supplied=0.0)
-    sentinel, found = InterfaceSentinel(balance, **{"steady": False, **settings}), []
+    solid = SimpleNamespace(exchanged=lambda: exchanged)
+    sentinel, found = InterfaceSentinel(balance, solid, **{"steady": False, **settings}), []
     for taken, given, missed in steps:
         balance.last_works, balance.work, balance.momentum = (taken, given), balance.work + taken - given, missed
         found = sentinel.look(0.0, 0.1)
@@ -56,6 +57,8 @@ def test_energy_and_momentum_pass_the_interface():
     assert interface([(1.0, 0.5, 0.0)]) == []  # time schemes weight forces within a step differently
     assert interface([(1.0, 0.5, 0.0)] * 3) == [("energy", "interface")]
     assert interface([(1.0, 0.5, 0.0)] * 3, steady=True) == []
+    assert interface([(1.0, 0.5, 0.0)] * 3, exchanged=5.0) == [("energy", "interface")]
+    assert interface([(1.0, 0.5, 0.0)] * 3, exchanged=50.0) == []  # the bodies have exchanged much more
     assert interface([(0.5, 1.0, 0.0)] * 3) == []
     assert interface([(1.0, 1.0, 0.1)]) == [("momentum", "fluid")]
     assert interface([(1.0, 1.0, 0.01)]) == []

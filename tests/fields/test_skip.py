@@ -18,10 +18,10 @@ from fsci.builder.build import build
 from fsci.case import load_case
 from fsci.run.run import FINISHED, Run, run_case
 from solvers.contact.mortar import Mortar
-from solvers.contact.search import Search
 from solvers.fluid.background.grid import uniform
 from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.system import FlowSystem
+from solvers.search import Search
 from solvers.structure.field import Structure
 from solvers.timing import Timer
 
