@@ -60,7 +60,8 @@ class Samples:
 class Overlaps:
     """Looks for points of the surface of one body in another one, unless both are rigid with a prescribed motion.
 
-    What was in the other body at the start may stay there, except on surfaces of a pair. Facets replace arcs: a
+    What was in the other body at the start may stay there, except on surfaces of a pair; without a pair, bodies that
+    overlap at the start are meant to, and what they do later is a finding but not worthless. Facets replace arcs: a
     point counts from the depth on that exceeds the height of the arcs of both facets. In contact, the gap is zero in
     the mean over a facet of the slave, so there the arcs are those of both surfaces over such a facet, edges included.
     """
@@ -118,7 +119,7 @@ class Overlaps:
         if depth == 0.0:
             return None
         meeting = self._meeting(i, j)
-        worthless = depth > limit
+        worthless = depth > limit and (meeting is not None or not self._at_start(i, j))
         names, place = self._names(i, j), place_of(where)
         message = f"{names} overlap by {depth:.3g} {place}: "
         if meeting is None:
@@ -142,9 +143,12 @@ class Overlaps:
     def overlapping(self) -> Iterator[tuple[str, str, float]]:
         """(name, name, depth [m]) of bodies that overlap at the start, also where one is whole in the other."""
         for i, j in self._near(self._start, self._start):
-            found = [self._deep(a, b, self._start, None, None, at_start=True) for a, b in ((i, j), (j, i))]
-            if (depth := max(found)[0]) > 0.0:
+            if (depth := self._at_start(i, j)) > 0.0:
                 yield self._bodies[i].name, self._bodies[j].name, depth
+
+    def _at_start(self, i: int, j: int) -> float:
+        """Depth [m] by which two bodies overlap at the start."""
+        return max(self._deep(a, b, self._start, None, None, at_start=True) for a, b in ((i, j), (j, i)))[0]
 
     def _deep(
         self,

@@ -112,6 +112,17 @@ def test_what_overlaps_at_the_start_may_stay_but_nothing_more():
     assert found.kind == "overlap"
 
 
+def test_bodies_that_overlap_on_purpose_go_on():
+    """Two plates that cross in the plane, such as beams at different depths: new parts meet, and the run goes on."""
+    points, facets = block(2, cells=20)
+    one = moving("one", points * np.array([2.0, 0.1]), facets, [(0.0, 0.0)] * 2)
+    two = moving("two", points * np.array([0.1, 2.0]), facets, [(1.0, -1.0), (1.5, -1.0)])
+    (found,) = watch([one, two]).look(1.0, 1.0)
+    assert (found.kind, found.worthless) == ("overlap", "")
+    apart = moving("two", points * np.array([0.1, 2.0]), facets, [(3.0, -1.0), (1.5, -1.0)])
+    assert [finding.worthless for finding in watch([one, apart]).look(1.0, 1.0)] == ["end"]
+
+
 def test_a_pair_must_remove_the_overlap_of_its_surfaces():
     points, facets = block(2)
     lower = moving("lower", points, facets, [(0.0, 0.0)] * 2)
