@@ -222,3 +222,13 @@ def test_a_later_end_after_a_partial_last_step():
     longer.restore(run.save())
     assert longer.time == 2.5
     assert [time for time, _ in steps(longer)] == pytest.approx([2.5, 3.5])
+
+
+@pytest.mark.parametrize(("step", "end", "later"), [(0.02, 0.28, 0.46), (0.1, 0.3, 1.0), (0.05, 0.35, 2.0)])
+def test_a_later_end_keeps_the_times_of_whole_steps(step, end, later):
+    """The last time is the end itself, which rounding sets apart from the multiple of the step: no new beginning."""
+    run, straight = clock(end, step), clock(later, step)
+    steps(run)
+    resumed = clock(later, step)
+    resumed.restore(run.save())
+    assert steps(resumed) == steps(straight)[run.step :]
