@@ -15,6 +15,7 @@ from fsci.case import Case
 from fsci.case.fluid import PatchSection
 from fsci.meshes.of_case import read_obstacle
 from solvers.api import Sentinel
+from solvers.cell_types import CELL_TYPES
 from solvers.sentinels.bodies import MovingBody
 from solvers.sentinels.overlaps import Meeting, Overlaps
 from solvers.sentinels.walls import BoxWalls, Wall
@@ -74,7 +75,8 @@ def _elastic(structure: Structure) -> Iterator[MovingBody]:
         def positions(t: float, points: Array = points, dofs: NDArray[np.int64] = dofs) -> Array:
             return points + gather_at(comm, structure.now.u, structure.layout.start, dofs)
 
-        yield MovingBody(body.name, facets, positions, free=True)
+        pieces = CELL_TYPES[body.domain.cell_type].degree
+        yield MovingBody(body.name, facets, positions, free=True, pieces=pieces)
 
 
 def _surface(mesh: Any) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:

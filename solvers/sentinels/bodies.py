@@ -29,6 +29,7 @@ class MovingBody:
     facets: Indices  #: vertices of segments or triangles, (m, dim), with the solid on their left or behind them
     positions: Callable[[float], Array]  #: time [s] -> positions of the vertices [m], (n, dim), on all processes
     free: bool  #: elastic, or a rigid body that the flow moves; else rigid and at rest or driven
+    pieces: int = 1  #: edges of facets here in one edge of a facet of its mesh: 2 with middle nodes
 
 
 class Measures:
@@ -64,6 +65,11 @@ class Measures:
             np.maximum.at(target, i[kept], angle[kept])
             np.maximum.at(target, j[kept], angle[kept])
         return smooth, sharp
+
+    @cached_property
+    def curvature(self) -> Array:
+        """Angle of smooth edges over the length of a facet [1/m], (m,)."""
+        return self.bends[0] / self.edge
 
     @cached_property
     def sagitta(self) -> Array:

@@ -136,9 +136,9 @@ class Overlaps:
         if not len(meet):
             return NOT_AT_ALL
         near = {i: np.unique(meet[:, 0]), j: np.unique(meet[:, 1])}
-        if all(self._deep(a, b, x, near[a], near[b])[0] == 0.0 for a, b in ((i, j), (j, i))):
+        if all(self._deep(a, b, x, near[a], near[b], whole=False)[0] == 0.0 for a, b in ((i, j), (j, i))):
             return NOT_AT_ALL
-        return max((self._deep(a, b, x, None, near[b]) for a, b in ((i, j), (j, i))), key=lambda one: one[0])
+        return max((self._deep(a, b, x, near[a], near[b]) for a, b in ((i, j), (j, i))), key=lambda one: one[0])
 
     def overlapping(self) -> Iterator[tuple[str, str, float]]:
         """(name, name, depth [m]) of bodies that overlap at the start, also where one is whole in the other."""
@@ -148,24 +148,26 @@ class Overlaps:
 
     def _at_start(self, i: int, j: int) -> float:
         """Depth [m] by which two bodies overlap at the start."""
-        return max(self._deep(a, b, self._start, None, None, at_start=True) for a, b in ((i, j), (j, i)))[0]
+        every = {k: np.arange(len(self._bodies[k].facets)) for k in (i, j)}
+        ways = ((i, j), (j, i))
+        return max(self._deep(a, b, self._start, every[a], every[b], at_start=True) for a, b in ways)[0]
 
     def _deep(
         self,
         a: int,
         b: int,
         x: Sequence[Array],
-        facets: NDArray[np.int64] | None,
-        near: NDArray[np.int64] | None,
+        mine_near: NDArray[np.int64],
+        near: NDArray[np.int64],
         *,
+        whole: bool = True,
         at_start: bool = False,
     ) -> Depth:
-        """The deepest point of facets of body a in body b; near: facets of b where the surfaces cross; None: all.
+        """The deepest point of body a in body b; mine_near, near: facets of a and b where the surfaces cross.
 
-        at_start: points count that were in body b at the start.
+        whole: points on all facets of a count, not only on these; at_start: also what was in body b at the start.
         """
-        facets = np.arange(len(self._bodies[a].facets)) if facets is None else facets
-        near = np.arange(len(self._bodies[b].facets)) if near is None else near
+        facets = np.arange(len(self._bodies[a].facets)) if whole else mine_near
         mine, other = x[a][self._bodies[a].facets], x[b][self._bodies[b].facets]
         samples = self._samples_of(a, b)
         chosen = samples.on(facets)
@@ -176,7 +178,7 @@ class Overlaps:
         if not len(points):
             return NOT_AT_ALL
         facet = samples.facet[chosen]
-        depth = depths(points, other, self._tolerance(a, b, facet, near))
+        depth = depths(points, other, self._tolerance(a, b, facet, mine_near, near))
         if not at_start:
             deep = np.flatnonzero(depth)
             first = self._start[a][self._bodies[a].facets], self._start[b][self._bodies[b].facets]
@@ -187,18 +189,23 @@ class Overlaps:
         limit = min(float(edge), SHARE * min(self._measures[k].thickness for k in (a, b)))
         return float(depth[k]), tuple(points[k].tolist()), limit
 
-    def _tolerance(self, a: int, b: int, facet: NDArray[np.int64], near: NDArray[np.int64]) -> Array:
-        """Depth [m] up to which points on facets of body a are on the surface of body b; near: facets of b there."""
+    def _tolerance(
+        self, a: int, b: int, facet: NDArray[np.int64], mine_near: NDArray[np.int64], near: NDArray[np.int64]
+    ) -> Array:
+        """Depth [m] up to which points on facets of body a are on the surface of body b; near as in `_deep`."""
         mine, other = self._measures[a], self._measures[b]
         thickness = min(mine.thickness, other.thickness)
         meeting = self._meeting(a, b)
         if meeting is None:
             return ROUNDING * thickness + mine.sagitta[facet] + other.sagitta[near].max()
-        slave_is_a = meeting.slave == self._bodies[a].name
-        chord = mine.edge[facet] if slave_is_a else np.full(len(facet), other.edge[near].max())
-        turn = chord * (mine.bends[0] / mine.edge)[facet] + mine.bends[1][facet]
-        turn = turn + chord * (other.bends[0] / other.edge)[near].max() + other.bends[1][near].max()
-        return ROUNDING * thickness + np.minimum(arc_height(chord, turn), SHARE * thickness)
+        slave, there = (a, mine_near) if meeting.slave == self._bodies[a].name else (b, near)
+        chord = self._bodies[slave].pieces * float(self._measures[slave].edge[there].max())
+        turn = sum(
+            chord * one.curvature[some].max() + one.bends[1][some].max()
+            for one, some in ((mine, mine_near), (other, near))
+        )
+        arc = float(arc_height(np.array(chord), np.array(turn)))
+        return np.full(len(facet), ROUNDING * thickness + min(arc, SHARE * thickness))
 
     def _samples_of(self, a: int, b: int) -> Samples:
         """Points on facets of body a, not farther apart than body b is thick."""
