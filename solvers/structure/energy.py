@@ -18,9 +18,8 @@ class EnergyBalance:
         #: the initial energy, and half of the sum of all |changes| since: each passes from one form to another [J]
         self.exchanged = 0.0
         self.last = 0.0  #: what the last step has exchanged [J]
-        self.doubt = (
-            0.0  #: by how much the work may be wrong: between forces at both ends of steps, and by residuals [J]
-        )
+        #: by how much the work may be wrong: between forces at both ends of steps, and by residuals [J]
+        self.doubt = 0.0
 
     def start(self, kinetic: float, internal: float, friction: float) -> None:
         """Set the energies at the start [J]."""
@@ -67,12 +66,14 @@ class EnergySentinel:
     """Implements `Sentinel`: energy from nothing, and energy that is lost though the scheme dissipates none.
 
     The energy at the end of a step and the mean forces over it differ by what the step itself exchanges. Up to this the
-    balance may be wrong for a while, as at the start of a fall.
+    balance may be wrong for a while, as at the start of a fall. Bodies that overlap at the start are pushed apart in
+    the first step: in contact, its error is the energy of the overlap.
     """
 
-    def __init__(self, energy: EnergyBalance, *, dissipates: bool):
+    def __init__(self, energy: EnergyBalance, *, dissipates: bool, contact: bool = False):
         """dissipates: the time scheme loses energy by the user's choice, or contact does where steps are long."""
-        self._energy, self._dissipates = energy, dissipates
+        self._energy, self._dissipates, self._contact = energy, dissipates, contact
+        self._of_overlap: float | None = None  # [J]; None before the first step
 
     def start(self, t: float) -> None:
         """The balance keeps what it needs."""
@@ -80,7 +81,9 @@ class EnergySentinel:
     def look(self, t: float, dt: float) -> Sequence[Finding]:
         """A finding if the balance does not hold."""
         energy = self._energy
-        error, exchanged = energy.error, energy.exchanged
+        if self._of_overlap is None:
+            self._of_overlap = energy.error if self._contact else 0.0
+        error, exchanged = energy.error - self._of_overlap, energy.exchanged
         allowed = max(EXCHANGED * exchanged + energy.last, energy.doubt)
         if abs(error) <= allowed or (error < 0.0 and self._dissipates):
             return []
@@ -93,7 +96,7 @@ class EnergySentinel:
         return [Finding("energy", "structure", error, f"{what}: {remedy}")]
 
     def save(self) -> State:
-        return {}
+        return {"of_overlap": self._of_overlap}
 
     def restore(self, state: State) -> None:
-        """The structure restores the balance."""
+        self._of_overlap = state["of_overlap"]

@@ -62,7 +62,9 @@ class Structure:
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
         self.current = Step(0.0, 0.0)  #: the present step, or the last one
         self.energy = EnergyBalance()
-        self.energy_sentinel = EnergySentinel(self.energy, dissipates=time.dissipates or contact is not None)
+        self.energy_sentinel = EnergySentinel(
+            self.energy, dissipates=time.dissipates or contact is not None, contact=contact is not None
+        )
         self.residual_force = np.zeros(self.layout.size)  #: residual of the balance, at held dofs the reaction [N]
         self.target = np.zeros(self.layout.size)
         self.increment = np.zeros(self.layout.size)
@@ -236,9 +238,9 @@ class Structure:
             0.5 * (after - before) @ at_supports,
             self.held.free_part(self.residual_force) @ du,
         ]
-        *works, damping, of_loads, of_surface, of_supports, unsolved = self.comm.allreduce(np.array(parts)).tolist()
-        works.append(float(pushed[0]))
-        doubt = sum(map(abs, (of_loads, of_surface, of_supports, unsolved, float(pushed[1]))))
+        sums = self.comm.allreduce(np.array(parts)).tolist()
+        works, damping = [*sums[:3], float(pushed[0])], sums[3]
+        doubt = sum(map(abs, (*sums[4:], float(pushed[1]))))
         self.energy.add_step(works, damping, *self._energies(), doubt)
 
     def split(self, array: Array) -> list[Array]:

@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 import pytest
-from programs import fsci
+from programs import fsci, warnings_of
 
 from coupling.sentinel import InterfaceSentinel
 from fsci.run.history import read_history
@@ -122,3 +122,29 @@ def test_all_work_is_counted(text, dynamics, tmp_path):
     total = history["e.internal"][-1] + history["e.kinetic"][-1]
     assert history["e.work"][-1] == pytest.approx(total, rel=0.01)
     assert abs(history["structure.energy"][-1]) < 0.01 * total
+
+
+PRESS_FIT = """\
+title: two blocks that overlap at the start
+time: {step: 0.5, end: 1}
+structure:
+  bodies:
+    lower:
+      mesh: {shape: rectangle, size: [1, 1], cells: [4, 4]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3}
+      supports: [{on: bottom, displacement: [0, 0]}]
+    upper:
+      mesh: {shape: rectangle, size: [1, 1], cells: [4, 4], origin: [0, 0.95]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3}
+      supports: [{on: top, displacement: [0, 0]}]
+contact: {pairs: {p: {slave: {body: upper, on: bottom}, master: {body: lower, on: top}}}}
+"""
+
+
+def test_a_press_fit_has_its_energy_from_the_overlap(tmp_path):
+    (tmp_path / "case.yaml").write_text(PRESS_FIT)
+    done = fsci("run", tmp_path, "-o", tmp_path / "out")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert warnings_of(tmp_path / "out") == []
+    energy = read_history(tmp_path / "out" / "history.csv")["structure.energy"]
+    assert energy.min() > 0.1  # what is stored, and no load has brought
