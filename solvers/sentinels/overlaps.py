@@ -178,7 +178,8 @@ class Overlaps:
         if not len(points):
             return NOT_AT_ALL
         facet = samples.facet[chosen]
-        depth = depths(points, other, self._tolerance(a, b, facet, mine_near, near))
+        tolerance = self._tolerance(a, b, facet, mine_near, near)
+        depth = depths(points, other, tolerance)
         if not at_start:
             deep = np.flatnonzero(depth)
             first = self._start[a][self._bodies[a].facets], self._start[b][self._bodies[b].facets]
@@ -187,6 +188,8 @@ class Overlaps:
         k = int(depth.argmax())
         edge = min(self._measures[a].edge[facet[k]], self._measures[b].edge[near].min())
         limit = min(float(edge), SHARE * min(self._measures[k].thickness for k in (a, b)))
+        if self._meeting(a, b) is not None:
+            limit += float(tolerance[k])
         return float(depth[k]), tuple(points[k].tolist()), limit
 
     def _tolerance(
@@ -205,7 +208,7 @@ class Overlaps:
             for one, some in ((mine, mine_near), (other, near))
         )
         arc = float(arc_height(np.array(chord), np.array(turn)))
-        return np.full(len(facet), ROUNDING * thickness + min(arc, SHARE * thickness))
+        return np.full(len(facet), ROUNDING * thickness + min(arc, 0.5 * thickness))
 
     def _samples_of(self, a: int, b: int) -> Samples:
         """Points on facets of body a, not farther apart than body b is thick."""
