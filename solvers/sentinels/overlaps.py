@@ -80,14 +80,15 @@ class Overlaps:
         self._start: list[Array] = []  # positions [m] at the start
         self._before: list[Array] = []  # positions [m] at the end of the last step
         self._time = 0.0  # of these [s]
-        self._measures: list[Measures] = []
+        self._measures: dict[int, Measures] = {}
         self._searches = {(i, j): Search(bodies[i].facets, bodies[j].facets) for i, j in self._pairs}
 
     def start(self, t: float) -> None:
         """Keep the positions and what overlaps at the time t [s]."""
         self._before, self._time = self._positions(t), t
         corners = [x[body.facets] for body, x in zip(self._bodies, self._before, strict=True)]
-        self._measures = [Measures(b.facets, c) for b, c in zip(self._bodies, corners, strict=True)]
+        parts = enumerate(zip(self._bodies, corners, strict=True))
+        self._measures = {k: Measures(body.facets, own) for k, (body, own) in parts}
         self._samples.clear()
         self._start = self._before
 
@@ -178,8 +179,13 @@ class Overlaps:
         if not len(points):
             return NOT_AT_ALL
         facet = samples.facet[chosen]
-        tolerance = self._tolerance(a, b, facet, mine_near, near)
+        near_both = mine_near, near
+        tolerance = self._tolerance(a, b, facet, near_both, self._measures)
         depth = depths(points, other, tolerance)
+        if depth.any():  # what bodies have bent since the start counts, too
+            present = {k: Measures(self._bodies[k].facets, x[k][self._bodies[k].facets]) for k in (a, b)}
+            tolerance = np.maximum(tolerance, self._tolerance(a, b, facet, near_both, present))
+            depth[depth <= tolerance] = 0.0
         if not at_start:
             deep = np.flatnonzero(depth)
             first = self._start[a][self._bodies[a].facets], self._start[b][self._bodies[b].facets]
@@ -193,19 +199,24 @@ class Overlaps:
         return float(depth[k]), tuple(points[k].tolist()), limit
 
     def _tolerance(
-        self, a: int, b: int, facet: NDArray[np.int64], mine_near: NDArray[np.int64], near: NDArray[np.int64]
+        self,
+        a: int,
+        b: int,
+        facet: NDArray[np.int64],
+        near: tuple[NDArray[np.int64], NDArray[np.int64]],
+        measures: Mapping[int, Measures],
     ) -> Array:
-        """Depth [m] up to which points on facets of body a are on the surface of body b; near as in `_deep`."""
-        mine, other = self._measures[a], self._measures[b]
+        """Depth [m] up to which points on facets of body a are on the surface of body b; near: facets of a and b."""
+        mine, other = measures[a], measures[b]
         thickness = min(mine.thickness, other.thickness)
         meeting = self._meeting(a, b)
         if meeting is None:
-            return ROUNDING * thickness + mine.sagitta[facet] + other.sagitta[near].max()
-        slave, there = (a, mine_near) if meeting.slave == self._bodies[a].name else (b, near)
-        chord = self._bodies[slave].pieces * float(self._measures[slave].edge[there].max())
+            return ROUNDING * thickness + mine.sagitta[facet] + other.sagitta[near[1]].max()
+        slave, there = (a, near[0]) if meeting.slave == self._bodies[a].name else (b, near[1])
+        chord = self._bodies[slave].pieces * float(measures[slave].edge[there].max())
         turn = sum(
             chord * one.curvature[some].max() + one.bends[1][some].max()
-            for one, some in ((mine, mine_near), (other, near))
+            for one, some in ((mine, near[0]), (other, near[1]))
         )
         arc = float(arc_height(np.array(chord), np.array(turn)))
         return np.full(len(facet), ROUNDING * thickness + min(arc, 0.5 * thickness))
