@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fsci.bench.search import measure_search, wavy_sheet
+from solvers import search as search_module
 from solvers.api import StepFailed
-from solvers.contact import search as search_module
 from solvers.kernels import KdopTree2, KdopTree3
 from solvers.search import REBUILD_ABOVE, Search
 
