@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import factorial
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from solvers.cell_types import CELL_TYPES, Group
 from solvers.mesh import Mesh
 
 Indices = NDArray[np.int64]
+
+_boundaries: WeakKeyDictionary[Mesh, Indices] = WeakKeyDictionary()  # a search for them sorts all facets
 
 
 def signed_volumes(mesh: Mesh) -> NDArray[np.float64]:
@@ -42,13 +45,21 @@ def cell_facets(mesh: Mesh) -> Indices:
 
 def boundary_facets(mesh: Mesh) -> Indices:
     """The facets of one cell only, with all their nodes, outward oriented, shape (k, nodes per facet)."""
-    facets, ids = cell_facets(mesh), facet_ids(mesh)
-    return facets[np.bincount(ids)[ids] == 1]
+    return cell_facets(mesh)[boundary_rows(mesh)]
+
+
+def boundary_rows(mesh: Mesh) -> Indices:
+    """Indices among `cell_facets` of the facets of one cell only, increasing."""
+    if mesh not in _boundaries:
+        facet_ids(mesh)
+    return _boundaries[mesh]
 
 
 def facet_ids(mesh: Mesh) -> Indices:
     """A number for every facet of `cell_facets`, equal where corners are the same, shape (cells * facets per cell,)."""
-    return _row_ids(_sorted_corners(mesh, cell_facets(mesh)))
+    ids = _row_ids(_sorted_corners(mesh, cell_facets(mesh)))
+    _boundaries[mesh] = np.flatnonzero(np.bincount(ids)[ids] == 1)
+    return ids
 
 
 def find_facets(mesh: Mesh, corners: Indices) -> Indices:
@@ -85,6 +96,9 @@ def cut_out(mesh: Mesh, names: Sequence[str] | None) -> tuple[NDArray[np.float64
 
 
 def _pick(mesh: Mesh, facets: Indices, corners: Indices) -> Indices:
+    named = np.zeros(len(mesh.points), dtype=bool)
+    named[corners] = True
+    facets = facets[named[facets[:, : corners.shape[1]]].all(axis=1)]
     ids = _row_ids(np.concatenate([_sorted_corners(mesh, facets), np.sort(corners, axis=1)]))
     first = np.full(ids.max(initial=-1) + 1, -1)
     first[ids[: len(facets)][::-1]] = np.arange(len(facets))[::-1]

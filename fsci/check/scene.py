@@ -48,6 +48,8 @@ class Placed:
 def overlaps(case: Case, bodies: list[Placed], pairs: dict[str, PairSection]) -> Iterator[tuple[bool, Keys, str]]:
     """(only a note, path, text) of bodies that overlap at the start."""
     by_name = {body.name: body for body in bodies if body.moves}
+    if len(by_name) < 2:
+        return
     found = Overlaps([_at_rest(body) for body in by_name.values()], {}, set())
     found.start(case.time.start)
     for one, other, depth in found.overlapping():

@@ -14,7 +14,7 @@ from fsci.meshes.jacobians import inverses
 from solvers.cell_types import CELL_TYPES
 from solvers.locate import shape_functions
 from solvers.mesh import Mesh
-from solvers.mesh_topology import cell_facets
+from solvers.mesh_topology import boundary_rows, cell_facets
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -30,9 +30,9 @@ DISTORTION = 0.5
 NEWTON_STEPS = 5
 
 
-def covering(mesh: Mesh, ids: Indices, maps: tuple[Array, Array]) -> tuple[int, int] | None:
-    """Two cells that cover each other, or None; ids: `facet_ids` of the mesh, maps: its `middle_maps`."""
-    points, owners, nodes = _points(mesh, ids)
+def covering(mesh: Mesh, maps: tuple[Array, Array]) -> tuple[int, int] | None:
+    """Two cells that cover each other, or None; maps: `middle_maps` of the mesh."""
+    points, owners, nodes = _points(mesh)
     which, cells = in_boxes(points, *_boxes(mesh))
     apart = owners[which] != cells
     corner = np.flatnonzero(which < len(nodes))
@@ -75,10 +75,10 @@ def _newton(mesh: Mesh, points: Array, cells: Indices, reference: Array) -> tupl
     return reference, np.nan_to_num(np.linalg.norm(step, axis=1), nan=np.inf)
 
 
-def _points(mesh: Mesh, ids: Indices) -> tuple[Array, Indices, Indices]:
+def _points(mesh: Mesh) -> tuple[Array, Indices, Indices]:
     """(points to test [m], the cell of each, numbers of those that are nodes, which come first)."""
     facets = cell_facets(mesh)
-    outer = np.flatnonzero(np.bincount(ids)[ids] == 1)
+    outer = boundary_rows(mesh)
     owners = outer // len(CELL_TYPES[mesh.cell_type].facets)
     corners = CELL_TYPES[CELL_TYPES[mesh.cell_type].facet].corners
     nodes, first = np.unique(facets[outer, :corners], return_index=True)

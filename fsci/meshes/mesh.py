@@ -43,6 +43,8 @@ def place(mesh: Mesh, rotate: Any = None, translate: Sequence[float] | None = No
 
     `rotate` is one rotation or a list of them, each with attributes `axis` and `angle` [degrees].
     """
+    if not rotate and translate is None:
+        return mesh
     points = mesh.points
     dim = points.shape[1]
     for rotation in rotate if isinstance(rotate, list | tuple) else [rotate] if rotate else []:

@@ -34,10 +34,9 @@ def require_valid(mesh: Mesh, *, parts_meet: bool = False) -> None:
     if CELL_TYPES[mesh.cell_type].degree == 2:
         remedy = "put its mid nodes near the middle of its edges (gmsh: Mesh.HighOrderOptimize = 2), or refine it there"
     require_positive(mesh, remedy)
-    ids = facet_ids(mesh)
-    if len(pairs := folded(mesh, ids)):
+    if len(pairs := folded(mesh, facet_ids(mesh))):
         raise BadMesh(_covers(mesh, *pairs[0].tolist()))
-    if not parts_meet and (pair := covering(mesh, ids, maps)) is not None:
+    if not parts_meet and (pair := covering(mesh, maps)) is not None:
         raise BadMesh(_covers(mesh, *pair))
 
 
