@@ -10,7 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fsci.builder.columns import Numbers, columns
-from fsci.builder.on_first import on_first
+from fsci.builder.on_first import shared
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
 from fsci.case.contact import FilmSection
@@ -60,7 +60,7 @@ def _grid(case: Case, comm: MPI.Comm) -> Grid:
     assert case.fluid is not None
     if not case.fluid.grid.refine:
         return Grid(case.fluid.grid.planes)
-    return on_first(comm, lambda: read_grid(case))
+    return shared(comm, lambda: read_grid(case))
 
 
 def _flow(settings: FluidSection) -> FlowSettings:
@@ -110,7 +110,7 @@ def _with_layer(case: Case, body: ImmersedBody) -> ImmersedBody:
 
 def read_surface(case: Case, name: str, comm: MPI.Comm) -> tuple[Array, NDArray[np.int64]]:
     """Points [m] and facets of a rigid body, whole on every process. Raises CaseError (collective)."""
-    return on_first(comm, lambda: read_rigid_body(case, name)[1:])
+    return shared(comm, lambda: read_rigid_body(case, name)[1:])
 
 
 def _body(case: Case, name: str, comm: MPI.Comm) -> ImmersedBody:

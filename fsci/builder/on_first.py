@@ -1,22 +1,27 @@
-"""Reading on the first process for all of them."""
+"""Reading and writing on the first process, whose failures reach all of them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
-from mpi4py import MPI
+T = TypeVar("T")
 
 
-def on_first(comm: MPI.Comm, read: Callable[[], Any]) -> Any:
-    """The result of reading on the first process, or its exception, on every process (collective)."""
-    found: Any = None
+def on_first(comm: Any, call: Callable[[], T]) -> T | None:
+    """The result on the first process, None on the others; its exception on all of them (collective)."""
+    result, error = None, None
     if comm.rank == 0:
         try:
-            found = read()
+            result = call()
         except Exception as raised:  # raised on every process below
-            found = raised
-    found = comm.bcast(found, root=0)
-    if isinstance(found, Exception):
-        raise found
-    return found
+            error = raised
+    error = comm.bcast(error, root=0)
+    if error is not None:
+        raise error
+    return result
+
+
+def shared(comm: Any, call: Callable[[], T]) -> T:
+    """The result on the first process, or its exception, on every process (collective)."""
+    return comm.bcast(on_first(comm, call), root=0)  # type: ignore[no-any-return]

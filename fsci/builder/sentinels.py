@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fsci.builder.on_first import on_first
+from fsci.builder.on_first import shared
 from fsci.case import Case
 from fsci.case.fluid import PatchSection
 from fsci.meshes.of_case import read_obstacle
@@ -112,7 +112,7 @@ def _obstacles(case: Case, comm: MPI.Comm) -> Iterator[MovingBody]:
     from fsci.builder.contact import motion_of_obstacle
 
     for name in case.contact.obstacles:
-        facets, _, points = on_first(comm, partial(_obstacle, case, name))
+        facets, _, points = shared(comm, partial(_obstacle, case, name))
         motion = motion_of_obstacle(case, name, points) or partial(_at_rest, points)
         yield MovingBody(name, facets, motion, free=False)
 

@@ -5,13 +5,9 @@ from __future__ import annotations
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, TypeVar
-
-from fsci.case import CaseError
-
-T = TypeVar("T")
+from typing import Any
 
 #: Time [s] within which a failure of all processes has reached all of them.
 PATIENCE = 5.0
@@ -32,20 +28,6 @@ def ending_together(comm: Any, *shared: type[Exception]) -> Iterator[None]:
         print(f"process {comm.rank} of {comm.size} failed, and all processes end: {describe(error)}", file=sys.stderr)
         sys.stderr.flush()
         comm.Abort(1)
-
-
-def on_first(comm: Any, call: Callable[[], T]) -> T | None:
-    """The result on the first process, None on the others; its CaseError or OSError on all of them (collective)."""
-    result, error = None, None
-    if comm.rank == 0:
-        try:
-            result = call()
-        except (CaseError, OSError) as raised:
-            error = raised
-    error = comm.bcast(error, root=0)
-    if error is not None:
-        raise error
-    return result
 
 
 def describe(error: BaseException) -> str:

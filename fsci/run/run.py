@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fsci.builder.on_first import on_first, shared
 from fsci.case import Case, CaseError, load_case
 from fsci.case.resume import changed, end_error, meshes_changed
 from fsci.case.settings import settings_of
@@ -27,7 +28,7 @@ from fsci.run.lock import Lock
 from fsci.run.memory import require_memory
 from fsci.run.monitor import Monitor
 from fsci.run.output import FieldWriter
-from fsci.run.processes import describe, on_first
+from fsci.run.processes import describe
 from fsci.run.results_folder import prepare_folder
 from fsci.run.stop import StopWatch
 from fsci.run.summary import RunRecord, memory_mb, shares, summarize, write_summary
@@ -76,7 +77,7 @@ def resume_run(out: Path, changes: Sequence[tuple[str, str]] = ()) -> int:
     case = load_case(out / "case.yaml", changes)
     lock = on_first(comm, lambda: _lock_to_resume(out))
     with closing(lock) if lock else nullcontext():
-        state, _ = comm.bcast(on_first(comm, lambda: read_checkpoint(out / "checkpoint")))
+        state, _ = shared(comm, lambda: read_checkpoint(out / "checkpoint"))
         if (early := end_error(case, changes, state["clock"]["time"])) is not None:
             raise early
         return Run(case, out, comm, lock=lock).from_checkpoint(state)
