@@ -7,6 +7,7 @@ from test_fluid_touching import overlap
 
 from solvers.fluid.background.grid import uniform
 from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.probes import of_fluid
 from solvers.fluid.thin.regions import area_of
 
 WEIGHT = 3.0
@@ -71,12 +72,26 @@ def test_rectangles_in_planes_of_the_grid(draw):
     balanced(*at_rest(*rectangles_in_planes(draw), "q2q1"))
 
 
+def disc(centre, radius, sides=48):
+    angle = 2.0 * np.pi * np.arange(sides) / sides
+    return centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+@pytest.mark.parametrize("inner", [0.3, 0.15, 0.02], ids=["the same place", "some cells", "part of a cell"])
+def test_disc_within_a_disc(inner):
+    """What is inside of another body changes neither the area nor the forces."""
+    outer = disc([0.51, 0.52], 0.3)
+    within = disc([0.51, 0.52], inner)
+    balanced(*at_rest(outer, within, loop(len(within)), "q1q1"))
+
+
 def balanced(fluid, area):
     cut = fluid.cut
     lengths = cut.pieces.moments.sum(axis=(1, 2))
     assert np.abs(lengths @ cut.pieces.normal).max() < 1e-12
     inside = np.concatenate([cut.uncut, cut.cut])
     assert cut.fraction[inside].sum() / 400 == pytest.approx(area, abs=1e-12)
+    assert of_fluid(fluid, "volume")()[""] == pytest.approx(area, abs=1e-12)
     assert np.abs(fluid.velocity()).max() < 1e-8
     force = sum(each.sum(axis=0) for each in fluid.force().values())
     assert force == pytest.approx([0.0, WEIGHT * (1.0 - area)], abs=1e-8)

@@ -179,7 +179,8 @@ class Cutter:
             share=share,
             depth=self._depth,
             fluid=fluid,
-            fraction=1.0 - moments.fraction[grid.numbers],
+            # cells that two bodies fill are solid once
+            fraction=np.where(solid, 0.0, 1.0 - moments.fraction)[grid.numbers],
             pieces=pieces,
             film=film,
             creeping=creeping,
