@@ -337,3 +337,42 @@ def test_plates_that_lie_on_each_other_and_part(tmp_path, scheme):
     assert len(history["time"]) == 4  # no step is repeated
     assert abs(history["flow"][-1]) < 1e-9
     assert np.abs(history["fluid.mass"]).max() < 1e-9
+
+
+STEADY = """\
+time: {step: 1, end: 1}
+fluid:
+  density: 1
+  viscosity: 0.1
+  scheme: steady
+  flow: FLOW
+  element: ELEMENT
+  grid: {from: [0, 0], to: [2, 1], cells: [20, 10]}
+  patches:
+    inlet: {on: x-, velocity: ["y*(1-y)", 0]}
+    outlet: {on: x+, outflow: true}
+    walls: {on: [y-, y+], no_slip: true}
+  bodies:
+    plate: {mesh: {shape: rectangle, size: [0.03, 0.5], cells: [1, 8], origin: ORIGIN}MOTION}
+probes:
+  force: {quantity: force, body: plate}
+"""
+
+
+@pytest.mark.parametrize("element", ["q1q1", "q2q1"])
+@pytest.mark.parametrize("flow", ["stokes", "navier_stokes"])
+def test_a_steady_flow_has_no_history(tmp_path, element, flow):
+    """A thin plate that comes from seven cells away has the forces of one that has always been there."""
+    found = []
+    moves = (
+        ', motion: {displacement: ["0.71*(1 - (1 - t)^2)", "0.13*(1 - (1 - t)^2)"]}'  # without a velocity at the end
+    )
+    for name, origin, motion in (("moved", "[0.213, 0.21]", moves), ("there", "[0.923, 0.34]", "")):
+        text = STEADY.replace("ELEMENT", element).replace("FLOW", flow).replace("ORIGIN", origin)
+        (tmp_path / "case.yaml").write_text(text.replace("MOTION", motion))
+        done = fsci("run", tmp_path, "-o", tmp_path / name)
+        assert done.returncode == 0, done.stdout + done.stderr
+        history = read_history(tmp_path / name / "history.csv")
+        found.append([history["force.x"][-1], history["force.y"][-1]])
+    assert np.allclose(found[0], found[1], rtol=1e-7, atol=1e-9)
+    assert found[1][0] > 0.1

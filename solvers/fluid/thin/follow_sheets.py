@@ -16,13 +16,13 @@ def follow_sheets(fluid: ExchangedFlow, sheets: Sheets | None, facets: NDArray[n
 
     If they have other unknowns, the iterate is carried over from the last iterate, and the history from the state at
     the beginning of the step, so that it does not depend on the iterates in between. Raises StepFailed if a body has
-    moved too far in this step.
+    moved too far in a step of an unsteady flow.
     """
     if sheets is fluid.grid.sheets:
         return
     assert sheets is not None
     began = fluid.began
-    if began is not None:
+    if began is not None and not fluid.settings.steady:  # a steady flow has no history
         began.require_near(fluid.smallest_cell, motion.x)
     now, old, flow, increment = fluid.grid.sheets, fluid.unknowns, fluid.flow, fluid.increment
     if now is not None and now.same_unknowns(sheets):
