@@ -5,13 +5,14 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from programs import on_processes
 
-from solvers.fluid.linear_systems.decoupled import decoupled
+from solvers.fluid.linear_systems.decoupled import decoupled, without
 
 
 def check(comm):
     """A full matrix of 10 unknowns: two components of the velocity and, numbered 2, the pressure."""
     component = np.array([0, 1, 0, 1, 0, 1, 2, 2, 0, 1])
     entries = 1.0 + np.arange(100.0).reshape(10, 10)
+    entries[7, 7] = entries[0, 2] = 0.0
     matrix = PETSc.Mat().createAIJ((10, 10), comm=comm)
     matrix.setUp()
     rows = np.arange(*matrix.getOwnershipRange())
@@ -21,10 +22,16 @@ def check(comm):
     expected = np.where(same | (component[:, None] == 2) | (component[None] == 2), entries, 0.0)
     found = decoupled(matrix, component[rows])
     indptr, columns, values = found.getValuesCSR()
-    assert len(values) == np.count_nonzero(expected[rows])
-    np.testing.assert_array_equal(values, expected[rows][expected[rows] > 0.0])
-    np.testing.assert_array_equal(columns, np.nonzero(expected[rows])[1])
-    np.testing.assert_array_equal(np.diff(indptr), np.count_nonzero(expected[rows], axis=1))
+    stays = ((expected != 0.0) | np.eye(10, dtype=bool))[rows]
+    np.testing.assert_array_equal(values, expected[rows][stays])
+    np.testing.assert_array_equal(columns, np.nonzero(stays)[1])
+    np.testing.assert_array_equal(np.diff(indptr), np.count_nonzero(stays, axis=1))
+    marked = np.isin(np.arange(10), [1, 7])
+    identity = np.where(marked[:, None] | marked[None], np.eye(10), expected)
+    indptr, columns, values = without(found, marked[rows]).getValuesCSR()
+    whole = np.zeros((len(rows), 10))
+    whole[np.repeat(np.arange(len(rows)), np.diff(indptr)), columns] = values
+    np.testing.assert_array_equal(whole, identity[rows])
 
 
 def test_what_is_left_out():

@@ -9,26 +9,34 @@ from petsc4py import PETSc
 
 
 def decoupled(matrix: PETSc.Mat, component: NDArray[np.int64]) -> PETSc.Mat:
-    """The matrix without couplings between different components of the velocity, and without zeros (collective).
+    """The matrix without couplings between different components of the velocity (collective).
 
     component: component of each owned unknown; that of the pressure has the largest number. With these couplings, of
     the symmetric gradient and of div u div v, the block of the velocity is that of elasticity, whose incomplete factors
     break down in stretched cells. Without them it consists of Laplace operators and has a third of the entries.
+    Zeros on the diagonal stay, which the pressure may have: factors need room for their pivots.
     """
     indptr, columns, values = matrix.getValuesCSR()
     of_row, of_column = _of_entries(matrix, component, indptr, columns)
     pressure = matrix.comm.tompi4py().allreduce(int(component.max(initial=0)), op=MPI.MAX)
     kept = (values != 0.0) & ((of_row == of_column) | (of_row == pressure) | (of_column == pressure))
+    kept |= _on_diagonal(matrix, indptr, columns)
     return _selected(matrix, kept, indptr, columns, values)
 
 
 def without(matrix: PETSc.Mat, marked: NDArray[np.bool_]) -> PETSc.Mat:
-    """The matrix without couplings of marked owned unknowns: of these only the diagonal stays (collective)."""
+    """The matrix with rows and columns of the identity at marked owned unknowns (collective)."""
     indptr, columns, values = matrix.getValuesCSR()
     of_row, of_column = _of_entries(matrix, marked.astype(np.int64), indptr, columns)
-    first = matrix.getOwnershipRange()[0]
-    own = np.repeat(np.arange(first, first + len(marked)), np.diff(indptr)) == columns
-    return _selected(matrix, (of_row + of_column == 0) | own, indptr, columns, values)
+    own = _on_diagonal(matrix, indptr, columns)
+    return _selected(
+        matrix, (of_row + of_column == 0) | own, indptr, columns, np.where(own & (of_row > 0), 1.0, values)
+    )
+
+
+def _on_diagonal(matrix: PETSc.Mat, indptr, columns) -> NDArray[np.bool_]:
+    first, end = matrix.getOwnershipRange()
+    return np.asarray(np.repeat(np.arange(first, end), np.diff(indptr)) == columns)
 
 
 def _of_entries(matrix: PETSc.Mat, some: NDArray[np.int64], indptr, columns) -> tuple[NDArray, NDArray]:
