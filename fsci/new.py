@@ -85,7 +85,7 @@ fluid:
     to: [2.2, 0.41]
     x: [{{to: 0.1, cells: 10}}, {{to: 0.3, cells: 50}}, {{to: 2.2, cells: 80, ratio: 8}}]
     y: [{{to: 0.1, cells: 15, ratio: 0.4}}, {{to: 0.3, cells: 50}}, {{to: 0.41, cells: 15, ratio: 3}}]
-  # What happens on the faces x-, x+, y-, y+ of the box; where patches meet, the one named last decides.
+  # What happens on the faces x-, x+, y-, y+ of the box; where patches overlap, the one named last decides.
   patches:
     inlet: {{on: x-, velocity: ["min(t, 1)*1.2*y*(0.41 - y)/0.41^2", 0]}}
     outlet: {{on: x+, outflow: true}}

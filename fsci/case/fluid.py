@@ -188,7 +188,7 @@ class FluidSection(Section):
     )
     grid: GridSection = setting(..., "box and cells")
     patches: dict[Name, PatchSection] = setting(
-        ..., "conditions on the boundary of the box by name; where patches meet, the one named last decides"
+        ..., "conditions on the boundary of the box by name; where patches overlap, the one named last decides"
     )
     bodies: dict[Name, RigidBodySection] = setting(dict, "rigid bodies by name")
     dynamics: RigidDynamics = setting(RigidDynamics, "time integration of free bodies")

@@ -29,8 +29,8 @@ def look_at(fluid, steps=2, dt=0.1):
     return found
 
 
-def inflow(value=1.0, **where):
-    return Patch("in", ("x-",), "velocity", field(value, 0.0), **where)
+def inflow(value=1.0):
+    return Patch("in", ("x-",), "velocity", field(value, 0.0))
 
 
 def plate(low, high, *, wet=None, speed=0.0):
@@ -71,20 +71,6 @@ def test_fluid_that_vanishes_in_a_dry_surface():
     assert found.kind == "mass"
     assert "'coupling.wetted'" in found.message
     assert look_at(flow([inflow(), OUT, SLIP], [plate([0.93, -0.2], [1.33, 0.5])])) == []
-
-
-def slot(edge):
-    return inflow(where=lambda x, t: edge - x[1])
-
-
-def test_a_wall_beside_an_inflow_on_the_same_face():
-    """The inflow goes on for half of the cell beside it, unless the patch of the wall has the node between them."""
-    wall = Patch("wall", ("x-",), "no_slip")
-    (found,) = look_at(flow([wall, slot(0.5), OUT, SLIP]))
-    assert (found.kind, found.body) == ("leak", "wall")
-    assert found.value == pytest.approx(-0.2 * 0.05, rel=1e-9)
-    assert "entered through the patch 'wall', which is tight (10.00%" in found.message.replace("9.09%", "10.00%")
-    assert look_at(flow([slot(0.5), wall, OUT, SLIP])) == []
 
 
 def test_cells_that_do_not_separate_both_sides_of_a_plate():

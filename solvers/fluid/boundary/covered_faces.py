@@ -11,6 +11,7 @@ from solvers import fem
 from solvers.api import Array
 from solvers.fluid.background.grid import FACES, DistributedGrid
 from solvers.fluid.background.space import Unknowns
+from solvers.fluid.boundary.meeting_patches import points_on_face
 from solvers.fluid.boundary.wet_faces import WetFace, wet_face
 from solvers.fluid.cutting.cut import Cut
 from solvers.gauss import gauss
@@ -128,9 +129,7 @@ def _covered(
     row_of = np.full(int(np.prod(shape)), -1)
     row_of[found.cells] = np.arange(len(found.cells))
     touched = np.flatnonzero(row_of[number] >= 0)
-    reference = np.full((len(points) ** len(others), grid.dim), float(side))
-    for k, i in enumerate(others):
-        reference[:, i] = np.tile(np.repeat(points, len(points) ** k), len(points) ** (len(others) - 1 - k))
+    reference = points_on_face(points, grid.dim, axis, side)
     areas = grid.sizes[cells[touched]][:, others].prod(axis=1)
     wet = found.weights[row_of[number[touched]]]
     if grid.sheets is not None:

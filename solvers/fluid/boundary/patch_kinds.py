@@ -51,6 +51,11 @@ class PatchKind:
     #: (faces, mu, rho a, values at the points) -> d<-t, v>/du; a: velocity of the step before; for forms with u
     slope: Callable[[WetPart, float, Array, Array | None], Array] | None = None
 
+    @property
+    def normal_given(self) -> bool:
+        """It prescribes the normal velocity."""
+        return self.prescribed in ("all", "normal")
+
 
 def _traction(flow: Coefficients, u: Expr, t: Expr, n: Expr, v: Expr) -> Expr:
     """-<t, v> with the given traction [Pa]."""

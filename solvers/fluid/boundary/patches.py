@@ -12,6 +12,7 @@ from solvers import fem
 from solvers.api import Array
 from solvers.fluid.background.grid import FACES, DistributedGrid
 from solvers.fluid.background.space import Unknowns
+from solvers.fluid.boundary.meeting_patches import meeting_patches
 from solvers.fluid.boundary.patch_kinds import PATCH_KINDS, PatchKind
 from solvers.values import Value, evaluate
 
@@ -57,7 +58,11 @@ def periodic_axes(patches: Sequence[Patch]) -> tuple[int, ...]:
 
 
 class Boundary:
-    """All patches on one grid. Where patches meet, the last one applies. Raises UncoveredFaces (collective)."""
+    """All patches on one grid. Raises UncoveredFaces (collective).
+
+    Where patches overlap, the last one applies. At nodes where they meet, normal velocities are means of what they
+    give (`meeting_patches`), and tangential ones are those of the last patch.
+    """
 
     def __init__(self, grid: DistributedGrid, unknowns: Unknowns, patches: Sequence[Patch]):
         self.patches = list(patches)
@@ -78,16 +83,24 @@ class Boundary:
         last = np.any([grid.on_face(midpoints, f"{axis}+") for axis in "xyz"[: grid.dim]], axis=0)
         #: mask of the facets that count in flow rates, by patch: of a period only those at its end
         self.at_end = [last[patch_of == n] | (not patch.record.periodic) for n, patch in enumerate(patches)]
+        #: number of the patch that prescribes each local dof, the last one where several do; -1: none
         self.imposed = np.full(unknowns.local, -1)
         for number, patch in enumerate(patches):
             for component in self._held(grid, patch, midpoints[patch_of == number]):
                 on_patch, axes = component
                 dofs = fem.facet_dofs(unknowns.space, axes, np.sort(self.facets[number][on_patch]))
                 self.imposed[dofs] = number
+        meeting = meeting_patches(grid, unknowns, list(self._across(grid, midpoints, patch_of)))
+        normal, owner = meeting.last()
+        self.imposed[normal] = owner
         if unknowns.hanging is not None:
             self.imposed[unknowns.hanging.dofs] = -1
         #: local dofs with a prescribed velocity
         self.dofs: NDArray[np.int64] = np.flatnonzero(self.imposed >= 0)
+        #: normal velocities that several patches prescribe; whether any process has some
+        self.shared = meeting.shared()
+        self.any_shared = bool(grid.comm.allreduce(len(self.shared.dofs)))
+        self._place = np.searchsorted(self.dofs, np.unique(self.shared.dofs))
         self._node_and_axis = np.full((unknowns.local, 2), -1)  #: of each local velocity dof
         for axis in range(unknowns.dim):
             dofs = unknowns.velocity.dofs[:, axis]
@@ -111,6 +124,13 @@ class Boundary:
             return [(face, axis) for face, normal in on for axis in range(grid.dim) if axis != normal]
         return []
 
+    def _across(self, grid: DistributedGrid, midpoints: Array, patch_of: NDArray[np.int64]):
+        """(patch, face of the box, local cells) of patches that prescribe the normal velocity."""
+        for number, patch in enumerate(self.patches):
+            if patch.record.normal_given:
+                for face in patch.faces:
+                    yield number, face, self._cells[(patch_of == number) & grid.on_face(midpoints, face)]
+
     def closed(self) -> bool:
         """Whether no patch is open, so that the pressure level is not determined."""
         return not any(patch.record.open for patch in self.patches)
@@ -122,9 +142,19 @@ class Boundary:
 
     def velocity(self, t: float) -> Array:
         """Prescribed velocities [m/s] of `dofs` at the time t [s]."""
-        values = np.zeros(len(self.dofs))
-        owner = self.imposed[self.dofs]
-        node, axis = self._node_and_axis[self.dofs].T
+        values = self._given(self.dofs, self.imposed[self.dofs], t)
+        if len(self._place):
+            values[self._place] = self.shared.means(self.given_at_shared(t))[1]
+        return values
+
+    def given_at_shared(self, t: float) -> Array:
+        """Velocities [m/s] that each patch of `shared` gives at its dofs at the time t [s]."""
+        return self._given(self.shared.dofs, self.shared.patches, t)
+
+    def _given(self, dofs: NDArray[np.int64], owner: NDArray[np.int64], t: float) -> Array:
+        """Velocities [m/s] that patches (their numbers: owner) give at dofs."""
+        values = np.zeros(len(dofs))
+        node, axis = self._node_and_axis[dofs].T
         for number, patch in enumerate(self.patches):
             if patch.record.value != "velocity":
                 continue

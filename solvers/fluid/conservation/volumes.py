@@ -34,8 +34,6 @@ class Volumes:
 
     def __init__(self, fluid: Fluid, regions: RegionsOfCut, balance: VolumeBalance):
         self._fluid, self._regions, self._balance = fluid, regions, balance
-        tight = [p for p in fluid.boundary.patches if p.record.prescribed in ("all", "normal")]
-        self._tight = [patch.name for patch in tight if patch.record.value != "velocity"]
         surfaces = [body.surface for body in fluid.bodies]
         self._names = [surface.name for surface in surfaces]
         self._body = np.repeat(np.arange(len(surfaces)), [len(surface.facets) for surface in surfaces])
@@ -43,7 +41,6 @@ class Volumes:
         self._unsolved = 0.0  #: volume that the residuals of the continuity equations explain [m^3]
         self._made = 0.0  #: volume that has left without having been there [m^3]; negative: that was lost
         self._exchanged = 0.0  #: volume that has passed from one region to another [m^3]
-        self._through = np.zeros(len(self._tight))  #: volume that has left through patches that are tight [m^3]
 
     def start(self, t: float) -> None:
         """Nothing has flowed."""
@@ -56,19 +53,10 @@ class Volumes:
         self._unsolved += dt * rates.unsolved
         self._made += dt * rates.mass
         self._exchanged += dt * 0.5 * (float(np.abs(rates.lost).sum()) - total)
-        self._through += dt * np.array([rates.patches[name] for name in self._tight])
         return list(self._findings(rates))
 
     def _findings(self, rates: FlowRates) -> Iterator[Finding]:
         least, unit = max(LOST * self._flowed, self._unsolved), f"m^{self._fluid.dim}"
-        for name, volume in zip(self._tight, self._through.tolist(), strict=True):
-            if abs(volume) > least:
-                way = "left" if volume > 0.0 else "entered"
-                yield Finding("leak", name, volume, (
-                    f"{abs(volume):.3g} {unit} of fluid have {way} through the patch '{name}', which is tight "
-                    f"({self._share(volume)}): a patch beside it with a given velocity on the same face ends within a "
-                    "cell. Let it end at a plane of the grid, and come first in 'fluid.patches'"
-                ))  # fmt: skip
         if abs(self._made) <= least and self._exchanged <= least:
             return
         regions = self._regions.now() if self._fluid.bodies else None
@@ -110,9 +98,7 @@ class Volumes:
         return ", ".join(f"'{self._names[index]}'" for index in found)
 
     def save(self) -> State:
-        volumes = [self._flowed, self._unsolved, self._made, self._exchanged]
-        return {"volumes": volumes, "through": self._through.copy()}
+        return {"volumes": [self._flowed, self._unsolved, self._made, self._exchanged]}
 
     def restore(self, state: State) -> None:
         self._flowed, self._unsolved, self._made, self._exchanged = state["volumes"]
-        self._through = state["through"].copy()

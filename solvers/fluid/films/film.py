@@ -107,7 +107,7 @@ def films_of(patches: Sequence[Patch], penalties: Penalties) -> Films:
 
 def wall_faces(patches: Sequence[Patch]) -> list[tuple[int, int]]:
     """Axis and side (0, 1) of the faces of the box that hold the normal velocity: they are walls."""
-    walls = {face for patch in patches if patch.record.prescribed in ("all", "normal") for face in patch.faces}
+    walls = {face for patch in patches if patch.record.normal_given for face in patch.faces}
     return sorted(("xyz".index(face[0]), int(face[1] == "+")) for face in walls)
 
 
