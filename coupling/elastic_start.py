@@ -19,6 +19,7 @@ class ElasticStart:
     """Implements `StartOfSolid`."""
 
     steps = STEPS
+    impulsive = False  #: the impulse would go to the surface alone, and waves that steps do not resolve take it further
 
     def __init__(self, elastic: Elastic):
         self.elastic, self._structure = elastic, elastic.structure
@@ -41,3 +42,7 @@ class ElasticStart:
         """Set the displacement u_0 + sum_k (du_k - du_n), see `coupling.start`."""
         now, old = self._structure.now, self._structure.old
         self._structure.take_start(now.u - self.steps * (now.u - old.u))
+
+    def end_impulse(self, dt: float) -> None:
+        """Not for `impulsive` False."""
+        raise NotImplementedError

@@ -92,8 +92,8 @@ def coupled_elastic(
 
 
 def coupled_bodies(fluid: Fluid, bodies: RigidBodies) -> Coupled:
-    """Rigid bodies in a flow. There is a start if the flow uses BDF2."""
-    return Coupled(fluid, bodies, start=Start(FlowStart(fluid), RigidStart(bodies)) if fluid.scheme.times > 1 else None)
+    """Rigid bodies in a flow. There is a start (`coupling.start`) unless the flow is steady."""
+    return Coupled(fluid, bodies, start=None if fluid.steady else Start(FlowStart(fluid), RigidStart(bodies)))
 
 
 def _box(grid: Grid) -> tuple[Array, Array]:

@@ -247,6 +247,8 @@ class Flow(Part, Protocol):
 class StartOfSolid(Protocol):
     """Start steps of a solid, with the acceleration a = (u - u_n) / dt^2."""
 
+    impulsive: bool  #: whether its velocity jumps as a whole when an impulse acts on the surface
+
     @property
     def steps(self) -> int:
         """Count of steps after which the acceleration is smooth."""
@@ -268,25 +270,44 @@ class StartOfSolid(Protocol):
         """Set the state from the acceleration, the load and the deformation of the start steps."""
         ...
 
+    def end_impulse(self, dt: float) -> None:
+        """Restore the displacement, and add the velocity a dt of a start step of length dt [s]."""
+        ...
+
 
 class StartOfFlow(Protocol):
     """Start steps of a flow: short steps of backward Euler, each from the initial velocity."""
+
+    share: float  #: length of a start step of the flow over that of the first step of the run
 
     @property
     def smallest_cell(self) -> float:
         """Shortest edge of a cell [m]."""
         ...
 
+    @property
+    def accelerates(self) -> bool:
+        """Whether its time scheme uses the acceleration at the start."""
+        ...
+
     def at_once(self, surfaces: Mapping[str, Motion]) -> bool:
         """Whether boundary or surfaces have another velocity than the flow: an impulsive start (collective)."""
         ...
 
-    def step(self, t: float, dt: float) -> AbstractContextManager[None]:
-        """Begin a start step; the caller solves it within the context."""
+    def step(self, t: float, short: float, of_solid: float) -> AbstractContextManager[None]:
+        """Begin a start step of length `short`, of the solid `of_solid`; the caller solves it within the context."""
         ...
 
     def end(self, dt: float) -> None:
         """Restore the initial velocity, and extrapolate those before it by the rate of the last start step."""
+        ...
+
+    def end_impulse(self, dt: float) -> None:
+        """Take the velocity of the last start step for the initial one; dt [s]: length of the first step."""
+        ...
+
+    def forget_step(self) -> None:
+        """Let the first step start from the present history."""
         ...
 
 

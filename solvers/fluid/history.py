@@ -51,9 +51,9 @@ class History:
         """The difference formula of a next step of length dt [s]."""
         return self.scheme.difference(dt, self.steps)
 
-    def start(self, velocity: Array) -> None:
-        """Set the initial velocity, which exists at all nodes."""
-        self.past[0] = Past(velocity, np.ones(len(velocity), dtype=bool))
+    def start(self, velocity: Array, found: Mask | None = None) -> None:
+        """Set the initial velocity; found: local dofs at which it exists, by default all."""
+        self.past[0] = Past(velocity, np.ones(len(velocity), dtype=bool) if found is None else found)
 
     def continue_back(self, dt: float, rate: Array, found: Mask) -> None:
         """Extrapolate velocities back before the start by their rate [m/s^2], in steps of length dt [s]."""

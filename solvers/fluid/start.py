@@ -1,4 +1,4 @@
-"""The start of a coupled flow: its initial rate, from which the velocities before the start are extrapolated."""
+"""The start of a coupled flow: its velocity after an impulse, or its initial rate, by which it is extrapolated back."""
 
 from __future__ import annotations
 
@@ -28,6 +28,8 @@ SHARE = 0.01
 class FlowStart:
     """Short steps of backward Euler from the initial velocity, with the loads at the start."""
 
+    share = SHARE
+
     def __init__(self, fluid: Fluid):
         self.fluid = fluid
 
@@ -35,6 +37,11 @@ class FlowStart:
     def smallest_cell(self) -> float:
         """Shortest edge of a cell [m]."""
         return self.fluid.smallest_cell
+
+    @property
+    def accelerates(self) -> bool:
+        """Whether its time scheme uses the acceleration at the start."""
+        return self.fluid.scheme.times > 1
 
     def at_once(self, surfaces: Mapping[str, Motion]) -> bool:
         """Whether the flow starts impulsively: boundary or bodies have another velocity than the flow (collective).
@@ -54,14 +61,14 @@ class FlowStart:
         return jump > JUMP * speed
 
     @contextmanager
-    def step(self, t: float, dt: float) -> Iterator[None]:
+    def step(self, t: float, short: float, of_solid: float) -> Iterator[None]:
         """A short start step: a context in which the flow can be solved for the motion of coupled surfaces.
 
         Positions and loads are those of t. Velocities of boundary and prescribed bodies are those at the end of the
-        step. A coupled surface that is displaced by dt^2 a gets the velocity a times the length of the step.
+        step. A coupled surface that is displaced by of_solid^2 a gets the velocity a short.
         """
-        fluid, short = self.fluid, SHARE * dt
-        bodies, rate = fluid.bodies, short / dt**2
+        fluid = self.fluid
+        bodies, rate = fluid.bodies, short / of_solid**2
         fluid.bodies = [b if b.motion is None else _with_later_velocity(b, b.motion, short) for b in bodies]
         try:
             fluid.begin_step(t - short, short)
@@ -79,7 +86,16 @@ class FlowStart:
         moving = fluid.unknowns.velocity_mask
         fluid.flow[moving] = start[moving]
         fluid.current = FlowStep(fluid.current.t, dt, fluid.history.difference(dt))
-        fluid.forget_step()
+
+    def end_impulse(self, dt: float) -> None:
+        """Take the velocity of the last start step for the initial one; dt [s]: length of the first step."""
+        fluid = self.fluid
+        fluid.history.start(fluid.velocity(), fluid.system.active_dofs.copy())
+        fluid.current = FlowStep(fluid.current.t, dt, fluid.history.difference(dt))
+
+    def forget_step(self) -> None:
+        """Let the first step start from the present history."""
+        self.fluid.forget_step()
 
 
 def _with_later_velocity(body: ImmersedBody, motion: Callable[[float], Motion], dt: float) -> ImmersedBody:

@@ -120,6 +120,10 @@ class RigidBodies:
         self._last = u - self._u
         self.set_increments(u)
 
+    def increments(self) -> Array:
+        """Increments in the present step: displacement [m] and rotation vector in space [rad], shape (bodies, 6)."""
+        return self._u.copy()
+
     def set_increments(self, u: Array) -> None:
         """Set the increments u since the start of the step, shape (bodies, 6)."""
         self._u = u

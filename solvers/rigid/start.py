@@ -21,6 +21,7 @@ class RigidStart:
     """Implements `StartOfSolid`. One step is enough, because rigid bodies do not oscillate."""
 
     steps = 1
+    impulsive = True
 
     def __init__(self, field: RigidBodies):
         self.field, self._initial = field, list(field.now)
@@ -62,4 +63,16 @@ class RigidStart:
         """Restore positions and velocities; rates of momentum are those of the start step."""
         field = self.field
         field.now = [replace(initial, p=now.p) for initial, now in zip(self._initial, field.now, strict=True)]
+        field.old = list(field.now)
+
+    def end_impulse(self, dt: float) -> None:
+        """Restore positions, and add the velocities that bodies have gained in a start step of length dt [s]."""
+        field = self.field
+        changed = []
+        for initial, now, old, u in zip(self._initial, field.now, field.old, field.increments(), strict=True):
+            v = initial.v.copy()
+            v[:3] += (now.shift - old.shift) / dt
+            v[3:] += initial.R.T @ u[3:] / dt
+            changed.append(replace(initial, v=v))
+        field.now = changed
         field.old = list(field.now)
