@@ -73,7 +73,7 @@ class FlowSystem:
             None if unknowns.hanging is None else HangingSystem(unknowns, unknowns.hanging, self.forms.tangents[0])
         )
         self.matrix = TangentMatrix(unknowns, self.ghost, self._hanging, self.forms.tangents[0], blocked=blocked)
-        self._outer = OuterFaces(grid, boundary, unknowns, self.terms, self.flow)
+        self._outer = OuterFaces(grid, boundary, unknowns, self.terms, self.flow, settings.body_force)
         ghost = [] if self.ghost is None else self.ghost.integrals
         fem.compile_integrals([*self.forms.integrals(), *self._outer.integrals(), *ghost], "the flow")
         #: owned cells: uncut ones, cut ones, and those in films if there are any; forms over them and the outer faces
