@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from coupling.coupled import Coupled
 from coupling.elastic import Elastic
 from coupling.elastic_start import ElasticStart
@@ -13,7 +11,6 @@ from coupling.interface import DrySide
 from coupling.ports import Start
 from coupling.sealing_layer import SealingLayer, sealing_layers
 from coupling.wetted import immerse, wetted_surface
-from solvers.api import Array
 from solvers.fluid.background.grid import Grid
 from solvers.fluid.bodies.immersed import ImmersedBody
 from solvers.fluid.bodies.surface import ImmersedSurface
@@ -47,7 +44,7 @@ def couple(
 
     grid: the box of cells around the bodies. patches: conditions on the faces of the box. rigid_bodies: further bodies
     with prescribed motion. wetted: body -> names of its wetted surfaces. Without a name the whole surface is wetted,
-    except parts in other bodies and, without contact, on the boundary of the box at the first time `start` [s].
+    except parts in other bodies at the first time `start` [s].
     seal: thickness of a tight layer on contact surfaces [m].
     """
     comm, bodies = structure.comm, structure.bodies
@@ -56,7 +53,7 @@ def couple(
         mesh = body.domain.source
         skin = comm.bcast(None if mesh is None else cut_out_skin(mesh, wetted.get(body.name)), root=0)
         surfaces.append(wetted_surface(structure, index, skin))
-    immersed = immerse([surface.at_start for surface in surfaces], rigid_bodies, _box(grid), start)
+    immersed = immerse([surface.at_start for surface in surfaces], rigid_bodies, start)
     fluid = Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=comm)
     layers = {} if seal is None else sealing_layers(surfaces, seal)
     return coupled_elastic(fluid, Elastic(structure, surfaces), layers=layers)
@@ -75,7 +72,7 @@ def couple_rigid(
 ) -> Coupled:
     """Rigid bodies that the flow moves, for `Monolithic` or `Partitioned`; all else as in `couple` (collective)."""
     moved = [(ImmersedSurface(body.name, body.facets, len(body.points)), body.points) for body in bodies.bodies]
-    immersed = immerse(moved, rigid_bodies, _box(grid), start, deform=False)
+    immersed = immerse(moved, rigid_bodies, start, deform=False)
     return coupled_bodies(Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=bodies.comm), bodies)
 
 
@@ -94,8 +91,3 @@ def coupled_elastic(
 def coupled_bodies(fluid: Fluid, bodies: RigidBodies) -> Coupled:
     """Rigid bodies in a flow. There is a start (`coupling.start`) unless the flow is steady."""
     return Coupled(fluid, bodies, start=None if fluid.steady else Start(FlowStart(fluid), RigidStart(bodies)))
-
-
-def _box(grid: Grid) -> tuple[Array, Array]:
-    """Lowest and highest corner of a grid [m]."""
-    return np.array([edge[0] for edge in grid.edges]), np.array([edge[-1] for edge in grid.edges])

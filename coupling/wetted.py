@@ -17,9 +17,6 @@ from solvers.fluid.bodies.surface import ImmersedSurface, Motion
 from solvers.skin import Skin
 from solvers.structure.field import Structure
 
-#: Distance to the face of the box, in sizes of the box, below which a facet is on it.
-ON_BOX = 1e-9
-
 #: Winding number above which the middle of a facet is in another body; on the surface of the body it is one half.
 INSIDE = 0.75
 
@@ -55,18 +52,17 @@ def wetted_surface(structure: Structure, index: int, skin: Skin) -> WettedSurfac
 def immerse(
     moved: Sequence[tuple[ImmersedSurface, Array]],
     given: Sequence[ImmersedBody],
-    box: tuple[Array, Array],
     t: float = 0.0,
     *,
     deform: bool = True,
 ) -> list[ImmersedBody]:
     """All bodies in the fluid: first those with prescribed motion, `given`, then those that a solid moves, `moved`.
 
-    moved: surfaces with the positions of their vertices [m] at the start; box: lowest and highest corner [m]; t: the
-    first time [s]; deform: the volume of the moved ones may change.
+    moved: surfaces with the positions of their vertices [m] at the start; t: the first time [s]; deform: the volume of
+    the moved ones may change.
     """
     at_start = [(body.surface, body.motion(t).x) for body in given if body.motion is not None]
-    wet = find_wet([*at_start, *moved], box)
+    wet = find_wet([*at_start, *moved])
     found = [replace(body, surface=surface) for body, surface in zip(given, wet, strict=False)]
     starts = [points for _, points in moved]
     return found + [
@@ -75,21 +71,17 @@ def immerse(
     ]
 
 
-def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]], box: tuple[Array, Array]) -> list[ImmersedSurface]:
+def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]]) -> list[ImmersedSurface]:
     """The surfaces, given with the positions of their vertices [m], with marked wet facets.
 
-    Facets with their middle in another body are not wet, nor those on the boundary of the box, except where they take
-    part in contact. Marks that a surface has already are kept.
+    Facets with their middle in another body are not wet. Those on the boundary of the box are: cuts leave them out as
+    long as they are there (`off_boundary`). Marks that a surface has already are kept.
     """
-    low, high = box
     found = []
     for index, (surface, x) in enumerate(surfaces):
         if surface.wet is None:
             middles = x[surface.facets].mean(axis=1)
-            distance = np.abs(np.concatenate([middles - low, middles - high], axis=1)).min(axis=1)
-            wet = distance > ON_BOX * (high - low).max()
-            if surface.in_contact is not None:
-                wet |= surface.in_contact
+            wet = np.ones(len(surface.facets), dtype=bool)
             hidden = np.zeros(len(wet), dtype=bool)
             for other, (body, at) in enumerate(surfaces):
                 if other == index:

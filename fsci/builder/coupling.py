@@ -42,8 +42,7 @@ def build_coupled(
     assert case.fluid is not None
     skins = [_skin(case, comm, body) for body in bodies]
     surfaces = [wetted_surface(structure, index, skin) for index, (skin, _) in enumerate(skins)]
-    box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
-    immersed = immerse([surface.at_start for surface in surfaces], build_rigid_bodies(case, comm), box, case.time.start)
+    immersed = immerse([surface.at_start for surface in surfaces], build_rigid_bodies(case, comm), case.time.start)
     dry_sides = [_dry_side(s, c) for s, (_, c) in zip(surfaces, skins, strict=True) if c is not None]
     immersed += [ImmersedBody(_dry_surface(side), None, deforms=True) for side in dry_sides]
     fluid = build_fluid(case, comm, timer, immersed)
@@ -58,8 +57,7 @@ def build_coupled_rigid(
     """The coupled system of a flow and the rigid bodies that it moves. Raises CaseError (collective)."""
     assert case.fluid is not None
     moved = [(ImmersedSurface(body.name, body.facets, len(body.points)), body.points) for body in bodies.bodies]
-    box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
-    immersed = immerse(moved, build_rigid_bodies(case, comm), box, case.time.start, deform=False)
+    immersed = immerse(moved, build_rigid_bodies(case, comm), case.time.start, deform=False)
     fluid = build_fluid(case, comm, timer, immersed)
     return _scheme(case, coupled_bodies(fluid, bodies)), fluid
 

@@ -20,8 +20,8 @@ class Coupling(Section):
     )
     wetted: dict[Name, Surfaces] = setting(
         dict,
-        "surfaces that the fluid touches, by body; default: all surfaces except those inside of other bodies and, "
-        "without contact, those on the boundary of the box at the start",
+        "surfaces that the fluid touches, by body; default: all surfaces except those inside of other bodies; "
+        "those on the boundary of the box are wet as soon as they leave it",
     )
     dry_side: dict[Name, Literal["outside"] | Annotated[tuple[NumberVector, ...], EntryCount(1, None)]] = setting(
         dict,

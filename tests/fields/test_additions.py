@@ -271,7 +271,7 @@ def test_kind_of_body():
     patches = [Patch("in", ("x-",), "velocity", (1.0, 0.0)), SIDES, Patch("out", ("x+",), "outflow")]
     settings = {"solver": SolverSettings(TIGHT.newton, "direct"), "dt": 0.1}
     moved = [(ImmersedSurface("block", facets, len(points)), points)]
-    immersed = immerse(moved, [], (np.zeros(2), np.ones(2)), deform=False)
+    immersed = immerse(moved, [], deform=False)
     still = Still(points)
     alone = make_fluid(
         uniform([0, 0], [1, 1], [10, 10]),

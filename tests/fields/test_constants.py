@@ -107,10 +107,9 @@ def test_winding_number_of_what_is_inside(monkeypatch, inside):
     ):
         facets, nodes = tessellate(mesh)
         surfaces.append((ImmersedSurface(f"{len(surfaces)}", facets, len(nodes)), mesh.points[nodes]))
-    box = np.array([-2.0, -2.0]), np.array([3.0, 3.0])
-    wanted = [surface.wet for surface in wetted.find_wet(surfaces, box)]
+    wanted = [surface.wet for surface in wetted.find_wet(surfaces)]
     monkeypatch.setattr(wetted, "INSIDE", inside)
-    found = [surface.wet for surface in wetted.find_wet(surfaces, box)]
+    found = [surface.wet for surface in wetted.find_wet(surfaces)]
     assert not all(wet.all() for wet in wanted)
     assert all(np.array_equal(a, b) for a, b in zip(found, wanted, strict=True))
 
