@@ -28,7 +28,7 @@ from solvers.fluid.closed_contact.zone import ClosedZone, find_zone
 from solvers.fluid.closed_contact.zone_seepage import ZoneSeepage
 from solvers.fluid.cut_shape import CutDerivatives, FlowTerms, cut_derivatives
 from solvers.fluid.cutting.cut import Cut
-from solvers.fluid.cutting.pieces import Pieces
+from solvers.fluid.cutting.pieces import NOTHING, Pieces
 from solvers.fluid.cutting.weights import Weights
 from solvers.fluid.films.film import coercive, film_cells
 from solvers.fluid.films.film_shape import FilmDerivatives, FilmFlow, film_derivatives
@@ -304,7 +304,9 @@ class FlowSystem:
         reduced = 1.0 if self.gaps is None else self.gaps.lengths(cells)
         least: Array | float = 0.0
         if cut.creeping is not None:
-            volume, area = cut.fraction[cells] * sizes.prod(axis=1), pieces.area.sum(axis=1)
+            # closed films have no fluid whose penalty would have to be larger
+            share = np.where(cut.fraction[cells] > NOTHING, cut.fraction[cells], np.inf)
+            volume, area = share * sizes.prod(axis=1), pieces.area.sum(axis=1)
             least = coercive(cut.creeping[self.grid.numbers[cells]], pieces.cell, volume, area)
         return nitsche.penalties(
             flow, settings.penalties, settings.degree, pieces.normal, sizes, *speeds, reduced, least

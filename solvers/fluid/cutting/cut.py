@@ -13,7 +13,7 @@ from solvers.api import Array
 from solvers.fluid.background.grid import DistributedGrid, Grid
 from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.cutting.overlaps import with_unions
-from solvers.fluid.cutting.pieces import FLUSH, NOTHING, Pieces, in_planes, put_where_fluid_is
+from solvers.fluid.cutting.pieces import FLUSH, NOTHING, Pieces, cells_across, in_planes, put_where_fluid_is
 from solvers.fluid.films.film import Films, Walls, creeping_cells, walls_of
 from solvers.fluid.films.gaps import GapFinder, NarrowGaps
 from solvers.fluid.thin.sheet_cells import on_sheets
@@ -244,11 +244,18 @@ class Cutter:
         return (moments.fraction > NOTHING) & (moments.fraction < 1.0 - NOTHING) | in_use, in_use
 
     def _facing(self, moments, counts, normal) -> NDArray[np.bool_]:
-        """Box cells with surfaces that face each other: fluid enters them if the surfaces separate."""
-        number, size = moments.cells[moments.piece_cell], self.grid.grid.size
+        """Box cells with surfaces that face each other, in them or in their faces: fluid enters if they separate."""
+        number, across, size = (
+            moments.cells[moments.piece_cell], cells_across(self.grid.grid, self.points, moments), self.grid.grid.size
+        )  # fmt: skip
         area = moments.piece_mass.sum(axis=(1, 2)) * counts[moments.piece_facet]
+        in_face = across >= 0
+        number = np.concatenate([number, across[in_face]])
+        area = np.concatenate([area, area[in_face]])
+        outward = normal[moments.piece_facet]
+        outward = np.concatenate([outward, outward[in_face]])
         total = np.bincount(number, area, size)
-        net = np.stack([np.bincount(number, area * n, size) for n in normal[moments.piece_facet].T])
+        net = np.stack([np.bincount(number, area * n, size) for n in outward.T])
         return (total > 0.0) & (np.linalg.norm(net, axis=0) < 0.5 * total)
 
     def _covered(self, corners: Array) -> NDArray[np.bool_]:

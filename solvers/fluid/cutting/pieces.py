@@ -95,6 +95,25 @@ def put_where_fluid_is(
     return bounds, found
 
 
+def cells_across(grid: Grid, points: Array, moments) -> NDArray[np.int64]:
+    """For pieces in a face of their cell, the cell of the box on the other side of the face; -1: there is none.
+
+    moments: result of the kernel; points: of the quadrature in one direction.
+    """
+    cell, count, dim = moments.cells[moments.piece_cell], len(points), grid.dim
+    by_point = moments.piece_moments.sum(axis=2).reshape(-1, *[count] * dim)
+    area = by_point.reshape(len(cell), -1).sum(axis=1)
+    index = np.stack(np.unravel_index(cell, grid.shape, order="F"))
+    across = np.full(len(cell), -1)
+    for axis in range(dim):
+        level = np.moveaxis(by_point, dim - axis, 1).reshape(len(cell), count, -1).sum(axis=2)
+        for side, step in ((0, -1), (1, 1)):
+            within = (index[axis] + step >= 0) & (index[axis] + step < grid.shape[axis])
+            flush = level @ (points - side) ** 2 <= FLUSH**2 * area
+            across = np.where(within & flush, cell + step * int(np.prod(grid.shape[:axis])), across)
+    return across
+
+
 def selected(pieces: Pieces, cell: NDArray[np.int64]) -> Pieces:
     """Pieces with other cells; those with a negative one are left out."""
     kept = np.flatnonzero(cell >= 0)
