@@ -68,10 +68,10 @@ fluid:
   bodies:
     lower:
       mesh: {{shape: rectangle, size: [0.2, 0.8], cells: [2, 8], origin: [0.9, -0.3]}}
-      motion: {{displacement: [0, "-0.2*max(t - 0.04, 0)"]}}}
+      motion: {{displacement: [0, "-0.2*max(t - 0.04, 0)"]}}
     upper:
       mesh: {{shape: rectangle, size: [0.2, 0.8], cells: [2, 8], origin: [0.9, 0.5]}}
-      motion: {{displacement: [0, "0.2*max(t - 0.04, 0)"]}}}
+      motion: {{displacement: [0, "0.2*max(t - 0.04, 0)"]}}
 probes:
   q: {{quantity: flow_rate, through: outlet}}
 """
