@@ -31,6 +31,7 @@ class ExchangedFlow(Protocol):
     dim: int
     settings: FlowSettings
     bodies: list[ImmersedBody]
+    motions: list[Motion]
     box: Grid
     grid: DistributedGrid
     unknowns: Unknowns

@@ -166,7 +166,8 @@ class Fluid:
             self.flow[mask] = self.history.past[0].velocity[mask]
         self.history.begin_step(self._present_pressure())
         history = tuple(self.history.past)
-        self.began = Began(self.unknowns, self.grid.sheets, self.current, history, tuple(self.motions))
+        layers = 0 if self.system.cut is None else self.system.cut.depth
+        self.began = Began(self.unknowns, self.grid.sheets, self.current, history, tuple(self.motions), layers)
         self.thin.begin_step()
         self.cutter.begin_step()
         self.begin_system(self.current)

@@ -23,7 +23,6 @@ class FlowAroundSurfaces(ExchangedFlow, Protocol):
 
     timer: Timer
     surfaces: AllSurfaces
-    motions: list[Motion]
     levels: PressureLevels
     held: NDArray[np.bool_]
     steady_iteration: SteadyIteration
@@ -39,7 +38,7 @@ def follow_surfaces(fluid: FlowAroundSurfaces, *, with_solid: bool) -> None:
         cut = _cut(fluid)
     with fluid.timer("weights"):
         fluid.system.set_cut(cut)
-        require_history(fluid.unknowns, cut, fluid.history.missing(fluid.current.difference))
+        require_history(fluid, cut, fluid.history.missing(fluid.current.difference))
         require_within_period(fluid.unknowns, cut)
         fluid.flow[~fluid.system.active_dofs] = 0.0
         if fluid.unknowns.hanging is not None:

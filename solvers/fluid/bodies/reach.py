@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -12,13 +13,34 @@ from solvers.api import StepFailed
 from solvers.fluid.background.grid import DistributedGrid
 from solvers.fluid.background.nested import FINE_LAYERS
 from solvers.fluid.background.space import Unknowns
+from solvers.fluid.bodies.immersed import ImmersedBody
 from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.cutting.cut import Cut, Cutter
 from solvers.fluid.cutting.pieces import NOTHING
+from solvers.fluid.time_scheme import FlowStep
 
-TOO_FAR = (
-    "a body moved farther in one step than velocities are extrapolated behind its surface: take a smaller time step"
-)
+
+class StepInMotion(Protocol):
+    """The state at the beginning of a step."""
+
+    @property
+    def motions(self) -> tuple[Motion, ...]: ...
+
+    @property
+    def layers(self) -> int: ...
+
+
+class FlowInMotion(Protocol):
+    """A flow around bodies that have moved since the step began."""
+
+    unknowns: Unknowns
+    bodies: list[ImmersedBody]
+    motions: list[Motion]
+    current: FlowStep
+    smallest_cell: float
+
+    @property
+    def began(self) -> StepInMotion | None: ...
 
 
 def strip_layers(grid: DistributedGrid, motion: Motion, time: float, smallest: float) -> int:
@@ -28,16 +50,42 @@ def strip_layers(grid: DistributedGrid, motion: Motion, time: float, smallest: f
     return math.ceil(min(max(1.0, layers), max(grid.grid.shape)))  # the grid has no more layers
 
 
-def require_history(unknowns: Unknowns, cut: Cut, missing: NDArray[np.bool_]) -> None:
+def require_history(fluid: FlowInMotion, cut: Cut, missing: NDArray[np.bool_]) -> None:
     """Raise StepFailed if a cell with fluid has no velocity from an earlier step (collective).
 
     missing: mask of local dofs without one.
     """
+    unknowns = fluid.unknowns
     blocks = np.zeros(unknowns.local // unknowns.block_size, dtype=bool)
     blocks[unknowns.cell_blocks[np.concatenate([cut.uncut, cut.cut])]] = True
     used = unknowns.expand(blocks) & unknowns.velocity_mask
-    if unknowns.grid.comm.allreduce(bool((used & missing).any()), op=MPI.LOR):
-        raise StepFailed("fluid", TOO_FAR)
+    nodes = unknowns.velocity
+    without = nodes.points[(used & missing)[nodes.dofs[:, 0]]]
+    places = [place for place in unknowns.grid.comm.allgather(without[:1].tolist()) if place]
+    if places:
+        assert fluid.began is not None
+        raise moved_too_far(fluid, max(fluid.began.layers, 1), tuple(places[0][0]))
+
+
+def moved_too_far(fluid: FlowInMotion, cells: int, place: tuple[float, ...] | None = None) -> StepFailed:
+    """The failure of a step in which a body moved by more than some cells, or else fluid appears at a place [m]."""
+    assert fluid.began is not None
+    ways = [
+        np.abs(now.x - before.x).max(axis=1) if len(before.x) else np.zeros(1)
+        for now, before in zip(fluid.motions, fluid.began.motions, strict=False)
+    ]
+    farthest = int(np.argmax([way.max() for way in ways])) if ways else 0
+    way = float(ways[farthest].max()) / fluid.smallest_cell if ways else 0.0
+    if way <= cells and place is not None:
+        where = ", ".join(f"{x:.4g}" for x in place)
+        reason = f"fluid appears near ({where}) where there was none, though no body moved by more than {cells} cells"
+        return StepFailed("fluid", f"{reason}: take a smaller time step, or finer cells there", where=place)
+    vertex = int(ways[farthest].argmax())
+    reason = (
+        f"body '{fluid.bodies[farthest].surface.name}' moved by {way:.3g} cells in one step; velocities are "
+        f"extrapolated to {cells} behind its surface: take a time step below {fluid.current.dt * cells / way:.2g}"
+    )
+    return StepFailed("fluid", reason, where=tuple(fluid.motions[farthest].x[vertex].tolist()))
 
 
 def require_finest(cutter: Cutter, comm: MPI.Comm) -> None:

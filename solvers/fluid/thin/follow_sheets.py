@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.fluid.bodies.reach import moved_too_far
 from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.exchanged import ExchangedFlow
+from solvers.fluid.thin.sheet_parts import AROUND
 from solvers.fluid.thin.sheets import Sheets
 from solvers.fluid.thin.thin_bodies import Carrying
 
@@ -23,7 +25,8 @@ def follow_sheets(fluid: ExchangedFlow, sheets: Sheets | None, facets: NDArray[n
     assert sheets is not None
     began = fluid.began
     if began is not None and not fluid.settings.steady:  # a steady flow has no history
-        began.require_near(fluid.smallest_cell, motion.x)
+        if began.way(motion.x) > AROUND * fluid.smallest_cell:
+            raise moved_too_far(fluid, AROUND)
     now, old, flow, increment = fluid.grid.sheets, fluid.unknowns, fluid.flow, fluid.increment
     if now is not None and now.same_unknowns(sheets):
         fluid.grid.sheets = sheets

@@ -11,18 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from solvers.api import Array, State, StepFailed
+from solvers.api import Array, State
 from solvers.fluid.background.box import Grid
 from solvers.fluid.background.carrier import Carrier
 from solvers.fluid.background.nested import Nested
 from solvers.fluid.background.space import Unknowns
 from solvers.fluid.bodies.immersed import ImmersedBody
-from solvers.fluid.bodies.reach import TOO_FAR
 from solvers.fluid.bodies.surface import Motion, wetness
 from solvers.fluid.cutting.cut import off_boundary
 from solvers.fluid.history import Past
 from solvers.fluid.thin.sheet_cycles import joined_in, recurring
-from solvers.fluid.thin.sheet_parts import AROUND
 from solvers.fluid.thin.sheet_transfer import Sides, along_surface, sides_of, transfer
 from solvers.fluid.thin.sheets import Sheets, find_sheets
 from solvers.fluid.thin.thickness import THIN, THIN_IF_MOVING
@@ -132,13 +130,12 @@ class Began:
     step: FlowStep  #: that the system has the terms of
     past: tuple[Past, ...]
     motions: tuple[Motion, ...]
+    layers: int  #: of cells behind surfaces with velocities
 
-    def require_near(self, smallest: float, x: Array) -> None:
-        """Raise StepFailed if a vertex has moved farther than the cells in which sheets are followed."""
-        if self.motions:
-            way = np.abs(x - np.concatenate([motion.x for motion in self.motions])).max(initial=0.0)
-            if way > AROUND * smallest:
-                raise StepFailed("fluid", TOO_FAR)
+    def way(self, x: Array) -> float:
+        """The farthest way [m] along an axis of a vertex to the positions x of all vertices."""
+        before = [motion.x for motion in self.motions]
+        return float(np.abs(x - np.concatenate(before)).max(initial=0.0)) if before else 0.0
 
 
 class Carrying:
