@@ -28,8 +28,12 @@ from solvers.contact.terms import Terms
 from solvers.rows import RowTransformation
 from solvers.sparse import Sparse, nothing
 
-#: Gap relative to the extent of all surfaces up to which nodes without pressure touch: the rounding of positions.
-TOUCHING = 1e-12
+#: Gap that is the rounding of positions, relative to the extent of all surfaces, and to their distance from the origin.
+TOUCHING, FAR = 1e-12, 1e-15
+
+#: The same of nodes that no iterate of this solve has pressed yet: rounding of meshes and their translations. Such nodes
+#: are tried. As those that would pull are open in the next iterate, the result does not depend on it.
+TRIED = 1e-10
 
 
 class Contact:
@@ -70,7 +74,8 @@ class Contact:
         self._constraints = Constraints(self.interface)
         self.merged = np.zeros(count, dtype=bool)  #: multipliers that are merged into another one of their node
         self._stiffness = np.zeros(count)
-        self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
+        extent, far = float(np.ptp(self.nodes.points, axis=0).max()), float(np.abs(self.nodes.points).max())
+        self._touching, self._nearly = max(TOUCHING * extent, FAR * far), TRIED * max(extent, far)  # gaps [m]
         self._shared: Sparse | None = None  # redistribution at the latest evaluation
         self._tied = np.isin(np.arange(count), [m for law, own in self.interface.laws if law == Tied() for m in own])
         self._integration = Integration(self.interface, comm)
@@ -188,7 +193,7 @@ class Contact:
             slip_defined=np.zeros(len(which), dtype=bool) if slip is None else slip.defined[which],
             c_n=self.c_n * self.active_set.damping * stiffness,
             c_t=self.c_n * self.active_set.damping * stiffness,
-            touching=self._touching,
+            touching=np.where(self.active_set.tried[which], self._touching, self._nearly),
         )
 
     def _drop_dependent(self, status: Statuses) -> None:
