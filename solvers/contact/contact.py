@@ -31,8 +31,8 @@ from solvers.sparse import Sparse, nothing
 #: Gap that is the rounding of positions, relative to the extent of all surfaces, and to their distance from the origin.
 TOUCHING, FAR = 1e-12, 1e-15
 
-#: The same of nodes that no iterate of this solve has pressed yet: rounding of meshes and their translations. Such nodes
-#: are tried. As those that would pull are open in the next iterate, the result does not depend on it.
+#: The same of nodes that no iterate of this solve has pressed yet: rounding of meshes and their translations. They are
+#: tried. As those that would pull are open in the next iterate, the result does not depend on it.
 TRIED = 1e-10
 
 
@@ -97,7 +97,7 @@ class Contact:
         self._stiffness = np.divide(at_node, areas, out=np.zeros_like(areas), where=areas > 0.0)
         self.x = self.positions(u, t)
         self.x_old = self.x.copy()
-        self._integration.search_anew()
+        self._integration.start(self.x)
         self._constraints.start(self.x)
 
     def positions(self, u: Array, t: float) -> Array:
@@ -152,11 +152,12 @@ class Contact:
         x = self.positions(u, t)
         self._integration.move(x - self.x)
         self.x, self.time = x, t
+        self._integration.interfere(t)
         if self._integration.clear:
             return
         self.terms = self._integrate()
         status = np.full(len(self.z), OPEN, dtype=np.int8)
-        self._gap = np.zeros(len(self.z)) if self.terms is None else self._redistributed(self.terms.gap)
+        self._gap = np.zeros(len(self.z)) if self.terms is None else self._redistributed(self._own_gap(self.terms))
         self._mean_gap = np.zeros(len(self.z))
         if self.terms is not None:
             self._D = self._redistributed(self.terms.D)
@@ -166,6 +167,11 @@ class Contact:
             self._drop_dependent(status)
         self.active_set.choose(status, x[self.multipliers.node])
         self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
+
+    def _own_gap(self, terms: Terms) -> Array:
+        """Weighted gaps of all multipliers [m^dim], less the interference of their pairs."""
+        interference = self._integration.interference
+        return terms.gap - interference @ terms.D_of_pair if interference.any() else terms.gap
 
     def _integrate(self) -> Terms | None:
         """Mortar terms, slip and multipliers with a constraint at the present positions; None if no facets are near."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.contact.law.law import Law
-from solvers.contact.mortar import FacetSearch, Mortar, join_masters
+from solvers.contact.mortar import FacetSearch, Masters, Mortar, join_masters
 from solvers.contact.pair import Pair
 from solvers.contact.patch import Multipliers, SlavePatch, number_multipliers
 from solvers.contact.self_search import SelfSearch
@@ -163,8 +163,19 @@ def _mortars_of(
                 search = Search(facets, joined.facets)
                 if len(np.intersect1d(numbers[id(slave)], joined.nodes)):
                     search = SearchApart(search, patch.nodes[facets], joined.nodes[joined.facets])
-            found.append(Mortar(patch, facets, edge, joined, integration, search))
+            deep = _deep_facets(joined, pairs)
+            found.append(Mortar(patch, facets, edge, joined, integration, search, deep))
     return found
+
+
+def _deep_facets(joined: Masters, pairs: Sequence[Pair]) -> NDArray[np.int32]:
+    """Facets that lie deep in each other at the start, those of masters in the numbers of the joined ones, (p, 2)."""
+    found = [np.empty((0, 2), dtype=np.int32)]
+    for pair in np.unique(joined.pair_of_facet).tolist():
+        deep = pairs[pair].deep
+        if deep is not None:
+            found.append(deep + np.array([0, np.argmax(joined.pair_of_facet == pair)], dtype=np.int32))
+    return np.concatenate(found)
 
 
 def _nodal_basis(multipliers: Multipliers, size: int) -> Basis | None:
