@@ -201,8 +201,7 @@ class ContactSection(Section):
     friction: Friction = setting(Friction, "friction law of the pairs that 'bodies' finds")
     reach: Positive | None = setting(
         None,
-        "largest distance of two surfaces at the start that 'bodies' makes a pair; default: the "
-        "extent of the smaller body",
+        "largest distance of two surfaces at the start that 'bodies' makes a pair; default: any",
         unit="m",
     )
     obstacles: dict[Name, ObstacleSection] = setting(dict, "rigid surfaces by name")

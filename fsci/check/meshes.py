@@ -126,12 +126,13 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
     found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in said]
     for only_note, keys, text in overlaps(case, bodies, found.pairs):
         (found.notes if only_note else found.warnings).append(f"{case.place(*keys)}: {text}")
-    if chosen is not None:
-        from fsci.check.far_pairs import far_pairs
+    if case.elastic_bodies:
+        from fsci.check.unpaired import unpaired
 
-        names = case.elastic_bodies if chosen == "all" else chosen
+        names = list(case.elastic_bodies) if chosen in (None, "all") else chosen
         meshes = {name: found.meshes[name] for name in names}
-        found.notes += [f"{case.place('contact')}: {text}" for text in far_pairs(case, meshes, found.pairs)]
+        at = case.place("structure" if case.contact is None else "contact")
+        found.notes += [f"{at}: {text}" for text in unpaired(case, meshes, found.pairs)]
 
 
 def _elastic(case: Case, found: Findings) -> None:

@@ -161,6 +161,8 @@ class Mortar:
         grown by s at most, and the motion of a step, which inflates them, by 2 s. Hence boxes with a clearance of 4 s
         do not overlap.
         """
+        if travel < self.clear_until and not len(self._kept):
+            return np.empty((0, 2), dtype=np.int32), 0.0
         slave, master = self.patch.nodes, self.masters.nodes
         motion = max(float(np.abs(x[nodes] - x_previous[nodes]).max(initial=0.0)) for nodes in (slave, master))
         motion += max(self.interference, 0.0)
