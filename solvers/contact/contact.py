@@ -17,6 +17,7 @@ from solvers.contact.force import force_matrix, nodal_force
 from solvers.contact.friction_work import FrictionWork
 from solvers.contact.integration import Integration
 from solvers.contact.interface import ContactInterface, describe_interface
+from solvers.contact.interference_work import InterferenceWork
 from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
 from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import ActiveMultipliers, linearise
@@ -83,6 +84,7 @@ class Contact:
         self._weight = 1.0  # of the new contact force in the balance
         self.work = FrictionWork((count, self.dim))
         self._of_obstacles = ObstacleWork(np.flatnonzero(self.nodes.dofs[:, 0] < 0), self.dim)
+        self._interfered = InterferenceWork(len(self.pairs))
         self.time = np.nan  #: of the latest evaluation [s]
         self.touched_at = np.full(len(self.pairs), np.inf)  #: time of the first contact of each pair [s], set by probes
         self.terms: Terms | None = None
@@ -98,6 +100,8 @@ class Contact:
         self.x = self.positions(u, t)
         self.x_old = self.x.copy()
         self._integration.start(self.x)
+        self._integration.interfere(t)
+        self._interfered.start(self._integration.interference)
         self._constraints.start(self.x)
 
     def positions(self, u: Array, t: float) -> Array:
@@ -127,6 +131,7 @@ class Contact:
         if self._integration.has_slip:
             self.work.end_step(weight, *self._force_and_slip())
         self._of_obstacles.end_step(self.force(), self.x - self.x_old)
+        self._interfered.end_step(self._normal_forces(), self._integration.interference)
         self.slip = None
 
     @property
@@ -136,8 +141,15 @@ class Contact:
 
     @property
     def obstacle_work(self) -> Array:
-        """(work of moved obstacles on the bodies since the start, by how much it may be wrong) [J]."""
-        return np.array([self._of_obstacles.total, self._of_obstacles.doubt])
+        """(work of moved obstacles and of growing interference since the start, by how much it may be wrong) [J]."""
+        parts = self._of_obstacles, self._interfered
+        return np.array([sum(part.total for part in parts), sum(part.doubt for part in parts)])
+
+    def _normal_forces(self) -> Array:
+        """Integral of the pressure of each pair [N], shape (pairs,)."""
+        if self.terms is None:
+            return np.zeros(len(self.pairs))
+        return self.terms.D_of_pair @ np.einsum("nd,nd->n", self.z, self.terms.normals)
 
     def _force_and_slip(self) -> tuple[Array, Array]:
         """(force [N], slip in this step [m]) along the surface for multipliers in contact, shapes (C, dim)."""
@@ -360,6 +372,7 @@ class Contact:
             "touched_at": self.touched_at.copy(),
             "work": self.work.save(),
             "obstacle_work": self._of_obstacles.save(),
+            "interference_work": self._interfered.save(),
         }
 
     def restore(self, state: State) -> None:
@@ -371,3 +384,4 @@ class Contact:
         self.touched_at[:] = state["touched_at"]
         self.work.restore(state["work"])
         self._of_obstacles.restore(state["obstacle_work"])
+        self._interfered.restore(state["interference_work"])

@@ -1,5 +1,7 @@
 """Bodies that overlap at the start, by any depth: the first step closes it with the force of the bodies' strain."""
 
+import json
+
 import numpy as np
 import pytest
 from contact_cases import run
@@ -173,6 +175,20 @@ def test_an_interference_of_several_cells(tmp_path):
     history = run(blocks(0.0, upper=8, lower=8, settings=", interference: 0.3"), tmp_path)
     np.testing.assert_allclose(history["force.y"], stress(0.3), rtol=1e-6)
     np.testing.assert_allclose(history["gap"], 0.3, rtol=1e-9)
+
+
+def test_the_work_of_a_growing_interference(tmp_path):
+    """All that is stored: energy minus work is that of the first overlap, up to second order in the step."""
+    text = blocks(0.1, step=0.25, settings=', interference: "0.2*t"')
+    history = run(text, tmp_path)
+    stored = history["energy.internal"] - history["energy.work"]
+    assert history["energy.internal"][-1] > 3.0 * history["energy.internal"][0]
+    np.testing.assert_allclose(stored, stored[0], rtol=0.02)
+    fine = run(text.replace("step: 0.25", "step: 0.125"), tmp_path / "fine")
+    error = [np.ptp(h["energy.internal"] - h["energy.work"]) for h in (history, fine)]
+    assert error[1] < 0.4 * error[0]  # of second order
+    warnings = json.loads((tmp_path / "out" / "summary.json").read_text())["warnings"]
+    assert warnings == []
 
 
 # ------------------------------------------------------------------------------------------------------------ adjust
