@@ -90,7 +90,7 @@ def _look(one: Watched, now: Array) -> Finding | None:
     before, one.before = one.before, now
     thickness = one.measures.thickness
     reach = REACH * thickness
-    if one.clear is not None and _deformed(one.clear, now) < 0.5 * reach:
+    if one.clear is not None and _is_close(one.clear, now, 0.5 * reach):
         return None
     middle, turned = now.mean(axis=0), _turned(before, now)
     here = now - middle
@@ -190,9 +190,12 @@ def _below(corners: Array, number: Indices, weights: Array, depth: float) -> Arr
     return np.einsum("kv,kvd->kd", weights, corners[number]) - depth * unit_normals(corners)[number]
 
 
-def _deformed(first: Array, second: Array) -> float:
-    """Largest distance [m] of vertices in two states, after the rigid motion between them."""
-    return float(np.linalg.norm(_turned(first, second) - (second - second.mean(axis=0)), axis=1).max())
+def _is_close(first: Array, second: Array, limit: float) -> bool:
+    """Whether no vertex has moved by the limit [m] between two states, but for the rigid motion between them."""
+    away = second - first
+    if np.abs(away - away[0]).max() < 0.5 * limit / first.shape[1]:  # a translation
+        return True
+    return bool(np.linalg.norm(_turned(first, second) - (second - second.mean(axis=0)), axis=1).max() < limit)
 
 
 def _turned(first: Array, second: Array) -> Array:
