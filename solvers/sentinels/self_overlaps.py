@@ -137,19 +137,16 @@ def _opposite(one: Watched, now: Array, before: Array, reach: float) -> Indices:
     facets = one.body.facets
     if one.search is None:
         one.search = Search(facets, facets)
-    pairs = one.search.pairs(now, now, reach, before, before).astype(np.int64)
-    pairs = pairs[pairs[:, 0] < pairs[:, 1]]
-    opposed = np.zeros(len(pairs), dtype=bool)
-    behind = np.zeros(len(pairs))
-    i, j = pairs.T
-    for x in (now, before):
-        corners = x[facets]
-        normals, middles = unit_normals(corners), corners.mean(axis=1)
-        opposed |= np.einsum("pd,pd->p", normals[i], normals[j]) < OPPOSED
-        behind = -0.5 * np.einsum("pd,pd->p", middles[j] - middles[i], normals[i] - normals[j])
-    chosen = pairs[opposed & (behind < WALL * one.measures.thickness)]
-    nodes = facets[chosen]
-    return chosen[~(nodes[:, 0, :, None] == nodes[:, 1, None, :]).any(axis=(1, 2))]
+    i, j = one.search.pairs(now, now, reach, before, before).astype(np.int64).T
+    i, j = i[i < j], j[i < j]
+    normals = unit_normals(now[facets]), unit_normals(before[facets])
+    opposed = np.logical_or.reduce([np.einsum("pd,pd->p", n.take(i, 0), n.take(j, 0)) < OPPOSED for n in normals])
+    i, j = i[opposed], j[opposed]
+    middles = before[facets].mean(axis=1)
+    behind = -0.5 * np.einsum("pd,pd->p", middles[j] - middles[i], normals[1][i] - normals[1][j])
+    walls = behind >= WALL * one.measures.thickness
+    neighbours = (facets[i][:, :, None] == facets[j][:, None]).any(axis=(1, 2))
+    return np.stack([i, j], axis=1)[~walls & ~neighbours]
 
 
 def _tolerance(one: Watched, x: Array, facets: Indices) -> float:
