@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from coupling.contact_surfaces import contact_surface
 from fsci.builder.named import named
+from fsci.builder.obstacle_motion import motion_of_obstacle
 from fsci.builder.overlap import facets_in_each_other
 from fsci.case import Case, CaseError
 from fsci.case.contact import PairSection
-from fsci.case.rigid_motion import rigid_motion
 from fsci.meshes.of_case import read_obstacle, read_rigid_body
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
@@ -82,19 +82,3 @@ def _rigid_mesh(case: Case, name: str) -> tuple[Array, NDArray[np.int64], str]:
         mesh = read_rigid_body(case, name)[0]
         points, facets, _ = cut_out(mesh, case.fluid.bodies[name].on)
     return points, facets, CELL_TYPES[mesh.cell_type].facet
-
-
-def motion_of_obstacle(case: Case, name: str, points: Array) -> Callable[[float], Array] | None:
-    """A function: time [s] -> positions of the points [m]; None if they are at rest."""
-    assert case.contact is not None
-    if name in case.contact.obstacles:
-        displacement = case.contact.obstacles[name].motion
-        if displacement is None:
-            return None
-        return lambda t: points + np.stack([component(points.T, t) for component in displacement], axis=1)
-    assert case.fluid is not None
-    movement = case.fluid.bodies[name].motion
-    if movement is None:
-        return None
-    moved = rigid_motion(points, movement, case.time.start, case.time.step)
-    return lambda t: moved(t)[0]

@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fsci.builder.obstacle_motion import motion_of_obstacle
 from fsci.builder.on_first import on_first
 from fsci.case import Case
 from fsci.case.contact import PairSection, Side
@@ -75,8 +76,6 @@ class PlacedSide:
 
 def _displacement(case: Case, side: Side, points: Array) -> Array:
     """Displacement [m] at the start."""
-    from fsci.builder.contact import motion_of_obstacle
-
     start = case.time.start
     if side.obstacle is not None:
         motion = motion_of_obstacle(case, side.obstacle, points)

@@ -112,7 +112,7 @@ def _positions_of(motion: Callable[[float], Any]) -> Callable[[float], Array]:
 def _obstacles(case: Case, comm: MPI.Comm) -> Iterator[MovingBody]:
     if case.contact is None:
         return
-    from fsci.builder.contact import motion_of_obstacle
+    from fsci.builder.obstacle_motion import motion_of_obstacle
 
     for name in case.contact.obstacles:
         facets, _, points = on_first(comm, partial(_obstacle, case, name))

@@ -38,7 +38,7 @@ BENT = 0.1
 
 
 @dataclass
-class Watched:
+class FoldingBody:
     """One body and what is known of it."""
 
     body: MovingBody
@@ -59,7 +59,7 @@ class SelfOverlaps:
     def __init__(self, bodies: Sequence[MovingBody], pairs: Mapping[str, tuple[str, ...]]):
         """pairs: names of the pairs of contact between surfaces of one body, by its name."""
         self._bodies, self._pairs = list(bodies), dict(pairs)
-        self._watched: list[Watched] = []
+        self._watched: list[FoldingBody] = []
         self._time = 0.0
 
     def start(self, t: float) -> None:
@@ -68,7 +68,7 @@ class SelfOverlaps:
         for body in self._bodies:
             x = body.positions(t)
             pairs, measures = self._pairs.get(body.name, ()), Measures(body.facets, x[body.facets])
-            self._watched.append(Watched(body, pairs, measures, x, x))
+            self._watched.append(FoldingBody(body, pairs, measures, x, x))
 
     def look(self, t: float, dt: float) -> list[Finding]:
         """Overlaps at the end t [s] of a step, and passages within it."""
@@ -86,7 +86,7 @@ class SelfOverlaps:
             one.before = one.body.positions(self._time)
 
 
-def _look(one: Watched, now: Array) -> Finding | None:
+def _look(one: FoldingBody, now: Array) -> Finding | None:
     before, one.before = one.before, now
     thickness = one.measures.thickness
     reach = REACH * thickness
@@ -100,7 +100,7 @@ def _look(one: Watched, now: Array) -> Finding | None:
     return _in_states(one, turned, here, middle, np.unique(swept)) if len(swept) else None
 
 
-def _in_states(one: Watched, before: Array, now: Array, middle: Array, facets: Indices) -> Finding | None:
+def _in_states(one: FoldingBody, before: Array, now: Array, middle: Array, facets: Indices) -> Finding | None:
     """The finding of the end of a step or of states within it; positions [m] are relative to their middle."""
     thickness = one.measures.thickness_at(facets)
     arcs = min(_tolerance(one, now, facets), 0.5 * thickness)
@@ -132,7 +132,7 @@ def _in_states(one: Watched, before: Array, now: Array, middle: Array, facets: I
     return None
 
 
-def _opposite(one: Watched, now: Array, before: Array, reach: float) -> Indices:
+def _opposite(one: FoldingBody, now: Array, before: Array, reach: float) -> Indices:
     """Pairs (p, 2) of facets that face each other and come so close [m] in a step; not the two sides of walls."""
     facets = one.body.facets
     if one.search is None:
@@ -149,7 +149,7 @@ def _opposite(one: Watched, now: Array, before: Array, reach: float) -> Indices:
     return np.stack([i, j], axis=1)[~walls & ~neighbours]
 
 
-def _tolerance(one: Watched, x: Array, facets: Indices) -> float:
+def _tolerance(one: FoldingBody, x: Array, facets: Indices) -> float:
     """Depth [m] up to which parts of a surface may lie in each other: the arcs that facets replace."""
     found = 0.0
     for measures in (one.measures, Measures(one.body.facets, x[one.body.facets])):
@@ -161,7 +161,7 @@ def _tolerance(one: Watched, x: Array, facets: Indices) -> float:
     return ROUNDING * one.measures.thickness + found
 
 
-def _enclosed_twice(one: Watched, x: Array, facets: Indices, depth: float, apart: float) -> Array | None:
+def _enclosed_twice(one: FoldingBody, x: Array, facets: Indices, depth: float, apart: float) -> Array | None:
     """A point [m] that the surface encloses twice, where parts of a body lie so deep [m] in each other, None without.
 
     It is in the middle of both surfaces, half of the depth below each. apart: distance [m] of points on large facets.
