@@ -7,18 +7,66 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
+from solvers.tessellation import unit_normals
+
+#: Relative difference of distances that is none: of a point to two facets with a common edge.
+SAME = 1e-9
+
+#: Height relative to the distance from a facet from which on a point is behind it and not beside it: 45 degrees.
+WITHIN = np.sqrt(0.5)
 
 
-def distances(points: Array, x: Array, facets: NDArray[np.int64], facet_type: str) -> Array:
-    """Distances [m] of points (n, dim) to facets with nodes at x [m]; facets are divided into flat simplices."""
+def signed_distances(points: Array, normals: Array, x: Array, facets: NDArray[np.int64], facet_type: str) -> Array:
+    """Distances [m] of points (n, dim) of a surface with these normals to facets with nodes at x [m], negative behind.
+
+    Facets are divided into flat simplices. A point is behind the nearest one if it lies on its inner side, within 45
+    degrees of its normal, and the normals of both surfaces are opposed.
+    """
     simplices = np.array(CELL_TYPES[facet_type].simplices)
     corners = x[facets[:, simplices].reshape(-1, simplices.shape[1])]
-    closest = np.full(len(points), np.inf)
+    outward = unit_normals(corners)
+    closest, best, sign = np.full(len(points), np.inf), np.zeros(len(points)), np.ones(len(points))
+    for simplex, normal in zip(corners, outward, strict=True):
+        distance = distances_in_pairs(points, np.broadcast_to(simplex, (len(points), *simplex.shape)))
+        height = (points - simplex[0]) @ normal
+        equal = distance <= closest * (1.0 + SAME)
+        better = (distance < closest * (1.0 - SAME)) | (equal & (np.abs(height) > best))
+        behind = (height < -WITHIN * distance) & (normals @ normal < 0.0)
+        sign[better] = np.where(behind, -1.0, 1.0)[better]
+        best[better] = np.abs(height)[better]
+        closest = np.minimum(closest, distance)
+    return np.asarray(sign * closest)
+
+
+def nearest_points(points: Array, corners: Array) -> Array:
+    """The points nearest to given ones, (n, dim), on segments or triangles with corners (m, dim, dim), all in [m]."""
+    found, closest = points.copy(), np.full(len(points), np.inf)
     for simplex in corners:
-        closest = np.minimum(
-            closest, distances_in_pairs(points, np.broadcast_to(simplex, (len(points), *simplex.shape)))
-        )
-    return closest
+        dim = len(simplex)
+        feet = [_on_segment(points, simplex[a], simplex[b]) for a in range(dim) for b in range(a)]
+        if dim == 3:
+            feet.append(_on_plane(points, simplex))
+        for foot in feet:
+            distance = np.linalg.norm(points - foot, axis=1)
+            nearer = distance < closest
+            found[nearer], closest[nearer] = foot[nearer], distance[nearer]
+    return found
+
+
+def _on_segment(points: Array, a: Array, b: Array) -> Array:
+    along = b - a
+    size = float(along @ along)
+    share = np.clip((points - a) @ along / size, 0.0, 1.0) if size > 0.0 else np.zeros(len(points))
+    return np.asarray(a + share[:, None] * along)
+
+
+def _on_plane(points: Array, corners: Array) -> Array:
+    """Projections on the plane of a triangle that are inside of it, else infinite."""
+    edges = (corners[1:] - corners[0]).T
+    inverse = np.linalg.pinv(edges)
+    shares = (points - corners[0]) @ inverse.T
+    within = (shares >= 0.0).all(axis=1) & (shares.sum(axis=1) <= 1.0)
+    return np.where(within[:, None], corners[0] + shares @ edges.T, np.inf)
 
 
 def distances_in_pairs(points: Array, corners: Array) -> Array:

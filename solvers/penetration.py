@@ -11,20 +11,25 @@ from solvers.search import Search
 
 
 def inside(points: Array, corners: Array) -> NDArray[np.bool_]:
-    """Which points, shape (n, dim), are in the solid that facets enclose, with corners (m, dim, dim), positions in [m].
+    """Which points (n, dim) are in the solid that facets enclose, with corners (m, dim, dim), positions in [m]."""
+    return windings(points, corners) > 0.5
+
+
+def windings(points: Array, corners: Array) -> Array:
+    """How often facets with corners (m, dim, dim) enclose points (n, dim): 2 where a solid overlaps itself, shape (n,).
 
     A ray along x from the point crosses the surface an odd number of times, counted with the direction of each facet.
     A facet has the lower ends of its edges and not the upper ones, so that each point of the surface is in one facet.
     """
     (count, dim), size = points.shape, len(corners)
     if not count or not size:
-        return np.zeros(count, dtype=bool)
+        return np.zeros(count)
     ends = points.copy()
     ends[:, 0] = np.maximum(points[:, 0], corners[:, :, 0].max())
     rays = np.arange(count)[:, None] + count * np.array([0, 1, 1][:dim])
     search = Search(rays, np.arange(size * dim).reshape(size, dim))
     ray, facet = search.pairs(np.concatenate([points, ends]), corners.reshape(-1, dim), 0.0).T
-    return np.bincount(ray, _crossings(points[ray], corners[facet]), count) > 0.5
+    return np.asarray(np.bincount(ray, _crossings(points[ray], corners[facet]), count), dtype=float)
 
 
 def _crossings(x: Array, corners: Array) -> Array:

@@ -1,9 +1,9 @@
 """Pairs of contact that the case leaves to the program: `contact: {bodies: all}`.
 
-Candidates are the named surfaces of the bodies that no support holds across. Two of them are a pair if they can meet
-(see `facing`). The softer body is the slave; of two that are equally stiff the one with the smaller facets; then the
-first one in the case. Obstacles and rigid bodies of the flow are masters. Bodies that a pair of the case names are left
-to such pairs.
+Candidates are the named surfaces of the bodies that no support holds across. Two of them are a pair if they face each
+other (see `facing`), at any distance: a pair that is far apart costs no more than the bounds of its motion. The softer
+body is the slave; of two that are equally stiff the one with the smaller facets; then the first one in the case.
+Obstacles and rigid bodies of the flow are masters. Bodies that a pair of the case names are left to such pairs.
 """
 
 from __future__ import annotations
@@ -39,7 +39,6 @@ class Candidate:
     side: dict[str, str]  #: body or obstacle -> name
     faces: list[Face]
     stiffness: float  #: mean of Young's modulus [Pa], infinite if rigid
-    extent: float  #: of the body [m]
 
     @property
     def name(self) -> str:
@@ -78,7 +77,7 @@ def find_pairs(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, PairSection]
     for first, second in combinations(candidates(case, meshes), 2):
         if first.rigid or not first.faces or not second.faces or {first.name, second.name} in named:
             continue
-        for pair in meeting(first.faces, second.faces, near(case, first, second)):
+        for pair in meeting(first.faces, second.faces, case.contact.reach):
             name, settings = _pair(case, (first, second), pair)
             found[name] = settings
     return found
@@ -86,17 +85,9 @@ def find_pairs(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, PairSection]
 
 def candidates(case: Case, meshes: Mapping[str, Mesh]) -> list[Candidate]:
     """Bodies with these meshes, obstacles and rigid bodies, in this order."""
-    assert case.contact is not None
     found = [_body(case, name, mesh) for name, mesh in meshes.items()]
-    found += [_obstacle(case, name) for name in case.contact.obstacles]
+    found += [_obstacle(case, name) for name in ({} if case.contact is None else case.contact.obstacles)]
     return found + [_rigid_body(case, name) for name in ({} if case.fluid is None else case.fluid.bodies)]
-
-
-def near(case: Case, first: Candidate, second: Candidate) -> float:
-    """Distance [m] up to which surfaces of two bodies are a pair."""
-    assert case.contact is not None
-    reach = case.contact.reach
-    return min(first.extent, second.extent) if reach is None else reach
 
 
 def _pair(case: Case, bodies: tuple[Candidate, Candidate], pair: tuple[Face, Face]) -> tuple[str, PairSection]:
@@ -130,25 +121,20 @@ def _body(case: Case, name: str, mesh: Mesh) -> Candidate:
     held = [support for support in settings.supports if support.on is not None]
     free = [face for face in faces(mesh) if not any(_holds(support, face) for support in held)]
     middles = mesh.points[mesh.cells].mean(axis=1).T
-    return Candidate({"body": name}, free, _youngs_modulus(settings.material, middles), _extent(mesh))
+    return Candidate({"body": name}, free, _youngs_modulus(settings.material, middles))
 
 
 def _obstacle(case: Case, name: str) -> Candidate:
     assert case.contact is not None
     mesh = read_obstacle(case, name)
     found = [face(mesh, [surface]) for surface in case.contact.obstacles[name].on]
-    return Candidate({"obstacle": name}, found, np.inf, np.inf)
+    return Candidate({"obstacle": name}, found, np.inf)
 
 
 def _rigid_body(case: Case, name: str) -> Candidate:
     assert case.fluid is not None
-    return Candidate(
-        {"obstacle": name}, [face(read_rigid_body(case, name)[0], case.fluid.bodies[name].on)], np.inf, np.inf
-    )
-
-
-def _extent(mesh: Mesh) -> float:
-    return float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    found = [face(read_rigid_body(case, name)[0], case.fluid.bodies[name].on)]
+    return Candidate({"obstacle": name}, found, np.inf)
 
 
 def _holds(support: SupportSection, face: Face) -> bool:

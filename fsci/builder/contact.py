@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from coupling.contact_surfaces import contact_surface
 from fsci.builder.named import named
+from fsci.builder.obstacle_motion import motion_of_obstacle
+from fsci.builder.overlap import facets_in_each_other
 from fsci.case import Case, CaseError
-from fsci.case.rigid_motion import rigid_motion
+from fsci.case.contact import PairSection
 from fsci.meshes.of_case import read_obstacle, read_rigid_body
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
@@ -28,6 +30,7 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
     assert case.contact is not None
     found: dict[tuple[str, ...], Surface] = {}
     pairs = []
+    meshes = {body.name: body.domain.source for body in bodies}
     for settings in case.contact.pairs.values():
         sides = []
         for _, side in settings.sides:
@@ -38,11 +41,18 @@ def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact
                 found[key] = contact_surface(bodies, side.body or "", *(side.on or ()))
             sides.append(found[key])
         law = named(laws, settings.law)(*settings.law_parameters)
-        pairs.append(Pair(sides[0], sides[1], settings.integration, law))
+        deep = facets_in_each_other(case, comm, settings, meshes)
+        pairs.append(Pair(sides[0], sides[1], settings.integration, law, deep, _interference(settings)))
     assert case.structure is not None
     moves = case.structure.dynamics is not None
     names = tuple(case.contact.pairs)
     return Contact(pairs, names=names, c_n=case.contact.c_n, keep_overlap=moves, comm=comm)
+
+
+def _interference(pair: PairSection) -> Callable[[float], float] | None:
+    """A function: time [s] -> overlap [m] of the bodies as meshed."""
+    formula = pair.interference
+    return None if formula is None else lambda t: float(formula(np.zeros((3, 1)), t)[0])
 
 
 def _obstacle(case: Case, comm: MPI.Comm, name: str) -> Surface:
@@ -72,19 +82,3 @@ def _rigid_mesh(case: Case, name: str) -> tuple[Array, NDArray[np.int64], str]:
         mesh = read_rigid_body(case, name)[0]
         points, facets, _ = cut_out(mesh, case.fluid.bodies[name].on)
     return points, facets, CELL_TYPES[mesh.cell_type].facet
-
-
-def motion_of_obstacle(case: Case, name: str, points: Array) -> Callable[[float], Array] | None:
-    """A function: time [s] -> positions of the points [m]; None if they are at rest."""
-    assert case.contact is not None
-    if name in case.contact.obstacles:
-        displacement = case.contact.obstacles[name].motion
-        if displacement is None:
-            return None
-        return lambda t: points + np.stack([component(points.T, t) for component in displacement], axis=1)
-    assert case.fluid is not None
-    movement = case.fluid.bodies[name].motion
-    if movement is None:
-        return None
-    moved = rigid_motion(points, movement, case.time.start, case.time.step)
-    return lambda t: moved(t)[0]

@@ -1,4 +1,4 @@
-"""Named surfaces of bodies that may come into contact: those that face each other and are near."""
+"""Named surfaces of bodies that may come into contact: those that face each other."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def faces(mesh: Mesh) -> list[Face]:
     return found
 
 
-def meeting(first: Sequence[Face], second: Sequence[Face], reach: float) -> list[tuple[Face, Face]]:
+def meeting(first: Sequence[Face], second: Sequence[Face], reach: float | None = None) -> list[tuple[Face, Face]]:
     """Surfaces of two bodies that may touch. A surface within a cavity may touch that cavity only."""
     hulls = [_hull(first), _hull(second)]
     sides = []
@@ -77,14 +77,15 @@ def meeting(first: Sequence[Face], second: Sequence[Face], reach: float) -> list
     return [(a, b) for a in sides[0] for b in sides[1] if face_each_other(a, b, reach)]
 
 
-def face_each_other(a: Face, b: Face, reach: float) -> bool:
-    """Some of their facets face each other, at most so far [m] apart, each in front of the other."""
+def face_each_other(a: Face, b: Face, reach: float | None = None) -> bool:
+    """Some of their facets face each other, each in front of the other, at most so far [m] apart (None: at will)."""
     behind = CROSSING * min(a.size, b.size)
     for start in range(0, len(a.middles), CHUNK):
         part = slice(start, start + CHUNK)
         away = b.middles[None] - a.middles[part, None]
-        found = np.linalg.norm(away, axis=2) <= reach
-        found &= a.normals[part] @ b.normals.T < OPPOSED
+        found = a.normals[part] @ b.normals.T < OPPOSED
+        if reach is not None:
+            found &= np.linalg.norm(away, axis=2) <= reach
         found &= np.einsum("ijd,id->ij", away, a.normals[part]) > -behind
         found &= np.einsum("ijd,jd->ij", away, b.normals) < behind
         if found.any():

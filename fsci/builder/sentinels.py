@@ -18,6 +18,7 @@ from solvers.api import Sentinel
 from solvers.cell_types import CELL_TYPES
 from solvers.sentinels.bodies import MovingBody
 from solvers.sentinels.overlaps import Meeting, Overlaps
+from solvers.sentinels.self_overlaps import SelfOverlaps
 from solvers.sentinels.walls import BoxWalls, Wall
 from solvers.tessellation import tessellate
 
@@ -47,6 +48,8 @@ def build_sentinels(
     if len(bodies) + len(rest) > 1:
         meetings, tied = _meetings(case, structure)
         found["overlaps"] = Overlaps([*bodies, *rest], meetings, tied)
+    if structure is not None and (len(bodies) > 1 or contact is not None):
+        found["self_overlaps"] = SelfOverlaps(bodies, _with_themselves(case))
     if case.fluid is not None and bodies:
         box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
         found["walls"] = BoxWalls(bodies, walls, box)
@@ -109,7 +112,7 @@ def _positions_of(motion: Callable[[float], Any]) -> Callable[[float], Array]:
 def _obstacles(case: Case, comm: MPI.Comm) -> Iterator[MovingBody]:
     if case.contact is None:
         return
-    from fsci.builder.contact import motion_of_obstacle
+    from fsci.builder.obstacle_motion import motion_of_obstacle
 
     for name in case.contact.obstacles:
         facets, _, points = shared(comm, partial(_obstacle, case, name))
@@ -150,6 +153,16 @@ def _meetings(case: Case, structure: Structure | None) -> tuple[dict[frozenset[s
                     masks[side.body] = mask | masks.get(side.body, np.zeros_like(mask))
             found[key] = Meeting(names, owners[0], masks)
     return found, tied
+
+
+def _with_themselves(case: Case) -> dict[str, tuple[str, ...]]:
+    """Names of the pairs between surfaces of one body, by its name."""
+    found: dict[str, tuple[str, ...]] = {}
+    for name, pair in {} if case.contact is None else case.contact.pairs.items():
+        (_, slave), (_, master) = pair.sides
+        if slave.body is not None and slave.body == master.body and not pair.tied:
+            found[slave.body] = (*found.get(slave.body, ()), name)
+    return found
 
 
 def _facets_on(structure: Structure, body: str, surfaces: tuple[str, ...]) -> NDArray[np.bool_]:

@@ -90,9 +90,10 @@ def _meshes(case: Case, comm: MPI.Comm) -> tuple[dict[str, Mesh], dict[str, Loca
             meshes = {name: read_body(case, name) for name in case.elastic_bodies}
             locations = {name: find_locations(case, name, mesh) for name, mesh in meshes.items()}
             if case.contact is not None:
+                from fsci.builder.adjust import adjusted
                 from fsci.builder.tied import join_tied
 
-                meshes = join_tied(case, meshes)
+                meshes = join_tied(case, adjusted(case, meshes))
         except Exception as raised:  # raised on every process below
             error = raised
     error, locations = comm.bcast((error, locations), root=0)
@@ -138,7 +139,7 @@ def build_probes(case: Case, structure: Structure) -> Callable[[], Numbers]:
 
 def _of_pair(case: Case, structure: Structure, settings: Probe) -> probes.Probe:
     from solvers.contact.contact import Contact
-    from solvers.contact.probes import at_slave, first_contact
+    from solvers.contact.probes import at_slave, first_contact, overlap
 
     contact, pairs = structure.constraint, [] if case.contact is None else list(case.contact.pairs)
     assert isinstance(contact, Contact)
@@ -148,6 +149,8 @@ def _of_pair(case: Case, structure: Structure, settings: Probe) -> probes.Probe:
     index = pairs.index(settings.pair)
     if settings.quantity == "first_contact":
         return first_contact(contact, index)
+    if settings.quantity == "overlap":
+        return overlap(contact, index)
     extreme = settings.extreme or ("least" if settings.quantity == "gap" else "largest")
     return at_slave(contact, index, settings.quantity, settings.at or extreme)
 

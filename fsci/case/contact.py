@@ -8,7 +8,7 @@ from pydantic import model_validator
 
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Name, NotNegative, Positive, Surfaces, Vector
+from fsci.case.values import Name, NotNegative, Positive, Surfaces, SwitchOrNotNegative, TimeFormula, Vector
 
 
 class Side(Section):
@@ -64,6 +64,17 @@ class PairSection(Section):
     )
 
     friction: Friction = setting(Friction, "friction law; default: none")
+    interference: TimeFormula | None = setting(
+        None,
+        "overlap of the bodies that their meshes do not show, as of a press fit: contact holds the surfaces of the"
+        " meshes so far apart; default: none",
+        unit="m",
+    )
+    adjust: SwitchOrNotNegative = setting(
+        False,
+        "true: slave nodes that lie in the master's body are moved onto its surface before the run, without strain;"
+        " a length: also those that are so near; false: the first step closes the overlap",
+    )
     tied: bool = setting(False, "true: the surfaces are joined where they touch at the start")
 
     @property
@@ -74,6 +85,11 @@ class PairSection(Section):
         if self.friction.coefficient is not None:
             return "coulomb"
         return "frictionless" if self.friction.bound is None else "tresca"
+
+    @property
+    def moves_nodes(self) -> bool:
+        """Whether slave nodes are moved onto the master before the run."""
+        return self.tied or self.adjust is not False
 
     @property
     def law_parameters(self) -> tuple[float, ...]:
@@ -103,6 +119,13 @@ class PairSection(Section):
             raise fault("the slave must be a surface of a body: make the obstacle the master", where)
         if self.tied and self.friction.some:
             raise fault("tied surfaces do not slide: remove 'friction' or 'tied'", "friction")
+        if self.tied and self.interference is not None:
+            raise fault("tied surfaces stay where they are: remove 'interference' or 'tied'", "interference")
+        if self.interference is not None and (self.interference.constant or 0.0) < 0.0:
+            raise fault("a clearance is a gap of the meshes: 'interference' must be at least 0", "interference")
+        if self.adjust is not False and (self.tied or self.itself is not None):
+            which = "tied surfaces are moved onto each other anyway" if self.tied else "'adjust' needs two surfaces"
+            raise fault(f"{which}: remove 'adjust'", "adjust")
         return self
 
 
@@ -178,8 +201,7 @@ class ContactSection(Section):
     friction: Friction = setting(Friction, "friction law of the pairs that 'bodies' finds")
     reach: Positive | None = setting(
         None,
-        "largest distance of two surfaces at the start that 'bodies' makes a pair; default: the "
-        "extent of the smaller body",
+        "largest distance of two surfaces at the start that 'bodies' makes a pair; default: any",
         unit="m",
     )
     obstacles: dict[Name, ObstacleSection] = setting(dict, "rigid surfaces by name")

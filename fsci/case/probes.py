@@ -122,8 +122,8 @@ column NAME. In 2D everything is per unit of depth.
         if self.extreme is not None and self.at is not None:
             raise fault("give either 'at' or 'extreme', not both", "extreme")
         for key in ("at", "extreme"):
-            if self.quantity == "first_contact" and getattr(self, key) is not None:
-                raise fault(f"'first_contact' is measured on the whole pair: remove '{key}'", key)
+            if self.quantity in ("first_contact", "overlap") and getattr(self, key) is not None:
+                raise fault(f"'{self.quantity}' is measured on the whole pair: remove '{key}'", key)
 
     def columns(self, name: str, dimension: int) -> tuple[str, ...]:
         """The columns of history.csv that the probe called `name` fills."""

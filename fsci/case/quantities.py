@@ -56,7 +56,8 @@ _ALL = (
     Quantity("reaction", _FORCE, "vector", ("on",), meaning="force of supports and springs on the bodies"),
     Quantity("traction", _FORCE, "vector", ("on",), meaning="integral of P N over the reference surface"),
     Quantity("area", (2, 0, 0), "one", ("on",)),
-    Quantity("gap", _LENGTH, "one", ("pair",), meaning="distance of the slave nodes to the master"),
+    Quantity("gap", _LENGTH, "one", ("pair",), meaning="distance of the slave nodes to the master, negative behind it"),
+    Quantity("overlap", _LENGTH, "one", ("pair",), meaning="largest depth of nodes of one side behind the other"),
     Quantity(
         "pressure",
         _STRESS,

@@ -213,9 +213,24 @@ def _switch(value: Any) -> bool:
     return value
 
 
+def _switch_or_number(value: Any) -> bool | float:
+    if isinstance(value, bool):
+        return value
+    number = _expression(value, "true, false or a number", "").constant
+    assert number is not None, "an expression without variables is constant"
+    if number < 0:
+        raise fault(f"must be true, false or a number of at least 0, not {describe_value(float(number))}")
+    return float(number)
+
+
 Text = Annotated[str, BeforeValidator(_text)]
 Name = Annotated[str, BeforeValidator(_name)]
 Switch = Annotated[bool, BeforeValidator(_switch)]
+SwitchOrNotNegative = Annotated[
+    bool | float,
+    PlainValidator(_switch_or_number),
+    WithJsonSchema({"type": ["boolean", "number", "string"], "minimum": 0, "$comment": "true, false or a number >= 0"}),
+]
 Surfaces = Annotated[tuple[Text, ...], EntryCount(1, None), OneOrMany()]
 
 

@@ -126,12 +126,13 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
     found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in said]
     for only_note, keys, text in overlaps(case, bodies, found.pairs):
         (found.notes if only_note else found.warnings).append(f"{case.place(*keys)}: {text}")
-    if chosen is not None:
-        from fsci.check.far_pairs import far_pairs
+    if case.elastic_bodies:
+        from fsci.check.unpaired import unpaired
 
-        names = case.elastic_bodies if chosen == "all" else chosen
+        names = list(case.elastic_bodies) if chosen in (None, "all") else chosen
         meshes = {name: found.meshes[name] for name in names}
-        found.notes += [f"{case.place('contact')}: {text}" for text in far_pairs(case, meshes, found.pairs)]
+        at = case.place("structure" if case.contact is None else "contact")
+        found.notes += [f"{at}: {text}" for text in unpaired(case, meshes, found.pairs)]
 
 
 def _elastic(case: Case, found: Findings) -> None:
@@ -144,9 +145,9 @@ def _elastic(case: Case, found: Findings) -> None:
         ]
         massless = case.structure is not None and case.structure.dynamics is not None and slave_surfaces(case, name)
         pairs = [] if case.contact is None else case.contact.pairs.values()
-        tied = [pair for pair in pairs if pair.tied and name in {side.body for _, side in pair.sides}]
+        moved = [pair for pair in pairs if pair.moves_nodes and name in {side.body for _, side in pair.sides}]
         edges = [pair for pair in pairs if pair.sides[0][1].body == name and len(pair.sides[0][1].on or ()) > 1]
-        special = at_points or symmetric or at_nodes or massless or tied or edges
+        special = at_points or symmetric or at_nodes or massless or moved or edges
         needed = special or (case.coupling and _has_period(case))
         if not (needed or isinstance(body.mesh, FileMesh)):
             continue
@@ -171,14 +172,20 @@ def _elastic(case: Case, found: Findings) -> None:
             _wet(case, found, keys, mesh)
     _one_dimension(case, found)
     if not found.problems:
-        found.attempt(partial(_tied, case, found.meshes))
+        found.attempt(partial(_move_nodes, case, found))
 
 
-def _tied(case: Case, meshes: dict[str, Mesh]) -> None:
-    if case.contact is not None and any(pair.tied for pair in case.contact.pairs.values()):
+def _move_nodes(case: Case, found: Findings) -> None:
+    if case.contact is not None and any(pair.moves_nodes for pair in case.contact.pairs.values()):
+        from fsci.builder.adjust import adjusted
         from fsci.builder.tied import join_tied
 
-        join_tied(case, meshes)
+        before, after = found.meshes, adjusted(case, found.meshes)
+        for name, mesh in after.items():
+            if mesh is not before[name]:
+                found.note(case, ("structure", "bodies", name), mesh)
+        found.meshes = after
+        join_tied(case, after)
 
 
 def _is_flat(mesh: Mesh, surface: str) -> bool:

@@ -27,6 +27,7 @@ class ActiveSet:
         self.changed = False  #: whether the latest choice changed the set
         self.changes = 0  #: count of choices in this step that changed the set
         self.damping = 1.0  #: factor of the complementarity parameter in this step
+        self.tried = np.zeros(size, dtype=bool)  #: mask of the multipliers that were in contact in this solve
         self._earlier: list[bytes] = []
         self._recurrences = 0
 
@@ -43,6 +44,7 @@ class ActiveSet:
     def begin_solve(self) -> None:
         """Discard the earlier sets, which other loads may have chosen."""
         self.damping, self._earlier, self._recurrences = 1.0, [self.status.tobytes()], 0
+        self.tried = self.active
 
     def choose(self, status: Statuses, x: Array) -> None:
         """Set the statuses of this iterate. Raises StepFailed if the set cycles, with the place of the first node.
@@ -67,3 +69,4 @@ class ActiveSet:
                 )
             self._earlier.append(chosen)
         self.status = status.copy()
+        self.tried = self.tried | self.active

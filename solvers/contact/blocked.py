@@ -1,4 +1,5 @@
-"""Blocked multipliers: excluded because supports or other multipliers leave them no free direction."""
+"""Blocked multipliers: excluded because supports or other multipliers leave them no free direction, or their node is on
+both sides of a pair."""
 
 from __future__ import annotations
 
@@ -16,12 +17,12 @@ def find_blocked(interface: ContactInterface, x: Array) -> NDArray[np.bool_]:
     multipliers, held = interface.multipliers, interface.nodes.held
     node, slaves = multipliers.node, multipliers.areas > 0.0
     if not held[node[slaves]].any() and multipliers.only_one.all():
-        return np.zeros(len(node), dtype=bool)
+        return interface.shared
     normals = find_normals(multipliers, x).values
     own = np.arange(len(node))  # treat every multiplier as the only one of its node
     is_free = np.abs(free_normals(normals, own, held[node])).max(axis=1) > 0.0
     whole = slaves & (interface.spans == "space")
     first = np.zeros(len(node), dtype=bool)
     first[np.flatnonzero(whole)[np.unique(node[whole], return_index=True)[1]]] = True
-    blocked = slaves & (interface.nodes.fixed[node] | (~whole & ~is_free))
+    blocked = slaves & (interface.nodes.fixed[node] | interface.shared | (~whole & ~is_free))
     return blocked | (slaves & np.isin(node, node[whole]) & ~first)

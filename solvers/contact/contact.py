@@ -17,6 +17,7 @@ from solvers.contact.force import force_matrix, nodal_force
 from solvers.contact.friction_work import FrictionWork
 from solvers.contact.integration import Integration
 from solvers.contact.interface import ContactInterface, describe_interface
+from solvers.contact.interference_work import InterferenceWork
 from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
 from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import ActiveMultipliers, linearise
@@ -28,8 +29,12 @@ from solvers.contact.terms import Terms
 from solvers.rows import RowTransformation
 from solvers.sparse import Sparse, nothing
 
-#: Gap relative to the extent of all surfaces up to which nodes without pressure touch: the rounding of positions.
-TOUCHING = 1e-12
+#: Gap that is the rounding of positions, relative to the extent of all surfaces, and to their distance from the origin.
+TOUCHING, FAR = 1e-12, 1e-15
+
+#: The same of nodes that no iterate of this solve has pressed yet: rounding of meshes and their translations. They are
+#: tried. As those that would pull are open in the next iterate, the result does not depend on it.
+TRIED = 1e-10
 
 
 class Contact:
@@ -70,7 +75,8 @@ class Contact:
         self._constraints = Constraints(self.interface)
         self.merged = np.zeros(count, dtype=bool)  #: multipliers that are merged into another one of their node
         self._stiffness = np.zeros(count)
-        self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
+        extent, far = float(np.ptp(self.nodes.points, axis=0).max()), float(np.abs(self.nodes.points).max())
+        self._touching, self._nearly = max(TOUCHING * extent, FAR * far), TRIED * max(extent, far)  # gaps [m]
         self._shared: Sparse | None = None  # redistribution at the latest evaluation
         self._tied = np.isin(np.arange(count), [m for law, own in self.interface.laws if law == Tied() for m in own])
         self._integration = Integration(self.interface, comm)
@@ -78,6 +84,7 @@ class Contact:
         self._weight = 1.0  # of the new contact force in the balance
         self.work = FrictionWork((count, self.dim))
         self._of_obstacles = ObstacleWork(np.flatnonzero(self.nodes.dofs[:, 0] < 0), self.dim)
+        self._interfered = InterferenceWork(len(self.pairs))
         self.time = np.nan  #: of the latest evaluation [s]
         self.touched_at = np.full(len(self.pairs), np.inf)  #: time of the first contact of each pair [s], set by probes
         self.terms: Terms | None = None
@@ -92,7 +99,9 @@ class Contact:
         self._stiffness = np.divide(at_node, areas, out=np.zeros_like(areas), where=areas > 0.0)
         self.x = self.positions(u, t)
         self.x_old = self.x.copy()
-        self._integration.search_anew()
+        self._integration.start(self.x)
+        self._integration.interfere(t)
+        self._interfered.start(self._integration.interference)
         self._constraints.start(self.x)
 
     def positions(self, u: Array, t: float) -> Array:
@@ -122,6 +131,7 @@ class Contact:
         if self._integration.has_slip:
             self.work.end_step(weight, *self._force_and_slip())
         self._of_obstacles.end_step(self.force(), self.x - self.x_old)
+        self._interfered.end_step(self._normal_forces(), self._integration.interference)
         self.slip = None
 
     @property
@@ -131,8 +141,15 @@ class Contact:
 
     @property
     def obstacle_work(self) -> Array:
-        """(work of moved obstacles on the bodies since the start, by how much it may be wrong) [J]."""
-        return np.array([self._of_obstacles.total, self._of_obstacles.doubt])
+        """(work of moved obstacles and of growing interference since the start, by how much it may be wrong) [J]."""
+        parts = self._of_obstacles, self._interfered
+        return np.array([sum(part.total for part in parts), sum(part.doubt for part in parts)])
+
+    def _normal_forces(self) -> Array:
+        """Integral of the pressure of each pair [N], shape (pairs,)."""
+        if self.terms is None:
+            return np.zeros(len(self.pairs))
+        return self.terms.D_of_pair @ np.einsum("nd,nd->n", self.z, self.terms.normals)
 
     def _force_and_slip(self) -> tuple[Array, Array]:
         """(force [N], slip in this step [m]) along the surface for multipliers in contact, shapes (C, dim)."""
@@ -147,11 +164,12 @@ class Contact:
         x = self.positions(u, t)
         self._integration.move(x - self.x)
         self.x, self.time = x, t
+        self._integration.interfere(t)
         if self._integration.clear:
             return
         self.terms = self._integrate()
         status = np.full(len(self.z), OPEN, dtype=np.int8)
-        self._gap = np.zeros(len(self.z)) if self.terms is None else self._redistributed(self.terms.gap)
+        self._gap = np.zeros(len(self.z)) if self.terms is None else self._redistributed(self._own_gap(self.terms))
         self._mean_gap = np.zeros(len(self.z))
         if self.terms is not None:
             self._D = self._redistributed(self.terms.D)
@@ -161,6 +179,11 @@ class Contact:
             self._drop_dependent(status)
         self.active_set.choose(status, x[self.multipliers.node])
         self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
+
+    def _own_gap(self, terms: Terms) -> Array:
+        """Weighted gaps of all multipliers [m^dim], less the interference of their pairs."""
+        interference = self._integration.interference
+        return terms.gap - interference @ terms.D_of_pair if interference.any() else terms.gap
 
     def _integrate(self) -> Terms | None:
         """Mortar terms, slip and multipliers with a constraint at the present positions; None if no facets are near."""
@@ -188,7 +211,7 @@ class Contact:
             slip_defined=np.zeros(len(which), dtype=bool) if slip is None else slip.defined[which],
             c_n=self.c_n * self.active_set.damping * stiffness,
             c_t=self.c_n * self.active_set.damping * stiffness,
-            touching=self._touching,
+            touching=np.where(self.active_set.tried[which], self._touching, self._nearly),
         )
 
     def _drop_dependent(self, status: Statuses) -> None:
@@ -349,6 +372,7 @@ class Contact:
             "touched_at": self.touched_at.copy(),
             "work": self.work.save(),
             "obstacle_work": self._of_obstacles.save(),
+            "interference_work": self._interfered.save(),
         }
 
     def restore(self, state: State) -> None:
@@ -360,3 +384,4 @@ class Contact:
         self.touched_at[:] = state["touched_at"]
         self.work.restore(state["work"])
         self._of_obstacles.restore(state["obstacle_work"])
+        self._interfered.restore(state["interference_work"])

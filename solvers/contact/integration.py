@@ -49,6 +49,7 @@ class Integration:
         self._sliding = Sliding(sliding, self._multipliers, self.shares, (N, dim))
         self._travel = 0.0  # sum over iterates of the largest motion of a node [m]
         self._nothing_near = False  # the latest integration found no facet pairs
+        self.interference = np.zeros(len(interface.pairs))  #: of each pair at present [m]
 
     @property
     def slides(self) -> bool:
@@ -60,6 +61,25 @@ class Integration:
         """Whether any law depends on a slip: that of the step, or that of ties since the start."""
         return self.slides or bool(self._ties.pieces)
 
+    def start(self, x: Array) -> None:
+        """Begin a run at the positions x [m], shape (N, dim)."""
+        self.search_anew()
+        for mortar in self._mortars:
+            mortar.start(x)
+
+    def interfere(self, t: float) -> None:
+        """Set the interference of the pairs at the time t [s]."""
+        if all(pair.interference is None for pair in self._interface.pairs):
+            return
+        before = self.interference
+        self.interference = np.array(
+            [pair.interference(t) if pair.interference else 0.0 for pair in self._interface.pairs]
+        )
+        for mortar in self._mortars:
+            mortar.interference = float(self.interference[mortar.masters.pair].max())
+        if (self.interference > before).any():
+            self.search_anew()
+
     def search_anew(self) -> None:
         """Require a search in the next integration."""
         self._nothing_near, self._travel = False, 0.0
@@ -70,7 +90,7 @@ class Integration:
         """Begin a step at the positions x [m], shape (N, dim); active: mask of the multipliers in contact, (C,)."""
         self.shares.begin_step()
         for mortar in self._mortars:
-            mortar.begin_step(active)
+            mortar.begin_step(x, active)
         self._sliding.begin_step(x, self._travel)
 
     def move(self, dx: Array) -> None:

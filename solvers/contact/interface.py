@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.contact.law.law import Law
-from solvers.contact.mortar import FacetSearch, Mortar, join_masters
+from solvers.contact.mortar import FacetSearch, Masters, Mortar, join_masters
 from solvers.contact.pair import Pair
 from solvers.contact.patch import Multipliers, SlavePatch, number_multipliers
 from solvers.contact.self_search import SelfSearch
+from solvers.contact.shared_nodes import SearchApart, shared_nodes
 from solvers.contact.surface import ContactNodes, Surface, longest_edge, number_nodes
 from solvers.search import Search
 from solvers.sparse import Sparse, sparse
@@ -37,6 +38,7 @@ class ContactInterface:
     patch_of: dict[int, int]  #: patch of each slave surface, by its id
     facets_of: dict[int, NDArray[np.int64]]  #: facets of each slave surface in numbers of its patch, by its id
     basis: Basis | None  #: basis that multipliers are dual to; None: the nodal basis (all but tri6)
+    shared: NDArray[np.bool_]  #: mask of the multipliers of nodes that are on both sides of a pair, shape (C,)
 
     def nodes_of(self, surface: Surface) -> NDArray[np.int64]:
         """Numbers of the nodes of a surface among all nodes."""
@@ -105,6 +107,7 @@ def describe_interface(pairs: Sequence[Pair]) -> ContactInterface:
         patch_of={id(slave): patch for slave, patch in zip(slaves, multipliers.patch_of_surface, strict=True)},
         facets_of={id(slave): own for slave, own in zip(slaves, multipliers.facets_of_surface, strict=True)},
         basis=_nodal_basis(multipliers, len(nodes.points)),
+        shared=_shared(slaves, pairs, numbers, multipliers),
     )
 
 
@@ -124,6 +127,17 @@ def _spans(multipliers: Multipliers, laws: Sequence[tuple[Law, NDArray[np.int64]
     for law, which in laws:
         spans[which] = law.span
     return spans
+
+
+def _shared(
+    slaves: Sequence[Surface], pairs: Sequence[Pair], numbers: dict[int, NDArray[np.int64]], multipliers: Multipliers
+) -> NDArray[np.bool_]:
+    found = np.zeros(len(multipliers.node), dtype=bool)
+    for slave, index in zip(slaves, multipliers.patch_of_surface, strict=True):
+        masters = [numbers[id(pair.master)] for pair in pairs if pair.slave is slave and pair.master is not slave]
+        patch = multipliers.patches[index]
+        found[patch.multipliers[np.isin(patch.nodes, shared_nodes(numbers[id(slave)], masters))]] = True
+    return found
 
 
 def _mortars_of(
@@ -147,8 +161,21 @@ def _mortars_of(
                 search = SelfSearch(slave.facets, slave.facet_type, slave.points, joined.facets[len(facets) :])
             else:
                 search = Search(facets, joined.facets)
-            found.append(Mortar(patch, facets, edge, joined, integration, search))
+                if len(np.intersect1d(numbers[id(slave)], joined.nodes)):
+                    search = SearchApart(search, patch.nodes[facets], joined.nodes[joined.facets])
+            deep = _deep_facets(joined, pairs)
+            found.append(Mortar(patch, facets, edge, joined, integration, search, deep))
     return found
+
+
+def _deep_facets(joined: Masters, pairs: Sequence[Pair]) -> NDArray[np.int32]:
+    """Facets that lie deep in each other at the start, those of masters in the numbers of the joined ones, (p, 2)."""
+    found = [np.empty((0, 2), dtype=np.int32)]
+    for pair in np.unique(joined.pair_of_facet).tolist():
+        deep = pairs[pair].deep
+        if deep is not None:
+            found.append(deep + np.array([0, np.argmax(joined.pair_of_facet == pair)], dtype=np.int32))
+    return np.concatenate(found)
 
 
 def _nodal_basis(multipliers: Multipliers, size: int) -> Basis | None:

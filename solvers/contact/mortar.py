@@ -49,6 +49,7 @@ class Masters:
     facet_type: str
     nodes: NDArray[np.int64]  #: among all nodes, shape (nm,)
     pair: NDArray[np.int64]  #: pair that each node belongs to, shape (nm,)
+    pair_of_facet: NDArray[np.int64]  #: shape (k,)
 
 
 def join_masters(
@@ -59,7 +60,7 @@ def join_masters(
     as_quads = {"triangle", "quad"} <= kinds
     found = []
     for kind in sorted(kinds - {"triangle"} if as_quads else kinds):
-        facets, numbers, owner, first = [], [], [], 0
+        facets, numbers, owner, of_facet, first = [], [], [], [], 0
         for surface, number, pair in zip(surfaces, nodes, pairs, strict=True):
             widen = as_quads and kind == "quad" and surface.facet_type == "triangle"
             if surface.facet_type != kind and not widen:
@@ -67,9 +68,10 @@ def join_masters(
             facets.append(first + (surface.facets[:, [0, 1, 2, 2]] if widen else surface.facets))
             numbers.append(number)
             owner.append(np.full(len(number), pair))
+            of_facet.append(np.full(len(surface.facets), pair))
             first += len(number)
         joined = np.ascontiguousarray(np.concatenate(facets), dtype=np.int64)
-        found.append(Masters(joined, kind, np.concatenate(numbers), np.concatenate(owner)))
+        found.append(Masters(joined, kind, *map(np.concatenate, (numbers, owner, of_facet))))
     return found
 
 
@@ -103,7 +105,9 @@ class Mortar:
         masters: Masters,
         integration: Integration,
         search: FacetSearch,
+        deep: NDArray[np.int32] | None = None,
     ):
+        """deep: facets that lie deep in each other's body at the start, see `overlap_at_start`, shape (p, 2)."""
         self.patch, self.masters, self.integration = patch, masters, integration
         self.search = search
         self._types = CELL_TYPES[patch.facet_type].kernel, CELL_TYPES[masters.facet_type].kernel
@@ -111,12 +115,27 @@ class Mortar:
         self.edge = edge
         self._evaluations = 0
         self._kept = np.empty(0, dtype=np.int64)
+        self._deep = np.empty(0, dtype=np.int64) if deep is None else np.unique(self._codes(deep))
+        self._first: list[Array] = []  # positions [m] of both sides at the start, if facets are deep there
+        self.interference = 0.0  #: largest overlap [m] that a pair asks for at present
         self.clear_until = -np.inf  #: travel [m], see `near`, up to which no facets can be near
 
-    def begin_step(self, active: NDArray[np.bool_]) -> None:
-        """Discard the kept facet pairs; active: mask of the multipliers in contact, shape (C,)."""
+    def start(self, x: Array) -> None:
+        """Keep the facet pairs that lie deep in each other at the start; x: positions [m] of all nodes, (N, dim)."""
+        self.clear_until = -np.inf
+        if len(self._deep):
+            self._first = [x[nodes] for nodes in (self.patch.nodes, self.masters.nodes)]
+            self._kept = self._deep
+
+    def begin_step(self, x: Array, active: NDArray[np.bool_]) -> None:
+        """Discard the kept facet pairs, but for those that are deep in each other until something moves.
+
+        x: positions [m] of all nodes, (N, dim); active: mask of the multipliers in contact, (C,).
+        """
         self._evaluations = 0
-        self._kept = np.empty(0, dtype=np.int64)
+        sides = (self.patch.nodes, self.masters.nodes)
+        same = all(np.array_equal(x[nodes], first) for nodes, first in zip(sides, self._first, strict=False))
+        self._kept = self._deep if same else np.empty(0, dtype=np.int64)
         self.search.begin_step(active[self.patch.multipliers][self.facets].sum(axis=1))
 
     def _codes(self, facet_pairs: NDArray[np.int32]) -> NDArray[np.int64]:
@@ -134,14 +153,19 @@ class Mortar:
             self._kept = np.union1d(self._kept, self._codes(used))
 
     def near(self, x: Array, x_previous: Array, travel: float = 0.0) -> tuple[NDArray[np.int32], float]:
-        """(facet pairs that may touch, largest motion [m] of a node in this step); x: positions [m] of all nodes.
+        """(facet pairs that may touch, the length [m] by which their reach is larger); x: positions [m] of all nodes.
+
+        The reach grows by the largest motion of a node in this step and by the interference.
 
         travel: upper bound of the path of any node so far [m]. When it has increased by s, each of the two boxes has
         grown by s at most, and the motion of a step, which inflates them, by 2 s. Hence boxes with a clearance of 4 s
         do not overlap.
         """
+        if travel < self.clear_until and not len(self._kept):
+            return np.empty((0, 2), dtype=np.int32), 0.0
         slave, master = self.patch.nodes, self.masters.nodes
         motion = max(float(np.abs(x[nodes] - x_previous[nodes]).max(initial=0.0)) for nodes in (slave, master))
+        motion += max(self.interference, 0.0)
         found = self.search.pairs(x[slave], x[master], self.edge + motion, x_previous[slave], x_previous[master])
         self.clear_until = travel + self.search.clearance / 4.0
         codes = self._codes(found)

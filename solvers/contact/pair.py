@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import Law
@@ -21,3 +25,6 @@ class Pair:
     master: Surface
     integration: Integration = "segments"
     law: Law = Frictionless()
+    #: facets (slave, master) in numbers of the surfaces that lie deep in each other's body at the start, shape (p, 2)
+    deep: NDArray[np.int32] | None = None
+    interference: Callable[[float], float] | None = None  #: time [s] -> overlap [m] of the bodies as meshed; None: zero

@@ -11,8 +11,11 @@ from typing import Literal
 import numpy as np
 
 from solvers.api import Array
+from solvers.cell_types import CELL_TYPES
 from solvers.contact.contact import Contact
-from solvers.distance import distances
+from solvers.contact.surface import Surface
+from solvers.distance import signed_distances
+from solvers.kernels import nodal_normals
 
 Probe = Callable[[], dict[str, float]]
 
@@ -45,15 +48,36 @@ def pressures(contact: Contact, pair: int) -> Array:
 
 
 def gaps(contact: Contact, pair: int) -> Array:
-    """Distances [m] of the slave nodes of a pair to its master, shape (n,).
+    """Gaps [m] of the slave nodes of a pair: their distances to its master, negative where they are behind it, (n,).
 
     In self contact the mean gaps, nan where nothing is near.
     """
     slave, master = contact.pairs[pair].slave, contact.pairs[pair].master
     if master is slave:
         return contact.interface.at_nodes(slave, contact.mean_gap(), np.fmin)
-    x, at_master = (contact.x[contact.interface.nodes_of(surface)] for surface in (slave, master))
-    return distances(x, at_master, master.facets, master.facet_type)
+    return _signed(contact, slave, master)
+
+
+def overlap(contact: Contact, pair: int) -> Probe:
+    """Probe of the largest depth [m] of nodes of one side behind the other one, zero without.
+
+    In self contact that of the mean gaps.
+    """
+    slave, master = contact.pairs[pair].slave, contact.pairs[pair].master
+
+    def probe() -> dict[str, float]:
+        sides = [gaps(contact, pair)] + ([] if master is slave else [_signed(contact, master, slave)])
+        return {"": max(0.0, *(-float(np.fmin.reduce(side, initial=0.0)) for side in sides))}
+
+    return probe
+
+
+def _signed(contact: Contact, one: Surface, other: Surface) -> Array:
+    x, at_other = (contact.x[contact.interface.nodes_of(surface)] for surface in (one, other))
+    normals = nodal_normals(
+        np.ascontiguousarray(x), one.facets, CELL_TYPES[one.facet_type].kernel, None, derivatives=False
+    )[0]
+    return signed_distances(x, normals, at_other, other.facets, other.facet_type)
 
 
 def first_contact(contact: Contact, pair: int) -> Probe:

@@ -8,15 +8,13 @@ from numpy.typing import NDArray
 from solvers.api import Array, StepFailed
 from solvers.contact.dual_tree import DualTree
 from solvers.contact.roles import MASTER, SLAVE, choose_roles
-from solvers.search import OPPOSED, Search
+from solvers.search import Search
+from solvers.wall_thickness import wall_thickness
 
 Indices = NDArray[np.int64]
 
 #: Overlap relative to the thickness of the wall above which a pair is the two sides of the wall.
 THROUGH = 0.5
-
-#: Facets whose distances from all others are computed together, to bound the memory.
-CHUNK = 256
 
 
 class SelfSearch:
@@ -84,19 +82,3 @@ class SelfSearch:
         i, j = pairs.T
         overlap = -0.5 * np.einsum("pd,pd->p", middles[j] - middles[i], normals[i] - normals[j])
         return overlap > THROUGH * np.minimum(self._thickness[i], self._thickness[j])
-
-
-def wall_thickness(middles: Array, normals: Array) -> Array:
-    """Distance [m] of facets from the nearest opposed facet behind them, infinite if there is none, shape (k,)."""
-    found = np.full(len(middles), np.inf)
-    for start in range(0, len(middles), CHUNK):
-        part = slice(start, start + CHUNK)
-        away = middles[None] - middles[part, None]
-        depth = -np.einsum("ijd,id->ij", away, normals[part])
-        behind = (depth > 0.0) & (np.einsum("ijd,jd->ij", away, normals) > 0.0)
-        behind &= normals[part] @ normals.T < OPPOSED
-        distance = np.where(behind, np.linalg.norm(away, axis=2), np.inf)
-        nearest = distance.argmin(axis=1)
-        rows = np.arange(len(nearest))
-        found[part] = np.where(np.isfinite(distance[rows, nearest]), depth[rows, nearest], np.inf)
-    return found

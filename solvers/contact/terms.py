@@ -13,7 +13,7 @@ from solvers.contact.blocks import add_up, components
 from solvers.contact.mortar import Mortar, MortarTerms
 from solvers.contact.patch import Multipliers, SlavePatch
 from solvers.contact.share import Shares
-from solvers.sparse import Sparse
+from solvers.sparse import Sparse, nothing
 
 
 @dataclass(frozen=True)
@@ -46,12 +46,16 @@ class Terms:
 def find_normals(multipliers: Multipliers, x: Array, near: Sequence[NDArray[np.bool_] | None] | None = None) -> Normals:
     """Normals of all patches at positions x [m] of all nodes, shape (N, dim).
 
-    near: for each patch, mask of the nodes whose derivatives are computed; None: of all.
+    near: for each patch, mask of the nodes whose derivatives are computed; None: of all. Normals of patches without any
+    such node are zero.
     """
     (N, dim), C = x.shape, len(multipliers.node)
     values, slopes, of_patch = np.zeros((C, dim)), [], []
     for patch, chosen in zip(multipliers.patches, near or [None] * len(multipliers.patches), strict=True):
-        normals, derivative = patch.normals(x[patch.nodes], chosen)
+        if chosen is not None and not chosen.any():
+            normals, derivative = np.zeros((len(patch.nodes), dim)), nothing((dim * len(patch.nodes),) * 2)
+        else:
+            normals, derivative = patch.normals(x[patch.nodes], chosen)
         values[patch.multipliers] = normals
         slopes.append((derivative, components(patch.multipliers, dim), components(patch.nodes, dim)))
         of_patch.append((normals, derivative))

@@ -11,11 +11,15 @@ from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.tessellation import area_vectors, unit_normals
+from solvers.wall_thickness import wall_thickness
 
 Indices = NDArray[np.int64]
 
 #: Angle between facets from which their edge is one of the body, not of its approximation [rad].
 SHARP = np.pi / 3
+
+#: Facets whose walls are measured for a median.
+SAMPLE = 50
 
 #: Distance, relative to the thickness, that Newton's tolerance and rounding leave between surfaces that touch.
 ROUNDING = 1e-6
@@ -48,6 +52,15 @@ class Measures:
         middles = self._corners.mean(axis=1) - self._corners.mean(axis=(0, 1))
         volume = abs(float(np.einsum("md,md->", middles, areas))) / dim
         return 2.0 * volume / float(np.linalg.norm(areas, axis=1).sum())
+
+    def thickness_at(self, facets: Indices) -> float:
+        """Median thickness [m] of the walls behind some facets (a sample of them), at most that of the body.
+
+        At least half of a facet's edge: walls that end in a wedge have no thickness there.
+        """
+        sample = facets[:: max(1, len(facets) // SAMPLE)]
+        walls = wall_thickness(self._corners.mean(axis=1), unit_normals(self._corners), sample)
+        return min(self.thickness, max(float(np.median(walls)), 0.5 * float(np.median(self.edge[facets]))))
 
     @cached_property
     def bends(self) -> tuple[Array, Array]:

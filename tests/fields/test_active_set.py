@@ -34,7 +34,7 @@ def update(active_set, pressure, gap, covered=ALL, c=ONE):
         stiffness=one,
         c_n=c * active_set.damping,
         c_t=one,
-        touching=0.0,
+        touching=0.0 * one,
         slip=0.0 * z,
         slip_defined=covered,
     )

@@ -1,5 +1,6 @@
 """Pairs of contact that the program finds: the rule, `fsci check`, and results equal to those of named pairs."""
 
+import numpy as np
 import pytest
 from programs import fsci
 
@@ -7,6 +8,7 @@ from fsci.builder.automatic_pairs import with_pairs
 from fsci.case import CaseError, load_case
 from fsci.run.history import read_history
 from fsci.run.run import FINISHED, run_case
+from solvers.search import Search
 
 #: A soft block between two stiff ones, and a rigid floor below.
 STACK = """\
@@ -105,6 +107,58 @@ def test_reach(tmp_path):
     found = pairs_of(path, ("contact.pairs", f"{{mine: {own}}}"))
     assert ("high.bottom", "soft.top") in found
     assert ("soft.top", "high.bottom") not in found
+
+
+APART = """\
+time: {step: 0.025, end: 1}
+structure:
+  dynamics: {rho_inf: 0.8}
+  bodies:
+    a: {mesh: {shape: disc, radius: 0.5, cells: [16, 1]}, material: &m {law: neo_hooke, E: 1e4, nu: 0.3, density: 1}}
+    b:
+      mesh: {shape: disc, radius: 0.5, cells: [16, 1], translate: [FAR, 0]}
+      material: *m
+      initial_velocity: [SPEED, 0]
+contact: {bodies: all}
+probes: {a: {body: a, quantity: momentum}, b: {body: b, quantity: momentum}}
+"""
+
+
+@pytest.mark.parametrize("far", [1.3, 3.0, 8.0])
+def test_bodies_meet_from_any_distance(far, tmp_path):
+    """A disc hits another one at rest, many diameters away; no step passes through it."""
+    (tmp_path / "case.yaml").write_text(APART.replace("FAR", str(far)).replace("SPEED", str(-2.0 * (far - 1.0))))
+    assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") == FINISHED
+    history = read_history(tmp_path / "out" / "history.csv")
+    before, after = history["b.x"][0], history["b.x"][-1]
+    assert history["contact.active"][0] == 0
+    assert abs(after) < 0.5 * abs(before)
+    assert history["a.x"][-1] + after == pytest.approx(before, rel=1e-7)
+
+
+def test_far_pairs_are_not_searched(tmp_path, monkeypatch):
+    """Three discs, of which two touch all the time: the pairs of the third one are searched once or twice."""
+    text = (
+        APART.replace("FAR", "0.99")
+        .replace("SPEED", "0")
+        .replace(
+            "contact:",
+            "    c: {mesh: {shape: disc, radius: 0.5, cells: [16, 1], translate: [0, 90]}, material: *m}\ncontact:",
+        )
+    )
+    (tmp_path / "case.yaml").write_text(text)
+    count: dict[int, int] = {}
+    pairs = Search.pairs
+
+    def counted(self, *arguments):
+        if arguments[2:] and np.shape(arguments[0])[1] == 2 and len(arguments) == 5:
+            count[id(self)] = count.get(id(self), 0) + 1
+        return pairs(self, *arguments)
+
+    monkeypatch.setattr(Search, "pairs", counted)
+    assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") == FINISHED
+    assert sorted(count.values())[0] <= 2
+    assert max(count.values()) > 20
 
 
 def test_check_lists_the_pairs(tmp_path):

@@ -360,3 +360,41 @@ def test_check_lists_it():
     done = fsci("check", "cases/self_contact_fold")
     assert done.returncode == 0, done.stderr
     assert "strip.inside on itself" in done.stdout
+
+
+#: A clip whose ends meet under pressure, half of it being the image of the other one.
+CLIP = """\
+time: {step: STEP, end: 0.1}
+structure:
+  bodies:
+    clip:
+      mesh: {shape: tube, inner_radius: 0.9, outer_radius: 1.1, height: 0.3, cells: [48, 2, 1], angle: 320, start: 20}
+      material: {law: neo_hooke, E: 1000, nu: 0.3}
+      pressures: [{on: outer, value: "1.6*t"}]
+      supports:
+        - {at: [-1.1, 0, 0], displacement: [0, 0, null]}
+        - {at: [-0.9, 0, 0], displacement: [null, 0, null]}
+        - {on: bottom, symmetry: true}
+contact:
+  pairs:
+    p: {self: {body: clip, on: [inner, start, end, outer]}}
+probes:
+  upper: {body: clip, quantity: displacement, at: [1.03366188, 0.37622216, 0]}
+  lower: {body: clip, quantity: displacement, at: [1.03366188, -0.37622216, 0]}
+solver: {newton: {residual: 1.0e-10, max_iterations: 30}, linear: {method: direct}}
+output: {fields_every: 0}
+"""
+
+
+def test_the_ends_of_a_clip_do_not_pass_in_one_step(tmp_path):
+    """With one step they stop on each other as with small ones."""
+    found = []
+    for step in (0.1, 0.02):
+        folder = tmp_path / str(step)
+        folder.mkdir()
+        (folder / "case.yaml").write_text(CLIP.replace("STEP", str(step)))
+        assert run_case(load_case(folder / "case.yaml"), folder / "out") == FINISHED
+        history = read_history(folder / "out" / "history.csv")
+        found.append([history[column][-1] for column in ("upper.y", "lower.y", "contact.active")])
+    assert found[1][2] > 0
+    assert found[0] == pytest.approx(found[1], rel=0.02)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from contact_cases import run
 from contact_setup import brick, make_body, make_contact, solve_step
 from structure_setup import constant
 
@@ -49,3 +50,63 @@ def test_nothing_happens(lower, upper, moves, law):
     pressed = contact.resultant(0)[-1]
     assert pressed < -1e-1
     assert np.nanmax(np.abs(contact.mean_gap())) < 1e-12
+
+
+LAID = """\
+time: {{step: 0.5, end: 1}}
+units: {{length: m, mass: kg, time: s}}
+structure:
+  bodies:
+    a:
+      mesh: {{shape: rectangle, size: [{one}, {one}], cells: [2, 2], origin: [{far}, 0]}}
+      material: {{law: st_venant_kirchhoff, E: 1e6, nu: 0}}
+      supports: [{{on: bottom, displacement: [0, 0]}}]
+    b:
+      mesh: {{shape: rectangle, size: [{wide}, {half}], cells: [3, 2], origin: [{far}, {height!r}]}}
+      material: {{law: st_venant_kirchhoff, E: 1e6, nu: 0}}
+      supports: [{{on: left, symmetry: true}}]
+      tractions: [{{on: top, value: [0, "-1e3*t"]}}]
+contact:
+  pairs:
+    p: {{slave: {{body: {slave}}}, master: {{body: {master}}}{friction}}}
+"""
+
+SIDES = {"upper": ("b, on: bottom", "a, on: top"), "lower": ("a, on: top", "b, on: bottom")}
+
+
+@pytest.mark.parametrize("gap", [1e-14, 1e-12, 1e-11, 7e-11])
+@pytest.mark.parametrize(
+    ("one", "far", "slave", "friction"),
+    [
+        (1.0, 0.0, "upper", ""),
+        (1.0, 0.0, "lower", ""),
+        (1e-3, 0.0, "upper", ""),
+        (1.0, 1e3, "upper", ""),
+        (1.0, 0.0, "upper", ", friction: {coefficient: 0.3}"),
+    ],
+)
+def test_gap_of_rounding_is_none(gap, one, far, slave, friction, tmp_path):
+    """A block that only contact supports lies on another one but for the rounding of its mesh: it bears its load."""
+    found = []
+    for height in (one, one * (1.0 + gap)):
+        sizes = {"one": one, "wide": 0.8 * one, "half": 0.5 * one, "far": far, "height": height}
+        text = LAID.format(**sizes, slave=SIDES[slave][0], master=SIDES[slave][1], friction=friction)
+        found.append(run(text, tmp_path / str(len(found))))
+    flat, close = found
+    force = abs(close["contact.p.y"])
+    np.testing.assert_allclose(force, [400 * one, 800 * one], rtol=1e-9)
+    np.testing.assert_allclose(close["contact.p.y"], flat["contact.p.y"], rtol=1e-9)
+    assert close["iterations"].sum() <= flat["iterations"].sum() + 2
+
+
+def test_what_nearly_touches_does_not_pull(tmp_path):
+    """Blocks at a gap of rounding that are drawn apart part at once, and it is no contact."""
+    text = LAID.format(
+        one=1.0, wide=0.8, half=0.5, far=0.0, height=1.0 + 5e-11, slave=SIDES["upper"][0], master=SIDES["upper"][1],
+        friction="",
+    ).replace('tractions: [{on: top, value: [0, "-1e3*t"]}]', "").replace(
+        "{on: left, symmetry: true}", '{on: left, symmetry: true}, {on: top, displacement: [null, "1e-12*t"]}'
+    )  # fmt: skip
+    history = run(text, tmp_path)
+    assert not history["contact.p.y"].any()
+    assert not history["contact.active"].any()

@@ -45,6 +45,23 @@ structure:
 PAIR = "contact: {pairs: {p: {slave: {body: upper, on: bottom}, master: {body: lower, on: top}}}}\n"
 
 
+FALLING = """\
+time: {step: 0.02, end: 2}
+structure:
+  dynamics: {}
+  bodies:
+    a:
+      mesh: {shape: rectangle, size: [1, 1], cells: [3, 3]}
+      material: {law: neo_hooke, E: 1000, nu: 0.3, density: 1}
+      gravity: [0, -1]
+      FIXED
+contact:
+  bodies: all
+  obstacles:
+    floor: {on: top, mesh: {shape: rectangle, size: [6, 1], cells: [1, 1], origin: [-2, -3]}}
+"""
+
+
 @pytest.mark.usefixtures("in_new_folder")
 def test_bodies_that_overlap():
     words = "move one of them, or make their surfaces a pair of contact"
@@ -249,8 +266,9 @@ contact:
 
 
 @pytest.mark.usefixtures("in_new_folder")
-def test_bodies_out_of_reach():
-    said, notes = warnings(FLYING)
+def test_bodies_that_approach_without_a_pair():
+    assert warnings(FLYING) == ([], [])  # at any distance
+    said, notes = warnings(FLYING.replace("bodies: all", "bodies: all\n  reach: 1.41"))
     assert said == []
     words = "'a' and 'b' move towards each other, but are farther apart (1.62 m) than 'reach' (1.41 m)"
     assert notes == [f"case.yaml:10:1: {words}: they are no pair of contact"]
@@ -267,7 +285,26 @@ def test_bodies_out_of_reach():
     assert warnings(falling)[1] == []  # towards the obstacle, which is a pair
     high = falling.replace("-0.61]", "-9]")
     with_pair = high.replace("cells: [24, 2]}\n", "cells: [24, 2], translate: [1.2, 0]}\n")
-    assert "'a' and 'bottom' move towards each other" in str(warnings(with_pair)[1])
+    assert "'a' and 'bottom' move towards each other" in str(warnings(with_pair.replace("all", "all\n  reach: 1"))[1])
+    nobody = FLYING[: FLYING.index("contact:")]
+    words = (
+        "'a' and 'b' move towards each other, 1.62 m apart, but are no pair of contact: nothing will hold them apart"
+    )
+    assert warnings(nobody)[1] == [f"case.yaml:2:1: {words}"]
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_surfaces_of_bodies_that_may_turn():
+    """A block that falls onto a floor may land on its side; one that a support guides, or in statics, does not."""
+    block = FALLING.replace("FIXED", "")
+    words = "'a' may turn, but its surfaces 'left', 'right' and 'top' are no pair with 'floor'"
+    assert warnings(block)[1] == [f"case.yaml:10:1: {words}: if they can meet, name all of them in 'on' of one side"]
+    held = FALLING.replace("FIXED", "supports: [{on: left, symmetry: true}]")
+    every = block.replace(
+        "bodies: all", "pairs: {p: {slave: {body: a, on: [left, right, top, bottom]}, master: {obstacle: floor}}}"
+    )
+    for text in (held, every, held.replace("  dynamics: {}\n", "")):
+        assert warnings(text)[1] == []
 
 
 # --- the flow

@@ -34,7 +34,7 @@ class Point:
     slip_defined: NDArray[np.bool_]  #: mask of those that a master covered at the beginning of the step, shape (m,)
     c_n: Array  #: complementarity parameter of the gap [Pa/m], (m,); the solution does not depend on it
     c_t: Array  #: complementarity parameter of the slip [Pa/m], (m,)
-    touching: float  #: gap [m] below which it is a rounding error
+    touching: Array  #: gap [m] below which it is a rounding error, shape (m,)
 
     @property
     def pressure(self) -> Array:

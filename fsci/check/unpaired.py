@@ -1,4 +1,4 @@
-"""Bodies that move towards each other but are no pair, because they are farther apart than `reach`."""
+"""Bodies that could meet but are no pair: those that move towards each other, and surfaces of bodies that may turn."""
 
 from __future__ import annotations
 
@@ -9,30 +9,62 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.builder.automatic_pairs import Candidate, candidates, near
+from fsci.builder.automatic_pairs import Candidate, candidates
 from fsci.builder.facing import meeting
 from fsci.case import Case
 from fsci.case.contact import PairSection
+from fsci.case.errors import listed
 from fsci.expression import Expression
 from solvers.mesh import Mesh
 
 Array = NDArray[np.float64]
 
 
-def far_pairs(case: Case, meshes: Mapping[str, Mesh], pairs: Mapping[str, PairSection]) -> Iterator[str]:
-    """Notes on bodies, with obstacles and rigid bodies, among those whose pairs the program finds."""
+def unpaired(case: Case, meshes: Mapping[str, Mesh], pairs: Mapping[str, PairSection]) -> Iterator[str]:
+    """Notes on elastic bodies with these meshes, and obstacles and rigid bodies beside them."""
     known = [{side.body or side.obstacle for _, side in pair.sides} for pair in pairs.values()]
+    reach = None if case.contact is None else case.contact.reach
     for first, second in combinations(candidates(case, meshes), 2):
-        if first.rigid or not first.faces or not second.faces or {first.name, second.name} in known:
+        if first.rigid or not first.faces or not second.faces:
             continue
-        if not meeting(first.faces, second.faces, np.inf) or not _approach(case, first, second):
+        if {first.name, second.name} in known:
+            yield from _beside(case, first, second, pairs)
             continue
-        reach = near(case, first, second)
+        if not _approach(case, first, second) or not meeting(first.faces, second.faces):
+            continue
         apart = f"{_distance(first, second):.3g} {case.units.length}"
-        yield (
-            f"'{first.name}' and '{second.name}' move towards each other, but are farther apart ({apart}) than 'reach' "
-            f"({reach:.3g} {case.units.length}): they are no pair of contact"
-        )
+        names = f"'{first.name}' and '{second.name}' move towards each other"
+        if reach is not None:
+            limit = f"{reach:.3g} {case.units.length}"
+            yield f"{names}, but are farther apart ({apart}) than 'reach' ({limit}): they are no pair of contact"
+        else:
+            yield f"{names}, {apart} apart, but are no pair of contact: nothing will hold them apart"
+
+
+def _beside(case: Case, first: Candidate, second: Candidate, pairs: Mapping[str, PairSection]) -> Iterator[str]:
+    """Surfaces of bodies that nothing keeps from turning, while other surfaces of them are in pairs of contact."""
+    for one, other in ((first, second), (second, first)):
+        if not _may_turn(case, one.name):
+            continue
+        named: set[str] = set()
+        for pair in pairs.values():
+            sides = [side for _, side in pair.sides]
+            if {side.body or side.obstacle for side in sides} == {one.name, other.name}:
+                named |= {name for side in sides if side.body == one.name for name in side.on or ()}
+        free = [face.name for face in one.faces if not face.cavity and face.name not in named]
+        if named and free:
+            which = listed(free, "and")
+            yield (
+                f"'{one.name}' may turn, but its surfaces {which} are no pair with '{other.name}': if they can meet, "
+                f"name all of them in 'on' of one side"
+            )
+
+
+def _may_turn(case: Case, name: str) -> bool:
+    """Whether neither supports nor springs hold a body that moves."""
+    if case.structure is None or case.structure.dynamics is None or name not in case.elastic_bodies:
+        return False
+    return not case.elastic_bodies[name].supports and not case.elastic_bodies[name].springs
 
 
 def _approach(case: Case, first: Candidate, second: Candidate) -> bool:

@@ -1,0 +1,27 @@
+"""The motion of obstacles, and of rigid bodies of the flow as obstacles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fsci.case import Case
+from fsci.case.rigid_motion import rigid_motion
+from solvers.api import Array
+
+
+def motion_of_obstacle(case: Case, name: str, points: Array) -> Callable[[float], Array] | None:
+    """A function: time [s] -> positions of the points [m]; None if they are at rest."""
+    assert case.contact is not None
+    if name in case.contact.obstacles:
+        displacement = case.contact.obstacles[name].motion
+        if displacement is None:
+            return None
+        return lambda t: points + np.stack([component(points.T, t) for component in displacement], axis=1)
+    assert case.fluid is not None
+    movement = case.fluid.bodies[name].motion
+    if movement is None:
+        return None
+    moved = rigid_motion(points, movement, case.time.start, case.time.step)
+    return lambda t: moved(t)[0]
