@@ -10,7 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fsci.builder.obstacle_motion import motion_of_obstacle
-from fsci.builder.on_first import on_first
+from fsci.builder.on_first import shared
 from fsci.case import Case
 from fsci.case.contact import PairSection, Side
 from fsci.meshes.of_case import read_obstacle, read_rigid_body
@@ -29,7 +29,7 @@ def facets_in_each_other(
 
     meshes: of elastic bodies by name, on the first process.
     """
-    return on_first(comm, partial(_find, case, pair, meshes))
+    return shared(comm, partial(_find, case, pair, meshes))
 
 
 def _find(case: Case, pair: PairSection, meshes: Mapping[str, Mesh | None]) -> NDArray[np.int32]:
