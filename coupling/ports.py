@@ -65,8 +65,8 @@ class Part(System, Stateful, Protocol):
         """Right-hand side for the increment: minus the residual."""
         ...
 
-    def update(self, increment: Array) -> float:
-        """Add an increment; returns its norm relative to that of the solution."""
+    def update(self, increment: Array) -> Array:
+        """Add an increment; returns its norm relative to that of the solution, by part."""
         ...
 
     def rounded(self) -> Array:

@@ -12,7 +12,7 @@ from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.condense import Condensed, Linearised, condense, recover
 from solvers.contact.constraints import Constraints
-from solvers.contact.directions import admissible, free_normals
+from solvers.contact.directions import free_normals
 from solvers.contact.force import force_matrix, nodal_force
 from solvers.contact.friction_work import FrictionWork
 from solvers.contact.integration import Integration
@@ -25,6 +25,7 @@ from solvers.contact.pair import Pair
 from solvers.contact.redistribute import redistributed
 from solvers.contact.slip import Slip
 from solvers.contact.terms import Terms
+from solvers.contact.violation import rounding_of_force, rounding_of_laws, violation
 from solvers.rows import RowTransformation
 from solvers.sparse import Sparse, nothing
 
@@ -214,20 +215,17 @@ class Contact:
             return np.zeros((self.size, self.dim))
         return nodal_force(self.interface, self.terms, self.z)
 
-    def violation(self, weight: float) -> float:
-        """Norm [N] of the residual of the laws of multipliers in contact."""
+    def violation(self, weight: float) -> Array:
+        """Norm [N] of the residual of the laws of multipliers in contact, by node, shape (N,)."""
         self._weight = weight
+        return violation(self.interface, self._spans, [] if self.terms is None else self.in_contact(), weight)
+
+    def rounding(self, weight: float) -> tuple[Array, Array]:
+        """Rounding errors [N] of the contact force in the balance, shape (N, dim), and of `violation`, shape (N,)."""
         if self.terms is None:
-            return 0.0
-        total = 0.0
-        for part in self.in_contact():
-            missed = part.law.residual(part.point, part.status, weight)
-            if part.law.span != "normal":
-                held, spans = self.nodes.held[self.multipliers.node[part.which]], self._spans[part.which]
-                less = held.any(axis=(1, 2)) | (spans == "normal")  # not all directions of its law
-                missed[less] = admissible(missed[less], part.point.normals[less], held[less], spans[less])
-            total += float(np.sum(missed**2))
-        return float(np.sqrt(total))
+            return np.zeros((self.size, self.dim)), np.zeros(self.size)
+        of_laws = rounding_of_laws(self.interface, self.in_contact(), self._slopes(), weight, self.x)
+        return rounding_of_force(self.terms.dforce, weight, self.x), of_laws
 
     def in_contact(self) -> list[ActiveMultipliers]:
         """The multipliers in contact, law by law."""
@@ -238,13 +236,18 @@ class Contact:
     def linearised(self, parts: Sequence[ActiveMultipliers], weight: float) -> Linearised:
         """Contribution of the multipliers in contact to a Newton iteration, linearised."""
         assert self.terms is not None
-        count, n, dgap = len(self.z), self.dim * self.size, self._redistributed(self.terms.dgap)
-        slip = nothing((self.dim * count, n)) if self.slip is None else self.slip.slopes
-        slopes = Slopes(gap=dgap, normals=self.terms.dnormals, slip=slip)
+        slopes = self._slopes()
         force = force_matrix(self.interface, self.terms)
         if self._shared is not None:
             force = force + force @ self._shared
         return linearise(self.interface, self._spans, parts, slopes, force, self.terms.dforce, weight)
+
+    def _slopes(self) -> Slopes:
+        """Derivatives of gaps, normals and slips of all multipliers."""
+        assert self.terms is not None
+        none = nothing((self.dim * len(self.z), self.dim * self.size))
+        slip = none if self.slip is None else self.slip.slopes
+        return Slopes(gap=self._redistributed(self.terms.dgap), normals=self.terms.dnormals, slip=slip)
 
     def condense(self, weight: float) -> RowTransformation:
         """The transformation that eliminates the multipliers from the linearised balance without contact force.

@@ -29,6 +29,7 @@ from solvers.structure.energy import EnergyBalance, EnergySentinel
 from solvers.structure.held import Held
 from solvers.structure.instant import Instant
 from solvers.structure.massless import mass_matrices
+from solvers.structure.pieces import Pieces
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.saved import restore_state, saved_state
 from solvers.structure.solid_solver import SolidSolver
@@ -57,6 +58,7 @@ class Structure:
         self.timer, self.constraint = timer or Timer(), contact
         self.dim = bodies[0].dim
         self.layout = Layout(comm, [body.size for body in bodies])
+        self.pieces = Pieces(comm, bodies)
         self._constrained = None if contact is None else ConstrainedDofs(self.layout, contact)
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
@@ -262,23 +264,43 @@ class Structure:
             self.constraint.evaluate(self._constrained.at_nodes(self.now.u), self.current.t)
             self.now.constraint[:] = self._constrained.force()
 
-    def residual(self) -> float:
-        """Norm [N] of the balance at the free dofs and of the residual of the constraint."""
+    def residual(self) -> Array:
+        """Norm [N] of the balance at the free dofs and of the residual of the constraint, by piece."""
         with self.timer("assembly"):
             self._assemble_bodies()
         with self.timer("contact"):
             self._assemble_constraint()
         self.now.v, self.now.a = self.time.motion(self, self.current.dt)
         self.residual_force = self.time.balance(self)
-        missed = 0.0 if self.constraint is None else self.constraint.violation(self.time.force_weight)
-        return float(np.hypot(self.norm(self.held.free_part(self.residual_force)), missed))
+        free, missed = self.held.free_part(self.residual_force), None
+        if self.constraint is not None and self._constrained is not None and self.constraint.near:
+            missed = self.constraint.violation(self.time.force_weight)
+            missed = np.bincount(self._piece_of_nodes, missed**2, self.pieces.count)
+        return self.pieces.norms([free], missed)[0]
+
+    @cached_property
+    def _piece_of_nodes(self) -> NDArray[np.int64]:
+        """Piece of each node of the constraint, 0 for rigid ones (collective)."""
+        assert self._constrained is not None
+        return self._constrained.at_nodes(self.pieces.of_dofs.astype(float))[:, 0].astype(np.int64)
+
+    def forces(self) -> Array:
+        """Norm [N] of the largest force on each piece: internal, external, of the constraint, of inertia and history.
+
+        They are those of the present iterate. A residual would not do: that of an iterate that has blown up says
+        nothing of the forces, and that of a support that moves none.
+        """
+        now = self.now
+        static = now.internal - now.external - now.constraint
+        others = self.residual_force - self.time.force_weight * static
+        return self.pieces.norms([now.internal, now.external, now.constraint, others]).max(axis=0)
 
     def tangent(self) -> PETSc.Mat:
         """d(balance)/du without supports; the next call overwrites the matrix."""
         return self._assembled_tangent.assemble(self, self.time)
 
-    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> float:
-        """One iteration of Newton's method; returns |du| / |u|. Raises StepFailed.
+    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> Array:
+        """One iteration of Newton's method; returns |du| / |u| by piece. Raises StepFailed.
 
         keep: use the matrix and the factors of the last iterate, away from contact. reduction: of the residual of the
         linear system that is good enough. It applies in contact, where the first iterates only find the active set;
@@ -354,13 +376,13 @@ class Structure:
         with self.timer("contact"):
             self._constrained.recover(taken, du)
 
-    def update(self, increment: Array) -> float:
-        """Add an increment of the owned dofs; returns |du| / |u|."""
+    def update(self, increment: Array) -> Array:
+        """Add an increment of the owned dofs; returns |du| / |u| by piece."""
         self.increment = increment.copy()
         self.now.u += self.increment
         self.now.u = self.held.free_part(self.now.u) + self.target
-        size = self.norm(self.now.u)
-        return self.norm(self.increment) / size if size > 0.0 else 0.0
+        change, size = self.pieces.norms([self.increment, self.now.u])
+        return np.divide(change, size, out=np.zeros_like(size), where=size > 0.0)
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""
@@ -377,16 +399,25 @@ class Structure:
         assert self.rounding is not None
         self.rounding = self.rounding + error
 
-    def round_off(self) -> float:
-        """Norm [N] of the rounding error of the balance, at the iterate that this step linearised last."""
+    def only_rounding(self) -> NDArray[np.bool_]:
+        """Whether the residual is rounding errors in all rows of a piece, at the iterate that this step linearised last."""
         if self.rounding is None:
             self._tangent = self.linearise()
         assert self.rounding is not None
-        return self.norm(self.held.free_part(self.rounding))
+        residual, rounding = self.held.free_part(self.residual_force), self.rounding
+        if self.constraint is None or self._constrained is None or not self.constraint.near:
+            return self.pieces.below(residual, rounding)
+        weight, several = self.time.force_weight, 2.0**self.dim
+        of_force, of_conditions = self.constraint.rounding(weight)
+        found = self.pieces.below(residual, rounding + several * self._constrained.at_owned(of_force))
+        missed = self.constraint.violation(weight) > several * of_conditions
+        return found & (np.bincount(self._piece_of_nodes[missed], minlength=self.pieces.count) == 0)
 
     def worst(self) -> tuple[float, ...] | None:
-        """Reference position [m] of the node with the largest residual (collective)."""
+        """Reference position [m] of the node with the largest residual relative to the forces on its piece (collective)."""
         size = np.abs(self.held.free_part(np.nan_to_num(self.residual_force, nan=np.inf)))
+        forces = np.nan_to_num(self.forces(), nan=np.inf)[self.pieces.of_dofs]
+        size = np.divide(size, forces, out=size, where=(forces > 0.0) & np.isfinite(forces))
         points = [body.points[: self.dim, : body.owned].T for body in self.bodies]
         return position_of_largest(self.comm, size, np.repeat(np.concatenate(points), self.dim, axis=0))
 
