@@ -225,7 +225,7 @@ class Contact:
         if self.terms is None:
             return np.zeros((self.size, self.dim)), np.zeros(self.size)
         of_laws = rounding_of_laws(self.interface, self.in_contact(), self._slopes(), weight, self.x)
-        return rounding_of_force(self.terms.dforce, weight, self.x), of_laws
+        return rounding_of_force(self.interface, self.terms.dforce, weight, self.x), of_laws
 
     def in_contact(self) -> list[ActiveMultipliers]:
         """The multipliers in contact, law by law."""

@@ -16,6 +16,7 @@ from solvers.contact.directions import admissible
 from solvers.contact.interface import ContactInterface
 from solvers.contact.law.law import Slopes
 from solvers.contact.linearise import ActiveMultipliers, law_rows
+from solvers.contact.surface import longest_edge
 from solvers.rounding import rounding_error_of_rows
 from solvers.sparse import Sparse
 
@@ -46,7 +47,7 @@ def rounding_of_laws(
     """Rounding errors [N] of `violation`, shape (N,), for nodes at x [m], shape (N, dim); slopes: of all multipliers."""
     by_z, by_u, _ = law_rows(parts, slopes, weight, x.size)
     z = np.concatenate([part.point.z.ravel() for part in parts] or [np.zeros(0)])
-    errors = np.hypot(rounding_error_of_rows(by_z, z), rounding_error_of_rows(by_u, x.ravel()))
+    errors = np.hypot(rounding_error_of_rows(by_z, z), rounding_error_of_rows(by_u, _rounded(interface, x)))
     squares, first = np.zeros(len(x)), 0
     for part in parts:
         own = errors[first : first + part.point.z.size].reshape(part.point.z.shape)
@@ -55,7 +56,16 @@ def rounding_of_laws(
     return np.sqrt(squares)
 
 
-def rounding_of_force(dforce: Sparse, weight: float, x: Array) -> Array:
+def rounding_of_force(interface: ContactInterface, dforce: Sparse, weight: float, x: Array) -> Array:
     """Rounding errors [N] of the contact force in the balance, shape (N, dim); dforce: its derivative at fixed z."""
-    return weight * rounding_error_of_rows(dforce, x.ravel()).reshape(x.shape)
+    return weight * rounding_error_of_rows(dforce, _rounded(interface, x)).reshape(x.shape)
+
+
+def _rounded(interface: ContactInterface, x: Array) -> Array:
+    """Magnitudes [m] whose rounding enters the integrals, shape (N * dim,): distances from the origin, and of nodes."""
+    size = np.linalg.norm(x, axis=1)
+    edge = np.zeros(len(x))
+    for surface, numbers in zip(interface.surfaces, interface.nodes.of_surface, strict=True):
+        edge[numbers] = np.maximum(edge[numbers], longest_edge(surface.corners))
+    return (size + edge).repeat(x.shape[1])
 

@@ -248,9 +248,14 @@ class RigidBodies:
         return np.linalg.norm(rows.reshape(arms.shape) / arms, axis=1)
 
     def forces(self) -> Array:
-        """Norm [N] of the largest force on each body: rate of momentum, own loads, those of the flow and of contact."""
+        """Norm [N] of the largest force on each body: rate of momentum, own loads, those of the flow and of contact.
+
+        The momentum over the length of the step counts too, because in free flight there are no others.
+        """
         rates, loads = np.array([now.p for now in self.now]), np.array([now.load for now in self.now])
-        all_forces = [self._by_component(some) for some in (rates, loads, self.on_surface)]
+        before = [motion.momentum(body, old.R, old.v) for body, old in zip(self.bodies, self.old, strict=True)]
+        momentum = np.array(before) / self.current.dt
+        all_forces = [self._by_component(some) for some in (rates, loads, momentum, self.on_surface)]
         if self.contact is not None:
             all_forces.append(self.contact.force)
         return np.max([self._norms(rows) for rows in all_forces], axis=0)

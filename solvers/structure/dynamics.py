@@ -172,6 +172,9 @@ class Dynamics:
     def dissipates(self) -> bool:
         return (self.scheme.alpha_m, self.scheme.alpha_f) != (0.5, 0.5)
 
+    def momentum(self, structure: Moving) -> Array:
+        return times(structure.mass, structure.old.v)
+
     def kinetic_energy(self, structure: Moving) -> float:
         v = structure.now.v
         return 0.5 * structure.comm.allreduce(float(v @ times(structure.mass, v)))
