@@ -352,10 +352,11 @@ class Structure:
 
     def rounded(self) -> Array:
         """Magnitudes whose rounding enters the balance, at owned dofs [m]: |u|, and h for that of I + grad u."""
-        size = np.abs(self.now.u)
-        for body, part in zip(self.bodies, self.split(size), strict=True):
-            part += body.cell_size
-        return size
+        return np.abs(self.now.u) + self._heights
+
+    @cached_property
+    def _heights(self) -> Array:
+        return np.concatenate([body.heights.repeat(self.dim) for body in self.bodies])
 
     def missing_displacement(self) -> Array:
         """Prescribed minus present displacements at owned dofs [m], zero at free ones."""
