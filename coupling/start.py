@@ -50,8 +50,10 @@ def start_together(
         return
     start, interface = coupled.start, coupled.interface
     velocity = start.solid.velocity()
-    if start.flow.at_once(interface.at_start(velocity)):
+    surfaces = interface.at_start(velocity)
+    if start.flow.at_once(surfaces):
         return
+    start.solid.leave_out(coupled.flow.outside(surfaces))
     moved = start.solid.steps * dt**2 * start.solid.acceleration()
     if moved > start.flow.smallest_cell:
         dt = lengths(dt, dt * math.sqrt(start.flow.smallest_cell / moved))[0]

@@ -208,6 +208,13 @@ class Fluid:
             self.history.extrapolate(self.flow, self.current.dt, fixed, with_pressure=with_pressure and first_degree)
         self.increment = self.flow[: self.unknowns.owned] - before
 
+    def outside(self, surfaces: Mapping[str, Motion]) -> set[str]:
+        """Names of the surfaces that lie outside of the box, which have nothing to do with the flow."""
+        repeated = periodic_axes(self._patches)
+        edges = [(axis, edge[0], edge[-1]) for axis, edge in enumerate(self.box.edges) if axis not in repeated]
+        away = {name: [(m.x[:, i].max() < a, m.x[:, i].min() > b) for i, a, b in edges] for name, m in surfaces.items()}
+        return {name for name, sides in away.items() if np.any(sides)}
+
     def has_films(self) -> bool:
         """Whether the present cut has films that are thinner than a cell (collective)."""
         return bool(self.comm.allreduce(self.cut.film is not None, op=MPI.LOR))

@@ -103,6 +103,7 @@ def stacked(scene, rng):
 
 def tied(scene, rng):
     force = scene.E * 10.0 ** rng.uniform(-4, -2)
+    scene.load = 0.1 * force
     scene.body("lower", scene.rectangle([1, 0.4], [5, 3]), supports=[held()])
     scene.body(
         "upper", scene.rectangle([1, 0.3], [3, 2], 0, 0.4),
