@@ -128,10 +128,10 @@ def draw_pair(rng):
     return found
 
 
-def case_of(scenes, *, dynamics=False, **more):
-    """The text of a case with some scenes."""
+def case_of(scenes, *, dynamics=False, end=1.0, **more):
+    """The text of a case with some scenes, in three steps."""
     case = {
-        "time": {"step": 1.0 / STEPS, "end": 1.0, "retry": {"halvings": 0}},
+        "time": {"step": end / STEPS, "end": end, "retry": {"halvings": 0}},
         "structure": {"bodies": {}} | ({"dynamics": {"rho_inf": 0.5}} if dynamics else {}),
         "solver": {"newton": {"residual": 1e-12}, "linear": {"method": "direct"}},
         "probes": {},
@@ -164,3 +164,38 @@ def difference(scene, alone, together):
         size = max(np.abs(one).max(), scene.load if name.endswith("_force") else 0.0)
         worst = max(worst, float(np.abs(np.subtract(two, one)).max() / size))
     return worst
+
+
+#: a channel around the post of `post`
+FLOW = {
+    "density": 1,
+    "viscosity": 0.05,
+    "grid": {"from": [0, 0], "to": [2, 1], "cells": [20, 10]},
+    "patches": {
+        "inlet": {"on": "x-", "velocity": ["4*y*(1 - y)*min(t/0.1, 1)", 0]},
+        "outlet": {"on": "x+", "outflow": True},
+        "walls": {"on": ["y-", "y+"], "no_slip": True},
+    },
+}
+
+
+def post(scene, rng):
+    scene.E = 1000.0
+    scene.body("post", scene.rectangle([0.23, 0.41], [3, 5], 0.62), law="st_venant_kirchhoff", supports=[held()])
+    scene.bodies[scene.name + "post"]["material"]["density"] = 10.0
+    scene.reaction("post", "bottom")
+
+
+def draw_beside_flow(rng):
+    """A post in a channel, and a scene outside of it."""
+    in_flow = Scene("a", [0.0, 0.0], 1000.0)
+    beside = Scene("b", [float(rng.uniform(4, 6)), 0.3], float(f"{10.0 ** rng.uniform(-3, 9):.3e}"))
+    post(in_flow, rng)
+    KINDS[int(rng.integers(len(KINDS)))](beside, rng)
+    return in_flow, beside
+
+
+def coupled(scheme, *, dynamics):
+    """Settings of the coupled case."""
+    settings = {"scheme": scheme} | ({"tolerance": 1e-11} if scheme == "partitioned" else {})
+    return {"fluid": FLOW if dynamics else FLOW | {"scheme": "steady"}, "coupling": settings}
