@@ -16,6 +16,9 @@ from solvers.counted import counted
 
 Flags = NDArray[np.bool_]
 
+#: Residual [N] in the place of zero in divisions; ratios to it are numbers.
+NOTHING = 1e-150
+
 
 class System(Protocol):
     """A nonlinear system of one field or many, at its current iterate.
@@ -99,13 +102,12 @@ def iterates(system: System, tolerance: Tolerance = Tolerance()) -> Iterator[Ite
         small, settled = tolerance.small(system.forces()), system.settled()
         yield Iterate(number, residual, small, increment, settled)
         before = residual
-        keep = number > 0 and bool((2.0 * ratio * residual <= small).all())
+        keep = number > 0 and (2.0 * ratio * residual <= small).all()
         increment = system.advance(keep=keep, reduction=enough(residual, ratio, tolerance=small))
         residual = system.residual()
         if tolerance.line_search and settled:
             increment, residual = _halve(system, before, small, increment, residual)
-        ratio = np.divide(residual, before, out=np.full(len(residual), math.inf), where=before > 0.0)
-        ratio[residual == 0.0] = 0.0
+        ratio = residual / np.maximum(before, NOTHING)
         number += 1
 
 
@@ -122,9 +124,8 @@ def enough(residual: Array, ratio: Array, *, tolerance: Array) -> float:
     iterates, infinite before the second. All by part; the part that needs most decides.
     Source: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996), choice 2.
     """
-    some = residual > 0.0
-    needed = np.maximum(0.1 * ratio[some] ** 2, 0.01 * tolerance[some] / residual[some])
-    return float(needed.min(initial=ENOUGH))
+    parts = zip(residual.tolist(), ratio.tolist(), tolerance.tolist(), strict=True)  # few: arrays would take longer
+    return min([ENOUGH, *(max(0.1 * q * q, 0.01 * small / r) for r, q, small in parts if r > 0.0)])
 
 
 def _halve(
@@ -170,11 +171,9 @@ def _within(iterate: Iterate, system: System, tolerance: Tolerance) -> Flags | N
     The first iterate is the state before the step, or a guess. It is no solution because forces have changed by less
     than the tolerance: such changes would be lost in every step.
     """
-    within = (iterate.residual <= iterate.small) & (
-        (iterate.increment <= tolerance.increment) | (iterate.residual == 0.0)
-    )
-    if iterate.number == 0:
-        within &= iterate.residual <= tolerance.residual_absolute
+    within: Flags = iterate.residual <= (tolerance.residual_absolute if iterate.number == 0 else iterate.small)
+    if math.isfinite(tolerance.increment):
+        within &= (iterate.increment <= tolerance.increment) | (iterate.residual == 0.0)
     return within if within.all() or (within | system.only_rounding()).all() else None
 
 

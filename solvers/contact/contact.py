@@ -25,7 +25,7 @@ from solvers.contact.pair import Pair
 from solvers.contact.redistribute import redistributed
 from solvers.contact.slip import Slip
 from solvers.contact.terms import Terms
-from solvers.contact.violation import rounding_of_force, rounding_of_laws, violation
+from solvers.contact.violation import rounding, violation
 from solvers.rows import RowTransformation
 from solvers.sparse import Sparse, nothing
 
@@ -112,6 +112,7 @@ class Contact:
         self._constraints.begin_step()
         self.active_set.begin_step()
         self._integration.begin_step(self.x, self.active_set.active)
+        self._condensation = None
         self.slip = None
 
     def begin_solve(self) -> None:
@@ -221,11 +222,16 @@ class Contact:
         return violation(self.interface, self._spans, [] if self.terms is None else self.in_contact(), weight)
 
     def rounding(self, weight: float) -> tuple[Array, Array]:
-        """Rounding errors [N] of the contact force in the balance, shape (N, dim), and of `violation`, shape (N,)."""
-        if self.terms is None:
+        """Rounding errors [N] of the contact force in the balance, shape (N, dim), and of `violation`, shape (N,).
+
+        Where this step eliminated the multipliers last.
+        """
+        if not self.near or not self.active_set.active.any():
             return np.zeros((self.size, self.dim)), np.zeros(self.size)
-        of_laws = rounding_of_laws(self.interface, self.in_contact(), self._slopes(), weight, self.x)
-        return rounding_of_force(self.interface, self.terms.dforce, weight, self.x), of_laws
+        if self._condensation is None:
+            self.condense(weight)
+        assert self._condensation is not None
+        return rounding(self.interface, self._condensation[2], self.force(), self.x)
 
     def in_contact(self) -> list[ActiveMultipliers]:
         """The multipliers in contact, law by law."""
@@ -236,18 +242,13 @@ class Contact:
     def linearised(self, parts: Sequence[ActiveMultipliers], weight: float) -> Linearised:
         """Contribution of the multipliers in contact to a Newton iteration, linearised."""
         assert self.terms is not None
-        slopes = self._slopes()
+        count, n, dgap = len(self.z), self.dim * self.size, self._redistributed(self.terms.dgap)
+        slip = nothing((self.dim * count, n)) if self.slip is None else self.slip.slopes
+        slopes = Slopes(gap=dgap, normals=self.terms.dnormals, slip=slip)
         force = force_matrix(self.interface, self.terms)
         if self._shared is not None:
             force = force + force @ self._shared
         return linearise(self.interface, self._spans, parts, slopes, force, self.terms.dforce, weight)
-
-    def _slopes(self) -> Slopes:
-        """Derivatives of gaps, normals and slips of all multipliers."""
-        assert self.terms is not None
-        none = nothing((self.dim * len(self.z), self.dim * self.size))
-        slip = none if self.slip is None else self.slip.slopes
-        return Slopes(gap=self._redistributed(self.terms.dgap), normals=self.terms.dnormals, slip=slip)
 
     def condense(self, weight: float) -> RowTransformation:
         """The transformation that eliminates the multipliers from the linearised balance without contact force.

@@ -49,7 +49,7 @@ def linearise(
     node, held = interface.multipliers.node[which], interface.nodes.held
     directions = find_directions(z, normals, node, held, spans[which])
     turning = directions.turning @ slopes.normals[components(which, dim)]
-    by_z, by_u, residual = law_rows(parts, slopes, w, dim * N)
+    by_z, by_u, residual = _law_rows(parts, slopes, w, dim * N)
     P, across = directions.basis, directions.basis.T
     return Linearised(
         weight=w,
@@ -65,7 +65,7 @@ def linearise(
     )
 
 
-def law_rows(
+def _law_rows(
     parts: Sequence[ActiveMultipliers], slopes: Slopes, weight: float, columns: int
 ) -> tuple[Sparse, Sparse, Array]:
     """(derivative by z, derivative by u, residual) of all multipliers in contact, law by law."""

@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.contact.condense import Condensed
 from solvers.contact.directions import admissible
 from solvers.contact.interface import ContactInterface
-from solvers.contact.law.law import Slopes
-from solvers.contact.linearise import ActiveMultipliers, law_rows
+from solvers.contact.linearise import ActiveMultipliers
 from solvers.contact.surface import longest_edge
-from solvers.rounding import rounding_error_of_rows
-from solvers.sparse import Sparse
+from solvers.rounding import EPS, rounding_error_of_rows
 
 
 def violation(
@@ -41,24 +40,15 @@ def violation(
     return np.sqrt(squares)
 
 
-def rounding_of_laws(
-    interface: ContactInterface, parts: Sequence[ActiveMultipliers], slopes: Slopes, weight: float, x: Array
-) -> Array:
-    """Rounding errors [N] of `violation`, shape (N,), for nodes at x [m], shape (N, dim); slopes: of all multipliers."""
-    by_z, by_u, _ = law_rows(parts, slopes, weight, x.size)
-    z = np.concatenate([part.point.z.ravel() for part in parts] or [np.zeros(0)])
-    errors = np.hypot(rounding_error_of_rows(by_z, z), rounding_error_of_rows(by_u, _rounded(interface, x)))
-    squares, first = np.zeros(len(x)), 0
-    for part in parts:
-        own = errors[first : first + part.point.z.size].reshape(part.point.z.shape)
-        np.add.at(squares, interface.multipliers.node[part.which], np.sum(own**2, axis=1))
-        first += own.size
-    return np.sqrt(squares)
+def rounding(interface: ContactInterface, condensed: Condensed, force: Array, x: Array) -> tuple[Array, Array]:
+    """Rounding errors [N] of the contact force in the balance, shape (N, dim), and of `violation`, shape (N,).
 
-
-def rounding_of_force(interface: ContactInterface, dforce: Sparse, weight: float, x: Array) -> Array:
-    """Rounding errors [N] of the contact force in the balance, shape (N, dim); dforce: its derivative at fixed z."""
-    return weight * rounding_error_of_rows(dforce, _rounded(interface, x)).reshape(x.shape)
+    condensed: where the multipliers were eliminated last; force: on the nodes [N], x: their positions [m], (N, dim).
+    """
+    positions = _rounded(interface, x)
+    of_force = rounding_error_of_rows(condensed.stiffness, positions).reshape(x.shape)
+    of_laws = np.hypot(rounding_error_of_rows(condensed.added, positions).reshape(x.shape), EPS * force)
+    return of_force, np.linalg.norm(of_laws, axis=1)
 
 
 def _rounded(interface: ContactInterface, x: Array) -> Array:

@@ -68,6 +68,7 @@ class Structure:
             self.energy, dissipates=time.dissipates or contact is not None, contact=contact is not None
         )
         self.residual_force = np.zeros(self.layout.size)  #: residual of the balance, at held dofs the reaction [N]
+        self._unbalanced = self.residual_force  #: the residual at free dofs [N]
         self.target = np.zeros(self.layout.size)
         self.increment = np.zeros(self.layout.size)
         self.rounding: Array | None = None  #: rounding error of `residual_force` [N]; None before this step linearises
@@ -272,11 +273,11 @@ class Structure:
             self._assemble_constraint()
         self.now.v, self.now.a = self.time.motion(self, self.current.dt)
         self.residual_force = self.time.balance(self)
-        free, missed = self.held.free_part(self.residual_force), None
+        self._unbalanced, missed = self.held.free_part(self.residual_force), None
         if self.constraint is not None and self._constrained is not None and self.constraint.near:
             missed = self.constraint.violation(self.time.force_weight)
             missed = np.bincount(self._piece_of_nodes, missed**2, self.pieces.count)
-        return self.pieces.norms([free], missed)[0]
+        return self.pieces.norms([self._unbalanced], missed)[0]
 
     @cached_property
     def _piece_of_nodes(self) -> NDArray[np.int64]:
@@ -285,19 +286,16 @@ class Structure:
         return self._constrained.at_nodes(self.pieces.of_dofs.astype(float))[:, 0].astype(np.int64)
 
     def forces(self) -> Array:
-        """Norm [N] of the largest force on each piece: internal, external, of the constraint, of inertia and history.
+        """Norm [N] of the largest force on each piece: internal, external, of the constraint.
 
         They are those of the present iterate. A residual would not do: that of an iterate that has blown up says
         nothing of the forces, and that of a support that moves none. The momentum over the length of the step counts
-        too, because in free flight there are no others.
+        too, because in free flight there are no others. Forces of inertia balance these.
         """
         now = self.now
-        static = now.internal - now.external - now.constraint
-        others = self.residual_force - self.time.force_weight * static
         if self._momentum is None:
             self._momentum = self.time.momentum(self) / self.current.dt
-        parts = [now.internal, now.external, now.constraint, others, self._momentum]
-        return self.pieces.norms(parts).max(axis=0)
+        return self.pieces.norms([now.internal, now.external, now.constraint, self._momentum]).max(axis=0)
 
     def tangent(self) -> PETSc.Mat:
         """d(balance)/du without supports; the next call overwrites the matrix."""
@@ -406,15 +404,17 @@ class Structure:
 
     def only_rounding(self) -> NDArray[np.bool_]:
         """Whether the residual is rounding errors in all rows of a piece, at the iterate that this step linearised last."""
-        if self.rounding is None:
+        if first := self.rounding is None:
             self._tangent = self.linearise()
         assert self.rounding is not None
-        residual, rounding = self.held.free_part(self.residual_force), self.rounding
+        found = self.pieces.below(self._unbalanced, self.rounding)
         if self.constraint is None or self._constrained is None or not self.constraint.near:
-            return self.pieces.below(residual, rounding)
+            return found
+        if first and not found.any():  # the errors of contact would take as long as another iterate
+            return found
         weight, several = self.time.force_weight, 2.0**self.dim
         of_force, of_conditions = self.constraint.rounding(weight)
-        found = self.pieces.below(residual, rounding + several * self._constrained.at_owned(of_force))
+        found = self.pieces.below(self._unbalanced, self.rounding + several * self._constrained.at_owned(of_force))
         missed = self.constraint.violation(weight) > several * of_conditions
         return found & (np.bincount(self._piece_of_nodes[missed], minlength=self.pieces.count) == 0)
 

@@ -35,24 +35,27 @@ class Pieces:
 
         other: the square of a norm to be added to all of them, by piece, the same on every process.
         """
-        with np.errstate(over="ignore"):  # an iterate that has blown up has an infinite norm
-            squares = np.stack([self._squares(array) for array in arrays])
-        total = self._comm.allreduce(squares)
+        if self.count == 1:
+            squares = np.array([[array @ array] for array in arrays])
+        else:
+            with np.errstate(over="ignore"):  # an iterate that has blown up has an infinite norm
+                squares = np.stack([np.bincount(self.of_dofs, array * array, self.count) for array in arrays])
+        total = self._sum(squares)
         return np.sqrt(total if other is None else total + other)
 
-    def _squares(self, array: Array) -> Array:
-        if self.count == 1:
-            return np.array([array @ array])
-        return np.bincount(self.of_dofs, array * array, self.count)
+    def _sum(self, values: NDArray) -> NDArray:
+        """The sum over all processes."""
+        return values if self._comm.size == 1 else self._comm.allreduce(values)
 
     def below(self, array: Array, bound: Array) -> NDArray[np.bool_]:
         """Whether the vector at each owned node of a piece is at most as long as another one, by piece (collective).
 
         array, bound: at owned dofs. Vectors of nodes, because components along the axes mean nothing to oblique rows.
         """
-        size, most = (np.linalg.norm(a.reshape(-1, self._dim), axis=1) for a in (array, bound))
-        failed = np.bincount(self.of_dofs[:: self._dim][~(size <= most)], minlength=self.count)
-        return np.asarray(self._comm.allreduce(failed)) == 0
+        with np.errstate(over="ignore"):
+            size, most = (np.add.reduce((a * a).reshape(-1, self._dim), axis=1) for a in (array, bound))
+        failed = ~(size <= most)
+        return self._sum(np.bincount(self.of_dofs[:: self._dim], failed, self.count)) == 0.0
 
 
 def _pieces_of_nodes(body: Body) -> tuple[int, NDArray[np.int64]]:
