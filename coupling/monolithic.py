@@ -43,7 +43,6 @@ class Monolithic:
 
     def __init__(self, coupled: Coupled, tolerance: Tolerance = Tolerance()):
         self.coupled, self.tolerance = coupled, tolerance
-        flow = coupled.flow
         self.comm = coupled.solid.comm
         self._number_unknowns()
         self._secant = Secant()

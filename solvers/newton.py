@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from solvers.api import Array, StepFailed, StepInfo
 from solvers.counted import counted
 
-
 Flags = NDArray[np.bool_]
 
 #: Residual [N] in the place of zero in divisions; ratios to it are numbers.
@@ -102,7 +101,7 @@ def iterates(system: System, tolerance: Tolerance = Tolerance()) -> Iterator[Ite
         small, settled = tolerance.small(system.forces()), system.settled()
         yield Iterate(number, residual, small, increment, settled)
         before = residual
-        keep = number > 0 and (2.0 * ratio * residual <= small).all()
+        keep = number > 0 and bool((2.0 * ratio * residual <= small).all())
         increment = system.advance(keep=keep, reduction=enough(residual, ratio, tolerance=small))
         residual = system.residual()
         if tolerance.line_search and settled:
@@ -128,10 +127,8 @@ def enough(residual: Array, ratio: Array, *, tolerance: Array) -> float:
     return min([ENOUGH, *(max(0.1 * q * q, 0.01 * small / r) for r, q, small in parts if r > 0.0)])
 
 
-def _halve(
-    system: System, before: Array, small: Array, increment: Array, residual: Array
-) -> tuple[Array, Array]:
-    """Line search: halve the increment until no part's residual increases or all that do are small, at most six times."""
+def _halve(system: System, before: Array, small: Array, increment: Array, residual: Array) -> tuple[Array, Array]:
+    """Line search: halve the increment until the residual of each part decreases or is small, at most six times."""
     remaining = 1.0
     for _ in range(6):
         if ((residual < before) | (residual <= small)).all():

@@ -58,4 +58,3 @@ def _rounded(interface: ContactInterface, x: Array) -> Array:
     for surface, numbers in zip(interface.surfaces, interface.nodes.of_surface, strict=True):
         edge[numbers] = np.maximum(edge[numbers], longest_edge(surface.corners))
     return (size + edge).repeat(x.shape[1])
-

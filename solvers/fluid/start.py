@@ -39,7 +39,7 @@ class FlowStart:
     def at_once(self, surfaces: Mapping[str, Motion]) -> bool:
         """Whether the flow starts impulsively: boundary or bodies have another velocity than the flow (collective).
 
-        surfaces: motions of coupled bodies by name; the others are as prescribed. Those outside of the box do not count.
+        surfaces: motions of coupled bodies by name; others are as prescribed. Those outside of the box do not count.
         """
         fluid, t, initial = self.fluid, self.fluid.current.t, self.fluid.settings.initial_velocity
         on_boundary, there = fluid.boundary.velocity(t), fluid.history.past[0].velocity[fluid.boundary.dofs]

@@ -342,7 +342,7 @@ class RigidBodies:
         self._noise = self._noise + error
 
     def only_rounding(self) -> NDArray[np.bool_]:
-        """Whether the balance of a body is rounding errors, at the iterate that this step linearised last (collective)."""
+        """Whether the balance of each body is rounding errors, where this step linearised last (collective)."""
         if self._noise is None:
             self.linearise()
         noise = self.comm.bcast(self._noise if self.comm.rank == 0 else None, root=0)

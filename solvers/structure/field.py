@@ -274,9 +274,9 @@ class Structure:
         self.now.v, self.now.a = self.time.motion(self, self.current.dt)
         self.residual_force = self.time.balance(self)
         self._unbalanced, missed = self.held.free_part(self.residual_force), None
-        if self.constraint is not None and self._constrained is not None and self.constraint.near:
-            missed = self.constraint.violation(self.time.force_weight)
-            missed = np.bincount(self._piece_of_nodes, missed**2, self.pieces.count)
+        if self.constraint is not None and self.constraint.near:
+            at_nodes = self.constraint.violation(self.time.force_weight)
+            missed = np.bincount(self._piece_of_nodes, at_nodes**2, self.pieces.count).astype(float)
         return self.pieces.norms([self._unbalanced], missed)[0]
 
     @cached_property
@@ -403,7 +403,7 @@ class Structure:
         self.rounding = self.rounding + error
 
     def only_rounding(self) -> NDArray[np.bool_]:
-        """Whether the residual is rounding errors in all rows of a piece, at the iterate that this step linearised last."""
+        """Whether the residual is rounding errors in all rows of a piece, where this step linearised last."""
         if first := self.rounding is None:
             self._tangent = self.linearise()
         assert self.rounding is not None
@@ -419,7 +419,7 @@ class Structure:
         return found & (np.bincount(self._piece_of_nodes[missed], minlength=self.pieces.count) == 0)
 
     def worst(self) -> tuple[float, ...] | None:
-        """Reference position [m] of the node with the largest residual relative to the forces on its piece (collective)."""
+        """Reference position [m] of the largest residual relative to the forces on its piece (collective)."""
         size = np.abs(self.held.free_part(np.nan_to_num(self.residual_force, nan=np.inf)))
         forces = np.nan_to_num(self.forces(), nan=np.inf)[self.pieces.of_dofs]
         size = np.divide(size, forces, out=size, where=(forces > 0.0) & np.isfinite(forces))

@@ -15,7 +15,6 @@ from solvers.structure.body import Body, Support
 from solvers.structure.field import Structure
 from solvers.structure.materials import NeoHooke
 
-
 AGREE = 1e-9
 
 
