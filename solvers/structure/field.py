@@ -72,7 +72,7 @@ class Structure:
         self.target = np.zeros(self.layout.size)
         self.increment = np.zeros(self.layout.size)
         self.rounding: Array | None = None  #: rounding error of `residual_force` [N]; None before this step linearises
-        self._momentum: Array | None = None  #: at the start of the step over its length [N]; None until it is needed
+        self._stopping: Array | None = None  #: force that would stop the motion in this step [N]; None until it is needed
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is assembled already
         self._imposed: PETSc.Mat | None = None  #: tangent of the last iterate with its supports; None in contact
         self._assembled_tangent = Tangent(bodies)
@@ -189,7 +189,7 @@ class Structure:
             body.element.begin_step()
         self.current = Step(t + dt, dt)
         # not part of the saved state: a resumed run must start alike
-        self.rounding = self._tangent = self._imposed = self._momentum = None
+        self.rounding = self._tangent = self._imposed = self._stopping = None
         self.solver.begin_step()
         if self.constraint is not None:
             self.constraint.begin_step()
@@ -289,13 +289,13 @@ class Structure:
         """Norm [N] of the largest force on each piece: internal, external, of the constraint.
 
         They are those of the present iterate. A residual would not do: that of an iterate that has blown up says
-        nothing of the forces, and that of a support that moves none. The momentum over the length of the step counts
-        too, because in free flight there are no others. Forces of inertia balance these.
+        nothing of the forces, and that of a support that moves none. What would stop the motion in one step counts too,
+        because in free flight there are no other forces.
         """
         now = self.now
-        if self._momentum is None:
-            self._momentum = self.time.momentum(self) / self.current.dt
-        return self.pieces.norms([now.internal, now.external, now.constraint, self._momentum]).max(axis=0)
+        if self._stopping is None:
+            self._stopping = self.time.stopping_force(self)
+        return self.pieces.norms([now.internal, now.external, now.constraint, self._stopping]).max(axis=0)
 
     def tangent(self) -> PETSc.Mat:
         """d(balance)/du without supports; the next call overwrites the matrix."""

@@ -82,8 +82,8 @@ class TimeScheme(Protocol):
         """Forces [N] of supports at both ends of the step, whose mean does work on its displacement."""
         ...
 
-    def momentum(self, structure: Moving) -> Array:
-        """M v [kg m/s] at the start of the step, at owned dofs; zero without inertia."""
+    def stopping_force(self, structure: Moving) -> Array:
+        """Force of inertia [N] in the balance if nothing moved in the step, at owned dofs; zero without inertia."""
         ...
 
     def kinetic_energy(self, structure: Moving) -> float:
@@ -138,7 +138,7 @@ class Statics:
     def damping_force(self, structure: Moving) -> Array:
         return np.zeros(structure.layout.size)
 
-    def momentum(self, structure: Moving) -> Array:
+    def stopping_force(self, structure: Moving) -> Array:
         return np.zeros(structure.layout.size)
 
     def kinetic_energy(self, structure: Moving) -> float:
