@@ -72,7 +72,7 @@ class Structure:
         self.target = np.zeros(self.layout.size)
         self.increment = np.zeros(self.layout.size)
         self.rounding: Array | None = None  #: rounding error of `residual_force` [N]; None before this step linearises
-        self._stopping: Array | None = None  #: force that would stop the motion in this step [N]; None until it is needed
+        self._stopping: Array | None = None  #: force that would stop the motion in this step [N]
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is assembled already
         self._imposed: PETSc.Mat | None = None  #: tangent of the last iterate with its supports; None in contact
         self._assembled_tangent = Tangent(bodies)
