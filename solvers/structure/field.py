@@ -23,13 +23,13 @@ from solvers.rows import RowTransformation, TakenRows, gather, transform_rows
 from solvers.solver_settings import SolverSettings
 from solvers.step import Step
 from solvers.structure.body import Body
+from solvers.structure.body_pieces import BodyPieces
 from solvers.structure.constrained_dofs import ConstrainedDofs
 from solvers.structure.deformation import flown_off, inverted, largest_extent
 from solvers.structure.energy import EnergyBalance, EnergySentinel
 from solvers.structure.held import Held
 from solvers.structure.instant import Instant
 from solvers.structure.massless import mass_matrices
-from solvers.structure.pieces import Pieces
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.saved import restore_state, saved_state
 from solvers.structure.solid_solver import SolidSolver
@@ -58,7 +58,7 @@ class Structure:
         self.timer, self.constraint = timer or Timer(), contact
         self.dim = bodies[0].dim
         self.layout = Layout(comm, [body.size for body in bodies])
-        self.pieces = Pieces(comm, bodies)
+        self.pieces = BodyPieces(comm, bodies)
         self._constrained = None if contact is None else ConstrainedDofs(self.layout, contact)
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))

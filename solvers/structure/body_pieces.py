@@ -17,7 +17,7 @@ from solvers.mesh import Mesh
 from solvers.structure.body import Body
 
 
-class Pieces:
+class BodyPieces:
     """The pieces of all bodies, numbered body by body."""
 
     def __init__(self, comm: MPI.Comm, bodies: Sequence[Body]):
