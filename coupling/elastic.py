@@ -112,8 +112,11 @@ class Elastic:
 
     # ------------------------------------------------------------------------------------- rows of a larger system
 
-    def residual(self) -> float:
+    def residual(self) -> Array:
         return self.structure.residual()
+
+    def forces(self) -> Array:
+        return self.structure.forces()
 
     def linearise(self) -> PETSc.Mat:
         return self.structure.linearise()
@@ -121,10 +124,10 @@ class Elastic:
     def right_side(self) -> Array:
         return self.structure.right_side()
 
-    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> float:
+    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> Array:
         return self.structure.advance(keep=keep, reduction=reduction)
 
-    def update(self, increment: Array) -> float:
+    def update(self, increment: Array) -> Array:
         return self.structure.update(increment)
 
     def retreat(self, fraction: float) -> None:
@@ -133,8 +136,8 @@ class Elastic:
     def settled(self) -> bool:
         return self.structure.settled()
 
-    def round_off(self) -> float:
-        return self.structure.round_off()
+    def only_rounding(self) -> NDArray[np.bool_]:
+        return self.structure.only_rounding()
 
     def rounded(self) -> Array:
         return self.structure.rounded()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from contextlib import AbstractContextManager
 
 import numpy as np
@@ -23,12 +24,19 @@ class ElasticStart:
 
     def __init__(self, elastic: Elastic):
         self.elastic, self._structure = elastic, elastic.structure
+        self._initial = elastic.structure.now
+        self._apart = np.zeros(elastic.size, dtype=bool)  #: owned dofs of bodies outside of the flow
+
+    def leave_out(self, names: Collection[str]) -> None:
+        bodies = self._structure.bodies
+        self._apart = np.concatenate([np.full(body.size, body.name in names) for body in bodies])
+        self._initial = self._structure.now.copy()
 
     def velocity(self) -> Array:
         return self.elastic.at_vertices(self._structure.now.v)
 
     def acceleration(self) -> float:
-        largest = float(np.abs(self._structure.now.a).max(initial=0.0))
+        largest = float(np.abs(self._structure.now.a[~self._apart]).max(initial=0.0))
         return self._structure.comm.allreduce(largest, op=MPI.MAX)
 
     def step(self, t: float, dt: float) -> AbstractContextManager[None]:
@@ -40,8 +48,9 @@ class ElasticStart:
 
     def end(self) -> None:
         """Set the displacement u_0 + sum_k (du_k - du_n), see `coupling.start`."""
-        now, old = self._structure.now, self._structure.old
-        self._structure.take_start(now.u - self.steps * (now.u - old.u))
+        now, old, initial, apart = self._structure.now, self._structure.old, self._initial, self._apart
+        now.a[apart] = initial.a[apart]
+        self._structure.take_start(np.where(apart, initial.u, now.u - self.steps * (now.u - old.u)))
 
     def end_impulse(self, dt: float) -> None:
         """Not for `impulsive` False."""

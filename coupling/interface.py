@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,6 +102,11 @@ class Interface:
     def _by_surface(self, x: Array, v: Array) -> dict[str, Motion]:
         parts = zip(self.surfaces, np.split(x, self._ends), np.split(v, self._ends), strict=True)
         return {name: Motion(self.layers[name].cover(x) if name in self.layers else x, v) for name, x, v in parts}
+
+    def vertices_of(self, names: Collection[str]) -> NDArray[np.bool_]:
+        """Mask of the vertices of some surfaces, shape (n,)."""
+        counts = [len(points) for points in self.solid.surfaces.values()]
+        return np.array([name in names for name in self.surfaces]).repeat(counts)
 
     def join(self, by_surface: dict[str, Array]) -> Array:
         """Values at all vertices from those of each surface."""

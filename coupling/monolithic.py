@@ -18,12 +18,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from coupling.blocks import Blocks
 from coupling.coupled import Coupled
 from coupling.divided import lengths, step_in_parts
-from coupling.ports import Part
 from coupling.secant import Secant
 from coupling.start import start_together
 from solvers import linear
@@ -43,15 +43,12 @@ class Monolithic:
 
     def __init__(self, coupled: Coupled, tolerance: Tolerance = Tolerance()):
         self.coupled, self.tolerance = coupled, tolerance
-        flow = coupled.flow
         self.comm = coupled.solid.comm
         self._number_unknowns()
         self._secant = Secant()
-        self._farther: Part = flow
         self._linear_iterations = 0  #: of this step
-        #: rounding errors of the residuals of solid and flow [N]; None before this step linearises
-        self._noise: Array | None = None
-        self._found, self.largest = np.zeros(2), np.zeros(2)  #: residuals of solid and flow: now, largest of the step
+        self._linearised = False  #: in this step
+        self._residual, self._on_surfaces = np.zeros(0), 0.0  #: residual by part, load of the flow on all surfaces [N]
         self._prepared: Blocks | None = None  #: the matrix at the present iterate, if it is assembled already
         #: tangent of the flow, into_flow, into_solid and the derivative of the force by the motion, of the last iterate
         self._of_flow: tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat, PETSc.Mat] | None = None
@@ -72,9 +69,9 @@ class Monolithic:
         start_together(self.coupled, t, dt, self._solve_unpredicted, with_solid=True)
 
     def _begin_system(self) -> None:
-        """Discard largest residuals, rounding errors and preconditioners of the last step."""
-        self.largest, self._linear_iterations = np.zeros(2), 0
-        self._noise = self._prepared = self._of_flow = None
+        """Discard derivatives and preconditioners of the last step."""
+        self._linear_iterations, self._linearised = 0, False
+        self._prepared = self._of_flow = None
         self._krylov.begin_step()
         self._direct.begin_step()
         self._secant.forget()
@@ -91,49 +88,50 @@ class Monolithic:
         coupled = self.coupled
         coupled.begin_step(t, dt)
         self._begin_system()
-        unmoved = 0.0
         if not coupled.flow.steady:
-            unmoved = self.residual()
-            self._predict(t + dt, unmoved)
-        info = converge(self, self.tolerance, unmoved)
+            self._predict(t + dt, self.residual())
+        info = converge(self, self.tolerance)
         coupled.solid.check(info)
         coupled.end_step()
         numbers = coupled.balance.numbers() | {"coupling.linear": float(self._linear_iterations)}
         numbers.update(coupled.solid.numbers())
         return StepInfo(info.iterations, info.residuals, numbers, coupled.take_notes())
 
-    def _predict(self, t: float, unmoved: float) -> None:
-        """Set the predictors for the time t [s]; in closed contact with films only if they reduce the residual [N].
+    def _predict(self, t: float, unmoved: Array) -> None:
+        """Set the predictors for the time t [s]; in closed contact with films only if they reduce the residuals [N].
 
         An extrapolated surface may open parts of the contact. The film there has hardly any height, and the pressure
         for which its first increment takes it moves the surface out of reach.
         """
         doubtful = self.coupled.solid.in_contact() and self.coupled.flow.has_films()
         self.coupled.predict(t, with_pressure=True)
-        if doubtful and not self.residual() < unmoved:
-            self.retreat(1.0)
+        if doubtful:
+            now, before = (np.array([np.linalg.norm(r[:-1]), r[-1]]) for r in (self.residual(), unmoved))
+            if not (now < before).all():
+                self.retreat(1.0)
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
-    def residual(self) -> float:
-        """Residual [N]: the larger relative residual of the parts, times the sum of their largest in this step."""
+    def residual(self) -> Array:
+        """Norm of the residual [N] of each part: those of the solid, then the flow."""
         flow, solid, interface = self.coupled.flow, self.coupled.solid, self.coupled.interface
         flow.move(interface.move(interface.displacement()), with_solid=True)
         if flow.renewals > self._numbered:
             self._number_unknowns()
             self._prepared = self._of_flow = None
-        of_flow = flow.residual()
-        solid.load(self.coupled.force())
-        found = np.array([solid.residual(), of_flow])
-        self.largest = np.maximum(self.largest, found)
-        self._found = found
-        above = found > (np.zeros(2) if self._noise is None else self._noise)
-        relative = np.divide(found, self.largest, out=np.zeros(2), where=above)
-        self._farther = solid if relative[0] > relative[1] else flow
-        return float(relative.max() * self.largest.sum())
+        of_flow, force = flow.residual(), self.coupled.force()
+        solid.load(force)
+        self._on_surfaces = float(np.linalg.norm(force))
+        self._residual = np.concatenate([solid.residual(), of_flow])
+        return self._residual
 
-    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> float:
-        """One Newton iteration; returns the larger of the relative increments of both parts. Raises StepFailed.
+    def forces(self) -> Array:
+        """Norm [N] of the largest force on each part; on the flow also by the surfaces."""
+        solid, flow = self.coupled.solid, self.coupled.flow
+        return np.concatenate([solid.forces(), np.maximum(flow.forces(), self._on_surfaces)])
+
+    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> Array:
+        """One Newton iteration; returns the relative increments of all parts. Raises StepFailed.
 
         keep: keep the derivatives of the flow, if the same unknowns are held. Those of the solid are cheap, and contact
         needs new ones.
@@ -152,15 +150,18 @@ class Monolithic:
                 self._solve(blocks, b, x)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
+        increment = self._corrected(x.array)
         if taken is not None:
-            solid.recover(taken, self._numbering.gather(self.comm, x.array))
-        increment = self._corrected(x.array) if taken is None else x.array
-        return max(solid.update(increment[:own]), flow.update(increment[own:]))
+            solid.recover(taken, self._numbering.gather(self.comm, increment))
+        return np.concatenate([solid.update(increment[:own]), flow.update(increment[own:])])
 
     def _corrected(self, increment: Array) -> Array:
-        """The increment of both parts, corrected by a secant once the stabilisation of a steady flow stays as it is."""
+        """The increment of both parts, corrected by a secant once stabilisation of a steady flow and contact stay."""
         solid, flow = self.coupled.solid, self.coupled.flow
         if not flow.steady or flow.steady_iteration.scales_follow:
+            return increment
+        if not solid.settled():
+            self._secant.forget()
             return increment
         moved = solid.jacobian() @ gather(self.comm, increment[: solid.size])
         return self._secant.corrected(increment, moved)
@@ -203,7 +204,7 @@ class Monolithic:
             K.axpy(1.0, mass, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
             solid.add_rounding(rounding_error(into_solid, flow.rounded()))
             solid.add_rounding(rounding_error(mass, solid.rounded()))
-            self._noise = np.array([solid.round_off(), flow.round_off()])
+            self._linearised = True
             return Blocks(K, into_solid, into_flow, A)
 
     def _derivatives_of_flow(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat, PETSc.Mat]:
@@ -243,16 +244,18 @@ class Monolithic:
         """Whether supports and active sets are fulfilled."""
         return self.coupled.solid.settled()
 
-    def round_off(self) -> float:
-        """Infinite if both residuals are rounding errors, else zero: `residual` leaves out a part below its error."""
-        if self._noise is None:
+    def only_rounding(self) -> NDArray[np.bool_]:
+        """Whether the residual is rounding errors in all rows of a part."""
+        if not self._linearised:
             self._prepared = self.blocks()
-        assert self._noise is not None
-        return math.inf if (self._found <= self._noise).all() else 0.0
+        return np.concatenate([self.coupled.solid.only_rounding(), self.coupled.flow.only_rounding()])
 
     def worst(self) -> tuple[float, ...] | None:
         """Position [m] of the largest residual, of the part with the larger relative residual (collective)."""
-        return self._farther.worst()
+        forces = self.forces()
+        relative = np.divide(self._residual, forces, out=self._residual.copy(), where=forces > 0.0)
+        solid, flow = self.coupled.solid, self.coupled.flow
+        return solid.worst() if relative[:-1].max() > relative[-1] else flow.worst()
 
     # ---------------------------------------------------------------------------------------- save and restore
 

@@ -12,6 +12,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coupling.accelerate import Accelerator, QuasiNewton
 from coupling.bracket import CouplingIterate, brackets, halved
@@ -74,7 +75,9 @@ class Partitioned:
         ends: tuple[CouplingIterate, CouplingIterate] | None = None
         last: CouplingIterate | None = None
         while True:
-            coupled.flow.move(interface.move(d))
+            motions = interface.move(d)
+            coupled.flow.move(motions)
+            apart = interface.vertices_of(coupled.flow.outside(motions))
             newton += coupled.flow.solve().iterations
             squeezed = coupled.flow.squeezed() if self.accelerator.finds_levels else np.zeros(0)
             if len(squeezed) != len(levels):
@@ -84,9 +87,9 @@ class Partitioned:
             coupled.solid.load(coupled.force())
             newton += coupled.solid.solve().iterations
             found = interface.displacement()
-            residual = max(_mean(found - d), float(np.abs(squeezed).max(initial=0.0)))
+            residual = max(_mean((found - d)[~apart]), float(np.abs(squeezed).max(initial=0.0)))
             history.append(residual)
-            if residual <= self._small(found):
+            if residual <= self._small(found, apart):
                 return history, newton
             if not math.isfinite(residual) or len(history) == self.tolerance.max_iterations:
                 taken = counted(len(history), "iteration")
@@ -108,15 +111,19 @@ class Partitioned:
                     self.accelerator.forget()
                 ends = None
                 after = self.accelerator.next(now.d, now.found)
-            d, levels = after[: d.size].reshape(d.shape), after[d.size :]
+            d, levels = np.where(apart[:, None], found, after[: d.size].reshape(d.shape)), after[d.size :]
             if len(levels):
                 coupled.flow.add_levels(levels - before[d.size :])
             last = now
 
-    def _small(self, found: Array) -> float:
-        """Tolerance [m], at least a few rounding errors of positions: bodies may move by less in a step."""
+    def _small(self, found: Array, apart: NDArray[np.bool_]) -> float:
+        """Tolerance [m], at least a few rounding errors of positions: bodies may move by less in a step.
+
+        apart: mask of the vertices of surfaces outside of the flow, however far they move.
+        """
         interface = self.coupled.interface
-        moved, rounding = _mean(found - interface.past[0]), 4.0 * np.finfo(float).eps * _mean(interface.points + found)
+        moved = _mean((found - interface.past[0])[~apart])
+        rounding = 4.0 * np.finfo(float).eps * _mean((interface.points + found)[~apart])
         return max(self.tolerance.relative * moved, self.tolerance.absolute, float(rounding))
 
     def save(self) -> State:
@@ -129,5 +136,5 @@ class Partitioned:
 
 
 def _mean(vectors: Array) -> float:
-    """Root mean square of the lengths of vectors."""
-    return float(np.sqrt((vectors**2).sum() / len(vectors)))
+    """Root mean square of the lengths of vectors, zero of none."""
+    return float(np.sqrt((vectors**2).sum() / max(len(vectors), 1)))

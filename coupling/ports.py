@@ -7,7 +7,7 @@ All calls are collective.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Protocol
@@ -65,8 +65,8 @@ class Part(System, Stateful, Protocol):
         """Right-hand side for the increment: minus the residual."""
         ...
 
-    def update(self, increment: Array) -> float:
-        """Add an increment; returns its norm relative to that of the solution."""
+    def update(self, increment: Array) -> Array:
+        """Add an increment; returns its norm relative to that of the solution, by part."""
         ...
 
     def rounded(self) -> Array:
@@ -199,6 +199,10 @@ class Flow(Part, Protocol):
         """
         ...
 
+    def outside(self, surfaces: Mapping[str, Motion]) -> set[str]:
+        """Names of the surfaces that lie outside of its domain."""
+        ...
+
     def has_films(self) -> bool:
         """Whether the present cut has films that are thinner than a cell (collective)."""
         ...
@@ -254,12 +258,16 @@ class StartOfSolid(Protocol):
         """Count of steps after which the acceleration is smooth."""
         ...
 
+    def leave_out(self, names: Collection[str]) -> None:
+        """Let bodies outside of the flow start as they would without it."""
+        ...
+
     def velocity(self) -> Array:
         """Velocity [m/s] of all vertices, shape (n, dim)."""
         ...
 
     def acceleration(self) -> float:
-        """Largest acceleration without fluid [m/s^2] (collective)."""
+        """Largest acceleration without fluid [m/s^2] of the bodies in the flow (collective)."""
         ...
 
     def step(self, t: float, dt: float) -> AbstractContextManager[None]:

@@ -69,7 +69,9 @@ def start_together(
         return
     flow, solid, interface = coupled.start.flow, coupled.start.solid, coupled.interface
     velocity, initial = solid.velocity(), coupled.save()
-    at_once = flow.at_once(interface.at_start(velocity))
+    surfaces = interface.at_start(velocity)
+    at_once = flow.at_once(surfaces)
+    solid.leave_out(coupled.flow.outside(surfaces))
     try:
         if at_once and solid.impulsive:
             _share_momentum(coupled, coupled.start, t, dt, velocity, solve)

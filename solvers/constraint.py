@@ -68,8 +68,12 @@ class Constraint(Stateful, Protocol):
         """Force [N] on its nodes for the present multipliers."""
         ...
 
-    def violation(self, weight: float) -> float:
-        """Norm [N] of the residual of the constraints."""
+    def violation(self, weight: float) -> Array:
+        """Norm [N] of the residual of the conditions at each node, shape (N,)."""
+        ...
+
+    def rounding(self, weight: float) -> tuple[Array, Array]:
+        """Rounding errors [N] of its force in the balance, shape (N, dim), and of `violation`, shape (N,)."""
         ...
 
     def condense(self, weight: float) -> RowTransformation:

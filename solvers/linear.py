@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal, TypeAlias
 
+import numpy as np
 from petsc4py import PETSc
 
 from solvers import unlocked
+from solvers.api import Array
 from solvers.counted import counted
 from solvers.gauss_seidel import GaussSeidel
 from solvers.petsc_python import free_deleted
-from solvers.rounding import random_signs
 from solvers.solid_factors import SIZE, SolidFactors
 
 Method = Literal["auto", "direct", "iterative", "ilu"]
@@ -287,7 +289,7 @@ def solid_preconditioner(matrix: PETSc.Mat) -> PETSc.KSP:
         trial = _entry_solver(comm, TRIAL_REDUCTION)
         trial.setTolerances(max_it=TRIAL_ITERATIONS)
         b, x = matrix.createVecs()
-        b.array[:] = random_signs(comm.rank, b.local_size)
+        b.array[:] = _random_signs(comm.rank, b.local_size)
         trial.setOperators(matrix)
         trial.solve(b, x)
         if trial.getConvergedReason() > 0:
@@ -368,3 +370,9 @@ def reason_of(ksp: PETSc.KSP) -> str:
     """Why a linear solver stopped without a solution."""
     reason = ksp.getConvergedReason()
     return WHY_STALLED.get(reason, f"PETSc gives the reason {reason}")
+
+
+@lru_cache(maxsize=8)
+def _random_signs(rank: int, n: int) -> Array:
+    """The n signs of a process, the same in every call."""
+    return np.random.default_rng(rank).choice((-1.0, 1.0), n)

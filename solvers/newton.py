@@ -3,25 +3,40 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from solvers.api import StepFailed, StepInfo
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array, StepFailed, StepInfo
 from solvers.counted import counted
+
+Flags = NDArray[np.bool_]
+
+#: Residual [N] in the place of zero in divisions; ratios to it are numbers.
+NOTHING = 1e-150
 
 
 class System(Protocol):
-    """A nonlinear system of one field or many, at its current iterate."""
+    """A nonlinear system of one field or many, at its current iterate.
+
+    Its rows belong to parts, such as bodies, each of which has to converge: arrays by part have the shape (parts,).
+    """
 
     name: str
 
-    def residual(self) -> float:
-        """Assemble the residual; returns its norm over the rows that are solved for."""
+    def residual(self) -> Array:
+        """Assemble the residual; returns its norm [N] over the rows that are solved for, by part."""
         ...
 
-    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> float:
-        """Linearise, solve and update; returns the norm of the increment relative to that of the solution.
+    def forces(self) -> Array:
+        """Norm [N] of the largest force on each part, which its residual is compared with."""
+        ...
+
+    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> Array:
+        """Linearise, solve and update; returns the norm of the increment relative to that of the solution, by part.
 
         keep: the tangent of the last iterate is good enough, if the system still has it. reduction: of the residual of
         the linear system that is good enough, for systems whose linear solver iterates.
@@ -32,8 +47,8 @@ class System(Protocol):
         """Take back a fraction of the last increment."""
         ...
 
-    def round_off(self) -> float:
-        """Norm of the residual below which it consists of rounding errors."""
+    def only_rounding(self) -> Flags:
+        """Whether the residual consists of rounding errors in every row of a part, by part."""
         ...
 
     def settled(self) -> bool:
@@ -47,11 +62,12 @@ class System(Protocol):
 
 @dataclass(frozen=True)
 class Iterate:
-    """The state of the iteration."""
+    """The state of the iteration; arrays by part."""
 
     number: int  #: count of linear solves
-    residual: float
-    increment: float  #: relative size of the last increment; infinite before the first
+    residual: Array  #: [N]
+    small: Array  #: residual that is small enough [N]
+    increment: Array  #: relative size of the last increment; infinite before the first
     settled: bool
 
 
@@ -59,18 +75,18 @@ class Iterate:
 class Tolerance:
     """Tolerances for an iterate: of the residual and, if it is finite, of the increment."""
 
-    residual: float = 1e-8  #: relative to the largest residual of the step
+    residual: float = 1e-8  #: relative to the largest force on the part
     residual_absolute: float = 0.0  #: [N]
     increment: float = math.inf  #: relative to the solution
     max_iterations: int = 25
     line_search: bool = False
 
-    def small(self, largest: float) -> float:
-        """Residual that is small enough [N]; largest: residual of the step [N]."""
-        return max(self.residual * largest, self.residual_absolute)
+    def small(self, forces: Array) -> Array:
+        """Residual that is small enough [N], by part; forces: on each [N]."""
+        return np.maximum(self.residual * forces, self.residual_absolute)
 
 
-def iterates(system: System, tolerance: Tolerance = Tolerance(), unmoved: float = 0.0) -> Iterator[Iterate]:
+def iterates(system: System, tolerance: Tolerance = Tolerance()) -> Iterator[Iterate]:
     """An endless sequence of Newton iterates; the caller applies tolerances and limits.
 
     The tangent is kept for an iterate that is expected to fulfil the tolerance with it. Newton's method leaves
@@ -79,21 +95,19 @@ def iterates(system: System, tolerance: Tolerance = Tolerance(), unmoved: float 
 
     The linear system may be solved as inexactly as `enough` says.
     """
-    number, increment, residual, ratio = 0, math.inf, system.residual(), math.inf
-    largest = max(unmoved, residual)
+    number, residual = 0, system.residual()
+    increment, ratio = np.full(len(residual), math.inf), np.full(len(residual), math.inf)
     while True:
-        yield Iterate(number, residual, increment, system.settled())
+        small, settled = tolerance.small(system.forces()), system.settled()
+        yield Iterate(number, residual, small, increment, settled)
         before = residual
-        imposed = system.settled()
-        small = tolerance.small(largest)
-        increment = system.advance(
-            keep=2.0 * ratio * residual <= small, reduction=enough(residual, ratio, tolerance=small)
-        )
+        keep = number > 0 and bool((2.0 * ratio * residual <= small).all())
+        increment = system.advance(keep=keep, reduction=enough(residual, ratio, tolerance=small))
         residual = system.residual()
-        if tolerance.line_search and imposed:
-            increment, residual = _halve(system, before, increment, residual)
-        ratio = residual / before if before > 0.0 else math.inf
-        largest, number = max(largest, residual), number + 1
+        if tolerance.line_search and settled:
+            increment, residual = _halve(system, before, small, increment, residual)
+        ratio = residual / np.maximum(before, NOTHING)
+        number += 1
 
 
 #: Reduction of the residual of a linear system that is enough while nothing is known of the convergence. Measured with
@@ -101,24 +115,23 @@ def iterates(system: System, tolerance: Tolerance = Tolerance(), unmoved: float 
 ENOUGH = 1e-3
 
 
-def enough(residual: float, ratio: float, *, tolerance: float) -> float:
+def enough(residual: Array, ratio: Array, *, tolerance: Array) -> float:
     """Reduction of the residual of a linear system by which the next iterate is hardly worse than by an exact solution.
 
     Newton's method leaves (r_1 / r_0)^2 r_1, of which a tenth is added, or what is below the tolerance. Of that only a
     hundredth is added: errors of linear solvers are smooth, and add up in resultants. ratio: r_1 / r_0 of the last
-    iterates, infinite before the second.
+    iterates, infinite before the second. All by part; the part that needs most decides.
     Source: Eisenstat & Walker, SIAM J. Sci. Comput. 17 (1996), choice 2.
     """
-    if residual == 0.0:
-        return ENOUGH
-    return min(ENOUGH, max(0.1 * ratio * ratio, 0.01 * tolerance / residual))
+    parts = zip(residual.tolist(), ratio.tolist(), tolerance.tolist(), strict=True)  # few: arrays would take longer
+    return min([ENOUGH, *(max(0.1 * q * q, 0.01 * small / r) for r, q, small in parts if r > 0.0)])
 
 
-def _halve(system: System, before: float, increment: float, residual: float) -> tuple[float, float]:
-    """Line search: halve the increment until the residual decreases, at most six times."""
+def _halve(system: System, before: Array, small: Array, increment: Array, residual: Array) -> tuple[Array, Array]:
+    """Line search: halve the increment until the residual of each part decreases or is small, at most six times."""
     remaining = 1.0
     for _ in range(6):
-        if residual < before:
+        if ((residual < before) | (residual <= small)).all():
             break
         system.retreat(0.5 * remaining)
         remaining *= 0.5
@@ -126,29 +139,42 @@ def _halve(system: System, before: float, increment: float, residual: float) -> 
     return increment * remaining, residual
 
 
-def converge(system: System, tolerance: Tolerance, unmoved: float = 0.0) -> StepInfo:
+def converge(system: System, tolerance: Tolerance) -> StepInfo:
     """Iterate to the tolerance. Raises StepFailed with the residuals and the position of the largest one.
 
-    unmoved: residual [N] before the predictor, with which the tolerance does not depend on the predictor.
+    Those of parts whose last residual is rounding error are not reported.
     """
-    history: list[float] = []
-    for iterate in iterates(system, tolerance, unmoved):
+    history: list[Array] = []
+    for iterate in iterates(system, tolerance):
         history.append(iterate.residual)
-        if not math.isfinite(iterate.residual):
-            reason = "the residual is not a number"
-        elif iterate.settled and _accepted(iterate, max(unmoved, *history), system.round_off(), tolerance):
-            return StepInfo(iterate.number, tuple(history))
+        if not np.isfinite(iterate.residual).all():
+            reason, open_parts = "the residual is not a number", np.ones(len(iterate.residual), dtype=bool)
+        elif iterate.settled and (within := _within(iterate, system, tolerance)) is not None:
+            return StepInfo(iterate.number, _norms(history, within))
         elif iterate.number == tolerance.max_iterations:
-            reason = f"Newton did not converge in {counted(iterate.number, 'iteration')} (residual {history[-1]:.3g})"
+            open_parts = ~system.only_rounding()
+            size = _norms(history, open_parts)[-1]
+            reason = f"Newton did not converge in {counted(iterate.number, 'iteration')} (residual {size:.3g})"
         else:
             continue
-        raise StepFailed(system.name, reason, iteration=iterate.number, where=system.worst(), history=tuple(history))
+        norms = _norms(history, open_parts)
+        raise StepFailed(system.name, reason, iteration=iterate.number, where=system.worst(), history=norms)
     raise AssertionError("unreachable: iterates() has no end")
 
 
-def _accepted(iterate: Iterate, largest: float, round_off: float, tolerance: Tolerance) -> bool:
-    if iterate.residual <= round_off:
-        return True
-    return iterate.residual <= tolerance.small(largest) and (
-        iterate.increment <= tolerance.increment or iterate.residual == 0.0
-    )
+def _within(iterate: Iterate, system: System, tolerance: Tolerance) -> Flags | None:
+    """Which parts are within their tolerance; None if neither this nor rounding errors hold for one of them.
+
+    The first iterate is the state before the step, or a guess. It is no solution because forces have changed by less
+    than the tolerance: such changes would be lost in every step.
+    """
+    within: Flags = iterate.residual <= (tolerance.residual_absolute if iterate.number == 0 else iterate.small)
+    if math.isfinite(tolerance.increment):
+        within &= (iterate.increment <= tolerance.increment) | (iterate.residual == 0.0)
+    return within if within.all() or (within | system.only_rounding()).all() else None
+
+
+def _norms(history: Sequence[Array], parts: Flags) -> tuple[float, ...]:
+    """Norms of the residuals [N] over some parts, over all if there are none."""
+    chosen = parts if parts.any() else ~parts
+    return tuple(float(np.linalg.norm(residual[chosen])) for residual in history)

@@ -11,7 +11,7 @@ from fsci.case.values import Count, NotNegative, Positive, Switch
 class Newton(Section):
     """Tolerances of the residual and, if it is given, of the increment."""
 
-    residual: Positive = setting(1e-8, "tolerance of the residual, relative to the largest one of the step", unit="1")
+    residual: Positive = setting(1e-8, "tolerance of the residual of a body, relative to its largest force", unit="1")
     residual_absolute: NotNegative = setting(0.0, "absolute tolerance of the residual", unit="N")
     increment: Positive | None = setting(
         None, "tolerance of the increment, relative to the solution; default: none", unit="1"

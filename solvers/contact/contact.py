@@ -12,7 +12,7 @@ from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.condense import Condensed, Linearised, condense, recover
 from solvers.contact.constraints import Constraints
-from solvers.contact.directions import admissible, free_normals
+from solvers.contact.directions import free_normals
 from solvers.contact.force import force_matrix, nodal_force
 from solvers.contact.friction_work import FrictionWork
 from solvers.contact.integration import Integration
@@ -26,6 +26,7 @@ from solvers.contact.pair import Pair
 from solvers.contact.redistribute import redistributed
 from solvers.contact.slip import Slip
 from solvers.contact.terms import Terms
+from solvers.contact.violation import rounding, violation
 from solvers.rows import RowTransformation
 from solvers.sparse import Sparse, nothing
 
@@ -120,6 +121,7 @@ class Contact:
         self._constraints.begin_step()
         self.active_set.begin_step()
         self._integration.begin_step(self.x, self.active_set.active)
+        self._condensation = None
         self.slip = None
 
     def begin_solve(self) -> None:
@@ -237,20 +239,22 @@ class Contact:
             return np.zeros((self.size, self.dim))
         return nodal_force(self.interface, self.terms, self.z)
 
-    def violation(self, weight: float) -> float:
-        """Norm [N] of the residual of the laws of multipliers in contact."""
+    def violation(self, weight: float) -> Array:
+        """Norm [N] of the residual of the laws of multipliers in contact, by node, shape (N,)."""
         self._weight = weight
-        if self.terms is None:
-            return 0.0
-        total = 0.0
-        for part in self.in_contact():
-            missed = part.law.residual(part.point, part.status, weight)
-            if part.law.span != "normal":
-                held, spans = self.nodes.held[self.multipliers.node[part.which]], self._spans[part.which]
-                less = held.any(axis=(1, 2)) | (spans == "normal")  # not all directions of its law
-                missed[less] = admissible(missed[less], part.point.normals[less], held[less], spans[less])
-            total += float(np.sum(missed**2))
-        return float(np.sqrt(total))
+        return violation(self.interface, self._spans, [] if self.terms is None else self.in_contact(), weight)
+
+    def rounding(self, weight: float) -> tuple[Array, Array]:
+        """Rounding errors [N] of the contact force in the balance, shape (N, dim), and of `violation`, shape (N,).
+
+        Where this step eliminated the multipliers last.
+        """
+        if not self.near or not self.active_set.active.any():
+            return np.zeros((self.size, self.dim)), np.zeros(self.size)
+        if self._condensation is None:
+            self.condense(weight)
+        assert self._condensation is not None
+        return rounding(self.interface, self._condensation[2], self.force(), self.x)
 
     def in_contact(self) -> list[ActiveMultipliers]:
         """The multipliers in contact, law by law."""

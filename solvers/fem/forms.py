@@ -106,12 +106,6 @@ def assemble_scalar(form: Any, comm: MPI.Comm) -> float:
     return comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM)
 
 
-def mean_cell_size(domain: Domain) -> float:
-    """(volume / number of cells)^(1/dim) [m] (collective)."""
-    volume = assemble_scalar(compile_form(constant(domain, 1.0) * volume_measure(domain, 1)), domain.comm)
-    return float((volume / domain.mesh.topology.index_map(domain.dim).size_global) ** (1.0 / domain.dim))
-
-
 def assemble_vector(form: Any, out: Array) -> None:
     """Add a linear form to a local array (owned and ghost dofs); ghost contributions stay where they are."""
     calls.assemble_vector(form, out)

@@ -183,6 +183,18 @@ def surface_blocks(domain: Domain, space: Any, name: str) -> NDArray[np.int32]:
     return fem.locate_dofs_topological(space, domain.mesh.topology.dim - 1, domain.surfaces[name])
 
 
+def node_heights(domain: Domain, space: Any) -> Array:
+    """Height [m] of the flattest cell at each local dof block: the least stretch of its map from the reference cell."""
+    record = CELL_TYPES[domain.cell_type]
+    middle = record.reference_nodes[: record.corners].mean(axis=0, keepdims=True)
+    slopes = tabulate_lagrange(domain, domain.degree, middle)[1][0]
+    nodes = calls.geometry_nodes(domain.mesh).reshape(-1, len(slopes))
+    maps = np.einsum("cni,nk->cik", domain.mesh.geometry.x[nodes, : domain.dim], slopes)
+    heights = np.full(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, np.inf)
+    np.minimum.at(heights, cell_blocks(space), np.linalg.svd(maps, compute_uv=False)[:, -1:])
+    return heights
+
+
 def block_points(space: Any) -> Array:
     """Reference position of each local dof block, shape (3, blocks)."""
     return np.ascontiguousarray(space.tabulate_dof_coordinates().T)

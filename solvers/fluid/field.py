@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers import fem, linear
@@ -92,6 +93,7 @@ class Fluid:
         self._fast_bodies = FastBodies(grid)
         self.linear_iterations = 0  #: of the last linear system
         self.steady_iteration = SteadyIteration()
+        self._first = 0.0  #: residual of the first iterate [N]
 
     def discretise(self, sheets: Sheets | None) -> None:
         """Create grid, unknowns and equations; sheets: separate cells on each side of thin bodies, None: none."""
@@ -183,6 +185,7 @@ class Fluid:
 
     def begin_system(self, step: FlowStep) -> None:
         """Set loads and history terms of the step."""
+        self._first = 0.0
         difference, last = step.difference, self.history.past[0].velocity
         self.system.begin_step(step, self.history.rate(difference), self.history.missing(difference), last)
 
@@ -206,6 +209,13 @@ class Fluid:
             self.history.extrapolate(self.flow, self.current.dt, fixed, with_pressure=with_pressure and first_degree)
         self.increment = self.flow[: self.unknowns.owned] - before
 
+    def outside(self, surfaces: Mapping[str, Motion]) -> set[str]:
+        """Names of the surfaces that lie outside of the box, which have nothing to do with the flow."""
+        repeated = periodic_axes(self._patches)
+        edges = [(axis, edge[0], edge[-1]) for axis, edge in enumerate(self.box.edges) if axis not in repeated]
+        away = {name: [(m.x[:, i].max() < a, m.x[:, i].min() > b) for i, a, b in edges] for name, m in surfaces.items()}
+        return {name for name, sides in away.items() if np.any(sides)}
+
     def has_films(self) -> bool:
         """Whether the present cut has films that are thinner than a cell (collective)."""
         return bool(self.comm.allreduce(self.cut.film is not None, op=MPI.LOR))
@@ -224,6 +234,7 @@ class Fluid:
     def solve(self) -> StepInfo:
         """Newton's method to the tolerance. Raises StepFailed."""
         self.steady_iteration.begin()
+        self._first = 0.0
         info = converge(self, self.solver.newton)
         self.levels.keep(self.flow[: self.unknowns.owned])
         self.unknowns.share(self.system.flow)
@@ -254,8 +265,8 @@ class Fluid:
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
-    def residual(self) -> float:
-        """Norm [N] of the momentum rows and of the continuity rows times the impedance of a cell."""
+    def residual(self) -> Array:
+        """Norm [N] of the momentum rows and of the continuity rows times the impedance of a cell, shape (1,)."""
         with self.timer("assembly"):
             if self.settings.steady and self.steady_iteration.scales_follow:
                 self.system.set_scales(self.velocity())
@@ -264,7 +275,15 @@ class Fluid:
         self.residual_rows[self.held] = 0.0
         size = self._norm(self.residual_rows)
         self.steady_iteration.record(size)
-        return size
+        self._first = self._first or size
+        return np.array([size])
+
+    def forces(self) -> Array:
+        """Norm [N] of the first residual of the solution, of those that are not zero: the change of forces, shape (1,).
+
+        Those of later iterates, which may blow up, say nothing of the forces.
+        """
+        return np.array([self._first])
 
     def _norm(self, rows: Array) -> float:
         settings, h, alpha = self.settings, self.smallest_cell, self.current.difference.alpha
@@ -272,7 +291,7 @@ class Fluid:
         scaled = np.where(self.unknowns.velocity_mask[: len(rows)], rows, impedance * rows)
         return math.sqrt(self.comm.allreduce(float(scaled @ scaled)))
 
-    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> float:
+    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> Array:
         """One iteration of Newton's method; returns the increment relative to the solution. Raises StepFailed.
 
         keep: use the tangent of the last iterate if the same unknowns are held and the flow is unsteady.
@@ -307,12 +326,12 @@ class Fluid:
         """The values whose rounding enters the residual: velocity [m/s] and pressure [Pa] at owned dofs."""
         return self.flow[: self.unknowns.owned]
 
-    def update(self, increment: Array) -> float:
-        """Add an increment of the owned dofs; returns its norm relative to that of the flow."""
+    def update(self, increment: Array) -> Array:
+        """Add an increment of the owned dofs; returns its norm relative to that of the flow, shape (1,)."""
         self.increment, self._improved = increment.copy(), True
         self._add(self.increment)
         size = self._norm(self._tangent.diagonal * self.flow[: self.unknowns.owned])
-        return self._norm(self._tangent.diagonal * self.increment) / size if size > 0.0 else 0.0
+        return np.array([self._norm(self._tangent.diagonal * self.increment) / size if size > 0.0 else 0.0])
 
     def multigrid(self, matrix: PETSc.Mat) -> PETSc.PC:
         """A multigrid cycle for the tangent; the next call overwrites it (collective)."""
@@ -347,9 +366,14 @@ class Fluid:
         """Add rounding errors at owned dofs that another field causes in these equations; call it after `linearise`."""
         self._tangent.add_rounding(error)
 
-    def round_off(self) -> float:
-        """Norm [N] of the rounding error of the residual, at the iterate that this step linearised last."""
-        return self._norm(np.where(self.held, 0.0, self._tangent.rounding_error(self.linearise)))
+    def only_rounding(self) -> NDArray[np.bool_]:
+        """Whether the norm of the residual is that of rounding errors, where this step linearised last, shape (1,).
+
+        Not row by row: entries of the matrix near surfaces are sums whose terms cancel, and so are underestimated rows.
+        A norm cannot hide anything, because rows of one fluid have errors of one size.
+        """
+        rounding = np.where(self.held, 0.0, self._tangent.rounding_error(self.linearise))
+        return np.array([self._norm(self.residual_rows) <= self._norm(rounding)])
 
     def worst(self) -> tuple[float, ...] | None:
         """Position [m] of the node with the largest momentum residual (collective)."""

@@ -46,13 +46,15 @@ class FlowStart:
     def at_once(self, surfaces: Mapping[str, Motion]) -> bool:
         """Whether the flow starts impulsively: boundary or bodies have another velocity than the flow (collective).
 
-        surfaces: motions of coupled bodies by name; the others are as prescribed.
+        surfaces: motions of coupled bodies by name; others are as prescribed. Those outside of the box do not count.
         """
         fluid, t, initial = self.fluid, self.fluid.current.t, self.fluid.settings.initial_velocity
         on_boundary, there = fluid.boundary.velocity(t), fluid.history.past[0].velocity[fluid.boundary.dofs]
         pairs = [(on_boundary, there)]
         for body in fluid.bodies:
             motion = surfaces[body.surface.name] if body.motion is None else body.motion(t)
+            if fluid.outside({body.surface.name: motion}):
+                continue
             flow = np.zeros_like(motion.x) if initial is None else evaluate_components(initial, motion.x.T, t).T
             pairs.append((motion.v, flow))
         jump = max(np.abs(a - b).max(initial=0.0) for a, b in pairs)

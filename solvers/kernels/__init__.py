@@ -17,6 +17,7 @@ from ._kernels import (
     nodal_normals,
     nodal_tangents,
     node_blocks,
+    row_squares,
     spread_blocks,
     surface_rows,
 )

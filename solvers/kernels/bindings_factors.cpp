@@ -1,5 +1,5 @@
-// Python names of block_factors.hpp, block_product.hpp, changed_rows.hpp and node_blocks.hpp: BlockFactors,
-// BlockProduct, changed_rows, node_blocks, spread_blocks.
+// Python names of block_factors.hpp, block_product.hpp, changed_rows.hpp, node_blocks.hpp and row_squares.hpp:
+// BlockFactors, BlockProduct, changed_rows, node_blocks, row_squares, spread_blocks.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
@@ -18,6 +18,7 @@
 #include "block_product.hpp"
 #include "changed_rows.hpp"
 #include "node_blocks.hpp"
+#include "row_squares.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -146,6 +147,18 @@ nb::object change(const Numbers& start, const Numbers& columns, const Vector& va
                           to_numpy(std::move(found.start), count + 1));
 }
 
+void add_squares(const Numbers& start, const Numbers& columns, const Blocks& blocks, const Vector& x, const Result& y) {
+    const std::size_t rows = start.size() - 1, n = blocks.shape(1);
+    require(blocks.shape(0) == columns.size() && n == blocks.shape(2), "each column needs a square block");
+    require(n >= 1 && n <= 4, "blocks must have 1 to 4 rows");
+    require(x.size() % n == 0 && y.size() == n * rows, "vectors need a number for each row and column");
+    require_rows(start, columns, x.size() / n, "no such column");
+    nb::gil_scoped_release release;
+    constexpr decltype(&row_squares::add<1>) add[] = {row_squares::add<1>, row_squares::add<2>, row_squares::add<3>,
+                                                      row_squares::add<4>};
+    add[n - 1](rows, start.data(), columns.data(), blocks.data(), x.data(), y.data());
+}
+
 bool update(factors::Factors& self, const Blocks& values) {
     require(values.size() == self.values(), "each column needs a square block");
     nb::gil_scoped_release release;
@@ -183,6 +196,8 @@ void bind_factors(nb::module_& module) {
                "(values, columns, start) of a matrix in compressed rows, with increasing columns in each, after a change\n"
                "of `rows`, each once. New rows, whose columns need no order, replace the first `replaced` of them and are\n"
                "added to the others.");
+    module.def("row_squares", &add_squares, "start"_a, "columns"_a, "blocks"_a, "x"_a, "y"_a,
+               "y_i += sum_j (a_ij x_j)^2 for a matrix of blocks in compressed rows, each transposed.");
     module.def("spread_blocks", &spread, "start"_a, "blocks"_a, "entries"_a, "factor"_a = 1.0,
                "Write the entries of blocks, each transposed, times a factor in the order of compressed rows.");
 }

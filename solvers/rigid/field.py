@@ -231,24 +231,38 @@ class RigidBodies:
         balance = self._by_component(np.array(rows))
         return balance if self.contact is None else balance - self.contact.force
 
-    def residual(self) -> float:
-        """Norm [N] of the balance; moments are divided by the size of the body."""
+    def residual(self) -> Array:
+        """Norm [N] of the balance of each body; moments are divided by its size."""
         weight = self.force_weight
         mean = self._by_component(weight * self.on_surface + (1.0 - weight) * self.on_surface_old)
         if self.contact is not None:
             self.contact.z[:] = 0.0
         self.balance = np.where(self._free, self._own_balance() - mean, 0.0)
         if self.contact is None:
-            return self._norm(self.balance)
+            return self._norms(self.balance)
         arms = [body.arms(now.R, body.points) for body, now in zip(self.bodies, self.now, strict=True)]
         self.contact.measure(surface.positions(self.bodies, self.now), arms, self.components, self.current.t)
         self.contact.G[:, ~self._free] = 0.0
         self.contact.press(self._system(), -self.balance)
-        return self._norm(self.balance - self.contact.force)
+        return self._norms(self.balance - self.contact.force)
 
-    def _norm(self, rows: Array) -> float:
-        arms = np.where(self.components < 3, 1.0, self.extents[:, None]).ravel()
-        return float(np.linalg.norm(rows / arms))
+    def _norms(self, rows: Array) -> Array:
+        """Norm [N] of forces and moments of each body, shape (bodies,)."""
+        arms = np.where(self.components < 3, 1.0, self.extents[:, None])
+        return np.linalg.norm(rows.reshape(arms.shape) / arms, axis=1)
+
+    def forces(self) -> Array:
+        """Norm [N] of the largest force on each body: rate of momentum, own loads, those of the flow and of contact.
+
+        The momentum over the length of the step counts too, because in free flight there are no others.
+        """
+        rates, loads = np.array([now.p for now in self.now]), np.array([now.load for now in self.now])
+        before = [motion.momentum(body, old.R, old.v) for body, old in zip(self.bodies, self.old, strict=True)]
+        momentum = np.array(before) / self.current.dt
+        all_forces = [self._by_component(some) for some in (rates, loads, momentum, self.on_surface)]
+        if self.contact is not None:
+            all_forces.append(self.contact.force)
+        return np.max([self._norms(rows) for rows in all_forces], axis=0)
 
     def tangent(self) -> Array:
         """d(balance)/d(unknowns), dense, including the change of moments of forces on the vertices by rotation."""
@@ -276,8 +290,8 @@ class RigidBodies:
         self._noise = rounding_error(matrix, self.rounded())
         return matrix
 
-    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> float:
-        """One Newton iteration; returns the norm of the increment relative to that of the step. It keeps no tangent."""
+    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> Array:
+        """One Newton iteration; returns increments relative to those of the step, by body. It keeps no tangent."""
         right = -self.balance
         if self.contact is not None:
             right += self.contact.force
@@ -294,19 +308,19 @@ class RigidBodies:
         """Minus the balance, without the contact force."""
         return -self.balance[: self.size]
 
-    def update(self, increment: Array) -> float:
-        """Add increments of the owned unknowns; returns their norm relative to that of the step."""
+    def update(self, increment: Array) -> Array:
+        """Add increments of the owned unknowns; returns their norm relative to that of the step, by body."""
         return self._add(self.comm.bcast(increment.copy() if self.comm.rank == 0 else None, root=0))
 
-    def _add(self, increment: Array) -> float:
+    def _add(self, increment: Array) -> Array:
         added = np.zeros_like(self._u)
         added[:, self.components] = np.where(self._free, increment, 0.0).reshape(len(added), -1)
         for part, u in zip(added, self._u, strict=True):
             part[3:] = vector_rate(u[3:]) @ part[3:]
         self._last = added
         self.set_increments(self._u + added)
-        size = np.linalg.norm(self._scaled(self._u))
-        return float(np.linalg.norm(self._scaled(added)) / size) if size > 0.0 else 0.0
+        change, size = (np.linalg.norm(self._scaled(u), axis=1) for u in (added, self._u))
+        return np.divide(change, size, out=np.zeros_like(size), where=size > 0.0)
 
     def _scaled(self, u: Array) -> Array:
         """Increments with rotations multiplied by the size of the body [m]."""
@@ -331,12 +345,13 @@ class RigidBodies:
         assert self._noise is not None
         self._noise = self._noise + error
 
-    def round_off(self) -> float:
-        """Norm [N] of the rounding error of the balance, at the iterate that this step linearised last (collective)."""
+    def only_rounding(self) -> NDArray[np.bool_]:
+        """Whether the balance of each body is rounding errors, where this step linearised last (collective)."""
         if self._noise is None:
             self.linearise()
         noise = self.comm.bcast(self._noise if self.comm.rank == 0 else None, root=0)
-        return self._norm(np.where(self._free, noise, 0.0))
+        missed = self.balance if self.contact is None else self.balance - self.contact.force
+        return (np.abs(missed) <= noise).reshape(len(self.bodies), -1).all(axis=1)
 
     def worst(self) -> tuple[float, ...] | None:
         """Position [m] of the centre of the body with the largest residual."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -25,6 +25,10 @@ class RigidStart:
 
     def __init__(self, field: RigidBodies):
         self.field, self._initial = field, list(field.now)
+        self._apart: Collection[str] = ()
+
+    def leave_out(self, names: Collection[str]) -> None:
+        self._apart = names
 
     def velocity(self) -> Array:
         """Velocities of all vertices [m/s], shape (n, dim)."""
@@ -37,6 +41,8 @@ class RigidStart:
         """Upper bound of the accelerations of vertices [m/s^2]."""
         largest = 0.0
         for body, now in zip(self.field.bodies, self.field.now, strict=True):
+            if body.name in self._apart:
+                continue
             a, turning = np.split(motion.acceleration(body, now), 2)
             arm = np.linalg.norm(body.arms(now.R, body.points), axis=1).max()
             largest = max(largest, float(np.linalg.norm(a) + np.linalg.norm(turning) * arm))
@@ -62,17 +68,20 @@ class RigidStart:
     def end(self) -> None:
         """Restore positions and velocities; rates of momentum are those of the start step."""
         field = self.field
-        field.now = [replace(initial, p=now.p) for initial, now in zip(self._initial, field.now, strict=True)]
+        parts = zip(field.bodies, self._initial, field.now, strict=True)
+        field.now = [start if body.name in self._apart else replace(start, p=now.p) for body, start, now in parts]
         field.old = list(field.now)
 
     def end_impulse(self, dt: float) -> None:
         """Restore positions, and add the velocities that bodies have gained in a start step of length dt [s]."""
         field = self.field
+        parts = zip(field.bodies, self._initial, field.now, field.old, field.increments(), strict=True)
         changed = []
-        for initial, now, old, u in zip(self._initial, field.now, field.old, field.increments(), strict=True):
+        for body, initial, now, old, u in parts:
             v = initial.v.copy()
-            v[:3] += (now.shift - old.shift) / dt
-            v[3:] += initial.R.T @ u[3:] / dt
+            if body.name not in self._apart:
+                v[:3] += (now.shift - old.shift) / dt
+                v[3:] += initial.R.T @ u[3:] / dt
             changed.append(replace(initial, v=v))
         field.now = changed
         field.old = list(field.now)

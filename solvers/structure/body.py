@@ -100,9 +100,9 @@ class Body:
         return fem.scalar_space(self.domain)
 
     @cached_property
-    def cell_size(self) -> float:
-        """Typical edge [m] of a cell."""
-        return fem.mean_cell_size(self.domain)
+    def heights(self) -> Array:
+        """Height [m] of the flattest cell at each owned node, shape (owned,)."""
+        return fem.node_heights(self.domain, self.space)[: self.owned]
 
     @property
     def linear(self) -> bool:

@@ -22,10 +22,13 @@ class ConstrainedDofs:
 
     def force(self) -> Array:
         """Force [N] of the constraint at owned dofs; zero if it is not near."""
+        return self.at_owned(self._constraint.force()) if self._constraint.near else np.zeros(self._layout.size)
+
+    def at_owned(self, at_nodes: Array) -> Array:
+        """Values at owned dofs from those at the nodes, shape (N, dim); zero elsewhere (collective)."""
         found = np.zeros(self._layout.size)
-        if self._constraint.near:
-            mine, numbers = self._layout.among_owned(self._constraint.dofs())
-            found[numbers] = self._constraint.force()[mine]
+        mine, numbers = self._layout.among_owned(self._constraint.dofs())
+        found[numbers] = at_nodes[mine]
         return found
 
     def recover(self, taken: TakenRows, du: Array) -> None:

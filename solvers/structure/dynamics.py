@@ -172,6 +172,11 @@ class Dynamics:
     def dissipates(self) -> bool:
         return (self.scheme.alpha_m, self.scheme.alpha_f) != (0.5, 0.5)
 
+    def stopping_force(self, structure: Moving) -> Array:
+        old, share = structure.old, self.scheme.alpha_m
+        stopped = self.scheme.acceleration(np.zeros_like(old.u), old.v, old.a, structure.current.dt)
+        return times(structure.mass, (1.0 - share) * stopped + share * old.a)
+
     def kinetic_energy(self, structure: Moving) -> float:
         v = structure.now.v
         return 0.5 * structure.comm.allreduce(float(v @ times(structure.mass, v)))

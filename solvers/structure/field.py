@@ -23,6 +23,7 @@ from solvers.rows import RowTransformation, TakenRows, gather, transform_rows
 from solvers.solver_settings import SolverSettings
 from solvers.step import Step
 from solvers.structure.body import Body
+from solvers.structure.body_pieces import BodyPieces
 from solvers.structure.constrained_dofs import ConstrainedDofs
 from solvers.structure.deformation import flown_off, inverted, largest_extent
 from solvers.structure.energy import EnergyBalance, EnergySentinel
@@ -57,6 +58,7 @@ class Structure:
         self.timer, self.constraint = timer or Timer(), contact
         self.dim = bodies[0].dim
         self.layout = Layout(comm, [body.size for body in bodies])
+        self.pieces = BodyPieces(comm, bodies)
         self._constrained = None if contact is None else ConstrainedDofs(self.layout, contact)
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
@@ -66,9 +68,11 @@ class Structure:
             self.energy, dissipates=time.dissipates or contact is not None, contact=contact is not None
         )
         self.residual_force = np.zeros(self.layout.size)  #: residual of the balance, at held dofs the reaction [N]
+        self._unbalanced = self.residual_force  #: the residual at free dofs [N]
         self.target = np.zeros(self.layout.size)
         self.increment = np.zeros(self.layout.size)
         self.rounding: Array | None = None  #: rounding error of `residual_force` [N]; None before this step linearises
+        self._stopping: Array | None = None  #: force that would stop the motion in this step [N]
         self._tangent: PETSc.Mat | None = None  #: at the present iterate, if it is assembled already
         self._imposed: PETSc.Mat | None = None  #: tangent of the last iterate with its supports; None in contact
         self._assembled_tangent = Tangent(bodies)
@@ -184,9 +188,8 @@ class Structure:
         for body in self.bodies:
             body.element.begin_step()
         self.current = Step(t + dt, dt)
-        self.rounding = self._tangent = self._imposed = (
-            None  # not part of the saved state: a resumed run must start alike
-        )
+        # not part of the saved state: a resumed run must start alike
+        self.rounding = self._tangent = self._imposed = self._stopping = None
         self.solver.begin_step()
         if self.constraint is not None:
             self.constraint.begin_step()
@@ -262,23 +265,44 @@ class Structure:
             self.constraint.evaluate(self._constrained.at_nodes(self.now.u), self.current.t)
             self.now.constraint[:] = self._constrained.force()
 
-    def residual(self) -> float:
-        """Norm [N] of the balance at the free dofs and of the residual of the constraint."""
+    def residual(self) -> Array:
+        """Norm [N] of the balance at the free dofs and of the residual of the constraint, by piece."""
         with self.timer("assembly"):
             self._assemble_bodies()
         with self.timer("contact"):
             self._assemble_constraint()
         self.now.v, self.now.a = self.time.motion(self, self.current.dt)
         self.residual_force = self.time.balance(self)
-        missed = 0.0 if self.constraint is None else self.constraint.violation(self.time.force_weight)
-        return float(np.hypot(self.norm(self.held.free_part(self.residual_force)), missed))
+        self._unbalanced, missed = self.held.free_part(self.residual_force), None
+        if self.constraint is not None and self.constraint.near:
+            at_nodes = self.constraint.violation(self.time.force_weight)
+            missed = np.bincount(self._piece_of_nodes, at_nodes**2, self.pieces.count).astype(float)
+        return self.pieces.norms([self._unbalanced], missed)[0]
+
+    @cached_property
+    def _piece_of_nodes(self) -> NDArray[np.int64]:
+        """Piece of each node of the constraint, 0 for rigid ones (collective)."""
+        assert self._constrained is not None
+        return self._constrained.at_nodes(self.pieces.of_dofs.astype(float))[:, 0].astype(np.int64)
+
+    def forces(self) -> Array:
+        """Norm [N] of the largest force on each piece: internal, external, of the constraint.
+
+        They are those of the present iterate. A residual would not do: that of an iterate that has blown up says
+        nothing of the forces, and that of a support that moves none. What would stop the motion in one step counts too,
+        because in free flight there are no other forces.
+        """
+        now = self.now
+        if self._stopping is None:
+            self._stopping = self.time.stopping_force(self)
+        return self.pieces.norms([now.internal, now.external, now.constraint, self._stopping]).max(axis=0)
 
     def tangent(self) -> PETSc.Mat:
         """d(balance)/du without supports; the next call overwrites the matrix."""
         return self._assembled_tangent.assemble(self, self.time)
 
-    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> float:
-        """One iteration of Newton's method; returns |du| / |u|. Raises StepFailed.
+    def advance(self, *, keep: bool = False, reduction: float = 0.0) -> Array:
+        """One iteration of Newton's method; returns |du| / |u| by piece. Raises StepFailed.
 
         keep: use the matrix and the factors of the last iterate, away from contact. reduction: of the residual of the
         linear system that is good enough. It applies in contact, where the first iterates only find the active set;
@@ -326,10 +350,11 @@ class Structure:
 
     def rounded(self) -> Array:
         """Magnitudes whose rounding enters the balance, at owned dofs [m]: |u|, and h for that of I + grad u."""
-        size = np.abs(self.now.u)
-        for body, part in zip(self.bodies, self.split(size), strict=True):
-            part += body.cell_size
-        return size
+        return np.abs(self.now.u) + self._heights
+
+    @cached_property
+    def _heights(self) -> Array:
+        return np.concatenate([body.heights.repeat(self.dim) for body in self.bodies])
 
     def missing_displacement(self) -> Array:
         """Prescribed minus present displacements at owned dofs [m], zero at free ones."""
@@ -354,13 +379,13 @@ class Structure:
         with self.timer("contact"):
             self._constrained.recover(taken, du)
 
-    def update(self, increment: Array) -> float:
-        """Add an increment of the owned dofs; returns |du| / |u|."""
+    def update(self, increment: Array) -> Array:
+        """Add an increment of the owned dofs; returns |du| / |u| by piece."""
         self.increment = increment.copy()
         self.now.u += self.increment
         self.now.u = self.held.free_part(self.now.u) + self.target
-        size = self.norm(self.now.u)
-        return self.norm(self.increment) / size if size > 0.0 else 0.0
+        change, size = self.pieces.norms([self.increment, self.now.u])
+        return np.divide(change, size, out=np.zeros_like(size), where=size > 0.0)
 
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""
@@ -377,16 +402,27 @@ class Structure:
         assert self.rounding is not None
         self.rounding = self.rounding + error
 
-    def round_off(self) -> float:
-        """Norm [N] of the rounding error of the balance, at the iterate that this step linearised last."""
-        if self.rounding is None:
+    def only_rounding(self) -> NDArray[np.bool_]:
+        """Whether the residual is rounding errors in all rows of a piece, where this step linearised last."""
+        if first := self.rounding is None:
             self._tangent = self.linearise()
         assert self.rounding is not None
-        return self.norm(self.held.free_part(self.rounding))
+        found = self.pieces.below(self._unbalanced, self.rounding)
+        if self.constraint is None or self._constrained is None or not self.constraint.near:
+            return found
+        if first and not found.any():  # the errors of contact would take as long as another iterate
+            return found
+        weight, several = self.time.force_weight, 2.0**self.dim
+        of_force, of_conditions = self.constraint.rounding(weight)
+        found = self.pieces.below(self._unbalanced, self.rounding + several * self._constrained.at_owned(of_force))
+        missed = self.constraint.violation(weight) > several * of_conditions
+        return found & (np.bincount(self._piece_of_nodes[missed], minlength=self.pieces.count) == 0)
 
     def worst(self) -> tuple[float, ...] | None:
-        """Reference position [m] of the node with the largest residual (collective)."""
+        """Reference position [m] of the largest residual relative to the forces on its piece (collective)."""
         size = np.abs(self.held.free_part(np.nan_to_num(self.residual_force, nan=np.inf)))
+        forces = np.nan_to_num(self.forces(), nan=np.inf)[self.pieces.of_dofs]
+        size = np.divide(size, forces, out=size, where=(forces > 0.0) & np.isfinite(forces))
         points = [body.points[: self.dim, : body.owned].T for body in self.bodies]
         return position_of_largest(self.comm, size, np.repeat(np.concatenate(points), self.dim, axis=0))
 

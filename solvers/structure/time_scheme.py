@@ -82,6 +82,10 @@ class TimeScheme(Protocol):
         """Forces [N] of supports at both ends of the step, whose mean does work on its displacement."""
         ...
 
+    def stopping_force(self, structure: Moving) -> Array:
+        """Force of inertia [N] in the balance if nothing moved in the step, at owned dofs; zero without inertia."""
+        ...
+
     def kinetic_energy(self, structure: Moving) -> float:
         """v.M v / 2 [J]."""
         ...
@@ -132,6 +136,9 @@ class Statics:
         return 0.5 * (before + after)
 
     def damping_force(self, structure: Moving) -> Array:
+        return np.zeros(structure.layout.size)
+
+    def stopping_force(self, structure: Moving) -> Array:
         return np.zeros(structure.layout.size)
 
     def kinetic_energy(self, structure: Moving) -> float:

@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from coupling.coupled import Coupled
@@ -30,8 +31,8 @@ def test_predictors_that_increase_the_residual_in_a_film_in_contact(contact, fil
     coupled = Coupled.__new__(Coupled)
     coupled.flow, coupled.solid = flow, solid
     scheme = Monolithic.__new__(Monolithic)
-    scheme.coupled, scheme.residual = coupled, lambda: residual
-    scheme._predict(0.5, 1.0)
+    scheme.coupled, scheme.residual = coupled, lambda: np.array([residual, 0.5])
+    scheme._predict(0.5, np.array([1.0, 1.0]))
     back = contact and films and not residual < 1.0
     assert flow.calls == solid.calls == (["predict", 1.0] if back else ["predict"])
 

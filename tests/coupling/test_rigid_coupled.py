@@ -71,7 +71,6 @@ def test_blocks_against_finite_differences(monkeypatch):
     scheme.initialise(0.0, 0.02)
     scheme.step(0.0, 0.02)
     coupled.begin_step(0.02, 0.02)
-    scheme.largest = np.zeros(2)
     fluid, bodies, interface = coupled.flow, coupled.solid, coupled.interface
     rng = np.random.default_rng(0)
     start = np.zeros((1, 6))

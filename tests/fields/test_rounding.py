@@ -16,12 +16,27 @@ def test_estimate_is_the_size_of_the_error():
     A = (random.normal(size=(200, 300)) * 10.0 ** random.uniform(-3, 3, (200, 1))).astype(np.float32)
     x = random.normal(size=300).astype(np.float32)
     error = np.abs(np.add.accumulate(A * x, axis=1, dtype=np.float32)[:, -1] - A.astype(float) @ x)
-    matrix = PETSc.Mat().createDense(A.shape, array=A.astype(float), comm=PETSc.COMM_SELF)
-    matrix.assemble()
+    start, columns = np.arange(201, dtype=np.int32) * 300, np.tile(np.arange(300, dtype=np.int32), 200)
+    matrix = PETSc.Mat().createAIJ(A.shape, csr=(start, columns, A.astype(float).ravel()), comm=PETSc.COMM_SELF)
     estimate = rounding_error(matrix, x.astype(float)) * np.finfo(np.float32).eps / np.finfo(float).eps
     ratio = error / estimate
     assert 0.1 < np.median(ratio) < 10.0
+    assert ratio.max() < 10.0
     assert 0.1 < np.linalg.norm(error) / np.linalg.norm(estimate) < 10.0
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4])
+def test_estimate_of_matrices_of_blocks(size):
+    """The same from the entries where they are, from blocks and from a copy of the rows."""
+    random = np.random.default_rng(size)
+    A, x = random.normal(size=(4 * size, 4 * size)), random.normal(size=4 * size)
+    expected = np.finfo(float).eps * np.sqrt(np.square(A * x).sum(axis=1))
+    dense = PETSc.Mat().createDense(A.shape, array=A, comm=PETSc.COMM_SELF)
+    dense.setBlockSize(size)
+    dense.assemble()
+    for kind in ("dense", "aij", "baij"):
+        matrix = dense.copy() if kind == "dense" else dense.convert("aij", PETSc.Mat()).convert(kind, PETSc.Mat())
+        np.testing.assert_allclose(rounding_error(matrix, x), expected, rtol=1e-13)
 
 
 PLATE = """

@@ -190,7 +190,6 @@ def test_forms_constants_and_scalars(square):
     assert fem.assemble_scalar(form, square.comm) == pytest.approx(10.0)
     side = fem.compile_form(number * fem.surface_measure(square, "top", 1))
     assert fem.assemble_scalar(side, square.comm) == pytest.approx(10.0)
-    assert fem.mean_cell_size(square) == pytest.approx(1.0)
 
 
 def test_the_same_form_has_one_name_whatever_was_made_before(square):
@@ -286,3 +285,21 @@ def test_both_generations_have_the_same_functions():
         body = parse((folder / f"{module}.py").read_text()).body
         names.append({part.name for part in body if isinstance(part, FunctionDef) and not part.name.startswith("_")})
     assert names[0] == names[1]
+
+
+@pytest.mark.parametrize("cell_type", CELLS)
+def test_heights_at_nodes(cell_type):
+    """Cells of 1 x 1 beside one of 1e-6 x 1: at its nodes its height counts; simplices have half of their squares."""
+    domain = make_domain(cell_type)
+    space = fem.vector_space(domain)
+    even = fem.node_heights(domain, space)
+    assert (even <= 1.0 + 1e-12).all()
+    assert (even >= 0.5).all()
+    x = domain.mesh.geometry.x
+    x[:, 0] = np.interp(x[:, 0], [0.0, 1.0, 2.0], [0.0, 1.0, 1.0 + 1e-6])
+    points = space.tabulate_dof_coordinates()
+    heights = fem.node_heights(domain, space)
+    flat = points[:, 0] > 1.0 - 1e-9
+    np.testing.assert_allclose(heights[~flat], even[~flat], rtol=1e-12)
+    assert (heights[flat] <= 1.01e-6).all()
+    assert (heights[flat] >= 0.5e-6).all()

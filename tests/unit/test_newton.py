@@ -3,6 +3,7 @@
 import itertools
 import math
 
+import numpy as np
 import pytest
 
 from solvers.api import StepFailed
@@ -10,18 +11,22 @@ from solvers.newton import ENOUGH, Tolerance, converge, enough, iterates
 
 
 class Scalar:
-    """f(x) = 0 with one unknown."""
+    """f(x) = 0 with one unknown; force: what its residual is compared with, that of the start if it is not given."""
 
     name = "scalar"
 
-    def __init__(self, f, slope, x, *, round_off=0.0, settled_after=0):
+    def __init__(self, f, slope, x, *, force=None, round_off=0.0, settled_after=0):
         self.f, self.slope, self.x = f, slope, x
+        self.force = abs(f(x)) if force is None else force
         self.increment, self.solves, self.kept, self.reductions = 0.0, 0, [], []
         self.used = math.nan  #: slope of the last iterate
         self._round_off, self.settled_after = round_off, settled_after
 
     def residual(self):
-        return abs(self.f(self.x))
+        return np.array([abs(self.f(self.x))])
+
+    def forces(self):
+        return np.array([self.force])
 
     def advance(self, *, keep=False, reduction=0.0):
         self.used = self.used if keep else self.slope(self.x)
@@ -30,13 +35,13 @@ class Scalar:
         self.increment = -self.f(self.x) / self.used
         self.x += self.increment
         self.solves += 1
-        return abs(self.increment / self.x)
+        return np.array([abs(self.increment / self.x)])
 
     def retreat(self, fraction):
         self.x -= fraction * self.increment
 
-    def round_off(self):
-        return self._round_off
+    def only_rounding(self):
+        return self.residual() <= self._round_off
 
     def settled(self):
         return self.solves >= self.settled_after
@@ -127,12 +132,90 @@ def test_unsettled_is_not_accepted():
     assert converge(system, Tolerance()).iterations == 2
 
 
-def test_a_good_first_guess_does_not_make_the_tolerance_stricter():
-    """|x^2 - 2| = 3e-6 at the guess: with 1e-8 of the 7 that the unmoved system had, one step is enough."""
-    guess = math.sqrt(2.0) + 1e-6
-    alone, moved = (Scalar(lambda x: x * x - 2, lambda x: 2 * x, guess) for _ in range(2))
-    assert converge(moved, Tolerance(1e-8), 7.0).iterations == 1
-    assert converge(alone, Tolerance(1e-8)).iterations == 2
+def test_tolerance_is_relative_to_forces():
+    """Neither a good guess makes it stricter nor an iterate that blows up looser."""
+    guess = Scalar(lambda x: x * x - 2, lambda x: 2 * x, math.sqrt(2.0) + 1e-6, force=2.0)
+    assert converge(guess, Tolerance(1e-8)).iterations == 1  # |x^2 - 2| = 3e-6
+    far = Scalar(lambda x: x * x - 2, lambda x: 2 * x, 1e-9, force=2.0)  # the first increment is 1e9
+    info = converge(far, Tolerance(1e-8, max_iterations=60))
+    assert max(info.residuals) > 1e17
+    assert info.residuals[-1] <= 2e-8
+
+
+def test_a_change_below_the_tolerance_is_not_lost():
+    """Forces that change by 1e-9 of themselves: Newton's method makes one iterate, however small the residual is."""
+    system = Scalar(lambda x: x - 1.0 - 1e-9, lambda x: 1.0, 1.0, force=1.0)
+    assert converge(system, Tolerance(1e-6)).iterations == 1
+    assert system.x == pytest.approx(1.0 + 1e-9, abs=1e-15)
+
+
+class Together:
+    """Systems that know nothing of each other, each of which is a part."""
+
+    name = "together"
+
+    def __init__(self, *systems):
+        self.systems = systems
+
+    def _each(self, what):
+        return np.concatenate([what(system) for system in self.systems])
+
+    def residual(self):
+        return self._each(lambda system: system.residual())
+
+    def forces(self):
+        return self._each(lambda system: system.forces())
+
+    def advance(self, *, keep=False, reduction=0.0):
+        return self._each(lambda system: system.advance(keep=keep, reduction=reduction))
+
+    def retreat(self, fraction):
+        for system in self.systems:
+            system.retreat(fraction)
+
+    def only_rounding(self):
+        return self._each(lambda system: system.only_rounding())
+
+    def settled(self):
+        return all(system.settled() for system in self.systems)
+
+    def worst(self):
+        return None
+
+
+def soft():
+    return Scalar(lambda x: 1e-6 * (x * x - 2), lambda x: 2e-6 * x, 2.0)
+
+
+def stiff(**options):
+    return Scalar(lambda x: 1e9 * (math.exp(x) - 1), lambda x: 1e9 * math.exp(x), 3.0, **options)
+
+
+@pytest.mark.parametrize("beside", [stiff, lambda: stiff(round_off=1.0), lambda: stiff(round_off=1e12)])
+@pytest.mark.parametrize("line_search", [False, True])
+def test_a_soft_part_converges_beside_a_stiff_one(beside, line_search):
+    """Whether that takes longer, has an error of rounding above all forces on the soft part, or consists of it."""
+    system, alone = soft(), soft()
+    converge(Together(beside(), system), Tolerance(1e-10, line_search=line_search))
+    converge(alone, Tolerance(1e-10, line_search=line_search))
+    assert system.residual() <= 1e-10 * system.force
+    assert system.x == pytest.approx(alone.x, abs=1e-10)
+
+
+def test_residuals_of_rounding_are_not_reported():
+    noise = Scalar(lambda x: 1.0, lambda x: 1e300, 1.0, round_off=2.0)
+    info = converge(Together(noise, root_of_two()), Tolerance(1e-10))
+    assert info.residuals == converge(root_of_two(), Tolerance(1e-10)).residuals
+    assert converge(noise, Tolerance(1e-10)).residuals == (1.0,)
+
+
+def test_a_part_that_fails_is_reported():
+    """x^2 + 1 = 0 beside a part that has converged, and one whose residual is rounding error."""
+    noise = Scalar(lambda x: 1e6, lambda x: 1e300, 1.0, round_off=2e6)
+    without = Scalar(lambda x: x * x + 1, lambda x: 2 * x, 0.5)
+    with pytest.raises(StepFailed, match="did not converge in 3 iterations") as failure:
+        converge(Together(noise, without, root_of_two()), Tolerance(1e-3, max_iterations=3))
+    assert failure.value.history[0] == pytest.approx(math.hypot(1.25, 2.0))
 
 
 class Inexact(Scalar):
@@ -156,8 +239,13 @@ def test_inexact_solutions_cost_no_iterate():
 
 
 def test_reduction_that_is_enough():
-    assert enough(0.0, math.inf, tolerance=0.0) == ENOUGH
-    assert enough(1.0, math.inf, tolerance=1e-8) == ENOUGH
-    assert enough(1.0, 1e-2, tolerance=1e-8) == pytest.approx(1e-5)  # Newton's method leaves 1e-4
-    assert enough(1e-4, 1e-4, tolerance=1e-8) == pytest.approx(1e-6)  # a hundredth of the tolerance
-    assert enough(1e-9, 1.0, tolerance=1e-8) == ENOUGH
+    def of(*parts):
+        residual, ratio, tolerance = np.array(parts).T
+        return enough(residual, ratio, tolerance=tolerance)
+
+    assert of((0.0, math.inf, 0.0)) == ENOUGH
+    assert of((1.0, math.inf, 1e-8)) == ENOUGH
+    assert of((1.0, 1e-2, 1e-8)) == pytest.approx(1e-5)  # Newton's method leaves 1e-4
+    assert of((1e-4, 1e-4, 1e-8)) == pytest.approx(1e-6)  # a hundredth of the tolerance
+    assert of((1e-9, 1.0, 1e-8)) == ENOUGH
+    assert of((1.0, 1e-2, 1e-8), (0.0, 0.0, 0.0), (1e-4, 1e-4, 1e-8)) == pytest.approx(1e-6)  # the strictest of all
