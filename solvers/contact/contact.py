@@ -24,6 +24,7 @@ from solvers.contact.obstacle_work import ObstacleWork
 from solvers.contact.pair import Pair
 from solvers.contact.redistribute import redistributed
 from solvers.contact.slip import Slip
+from solvers.contact.stiffness import ContactStiffness
 from solvers.contact.terms import Terms
 from solvers.rows import RowTransformation
 from solvers.sparse import Sparse, nothing
@@ -69,7 +70,8 @@ class Contact:
         self._kept = np.zeros(count)  # mean gap that may stay in this step [m], <= 0
         self._constraints = Constraints(self.interface)
         self.merged = np.zeros(count, dtype=bool)  #: multipliers that are merged into another one of their node
-        self._stiffness = np.zeros(count)
+        self._stiffness = np.zeros(count)  # per area [Pa/m], at the latest evaluation
+        self._stiffnesses = ContactStiffness(self.interface, np.zeros_like(self.x))
         self._touching = TOUCHING * float(np.ptp(self.nodes.points, axis=0).max())
         self._shared: Sparse | None = None  # redistribution at the latest evaluation
         self._tied = np.isin(np.arange(count), [m for law, own in self.interface.laws if law == Tied() for m in own])
@@ -88,8 +90,7 @@ class Contact:
 
     def start(self, u: Array, stiffness: Array, t: float) -> None:
         """Set the displacements at the start [m] and the diagonal of the stiffness [N/m], both of shape (N, dim)."""
-        at_node, areas = stiffness.mean(axis=1)[self.multipliers.node], self.multipliers.areas
-        self._stiffness = np.divide(at_node, areas, out=np.zeros_like(areas), where=areas > 0.0)
+        self._stiffnesses = ContactStiffness(self.interface, stiffness)
         self.x = self.positions(u, t)
         self.x_old = self.x.copy()
         self._integration.search_anew()
@@ -170,6 +171,7 @@ class Contact:
         constrained = self._constraints.choose(found.terms)
         self._covers, self._shared = constrained.covers, constrained.shared
         self._spans, self.merged = constrained.spans, constrained.merged
+        self._stiffness = self._stiffnesses.opposite(constrained.terms.M)
         self.slip = self._integration.slip(self.x, found, self._shared)
         return constrained.terms
 
