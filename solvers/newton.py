@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from solvers.api import StepFailed, StepInfo
 from solvers.counted import counted
 
@@ -38,6 +40,13 @@ class System(Protocol):
 
     def settled(self) -> bool:
         """Whether the iterate fulfils supports, and its active set has not changed."""
+        ...
+
+    def astray(self, rises: int) -> str:
+        """Why whole increments may not converge, such as an active set that cycles; empty if they may.
+
+        rises: how often the residual has risen above all earlier ones of this solution.
+        """
         ...
 
     def worst(self) -> tuple[float, ...] | None:
@@ -77,10 +86,11 @@ def iterates(system: System, tolerance: Tolerance = Tolerance(), unmoved: float 
     r_1 = f'' dx^2 / 2. With the same tangent the next residual is f'' dx dx_1 = 2 (r_1 / r_0) r_1.
     Source: C. T. Kelley, Solving Nonlinear Equations with Newton's Method, SIAM 2003, section 2.3 (chord method).
 
-    The linear system may be solved as inexactly as `enough` says.
+    The linear system may be solved as inexactly as `enough` says. Where a system goes astray, and with `line_search`,
+    increments are halved until the residual decreases.
     """
     number, increment, residual, ratio = 0, math.inf, system.residual(), math.inf
-    largest = max(unmoved, residual)
+    largest, rises = max(unmoved, residual), 0
     while True:
         yield Iterate(number, residual, increment, system.settled())
         before = residual
@@ -90,7 +100,8 @@ def iterates(system: System, tolerance: Tolerance = Tolerance(), unmoved: float 
             keep=2.0 * ratio * residual <= small, reduction=enough(residual, ratio, tolerance=small)
         )
         residual = system.residual()
-        if tolerance.line_search and imposed:
+        rises += (residual > largest) + 2 * (not math.isfinite(residual))  # not a number: elements are inverted
+        if (tolerance.line_search and imposed) or (number > 0 and system.astray(rises)):
             increment, residual = _halve(system, before, increment, residual)
         ratio = residual / before if before > 0.0 else math.inf
         largest, number = max(largest, residual), number + 1
@@ -114,15 +125,25 @@ def enough(residual: float, ratio: float, *, tolerance: float) -> float:
     return min(ENOUGH, max(0.1 * ratio * ratio, 0.01 * tolerance / residual))
 
 
+#: Largest count of halvings of an increment in a line search. With 6 a ring with Tresca friction does not converge.
+HALVINGS = 14
+
+
 def _halve(system: System, before: float, increment: float, residual: float) -> tuple[float, float]:
-    """Line search: halve the increment until the residual decreases, at most six times."""
-    remaining = 1.0
-    for _ in range(6):
-        if residual < before:
-            break
+    """Line search: halve the increment until the residual decreases, or take the best of the fractions tried.
+
+    The residual has kinks, from which it may increase in all directions; the way on is then that of the least increase.
+    """
+    remaining, tried = 1.0, [residual]
+    while not residual < before and len(tried) <= HALVINGS:
         system.retreat(0.5 * remaining)
         remaining *= 0.5
         residual = system.residual()
+        tried.append(residual)
+    if not residual < before:
+        best = 0.5 ** int(np.nanargmin(tried))
+        system.retreat(remaining - best)
+        remaining, residual = best, system.residual()
     return increment * remaining, residual
 
 
@@ -140,6 +161,7 @@ def converge(system: System, tolerance: Tolerance, unmoved: float = 0.0) -> Step
             return StepInfo(iterate.number, tuple(history))
         elif iterate.number == tolerance.max_iterations:
             reason = f"Newton did not converge in {counted(iterate.number, 'iteration')} (residual {history[-1]:.3g})"
+            reason += f": {cycle}" if (cycle := system.astray(0)) else ""
         else:
             continue
         raise StepFailed(system.name, reason, iteration=iterate.number, where=system.worst(), history=tuple(history))

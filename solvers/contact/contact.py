@@ -83,6 +83,7 @@ class Contact:
         self.time = np.nan  #: of the latest evaluation [s]
         self.touched_at = np.full(len(self.pairs), np.inf)  #: time of the first contact of each pair [s], set by probes
         self.terms: Terms | None = None
+        self._own, self._increment = self.z.copy(), np.zeros_like(self.z)  # before redistribution; of the last iterate
         self._D, self._covers = np.zeros(count), np.zeros(count, dtype=bool)  # at the latest evaluation
         self._condensation: tuple[list[ActiveMultipliers], Linearised, Condensed] | None = None  # the latest
 
@@ -110,9 +111,11 @@ class Contact:
         if self._keep_overlap:
             self._kept = np.minimum(0.0, self._mean_gap)
         self._constraints.begin_step()
+        self._stiffnesses.begin_step()
         self.active_set.begin_step()
         self._integration.begin_step(self.x, self.active_set.active)
         self.slip = None
+        self._own, self._increment = self.z.copy(), np.zeros_like(self.z)
 
     def begin_solve(self) -> None:
         """New loads: sets that the old ones chose are no sign of a cycle."""
@@ -160,7 +163,7 @@ class Contact:
             for law, which in self.interface.laws:
                 status[which] = law.status(self.point(which))
             self._drop_dependent(status)
-        self.active_set.choose(status, x[self.multipliers.node])
+        self.active_set.choose(status)
         self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
 
     def _integrate(self) -> Terms | None:
@@ -171,7 +174,7 @@ class Contact:
         constrained = self._constraints.choose(found.terms)
         self._covers, self._shared = constrained.covers, constrained.shared
         self._spans, self.merged = constrained.spans, constrained.merged
-        self._stiffness = self._stiffnesses.opposite(constrained.terms.M)
+        self._stiffness = self._stiffnesses.per_area(constrained.terms.M)
         self.slip = self._integration.slip(self.x, found, self._shared)
         return constrained.terms
 
@@ -188,8 +191,8 @@ class Contact:
             stiffness=stiffness,
             slip=np.zeros((len(which), self.dim)) if slip is None else slip.values[which],
             slip_defined=np.zeros(len(which), dtype=bool) if slip is None else slip.defined[which],
-            c_n=self.c_n * self.active_set.damping * stiffness,
-            c_t=self.c_n * self.active_set.damping * stiffness,
+            c_n=self.c_n * stiffness,
+            c_t=self.c_n * stiffness,
             touching=self._touching,
         )
 
@@ -278,7 +281,14 @@ class Contact:
         found = recover(linearised, condensed, balance, du)
         if parts:
             own[np.concatenate([part.which for part in parts])] = found.reshape(-1, self.dim)
+        self._increment = own - np.where(self._covers[:, None], self.z, 0.0)
+        self._own = own
         self._set_multipliers(own)
+
+    def retreat(self, fraction: float) -> None:
+        """Take back a fraction of the last increment of the multipliers."""
+        self._own = self._own - fraction * self._increment
+        self._set_multipliers(self._own)
 
     def dofs(self) -> NDArray[np.int64]:
         """Global dofs of all nodes, -1 where rigid, shape (N, dim)."""
@@ -303,8 +313,15 @@ class Contact:
 
     @property
     def settled(self) -> bool:
-        """Whether the latest `evaluate` left the active set unchanged."""
-        return not self.active_set.changed
+        """Whether the latest `evaluate` left the active set unchanged, or returned to an earlier one.
+
+        The residual covers all conditions. If it is small and sets recur, their nodes have neither pressure nor gap.
+        """
+        return not self.active_set.changed or bool(self.cycle())
+
+    def cycle(self) -> str:
+        """What cycles, for messages; empty if no earlier active set has come back."""
+        return self.active_set.cycle()
 
     # ------------------------------------------------------------------------------------------- results and state
 

@@ -1,8 +1,8 @@
 """The stiffness that a gap acts against: that of both sides in series, per area.
 
 A body resists the motion of a node of its surface with the mean diagonal entry k of its tangent there, over the area A
-of the node: a compliance A / k [m/Pa]. The compliances of a slave node and of the masters opposite of it add up, so that
-the stiffness of a pair does not depend on which side is the slave, and a rigid side adds nothing.
+of the node: a compliance A / k [m/Pa]. Those of a slave node and of the masters opposite of it add up, so that the
+stiffness of a pair does not depend on which side is the slave, and a rigid side adds nothing.
 """
 
 from __future__ import annotations
@@ -29,11 +29,24 @@ class ContactStiffness:
         self._of_slaves = np.divide(
             interface.multipliers.areas, at_slaves, out=np.zeros_like(at_slaves), where=at_slaves > 0.0
         )
+        self._values = np.zeros(len(at_slaves))
+        self.begin_step()
 
-    def opposite(self, M: Sparse) -> Array:
-        """Stiffness per area [Pa/m] of each multiplier and its masters, (C,); M: mortar integrals with these, (C, N)."""
+    def begin_step(self) -> None:
+        """Find the masters of each multiplier anew."""
+        self._found = np.zeros(len(self._of_slaves), dtype=bool)
+
+    def per_area(self, M: Sparse) -> Array:
+        """Stiffness [Pa/m] of each multiplier and its masters, (C,); M: mortar integrals with all nodes, (C, N).
+
+        The masters count that a multiplier has when it first has any in a step: a factor that changed with the iterate
+        would change the residual.
+        """
         rows, weights, count = M.row_numbers(), np.abs(M.data), len(self._of_slaves)
         total = np.bincount(rows, weights, count)
         sums = np.bincount(rows, weights * self._of_masters[M.indices], count)
-        compliance = self._of_slaves + np.divide(sums, total, out=np.zeros(count), where=total > 0.0)
-        return np.divide(1.0, compliance, out=np.zeros(count), where=compliance > 0.0)
+        new = (total > 0.0) & ~self._found
+        compliance = self._of_slaves[new] + sums[new] / total[new]
+        self._values[new] = np.divide(1.0, compliance, out=np.zeros_like(compliance), where=compliance > 0.0)
+        self._found |= new
+        return self._values

@@ -365,6 +365,14 @@ class Structure:
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""
         self.now.u -= fraction * self.increment
+        if self.constraint is not None:
+            self.constraint.retreat(fraction)
+
+    def astray(self, rises: int) -> str:
+        """Why whole increments may not converge: an active set that cycles, or a residual that grows in contact."""
+        if self.constraint is None or not self.constraint.near:
+            return ""
+        return self.constraint.cycle() or ("the residual grows" if rises > 1 else "")
 
     def settled(self) -> bool:
         """Whether the prescribed displacements are reached and the active set has not changed (collective)."""

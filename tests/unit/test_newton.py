@@ -38,6 +38,9 @@ class Scalar:
     def round_off(self):
         return self._round_off
 
+    def astray(self, rises):
+        return ""
+
     def settled(self):
         return self.solves >= self.settled_after
 
