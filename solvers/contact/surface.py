@@ -96,7 +96,9 @@ def facet_areas(points: Array, facets: NDArray[np.int64], facet_type: str) -> Ar
 def nodal_areas(points: Array, facets: NDArray[np.int64], facet_type: str) -> Array:
     """Area [m^(dim-1)] of each node: its equal part of the facets around it, shape (n,)."""
     areas = facet_areas(points, facets, facet_type) / facets.shape[1]
-    return np.bincount(facets.ravel(), areas.repeat(facets.shape[1]), len(points))
+    found = np.zeros(len(points))
+    np.add.at(found, facets, areas[:, None])
+    return found
 
 
 def longest_edge(corners: Array) -> float:
