@@ -141,7 +141,7 @@ def _halve(system: System, before: float, increment: float, residual: float) -> 
         residual = system.residual()
         tried.append(residual)
     if not residual < before:
-        best = 0.5 ** int(np.nanargmin(tried))
+        best = 0.5 ** int(np.argmin(np.nan_to_num(tried, nan=math.inf)))
         system.retreat(remaining - best)
         remaining, residual = best, system.residual()
     return increment * remaining, residual

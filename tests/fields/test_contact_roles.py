@@ -103,7 +103,7 @@ def test_a_strip_on_the_corner_of_a_step(order, edge):
     step = Surface("step", points, np.array([[0, 1], [1, 2]]), "line", None)
     structure, contact = make_contact([strip], [(("strip", "bottom"), step)], settings=SETTINGS)
     structure.initialise(0.0, 1.0)
-    for k in range(8):
+    for k in range(10):
         solve_step(structure, float(k), first=False)
     assert contact.resultant(0)[1] > 0.0
     assert structure.now.u.min() > -1.0

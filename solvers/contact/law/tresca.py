@@ -33,6 +33,6 @@ class Tresca:
         return np.where(at.slip_defined, np.minimum(self.bound, STEEP.radius(at)), 0.0)
 
     def radius_slopes(self, at: Point) -> tuple[Array, Array, Array]:
-        steep = STEEP.radius(at) < self.bound
+        steep = at.slip_defined & (STEEP.radius(at) < self.bound)
         by_z, by_normal, by_gap = STEEP.radius_slopes(at)
         return steep[:, None] * by_z, steep[:, None] * by_normal, steep * by_gap
