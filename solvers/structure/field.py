@@ -207,8 +207,7 @@ class Structure:
             info = converge(self, self.settings.newton)
         except StepFailed as failure:
             self.check_deformation(failure.iteration, failure.history)
-            at = {"iteration": failure.iteration, "where": failure.where, "history": failure.history}
-            raise StepFailed(failure.field, failure.reason + self._limit_point.explain(), **at) from None
+            raise failure.with_reason(failure.reason + self._limit_point.explain()) from None
         self.check_deformation(info.iterations, info.residuals)
         return info if self.constraint is None else replace(info, numbers=self.constraint.numbers())
 
