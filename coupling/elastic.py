@@ -133,6 +133,9 @@ class Elastic:
     def retreat(self, fraction: float) -> None:
         self.structure.retreat(fraction)
 
+    def astray(self, rises: int) -> str:
+        return self.structure.astray(rises)
+
     def settled(self) -> bool:
         return self.structure.settled()
 

@@ -240,6 +240,10 @@ class Monolithic:
         self.coupled.solid.retreat(fraction)
         self.coupled.flow.retreat(fraction)
 
+    def astray(self, rises: int) -> str:
+        """Why whole increments may not converge: an active set that cycles. Residuals of two parts may well rise."""
+        return self.coupled.solid.astray(0)
+
     def settled(self) -> bool:
         """Whether supports and active sets are fulfilled."""
         return self.coupled.solid.settled()

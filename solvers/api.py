@@ -85,6 +85,12 @@ class StepFailed(Exception):
         )
         self.finding = finding
 
+    def with_reason(self, reason: str) -> StepFailed:
+        """The same failure with another reason."""
+        return StepFailed(
+            self.field, reason, iteration=self.iteration, where=self.where, history=self.history, finding=self.finding
+        )
+
     @property
     def hopeless(self) -> bool:
         """Whether a smaller step cannot help."""

@@ -24,7 +24,11 @@ class Constraint(Stateful, Protocol):
 
     @property
     def settled(self) -> bool:
-        """Whether the latest `evaluate` left the active set unchanged."""
+        """Whether the latest `evaluate` left the active set unchanged, or returned to an earlier one."""
+        ...
+
+    def cycle(self) -> str:
+        """What cycles, for messages: an active set that has come back to an earlier one of this step; else empty."""
         ...
 
     def dofs(self) -> NDArray[np.int64]:
@@ -82,6 +86,10 @@ class Constraint(Stateful, Protocol):
 
     def recover(self, balance: Array, du: Array) -> None:
         """Compute the multipliers from the linearised balance [N] and the increment [m] at the dofs, (N * dim,)."""
+        ...
+
+    def retreat(self, fraction: float) -> None:
+        """Take back a fraction of the last increment of the multipliers."""
         ...
 
     def active(self) -> NDArray[np.bool_]:

@@ -55,6 +55,13 @@ class System(Protocol):
         """Whether the iterate fulfils supports, and its active set has not changed."""
         ...
 
+    def astray(self, rises: int) -> str:
+        """Why whole increments may not converge, such as an active set that cycles; empty if they may.
+
+        rises: how often the residual has risen above all earlier ones of this solution.
+        """
+        ...
+
     def worst(self) -> tuple[float, ...] | None:
         """Position [m] of the largest residual, for messages."""
         ...
@@ -93,10 +100,12 @@ def iterates(system: System, tolerance: Tolerance = Tolerance()) -> Iterator[Ite
     r_1 = f'' dx^2 / 2. With the same tangent the next residual is f'' dx dx_1 = 2 (r_1 / r_0) r_1.
     Source: C. T. Kelley, Solving Nonlinear Equations with Newton's Method, SIAM 2003, section 2.3 (chord method).
 
-    The linear system may be solved as inexactly as `enough` says.
+    The linear system may be solved as inexactly as `enough` says. Where a system goes astray, and with `line_search`,
+    increments are halved until the residual decreases.
     """
     number, residual = 0, system.residual()
     increment, ratio = np.full(len(residual), math.inf), np.full(len(residual), math.inf)
+    largest, rises = residual, 0
     while True:
         small, settled = tolerance.small(system.forces()), system.settled()
         yield Iterate(number, residual, small, increment, settled)
@@ -104,10 +113,12 @@ def iterates(system: System, tolerance: Tolerance = Tolerance()) -> Iterator[Ite
         keep = number > 0 and bool((2.0 * ratio * residual <= small).all())
         increment = system.advance(keep=keep, reduction=enough(residual, ratio, tolerance=small))
         residual = system.residual()
-        if tolerance.line_search and settled:
+        finite = bool(np.isfinite(residual).all())  # not a number: elements are inverted
+        rises += bool(((residual > largest) & (residual > small)).any()) + 2 * (not finite)
+        if (tolerance.line_search and settled) or (number > 0 and system.astray(rises)):
             increment, residual = _halve(system, before, small, increment, residual)
         ratio = residual / np.maximum(before, NOTHING)
-        number += 1
+        largest, number = np.fmax(largest, residual), number + 1
 
 
 #: Reduction of the residual of a linear system that is enough while nothing is known of the convergence. Measured with
@@ -127,15 +138,30 @@ def enough(residual: Array, ratio: Array, *, tolerance: Array) -> float:
     return min([ENOUGH, *(max(0.1 * q * q, 0.01 * small / r) for r, q, small in parts if r > 0.0)])
 
 
+#: Largest count of halvings of an increment in a line search. With 6 a ring with Tresca friction does not converge.
+HALVINGS = 14
+
+
 def _halve(system: System, before: Array, small: Array, increment: Array, residual: Array) -> tuple[Array, Array]:
-    """Line search: halve the increment until the residual of each part decreases or is small, at most six times."""
-    remaining = 1.0
-    for _ in range(6):
-        if ((residual < before) | (residual <= small)).all():
-            break
+    """Line search: halve the increment until the residual decreases, or take the best of the fractions tried.
+
+    Parts whose residual is small do not count. The residual has kinks, from which it may increase in all directions;
+    the way on is then that of the least increase.
+    """
+
+    def size(of: Array) -> float:
+        return math.inf if np.isnan(of).any() else float(np.linalg.norm(np.where(of > small, of, 0.0)))
+
+    remaining, tried, enough_below = 1.0, [size(residual)], size(before)
+    while 0.0 < tried[-1] and not tried[-1] < enough_below and len(tried) <= HALVINGS:
         system.retreat(0.5 * remaining)
         remaining *= 0.5
         residual = system.residual()
+        tried.append(size(residual))
+    if 0.0 < tried[-1] and not tried[-1] < enough_below:
+        best = 0.5 ** int(np.argmin(tried))
+        system.retreat(remaining - best)
+        remaining, residual = best, system.residual()
     return increment * remaining, residual
 
 
@@ -155,6 +181,7 @@ def converge(system: System, tolerance: Tolerance) -> StepInfo:
             open_parts = ~system.only_rounding()
             size = _norms(history, open_parts)[-1]
             reason = f"Newton did not converge in {counted(iterate.number, 'iteration')} (residual {size:.3g})"
+            reason += f": {cycle}" if (cycle := system.astray(0)) else ""
         else:
             continue
         norms = _norms(history, open_parts)

@@ -15,6 +15,7 @@ REASONS = {
         "a finer mesh, or rounder corners, where the element is",
     ),
     "far larger than the body": ("supports or weak springs: a static body without them has no unique solution",),
+    "no equilibrium beyond": ("structure.dynamics: past a limit point a structure snaps, and has inertia",),
     "active set cycles": (
         "a smaller time.step",
         "slave and master exchanged: the slave should be the softer or finer side",

@@ -16,5 +16,4 @@ def with_cause(failure: StepFailed, case: Case, begin: float, comm: Any) -> Step
     found = next(filter(None, comm.allgather(missed_formula(case, begin))), None)
     if found is None:
         return failure
-    reason = f"{failure.reason} ({found})"
-    return StepFailed(failure.field, reason, iteration=failure.iteration, where=failure.where, history=failure.history)
+    return failure.with_reason(f"{failure.reason} ({found})")

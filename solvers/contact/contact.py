@@ -25,6 +25,7 @@ from solvers.contact.obstacle_work import ObstacleWork
 from solvers.contact.pair import Pair
 from solvers.contact.redistribute import redistributed
 from solvers.contact.slip import Slip
+from solvers.contact.stiffness import ContactStiffness
 from solvers.contact.terms import Terms
 from solvers.contact.violation import rounding, violation
 from solvers.rows import RowTransformation
@@ -75,7 +76,8 @@ class Contact:
         self._kept = np.zeros(count)  # mean gap that may stay in this step [m], <= 0
         self._constraints = Constraints(self.interface)
         self.merged = np.zeros(count, dtype=bool)  #: multipliers that are merged into another one of their node
-        self._stiffness = np.zeros(count)
+        self._stiffness = np.zeros(count)  # per area [Pa/m], at the latest evaluation
+        self._stiffnesses = ContactStiffness(self.interface, np.zeros_like(self.x))
         extent, far = float(np.ptp(self.nodes.points, axis=0).max()), float(np.abs(self.nodes.points).max())
         self._touching, self._nearly = max(TOUCHING * extent, FAR * far), TRIED * max(extent, far)  # gaps [m]
         self._shared: Sparse | None = None  # redistribution at the latest evaluation
@@ -89,6 +91,7 @@ class Contact:
         self.time = np.nan  #: of the latest evaluation [s]
         self.touched_at = np.full(len(self.pairs), np.inf)  #: time of the first contact of each pair [s], set by probes
         self.terms: Terms | None = None
+        self._own, self._increment = self.z.copy(), np.zeros_like(self.z)  # before redistribution; of the last iterate
         self._D, self._covers = np.zeros(count), np.zeros(count, dtype=bool)  # at the latest evaluation
         self._condensation: tuple[list[ActiveMultipliers], Linearised, Condensed] | None = None  # the latest
 
@@ -96,8 +99,7 @@ class Contact:
 
     def start(self, u: Array, stiffness: Array, t: float) -> None:
         """Set the displacements at the start [m] and the diagonal of the stiffness [N/m], both of shape (N, dim)."""
-        at_node, areas = stiffness.mean(axis=1)[self.multipliers.node], self.multipliers.areas
-        self._stiffness = np.divide(at_node, areas, out=np.zeros_like(areas), where=areas > 0.0)
+        self._stiffnesses = ContactStiffness(self.interface, stiffness)
         self.x = self.positions(u, t)
         self.x_old = self.x.copy()
         self._integration.start(self.x)
@@ -119,10 +121,12 @@ class Contact:
         if self._keep_overlap:
             self._kept = np.minimum(0.0, self._mean_gap)
         self._constraints.begin_step()
+        self._stiffnesses.begin_step()
         self.active_set.begin_step()
         self._integration.begin_step(self.x, self.active_set.active)
         self._condensation = None
         self.slip = None
+        self._own, self._increment = self.z.copy(), np.zeros_like(self.z)
 
     def begin_solve(self) -> None:
         """New loads: sets that the old ones chose are no sign of a cycle."""
@@ -179,7 +183,7 @@ class Contact:
             for law, which in self.interface.laws:
                 status[which] = law.status(self.point(which))
             self._drop_dependent(status)
-        self.active_set.choose(status, x[self.multipliers.node])
+        self.active_set.choose(status)
         self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
 
     def _own_gap(self, terms: Terms) -> Array:
@@ -195,6 +199,7 @@ class Contact:
         constrained = self._constraints.choose(found.terms)
         self._covers, self._shared = constrained.covers, constrained.shared
         self._spans, self.merged = constrained.spans, constrained.merged
+        self._stiffness = self._stiffnesses.per_area(constrained.terms.M)
         self.slip = self._integration.slip(self.x, found, self._shared)
         return constrained.terms
 
@@ -211,8 +216,8 @@ class Contact:
             stiffness=stiffness,
             slip=np.zeros((len(which), self.dim)) if slip is None else slip.values[which],
             slip_defined=np.zeros(len(which), dtype=bool) if slip is None else slip.defined[which],
-            c_n=self.c_n * self.active_set.damping * stiffness,
-            c_t=self.c_n * self.active_set.damping * stiffness,
+            c_n=self.c_n * stiffness,
+            c_t=self.c_n * stiffness,
             touching=np.where(self.active_set.tried[which], self._touching, self._nearly),
         )
 
@@ -303,7 +308,14 @@ class Contact:
         found = recover(linearised, condensed, balance, du)
         if parts:
             own[np.concatenate([part.which for part in parts])] = found.reshape(-1, self.dim)
+        self._increment = own - np.where(self._covers[:, None], self.z, 0.0)
+        self._own = own
         self._set_multipliers(own)
+
+    def retreat(self, fraction: float) -> None:
+        """Take back a fraction of the last increment of the multipliers."""
+        self._own = self._own - fraction * self._increment
+        self._set_multipliers(self._own)
 
     def dofs(self) -> NDArray[np.int64]:
         """Global dofs of all nodes, -1 where rigid, shape (N, dim)."""
@@ -328,8 +340,15 @@ class Contact:
 
     @property
     def settled(self) -> bool:
-        """Whether the latest `evaluate` left the active set unchanged."""
-        return not self.active_set.changed
+        """Whether the latest `evaluate` left the active set unchanged, or returned to an earlier one.
+
+        The residual covers all conditions. If it is small and sets recur, their nodes have neither pressure nor gap.
+        """
+        return not self.active_set.changed or bool(self.cycle())
+
+    def cycle(self) -> str:
+        """What cycles, for messages; empty if no earlier active set has come back."""
+        return self.active_set.cycle()
 
     # ------------------------------------------------------------------------------------------- results and state
 

@@ -25,7 +25,7 @@ from solvers.contact.mortar import Mortar
 from solvers.contact.patch import Multipliers
 from solvers.contact.share import Shares
 from solvers.contact.terms import Normals, find_normals
-from solvers.sparse import Sparse
+from solvers.sparse import Sparse, nothing
 
 
 @dataclass(frozen=True)
@@ -61,10 +61,11 @@ class Sliding:
 
     def begin_step(self, x: Array, travel: float) -> None:
         """Integrals at the positions x [m] at the beginning of a step, (N, dim); travel: see `Mortar.near`."""
-        self._beginning = None
-        if all(travel < mortar.clear_until for mortar in self.mortars):
-            return
         (N, dim), C = self._shape, self._count
+        if all(travel < mortar.clear_until for mortar in self.mortars):
+            # all integrals are zero; other pairs, or these by a long step, may still meet
+            self._beginning = Beginning(nothing((C, N)), nothing((dim * C, dim * N)), np.zeros(C))
+            return
         D, parts = np.zeros(C), []
         normals = find_normals(self._multipliers, x) if self.mortars else None
         for index, mortar in enumerate(self.mortars):

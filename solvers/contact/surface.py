@@ -93,6 +93,14 @@ def facet_areas(points: Array, facets: NDArray[np.int64], facet_type: str) -> Ar
     return 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)
 
 
+def nodal_areas(points: Array, facets: NDArray[np.int64], facet_type: str) -> Array:
+    """Area [m^(dim-1)] of each node: its equal part of the facets around it, shape (n,)."""
+    areas = facet_areas(points, facets, facet_type) / facets.shape[1]
+    found = np.zeros(len(points))
+    np.add.at(found, facets, areas[:, None])
+    return found
+
+
 def longest_edge(corners: Array) -> float:
     """Longest edge [m] of facets with given corners [m], shape (k, corners, dim)."""
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())

@@ -346,6 +346,10 @@ class Fluid:
         self.flow[: self.unknowns.owned] += owned
         self.unknowns.share(self.system.flow)
 
+    def astray(self, rises: int) -> str:
+        """Empty: a flow has no active set."""
+        return ""
+
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""
         self._add(-fraction * self.increment)

@@ -330,6 +330,10 @@ class RigidBodies:
         """Take back a fraction of the last increment."""
         self.set_increments(self._u - fraction * self._last)
 
+    def astray(self, rises: int) -> str:
+        """Empty: the contact of rigid bodies has no active set."""
+        return ""
+
     def settled(self) -> bool:
         """True: the residual includes the contact conditions."""
         return True

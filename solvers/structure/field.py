@@ -29,6 +29,7 @@ from solvers.structure.deformation import flown_off, inverted, largest_extent
 from solvers.structure.energy import EnergyBalance, EnergySentinel
 from solvers.structure.held import Held
 from solvers.structure.instant import Instant
+from solvers.structure.limit_point import LimitPoint
 from solvers.structure.massless import mass_matrices
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.saved import restore_state, saved_state
@@ -64,6 +65,7 @@ class Structure:
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
         self.current = Step(0.0, 0.0)  #: the present step, or the last one
         self.energy = EnergyBalance()
+        self._limit_point = LimitPoint()
         self.energy_sentinel = EnergySentinel(
             self.energy, dissipates=time.dissipates or contact is not None, contact=contact is not None
         )
@@ -208,7 +210,7 @@ class Structure:
             info = converge(self, self.settings.newton)
         except StepFailed as failure:
             self.check_deformation(failure.iteration, failure.history)
-            raise
+            raise failure.with_reason(failure.reason + self._limit_point.explain()) from None
         self.check_deformation(info.iterations, info.residuals)
         return info if self.constraint is None else replace(info, numbers=self.constraint.numbers())
 
@@ -241,6 +243,8 @@ class Structure:
             0.5 * (after - before) @ at_supports,
             self.held.free_part(self.residual_force) @ du,
         ]
+        if isinstance(self.time, Statics) and self.current.dt > 0.0:
+            self._limit_point.accept(self.current.t, self.norm(du) / self.current.dt)
         sums = self.comm.allreduce(np.array(parts)).tolist()
         works, damping = [*sums[:3], float(pushed[0])], sums[3]
         doubt = sum(map(abs, (*sums[4:], float(pushed[1]))))
@@ -390,6 +394,14 @@ class Structure:
     def retreat(self, fraction: float) -> None:
         """Take back a fraction of the last increment."""
         self.now.u -= fraction * self.increment
+        if self.constraint is not None:
+            self.constraint.retreat(fraction)
+
+    def astray(self, rises: int) -> str:
+        """Why whole increments may not converge: an active set that cycles, or a residual that grows in contact."""
+        if self.constraint is None or not self.constraint.near:
+            return ""
+        return self.constraint.cycle() or ("the residual grows" if rises > 1 and self._touching else "")
 
     def settled(self) -> bool:
         """Whether the prescribed displacements are reached and the active set has not changed (collective)."""

@@ -5,8 +5,7 @@ import pytest
 from contact_setup import make_body, make_contact, solve_step
 
 from fsci import shapes
-from solvers.api import StepFailed
-from solvers.contact.active_set import MAX_RECURRENCES, ActiveSet
+from solvers.contact.active_set import ActiveSet
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import Point
 from solvers.contact.surface import Surface
@@ -32,13 +31,13 @@ def update(active_set, pressure, gap, covered=ALL, c=ONE):
         gap=gap,
         covered=covered,
         stiffness=one,
-        c_n=c * active_set.damping,
+        c_n=c,
         c_t=one,
         touching=0.0 * one,
         slip=0.0 * z,
         slip_defined=covered,
     )
-    active_set.choose(Frictionless().status(point), np.arange(2.0 * size).reshape(size, 2))
+    active_set.choose(Frictionless().status(point))
     return active_set.active.tolist()
 
 
@@ -79,26 +78,26 @@ def flip(active_set, times):
 def test_going_in_circles_is_reported():
     active_set = ActiveSet(3)
     active_set.begin_step()
-    with pytest.raises(StepFailed) as caught:
-        flip(active_set, 100)
-    assert "contact: the active set cycles: 2 nodes change their status again and again" in str(caught.value)
-    assert caught.value.field == "contact"
-    assert caught.value.where == (2.0, 3.0), "the first of the two"
+    flip(active_set, 1)
+    assert active_set.cycle() == ""
+    flip(active_set, 100)
+    assert active_set.cycle() == "the active set cycles: 2 nodes change their status again and again"
 
 
 def test_a_new_step_forgets_the_circles():
     active_set = ActiveSet(3)
-    for _ in range(5):
-        active_set.begin_step()
-        flip(active_set, MAX_RECURRENCES)
+    flip(active_set, 100)
+    active_set.begin_step()
+    assert active_set.cycle() == ""
 
 
 def test_growing_is_no_circle():
     active_set = ActiveSet(100)
     active_set.begin_step()
     for n in range(100):
-        active_set.choose((np.arange(100) <= n).astype(np.int8), np.zeros((100, 2)))
+        active_set.choose((np.arange(100) <= n).astype(np.int8))
     assert active_set.changes == 100
+    assert active_set.cycle() == ""
 
 
 # ------------------------------------------------------------------------------------------ Newton with the active set
@@ -176,34 +175,23 @@ def test_result_does_not_depend_on_c_n(name):
     assert max(counts.values()) <= 8, f"Newton steps {counts}"
 
 
-def test_a_return_makes_c_n_smaller_for_the_step():
-    """With a large c_n the set steps over the solution to and fro; the solution does not depend on c_n."""
-    active_set, ten = ActiveSet(3), 10 * ONE
-    active_set.begin_step()
-    for pressure, gap in (([1, 1, 0], 0), ([1, 0, 0], 0), ([1, 1, 0], 0)):  # the last one is a return
-        update(active_set, pressure, [gap] * 3, c=ten)
-    assert update(active_set, [1, 1, 0], [0, 0.5, 0], c=ten) == [True, True, False]
-    active_set.begin_step()
-    assert update(active_set, [1, 1, 0], [0, 0.5, 0], c=ten) == [True, False, False]
-
-
 def test_sets_of_other_loads_are_no_cycle():
     """A partitioned step solves for the contact of many loads, which may choose two sets by turns."""
     active_set = ActiveSet(1)
     active_set.begin_step()
-    for _ in range(3 * MAX_RECURRENCES):
-        active_set.begin_solve()
-        assert update(active_set, [1], [0], ALL[:1], ONE[:1]) == [True]
-        active_set.begin_solve()
-        assert update(active_set, [-1], [0], ALL[:1], ONE[:1]) == [False]
-    assert active_set.changes == 6 * MAX_RECURRENCES
+    for _ in range(20):
+        for pressure in (1, -1):
+            active_set.begin_solve()
+            assert update(active_set, [pressure], [0], ALL[:1], ONE[:1]) == [pressure > 0]
+            assert active_set.cycle() == ""
+    assert active_set.changes == 40
 
 
 def test_loads_between_iterates_forget_no_set():
     """A monolithic iteration sets a load in each iterate of its one solve; `solve` of the structure begins anew."""
     structure, contact, _ = press(SHAPES["ring"](), plane(2, -1.02))
-    contact.active_set.damping = 0.1  # as after a return
+    contact.active_set.alternating = 1  # as after a return
     structure.load(np.zeros(structure.layout.size))
-    assert contact.active_set.damping == 0.1
+    assert structure.astray(0).startswith("the active set cycles: 1 node ")
     structure.solve()
-    assert contact.active_set.damping == 1.0
+    assert structure.astray(0) == ""

@@ -10,7 +10,7 @@ from test_contact_several import wall
 from test_contact_system import Linearisation, compare
 
 from fsci import shapes
-from solvers.contact.law import friction
+from solvers.contact.law import friction, tresca
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.friction import trial_traction
 from solvers.contact.law.frictionless import Frictionless
@@ -259,3 +259,17 @@ def test_work_of_a_ring_rolled_over_a_block():
     assert np.diff(work).min() >= -1e-12
     assert work[-1] > 0.0
     assert max(newton) <= 8, newton
+
+
+def test_a_bound_far_below_the_pressure_does_not_depend_on_its_slope(monkeypatch):
+    """Tresca's bound is at most a multiple of the pressure, which only matters where a surface opens."""
+    forces = []
+    for steep in (1e2, 1e3, 1e5):
+        monkeypatch.setattr(tresca, "STEEP", Coulomb(steep))
+        structure, contact = sheared("quad", Tresca(4.0), 0.02, dim=2)
+        structure.initialise(0.0, 1.0)
+        for k in range(4):
+            solve_step(structure, float(k), first=False)
+        forces.append(contact.resultant(0))
+    assert forces[1] == pytest.approx(forces[0], rel=1e-9)
+    assert forces[2] == pytest.approx(forces[0], rel=1e-9)

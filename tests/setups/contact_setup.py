@@ -34,14 +34,14 @@ def make_body(name: str, mesh: Mesh, material=MATERIAL, **loads) -> Body:
 
 def make_contact(
     bodies: Sequence[Body],
-    pairs: Sequence[tuple[tuple[str, str] | Surface, tuple[str, str] | Surface]],
+    pairs: Sequence[tuple],
     *,
     time=None,
     settings: SolverSettings = SETTINGS,
     c_n: float = 1.0,
     law: Law = Frictionless(),
 ) -> tuple[Structure, Contact]:
-    """Each pair is slave and master: (body, surface), or a rigid surface."""
+    """Each pair is slave and master, (body, surface) or a rigid surface, and its own law if it is not `law`."""
     found: dict[tuple[str, str], Surface] = {}
 
     def side(of: tuple[str, str] | Surface) -> Surface:
@@ -51,7 +51,7 @@ def make_contact(
             found[of] = contact_surface(bodies, *of)
         return found[of]
 
-    parts = [Pair(side(slave), side(master), law=law) for slave, master in pairs]
+    parts = [Pair(side(slave), side(master), law=own[0] if own else law) for slave, master, *own in pairs]
     contact = Contact(parts, c_n=c_n, comm=MPI.COMM_SELF)
     return Structure(bodies, time or Statics(), settings, contact=contact), contact
 

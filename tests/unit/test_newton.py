@@ -43,6 +43,9 @@ class Scalar:
     def only_rounding(self):
         return self.residual() <= self._round_off
 
+    def astray(self, rises):
+        return ""
+
     def settled(self):
         return self.solves >= self.settled_after
 
@@ -178,6 +181,9 @@ class Together:
 
     def settled(self):
         return all(system.settled() for system in self.systems)
+
+    def astray(self, rises):
+        return ""
 
     def worst(self):
         return None

@@ -28,5 +28,6 @@ class Coulomb:
         return self.mu * np.where(at.slip_defined, np.maximum(0.0, at.trial_pressure), 0.0)
 
     def radius_slopes(self, at: Point) -> tuple[Array, Array, Array]:
-        by_gap = -self.mu * np.divide(at.c_n, at.D, out=np.zeros_like(at.D), where=at.D > 0.0)
-        return self.mu * at.normals, self.mu * at.z, by_gap
+        mu = self.mu * (at.slip_defined & (at.trial_pressure > 0.0))
+        by_gap = -mu * np.divide(at.c_n, at.D, out=np.zeros_like(at.D), where=at.D > 0.0)
+        return mu[:, None] * at.normals, mu[:, None] * at.z, by_gap

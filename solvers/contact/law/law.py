@@ -29,7 +29,7 @@ class Point:
     D: Array  #: covered area [m^(dim-1)], shape (m,)
     gap: Array  #: weighted gap [m^dim] that must not be negative, shape (m,)
     covered: NDArray[np.bool_]  #: mask of the multipliers that may have a constraint, shape (m,)
-    stiffness: Array  #: of the bodies, per area [Pa/m], shape (m,)
+    stiffness: Array  #: of slave and masters in series, per area [Pa/m], shape (m,)
     slip: Array  #: [m], shape (m, dim); with friction that of the step, of which the tangential part is used
     slip_defined: NDArray[np.bool_]  #: mask of those that a master covered at the beginning of the step, shape (m,)
     c_n: Array  #: complementarity parameter of the gap [Pa/m], (m,); the solution does not depend on it
