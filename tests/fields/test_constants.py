@@ -13,8 +13,9 @@ from fsci import shapes
 from fsci.bench import fluid as flows
 from fsci.builder import facing
 from fsci.case import load_case
+from solvers import wall_thickness
 from solvers.cell_types import CELL_TYPES
-from solvers.contact import dual_tree, mortar, self_search, share, sharp_edges
+from solvers.contact import dual_tree, mortar, overlap_at_start, share, sharp_edges
 from solvers.contact.sharp_edges import split_nodes
 from solvers.fluid.bodies.surface import ImmersedSurface
 from solvers.fluid.films import film, gaps
@@ -25,7 +26,7 @@ from solvers.tessellation import tessellate
 
 
 def set_opposed(monkeypatch, value):
-    for module in (mortar, dual_tree, self_search):
+    for module in (mortar, dual_tree, overlap_at_start, wall_thickness):
         monkeypatch.setattr(module, "OPPOSED", value)
     monkeypatch.setattr(dual_tree, "CONE", np.sqrt(0.5 * (1.0 + value)))
 

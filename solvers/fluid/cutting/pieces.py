@@ -101,12 +101,12 @@ def cells_across(grid: Grid, points: Array, moments) -> NDArray[np.int64]:
     moments: result of the kernel; points: of the quadrature in one direction.
     """
     cell, count, dim = moments.cells[moments.piece_cell], len(points), grid.dim
-    by_point = moments.piece_moments.sum(axis=2).reshape(-1, *[count] * dim)
-    area = by_point.reshape(len(cell), -1).sum(axis=1)
+    by_point = moments.piece_moments.sum(axis=2).reshape(len(cell), *[count] * dim)
+    area = moments.piece_moments.sum(axis=(1, 2))
     index = np.stack(np.unravel_index(cell, grid.shape, order="F"))
     across = np.full(len(cell), -1)
     for axis in range(dim):
-        level = np.moveaxis(by_point, dim - axis, 1).reshape(len(cell), count, -1).sum(axis=2)
+        level = np.moveaxis(by_point, dim - axis, 1).reshape(len(cell), count, count ** (dim - 1)).sum(axis=2)
         for side, step in ((0, -1), (1, 1)):
             within = (index[axis] + step >= 0) & (index[axis] + step < grid.shape[axis])
             flush = level @ (points - side) ** 2 <= FLUSH**2 * area
