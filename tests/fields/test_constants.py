@@ -15,7 +15,7 @@ from fsci.builder import facing
 from fsci.case import load_case
 from solvers import wall_thickness
 from solvers.cell_types import CELL_TYPES
-from solvers.contact import dual_tree, mortar, overlap_at_start, share, sharp_edges
+from solvers.contact import dual_tree, mortar, overlap_at_start, self_search, share, sharp_edges
 from solvers.contact.sharp_edges import split_nodes
 from solvers.fluid.bodies.surface import ImmersedSurface
 from solvers.fluid.films import film, gaps
