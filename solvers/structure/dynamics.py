@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from solvers.added_product import with_product
 from solvers.api import Array, StepFailed
-from solvers.blocks import block_diagonal
+from solvers.blocks import block_diagonal, times
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.linear import reason_of
 from solvers.structure.first_state import FirstState
-from solvers.structure.instant import Instant, Moving, times
+from solvers.structure.instant import Instant, Moving
 from solvers.structure.massless import massless_dofs
 from solvers.structure.time_scheme import Settling
 
@@ -54,7 +55,7 @@ class Dynamics:
     def massless(self, structure: Moving) -> NDArray[np.int64]:
         if structure.constraint is None:
             return np.empty(0, dtype=np.int64)
-        return np.flatnonzero(np.concatenate(massless_dofs(structure)))
+        return np.flatnonzero(massless_dofs(structure))
 
     def damping_matrix(self, structure: Moving) -> PETSc.Mat | None:
         if self.damping == Damping():
@@ -88,15 +89,22 @@ class Dynamics:
 
     def _solve_acceleration(self, structure: Moving) -> None:
         """M a_0 = f_ext - f_int - C v_0, prescribed where supports are. Raises StepFailed."""
-        now, (x, b) = structure.now, structure.mass.createVecs()
-        b.array[:] = now.external + now.constraint - now.internal - _damping_force(structure, now.v)
+        now, rigid, frame, held = structure.now, structure.rigid, structure.frame, structure.held
+        x, b = structure.mass.createVecs()
+        b.array[:] = now.external + now.constraint - now.internal - self._damping_force(structure, now)
         x.array[:] = now.a
         x.array[structure.massless] = 0.0
-        matrix = structure.held.impose(structure.mass.copy(), x, b)
+        if rigid is not None and frame is not None:
+            b.array[:] -= rigid.force_by_acceleration(frame, now.v, held.part(x.array))
+        matrix = held.impose(structure.mass.copy(), x, b)
         rows = (structure.layout.start + structure.massless).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, x, b)
         ksp = PETSc.KSP().create(structure.comm)
-        ksp.setOperators(matrix)
+        if rigid is None or frame is None:
+            ksp.setOperators(matrix)
+        else:
+            more = with_product(matrix, lambda a: held.free_part(rigid.times(frame, held.free_part(a))))
+            ksp.setOperators(more, matrix)
         ksp.setType(PETSc.KSP.Type.CG)
         ksp.getPC().setType(PETSc.PC.Type.JACOBI)
         ksp.setTolerances(rtol=1e-15, atol=0.0, max_it=1000)
@@ -106,6 +114,8 @@ class Dynamics:
             why = reason_of(ksp) if finite else "a force is not a number"
             raise StepFailed("structure", f"the acceleration at the start cannot be computed ({why})")
         now.a[:] = x.array
+        if rigid is not None and frame is not None:
+            now.rigid[:] = rigid.force_by_acceleration(frame, now.v, now.a)
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -123,24 +133,48 @@ class Dynamics:
         a[massless], v[massless] = 0.0, du[massless] / dt
         return v, a
 
+    def rigid_force(self, structure: Moving, dt: float) -> Array:
+        now, rigid, frame, before = structure.now, structure.rigid, structure.frame, structure.momenta
+        if rigid is None or frame is None or before is None:
+            return now.rigid
+        return rigid.force(frame, now.v, now.a, before, dt, self.scheme.gamma)
+
+    def rigid_factor(self, dt: float) -> float:
+        return self.scheme.mass_factor(dt) + self.damping.mass * self.scheme.damping_factor(dt)
+
     def balance(self, structure: Moving) -> Array:
-        present, before = (_own_forces(structure, at) - at.surface for at in (structure.now, structure.old))
+        present, before = (self._own_forces(structure, at) - at.surface for at in (structure.now, structure.old))
         before[structure.massless] = 0.0
         return self._inertia(structure) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
 
     def averaged_load(self, structure: Moving) -> Array:
-        present, before = (_own_forces(structure, at) for at in (structure.now, structure.old))
+        present, before = (self._own_forces(structure, at) for at in (structure.now, structure.old))
         return self._inertia(structure) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
 
     def _inertia(self, structure: Moving) -> Array:
-        share = self.scheme.alpha_m
-        return times(structure.mass, (1.0 - share) * structure.now.a + share * structure.old.a)
+        share, now, old = self.scheme.alpha_m, structure.now, structure.old
+        return (
+            times(structure.mass, (1.0 - share) * now.a + share * old.a) + (1.0 - share) * now.rigid + share * old.rigid
+        )
 
     def averaged(self, before: Array, after: Array) -> Array:
         return (1.0 - self.scheme.alpha_f) * after + self.scheme.alpha_f * before
 
     def damping_force(self, structure: Moving) -> Array:
-        return _damping_force(structure, self.averaged(structure.old.v, structure.now.v))
+        return self.averaged(*(self._damping_force(structure, at) for at in (structure.old, structure.now)))
+
+    def _damping_force(self, structure: Moving, at: Instant) -> Array:
+        """C v at one end of the step."""
+        if structure.damping is None:
+            return np.zeros_like(at.v)
+        force, rigid = times(structure.damping, at.v), structure.rigid
+        frame = structure.frame if at is structure.now or structure.momenta is None else structure.momenta.frame
+        if rigid is not None and frame is not None and self.damping.mass:
+            force = force + self.damping.mass * rigid.times(frame, at.v)
+        return force
+
+    def _own_forces(self, structure: Moving, at: Instant) -> Array:
+        return at.internal - at.loads - at.constraint + self._damping_force(structure, at)
 
     def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat:
         """mass_factor M + damping_factor C; in columns of massless dofs (1 - alpha_f) / dt C."""
@@ -157,14 +191,14 @@ class Dynamics:
     def reaction(self, structure: Moving) -> Array:
         """M a + C v + f_int - f_ext [N] at the present time."""
         now = structure.now
-        dynamic = times(structure.mass, now.a) + _damping_force(structure, now.v)
+        dynamic = times(structure.mass, now.a) + now.rigid + self._damping_force(structure, now)
         return dynamic + now.internal - now.external - now.constraint
 
     def support_forces(self, structure: Moving) -> tuple[Array, Array]:
         """The balance of the step at both ends; at massless dofs the static balances at its ends."""
         found = (structure.residual_force.copy(), structure.residual_force.copy())
         for force, at in zip(found, (structure.old, structure.now), strict=True):
-            static = _own_forces(structure, at) - at.surface
+            static = self._own_forces(structure, at) - at.surface
             force[structure.massless] = static[structure.massless]
         return found
 
@@ -173,16 +207,9 @@ class Dynamics:
         return (self.scheme.alpha_m, self.scheme.alpha_f) != (0.5, 0.5)
 
     def kinetic_energy(self, structure: Moving) -> float:
-        v = structure.now.v
-        return 0.5 * structure.comm.allreduce(float(v @ times(structure.mass, v)))
-
-
-def _own_forces(structure: Moving, at: Instant) -> Array:
-    return at.internal - at.loads - at.constraint + _damping_force(structure, at.v)
-
-
-def _damping_force(structure: Moving, v: Array) -> Array:
-    return np.zeros_like(v) if structure.damping is None else times(structure.damping, v)
+        v, rigid, frame = structure.now.v, structure.rigid, structure.frame
+        energy = 0.5 * structure.comm.allreduce(float(v @ times(structure.mass, v)))
+        return energy if rigid is None or frame is None else energy + rigid.energy(frame, v)
 
 
 def _initial_stiffness(structure: Moving) -> PETSc.Mat:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
@@ -28,7 +28,9 @@ from solvers.structure.deformation import flown_off, inverted, largest_extent
 from solvers.structure.energy import EnergyBalance, EnergySentinel
 from solvers.structure.held import Held
 from solvers.structure.instant import Instant
-from solvers.structure.massless import mass_matrices
+from solvers.structure.massless import without_mass
+from solvers.structure.pieces import pieces
+from solvers.structure.rigid_inertia import Frame, Momenta, RigidInertia
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.saved import restore_state, saved_state
 from solvers.structure.solid_solver import SolidSolver
@@ -60,6 +62,8 @@ class Structure:
         self._constrained = None if contact is None else ConstrainedDofs(self.layout, contact)
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
+        self.frame: Frame | None = None
+        self.momenta: Momenta | None = None
         self.current = Step(0.0, 0.0)  #: the present step, or the last one
         self.energy = EnergyBalance()
         self.energy_sentinel = EnergySentinel(
@@ -106,13 +110,35 @@ class Structure:
         return self.time.massless(self)
 
     @cached_property
-    def _masses(self) -> list[tuple[PETSc.Mat, PETSc.Mat | None]]:
-        return mass_matrices(self)
+    def _all_mass(self) -> PETSc.Mat:
+        return block_diagonal([body.mass() for body in self.bodies])
+
+    @cached_property
+    def _moves_mass(self) -> bool:
+        return self.comm.allreduce(bool(len(self.massless)), op=MPI.LOR)
+
+    @cached_property
+    def pieces(self) -> tuple[NDArray[np.int64], int]:
+        """(number of the connected piece of each owned node, count of all pieces)."""
+        return pieces(self.bodies)
 
     @cached_property
     def mass(self) -> PETSc.Mat:
-        """Mass matrix of all bodies [kg]."""
-        return block_diagonal([mass for mass, _ in self._masses])
+        """Mass matrix of all bodies [kg], without that of massless dofs."""
+        if not self._moves_mass:
+            return self._all_mass
+        massless = np.zeros(self.layout.size, dtype=bool)
+        massless[self.massless] = True
+        return without_mass(self._all_mass, massless, *self.pieces)
+
+    @cached_property
+    def rigid(self) -> RigidInertia | None:
+        """What `mass` lacks for rigid motion; None if no dofs are massless."""
+        if not self._moves_mass:
+            return None
+        points = np.concatenate([body.points[: self.dim, : body.owned].T for body in self.bodies])
+        turns = np.repeat([not body.linear for body in self.bodies], [body.owned for body in self.bodies])
+        return RigidInertia(self.comm, self._all_mass, self.mass, points, self.pieces, turns)
 
     @cached_property
     def damping(self) -> PETSc.Mat | None:
@@ -127,9 +153,6 @@ class Structure:
             for target, value in ((u, body.initial_displacement), (v, body.initial_velocity)):
                 if value is not None:
                     target[:] = body.nodal(value, t)[: body.owned].ravel()
-        for body, (_, moved) in zip(self.bodies, self._masses, strict=True):
-            if moved is not None:
-                body.move_mass(moved)  # gravity acts on the moved mass
         self.current = Step(t, dt)
         self._assemble_bodies()
         if self.constraint is not None and self._constrained is not None:
@@ -184,6 +207,9 @@ class Structure:
         for body in self.bodies:
             body.element.begin_step()
         self.current = Step(t + dt, dt)
+        if self.rigid is not None:
+            old = self.old
+            self.momenta = self.rigid.momenta(old.u, old.v, old.a, old.rigid)
         self.rounding = self._tangent = self._imposed = (
             None  # not part of the saved state: a resumed run must start alike
         )
@@ -256,6 +282,18 @@ class Structure:
             body.set_displacement(u)
             internal[:] = body.internal_force()
             loads[:] = body.external_force(self.current.t)
+        if self.rigid is not None:
+            self.frame = self.rigid.frame(now.u)
+            if any(body.gravity for body in self.bodies):
+                now.loads += self.rigid.weight(self.frame, self._gravity(self.current.t))
+
+    def _gravity(self, t: float) -> Array:
+        """Acceleration [m/s^2] at owned dofs."""
+        parts = [
+            body.nodal(body.gravity, t)[: body.owned].ravel() if body.gravity else np.zeros(body.size)
+            for body in self.bodies
+        ]
+        return np.concatenate(parts)
 
     def _assemble_constraint(self) -> None:
         if self.constraint is not None and self._constrained is not None:
@@ -269,6 +307,7 @@ class Structure:
         with self.timer("contact"):
             self._assemble_constraint()
         self.now.v, self.now.a = self.time.motion(self, self.current.dt)
+        self.now.rigid = self.time.rigid_force(self, self.current.dt)
         self.residual_force = self.time.balance(self)
         missed = 0.0 if self.constraint is None else self.constraint.violation(self.time.force_weight)
         return float(np.hypot(self.norm(self.held.free_part(self.residual_force)), missed))
@@ -286,8 +325,11 @@ class Structure:
         """
         change = self.row_transformation() if self._touching else None
         taken, imposed = None, self._imposed
+        added = self.added_product()
         self._x.array[:] = self.missing_displacement()
         self._b.array[:] = self.right_side()
+        if added is not None:
+            self._b.array[:] -= added(self._x.array)
         if keep and change is None and imposed is not None and not self.norm(self._x.array):
             matrix = imposed
             self._b.array[:] = self.held.free_part(self._b.array)
@@ -301,12 +343,21 @@ class Structure:
         symmetric, enough = (self._symmetric, 0.0) if change is None else (False, reduction)
         try:
             with self.timer("solve"):
-                self.solver.solve(matrix, self._b, self._x, self._attach_modes, symmetric=symmetric, reduction=enough)
+                self.solver.solve(
+                    matrix, self._b, self._x, self._attach_modes, symmetric=symmetric, reduction=enough, added=added
+                )
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         if taken is not None:
             self.recover(taken, gather(self.comm, self._x.array))
         return self.update(self._x.array)
+
+    def added_product(self) -> Callable[[Array], Array] | None:
+        """The part of the tangent that `linearise` lacks, as a product with owned dofs: of the inertia `rigid`."""
+        rigid, frame, factor = self.rigid, self.frame, self.time.rigid_factor(self.current.dt)
+        if rigid is None or frame is None or not factor:
+            return None
+        return lambda du: factor * self.held.free_part(rigid.times(frame, du))
 
     @property
     def _touching(self) -> bool:

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array
-from solvers.structure.instant import Moving, times
+from solvers.blocks import times
+from solvers.structure.instant import Moving
 from solvers.structure.time_scheme import Statics
 
 
@@ -19,8 +20,15 @@ class SmoothAcceleration(Statics):
         a[structure.massless] = 0.0
         return structure.now.v, a
 
+    def rigid_force(self, structure: Moving, dt: float) -> Array:
+        now, rigid, frame = structure.now, structure.rigid, structure.frame
+        return now.rigid if rigid is None or frame is None else rigid.force_by_acceleration(frame, now.v, now.a)
+
+    def rigid_factor(self, dt: float) -> float:
+        return 1.0 / dt**2
+
     def balance(self, structure: Moving) -> Array:
-        force = self.reaction(structure) + times(structure.mass, structure.now.a)
+        force = self.reaction(structure) + times(structure.mass, structure.now.a) + structure.now.rigid
         return force if structure.damping is None else force + times(structure.damping, structure.now.v)
 
     def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat:

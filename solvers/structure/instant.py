@@ -16,6 +16,7 @@ from solvers.constraint import Constraint
 from solvers.step import Step
 from solvers.structure.body import Body
 from solvers.structure.held import Held
+from solvers.structure.rigid_inertia import Frame, Momenta, RigidInertia
 
 
 @dataclass
@@ -29,6 +30,7 @@ class Instant:
     loads: Array  #: loads of its own [N]
     surface: Array  #: load by another field [N]
     constraint: Array  #: contact force [N]
+    rigid: Array  #: inertia force [N] that the moved mass lacks, see `rigid_inertia.py`
 
     @classmethod
     def zeros(cls, size: int) -> Instant:
@@ -62,19 +64,24 @@ class Moving(Protocol):
         ...
 
     @property
-    def mass(self) -> PETSc.Mat:
-        """Mass matrix of all bodies [kg]."""
+    def pieces(self) -> tuple[NDArray[np.int64], int]:
+        """(number of the connected piece of each owned node, count of all pieces)."""
         ...
+
+    @property
+    def mass(self) -> PETSc.Mat:
+        """Mass matrix of all bodies [kg], without that of massless dofs."""
+        ...
+
+    @property
+    def rigid(self) -> RigidInertia | None:
+        """What `mass` lacks for rigid motion; None if no dofs are massless."""
+        ...
+
+    frame: Frame | None  #: of `rigid` at the present iterate
+    momenta: Momenta | None  #: of `rigid` at the start of the step
 
     @property
     def damping(self) -> PETSc.Mat | None:
         """Damping matrix [N s/m] of all bodies, None without damping."""
         ...
-
-
-def times(matrix: PETSc.Mat, array: Array) -> Array:
-    """Product of a matrix and an array of owned dofs (collective)."""
-    x, y = matrix.createVecs()
-    x.array[:] = array
-    matrix.mult(x, y)
-    return y.array

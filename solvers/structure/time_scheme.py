@@ -54,6 +54,14 @@ class TimeScheme(Protocol):
         """(velocity [m/s], acceleration [m/s^2]) for the present displacement in a step of length dt."""
         ...
 
+    def rigid_force(self, structure: Moving, dt: float) -> Array:
+        """The inertia force [N] that the moved mass lacks, for the present motion in a step of length dt."""
+        ...
+
+    def rigid_factor(self, dt: float) -> float:
+        """Derivative of this force in the balance by the mass that is lacking times the displacement [1/s^2]."""
+        ...
+
     def balance(self, structure: Moving) -> Array:
         """The residual [N] at the present iterate."""
         ...
@@ -83,7 +91,7 @@ class TimeScheme(Protocol):
         ...
 
     def kinetic_energy(self, structure: Moving) -> float:
-        """v.M v / 2 [J]."""
+        """Kinetic energy [J]."""
         ...
 
     @property
@@ -111,6 +119,12 @@ class Statics:
 
     def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
         return structure.now.v, structure.now.a
+
+    def rigid_force(self, structure: Moving, dt: float) -> Array:
+        return structure.now.rigid
+
+    def rigid_factor(self, dt: float) -> float:
+        return 0.0
 
     def balance(self, structure: Moving) -> Array:
         return self.reaction(structure)

@@ -9,6 +9,7 @@ from test_contact_friction_run import SLIDING
 from fsci import shapes
 from fsci.case import CaseError, load_case
 from fsci.run.run import run_case
+from solvers.blocks import times
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.surface import Surface
@@ -17,9 +18,9 @@ from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
 from solvers.structure.dynamics import Damping, Dynamics
-from solvers.structure.instant import times
 from solvers.structure.loads import Pressure, Traction
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
+from solvers.structure.probes import of_bodies
 
 TIGHT = SolverSettings(Tolerance(residual=1e-12, residual_absolute=1e-13), linear="direct")
 TRAPEZOIDAL = GeneralisedAlpha.from_rho_inf(1.0)
@@ -27,10 +28,7 @@ FAR = Surface("wall", np.array([[9.0, 9.0], [9.0, -9.0]]), np.array([[0, 1]]), "
 
 
 def momentum(structure):
-    x, y = structure.mass.createVecs()
-    x.array[:] = structure.now.v
-    structure.mass.mult(x, y)
-    return y.array.reshape(-1, structure.dim).sum(axis=0)
+    return list(of_bodies(structure, structure.bodies, "momentum")().values())
 
 
 def advance(structure, dt, steps):

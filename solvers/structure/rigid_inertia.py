@@ -1,0 +1,232 @@
+"""Inertia of rigid motion of bodies whose mass is not where their material is.
+
+Massless contact surfaces (`massless.py`) change the centre of mass and the moments of inertia of a body. Here each
+connected piece gets the difference back, as that of a rigid body without mass that it carries along. Let M' be the
+matrix of the moved mass, c' its centre, r = x - c', and I' = int (|r|^2 1 - r r^T) dm' its inertia. As a rigid body the
+piece has the velocity
+
+    V = sum M' v / m,    omega = I'^-1 sum M' r x v.
+
+The difference has the first moment m d, where c' + d is the true centre, and the inertia K about c'. Both are turned
+from the reference by the rotation R that fits the nodes with mass best:
+
+    momenta  H = omega x m d,    h = K omega          energy  V . H + omega . K omega / 2
+    force    A = dH/dt,          couple about c'  B = dh/dt + m d x dV/dt
+    forces on nodes  f = M' (A / m + (I'^-1 B) x r)
+
+f has the resultants A and B, and its power is A . V + B . omega. Together with M' a the inertia of all rigid motions is
+that of the true mass; other motions have that of M' alone. The energy of both together is never negative:
+
+    v.M'v / 2 >= m |V|^2 / 2 + omega . I' omega / 2,    m |V + omega x d|^2 / 2 + omega . (I' + K - K_d) omega / 2,
+
+K_d the inertia of a mass m at d. The rates of H and h follow the rule of the time scheme for velocities, v_{n+1} =
+v_n + dt ((1 - gamma) a_n + gamma a_{n+1}), so that the momenta of the whole are conserved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from solvers.api import Array
+from solvers.blocks import times
+
+#: Moments below this share of those of the whole piece are rounding errors.
+NO_DIFFERENCE = 1e-12
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The frames of the pieces at one displacement. Vectors have three components, in 2D, too."""
+
+    arms: Array  #: r [m] of owned nodes, shape (n, 3)
+    moments: Array  #: M' r [kg m], shape (n, 3)
+    compliance: Array  #: I'^-1 [1/(kg m^2)], shape (pieces, 3, 3); in 2D of rotations in the plane
+    first: Array  #: m d [kg m], shape (pieces, 3)
+    second: Array  #: K [kg m^2], shape (pieces, 3, 3)
+
+
+@dataclass(frozen=True)
+class Momenta:
+    """H and h of the pieces, and their rates; shape (pieces, 3)."""
+
+    frame: Frame
+    linear: Array  #: H [kg m/s]
+    angular: Array  #: h [kg m^2/s]
+    force: Array  #: dH/dt [N]
+    couple: Array  #: dh/dt [N m]
+
+
+class RigidInertia:
+    """What the inertia of the true mass has more than that of the moved mass, for rigid motion of each piece."""
+
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        true: PETSc.Mat,
+        moved: PETSc.Mat,
+        points: Array,
+        pieces: tuple[NDArray[np.int64], int],
+        turns: NDArray[np.bool_],
+    ):
+        """true, moved: mass matrices [kg] of all bodies. Of owned nodes: points, their reference positions [m], shape
+        (n, dim); pieces, the number of each, shape (n,), and their count; turns, whether they have large displacements,
+        shape (n,) (collective).
+        """
+        self._comm, self._true, self._moved = comm, true, moved
+        self._piece, self._count = piece, _ = pieces
+        self._dim, self._turns = points.shape[1], turns
+        self._points = self._in_space(points.ravel())
+        self._large = self._sums(turns[:, None].astype(float)) > 0.0
+        ones = np.ones_like(self._points)
+        self._weights, true_weights = (self._scalar(matrix, ones)[:, :1] for matrix in (moved, true))
+        self.mass = self._sums(self._weights)  #: [kg], shape (pieces, 1)
+        self._reference = r = self._points - self._means(self._points)[piece]
+        weighted = [self._scalar(matrix, r) for matrix in (true, moved)]
+        total, own = (self._sums(_outer(r, values)) for values in weighted)
+        first, size = self._sums(true_weights * r), np.trace(total, axis1=1, axis2=2)[:, None]
+        self._first = np.where(np.abs(first) > NO_DIFFERENCE * np.sqrt(self.mass * size), first, 0.0)
+        changed = np.abs(total - own) > NO_DIFFERENCE * size[:, None]
+        self._second = np.where(changed, total - own, 0.0)  # int r r^T of the difference
+
+    # ------------------------------------------------------------------------------------------------ geometry
+
+    def frame(self, u: Array) -> Frame:
+        """The frames at the displacement u [m] of owned dofs (collective)."""
+        x = self._points + self._turns[:, None] * self._in_space(u)
+        arms = x - self._means(x)[self._piece]
+        moments = self._scalar(self._moved, arms)
+        spread = self._sums(_outer(arms, moments))
+        turned = self._sums(_outer(moments, self._reference))
+        R = np.tile(np.eye(3), (self._count, 1, 1))
+        R[:, : self._dim, : self._dim] = _rotation(turned[:, : self._dim, : self._dim])
+        second = self._planar(_inertia(R @ self._second @ R.transpose(0, 2, 1)))
+        inertia = _inertia(spread)
+        return Frame(arms, moments, self._inverse(inertia), _apply(R, self._first), second)
+
+    def _inverse(self, inertia: Array) -> Array:
+        if self._dim == 3:
+            return np.linalg.inv(inertia)
+        found = np.zeros_like(inertia)
+        found[:, 2, 2] = 1.0 / inertia[:, 2, 2]
+        return found
+
+    def _planar(self, tensor: Array) -> Array:
+        """In 2D of rotations in the plane alone."""
+        if self._dim == 2:
+            tensor[:, :2], tensor[:, 2, :2] = 0.0, 0.0
+        return tensor
+
+    # --------------------------------------------------------------------------------------------------- motion
+
+    def velocities(self, frame: Frame, v: Array) -> tuple[Array, Array]:
+        """(V [m/s], omega [1/s]) of the velocity v of owned dofs, shape (pieces, 3) (collective)."""
+        w = self._in_space(v)
+        sums = self._sums(np.hstack([self._weights * w, np.cross(frame.moments, w)]))
+        return sums[:, :3] / self.mass, _apply(frame.compliance, sums[:, 3:])
+
+    def energy(self, frame: Frame, v: Array) -> float:
+        """V . H + omega . K omega / 2 [J] (collective)."""
+        V, omega = self.velocities(frame, v)
+        linear, angular = self._momenta(frame, omega)
+        return float(np.sum(V * linear) + 0.5 * np.sum(omega * angular))
+
+    def _momenta(self, frame: Frame, omega: Array) -> tuple[Array, Array]:
+        return np.cross(omega, frame.first), _apply(frame.second, omega)
+
+    # --------------------------------------------------------------------------------------------------- forces
+
+    def on_nodes(self, frame: Frame, force: Array, couple: Array) -> Array:
+        """Forces [N] on owned dofs with these resultants about c', shape (pieces, 3) (collective)."""
+        spin = _apply(frame.compliance, couple)
+        found = self._weights * (force / self.mass)[self._piece] + np.cross(spin[self._piece], frame.moments)
+        return self._owned(np.asarray(found))
+
+    def times(self, frame: Frame, a: Array) -> Array:
+        """The difference of the mass matrices times a field at owned dofs, as if bodies were at rest (collective)."""
+        V, omega = self.velocities(frame, a)
+        force, couple = self._momenta(frame, omega)
+        return self.on_nodes(frame, force, couple + np.cross(frame.first, V))
+
+    def weight(self, frame: Frame, gravity: Array) -> Array:
+        """What the weight of the moved mass has more than that of the true mass [N] (collective).
+
+        Resultant and couple are those of the true mass. gravity: [m/s^2] at owned dofs.
+        """
+        return times(self._moved, gravity) - times(self._true, gravity) + self.times(frame, gravity)
+
+    def force_by_acceleration(self, frame: Frame, v: Array, a: Array) -> Array:
+        """f [N] of given velocities and accelerations of owned dofs (collective)."""
+        (_, omega), (acceleration, spin) = self.velocities(frame, v), self.velocities(frame, a)
+        spread = self._sums(_outer(self._in_space(v), frame.moments))
+        change = _apply(_inertia(spread + spread.transpose(0, 2, 1)), omega)  # dI'/dt omega
+        spin = spin - np.where(self._large, _apply(frame.compliance, change), 0.0)
+        turning = np.where(self._large, omega, 0.0)
+        force, couple = self._momenta(frame, spin)
+        linear, angular = self._momenta(frame, omega)
+        force, couple = force + np.cross(turning, linear), couple + np.cross(turning, angular)
+        return self.on_nodes(frame, force, couple + np.cross(frame.first, acceleration))
+
+    def momenta(self, u: Array, v: Array, a: Array, force: Array) -> Momenta:
+        """Momenta and their rates from the state of owned dofs; force: f [N] (collective)."""
+        frame, f = self.frame(u), self._in_space(force)
+        linear, angular = self._momenta(frame, self.velocities(frame, v)[1])
+        resultant, couple = np.split(self._sums(np.hstack([f, np.cross(frame.arms, f)])), 2, axis=1)
+        return Momenta(frame, linear, angular, resultant, couple - np.cross(frame.first, self.velocities(frame, a)[0]))
+
+    def force(self, frame: Frame, v: Array, a: Array, before: Momenta, dt: float, gamma: float) -> Array:
+        """f [N] at the end of a step of length dt [s] from the motion of owned dofs there (collective)."""
+        linear, angular = self._momenta(frame, self.velocities(frame, v)[1])
+        force = ((linear - before.linear) / dt - (1.0 - gamma) * before.force) / gamma
+        couple = ((angular - before.angular) / dt - (1.0 - gamma) * before.couple) / gamma
+        return self.on_nodes(frame, force, couple + np.cross(frame.first, self.velocities(frame, a)[0]))
+
+    # ---------------------------------------------------------------------------------------------------- arrays
+
+    def _in_space(self, owned: Array) -> Array:
+        """Vectors of three components from an array of owned dofs, shape (n, 3)."""
+        found = np.zeros((len(self._piece), 3))
+        found[:, : self._dim] = owned.reshape(-1, self._dim)
+        return found
+
+    def _owned(self, vectors: Array) -> Array:
+        return vectors[:, : self._dim].ravel()
+
+    def _scalar(self, matrix: PETSc.Mat, vectors: Array) -> Array:
+        return self._in_space(times(matrix, self._owned(vectors)))
+
+    def _sums(self, values: Array) -> Array:
+        """Sums over the nodes of each piece, shape (pieces, ...) (collective)."""
+        columns = values.reshape(len(values), -1).T
+        sums = np.stack([np.bincount(self._piece, column, self._count) for column in columns], axis=1)
+        return self._comm.allreduce(sums).reshape(self._count, *values.shape[1:])
+
+    def _means(self, vectors: Array) -> Array:
+        return self._sums(self._weights * vectors) / self.mass
+
+
+def _outer(a: Array, b: Array) -> Array:
+    return a[:, :, None] * b[:, None, :]
+
+
+def _apply(tensors: Array, vectors: Array) -> Array:
+    return np.einsum("pij,pj->pi", tensors, vectors)
+
+
+def _inertia(second: Array) -> Array:
+    """tr(S) 1 - S of second moments S."""
+    return np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+
+
+def _rotation(spread: Array) -> Array:
+    """The rotations R that maximise tr(R^T A), shape (pieces, dim, dim).
+
+    Source: W. Kabsch, Acta Cryst. A 32 (1976) 922-923.
+    """
+    left, _, right = np.linalg.svd(spread)
+    left[:, :, -1] *= np.sign(np.linalg.det(left @ right))[:, None]
+    return left @ right
