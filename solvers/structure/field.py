@@ -207,9 +207,8 @@ class Structure:
         for body in self.bodies:
             body.element.begin_step()
         self.current = Step(t + dt, dt)
-        if self.rigid is not None:
-            old = self.old
-            self.momenta = self.rigid.momenta(old.u, old.v, old.a, old.rigid)
+        if self.rigid is not None and self.frame is not None:
+            self.momenta = self.rigid.momenta(self.frame, self.old.v, self.old.a, self.old.rigid)
         self.rounding = self._tangent = self._imposed = (
             None  # not part of the saved state: a resumed run must start alike
         )
@@ -282,10 +281,14 @@ class Structure:
             body.set_displacement(u)
             internal[:] = body.internal_force()
             loads[:] = body.external_force(self.current.t)
-        if self.rigid is not None:
-            self.frame = self.rigid.frame(now.u)
-            if any(body.gravity for body in self.bodies):
-                now.loads += self.rigid.weight(self.frame, self._gravity(self.current.t))
+        frame, heavy = self.find_frame(), any(body.gravity for body in self.bodies)
+        if heavy and self.rigid is not None and frame is not None:
+            now.loads += self.rigid.weight(frame, self._gravity(self.current.t))
+
+    def find_frame(self) -> Frame | None:
+        """Set `frame` at the present displacement."""
+        self.frame = None if self.rigid is None else self.rigid.frame(self.now.u)
+        return self.frame
 
     def _gravity(self, t: float) -> Array:
         """Acceleration [m/s^2] at owned dofs."""

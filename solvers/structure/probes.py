@@ -129,8 +129,8 @@ def _mass(structure: Structure, bodies: Sequence[Body]) -> float:
 
 def _momenta(structure: Structure) -> Array:
     """Momentum [kg m/s] of the nodes, with that of massless ones on the others."""
-    momenta, rigid = times(structure.mass, structure.now.v), structure.rigid
-    return momenta if rigid is None else momenta + rigid.times(rigid.frame(structure.now.u), structure.now.v)
+    momenta, rigid, frame = times(structure.mass, structure.now.v), structure.rigid, structure.frame
+    return momenta if rigid is None or frame is None else momenta + rigid.times(frame, structure.now.v)
 
 
 def _positions(structure: Structure) -> Array:
@@ -139,10 +139,9 @@ def _positions(structure: Structure) -> Array:
 
 
 def _centre(structure: Structure, bodies: Sequence[Body]) -> dict[str, float]:
-    moments, rigid = times(structure.mass, _positions(structure)), structure.rigid
-    if rigid is not None:
-        first = rigid.frame(structure.now.u).first
-        moments = moments + rigid.on_nodes(rigid.frame(structure.now.u), first, np.zeros_like(first))
+    moments, rigid, frame = times(structure.mass, _positions(structure)), structure.rigid, structure.frame
+    if rigid is not None and frame is not None:
+        moments = moments + rigid.on_nodes(frame, frame.first, np.zeros_like(frame.first))
     return _components(_sums(structure, bodies, moments) / _mass(structure, bodies))
 
 

@@ -34,6 +34,7 @@ from petsc4py import PETSc
 
 from solvers.api import Array
 from solvers.blocks import times
+from solvers.sparse import Sparse, sparse_from_entries
 
 #: Moments below this share of those of the whole piece are rounding errors.
 NO_DIFFERENCE = 1e-12
@@ -44,7 +45,8 @@ class Frame:
     """The frames of the pieces at one displacement. Vectors have three components, in 2D, too."""
 
     arms: Array  #: r [m] of owned nodes, shape (n, 3)
-    moments: Array  #: M' r [kg m], shape (n, 3)
+    modes: Sparse  #: M' e_k [kg] and M' e_k x r [kg m] at owned dofs, shape (n dim, 6 pieces)
+    projection: Sparse  #: its transpose
     compliance: Array  #: I'^-1 [1/(kg m^2)], shape (pieces, 3, 3); in 2D of rotations in the plane
     first: Array  #: m d [kg m], shape (pieces, 3)
     second: Array  #: K [kg m^2], shape (pieces, 3, 3)
@@ -78,79 +80,87 @@ class RigidInertia:
         shape (n,) (collective).
         """
         self._comm, self._true, self._moved = comm, true, moved
-        self._piece, self._count = piece, _ = pieces
-        self._dim, self._turns = points.shape[1], turns
-        self._points = self._in_space(points.ravel())
+        self._piece, self._count = piece, count = pieces
+        n, self._dim = points.shape
+        self._turns, self._points = turns, self._in_space(points.ravel())
+        self._gather = sparse_from_entries(piece, np.arange(n), np.ones(n), (count, n))
         self._large = self._sums(turns[:, None].astype(float)) > 0.0
         ones = np.ones_like(self._points)
         self._weights, true_weights = (self._scalar(matrix, ones)[:, :1] for matrix in (moved, true))
         self.mass = self._sums(self._weights)  #: [kg], shape (pieces, 1)
-        self._reference = r = self._points - self._means(self._points)[piece]
-        weighted = [self._scalar(matrix, r) for matrix in (true, moved)]
-        total, own = (self._sums(_outer(r, values)) for values in weighted)
+        self._reference = r = self._points - (self._sums(self._weights * self._points) / self.mass)[piece]
+        total, own = (self._sums(_outer(r, self._scalar(matrix, r))) for matrix in (true, moved))
         first, size = self._sums(true_weights * r), np.trace(total, axis1=1, axis2=2)[:, None]
         self._first = np.where(np.abs(first) > NO_DIFFERENCE * np.sqrt(self.mass * size), first, 0.0)
         changed = np.abs(total - own) > NO_DIFFERENCE * size[:, None]
         self._second = np.where(changed, total - own, 0.0)  # int r r^T of the difference
+        self._number_modes()
 
     # ------------------------------------------------------------------------------------------------ geometry
 
     def frame(self, u: Array) -> Frame:
         """The frames at the displacement u [m] of owned dofs (collective)."""
         x = self._points + self._turns[:, None] * self._in_space(u)
-        arms = x - self._means(x)[self._piece]
-        moments = self._scalar(self._moved, arms)
-        spread = self._sums(_outer(arms, moments))
-        turned = self._sums(_outer(moments, self._reference))
+        moments = self._scalar(self._moved, x)
+        centre = (self._sums(moments) / self.mass)[self._piece]
+        arms, moments = x - centre, moments - self._weights * centre
+        products = self._sums(np.stack([_outer(arms, moments), _outer(moments, self._reference)], axis=1))
+        spread, turned = products[:, 0], products[:, 1]
         R = np.tile(np.eye(3), (self._count, 1, 1))
         R[:, : self._dim, : self._dim] = _rotation(turned[:, : self._dim, : self._dim])
-        second = self._planar(_inertia(R @ self._second @ R.transpose(0, 2, 1)))
-        inertia = _inertia(spread)
-        return Frame(arms, moments, self._inverse(inertia), _apply(R, self._first), second)
+        inertia, second = _inertia(spread), _inertia(R @ self._second @ R.transpose(0, 2, 1))
+        if self._dim == 2:  # of rotations in the plane alone
+            second[:, :2], second[:, 2, :2] = 0.0, 0.0
+            compliance = np.zeros_like(inertia)
+            compliance[:, 2, 2] = 1.0 / inertia[:, 2, 2]
+        else:
+            compliance = np.linalg.inv(inertia)
+        return Frame(arms, *self._modes(moments), compliance, _apply(R, self._first), second)
 
-    def _inverse(self, inertia: Array) -> Array:
-        if self._dim == 3:
-            return np.linalg.inv(inertia)
-        found = np.zeros_like(inertia)
-        found[:, 2, 2] = 1.0 / inertia[:, 2, 2]
-        return found
+    def _number_modes(self) -> None:
+        """The pattern of the modes: at component k of a node e_k, and those e_j x r that have this component."""
+        turning = [(1, 2), (0, 2), (0, 1)] if self._dim == 3 else [(2,), (2,)]
+        columns = np.array([[k, *(3 + j for j in axes)] for k, axes in enumerate(turning)])
+        indices = (6 * self._piece[:, None, None] + columns).astype(np.int32)
+        rows, width = indices.shape[0] * indices.shape[1], indices.shape[2]
+        indptr = np.arange(rows + 1, dtype=np.int32) * np.int32(width)
+        self._pattern = indices.ravel(), indptr
+        self._shape = rows, 6 * self._count
+        numbered = Sparse(np.arange(indices.size, dtype=float), *self._pattern, self._shape).T
+        self._transposed, self._order = (numbered.indices, numbered.indptr), numbered.data.astype(np.int64)
 
-    def _planar(self, tensor: Array) -> Array:
-        """In 2D of rotations in the plane alone."""
-        if self._dim == 2:
-            tensor[:, :2], tensor[:, 2, :2] = 0.0, 0.0
-        return tensor
+    def _modes(self, moments: Array) -> tuple[Sparse, Sparse]:
+        """The modes and their transpose."""
+        w, (x, y, z) = self._weights[:, 0], moments.T
+        parts = [w, -y, w, x] if self._dim == 2 else [w, z, -y, w, -z, x, w, y, -x]
+        data = np.stack(parts, axis=1).ravel()
+        modes = Sparse(data, *self._pattern, self._shape)
+        return modes, Sparse(data[self._order], *self._transposed, self._shape[::-1])
 
     # --------------------------------------------------------------------------------------------------- motion
 
     def velocities(self, frame: Frame, v: Array) -> tuple[Array, Array]:
         """(V [m/s], omega [1/s]) of the velocity v of owned dofs, shape (pieces, 3) (collective)."""
-        w = self._in_space(v)
-        sums = self._sums(np.hstack([self._weights * w, np.cross(frame.moments, w)]))
+        sums = self._summed(frame.projection @ v).reshape(-1, 6)
         return sums[:, :3] / self.mass, _apply(frame.compliance, sums[:, 3:])
 
     def energy(self, frame: Frame, v: Array) -> float:
         """V . H + omega . K omega / 2 [J] (collective)."""
         V, omega = self.velocities(frame, v)
-        linear, angular = self._momenta(frame, omega)
+        linear, angular = _momenta(frame, omega)
         return float(np.sum(V * linear) + 0.5 * np.sum(omega * angular))
-
-    def _momenta(self, frame: Frame, omega: Array) -> tuple[Array, Array]:
-        return np.cross(omega, frame.first), _apply(frame.second, omega)
 
     # --------------------------------------------------------------------------------------------------- forces
 
     def on_nodes(self, frame: Frame, force: Array, couple: Array) -> Array:
-        """Forces [N] on owned dofs with these resultants about c', shape (pieces, 3) (collective)."""
-        spin = _apply(frame.compliance, couple)
-        found = self._weights * (force / self.mass)[self._piece] + np.cross(spin[self._piece], frame.moments)
-        return self._owned(np.asarray(found))
+        """Forces [N] on owned dofs with these resultants about c', shape (pieces, 3)."""
+        return frame.modes @ np.hstack([force / self.mass, _apply(frame.compliance, couple)]).ravel()
 
     def times(self, frame: Frame, a: Array) -> Array:
         """The difference of the mass matrices times a field at owned dofs, as if bodies were at rest (collective)."""
         V, omega = self.velocities(frame, a)
-        force, couple = self._momenta(frame, omega)
-        return self.on_nodes(frame, force, couple + np.cross(frame.first, V))
+        force, couple = _momenta(frame, omega)
+        return self.on_nodes(frame, force, couple + _cross(frame.first, V))
 
     def weight(self, frame: Frame, gravity: Array) -> Array:
         """What the weight of the moved mass has more than that of the true mass [N] (collective).
@@ -162,28 +172,28 @@ class RigidInertia:
     def force_by_acceleration(self, frame: Frame, v: Array, a: Array) -> Array:
         """f [N] of given velocities and accelerations of owned dofs (collective)."""
         (_, omega), (acceleration, spin) = self.velocities(frame, v), self.velocities(frame, a)
-        spread = self._sums(_outer(self._in_space(v), frame.moments))
+        spread = self._sums(_outer(self._in_space(times(self._moved, v)), frame.arms))
         change = _apply(_inertia(spread + spread.transpose(0, 2, 1)), omega)  # dI'/dt omega
         spin = spin - np.where(self._large, _apply(frame.compliance, change), 0.0)
         turning = np.where(self._large, omega, 0.0)
-        force, couple = self._momenta(frame, spin)
-        linear, angular = self._momenta(frame, omega)
-        force, couple = force + np.cross(turning, linear), couple + np.cross(turning, angular)
-        return self.on_nodes(frame, force, couple + np.cross(frame.first, acceleration))
+        force, couple = _momenta(frame, spin)
+        linear, angular = _momenta(frame, omega)
+        force, couple = force + _cross(turning, linear), couple + _cross(turning, angular)
+        return self.on_nodes(frame, force, couple + _cross(frame.first, acceleration))
 
-    def momenta(self, u: Array, v: Array, a: Array, force: Array) -> Momenta:
+    def momenta(self, frame: Frame, v: Array, a: Array, force: Array) -> Momenta:
         """Momenta and their rates from the state of owned dofs; force: f [N] (collective)."""
-        frame, f = self.frame(u), self._in_space(force)
-        linear, angular = self._momenta(frame, self.velocities(frame, v)[1])
-        resultant, couple = np.split(self._sums(np.hstack([f, np.cross(frame.arms, f)])), 2, axis=1)
-        return Momenta(frame, linear, angular, resultant, couple - np.cross(frame.first, self.velocities(frame, a)[0]))
+        linear, angular = _momenta(frame, self.velocities(frame, v)[1])
+        f = self._in_space(force)
+        resultant, couple = np.split(self._sums(np.hstack([f, _cross(frame.arms, f)])), 2, axis=1)
+        return Momenta(frame, linear, angular, resultant, couple - _cross(frame.first, self.velocities(frame, a)[0]))
 
     def force(self, frame: Frame, v: Array, a: Array, before: Momenta, dt: float, gamma: float) -> Array:
         """f [N] at the end of a step of length dt [s] from the motion of owned dofs there (collective)."""
-        linear, angular = self._momenta(frame, self.velocities(frame, v)[1])
+        linear, angular = _momenta(frame, self.velocities(frame, v)[1])
         force = ((linear - before.linear) / dt - (1.0 - gamma) * before.force) / gamma
         couple = ((angular - before.angular) / dt - (1.0 - gamma) * before.couple) / gamma
-        return self.on_nodes(frame, force, couple + np.cross(frame.first, self.velocities(frame, a)[0]))
+        return self.on_nodes(frame, force, couple + _cross(frame.first, self.velocities(frame, a)[0]))
 
     # ---------------------------------------------------------------------------------------------------- arrays
 
@@ -193,20 +203,27 @@ class RigidInertia:
         found[:, : self._dim] = owned.reshape(-1, self._dim)
         return found
 
-    def _owned(self, vectors: Array) -> Array:
-        return vectors[:, : self._dim].ravel()
-
     def _scalar(self, matrix: PETSc.Mat, vectors: Array) -> Array:
-        return self._in_space(times(matrix, self._owned(vectors)))
+        return self._in_space(times(matrix, vectors[:, : self._dim].ravel()))
 
     def _sums(self, values: Array) -> Array:
         """Sums over the nodes of each piece, shape (pieces, ...) (collective)."""
-        columns = values.reshape(len(values), -1).T
-        sums = np.stack([np.bincount(self._piece, column, self._count) for column in columns], axis=1)
-        return self._comm.allreduce(sums).reshape(self._count, *values.shape[1:])
+        sums = self._gather @ values.reshape(len(values), -1)
+        return self._summed(sums).reshape(self._count, *values.shape[1:])
 
-    def _means(self, vectors: Array) -> Array:
-        return self._sums(self._weights * vectors) / self.mass
+    def _summed(self, local: Array) -> Array:
+        return local if self._comm.size == 1 else self._comm.allreduce(local)
+
+
+def _momenta(frame: Frame, omega: Array) -> tuple[Array, Array]:
+    """H and h of the pieces."""
+    return _cross(omega, frame.first), _apply(frame.second, omega)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """np.cross of vectors of three components, several times as fast."""
+    (a1, a2, a3), (b1, b2, b3) = a.T, b.T
+    return np.stack([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1], axis=1)
 
 
 def _outer(a: Array, b: Array) -> Array:
@@ -214,7 +231,7 @@ def _outer(a: Array, b: Array) -> Array:
 
 
 def _apply(tensors: Array, vectors: Array) -> Array:
-    return np.einsum("pij,pj->pi", tensors, vectors)
+    return (tensors @ vectors[:, :, None])[:, :, 0]
 
 
 def _inertia(second: Array) -> Array:

@@ -10,6 +10,7 @@ from solvers.api import Array, State
 from solvers.distributed import Nodal
 from solvers.structure.energy import EnergyBalance
 from solvers.structure.instant import Moving
+from solvers.structure.rigid_inertia import Frame
 from solvers.structure.solid_solver import SolidSolver
 
 
@@ -18,6 +19,10 @@ class Saved(Moving, Protocol):
 
     energy: EnergyBalance
     solver: SolidSolver
+
+    def find_frame(self) -> Frame | None:
+        """Set `frame` at the present displacement."""
+        ...
 
 
 def saved_state(structure: Saved) -> State:
@@ -36,6 +41,7 @@ def restore_state(structure: Saved, state: State) -> None:
         array[:] = from_bodies(structure, state[name])
     for body, u in zip(structure.bodies, structure.layout.split(structure.now.u), strict=True):
         body.set_displacement(u)
+    structure.find_frame()
     structure.energy.restore(state["energy"])
     structure.solver.position = state["linear_solver"]
     if structure.constraint is not None:
