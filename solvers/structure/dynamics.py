@@ -103,7 +103,8 @@ class Dynamics:
         if rigid is None or frame is None:
             ksp.setOperators(matrix)
         else:
-            more = with_product(matrix, lambda a: held.free_part(rigid.times(frame, held.free_part(a))))
+            product = rigid.product(frame)
+            more = with_product(matrix, lambda a: held.free_part(product(held.free_part(a))))
             ksp.setOperators(more, matrix)
         ksp.setType(PETSc.KSP.Type.CG)
         ksp.getPC().setType(PETSc.PC.Type.JACOBI)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from mpi4py import MPI
@@ -328,11 +328,12 @@ class Structure:
         """
         change = self.row_transformation() if self._touching else None
         taken, imposed = None, self._imposed
-        added = self.added_product()
+        added, free = self.added_product(), None
         self._x.array[:] = self.missing_displacement()
         self._b.array[:] = self.right_side()
         if added is not None:
             self._b.array[:] -= added(self._x.array)
+            free = partial(_of_free_part, self.held, added)
         if keep and change is None and imposed is not None and not self.norm(self._x.array):
             matrix = imposed
             self._b.array[:] = self.held.free_part(self._b.array)
@@ -347,7 +348,7 @@ class Structure:
         try:
             with self.timer("solve"):
                 self.solver.solve(
-                    matrix, self._b, self._x, self._attach_modes, symmetric=symmetric, reduction=enough, added=added
+                    matrix, self._b, self._x, self._attach_modes, symmetric=symmetric, reduction=enough, added=free
                 )
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
@@ -360,7 +361,8 @@ class Structure:
         rigid, frame, factor = self.rigid, self.frame, self.time.rigid_factor(self.current.dt)
         if rigid is None or frame is None or not factor:
             return None
-        return lambda du: factor * self.held.free_part(rigid.times(frame, du))
+        product = rigid.product(frame)
+        return lambda du: self.held.free_part(factor * product(du))
 
     @property
     def _touching(self) -> bool:
@@ -461,3 +463,7 @@ class Structure:
     def restore(self, state: State) -> None:
         """Restore a saved state."""
         restore_state(self, state)
+
+
+def _of_free_part(held: Held, product: Callable[[Array], Array], du: Array) -> Array:
+    return product(held.free_part(du))

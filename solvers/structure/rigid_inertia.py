@@ -25,6 +25,7 @@ v_n + dt ((1 - gamma) a_n + gamma a_{n+1}), so that the momenta of the whole are
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -156,11 +157,28 @@ class RigidInertia:
         """Forces [N] on owned dofs with these resultants about c', shape (pieces, 3)."""
         return frame.modes @ np.hstack([force / self.mass, _apply(frame.compliance, couple)]).ravel()
 
+    def product(self, frame: Frame) -> Callable[[Array], Array]:
+        """Function that multiplies fields at owned dofs with the difference of the mass matrices (collective).
+
+        That is f of accelerations a of bodies at rest: M' E N^-1 D N^-1 E^T M' a, E the rigid modes, N = E^T M' E,
+        and D the difference of the true mass from N.
+        """
+        difference, inverse = np.zeros((2, self._count, 6, 6))
+        lever = _cross(frame.first.repeat(3, axis=0), np.tile(np.eye(3), (self._count, 1))).reshape(-1, 3, 3)
+        difference[:, :3, 3:], difference[:, 3:, :3] = lever, lever.transpose(0, 2, 1)
+        difference[:, 3:, 3:] = frame.second
+        inverse[:, :3, :3], inverse[:, 3:, 3:] = np.eye(3) / self.mass[:, :, None], frame.compliance
+        by_sums = inverse @ difference @ inverse
+
+        def times(a: Array) -> Array:
+            sums = self._summed(frame.projection @ a).reshape(-1, 6, 1)
+            return frame.modes @ (by_sums @ sums).ravel()
+
+        return times
+
     def times(self, frame: Frame, a: Array) -> Array:
-        """The difference of the mass matrices times a field at owned dofs, as if bodies were at rest (collective)."""
-        V, omega = self.velocities(frame, a)
-        force, couple = _momenta(frame, omega)
-        return self.on_nodes(frame, force, couple + _cross(frame.first, V))
+        """The difference of the mass matrices times a field at owned dofs (collective)."""
+        return self.product(frame)(a)
 
     def weight(self, frame: Frame, gravity: Array) -> Array:
         """What the weight of the moved mass has more than that of the true mass [N] (collective).
