@@ -40,6 +40,9 @@ class Dynamics:
     Contact surfaces have no mass. Their rows are static balances at n+1, multiplied by 1 - alpha_f. The forces at n are
     left out: they are in equilibrium, and with them contact forces would oscillate without damping. The velocity of
     massless dofs is (u_{n+1} - u_n) / dt.
+
+    A piece that touches with nodes that have mass, as one cell with contact on all sides, is integrated by implicit
+    Euler, M (v_{n+1} - v_n) / dt + f_{n+1} = 0, multiplied by 1 - alpha_f. It loses energy in impacts, and gains none.
     """
 
     scheme: GeneralisedAlpha
@@ -52,10 +55,11 @@ class Dynamics:
 
     # ------------------------------------------------------------------------------------------------- start
 
-    def massless(self, structure: Moving) -> NDArray[np.int64]:
+    def massless(self, structure: Moving) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         if structure.constraint is None:
-            return np.empty(0, dtype=np.int64)
-        return np.flatnonzero(massless_dofs(structure))
+            return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+        massless, impulsive = massless_dofs(structure)
+        return np.flatnonzero(massless), np.flatnonzero(impulsive)
 
     def damping_matrix(self, structure: Moving) -> PETSc.Mat | None:
         if self.damping == Damping():
@@ -127,11 +131,13 @@ class Dynamics:
         return dt * structure.held.free_part(structure.now.v)
 
     def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
-        """Newmark's relations; for massless dofs v = (u_{n+1} - u_n) / dt."""
-        old, massless = structure.old, structure.massless
+        """Newmark's relations; for massless and impulsive dofs v = (u_{n+1} - u_n) / dt."""
+        old, massless, impulsive = structure.old, structure.massless, structure.impulsive
         du = structure.now.u - old.u
         a, v = (rule(du, old.v, old.a, dt) for rule in (self.scheme.acceleration, self.scheme.velocity))
         a[massless], v[massless] = 0.0, du[massless] / dt
+        v[impulsive] = du[impulsive] / dt
+        a[impulsive] = (v - old.v)[impulsive] / dt
         return v, a
 
     def rigid_force(self, structure: Moving, dt: float) -> Array:
@@ -145,18 +151,20 @@ class Dynamics:
 
     def balance(self, structure: Moving) -> Array:
         present, before = (self._own_forces(structure, at) - at.surface for at in (structure.now, structure.old))
-        before[structure.massless] = 0.0
-        return self._inertia(structure) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
+        before[structure.massless] = before[structure.impulsive] = 0.0
+        return self._inertia(structure, 0.0) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
 
     def averaged_load(self, structure: Moving) -> Array:
         present, before = (self._own_forces(structure, at) for at in (structure.now, structure.old))
-        return self._inertia(structure) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
+        alpha = self.scheme.alpha_f
+        return self._inertia(structure, alpha) + (1.0 - alpha) * present + alpha * before
 
-    def _inertia(self, structure: Moving) -> Array:
-        share, now, old = self.scheme.alpha_m, structure.now, structure.old
-        return (
-            times(structure.mass, (1.0 - share) * now.a + share * old.a) + (1.0 - share) * now.rigid + share * old.rigid
-        )
+    def _inertia(self, structure: Moving, old_share: float) -> Array:
+        """The mean force of inertia; old_share: weight of that at the start of the step at impulsive dofs."""
+        share, now, old, impulsive = self.scheme.alpha_m, structure.now, structure.old, structure.impulsive
+        a = (1.0 - share) * now.a + share * old.a
+        a[impulsive] = (1.0 - self.scheme.alpha_f) * now.a[impulsive] + old_share * old.a[impulsive]
+        return times(structure.mass, a) + (1.0 - share) * now.rigid + share * old.rigid
 
     def averaged(self, before: Array, after: Array) -> Array:
         return (1.0 - self.scheme.alpha_f) * after + self.scheme.alpha_f * before
@@ -178,13 +186,19 @@ class Dynamics:
         return at.internal - at.loads - at.constraint + self._damping_force(structure, at)
 
     def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat:
-        """mass_factor M + damping_factor C; in columns of massless dofs (1 - alpha_f) / dt C."""
-        matrix = structure.mass.copy()
-        matrix.scale(self.scheme.mass_factor(dt))
+        """mass_factor M + damping_factor C; in columns of massless and impulsive dofs (1 - alpha_f) / dt C.
+
+        In rows of impulsive dofs (1 - alpha_f) / dt^2 M.
+        """
+        matrix, (slope, factor) = structure.mass.copy(), structure.mass.createVecs()
+        factor.array[:] = self.scheme.mass_factor(dt)
+        factor.array[structure.impulsive] = (1.0 - self.scheme.alpha_f) / dt**2
+        matrix.diagonalScale(factor, None)
         if structure.damping is not None:
-            by_displacement, (slope, _) = structure.damping.copy(), structure.damping.createVecs()
+            by_displacement = structure.damping.copy()
             slope.array[:] = self.scheme.damping_factor(dt)
-            slope.array[structure.massless] = (1.0 - self.scheme.alpha_f) / dt
+            for changed in (structure.massless, structure.impulsive):
+                slope.array[changed] = (1.0 - self.scheme.alpha_f) / dt
             by_displacement.diagonalScale(None, slope)
             matrix.axpy(1.0, by_displacement, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         return matrix
@@ -196,11 +210,13 @@ class Dynamics:
         return dynamic + now.internal - now.external - now.constraint
 
     def support_forces(self, structure: Moving) -> tuple[Array, Array]:
-        """The balance of the step at both ends; at massless dofs the static balances at its ends."""
+        """The balance of the step at both ends; at massless and impulsive dofs those of its ends."""
         found = (structure.residual_force.copy(), structure.residual_force.copy())
         for force, at in zip(found, (structure.old, structure.now), strict=True):
             static = self._own_forces(structure, at) - at.surface
             force[structure.massless] = static[structure.massless]
+            if len(structure.impulsive):
+                force[structure.impulsive] = (static + times(structure.mass, at.a))[structure.impulsive]
         return found
 
     @property

@@ -105,9 +105,18 @@ class Structure:
         return largest_extent(self.comm, self.bodies)
 
     @cached_property
+    def _touching_dofs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        return self.time.massless(self)
+
+    @property
     def massless(self) -> NDArray[np.int64]:
         """Owned dofs without mass."""
-        return self.time.massless(self)
+        return self._touching_dofs[0]
+
+    @property
+    def impulsive(self) -> NDArray[np.int64]:
+        """Owned dofs of pieces that touch with nodes that have mass."""
+        return self._touching_dofs[1]
 
     @cached_property
     def _all_mass(self) -> PETSc.Mat:

@@ -69,6 +69,11 @@ class Moving(Protocol):
         ...
 
     @property
+    def impulsive(self) -> NDArray[np.int64]:
+        """Owned dofs of pieces that touch with nodes that have mass."""
+        ...
+
+    @property
     def mass(self) -> PETSc.Mat:
         """Mass matrix of all bodies [kg], without that of massless dofs."""
         ...

@@ -27,11 +27,12 @@ from solvers.structure.instant import Moving
 NO_EXTENT = 1e-12
 
 
-def massless_dofs(structure: Moving) -> NDArray[np.bool_]:
-    """Mask of the massless owned dofs: those of all contact surfaces (collective).
+def massless_dofs(structure: Moving) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Masks of owned dofs: massless ones, and those of pieces that touch with nodes that have mass (collective).
 
-    The other nodes of a piece must determine its rotation: in 2D there are two of them, in 3D they are not on a line.
-    If they do not, only those of its slave surfaces are massless, or else none.
+    Nodes of all contact surfaces are massless. The other nodes of a piece must determine its rotation: in 2D there are
+    two of them, in 3D they are not on a line. If they do not, only nodes of its slave surfaces are massless. If this is
+    not enough either, as for one cell with contact on all sides, no node of the piece is.
     """
     constraint, layout, dim = structure.constraint, structure.layout, structure.bodies[0].dim
     assert constraint is not None
@@ -47,7 +48,7 @@ def massless_dofs(structure: Moving) -> NDArray[np.bool_]:
         turns = _extent(structure.comm, points, piece, count, ~nodes) > NO_EXTENT * size
         found |= nodes & (undecided & turns)[piece]
         undecided &= ~turns
-    return found.repeat(dim)
+    return found.repeat(dim), undecided[piece].repeat(dim)
 
 
 def _extent(comm: MPI.Comm, points: Array, piece: NDArray[np.int64], count: int, chosen: NDArray[np.bool_]) -> Array:

@@ -34,8 +34,8 @@ class TimeScheme(Protocol):
         """Weight w of the forces at the end of the step in the balance; those at its start have 1 - w."""
         ...
 
-    def massless(self, structure: Moving) -> NDArray[np.int64]:
-        """Owned dofs without mass. Raises NoMassLeft."""
+    def massless(self, structure: Moving) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Owned dofs without mass, and those of pieces that touch with nodes that have mass."""
         ...
 
     def damping_matrix(self, structure: Moving) -> PETSc.Mat | None:
@@ -106,8 +106,8 @@ class Statics:
     force_weight = 1.0
     dissipates = True  #: a state without equilibrium nearby jumps to another one
 
-    def massless(self, structure: Moving) -> NDArray[np.int64]:
-        return np.empty(0, dtype=np.int64)
+    def massless(self, structure: Moving) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
 
     def damping_matrix(self, structure: Moving) -> PETSc.Mat | None:
         return None

@@ -242,6 +242,31 @@ def test_a_thin_block_pulled_through_its_centre_does_not_turn(cells):
     assert ends[0] == pytest.approx(ends[1], abs=2e-4)
 
 
+@pytest.mark.parametrize("cell_type", ["quad", "hexahedron"])
+@pytest.mark.parametrize("rho_inf", [1.0, 0.5])
+def test_one_cell_with_contact_on_all_sides(cell_type, rho_inf):
+    """No node can be massless: it keeps all of its momentum, bounces off a wall, and gains no energy."""
+    dim, time = (2 if cell_type == "quad" else 3), Dynamics(GeneralisedAlpha.from_rho_inf(rho_inf))
+    flies = (constant(1.0), *[constant(0.2)] * (dim - 1))
+    body = make_body("body", block(cell_type, 1), NeoHooke(400.0, 600.0, 2.0), initial_velocity=flies)
+    near = FAR[dim]
+    points = near.points.copy()
+    points[:, 0] = 1.1
+    points[:, 1:] = 20.0 * (points[:, 1:] - 3.0)
+    wall = replace(near, points=points)
+    sides = ["left", "right", "bottom", "top", *(["front", "back"] if dim == 3 else [])]
+    structure, _ = make_contact([body], [(("body", side), wall) for side in sides], time=time, settings=TIGHT)
+    energies, momenta = [], []
+    for _ in advance(structure, 0.005, 80):
+        energies.append(structure.energy.kinetic + structure.energy.internal)
+        momenta.append(probe(structure, "momentum"))
+    assert not len(structure.massless)
+    assert momenta[10] == pytest.approx([2.0, *[0.4] * (dim - 1)], rel=1e-9)
+    assert -2.0 < momenta[-1][0] < -0.5
+    assert momenta[-1][1:] == pytest.approx([0.4] * (dim - 1), rel=1e-9)
+    assert max(energies) < energies[0] * (1.0 + 1e-9)
+
+
 @pytest.mark.parametrize("dim", [2, 3])
 def test_pieces_move_each_for_itself(dim):
     """A body of two pieces: the one that spins does not turn the other, and each keeps its momentum."""
