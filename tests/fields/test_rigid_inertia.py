@@ -22,7 +22,7 @@ from solvers.structure.probes import of_bodies
 TRAPEZOIDAL = Dynamics(GeneralisedAlpha.from_rho_inf(1.0))
 FAR = {
     2: Surface("wall", np.array([[99.0, 9.0], [99.0, -9.0]]), np.array([[0, 1]]), "line", None),
-    3: Surface("wall", np.array([[99.0, 0, 0], [99.0, 9, 0], [99.0, 0, 9]]), np.array([[0, 1, 2]]), "triangle", None),
+    3: Surface("wall", np.array([[99.0, 0, 0], [99.0, 9, 0], [99.0, 0, 9]]), np.array([[0, 2, 1]]), "triangle", None),
 }
 STIFF = StVenantKirchhoff(4e5, 6e5, 2.0)
 
