@@ -27,6 +27,16 @@ class Constraint(Stateful, Protocol):
         """Whether the latest `evaluate` left the active set unchanged."""
         ...
 
+    #: mask of the groups of conditions, as contact pairs, whose surfaces have no mass in dynamics
+    present: NDArray[np.bool_]
+
+    def find_present(self, u: Array, way: float, t: float, dt: float) -> NDArray[np.bool_]:
+        """The groups that may be active in the step from t to t + dt [s].
+
+        u: displacements [m], shape (N, dim); way: by which nodes with these move in the step [m].
+        """
+        ...
+
     def dofs(self) -> NDArray[np.int64]:
         """Global dofs of its nodes, -1 where there are none, shape (N, dim)."""
         ...

@@ -51,7 +51,9 @@ def build_structure(
     linear = case.solver.linear
     settings = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
     try:
-        return Structure(bodies, _time_scheme(case), settings, contact=contact, timer=timer)
+        alone = case.coupling is None
+        time = _time_scheme(case)
+        return Structure(bodies, time, settings, contact=contact, exchanges_mass=alone, timer=timer)
     except SupportError as error:
         supports = case.elastic_bodies[error.body].supports
         index = next(i for i, support in enumerate(supports) if error.where in (support.on or ()))

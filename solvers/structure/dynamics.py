@@ -16,8 +16,9 @@ from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.linear import reason_of
 from solvers.structure.first_state import FirstState
 from solvers.structure.instant import Instant, Moving
+from solvers.structure.mass_exchange import exchange
 from solvers.structure.massless import massless_dofs
-from solvers.structure.time_scheme import Settling
+from solvers.structure.time_scheme import Exchanging, Settling
 
 #: Interval of the finite differences at the start, relative to the first step.
 SHORT = 1e-3
@@ -123,6 +124,28 @@ class Dynamics:
             now.rigid[:] = rigid.force_by_acceleration(frame, now.v, now.a)
 
     # ------------------------------------------------------------------------------------------------- steps
+
+    def prepare(self, structure: Exchanging, t: float, dt: float) -> None:
+        """Exchange mass if other contact pairs may come together in this step."""
+        constraint = structure.constraint
+        if constraint is None or not structure.exchanges_mass:
+            return
+        present = constraint.find_present(structure.at_constraint(structure.now.u), structure.way(dt), t, dt)
+        if np.array_equal(present, constraint.present):
+            return
+
+        def switch() -> None:
+            constraint.present = present
+
+        def settle(lighter: NDArray[np.int64]) -> None:
+            others = np.setdiff1d(np.arange(structure.layout.size), lighter)
+            held = structure.held.stopped(others, structure.now.u)
+            with structure.by(FirstState(lighter, structure.damping), held, t, SHORT * dt):
+                structure.solve()
+
+        exchange(structure, switch, settle)
+        structure.assemble()
+        self._solve_acceleration(structure)
 
     def guess(self, structure: Moving, dt: float) -> Array:
         """Zero, or the velocity times dt."""

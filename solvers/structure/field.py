@@ -52,8 +52,11 @@ class Structure:
         settings: SolverSettings = SolverSettings(),
         *,
         contact: Constraint | None = None,
+        exchanges_mass: bool = False,
         timer: Timer | None = None,
     ):
+        """exchanges_mass: surfaces lose their mass only while their contact pairs are near, else for good."""
+        self.exchanges_mass = exchanges_mass
         self.comm = comm = bodies[0].domain.comm
         self.bodies, self.time, self.settings = list(bodies), time, settings
         self.timer, self.constraint = timer or Timer(), contact
@@ -83,7 +86,7 @@ class Structure:
     def _symmetric(self) -> bool:
         """Whether tangents away from contact are symmetric."""
         # follower pressures have an unsymmetric boundary term, and the velocity of massless nodes has a rule of its own
-        damped = self.constraint is not None and self.damping is not None
+        damped = self._moves_mass and self.damping is not None
         return not (damped or any(body.pressures for body in self.bodies))
 
     @property
@@ -145,9 +148,28 @@ class Structure:
         """What `mass` lacks for rigid motion; None if no dofs are massless."""
         if not self._moves_mass:
             return None
+        return self.all_inertia()
+
+    def all_inertia(self) -> RigidInertia:
+        """The inertia of all pieces, of those with all of their mass, too."""
         points = np.concatenate([body.points[: self.dim, : body.owned].T for body in self.bodies])
         turns = np.repeat([not body.linear for body in self.bodies], [body.owned for body in self.bodies])
         return RigidInertia(self.comm, self._all_mass, self.mass, points, self.pieces, turns)
+
+    def forget_mass(self) -> None:
+        """Find the massless nodes anew, and all that follows from them."""
+        for name in ("_touching_dofs", "_moves_mass", "mass", "rigid", "damping", "_symmetric"):
+            vars(self).pop(name, None)
+        self._assembled_tangent.forget()
+
+    def at_constraint(self, owned: Array) -> Array:
+        """Values at the nodes of the constraint, shape (N, dim) (collective)."""
+        assert self._constrained is not None
+        return self._constrained.at_nodes(owned)
+
+    def way(self, dt: float) -> float:
+        """By how much nodes of the constraint move in a step by their velocity [m] (collective)."""
+        return dt * float(np.abs(self.at_constraint(self.now.v)).max(initial=0.0))
 
     @cached_property
     def damping(self) -> PETSc.Mat | None:
@@ -163,6 +185,9 @@ class Structure:
                 if value is not None:
                     target[:] = body.nodal(value, t)[: body.owned].ravel()
         self.current = Step(t, dt)
+        if self.constraint is not None and self.exchanges_mass:
+            self.constraint.present = self.constraint.find_present(self.at_constraint(self.now.u), self.way(dt), t, dt)
+            self.forget_mass()
         self._assemble_bodies()
         if self.constraint is not None and self._constrained is not None:
             at_nodes, stiffness = self._constrained.at_nodes, self._assembled_tangent.diagonal(t)
@@ -212,6 +237,7 @@ class Structure:
 
     def begin_step(self, t: float, dt: float) -> None:
         """Store the state at t [s] and predict that at t + dt."""
+        self.time.prepare(self, t, dt)
         self.old = self.now.copy()
         for body in self.bodies:
             body.element.begin_step()
@@ -282,6 +308,11 @@ class Structure:
         return self.layout.split(array)
 
     # ---------------------------------------------------------------------------- the system that Newton solves
+
+    def assemble(self) -> None:
+        """Compute forces at the present displacement."""
+        self._assemble_bodies()
+        self._assemble_constraint()
 
     def _assemble_bodies(self) -> None:
         now = self.now

@@ -48,9 +48,21 @@ class Frame:
     arms: Array  #: r [m] of owned nodes, shape (n, 3)
     modes: Sparse  #: M' e_k [kg] and M' e_k x r [kg m] at owned dofs, shape (n dim, 6 pieces)
     projection: Sparse  #: its transpose
+    inertia: Array  #: I' [kg m^2], shape (pieces, 3, 3)
     compliance: Array  #: I'^-1 [1/(kg m^2)], shape (pieces, 3, 3); in 2D of rotations in the plane
     first: Array  #: m d [kg m], shape (pieces, 3)
     second: Array  #: K [kg m^2], shape (pieces, 3, 3)
+
+
+@dataclass(frozen=True)
+class Split:
+    """A motion as rigid ones of the pieces with their true mass, and the rest."""
+
+    velocity: Array  #: of the centre [m/s], shape (pieces, 3)
+    spin: Array  #: angular momentum about the centre [kg m^2/s], shape (pieces, 3)
+    velocities: Array  #: [m/s] at owned dofs besides the rigid motion
+    energy_of_rest: Array  #: kinetic energy [J] of these, shape (pieces,)
+    energy: Array  #: kinetic energy [J] of the whole, shape (pieces,)
 
 
 @dataclass(frozen=True)
@@ -116,7 +128,7 @@ class RigidInertia:
             compliance[:, 2, 2] = 1.0 / inertia[:, 2, 2]
         else:
             compliance = np.linalg.inv(inertia)
-        return Frame(arms, *self._modes(moments), compliance, _apply(R, self._first), second)
+        return Frame(arms, *self._modes(moments), inertia, compliance, _apply(R, self._first), second)
 
     def _number_modes(self) -> None:
         """The pattern of the modes: at component k of a node e_k, and those e_j x r that have this component."""
@@ -150,6 +162,32 @@ class RigidInertia:
         V, omega = self.velocities(frame, v)
         linear, angular = _momenta(frame, omega)
         return float(np.sum(V * linear) + 0.5 * np.sum(omega * angular))
+
+    def split(self, frame: Frame, v: Array) -> Split:
+        """The rigid motion of each piece and the rest, of the velocity v of owned dofs (collective)."""
+        V, omega = self.velocities(frame, v)
+        rigid = V[self._piece] + _cross(omega[self._piece], frame.arms)
+        rest = self._in_space(v) - rigid
+        energy = 0.5 * self._sums((rest * self._scalar(self._moved, rest)).sum(axis=1)[:, None])[:, 0]
+        velocity, spin = V + _cross(omega, frame.first / self.mass), _apply(self._about_centre(frame), omega)
+        whole = energy + 0.5 * (self.mass[:, 0] * (velocity**2).sum(axis=1) + (omega * spin).sum(axis=1))
+        return Split(velocity, spin, rest[:, : self._dim].ravel(), energy, whole)
+
+    def joined(self, frame: Frame, motion: Split, rest: Array) -> Array:
+        """Velocities [m/s] of owned dofs with the rigid motion of `motion` and other velocities `rest`."""
+        inertia, spin = self._about_centre(frame), motion.spin.copy()
+        if self._dim == 2:
+            inertia[:, :2], inertia[:, 2, :2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], 0.0
+            spin[:, :2] = 0.0
+        omega = np.linalg.solve(inertia, spin[:, :, None])[:, :, 0]
+        V = motion.velocity - _cross(omega, frame.first / self.mass)
+        rigid = V[self._piece] + _cross(omega[self._piece], frame.arms)
+        return rest + rigid[:, : self._dim].ravel()
+
+    def _about_centre(self, frame: Frame) -> Array:
+        """Inertia [kg m^2] about the true centre, I' + K - K_d, shape (pieces, 3, 3)."""
+        d = frame.first / self.mass
+        return frame.inertia + frame.second - _inertia(self.mass[:, :, None] * _outer(d, d))
 
     # --------------------------------------------------------------------------------------------------- forces
 

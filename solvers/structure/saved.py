@@ -20,6 +20,10 @@ class Saved(Moving, Protocol):
     energy: EnergyBalance
     solver: SolidSolver
 
+    def forget_mass(self) -> None:
+        """Find the massless nodes anew, and all that follows from them."""
+        ...
+
     def find_frame(self) -> Frame | None:
         """Set `frame` at the present displacement."""
         ...
@@ -41,11 +45,12 @@ def restore_state(structure: Saved, state: State) -> None:
         array[:] = from_bodies(structure, state[name])
     for body, u in zip(structure.bodies, structure.layout.split(structure.now.u), strict=True):
         body.set_displacement(u)
+    if structure.constraint is not None:
+        structure.constraint.restore(state["contact"])
+        structure.forget_mass()
     structure.find_frame()
     structure.energy.restore(state["energy"])
     structure.solver.position = state["linear_solver"]
-    if structure.constraint is not None:
-        structure.constraint.restore(state["contact"])
 
 
 def per_body(structure: Moving, array: Array) -> State:

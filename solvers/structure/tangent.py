@@ -41,6 +41,10 @@ class Tangent:
             self._combined.axpy(1.0, added, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         return self._combined
 
+    def forget(self) -> None:
+        """Compute D anew: mass and damping have changed."""
+        self._dynamic = None
+
     def _write(self, matrix: PETSc.Mat, t: float, weight: float) -> bool:
         """Write the weighted blocks of all bodies into the matrix, with the same entries; False if some has none."""
         parts: list[BlockRows] = []

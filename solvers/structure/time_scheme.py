@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from solvers.api import Array, StepInfo
 from solvers.structure.held import Held
 from solvers.structure.instant import Moving
+from solvers.structure.rigid_inertia import RigidInertia
 
 
 class Settling(Moving, Protocol):
@@ -23,6 +24,32 @@ class Settling(Moving, Protocol):
 
     def solve(self) -> StepInfo:
         """Solve the step. Raises StepFailed."""
+        ...
+
+
+class Exchanging(Settling, Protocol):
+    """A structure whose massless nodes may change between steps."""
+
+    exchanges_mass: bool
+
+    def way(self, dt: float) -> float:
+        """By how much nodes of the constraint move in a step by their velocity [m]."""
+        ...
+
+    def at_constraint(self, owned: Array) -> Array:
+        """Values at the nodes of the constraint, shape (N, dim) (collective)."""
+        ...
+
+    def all_inertia(self) -> RigidInertia:
+        """The inertia of all pieces, of those with all of their mass, too."""
+        ...
+
+    def forget_mass(self) -> None:
+        """Find the massless nodes anew, and all that follows from them."""
+        ...
+
+    def assemble(self) -> None:
+        """Compute forces at the present displacement."""
         ...
 
 
@@ -44,6 +71,10 @@ class TimeScheme(Protocol):
 
     def start(self, structure: Settling, t: float, dt: float) -> None:
         """Set velocity and acceleration at the start."""
+        ...
+
+    def prepare(self, structure: Exchanging, t: float, dt: float) -> None:
+        """Prepare a step from t to t + dt [s], before its start is stored. Raises StepFailed."""
         ...
 
     def guess(self, structure: Moving, dt: float) -> Array:
@@ -113,6 +144,8 @@ class Statics:
         return None
 
     def start(self, structure: Settling, t: float, dt: float) -> None: ...
+
+    def prepare(self, structure: Exchanging, t: float, dt: float) -> None: ...
 
     def guess(self, structure: Moving, dt: float) -> Array:
         return np.zeros(structure.layout.size)
