@@ -119,7 +119,7 @@ class Dynamics:
             finite = np.isfinite(b.norm())
             why = reason_of(ksp) if finite else "a force is not a number"
             raise StepFailed("structure", f"the acceleration at the start cannot be computed ({why})")
-        now.a[:] = x.array
+        now.a[:], now.rigid[:] = x.array, 0.0
         if rigid is not None and frame is not None:
             now.rigid[:] = rigid.force_by_acceleration(frame, now.v, now.a)
 

@@ -186,6 +186,7 @@ class Structure:
                     target[:] = body.nodal(value, t)[: body.owned].ravel()
         self.current = Step(t, dt)
         if self.constraint is not None and self.exchanges_mass:
+            self.constraint.present[:] = False
             self.constraint.present = self.constraint.find_present(self.at_constraint(self.now.u), self.way(dt), t, dt)
             self.forget_mass()
         self._assemble_bodies()
