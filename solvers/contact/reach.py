@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.contact.interface import ContactInterface
 from solvers.contact.law.tied import Tied
+from solvers.contact.surface import Surface
 from solvers.search import Search
 
 #: A step could bring together surfaces whose distance is at most this multiple of the way by velocity, plus this share
@@ -23,26 +24,37 @@ class Reach:
     """Finds the present pairs of an interface; all others are tied or in self contact, and always present."""
 
     def __init__(self, interface: ContactInterface):
-        self._nodes = [(interface.nodes_of(pair.slave), interface.nodes_of(pair.master)) for pair in interface.pairs]
-        self._searches = [
-            None if pair.master is pair.slave or pair.law == Tied() else Search(pair.slave.facets, pair.master.facets)
-            for pair in interface.pairs
-        ]
-        self._edges = [_mean_edge(pair.slave.points, pair.slave.facets) for pair in interface.pairs]
+        self._surfaces = interface.nodes.of_surface
+        self._sides = np.array(
+            [[_index(interface, side) for side in (pair.slave, pair.master)] for pair in interface.pairs]
+        ).reshape(-1, 2)
+        self._watched = np.array([pair.master is not pair.slave and pair.law != Tied() for pair in interface.pairs])
+        self._edges = np.array([_mean_edge(pair.slave.points, pair.slave.facets) for pair in interface.pairs])
+        self._facets = [surface.facets for surface in interface.surfaces]
+        self._searches: dict[int, Search] = {}  # created when the boxes of two surfaces first come near
 
     def find(self, x: Array, way: float, present: NDArray[np.bool_], pressed: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Mask of the pairs that are present in a step that moves nodes by up to `way` [m].
 
         x: positions [m], shape (N, dim); present: the mask of the last step; pressed: nodes with contact forces, (N,).
         """
-        found = np.ones(len(self._searches), dtype=bool)
-        for k, (search, (slave, master)) in enumerate(zip(self._searches, self._nodes, strict=True)):
-            if search is None or (present[k] and pressed[slave].any()):
-                continue
-            distance = WAYS * way + EDGES * self._edges[k]
-            xs, xm = np.ascontiguousarray(x[slave]), np.ascontiguousarray(x[master])
-            found[k] = len(search.pairs(xs, xm, 2.0 * distance if present[k] else distance)) > 0
+        distance = (WAYS * way + EDGES * self._edges) * np.where(present, 2.0, 1.0)
+        low, high = (np.array([end(x[nodes], axis=0) for nodes in self._surfaces]) for end in (np.min, np.max))
+        slave, master = self._sides.T
+        apart = np.maximum(low[slave] - high[master], low[master] - high[slave]).max(axis=1, initial=-np.inf)
+        touching = present & np.array([pressed[self._surfaces[side]].any() for side in slave], dtype=bool)
+        found = ~self._watched | touching | (apart <= distance)
+        for pair in np.flatnonzero(found & self._watched & ~touching):
+            sides = self._sides[pair]
+            if pair not in self._searches:
+                self._searches[pair] = Search(*(self._facets[side] for side in sides))
+            xs, xm = (np.ascontiguousarray(x[self._surfaces[side]]) for side in sides)
+            found[pair] = len(self._searches[pair].pairs(xs, xm, float(distance[pair]))) > 0
         return found
+
+
+def _index(interface: ContactInterface, surface: Surface) -> int:
+    return next(k for k, other in enumerate(interface.surfaces) if other is surface)
 
 
 def _mean_edge(points: Array, facets: NDArray[np.int64]) -> float:
