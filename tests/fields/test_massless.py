@@ -156,14 +156,14 @@ def exact_tip(t):
 
 
 @pytest.mark.parametrize(
-    ("steps_per_cell", "until", "most", "ringing"), [(1.4, 3.0, 0.525, 0.001), (2.5, 1.6, 0.8, 0.06)]
+    ("steps_per_cell", "until", "most", "ringing"), [(1.4, 3.0, 0.515, 0.001), (2.5, 1.6, 0.8, 0.06)]
 )
 def test_bar_impact(steps_per_cell, until, most, ringing):
     """The pressure is 1/2 throughout: no overshoot, no ringing, nothing gained, hardly anything lost.
 
     steps_per_cell: in which a wave crosses a cell. With many, waves of a few cells' length run ahead of the one that
     comes back from the other end: `until` they arrive the bounds are sharp. Over the whole contact the pressure is at
-    most `most` (measured 0.52 and 0.77), its standard deviation below `ringing` (0.0004 and 0.058).
+    most `most` (measured 0.509 and 0.76), its standard deviation below `ringing` (0.0003 and 0.059).
     """
     (t, tip, force, energy), structure, _ = bar(40, 1.0 / 40.0 / steps_per_cell)
     body, touching = structure.bodies[0], (t > 1.1) & (t < 1.9)
@@ -171,7 +171,7 @@ def test_bar_impact(steps_per_cell, until, most, ringing):
     assert np.abs(tip - exact_tip(t)).max() < 0.03
     assert np.abs(u - 0.5 * (1 - body.points[0, : body.owned])).max() < 0.03
     assert force[t < until].max() < 0.5 * 1.03
-    assert force[touching].mean() == pytest.approx(0.5, rel=0.04)
+    assert force[touching].mean() == pytest.approx(0.5, rel=0.01)
     assert force[touching & (t < until)].std() < 0.002
     assert force.max() < most
     assert force[touching].std() < ringing
