@@ -23,7 +23,7 @@ from solvers.mesh import Mesh
 from solvers.solver_settings import SolverSettings
 from solvers.structure import materials, probes
 from solvers.structure.body import Body
-from solvers.structure.dynamics import Damping, Dynamics
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.elastic_constants import plane_stress_lambda
 from solvers.structure.field import Structure
 from solvers.structure.materials import (
@@ -32,6 +32,7 @@ from solvers.structure.materials import (
     PlaneStressLinearElastic,
     PlaneStressStVenantKirchhoff,
 )
+from solvers.structure.rayleigh import Damping
 from solvers.structure.supports import SupportError
 from solvers.structure.time_scheme import Statics, TimeScheme
 from solvers.timing import Timer

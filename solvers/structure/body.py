@@ -186,6 +186,11 @@ class Body:
         """Force of the body on its springs [N], shape (size,); 0 without springs (collective)."""
         return 0.0 if self._spring_matrix is None else self._spring_matrix.force(self.u.x.array[: self.size])
 
+    @property
+    def spring_stiffness(self) -> Springs | None:
+        """The springs of the body, None without any."""
+        return self._spring_matrix
+
     def external_force(self, t: float) -> Array:
         """Loads [N] at the time t [s] and the present displacement, shape (size,) (collective)."""
         self._evaluate_loads(t)

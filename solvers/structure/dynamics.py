@@ -11,25 +11,18 @@ from petsc4py import PETSc
 
 from solvers.added_product import with_product
 from solvers.api import Array, StepFailed
-from solvers.blocks import block_diagonal, times
+from solvers.blocks import times
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.linear import reason_of
 from solvers.structure.first_state import FirstState
 from solvers.structure.instant import Instant, Moving
 from solvers.structure.mass_exchange import exchange
 from solvers.structure.massless import massless_dofs
+from solvers.structure.rayleigh import Damping, RayleighDamping
 from solvers.structure.time_scheme import Exchanging, Settling
 
 #: Interval of the finite differences at the start, relative to the first step.
 SHORT = 1e-3
-
-
-@dataclass(frozen=True)
-class Damping:
-    """Rayleigh damping C = mass * M + stiffness * K(u = 0)."""
-
-    mass: float = 0.0  #: [1/s]
-    stiffness: float = 0.0  #: [s]
 
 
 @dataclass(frozen=True)
@@ -62,14 +55,8 @@ class Dynamics:
         massless, impulsive = massless_dofs(structure)
         return np.flatnonzero(massless), np.flatnonzero(impulsive)
 
-    def damping_matrix(self, structure: Moving) -> PETSc.Mat | None:
-        if self.damping == Damping():
-            return None
-        damping = structure.mass.copy()
-        damping.scale(self.damping.mass)
-        if self.damping.stiffness:
-            damping.axpy(self.damping.stiffness, _initial_stiffness(structure))
-        return damping
+    def create_damping(self, structure: Moving) -> RayleighDamping | None:
+        return None if self.damping == Damping() else RayleighDamping(self.damping, structure)
 
     def start(self, structure: Settling, t: float, dt: float) -> None:
         """Solve for the positions of massless nodes, then M a_0 = -C v_0 - f_0; prescribed dofs follow their functions.
@@ -81,7 +68,9 @@ class Dynamics:
         if structure.comm.allreduce(len(structure.massless)):
             others = np.setdiff1d(np.arange(structure.layout.size), structure.massless)
             held = structure.held.stopped(others, structure.now.u)
-            with structure.by(FirstState(structure.massless, structure.damping), held, t, SHORT * dt):
+            with structure.by(
+                FirstState(structure.massless, damped=structure.damping is not None), held, t, SHORT * dt
+            ):
                 structure.solve()
         self._solve_acceleration(structure)
 
@@ -96,7 +85,9 @@ class Dynamics:
         """M a_0 = f_ext - f_int - C v_0, prescribed where supports are. Raises StepFailed."""
         now, rigid, frame, held = structure.now, structure.rigid, structure.frame, structure.held
         x, b = structure.mass.createVecs()
-        b.array[:] = now.external + now.constraint - now.internal - self._damping_force(structure, now)
+        if structure.damping is not None:
+            now.damping[:] = structure.damping.force(now.v)
+        b.array[:] = now.external + now.constraint - now.internal - now.damping
         x.array[:] = now.a
         x.array[structure.massless] = 0.0
         if rigid is not None and frame is not None:
@@ -140,7 +131,7 @@ class Dynamics:
         def settle(lighter: NDArray[np.int64]) -> None:
             others = np.setdiff1d(np.arange(structure.layout.size), lighter)
             held = structure.held.stopped(others, structure.now.u)
-            with structure.by(FirstState(lighter, structure.damping), held, t, SHORT * dt):
+            with structure.by(FirstState(lighter, damped=structure.damping is not None), held, t, SHORT * dt):
                 structure.solve()
 
         exchange(structure, switch, settle)
@@ -193,43 +184,29 @@ class Dynamics:
         return (1.0 - self.scheme.alpha_f) * after + self.scheme.alpha_f * before
 
     def damping_force(self, structure: Moving) -> Array:
-        return self.averaged(*(self._damping_force(structure, at) for at in (structure.old, structure.now)))
-
-    def _damping_force(self, structure: Moving, at: Instant) -> Array:
-        """C v at one end of the step."""
-        if structure.damping is None:
-            return np.zeros_like(at.v)
-        force, rigid = times(structure.damping, at.v), structure.rigid
-        frame = structure.frame if at is structure.now or structure.momenta is None else structure.momenta.frame
-        if rigid is not None and frame is not None and self.damping.mass:
-            force = force + self.damping.mass * rigid.times(frame, at.v)
-        return force
+        return self.averaged(structure.old.damping, structure.now.damping)
 
     def _own_forces(self, structure: Moving, at: Instant) -> Array:
-        return at.internal - at.loads - at.constraint + self._damping_force(structure, at)
+        return at.internal - at.loads - at.constraint + at.damping
 
     def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat:
-        """mass_factor M + damping_factor C; in columns of massless and impulsive dofs (1 - alpha_f) / dt C.
-
-        In rows of impulsive dofs (1 - alpha_f) / dt^2 M.
-        """
-        matrix, (slope, factor) = structure.mass.copy(), structure.mass.createVecs()
+        """mass_factor M, in rows of impulsive dofs (1 - alpha_f) / dt^2 M."""
+        matrix, (factor, _) = structure.mass.copy(), structure.mass.createVecs()
         factor.array[:] = self.scheme.mass_factor(dt)
         factor.array[structure.impulsive] = (1.0 - self.scheme.alpha_f) / dt**2
         matrix.diagonalScale(factor, None)
-        if structure.damping is not None:
-            by_displacement = structure.damping.copy()
-            slope.array[:] = self.scheme.damping_factor(dt)
-            for changed in (structure.massless, structure.impulsive):
-                slope.array[changed] = (1.0 - self.scheme.alpha_f) / dt
-            by_displacement.diagonalScale(None, slope)
-            matrix.axpy(1.0, by_displacement, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         return matrix
+
+    def damping_slope(self, structure: Moving, dt: float) -> Array | None:
+        slope = np.full(structure.layout.size, self.scheme.damping_factor(dt))
+        for dofs in (structure.massless, structure.impulsive):
+            slope[dofs] = (1.0 - self.scheme.alpha_f) / dt
+        return slope
 
     def reaction(self, structure: Moving) -> Array:
         """M a + C v + f_int - f_ext [N] at the present time."""
         now = structure.now
-        dynamic = times(structure.mass, now.a) + now.rigid + self._damping_force(structure, now)
+        dynamic = times(structure.mass, now.a) + now.rigid + now.damping
         return dynamic + now.internal - now.external - now.constraint
 
     def support_forces(self, structure: Moving) -> tuple[Array, Array]:
@@ -250,13 +227,3 @@ class Dynamics:
         v, rigid, frame = structure.now.v, structure.rigid, structure.frame
         energy = 0.5 * structure.comm.allreduce(float(v @ times(structure.mass, v)))
         return energy if rigid is None or frame is None else energy + rigid.energy(frame, v)
-
-
-def _initial_stiffness(structure: Moving) -> PETSc.Mat:
-    matrices = []
-    for body, u in zip(structure.bodies, structure.layout.split(structure.now.u), strict=True):
-        body.set_displacement(np.zeros_like(u))
-        matrices.append(body.create_tangent())
-        body.assemble_tangent(matrices[-1], structure.current.t)
-        body.set_displacement(u)
-    return block_diagonal(matrices)

@@ -30,6 +30,7 @@ from solvers.structure.held import Held
 from solvers.structure.instant import Instant
 from solvers.structure.massless import without_mass
 from solvers.structure.pieces import pieces
+from solvers.structure.rayleigh import RayleighDamping
 from solvers.structure.rigid_inertia import Frame, Momenta, RigidInertia
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.saved import restore_state, saved_state
@@ -86,7 +87,7 @@ class Structure:
     def _symmetric(self) -> bool:
         """Whether tangents away from contact are symmetric."""
         # follower pressures have an unsymmetric boundary term, and the velocity of massless nodes has a rule of its own
-        damped = self._moves_mass and self.damping is not None
+        damped = self.damping is not None and (self._moves_mass or not self.damping.symmetric)
         return not (damped or any(body.pressures for body in self.bodies))
 
     @property
@@ -158,7 +159,7 @@ class Structure:
 
     def forget_mass(self) -> None:
         """Find the massless nodes anew, and all that follows from them."""
-        for name in ("_touching_dofs", "_moves_mass", "mass", "rigid", "damping", "_symmetric"):
+        for name in ("_touching_dofs", "_moves_mass", "mass", "rigid", "_symmetric"):
             vars(self).pop(name, None)
         self._assembled_tangent.forget()
 
@@ -172,9 +173,9 @@ class Structure:
         return dt * float(np.abs(self.at_constraint(self.now.v)).max(initial=0.0))
 
     @cached_property
-    def damping(self) -> PETSc.Mat | None:
-        """Damping matrix of all bodies [N s/m], None without damping."""
-        return self.time.damping_matrix(self)
+    def damping(self) -> RayleighDamping | None:
+        """Damping of all bodies, None without damping."""
+        return self.time.create_damping(self)
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -352,6 +353,8 @@ class Structure:
             self._assemble_constraint()
         self.now.v, self.now.a = self.time.motion(self, self.current.dt)
         self.now.rigid = self.time.rigid_force(self, self.current.dt)
+        if self.damping is not None:
+            self.now.damping = self.damping.force(self.now.v)
         self.residual_force = self.time.balance(self)
         missed = 0.0 if self.constraint is None else self.constraint.violation(self.time.force_weight)
         return float(np.hypot(self.norm(self.held.free_part(self.residual_force)), missed))

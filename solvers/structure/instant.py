@@ -30,6 +30,7 @@ class Instant:
     loads: Array  #: loads of its own [N]
     surface: Array  #: load by another field [N]
     constraint: Array  #: contact force [N]
+    damping: Array  #: force of damping [N]
     rigid: Array  #: inertia force [N] that the moved mass lacks, see `rigid_inertia.py`
 
     @classmethod
@@ -43,6 +44,23 @@ class Instant:
 
     def copy(self) -> Instant:
         return Instant(**{name: array.copy() for name, array in vars(self).items()})
+
+
+class DampingForce(Protocol):
+    """A force that depends on the velocity."""
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether its derivative by the displacement is symmetric if velocities are proportional to displacements."""
+        ...
+
+    def force(self, v: Array) -> Array:
+        """Force [N] at owned dofs of the velocity v [m/s], at the present displacement."""
+        ...
+
+    def add_tangent(self, matrix: PETSc.Mat, v: Array, slope: Array, weight: float) -> None:
+        """Add its derivative by the displacement; slope: that of the weighted velocity [1/s], weight: of the force."""
+        ...
 
 
 class Moving(Protocol):
@@ -79,14 +97,14 @@ class Moving(Protocol):
         ...
 
     @property
+    def damping(self) -> DampingForce | None:
+        """The damping, None without any."""
+        ...
+
+    @property
     def rigid(self) -> RigidInertia | None:
         """What `mass` lacks for rigid motion; None if no dofs are massless."""
         ...
 
     frame: Frame | None  #: of `rigid` at the present iterate
     momenta: Momenta | None  #: of `rigid` at the start of the step
-
-    @property
-    def damping(self) -> PETSc.Mat | None:
-        """Damping matrix [N s/m] of all bodies, None without damping."""
-        ...

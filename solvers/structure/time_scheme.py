@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from solvers.api import Array, StepInfo
 from solvers.structure.held import Held
 from solvers.structure.instant import Moving
+from solvers.structure.rayleigh import RayleighDamping
 from solvers.structure.rigid_inertia import RigidInertia
 
 
@@ -65,8 +66,12 @@ class TimeScheme(Protocol):
         """Owned dofs without mass, and those of pieces that touch with nodes that have mass."""
         ...
 
-    def damping_matrix(self, structure: Moving) -> PETSc.Mat | None:
-        """C [N s/m]; None without damping."""
+    def create_damping(self, structure: Moving) -> RayleighDamping | None:
+        """The damping of a structure; None without damping."""
+        ...
+
+    def damping_slope(self, structure: Moving, dt: float) -> Array | None:
+        """Derivative of the weighted velocity of damping by the displacement [1/s]; None: there is no damping."""
         ...
 
     def start(self, structure: Settling, t: float, dt: float) -> None:
@@ -140,7 +145,10 @@ class Statics:
     def massless(self, structure: Moving) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
 
-    def damping_matrix(self, structure: Moving) -> PETSc.Mat | None:
+    def create_damping(self, structure: Moving) -> RayleighDamping | None:
+        return None
+
+    def damping_slope(self, structure: Moving, dt: float) -> Array | None:
         return None
 
     def start(self, structure: Settling, t: float, dt: float) -> None: ...

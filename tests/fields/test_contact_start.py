@@ -17,10 +17,11 @@ from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
-from solvers.structure.dynamics import Damping, Dynamics
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.loads import Pressure, Traction
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
 from solvers.structure.probes import of_bodies
+from solvers.structure.rayleigh import Damping
 
 TIGHT = SolverSettings(Tolerance(residual=1e-12, residual_absolute=1e-13), linear="direct")
 TRAPEZOIDAL = GeneralisedAlpha.from_rho_inf(1.0)

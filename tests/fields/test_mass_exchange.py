@@ -16,9 +16,10 @@ from solvers.contact.pair import Pair
 from solvers.contact.reach import Reach
 from solvers.contact.surface import Surface
 from solvers.generalised_alpha import GeneralisedAlpha
-from solvers.structure.dynamics import Damping, Dynamics
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.field import Structure
 from solvers.structure.materials import NeoHooke
+from solvers.structure.rayleigh import Damping
 from solvers.structure.supports import Support
 
 SOFT = NeoHooke(4e2, 6e2, 2.0)

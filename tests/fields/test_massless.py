@@ -14,10 +14,11 @@ from solvers.blocks import Layout
 from solvers.contact.surface import Surface
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Support
-from solvers.structure.dynamics import Damping, Dynamics
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.massless import massless_dofs, without_mass
 from solvers.structure.materials import StVenantKirchhoff
 from solvers.structure.pieces import pieces
+from solvers.structure.rayleigh import Damping
 
 TRAPEZOIDAL = GeneralisedAlpha.from_rho_inf(1.0)
 

@@ -14,10 +14,11 @@ from fsci import shapes
 from solvers.blocks import times
 from solvers.contact.surface import Surface
 from solvers.generalised_alpha import GeneralisedAlpha
-from solvers.structure.dynamics import Damping, Dynamics
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.loads import Traction
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
 from solvers.structure.probes import of_bodies
+from solvers.structure.rayleigh import Damping
 
 TRAPEZOIDAL = Dynamics(GeneralisedAlpha.from_rho_inf(1.0))
 FAR = {
