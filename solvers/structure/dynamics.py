@@ -145,14 +145,24 @@ class Dynamics:
         return dt * structure.held.free_part(structure.now.v)
 
     def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
-        """Newmark's relations; for massless and impulsive dofs v = (u_{n+1} - u_n) / dt."""
+        """Newmark's relations; for massless and impulsive dofs v = (u_{n+1} - u_n) / dt.
+
+        With damping massless dofs have v = w + (w - w_n) dt / (dt + dt_n), w = (u_{n+1} - u_n) / dt and w_n that of the
+        last step, of second order at the end of the step (the backward difference of three positions).
+        """
         old, massless, impulsive = structure.old, structure.massless, structure.impulsive
         du = structure.now.u - old.u
         a, v = (rule(du, old.v, old.a, dt) for rule in (self.scheme.acceleration, self.scheme.velocity))
-        a[massless], v[massless] = 0.0, du[massless] / dt
+        w = du[massless] / dt
+        a[massless], v[massless] = 0.0, w + self._extrapolated(structure, dt) * (w - old.mean[massless])
         v[impulsive] = du[impulsive] / dt
         a[impulsive] = (v - old.v)[impulsive] / dt
         return v, a
+
+    def _extrapolated(self, structure: Moving, dt: float) -> float:
+        """dt / (dt + dt_n); zero in the first step, and without damping, where these velocities do nothing."""
+        first = structure.damping is None or structure.last_length == 0.0
+        return 0.0 if first else dt / (dt + structure.last_length)
 
     def rigid_force(self, structure: Moving, dt: float) -> Array:
         now, rigid, frame, before = structure.now, structure.rigid, structure.frame, structure.momenta
@@ -199,8 +209,8 @@ class Dynamics:
 
     def damping_slope(self, structure: Moving, dt: float) -> Array | None:
         slope = np.full(structure.layout.size, self.scheme.damping_factor(dt))
-        for dofs in (structure.massless, structure.impulsive):
-            slope[dofs] = (1.0 - self.scheme.alpha_f) / dt
+        slope[structure.impulsive] = (1.0 - self.scheme.alpha_f) / dt
+        slope[structure.massless] = (1.0 - self.scheme.alpha_f) * (1.0 + self._extrapolated(structure, dt)) / dt
         return slope
 
     def reaction(self, structure: Moving) -> Array:

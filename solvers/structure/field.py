@@ -69,6 +69,7 @@ class Structure:
         self.frame: Frame | None = None
         self.momenta: Momenta | None = None
         self.current = Step(0.0, 0.0)  #: the present step, or the last one
+        self.last_length = 0.0  #: of the last accepted step [s], 0 at the start
         self.energy = EnergyBalance()
         self.energy_sentinel = EnergySentinel(
             self.energy, dissipates=time.dissipates or contact is not None, contact=contact is not None
@@ -289,6 +290,7 @@ class Structure:
             self.constraint.end_step(self.time.force_weight)
             pushed += self.constraint.obstacle_work
         du, now, old, averaged = self.now.u - self.old.u, self.now, self.old, self.time.averaged
+        now.mean, self.last_length = du / self.current.dt, self.current.dt
         at_supports, (before, after) = self.held.part(du), self.time.support_forces(self)
         parts = [
             averaged(old.loads, now.loads) @ du,

@@ -31,6 +31,7 @@ class Instant:
     surface: Array  #: load by another field [N]
     constraint: Array  #: contact force [N]
     damping: Array  #: force of damping [N]
+    mean: Array  #: displacement of the last step over its length [m/s]
     rigid: Array  #: inertia force [N] that the moved mass lacks, see `rigid_inertia.py`
 
     @classmethod
@@ -75,6 +76,7 @@ class Moving(Protocol):
     old: Instant
     residual_force: Array
     current: Step
+    last_length: float  #: of the last accepted step [s], 0 at the start
 
     @property
     def massless(self) -> NDArray[np.int64]:

@@ -32,6 +32,7 @@ class Saved(Moving, Protocol):
 def saved_state(structure: Saved) -> State:
     """The state, by body."""
     state: State = {name: per_body(structure, array) for name, array in vars(structure.now).items()}
+    state["last_length"] = structure.last_length
     state["energy"] = structure.energy.save()
     state["linear_solver"] = structure.solver.position
     if structure.constraint is not None:
@@ -50,7 +51,7 @@ def restore_state(structure: Saved, state: State) -> None:
         structure.forget_mass()
     structure.find_frame()
     structure.energy.restore(state["energy"])
-    structure.solver.position = state["linear_solver"]
+    structure.solver.position, structure.last_length = state["linear_solver"], state["last_length"]
 
 
 def per_body(structure: Moving, array: Array) -> State:

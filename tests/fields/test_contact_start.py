@@ -82,6 +82,26 @@ def test_second_order_with_a_sudden_load(rho_inf):
     assert np.log2(ratio) == pytest.approx(2.0, abs=0.15)
 
 
+@pytest.mark.parametrize("damping", [0.001, 0.05], ids=["weak", "strong"])
+def test_second_order_with_damping(damping):
+    """Of a bar that is pushed by its massless end, by a force that grows smoothly."""
+
+    def end(steps):
+        push = Pressure("right", lambda x, t: np.full(x.shape[1], 10.0 * np.sin(20.0 * t) ** 2))
+        held = [Support("left", (constant(0), constant(0)))]
+        mesh = shapes.rectangle([1, 0.25], [8, 2])
+        body = make_body("bar", mesh, NeoHooke(40.0, 60.0, 1.0), supports=held, pressures=[push])
+        time = Dynamics(GeneralisedAlpha.from_rho_inf(1.0), damping=Damping(0.0, damping))
+        structure, _ = make_contact([body], [(("bar", "right"), FAR)], time=time, settings=TIGHT)
+        *_, _ = advance(structure, 0.08 / steps, steps)
+        return structure.now.u.copy()
+
+    exact, coarse, fine = (end(steps) for steps in (256, 32, 64))
+    errors = [np.linalg.norm(u - exact) for u in (coarse, fine)]
+    assert np.log2(errors[0] / errors[1]) > 1.8
+    assert errors[1] < 2e-3 * np.linalg.norm(exact)
+
+
 @pytest.mark.parametrize("cell_type", ["quad", "triangle6"])
 def test_free_fall(cell_type):
     """Gravity acts on mass where it is: a body that falls is not strained, although its surface has no mass."""
