@@ -31,7 +31,7 @@ from solvers.structure.instant import Instant
 from solvers.structure.massless import without_mass
 from solvers.structure.pieces import pieces
 from solvers.structure.rayleigh import RayleighDamping
-from solvers.structure.rigid_inertia import Frame, Momenta, RigidInertia
+from solvers.structure.rigid_inertia import Frames, Momenta, RigidInertia
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.saved import restore_state, saved_state
 from solvers.structure.solid_solver import SolidSolver
@@ -66,7 +66,7 @@ class Structure:
         self._constrained = None if contact is None else ConstrainedDofs(self.layout, contact)
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
-        self.frame: Frame | None = None
+        self.frame: Frames | None = None
         self.momenta: Momenta | None = None
         self.current = Step(0.0, 0.0)  #: the present step, or the last one
         self.last_length = 0.0  #: of the last accepted step [s], 0 at the start
@@ -329,7 +329,7 @@ class Structure:
         if heavy and self.rigid is not None and frame is not None:
             now.loads += self.rigid.weight(frame, self._gravity(self.current.t))
 
-    def find_frame(self) -> Frame | None:
+    def find_frame(self) -> Frames | None:
         """Set `frame` at the present displacement."""
         self.frame = None if self.rigid is None else self.rigid.frame(self.now.u)
         return self.frame

@@ -16,7 +16,7 @@ from solvers.constraint import Constraint
 from solvers.step import Step
 from solvers.structure.body import Body
 from solvers.structure.held import Held
-from solvers.structure.rigid_inertia import Frame, Momenta, RigidInertia
+from solvers.structure.rigid_inertia import Frames, Momenta, RigidInertia
 
 
 @dataclass
@@ -108,5 +108,5 @@ class Moving(Protocol):
         """What `mass` lacks for rigid motion; None if no dofs are massless."""
         ...
 
-    frame: Frame | None  #: of `rigid` at the present iterate
+    frame: Frames | None  #: of `rigid` at the present iterate
     momenta: Momenta | None  #: of `rigid` at the start of the step

@@ -42,7 +42,7 @@ NO_DIFFERENCE = 1e-12
 
 
 @dataclass(frozen=True)
-class Frame:
+class Frames:
     """The frames of the pieces at one displacement. Vectors have three components, in 2D, too."""
 
     arms: Array  #: r [m] of owned nodes, shape (n, 3)
@@ -69,7 +69,7 @@ class Split:
 class Momenta:
     """H and h of the pieces, and their rates; shape (pieces, 3)."""
 
-    frame: Frame
+    frame: Frames
     linear: Array  #: H [kg m/s]
     angular: Array  #: h [kg m^2/s]
     force: Array  #: dH/dt [N]
@@ -111,7 +111,7 @@ class RigidInertia:
 
     # ------------------------------------------------------------------------------------------------ geometry
 
-    def frame(self, u: Array) -> Frame:
+    def frame(self, u: Array) -> Frames:
         """The frames at the displacement u [m] of owned dofs (collective)."""
         x = self._points + self._turns[:, None] * self._in_space(u)
         moments = self._scalar(self._moved, x)
@@ -128,7 +128,7 @@ class RigidInertia:
             compliance[:, 2, 2] = 1.0 / inertia[:, 2, 2]
         else:
             compliance = np.linalg.inv(inertia)
-        return Frame(arms, *self._modes(moments), inertia, compliance, _apply(R, self._first), second)
+        return Frames(arms, *self._modes(moments), inertia, compliance, _apply(R, self._first), second)
 
     def _number_modes(self) -> None:
         """The pattern of the modes: at component k of a node e_k, and those e_j x r that have this component."""
@@ -152,18 +152,18 @@ class RigidInertia:
 
     # --------------------------------------------------------------------------------------------------- motion
 
-    def velocities(self, frame: Frame, v: Array) -> tuple[Array, Array]:
+    def velocities(self, frame: Frames, v: Array) -> tuple[Array, Array]:
         """(V [m/s], omega [1/s]) of the velocity v of owned dofs, shape (pieces, 3) (collective)."""
         sums = self._summed(frame.projection @ v).reshape(-1, 6)
         return sums[:, :3] / self.mass, _apply(frame.compliance, sums[:, 3:])
 
-    def energy(self, frame: Frame, v: Array) -> float:
+    def energy(self, frame: Frames, v: Array) -> float:
         """V . H + omega . K omega / 2 [J] (collective)."""
         V, omega = self.velocities(frame, v)
         linear, angular = _momenta(frame, omega)
         return float(np.sum(V * linear) + 0.5 * np.sum(omega * angular))
 
-    def split(self, frame: Frame, v: Array) -> Split:
+    def split(self, frame: Frames, v: Array) -> Split:
         """The rigid motion of each piece and the rest, of the velocity v of owned dofs (collective)."""
         V, omega = self.velocities(frame, v)
         rigid = V[self._piece] + _cross(omega[self._piece], frame.arms)
@@ -173,7 +173,7 @@ class RigidInertia:
         whole = energy + 0.5 * (self.mass[:, 0] * (velocity**2).sum(axis=1) + (omega * spin).sum(axis=1))
         return Split(velocity, spin, rest[:, : self._dim].ravel(), energy, whole)
 
-    def joined(self, frame: Frame, motion: Split, rest: Array) -> Array:
+    def joined(self, frame: Frames, motion: Split, rest: Array) -> Array:
         """Velocities [m/s] of owned dofs with the rigid motion of `motion` and other velocities `rest`."""
         inertia, spin = self._about_centre(frame), motion.spin.copy()
         if self._dim == 2:
@@ -184,18 +184,18 @@ class RigidInertia:
         rigid = V[self._piece] + _cross(omega[self._piece], frame.arms)
         return rest + rigid[:, : self._dim].ravel()
 
-    def _about_centre(self, frame: Frame) -> Array:
+    def _about_centre(self, frame: Frames) -> Array:
         """Inertia [kg m^2] about the true centre, I' + K - K_d, shape (pieces, 3, 3)."""
         d = frame.first / self.mass
         return frame.inertia + frame.second - _inertia(self.mass[:, :, None] * _outer(d, d))
 
     # --------------------------------------------------------------------------------------------------- forces
 
-    def on_nodes(self, frame: Frame, force: Array, couple: Array) -> Array:
+    def on_nodes(self, frame: Frames, force: Array, couple: Array) -> Array:
         """Forces [N] on owned dofs with these resultants about c', shape (pieces, 3)."""
         return frame.modes @ np.hstack([force / self.mass, _apply(frame.compliance, couple)]).ravel()
 
-    def product(self, frame: Frame) -> Callable[[Array], Array]:
+    def product(self, frame: Frames) -> Callable[[Array], Array]:
         """Function that multiplies fields at owned dofs with the difference of the mass matrices (collective).
 
         That is f of accelerations a of bodies at rest: M' E N^-1 D N^-1 E^T M' a, E the rigid modes, N = E^T M' E,
@@ -214,18 +214,18 @@ class RigidInertia:
 
         return times
 
-    def times(self, frame: Frame, a: Array) -> Array:
+    def times(self, frame: Frames, a: Array) -> Array:
         """The difference of the mass matrices times a field at owned dofs (collective)."""
         return self.product(frame)(a)
 
-    def weight(self, frame: Frame, gravity: Array) -> Array:
+    def weight(self, frame: Frames, gravity: Array) -> Array:
         """What the weight of the moved mass has more than that of the true mass [N] (collective).
 
         Resultant and couple are those of the true mass. gravity: [m/s^2] at owned dofs.
         """
         return times(self._moved, gravity) - times(self._true, gravity) + self.times(frame, gravity)
 
-    def force_by_acceleration(self, frame: Frame, v: Array, a: Array) -> Array:
+    def force_by_acceleration(self, frame: Frames, v: Array, a: Array) -> Array:
         """f [N] of given velocities and accelerations of owned dofs (collective)."""
         (_, omega), (acceleration, spin) = self.velocities(frame, v), self.velocities(frame, a)
         spread = self._sums(_outer(self._in_space(times(self._moved, v)), frame.arms))
@@ -237,14 +237,14 @@ class RigidInertia:
         force, couple = force + _cross(turning, linear), couple + _cross(turning, angular)
         return self.on_nodes(frame, force, couple + _cross(frame.first, acceleration))
 
-    def momenta(self, frame: Frame, v: Array, a: Array, force: Array) -> Momenta:
+    def momenta(self, frame: Frames, v: Array, a: Array, force: Array) -> Momenta:
         """Momenta and their rates from the state of owned dofs; force: f [N] (collective)."""
         linear, angular = _momenta(frame, self.velocities(frame, v)[1])
         f = self._in_space(force)
         resultant, couple = np.split(self._sums(np.hstack([f, _cross(frame.arms, f)])), 2, axis=1)
         return Momenta(frame, linear, angular, resultant, couple - _cross(frame.first, self.velocities(frame, a)[0]))
 
-    def force(self, frame: Frame, v: Array, a: Array, before: Momenta, dt: float, gamma: float) -> Array:
+    def force(self, frame: Frames, v: Array, a: Array, before: Momenta, dt: float, gamma: float) -> Array:
         """f [N] at the end of a step of length dt [s] from the motion of owned dofs there (collective)."""
         linear, angular = _momenta(frame, self.velocities(frame, v)[1])
         force = ((linear - before.linear) / dt - (1.0 - gamma) * before.force) / gamma
@@ -271,7 +271,7 @@ class RigidInertia:
         return local if self._comm.size == 1 else self._comm.allreduce(local)
 
 
-def _momenta(frame: Frame, omega: Array) -> tuple[Array, Array]:
+def _momenta(frame: Frames, omega: Array) -> tuple[Array, Array]:
     """H and h of the pieces."""
     return _cross(omega, frame.first), _apply(frame.second, omega)
 

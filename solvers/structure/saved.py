@@ -10,7 +10,7 @@ from solvers.api import Array, State
 from solvers.distributed import Nodal
 from solvers.structure.energy import EnergyBalance
 from solvers.structure.instant import Moving
-from solvers.structure.rigid_inertia import Frame
+from solvers.structure.rigid_inertia import Frames
 from solvers.structure.solid_solver import SolidSolver
 
 
@@ -24,7 +24,7 @@ class Saved(Moving, Protocol):
         """Find the massless nodes anew, and all that follows from them."""
         ...
 
-    def find_frame(self) -> Frame | None:
+    def find_frame(self) -> Frames | None:
         """Set `frame` at the present displacement."""
         ...
 
