@@ -132,7 +132,7 @@ class Structure:
         return self.comm.allreduce(bool(len(self.massless)), op=MPI.LOR)
 
     @cached_property
-    def pieces(self) -> tuple[NDArray[np.int64], int]:
+    def piece_of_nodes(self) -> tuple[NDArray[np.int64], int]:
         """(number of the connected piece of each owned node, count of all pieces)."""
         return pieces(self.bodies)
 
@@ -143,7 +143,7 @@ class Structure:
             return self._all_mass
         massless = np.zeros(self.layout.size, dtype=bool)
         massless[self.massless] = True
-        return without_mass(self._all_mass, massless, *self.pieces)
+        return without_mass(self._all_mass, massless, *self.piece_of_nodes)
 
     @cached_property
     def rigid(self) -> RigidInertia | None:
@@ -156,7 +156,7 @@ class Structure:
         """The inertia of all pieces, of those with all of their mass, too."""
         points = np.concatenate([body.points[: self.dim, : body.owned].T for body in self.bodies])
         turns = np.repeat([not body.linear for body in self.bodies], [body.owned for body in self.bodies])
-        return RigidInertia(self.comm, self._all_mass, self.mass, points, self.pieces, turns)
+        return RigidInertia(self.comm, self._all_mass, self.mass, points, self.piece_of_nodes, turns)
 
     def forget_mass(self) -> None:
         """Find the massless nodes anew, and all that follows from them."""

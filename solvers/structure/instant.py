@@ -84,7 +84,7 @@ class Moving(Protocol):
         ...
 
     @property
-    def pieces(self) -> tuple[NDArray[np.int64], int]:
+    def piece_of_nodes(self) -> tuple[NDArray[np.int64], int]:
         """(number of the connected piece of each owned node, count of all pieces)."""
         ...
 

@@ -24,7 +24,7 @@ def exchange(structure: Exchanging, switch: Callable[[], None], settle: Callable
 
     settle: moves nodes that have become massless, owned dofs, to their equilibrium.
     """
-    comm, (piece, count) = structure.comm, structure.pieces
+    comm, (piece, count) = structure.comm, structure.piece_of_nodes
     before, energy = structure.all_inertia(), _internal(structure)
     frame = before.frame(structure.now.u)
     motion = before.split(frame, structure.now.v)

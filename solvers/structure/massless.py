@@ -37,7 +37,7 @@ def massless_dofs(structure: Moving) -> tuple[NDArray[np.bool_], NDArray[np.bool
     constraint, layout, dim = structure.constraint, structure.layout, structure.bodies[0].dim
     assert constraint is not None
     points = np.concatenate([body.points[:dim, : body.owned].T for body in structure.bodies])
-    piece, count = structure.pieces
+    piece, count = structure.piece_of_nodes
     size = _extent(structure.comm, points, piece, count, np.ones(len(points), dtype=bool))
     found = np.zeros(layout.size // dim, dtype=bool)
     undecided = np.ones(count, dtype=bool)

@@ -82,7 +82,7 @@ def surfaces(body, slave, master):
     }
     layout, found = Layout(MPI.COMM_SELF, [body.size]), pieces([body])
     return SimpleNamespace(
-        comm=MPI.COMM_SELF, bodies=[body], layout=layout, constraint=SimpleNamespace(**of), pieces=found
+        comm=MPI.COMM_SELF, bodies=[body], layout=layout, constraint=SimpleNamespace(**of), piece_of_nodes=found
     )
 
 
