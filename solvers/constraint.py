@@ -30,10 +30,10 @@ class Constraint(Stateful, Protocol):
     #: mask of the groups of conditions, as contact pairs, whose surfaces have no mass in dynamics
     present: NDArray[np.bool_]
 
-    def find_present(self, u: Array, way: float, t: float, dt: float) -> NDArray[np.bool_]:
+    def find_present(self, u: Array, v: Array, t: float, dt: float) -> NDArray[np.bool_]:
         """The groups that may be active in the step from t to t + dt [s].
 
-        u: displacements [m], shape (N, dim); way: by which nodes with these move in the step [m].
+        u, v: displacements [m] and velocities [m/s] of the deformable nodes, shape (N, dim).
         """
         ...
 

@@ -302,17 +302,16 @@ class Contact:
         slaves = (self.multipliers.areas > 0.0) & ~self._tied & near[self.multipliers.node]
         return self.nodes.dofs[np.unique(self.multipliers.node[slaves])].ravel()
 
-    def find_present(self, u: Array, way: float, t: float, dt: float) -> NDArray[np.bool_]:
+    def find_present(self, u: Array, v: Array, t: float, dt: float) -> NDArray[np.bool_]:
         """Mask of the pairs that the step from t to t + dt [s] could bring into contact, or that are in contact.
 
-        u: displacements [m], shape (N, dim); way: by which nodes with these move in the step [m].
+        u, v: displacements [m] and velocities [m/s] of the deformable nodes, shape (N, dim).
         """
         if self._reach is None:
             self._reach = Reach(self.interface)
         x, pressed = self.positions(u, t), np.zeros(self.size, dtype=bool)
         pressed[self.multipliers.node[self.active_set.active & ~self._tied]] = True
-        driven = float(np.abs(self.positions(u, t + dt) - x).max(initial=0.0))
-        return self._reach.find(x, way + driven, self.present, pressed)
+        return self._reach.find(x, self.positions(u, t + dt) - x + dt * v, self.present, pressed)
 
     @property
     def near(self) -> bool:

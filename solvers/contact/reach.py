@@ -15,8 +15,8 @@ from solvers.contact.law.tied import Tied
 from solvers.contact.surface import Surface
 from solvers.search import Search
 
-#: A step could bring together surfaces whose distance is at most this multiple of the way by velocity, plus this share
-#: of an edge of the slave for bodies at rest.
+#: A step could bring together surfaces whose distance is at most this multiple of their ways by velocity, plus this
+#: share of an edge of the slave for bodies at rest.
 WAYS, EDGES = 2.0, 0.2
 
 
@@ -33,11 +33,13 @@ class Reach:
         self._facets = [surface.facets for surface in interface.surfaces]
         self._searches: dict[int, Search] = {}  # created when the boxes of two surfaces first come near
 
-    def find(self, x: Array, way: float, present: NDArray[np.bool_], pressed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Mask of the pairs that are present in a step that moves nodes by up to `way` [m].
+    def find(self, x: Array, ways: Array, present: NDArray[np.bool_], pressed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Mask of the pairs that are present in a step.
 
-        x: positions [m], shape (N, dim); present: the mask of the last step; pressed: nodes with contact forces, (N,).
+        x: positions [m], ways: displacements by the velocities in the step [m], shape (N, dim); present: the mask of
+        the last step; pressed: nodes with contact forces, shape (N,).
         """
+        way = np.array([np.abs(ways[nodes]).max(initial=0.0) for nodes in self._surfaces])[self._sides].sum(axis=1)
         distance = (WAYS * way + EDGES * self._edges) * np.where(present, 2.0, 1.0)
         low, high = (np.array([end(x[nodes], axis=0) for nodes in self._surfaces]) for end in (np.min, np.max))
         slave, master = self._sides.T

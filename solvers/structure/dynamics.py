@@ -121,7 +121,8 @@ class Dynamics:
         constraint = structure.constraint
         if constraint is None or not structure.exchanges_mass:
             return
-        present = constraint.find_present(structure.at_constraint(structure.now.u), structure.way(dt), t, dt)
+        u, v = (structure.at_constraint(array) for array in (structure.now.u, structure.now.v))
+        present = constraint.find_present(u, v, t, dt)
         if np.array_equal(present, constraint.present):
             return
 

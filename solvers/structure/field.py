@@ -169,10 +169,6 @@ class Structure:
         assert self._constrained is not None
         return self._constrained.at_nodes(owned)
 
-    def way(self, dt: float) -> float:
-        """By how much nodes of the constraint move in a step by their velocity [m] (collective)."""
-        return dt * float(np.abs(self.at_constraint(self.now.v)).max(initial=0.0))
-
     @cached_property
     def damping(self) -> RayleighDamping | None:
         """Damping of all bodies, None without damping."""
@@ -189,7 +185,9 @@ class Structure:
         self.current = Step(t, dt)
         if self.constraint is not None and self.exchanges_mass:
             self.constraint.present[:] = False
-            self.constraint.present = self.constraint.find_present(self.at_constraint(self.now.u), self.way(dt), t, dt)
+            self.constraint.present = self.constraint.find_present(
+                self.at_constraint(self.now.u), self.at_constraint(self.now.v), t, dt
+            )
             self.forget_mass()
         self._assemble_bodies()
         if self.constraint is not None and self._constrained is not None:

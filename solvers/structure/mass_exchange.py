@@ -2,7 +2,7 @@
 
 Nodes that have become massless move to their equilibrium first, as at the start of a run. Each free piece keeps the
 velocity of its centre and its angular momentum about it; what its velocities have besides this rigid motion is scaled
-such that kinetic and internal energy stay together. Then accelerations follow from the balance.
+such that kinetic and internal energy of the body stay together. Then accelerations follow from the balance.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from solvers.api import Array
 from solvers.structure.time_scheme import Exchanging
 
 #: Factors by which velocities besides rigid motion may be scaled. Outside of them energy is lost or gained instead.
@@ -40,18 +41,30 @@ def exchange(structure: Exchanging, switch: Callable[[], None], settle: Callable
     after = structure.all_inertia()
     frame = after.frame(structure.now.u)
     rest = after.split(frame, structure.now.v)
-    joined = after.joined(frame, motion, rest.velocities)
-    gained = after.split(frame, joined).energy - motion.energy
-    wanted = energy - _internal(structure) - float(gained[changed].sum()) + float(rest.energy_of_rest[changed].sum())
-    have = float(rest.energy_of_rest[changed].sum())
-    factor = np.sqrt(max(wanted, 0.0) / have) if have > 0.0 else 1.0
-    v = after.joined(frame, motion, (factor if LEAST < factor < MOST else 1.0) * rest.velocities)
-    at = changed[piece].repeat(structure.bodies[0].dim)
-    structure.now.v[at] = v[at]
+    gained = after.split(frame, after.joined(frame, motion, rest.velocities)).energy - motion.energy
+    freed = energy - _internal(structure)
+    factors = np.ones(count)
+    for body, own in enumerate(_pieces_of_bodies(structure)):
+        own = own[changed[own]]
+        have = float(rest.energy_of_rest[own].sum())
+        wanted = have + float(freed[body]) - float(gained[own].sum())
+        factor = np.sqrt(max(wanted, 0.0) / have) if have > 0.0 else 1.0
+        factors[own] = factor if LEAST < factor < MOST else 1.0
+    at = piece.repeat(structure.bodies[0].dim)
+    v = after.joined(frame, motion, factors[at] * rest.velocities)
+    structure.now.v[changed[at]] = v[changed[at]]
 
 
-def _internal(structure: Exchanging) -> float:
-    return sum(body.internal_energy() for body in structure.bodies)
+def _pieces_of_bodies(structure: Exchanging) -> list[NDArray[np.int64]]:
+    """Numbers of the pieces of each body (collective)."""
+    ends = np.cumsum([body.owned for body in structure.bodies])[:-1]
+    parts = np.split(structure.piece_of_nodes[0], ends)
+    return [np.unique(np.concatenate(structure.comm.allgather(part))) for part in parts]
+
+
+def _internal(structure: Exchanging) -> Array:
+    """Internal energy [J] of each body (collective)."""
+    return np.array([body.internal_energy() for body in structure.bodies])
 
 
 def _mask(structure: Exchanging) -> NDArray[np.bool_]:

@@ -33,10 +33,6 @@ class Exchanging(Settling, Protocol):
 
     exchanges_mass: bool
 
-    def way(self, dt: float) -> float:
-        """By how much nodes of the constraint move in a step by their velocity [m]."""
-        ...
-
     def at_constraint(self, owned: Array) -> Array:
         """Values at the nodes of the constraint, shape (N, dim) (collective)."""
         ...

@@ -170,10 +170,12 @@ def test_reach(dim):
     slave = interface.nodes_of(interface.pairs[0].slave)
     none, away, there = np.zeros(len(x), dtype=bool), np.array([False]), np.array([True])
     distance = 2.0 * 0.1 + 0.2 * 0.25
+    ways = np.zeros_like(x)
+    ways[slave, 1] = -0.1
 
     def found(gap, present, pressed=none):
         x[slave, 0] = -gap
-        return bool(reach.find(x, 0.1, present, pressed)[0])
+        return bool(reach.find(x, ways, present, pressed)[0])
 
     assert found(0.9 * distance, away)
     assert not found(1.5 * distance, away)
