@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
 from petsc4py import PETSc
 
 from coupling.ports import Solid
+from solvers.added_product import with_product
+from solvers.api import Array
 from solvers.gauss_seidel import TwoFields, matrix_of
 from solvers.rows import Numbering, RowTransformation, TakenRows, transform_rows
 
@@ -19,6 +23,7 @@ class Blocks:
     into_solid: PETSc.Mat
     into_flow: PETSc.Mat
     flow: PETSc.Mat
+    added: Callable[[Array], Array] | None = None  #: a part of low rank of `solid`, as a product with its unknowns
 
     def create_vectors(self) -> tuple[PETSc.Vec, PETSc.Vec]:
         """Two vectors; each process has the rows of the solid, then those of the flow."""
@@ -48,6 +53,17 @@ class Blocks:
         """The matrix as its product with vectors, and that of the flow as it multiplies them."""
         blocks = (self.solid, self.into_solid), (self.into_flow, self.flow)
         return matrix_of(TwoFields(blocks, numbering.first, numbering.second, flow))
+
+    def with_added(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """The matrix of all blocks with the part of low rank."""
+        own, added = self.solid.getLocalSize()[0], self.added
+        if added is None:
+            return matrix
+
+        def product(x: Array) -> Array:
+            return np.concatenate([added(x[:own]), np.zeros(len(x) - own)])
+
+        return with_product(matrix, product)
 
     def assembled(self) -> PETSc.Mat:
         """The matrix as one sparse matrix."""

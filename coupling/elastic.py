@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from mpi4py import MPI
@@ -120,6 +120,9 @@ class Elastic:
 
     def linearise(self) -> PETSc.Mat:
         return self.structure.linearise()
+
+    def added_product(self) -> Callable[[Array], Array] | None:
+        return self.structure.added_product()
 
     def right_side(self) -> Array:
         return self.structure.right_side()

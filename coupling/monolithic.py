@@ -171,14 +171,16 @@ class Monolithic:
         while sequence.current != "direct":
             try:
                 matrix = blocks.product(self._numbering, self.coupled.flow.product(blocks.flow))
-                iterations = self._krylov.solve_again(matrix, b, x)
+                whole = blocks.with_added(matrix)
+                iterations = self._krylov.solve_again(whole, b, x)
                 if iterations is None:
-                    iterations = self._krylov.solve(self._krylov_solver(blocks), matrix, b, x)
+                    iterations = self._krylov.solve(self._krylov_solver(blocks), whole, b, x, matrix)
                 self._linear_iterations += iterations
                 return
             except linear.LinearSolveFailed as failure:
                 sequence.advance(failure)
-        self._direct.solve(blocks.assembled(), b, x)
+        matrix = blocks.assembled()
+        self._direct.solve(blocks.with_added(matrix), b, x, matrix)
 
     def _krylov_solver(self, blocks: Blocks) -> PETSc.KSP:
         flow = self.coupled.flow
@@ -205,7 +207,7 @@ class Monolithic:
             solid.add_rounding(rounding_error(into_solid, flow.rounded()))
             solid.add_rounding(rounding_error(mass, solid.rounded()))
             self._linearised = True
-            return Blocks(K, into_solid, into_flow, A)
+            return Blocks(K, into_solid, into_flow, A, solid.added_product())
 
     def _derivatives_of_flow(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat, PETSc.Mat]:
         """The tangent of the flow and the coupling blocks at the present iterate."""

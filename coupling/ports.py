@@ -7,7 +7,7 @@ All calls are collective.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Protocol
@@ -146,6 +146,10 @@ class Solid(Part, Protocol):
 
     def recover(self, taken: TakenRows, du: Array) -> None:
         """Recover the multipliers from the rows before the transformation and the increment of all unknowns."""
+        ...
+
+    def added_product(self) -> Callable[[Array], Array] | None:
+        """The part of its derivative that `linearise` lacks, as a product with its unknowns; None: nothing."""
         ...
 
     def missing(self) -> Array:

@@ -59,3 +59,11 @@ def block_diagonal(blocks: Sequence[PETSc.Mat], out: PETSc.Mat | None = None) ->
     if out is None:
         return quick_to_multiply(nest.convert(PETSc.Mat.Type.AIJ, PETSc.Mat()))
     return nest.convert(PETSc.Mat.Type.AIJ, out)
+
+
+def times(matrix: PETSc.Mat, array: Array) -> Array:
+    """Product of a matrix and an array of owned dofs (collective)."""
+    x, y = matrix.createVecs()
+    x.array[:] = array
+    matrix.mult(x, y)
+    return y.array

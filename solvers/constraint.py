@@ -31,6 +31,16 @@ class Constraint(Stateful, Protocol):
         """What cycles, for messages: an active set that has come back to an earlier one of this step; else empty."""
         ...
 
+    #: mask of the groups of conditions, as contact pairs, whose surfaces have no mass in dynamics
+    present: NDArray[np.bool_]
+
+    def find_present(self, u: Array, v: Array, t: float, dt: float) -> NDArray[np.bool_]:
+        """The groups that may be active in the step from t to t + dt [s].
+
+        u, v: displacements [m] and velocities [m/s] of the deformable nodes, shape (N, dim).
+        """
+        ...
+
     def dofs(self) -> NDArray[np.int64]:
         """Global dofs of its nodes, -1 where there are none, shape (N, dim)."""
         ...

@@ -71,10 +71,13 @@ class LaggedFactors:
         """Discard the factors of the last step."""
         self._lagged.begin_step()
 
-    def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> int:
-        """Solve matrix x = b. Returns the count of iterations. Raises LinearSolveFailed."""
+    def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, entries: PETSc.Mat | None = None) -> int:
+        """Solve matrix x = b. Returns the count of iterations. Raises LinearSolveFailed.
+
+        entries: what to factor, if `matrix` has products with vectors alone.
+        """
         iterations = self._lagged.solve_again(matrix, b, x)
         if iterations is not None:
             return iterations
         self._ksp.getPC().setReusePreconditioner(False)  # the order of elimination stays
-        return self._lagged.solve(self._ksp, matrix, b, x)
+        return self._lagged.solve(self._ksp, matrix, b, x, entries)

@@ -313,6 +313,20 @@ def factored_solver(comm, *, iterations: int) -> PETSc.KSP:
     return ksp
 
 
+#: Reduction of the residual that stands for an exact solution.
+EXACT = 1e-13
+
+
+def krylov_around(direct: PETSc.KSP) -> PETSc.KSP:
+    """GMRES with the factors of a direct solver, for their matrix plus one of low rank r: exact in r + 1 iterations."""
+    ksp = PETSc.KSP().create(direct.comm)
+    ksp.setType(PETSc.KSP.Type.GMRES)
+    ksp.setPCSide(PETSc.PC.Side.RIGHT)
+    ksp.setTolerances(rtol=EXACT, max_it=100)
+    ksp.setPC(direct.getPC())
+    return ksp
+
+
 def keep_preconditioner(ksp: PETSc.KSP) -> None:
     """Let a solver keep its preconditioner when the matrix changes."""
     ksp.getPC().setReusePreconditioner(True)

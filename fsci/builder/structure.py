@@ -23,7 +23,7 @@ from solvers.mesh import Mesh
 from solvers.solver_settings import SolverSettings
 from solvers.structure import materials, probes
 from solvers.structure.body import Body
-from solvers.structure.dynamics import Damping, Dynamics
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.elastic_constants import plane_stress_lambda
 from solvers.structure.field import Structure
 from solvers.structure.materials import (
@@ -32,6 +32,7 @@ from solvers.structure.materials import (
     PlaneStressLinearElastic,
     PlaneStressStVenantKirchhoff,
 )
+from solvers.structure.rayleigh import Damping
 from solvers.structure.supports import SupportError
 from solvers.structure.time_scheme import Statics, TimeScheme
 from solvers.timing import Timer
@@ -51,7 +52,9 @@ def build_structure(
     linear = case.solver.linear
     settings = SolverSettings(build_tolerance(case), linear.method, linear.tolerance)
     try:
-        return Structure(bodies, _time_scheme(case), settings, contact=contact, timer=timer)
+        alone = case.coupling is None
+        time = _time_scheme(case)
+        return Structure(bodies, time, settings, contact=contact, exchanges_mass=alone, timer=timer)
     except SupportError as error:
         supports = case.elastic_bodies[error.body].supports
         index = next(i for i, support in enumerate(supports) if error.where in (support.on or ()))

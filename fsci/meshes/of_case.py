@@ -88,7 +88,6 @@ def read_body(case: Case, name: str) -> Mesh:
         raise case.error(keys, str(error)) from None
     case.meshes[f"structure.bodies.{name}"] = mesh_checksum(mesh)
     _check_lengths(case, name, mesh.points.shape[1])
-    _require_mass(case, name, mesh)
     require_finite(case, name, mesh, find_locations(case, name, mesh))
     return mesh
 
@@ -123,23 +122,6 @@ def slave_surfaces(case: Case, name: str) -> list[str]:
     pairs = () if case.contact is None else case.contact.pairs.values()
     slaves = [pair.sides[0][1] for pair in pairs if not pair.tied]
     return [surface for side in slaves if side.body == name for surface in side.on or ()]
-
-
-def _require_mass(case: Case, name: str, mesh: Mesh) -> None:
-    """In dynamics slave surfaces have no mass: the body needs other nodes too."""
-    assert case.structure is not None
-    surfaces = slave_surfaces(case, name)
-    if not surfaces or case.structure.dynamics is None:
-        return
-    slaves = np.unique(np.concatenate([surface_facets(mesh, surface).ravel() for surface in surfaces]))
-    if len(slaves) == len(mesh.points):
-        raise case.error(("structure", "bodies", name, "mesh"), _NO_MASS_LEFT)
-
-
-_NO_MASS_LEFT = (
-    "all nodes of the body are on slave surfaces, which have no mass in dynamics: "
-    "use two or more cells between them, or make one of them the master"
-)
 
 
 def _named_surfaces(case: Case, name: str) -> Iterator[tuple[Keys, str]]:

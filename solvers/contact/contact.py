@@ -23,6 +23,7 @@ from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import ActiveMultipliers, linearise
 from solvers.contact.obstacle_work import ObstacleWork
 from solvers.contact.pair import Pair
+from solvers.contact.reach import Reach
 from solvers.contact.redistribute import redistributed
 from solvers.contact.slip import Slip
 from solvers.contact.stiffness import ContactStiffness
@@ -74,6 +75,10 @@ class Contact:
         self._gap = np.zeros(count)  # weighted gap at the latest evaluation
         self._mean_gap = np.zeros(count)  # weighted gap over D [m], zero where D is zero
         self._kept = np.zeros(count)  # mean gap that may stay in this step [m], <= 0
+        self.present = np.ones(
+            len(self.pairs), dtype=bool
+        )  #: mask of the pairs whose surfaces have no mass in dynamics
+        self._reach: Reach | None = None
         self._constraints = Constraints(self.interface)
         self.merged = np.zeros(count, dtype=bool)  #: multipliers that are merged into another one of their node
         self._stiffness = np.zeros(count)  # per area [Pa/m], at the latest evaluation
@@ -322,16 +327,30 @@ class Contact:
         return self.nodes.dofs
 
     def touching_dofs(self) -> NDArray[np.int64]:
-        """Global dofs of the nodes of all surfaces that are not tied, each once."""
-        pairs = [pair for pair in self.pairs if pair.law != Tied()]
+        """Global dofs of the nodes of surfaces of present pairs that are not tied, each once."""
+        pairs = [pair for pair, present in zip(self.pairs, self.present, strict=True) if present and pair.law != Tied()]
         numbers = [self.interface.nodes_of(side) for pair in pairs for side in (pair.slave, pair.master)]
         dofs = self.nodes.dofs[np.unique(np.concatenate(numbers))] if numbers else np.empty(0, dtype=np.int64)
         return dofs[dofs >= 0]
 
     def multiplier_dofs(self) -> NDArray[np.int64]:
-        """Global dofs of slave nodes that are not tied."""
-        slaves = (self.multipliers.areas > 0.0) & ~self._tied
+        """Global dofs of slave nodes of present pairs that are not tied."""
+        near = np.zeros(self.size, dtype=bool)
+        for pair, present in zip(self.pairs, self.present, strict=True):
+            near[self.interface.nodes_of(pair.slave)] |= present
+        slaves = (self.multipliers.areas > 0.0) & ~self._tied & near[self.multipliers.node]
         return self.nodes.dofs[np.unique(self.multipliers.node[slaves])].ravel()
+
+    def find_present(self, u: Array, v: Array, t: float, dt: float) -> NDArray[np.bool_]:
+        """Mask of the pairs that the step from t to t + dt [s] could bring into contact, or that are in contact.
+
+        u, v: displacements [m] and velocities [m/s] of the deformable nodes, shape (N, dim).
+        """
+        if self._reach is None:
+            self._reach = Reach(self.interface)
+        x, pressed = self.positions(u, t), np.zeros(self.size, dtype=bool)
+        pressed[self.multipliers.node[self.active_set.active & ~self._tied]] = True
+        return self._reach.find(x, self.positions(u, t + dt) - x + dt * v, self.present, pressed)
 
     @property
     def near(self) -> bool:
@@ -392,6 +411,7 @@ class Contact:
             "x": self.x.copy(),
             "mean_gap": self._mean_gap.copy(),
             "status": self.active_set.status.copy(),
+            "present": self.present.copy(),
             "touched_at": self.touched_at.copy(),
             "work": self.work.save(),
             "obstacle_work": self._of_obstacles.save(),
@@ -404,6 +424,7 @@ class Contact:
         self.x[:] = state["x"]
         self._mean_gap = state["mean_gap"].copy()
         self.active_set.status = state["status"].copy()
+        self.present = state["present"].copy()
         self.touched_at[:] = state["touched_at"]
         self.work.restore(state["work"])
         self._of_obstacles.restore(state["obstacle_work"])

@@ -371,6 +371,9 @@ class RigidBodies:
     def recover(self, taken: TakenRows, du: Array) -> None:
         """Nothing to do: the next evaluation of the balance computes the contact forces."""
 
+    def added_product(self) -> None:
+        """`linearise` is the whole derivative."""
+
     def missing(self) -> Array:
         """Zero: held components have their values since the start of the step."""
         return np.zeros(self.size)

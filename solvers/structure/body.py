@@ -84,8 +84,7 @@ class Body:
             self._dead.add_points(point)
         self.dead_load = np.zeros(self.size)
         self._loads_at: float | None = None  #: time [s] of the loads
-        self._gravity = gravity
-        self._moved: PETSc.Mat | None = None  # difference of the mass matrix from that of the density [kg]
+        self.gravity = gravity
         self.pressures = [FollowerPressure(domain, self.space, pressure) for pressure in pressures]
         self._spring_matrix = Springs(self) if springs else None
 
@@ -161,7 +160,7 @@ class Body:
         changed = self._dead.update(t) or self._loads_at is None
         if self.domain.comm.allreduce(changed, op=MPI.LOR):
             self._force.x.array[:] = self._dead.force
-            self.dead_load = self._summed() + self._moved_weight(t)
+            self.dead_load = self._summed()
         for pressure in self.pressures:
             pressure.set_time(t)
         self._loads_at = t
@@ -187,6 +186,11 @@ class Body:
         """Force of the body on its springs [N], shape (size,); 0 without springs (collective)."""
         return 0.0 if self._spring_matrix is None else self._spring_matrix.force(self.u.x.array[: self.size])
 
+    @property
+    def spring_stiffness(self) -> Springs | None:
+        """The springs of the body, None without any."""
+        return self._spring_matrix
+
     def external_force(self, t: float) -> Array:
         """Loads [N] at the time t [s] and the present displacement, shape (size,) (collective)."""
         self._evaluate_loads(t)
@@ -208,18 +212,6 @@ class Body:
         fem.assemble_matrix(matrix, self._mass)
         matrix.assemble()
         return matrix
-
-    def move_mass(self, change: PETSc.Mat) -> None:
-        """Let gravity act on the mass of the time scheme; change: its mass matrix minus `mass()` [kg]."""
-        self._moved, self._loads_at = change, None
-
-    def _moved_weight(self, t: float) -> Array | float:
-        if self._moved is None or not self._gravity:
-            return 0.0
-        g, force = self._moved.createVecs()
-        g.array[:] = self.nodal(self._gravity, t)[: self.owned].ravel()
-        self._moved.mult(g, force)
-        return force.array.copy()
 
     def create_tangent(self) -> PETSc.Mat:
         """An empty matrix for `assemble_tangent`."""

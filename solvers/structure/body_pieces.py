@@ -25,10 +25,9 @@ class BodyPieces:
         found = [_pieces_of_nodes(body) for body in bodies]
         first = np.cumsum([0, *(count for count, _ in found)])
         self.count = int(first[-1])
-        #: number of the piece of each owned dof
-        self.of_dofs = np.concatenate(
-            [np.repeat(start + own, body.dim) for body, start, (_, own) in zip(bodies, first, found, strict=False)]
-        )
+        #: number of the piece of each owned node and of each owned dof
+        self.of_nodes = np.concatenate([start + own for start, (_, own) in zip(first, found, strict=False)])
+        self.of_dofs = np.repeat(self.of_nodes, self._dim)
 
     def norms(self, arrays: Sequence[Array], other: Array | None = None) -> Array:
         """Norm of each array of owned dofs over each piece, shape (arrays, pieces) (collective).

@@ -9,25 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from solvers.added_product import with_product
 from solvers.api import Array, StepFailed
-from solvers.blocks import block_diagonal
+from solvers.blocks import times
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.linear import reason_of
 from solvers.structure.first_state import FirstState
-from solvers.structure.instant import Instant, Moving, times
+from solvers.structure.instant import Instant, Moving
+from solvers.structure.mass_exchange import exchange
 from solvers.structure.massless import massless_dofs
-from solvers.structure.time_scheme import Settling
+from solvers.structure.rayleigh import Damping, RayleighDamping
+from solvers.structure.time_scheme import Exchanging, Settling
 
 #: Interval of the finite differences at the start, relative to the first step.
 SHORT = 1e-3
-
-
-@dataclass(frozen=True)
-class Damping:
-    """Rayleigh damping C = mass * M + stiffness * K(u = 0)."""
-
-    mass: float = 0.0  #: [1/s]
-    stiffness: float = 0.0  #: [s]
 
 
 @dataclass(frozen=True)
@@ -39,6 +34,9 @@ class Dynamics:
     Contact surfaces have no mass. Their rows are static balances at n+1, multiplied by 1 - alpha_f. The forces at n are
     left out: they are in equilibrium, and with them contact forces would oscillate without damping. The velocity of
     massless dofs is (u_{n+1} - u_n) / dt.
+
+    A piece that touches with nodes that have mass, as one cell with contact on all sides, is integrated by implicit
+    Euler, M (v_{n+1} - v_n) / dt + f_{n+1} = 0, multiplied by 1 - alpha_f. It loses energy in impacts, and gains none.
     """
 
     scheme: GeneralisedAlpha
@@ -51,19 +49,14 @@ class Dynamics:
 
     # ------------------------------------------------------------------------------------------------- start
 
-    def massless(self, structure: Moving) -> NDArray[np.int64]:
+    def massless(self, structure: Moving) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         if structure.constraint is None:
-            return np.empty(0, dtype=np.int64)
-        return np.flatnonzero(np.concatenate(massless_dofs(structure)))
+            return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+        massless, impulsive = massless_dofs(structure)
+        return np.flatnonzero(massless), np.flatnonzero(impulsive)
 
-    def damping_matrix(self, structure: Moving) -> PETSc.Mat | None:
-        if self.damping == Damping():
-            return None
-        damping = structure.mass.copy()
-        damping.scale(self.damping.mass)
-        if self.damping.stiffness:
-            damping.axpy(self.damping.stiffness, _initial_stiffness(structure))
-        return damping
+    def create_damping(self, structure: Moving) -> RayleighDamping | None:
+        return None if self.damping == Damping() else RayleighDamping(self.damping, structure)
 
     def start(self, structure: Settling, t: float, dt: float) -> None:
         """Solve for the positions of massless nodes, then M a_0 = -C v_0 - f_0; prescribed dofs follow their functions.
@@ -75,7 +68,9 @@ class Dynamics:
         if structure.comm.allreduce(len(structure.massless)):
             others = np.setdiff1d(np.arange(structure.layout.size), structure.massless)
             held = structure.held.stopped(others, structure.now.u)
-            with structure.by(FirstState(structure.massless, structure.damping), held, t, SHORT * dt):
+            with structure.by(
+                FirstState(structure.massless, damped=structure.damping is not None), held, t, SHORT * dt
+            ):
                 structure.solve()
         self._solve_acceleration(structure)
 
@@ -88,15 +83,25 @@ class Dynamics:
 
     def _solve_acceleration(self, structure: Moving) -> None:
         """M a_0 = f_ext - f_int - C v_0, prescribed where supports are. Raises StepFailed."""
-        now, (x, b) = structure.now, structure.mass.createVecs()
-        b.array[:] = now.external + now.constraint - now.internal - _damping_force(structure, now.v)
+        now, rigid, frame, held = structure.now, structure.rigid, structure.frame, structure.held
+        x, b = structure.mass.createVecs()
+        if structure.damping is not None:
+            now.damping[:] = structure.damping.force(now.v)
+        b.array[:] = now.external + now.constraint - now.internal - now.damping
         x.array[:] = now.a
         x.array[structure.massless] = 0.0
-        matrix = structure.held.impose(structure.mass.copy(), x, b)
+        if rigid is not None and frame is not None:
+            b.array[:] -= rigid.force_by_acceleration(frame, now.v, held.part(x.array))
+        matrix = held.impose(structure.mass.copy(), x, b)
         rows = (structure.layout.start + structure.massless).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, x, b)
         ksp = PETSc.KSP().create(structure.comm)
-        ksp.setOperators(matrix)
+        if rigid is None or frame is None:
+            ksp.setOperators(matrix)
+        else:
+            product = rigid.product(frame)
+            more = with_product(matrix, lambda a: held.free_part(product(held.free_part(a))))
+            ksp.setOperators(more, matrix)
         ksp.setType(PETSc.KSP.Type.CG)
         ksp.getPC().setType(PETSc.PC.Type.JACOBI)
         ksp.setTolerances(rtol=1e-15, atol=0.0, max_it=1000)
@@ -105,9 +110,34 @@ class Dynamics:
             finite = np.isfinite(b.norm())
             why = reason_of(ksp) if finite else "a force is not a number"
             raise StepFailed("structure", f"the acceleration at the start cannot be computed ({why})")
-        now.a[:] = x.array
+        now.a[:], now.rigid[:] = x.array, 0.0
+        if rigid is not None and frame is not None:
+            now.rigid[:] = rigid.force_by_acceleration(frame, now.v, now.a)
 
     # ------------------------------------------------------------------------------------------------- steps
+
+    def prepare(self, structure: Exchanging, t: float, dt: float) -> None:
+        """Exchange mass if other contact pairs may come together in this step."""
+        constraint = structure.constraint
+        if constraint is None or not structure.exchanges_mass:
+            return
+        u, v = (structure.at_constraint(array) for array in (structure.now.u, structure.now.v))
+        present = constraint.find_present(u, v, t, dt)
+        if np.array_equal(present, constraint.present):
+            return
+
+        def switch() -> None:
+            constraint.present = present
+
+        def settle(lighter: NDArray[np.int64]) -> None:
+            others = np.setdiff1d(np.arange(structure.layout.size), lighter)
+            held = structure.held.stopped(others, structure.now.u)
+            with structure.by(FirstState(lighter, damped=structure.damping is not None), held, t, SHORT * dt):
+                structure.solve()
+
+        exchange(structure, switch, settle)
+        structure.assemble()
+        self._solve_acceleration(structure)
 
     def guess(self, structure: Moving, dt: float) -> Array:
         """Zero, or the velocity times dt."""
@@ -116,56 +146,88 @@ class Dynamics:
         return dt * structure.held.free_part(structure.now.v)
 
     def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
-        """Newmark's relations; for massless dofs v = (u_{n+1} - u_n) / dt."""
-        old, massless = structure.old, structure.massless
+        """Newmark's relations; for massless and impulsive dofs v = (u_{n+1} - u_n) / dt.
+
+        With damping massless dofs have v = w + (w - w_n) dt / (dt + dt_n), w = (u_{n+1} - u_n) / dt and w_n that of the
+        last step, of second order at the end of the step (the backward difference of three positions).
+        """
+        old, massless, impulsive = structure.old, structure.massless, structure.impulsive
         du = structure.now.u - old.u
         a, v = (rule(du, old.v, old.a, dt) for rule in (self.scheme.acceleration, self.scheme.velocity))
-        a[massless], v[massless] = 0.0, du[massless] / dt
+        w = du[massless] / dt
+        a[massless], v[massless] = 0.0, w + self._extrapolated(structure, dt) * (w - old.mean[massless])
+        v[impulsive] = du[impulsive] / dt
+        a[impulsive] = (v - old.v)[impulsive] / dt
         return v, a
 
+    def _extrapolated(self, structure: Moving, dt: float) -> float:
+        """dt / (dt + dt_n); zero in the first step, and without damping, where these velocities do nothing."""
+        first = structure.damping is None or structure.last_length == 0.0
+        return 0.0 if first else dt / (dt + structure.last_length)
+
+    def rigid_force(self, structure: Moving, dt: float) -> Array:
+        now, rigid, frame, before = structure.now, structure.rigid, structure.frame, structure.momenta
+        if rigid is None or frame is None or before is None:
+            return now.rigid
+        return rigid.force(frame, now.v, now.a, before, dt, self.scheme.gamma)
+
+    def rigid_factor(self, dt: float) -> float:
+        return self.scheme.mass_factor(dt) + self.damping.mass * self.scheme.damping_factor(dt)
+
     def balance(self, structure: Moving) -> Array:
-        present, before = (_own_forces(structure, at) - at.surface for at in (structure.now, structure.old))
-        before[structure.massless] = 0.0
-        return self._inertia(structure) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
+        present, before = (self._own_forces(structure, at) - at.surface for at in (structure.now, structure.old))
+        before[structure.massless] = before[structure.impulsive] = 0.0
+        return self._inertia(structure, 0.0) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
 
     def averaged_load(self, structure: Moving) -> Array:
-        present, before = (_own_forces(structure, at) for at in (structure.now, structure.old))
-        return self._inertia(structure) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
+        present, before = (self._own_forces(structure, at) for at in (structure.now, structure.old))
+        alpha = self.scheme.alpha_f
+        return self._inertia(structure, alpha) + (1.0 - alpha) * present + alpha * before
 
-    def _inertia(self, structure: Moving) -> Array:
-        share = self.scheme.alpha_m
-        return times(structure.mass, (1.0 - share) * structure.now.a + share * structure.old.a)
+    def _inertia(self, structure: Moving, old_share: float) -> Array:
+        """The mean force of inertia; old_share: weight of that at the start of the step at impulsive dofs."""
+        share, now, old, impulsive = self.scheme.alpha_m, structure.now, structure.old, structure.impulsive
+        a = (1.0 - share) * now.a + share * old.a
+        a[impulsive] = (1.0 - self.scheme.alpha_f) * now.a[impulsive] + old_share * old.a[impulsive]
+        return times(structure.mass, a) + (1.0 - share) * now.rigid + share * old.rigid
 
     def averaged(self, before: Array, after: Array) -> Array:
         return (1.0 - self.scheme.alpha_f) * after + self.scheme.alpha_f * before
 
     def damping_force(self, structure: Moving) -> Array:
-        return _damping_force(structure, self.averaged(structure.old.v, structure.now.v))
+        return self.averaged(structure.old.damping, structure.now.damping)
+
+    def _own_forces(self, structure: Moving, at: Instant) -> Array:
+        return at.internal - at.loads - at.constraint + at.damping
 
     def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat:
-        """mass_factor M + damping_factor C; in columns of massless dofs (1 - alpha_f) / dt C."""
-        matrix = structure.mass.copy()
-        matrix.scale(self.scheme.mass_factor(dt))
-        if structure.damping is not None:
-            by_displacement, (slope, _) = structure.damping.copy(), structure.damping.createVecs()
-            slope.array[:] = self.scheme.damping_factor(dt)
-            slope.array[structure.massless] = (1.0 - self.scheme.alpha_f) / dt
-            by_displacement.diagonalScale(None, slope)
-            matrix.axpy(1.0, by_displacement, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        """mass_factor M, in rows of impulsive dofs (1 - alpha_f) / dt^2 M."""
+        matrix, (factor, _) = structure.mass.copy(), structure.mass.createVecs()
+        factor.array[:] = self.scheme.mass_factor(dt)
+        factor.array[structure.impulsive] = (1.0 - self.scheme.alpha_f) / dt**2
+        matrix.diagonalScale(factor, None)
         return matrix
+
+    def damping_slope(self, structure: Moving, dt: float) -> Array | None:
+        slope = np.full(structure.layout.size, self.scheme.damping_factor(dt))
+        slope[structure.impulsive] = (1.0 - self.scheme.alpha_f) / dt
+        slope[structure.massless] = (1.0 - self.scheme.alpha_f) * (1.0 + self._extrapolated(structure, dt)) / dt
+        return slope
 
     def reaction(self, structure: Moving) -> Array:
         """M a + C v + f_int - f_ext [N] at the present time."""
         now = structure.now
-        dynamic = times(structure.mass, now.a) + _damping_force(structure, now.v)
+        dynamic = times(structure.mass, now.a) + now.rigid + now.damping
         return dynamic + now.internal - now.external - now.constraint
 
     def support_forces(self, structure: Moving) -> tuple[Array, Array]:
-        """The balance of the step at both ends; at massless dofs the static balances at its ends."""
+        """The balance of the step at both ends; at massless and impulsive dofs those of its ends."""
         found = (structure.residual_force.copy(), structure.residual_force.copy())
         for force, at in zip(found, (structure.old, structure.now), strict=True):
-            static = _own_forces(structure, at) - at.surface
+            static = self._own_forces(structure, at) - at.surface
             force[structure.massless] = static[structure.massless]
+            if len(structure.impulsive):
+                force[structure.impulsive] = (static + times(structure.mass, at.a))[structure.impulsive]
         return found
 
     @property
@@ -178,23 +240,6 @@ class Dynamics:
         return times(structure.mass, (1.0 - share) * stopped + share * old.a)
 
     def kinetic_energy(self, structure: Moving) -> float:
-        v = structure.now.v
-        return 0.5 * structure.comm.allreduce(float(v @ times(structure.mass, v)))
-
-
-def _own_forces(structure: Moving, at: Instant) -> Array:
-    return at.internal - at.loads - at.constraint + _damping_force(structure, at.v)
-
-
-def _damping_force(structure: Moving, v: Array) -> Array:
-    return np.zeros_like(v) if structure.damping is None else times(structure.damping, v)
-
-
-def _initial_stiffness(structure: Moving) -> PETSc.Mat:
-    matrices = []
-    for body, u in zip(structure.bodies, structure.layout.split(structure.now.u), strict=True):
-        body.set_displacement(np.zeros_like(u))
-        matrices.append(body.create_tangent())
-        body.assemble_tangent(matrices[-1], structure.current.t)
-        body.set_displacement(u)
-    return block_diagonal(matrices)
+        v, rigid, frame = structure.now.v, structure.rigid, structure.frame
+        energy = 0.5 * structure.comm.allreduce(float(v @ times(structure.mass, v)))
+        return energy if rigid is None or frame is None else energy + rigid.energy(frame, v)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from mpi4py import MPI
@@ -30,7 +30,9 @@ from solvers.structure.energy import EnergyBalance, EnergySentinel
 from solvers.structure.held import Held
 from solvers.structure.instant import Instant
 from solvers.structure.limit_point import LimitPoint
-from solvers.structure.massless import mass_matrices
+from solvers.structure.massless import without_mass
+from solvers.structure.rayleigh import RayleighDamping
+from solvers.structure.rigid_inertia import Frames, Momenta, RigidInertia
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.saved import restore_state, saved_state
 from solvers.structure.solid_solver import SolidSolver
@@ -52,8 +54,11 @@ class Structure:
         settings: SolverSettings = SolverSettings(),
         *,
         contact: Constraint | None = None,
+        exchanges_mass: bool = False,
         timer: Timer | None = None,
     ):
+        """exchanges_mass: surfaces lose their mass only while their contact pairs are near, else for good."""
+        self.exchanges_mass = exchanges_mass
         self.comm = comm = bodies[0].domain.comm
         self.bodies, self.time, self.settings = list(bodies), time, settings
         self.timer, self.constraint = timer or Timer(), contact
@@ -63,7 +68,10 @@ class Structure:
         self._constrained = None if contact is None else ConstrainedDofs(self.layout, contact)
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
+        self.frame: Frames | None = None
+        self.momenta: Momenta | None = None
         self.current = Step(0.0, 0.0)  #: the present step, or the last one
+        self.last_length = 0.0  #: of the last accepted step [s], 0 at the start
         self.energy = EnergyBalance()
         self._limit_point = LimitPoint()
         self.energy_sentinel = EnergySentinel(
@@ -85,7 +93,7 @@ class Structure:
     def _symmetric(self) -> bool:
         """Whether tangents away from contact are symmetric."""
         # follower pressures have an unsymmetric boundary term, and the velocity of massless nodes has a rule of its own
-        damped = self.constraint is not None and self.damping is not None
+        damped = self.damping is not None and (self._moves_mass or not self.damping.symmetric)
         return not (damped or any(body.pressures for body in self.bodies))
 
     @property
@@ -107,23 +115,69 @@ class Structure:
         return largest_extent(self.comm, self.bodies)
 
     @cached_property
-    def massless(self) -> NDArray[np.int64]:
-        """Owned dofs without mass."""
+    def _touching_dofs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         return self.time.massless(self)
 
+    @property
+    def massless(self) -> NDArray[np.int64]:
+        """Owned dofs without mass."""
+        return self._touching_dofs[0]
+
+    @property
+    def impulsive(self) -> NDArray[np.int64]:
+        """Owned dofs of pieces that touch with nodes that have mass."""
+        return self._touching_dofs[1]
+
     @cached_property
-    def _masses(self) -> list[tuple[PETSc.Mat, PETSc.Mat | None]]:
-        return mass_matrices(self)
+    def _all_mass(self) -> PETSc.Mat:
+        return block_diagonal([body.mass() for body in self.bodies])
+
+    @cached_property
+    def _moves_mass(self) -> bool:
+        return self.comm.allreduce(bool(len(self.massless)), op=MPI.LOR)
+
+    @property
+    def piece_of_nodes(self) -> tuple[NDArray[np.int64], int]:
+        """(number of the connected piece of each owned node, count of all pieces)."""
+        return self.pieces.of_nodes, self.pieces.count
 
     @cached_property
     def mass(self) -> PETSc.Mat:
-        """Mass matrix of all bodies [kg]."""
-        return block_diagonal([mass for mass, _ in self._masses])
+        """Mass matrix of all bodies [kg], without that of massless dofs."""
+        if not self._moves_mass:
+            return self._all_mass
+        massless = np.zeros(self.layout.size, dtype=bool)
+        massless[self.massless] = True
+        return without_mass(self._all_mass, massless, *self.piece_of_nodes)
 
     @cached_property
-    def damping(self) -> PETSc.Mat | None:
-        """Damping matrix of all bodies [N s/m], None without damping."""
-        return self.time.damping_matrix(self)
+    def rigid(self) -> RigidInertia | None:
+        """What `mass` lacks for rigid motion; None if no dofs are massless."""
+        if not self._moves_mass:
+            return None
+        return self.all_inertia()
+
+    def all_inertia(self) -> RigidInertia:
+        """The inertia of all pieces, of those with all of their mass, too."""
+        points = np.concatenate([body.points[: self.dim, : body.owned].T for body in self.bodies])
+        turns = np.repeat([not body.linear for body in self.bodies], [body.owned for body in self.bodies])
+        return RigidInertia(self.comm, self._all_mass, self.mass, points, self.piece_of_nodes, turns)
+
+    def forget_mass(self) -> None:
+        """Find the massless nodes anew, and all that follows from them."""
+        for name in ("_touching_dofs", "_moves_mass", "mass", "rigid", "_symmetric"):
+            vars(self).pop(name, None)
+        self._assembled_tangent.forget()
+
+    def at_constraint(self, owned: Array) -> Array:
+        """Values at the nodes of the constraint, shape (N, dim) (collective)."""
+        assert self._constrained is not None
+        return self._constrained.at_nodes(owned)
+
+    @cached_property
+    def damping(self) -> RayleighDamping | None:
+        """Damping of all bodies, None without damping."""
+        return self.time.create_damping(self)
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -133,10 +187,13 @@ class Structure:
             for target, value in ((u, body.initial_displacement), (v, body.initial_velocity)):
                 if value is not None:
                     target[:] = body.nodal(value, t)[: body.owned].ravel()
-        for body, (_, moved) in zip(self.bodies, self._masses, strict=True):
-            if moved is not None:
-                body.move_mass(moved)  # gravity acts on the moved mass
         self.current = Step(t, dt)
+        if self.constraint is not None and self.exchanges_mass:
+            self.constraint.present[:] = False
+            self.constraint.present = self.constraint.find_present(
+                self.at_constraint(self.now.u), self.at_constraint(self.now.v), t, dt
+            )
+            self.forget_mass()
         self._assemble_bodies()
         if self.constraint is not None and self._constrained is not None:
             at_nodes, stiffness = self._constrained.at_nodes, self._assembled_tangent.diagonal(t)
@@ -186,10 +243,13 @@ class Structure:
 
     def begin_step(self, t: float, dt: float) -> None:
         """Store the state at t [s] and predict that at t + dt."""
+        self.time.prepare(self, t, dt)
         self.old = self.now.copy()
         for body in self.bodies:
             body.element.begin_step()
         self.current = Step(t + dt, dt)
+        if self.rigid is not None and self.frame is not None:
+            self.momenta = self.rigid.momenta(self.frame, self.old.v, self.old.a, self.old.rigid)
         # not part of the saved state: a resumed run must start alike
         self.rounding = self._tangent = self._imposed = self._stopping = None
         self.solver.begin_step()
@@ -232,6 +292,7 @@ class Structure:
             self.constraint.end_step(self.time.force_weight)
             pushed += self.constraint.obstacle_work
         du, now, old, averaged = self.now.u - self.old.u, self.now, self.old, self.time.averaged
+        now.mean, self.last_length = du / self.current.dt, self.current.dt
         at_supports, (before, after) = self.held.part(du), self.time.support_forces(self)
         parts = [
             averaged(old.loads, now.loads) @ du,
@@ -256,6 +317,11 @@ class Structure:
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
+    def assemble(self) -> None:
+        """Compute forces at the present displacement."""
+        self._assemble_bodies()
+        self._assemble_constraint()
+
     def _assemble_bodies(self) -> None:
         now = self.now
         parts = zip(self.bodies, *(self.split(a) for a in (now.u, now.internal, now.loads)), strict=True)
@@ -263,6 +329,22 @@ class Structure:
             body.set_displacement(u)
             internal[:] = body.internal_force()
             loads[:] = body.external_force(self.current.t)
+        frame, heavy = self.find_frame(), any(body.gravity for body in self.bodies)
+        if heavy and self.rigid is not None and frame is not None:
+            now.loads += self.rigid.weight(frame, self._gravity(self.current.t))
+
+    def find_frame(self) -> Frames | None:
+        """Set `frame` at the present displacement."""
+        self.frame = None if self.rigid is None else self.rigid.frame(self.now.u)
+        return self.frame
+
+    def _gravity(self, t: float) -> Array:
+        """Acceleration [m/s^2] at owned dofs."""
+        parts = [
+            body.nodal(body.gravity, t)[: body.owned].ravel() if body.gravity else np.zeros(body.size)
+            for body in self.bodies
+        ]
+        return np.concatenate(parts)
 
     def _assemble_constraint(self) -> None:
         if self.constraint is not None and self._constrained is not None:
@@ -276,15 +358,18 @@ class Structure:
         with self.timer("contact"):
             self._assemble_constraint()
         self.now.v, self.now.a = self.time.motion(self, self.current.dt)
+        self.now.rigid = self.time.rigid_force(self, self.current.dt)
+        if self.damping is not None:
+            self.now.damping = self.damping.force(self.now.v)
         self.residual_force = self.time.balance(self)
         self._unbalanced, missed = self.held.free_part(self.residual_force), None
         if self.constraint is not None and self.constraint.near:
             at_nodes = self.constraint.violation(self.time.force_weight)
-            missed = np.bincount(self._piece_of_nodes, at_nodes**2, self.pieces.count).astype(float)
+            missed = np.bincount(self._piece_at_constraint, at_nodes**2, self.pieces.count).astype(float)
         return self.pieces.norms([self._unbalanced], missed)[0]
 
     @cached_property
-    def _piece_of_nodes(self) -> NDArray[np.int64]:
+    def _piece_at_constraint(self) -> NDArray[np.int64]:
         """Piece of each node of the constraint, 0 for rigid ones (collective)."""
         assert self._constrained is not None
         return self._constrained.at_nodes(self.pieces.of_dofs.astype(float))[:, 0].astype(np.int64)
@@ -314,8 +399,12 @@ class Structure:
         """
         change = self.row_transformation() if self._touching else None
         taken, imposed = None, self._imposed
+        added, free = self.added_product(), None
         self._x.array[:] = self.missing_displacement()
         self._b.array[:] = self.right_side()
+        if added is not None:
+            self._b.array[:] -= added(self._x.array)
+            free = partial(_of_free_part, self.held, added)
         if keep and change is None and imposed is not None and not self.norm(self._x.array):
             matrix = imposed
             self._b.array[:] = self.held.free_part(self._b.array)
@@ -329,12 +418,22 @@ class Structure:
         symmetric, enough = (self._symmetric, 0.0) if change is None else (False, reduction)
         try:
             with self.timer("solve"):
-                self.solver.solve(matrix, self._b, self._x, self._attach_modes, symmetric=symmetric, reduction=enough)
+                self.solver.solve(
+                    matrix, self._b, self._x, self._attach_modes, symmetric=symmetric, reduction=enough, added=free
+                )
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         if taken is not None:
             self.recover(taken, gather(self.comm, self._x.array))
         return self.update(self._x.array)
+
+    def added_product(self) -> Callable[[Array], Array] | None:
+        """The part of the tangent that `linearise` lacks, as a product with owned dofs: of the inertia `rigid`."""
+        rigid, frame, factor = self.rigid, self.frame, self.time.rigid_factor(self.current.dt)
+        if rigid is None or frame is None or not factor:
+            return None
+        product = rigid.product(frame)
+        return lambda du: self.held.free_part(factor * product(du))
 
     @property
     def _touching(self) -> bool:
@@ -428,7 +527,7 @@ class Structure:
         of_force, of_conditions = self.constraint.rounding(weight)
         found = self.pieces.below(self._unbalanced, self.rounding + several * self._constrained.at_owned(of_force))
         missed = self.constraint.violation(weight) > several * of_conditions
-        return found & (np.bincount(self._piece_of_nodes[missed], minlength=self.pieces.count) == 0)
+        return found & (np.bincount(self._piece_at_constraint[missed], minlength=self.pieces.count) == 0)
 
     def worst(self) -> tuple[float, ...] | None:
         """Reference position [m] of the largest residual relative to the forces on its piece (collective)."""
@@ -455,3 +554,7 @@ class Structure:
     def restore(self, state: State) -> None:
         """Restore a saved state."""
         restore_state(self, state)
+
+
+def _of_free_part(held: Held, product: Callable[[Array], Array], du: Array) -> Array:
+    return product(held.free_part(du))

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array
-from solvers.structure.instant import Moving, times
+from solvers.blocks import times
+from solvers.structure.instant import Moving
 from solvers.structure.time_scheme import Statics
 
 
@@ -19,9 +20,16 @@ class SmoothAcceleration(Statics):
         a[structure.massless] = 0.0
         return structure.now.v, a
 
+    def rigid_force(self, structure: Moving, dt: float) -> Array:
+        now, rigid, frame = structure.now, structure.rigid, structure.frame
+        return now.rigid if rigid is None or frame is None else rigid.force_by_acceleration(frame, now.v, now.a)
+
+    def rigid_factor(self, dt: float) -> float:
+        return 1.0 / dt**2
+
     def balance(self, structure: Moving) -> Array:
-        force = self.reaction(structure) + times(structure.mass, structure.now.a)
-        return force if structure.damping is None else force + times(structure.damping, structure.now.v)
+        now = structure.now
+        return self.reaction(structure) + times(structure.mass, now.a) + now.rigid + now.damping
 
     def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat:
         matrix = structure.mass.copy()
@@ -36,23 +44,18 @@ class FirstState(Statics):
     their initial velocity. The velocity of other nodes is given.
     """
 
-    def __init__(self, moving: NDArray[np.int64], damping: PETSc.Mat | None):
-        """moving: owned dofs without mass; damping: C."""
-        self._moving, self._damping = moving, damping
+    def __init__(self, moving: NDArray[np.int64], *, damped: bool):
+        """moving: owned dofs without mass; damped: whether the structure has damping."""
+        self._moving, self._damped = moving, damped
 
     def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
         v = structure.now.v.copy()
-        if self._damping is not None:
+        if self._damped:
             v[self._moving] = (structure.now.u - structure.old.u)[self._moving] / dt
         return v, structure.now.a
 
     def balance(self, structure: Moving) -> Array:
-        force = self.reaction(structure)
-        return force if self._damping is None else force + times(self._damping, structure.now.v)
+        return self.reaction(structure) + structure.now.damping
 
-    def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat | None:
-        if self._damping is None:
-            return None
-        matrix = self._damping.copy()
-        matrix.scale(1.0 / dt)
-        return matrix
+    def damping_slope(self, structure: Moving, dt: float) -> Array | None:
+        return np.full(structure.layout.size, 1.0 / dt)

@@ -16,6 +16,7 @@ from solvers.constraint import Constraint
 from solvers.step import Step
 from solvers.structure.body import Body
 from solvers.structure.held import Held
+from solvers.structure.rigid_inertia import Frames, Momenta, RigidInertia
 
 
 @dataclass
@@ -29,6 +30,9 @@ class Instant:
     loads: Array  #: loads of its own [N]
     surface: Array  #: load by another field [N]
     constraint: Array  #: contact force [N]
+    damping: Array  #: force of damping [N]
+    mean: Array  #: displacement of the last step over its length [m/s]
+    rigid: Array  #: inertia force [N] that the moved mass lacks, see `rigid_inertia.py`
 
     @classmethod
     def zeros(cls, size: int) -> Instant:
@@ -43,6 +47,23 @@ class Instant:
         return Instant(**{name: array.copy() for name, array in vars(self).items()})
 
 
+class DampingForce(Protocol):
+    """A force that depends on the velocity."""
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether its derivative by the displacement is symmetric if velocities are proportional to displacements."""
+        ...
+
+    def force(self, v: Array) -> Array:
+        """Force [N] at owned dofs of the velocity v [m/s], at the present displacement."""
+        ...
+
+    def add_tangent(self, matrix: PETSc.Mat, v: Array, slope: Array, weight: float) -> None:
+        """Add its derivative by the displacement; slope: that of the weighted velocity [1/s], weight: of the force."""
+        ...
+
+
 class Moving(Protocol):
     """A structure with its state at both ends of a step."""
 
@@ -55,6 +76,7 @@ class Moving(Protocol):
     old: Instant
     residual_force: Array
     current: Step
+    last_length: float  #: of the last accepted step [s], 0 at the start
 
     @property
     def massless(self) -> NDArray[np.int64]:
@@ -62,19 +84,29 @@ class Moving(Protocol):
         ...
 
     @property
-    def mass(self) -> PETSc.Mat:
-        """Mass matrix of all bodies [kg]."""
+    def piece_of_nodes(self) -> tuple[NDArray[np.int64], int]:
+        """(number of the connected piece of each owned node, count of all pieces)."""
         ...
 
     @property
-    def damping(self) -> PETSc.Mat | None:
-        """Damping matrix [N s/m] of all bodies, None without damping."""
+    def impulsive(self) -> NDArray[np.int64]:
+        """Owned dofs of pieces that touch with nodes that have mass."""
         ...
 
+    @property
+    def mass(self) -> PETSc.Mat:
+        """Mass matrix of all bodies [kg], without that of massless dofs."""
+        ...
 
-def times(matrix: PETSc.Mat, array: Array) -> Array:
-    """Product of a matrix and an array of owned dofs (collective)."""
-    x, y = matrix.createVecs()
-    x.array[:] = array
-    matrix.mult(x, y)
-    return y.array
+    @property
+    def damping(self) -> DampingForce | None:
+        """The damping, None without any."""
+        ...
+
+    @property
+    def rigid(self) -> RigidInertia | None:
+        """What `mass` lacks for rigid motion; None if no dofs are massless."""
+        ...
+
+    frame: Frames | None  #: of `rigid` at the present iterate
+    momenta: Momenta | None  #: of `rigid` at the start of the step

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from solvers.api import Array, Finding, State
+from solvers.blocks import times
 from solvers.structure.field import Structure
-from solvers.structure.instant import times
 from solvers.structure.time_scheme import Statics
 
 

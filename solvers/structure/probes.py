@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from solvers import fem
 from solvers.api import Array
+from solvers.blocks import times
 from solvers.structure import forms
 from solvers.structure.body import Body
 from solvers.structure.field import Structure
@@ -97,9 +98,9 @@ def of_bodies(structure: Structure, bodies: Sequence[Body], quantity: str) -> Pr
     """
     return {
         "energy": lambda: _energy(structure),
-        "mass": lambda: {"": float(_moments(structure, bodies, np.ones_like(structure.now.u))[0])},
+        "mass": lambda: {"": _mass(structure, bodies)},
         "centre": lambda: _centre(structure, bodies),
-        "momentum": lambda: _components(_moments(structure, bodies, structure.now.v)),
+        "momentum": lambda: _components(_sums(structure, bodies, _momenta(structure))),
         "angular_momentum": lambda: _angular_momentum(structure, bodies),
         "volume": _volume(structure, bodies) if quantity == "volume" else dict,
     }[quantity]
@@ -115,18 +116,21 @@ def _energy(structure: Structure) -> dict[str, float]:
     }
 
 
-def _times_mass(structure: Structure, array: Array) -> Array:
-    x, y = structure.mass.createVecs("right"), structure.mass.createVecs("left")
-    x.array[:] = array
-    structure.mass.mult(x, y)
-    return y.array
-
-
-def _moments(structure: Structure, bodies: Sequence[Body], array: Array) -> Array:
-    """int rho f dX by component: the sum of the nodal values of M f, because shape functions add up to one."""
-    parts = zip(structure.bodies, structure.split(_times_mass(structure, array)), strict=True)
+def _sums(structure: Structure, bodies: Sequence[Body], array: Array) -> Array:
+    """Sums of nodal values by component. Those of M f are int rho f dX: shape functions add up to one."""
+    parts = zip(structure.bodies, structure.split(array), strict=True)
     total = sum(part.reshape(-1, structure.dim).sum(axis=0) for body, part in parts if body in bodies)
     return structure.comm.allreduce(total)
+
+
+def _mass(structure: Structure, bodies: Sequence[Body]) -> float:
+    return float(_sums(structure, bodies, times(structure.mass, np.ones_like(structure.now.u)))[0])
+
+
+def _momenta(structure: Structure) -> Array:
+    """Momentum [kg m/s] of the nodes, with that of massless ones on the others."""
+    momenta, rigid, frame = times(structure.mass, structure.now.v), structure.rigid, structure.frame
+    return momenta if rigid is None or frame is None else momenta + rigid.times(frame, structure.now.v)
 
 
 def _positions(structure: Structure) -> Array:
@@ -135,12 +139,14 @@ def _positions(structure: Structure) -> Array:
 
 
 def _centre(structure: Structure, bodies: Sequence[Body]) -> dict[str, float]:
-    mass = _moments(structure, bodies, np.ones_like(structure.now.u))[0]
-    return _components(_moments(structure, bodies, _positions(structure)) / mass)
+    moments, rigid, frame = times(structure.mass, _positions(structure)), structure.rigid, structure.frame
+    if rigid is not None and frame is not None:
+        moments = moments + rigid.on_nodes(frame, frame.first, np.zeros_like(frame.first))
+    return _components(_sums(structure, bodies, moments) / _mass(structure, bodies))
 
 
 def _angular_momentum(structure: Structure, bodies: Sequence[Body]) -> dict[str, float]:
-    momenta = structure.split(_times_mass(structure, structure.now.v))
+    momenta = structure.split(_momenta(structure))
     total = np.zeros(3)
     for body, x, p in zip(structure.bodies, structure.split(_positions(structure)), momenta, strict=True):
         if body in bodies:

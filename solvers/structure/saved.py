@@ -10,6 +10,7 @@ from solvers.api import Array, State
 from solvers.distributed import Nodal
 from solvers.structure.energy import EnergyBalance
 from solvers.structure.instant import Moving
+from solvers.structure.rigid_inertia import Frames
 from solvers.structure.solid_solver import SolidSolver
 
 
@@ -19,10 +20,19 @@ class Saved(Moving, Protocol):
     energy: EnergyBalance
     solver: SolidSolver
 
+    def forget_mass(self) -> None:
+        """Find the massless nodes anew, and all that follows from them."""
+        ...
+
+    def find_frame(self) -> Frames | None:
+        """Set `frame` at the present displacement."""
+        ...
+
 
 def saved_state(structure: Saved) -> State:
     """The state, by body."""
     state: State = {name: per_body(structure, array) for name, array in vars(structure.now).items()}
+    state["last_length"] = structure.last_length
     state["energy"] = structure.energy.save()
     state["linear_solver"] = structure.solver.position
     if structure.constraint is not None:
@@ -36,10 +46,12 @@ def restore_state(structure: Saved, state: State) -> None:
         array[:] = from_bodies(structure, state[name])
     for body, u in zip(structure.bodies, structure.layout.split(structure.now.u), strict=True):
         body.set_displacement(u)
-    structure.energy.restore(state["energy"])
-    structure.solver.position = state["linear_solver"]
     if structure.constraint is not None:
         structure.constraint.restore(state["contact"])
+        structure.forget_mass()
+    structure.find_frame()
+    structure.energy.restore(state["energy"])
+    structure.solver.position, structure.last_length = state["linear_solver"], state["last_length"]
 
 
 def per_body(structure: Moving, array: Array) -> State:

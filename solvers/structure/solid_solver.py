@@ -7,6 +7,8 @@ from collections.abc import Callable
 from petsc4py import PETSc
 
 from solvers import linear
+from solvers.added_product import with_product
+from solvers.api import Array
 from solvers.solver_settings import SolverSettings
 
 #: Iterations after which incomplete factors are given up if another solver follows: FIRST, and one more for each
@@ -50,6 +52,7 @@ class SolidSolver:
         )
         self.position = 0
         self._solvers: dict[tuple[int, bool], PETSc.KSP] = {}
+        self._around: dict[tuple[int, bool], PETSc.KSP] = {}
         self._tried = False
 
     def begin_step(self) -> None:
@@ -77,6 +80,15 @@ class SolidSolver:
             ksp.setTolerances(max_it=iterations_allowed(self._dofs))
         return ksp
 
+    def _iterating(self, *, symmetric: bool) -> PETSc.KSP:
+        """The present solver as a Krylov method."""
+        solver, key = self.current(symmetric=symmetric), (self.position, symmetric)
+        if solver.getType() != PETSc.KSP.Type.PREONLY:
+            return solver
+        if key not in self._around:
+            self._around[key] = linear.krylov_around(solver)
+        return self._around[key]
+
     def solve(
         self,
         matrix: PETSc.Mat,
@@ -86,9 +98,11 @@ class SolidSolver:
         *,
         symmetric: bool,
         reduction: float = 0.0,
+        added: Callable[[Array], Array] | None = None,
     ) -> None:
-        """Solve matrix x = b (collective). Raises LinearSolveFailed.
+        """Solve (matrix + added) x = b (collective). Raises LinearSolveFailed.
 
+        added: product of a part of low rank with owned unknowns, for which direct solvers become preconditioners.
         attach_modes: attaches the rigid modes to a matrix, for multigrid; reduction: see `linear.solve`.
         """
         while True:
@@ -96,7 +110,12 @@ class SolidSolver:
                 attach_modes(matrix)
             solver, trial = self.current(symmetric=symmetric), not (self._last or self._tried)
             try:
-                linear.solve(solver, matrix, b, x, reduction=reduction, squared=trial)
+                if added is None:
+                    linear.solve(solver, matrix, b, x, reduction=reduction, squared=trial)
+                else:
+                    solver = self._iterating(symmetric=symmetric)
+                    whole = with_product(matrix, added)
+                    linear.solve(solver, whole, b, x, matrix, reduction=reduction, squared=trial)
             except linear.LinearSolveFailed:
                 if self._last:
                     raise

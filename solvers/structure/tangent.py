@@ -39,7 +39,14 @@ class Tangent:
                 self._combined.scale(weight)
         if added is not None:
             self._combined.axpy(1.0, added, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        slope = None if structure.damping is None else time.damping_slope(structure, structure.current.dt)
+        if structure.damping is not None and slope is not None:
+            structure.damping.add_tangent(self._combined, structure.now.v, slope, weight)
         return self._combined
+
+    def forget(self) -> None:
+        """Compute D anew: mass and damping have changed."""
+        self._dynamic = None
 
     def _write(self, matrix: PETSc.Mat, t: float, weight: float) -> bool:
         """Write the weighted blocks of all bodies into the matrix, with the same entries; False if some has none."""

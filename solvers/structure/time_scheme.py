@@ -12,6 +12,8 @@ from petsc4py import PETSc
 from solvers.api import Array, StepInfo
 from solvers.structure.held import Held
 from solvers.structure.instant import Moving
+from solvers.structure.rayleigh import RayleighDamping
+from solvers.structure.rigid_inertia import RigidInertia
 
 
 class Settling(Moving, Protocol):
@@ -26,6 +28,28 @@ class Settling(Moving, Protocol):
         ...
 
 
+class Exchanging(Settling, Protocol):
+    """A structure whose massless nodes may change between steps."""
+
+    exchanges_mass: bool
+
+    def at_constraint(self, owned: Array) -> Array:
+        """Values at the nodes of the constraint, shape (N, dim) (collective)."""
+        ...
+
+    def all_inertia(self) -> RigidInertia:
+        """The inertia of all pieces, of those with all of their mass, too."""
+        ...
+
+    def forget_mass(self) -> None:
+        """Find the massless nodes anew, and all that follows from them."""
+        ...
+
+    def assemble(self) -> None:
+        """Compute forces at the present displacement."""
+        ...
+
+
 class TimeScheme(Protocol):
     """A scheme without state of its own: results depend on the structure at both ends of the step only."""
 
@@ -34,16 +58,24 @@ class TimeScheme(Protocol):
         """Weight w of the forces at the end of the step in the balance; those at its start have 1 - w."""
         ...
 
-    def massless(self, structure: Moving) -> NDArray[np.int64]:
-        """Owned dofs without mass. Raises NoMassLeft."""
+    def massless(self, structure: Moving) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Owned dofs without mass, and those of pieces that touch with nodes that have mass."""
         ...
 
-    def damping_matrix(self, structure: Moving) -> PETSc.Mat | None:
-        """C [N s/m]; None without damping."""
+    def create_damping(self, structure: Moving) -> RayleighDamping | None:
+        """The damping of a structure; None without damping."""
+        ...
+
+    def damping_slope(self, structure: Moving, dt: float) -> Array | None:
+        """Derivative of the weighted velocity of damping by the displacement [1/s]; None: there is no damping."""
         ...
 
     def start(self, structure: Settling, t: float, dt: float) -> None:
         """Set velocity and acceleration at the start."""
+        ...
+
+    def prepare(self, structure: Exchanging, t: float, dt: float) -> None:
+        """Prepare a step from t to t + dt [s], before its start is stored. Raises StepFailed."""
         ...
 
     def guess(self, structure: Moving, dt: float) -> Array:
@@ -52,6 +84,14 @@ class TimeScheme(Protocol):
 
     def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
         """(velocity [m/s], acceleration [m/s^2]) for the present displacement in a step of length dt."""
+        ...
+
+    def rigid_force(self, structure: Moving, dt: float) -> Array:
+        """The inertia force [N] that the moved mass lacks, for the present motion in a step of length dt."""
+        ...
+
+    def rigid_factor(self, dt: float) -> float:
+        """Derivative of this force in the balance by the mass that is lacking times the displacement [1/s^2]."""
         ...
 
     def balance(self, structure: Moving) -> Array:
@@ -87,7 +127,7 @@ class TimeScheme(Protocol):
         ...
 
     def kinetic_energy(self, structure: Moving) -> float:
-        """v.M v / 2 [J]."""
+        """Kinetic energy [J]."""
         ...
 
     @property
@@ -102,19 +142,30 @@ class Statics:
     force_weight = 1.0
     dissipates = True  #: a state without equilibrium nearby jumps to another one
 
-    def massless(self, structure: Moving) -> NDArray[np.int64]:
-        return np.empty(0, dtype=np.int64)
+    def massless(self, structure: Moving) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
 
-    def damping_matrix(self, structure: Moving) -> PETSc.Mat | None:
+    def create_damping(self, structure: Moving) -> RayleighDamping | None:
+        return None
+
+    def damping_slope(self, structure: Moving, dt: float) -> Array | None:
         return None
 
     def start(self, structure: Settling, t: float, dt: float) -> None: ...
+
+    def prepare(self, structure: Exchanging, t: float, dt: float) -> None: ...
 
     def guess(self, structure: Moving, dt: float) -> Array:
         return np.zeros(structure.layout.size)
 
     def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
         return structure.now.v, structure.now.a
+
+    def rigid_force(self, structure: Moving, dt: float) -> Array:
+        return structure.now.rigid
+
+    def rigid_factor(self, dt: float) -> float:
+        return 0.0
 
     def balance(self, structure: Moving) -> Array:
         return self.reaction(structure)

@@ -9,6 +9,7 @@ from test_contact_friction_run import SLIDING
 from fsci import shapes
 from fsci.case import CaseError, load_case
 from fsci.run.run import run_case
+from solvers.blocks import times
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.surface import Surface
@@ -16,10 +17,11 @@ from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
-from solvers.structure.dynamics import Damping, Dynamics
-from solvers.structure.instant import times
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.loads import Pressure, Traction
 from solvers.structure.materials import NeoHooke, StVenantKirchhoff
+from solvers.structure.probes import of_bodies
+from solvers.structure.rayleigh import Damping
 
 TIGHT = SolverSettings(Tolerance(residual=1e-12, residual_absolute=1e-13), linear="direct")
 TRAPEZOIDAL = GeneralisedAlpha.from_rho_inf(1.0)
@@ -27,10 +29,7 @@ FAR = Surface("wall", np.array([[9.0, 9.0], [9.0, -9.0]]), np.array([[0, 1]]), "
 
 
 def momentum(structure):
-    x, y = structure.mass.createVecs()
-    x.array[:] = structure.now.v
-    structure.mass.mult(x, y)
-    return y.array.reshape(-1, structure.dim).sum(axis=0)
+    return list(of_bodies(structure, structure.bodies, "momentum")().values())
 
 
 def advance(structure, dt, steps):
@@ -81,6 +80,26 @@ def test_second_order_with_a_sudden_load(rho_inf):
     ratio = np.linalg.norm(coarse - middle) / np.linalg.norm(middle - fine)
     assert np.abs(coarse).max() > 0.01
     assert np.log2(ratio) == pytest.approx(2.0, abs=0.15)
+
+
+@pytest.mark.parametrize("damping", [0.001, 0.05], ids=["weak", "strong"])
+def test_second_order_with_damping(damping):
+    """Of a bar that is pushed by its massless end, by a force that grows smoothly."""
+
+    def end(steps):
+        push = Pressure("right", lambda x, t: np.full(x.shape[1], 10.0 * np.sin(20.0 * t) ** 2))
+        held = [Support("left", (constant(0), constant(0)))]
+        mesh = shapes.rectangle([1, 0.25], [8, 2])
+        body = make_body("bar", mesh, NeoHooke(40.0, 60.0, 1.0), supports=held, pressures=[push])
+        time = Dynamics(GeneralisedAlpha.from_rho_inf(1.0), damping=Damping(0.0, damping))
+        structure, _ = make_contact([body], [(("bar", "right"), FAR)], time=time, settings=TIGHT)
+        *_, _ = advance(structure, 0.08 / steps, steps)
+        return structure.now.u.copy()
+
+    exact, coarse, fine = (end(steps) for steps in (256, 32, 64))
+    errors = [np.linalg.norm(u - exact) for u in (coarse, fine)]
+    assert np.log2(errors[0] / errors[1]) > 1.8
+    assert errors[1] < 2e-3 * np.linalg.norm(exact)
 
 
 @pytest.mark.parametrize("cell_type", ["quad", "triangle6"])

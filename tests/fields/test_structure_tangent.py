@@ -7,7 +7,7 @@ from structure_setup import block, constant, distort, make_structure, vector
 
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Pressure, Support
-from solvers.structure.dynamics import Damping, Dynamics
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.elastic_constants import lame, plane_stress_lambda
 from solvers.structure.materials import (
     CoupNeoHooke,
@@ -16,6 +16,7 @@ from solvers.structure.materials import (
     PlaneStressStVenantKirchhoff,
     StVenantKirchhoff,
 )
+from solvers.structure.rayleigh import Damping
 
 MATERIALS = {
     "st_venant_kirchhoff": StVenantKirchhoff(3.0, 5.0, 2.0),

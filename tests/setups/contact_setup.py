@@ -40,6 +40,7 @@ def make_contact(
     settings: SolverSettings = SETTINGS,
     c_n: float = 1.0,
     law: Law = Frictionless(),
+    exchanges_mass: bool = False,
 ) -> tuple[Structure, Contact]:
     """Each pair is slave and master, (body, surface) or a rigid surface, and its own law if it is not `law`."""
     found: dict[tuple[str, str], Surface] = {}
@@ -53,7 +54,8 @@ def make_contact(
 
     parts = [Pair(side(slave), side(master), law=own[0] if own else law) for slave, master, *own in pairs]
     contact = Contact(parts, c_n=c_n, comm=MPI.COMM_SELF)
-    return Structure(bodies, time or Statics(), settings, contact=contact), contact
+    time = time or Statics()
+    return Structure(bodies, time, settings, contact=contact, exchanges_mass=exchanges_mass), contact
 
 
 def solve_step(structure: Structure, t: float = 0.0, dt: float = 1.0, *, first: bool = True):

@@ -1,0 +1,184 @@
+"""Contact surfaces lose their mass when a step could bring them together, and get it back."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+from contact_setup import make_body, make_contact
+from structure_setup import block, constant
+from test_contact_start import TIGHT, advance
+from test_rigid_inertia import FAR, probe, spins
+
+from fsci import shapes
+from solvers.contact.interface import describe_interface
+from solvers.contact.pair import Pair
+from solvers.contact.reach import Reach
+from solvers.contact.surface import Surface
+from solvers.generalised_alpha import GeneralisedAlpha
+from solvers.structure.dynamics import Dynamics
+from solvers.structure.field import Structure
+from solvers.structure.materials import NeoHooke
+from solvers.structure.rayleigh import Damping
+from solvers.structure.supports import Support
+
+SOFT = NeoHooke(4e2, 6e2, 2.0)
+
+
+def wall_at(x):
+    return Surface("wall", np.array([[x, 99.0], [x, -99.0]]), np.array([[0, 1]]), "line", None)
+
+
+def rows(structure, steps, dt=0.01):
+    """The whole state after each step."""
+    found = []
+    for _ in advance(structure, dt, steps):
+        now, energy = structure.now, structure.energy
+        found.append(np.concatenate([now.u, now.v, now.a, [energy.kinetic, energy.internal, energy.work]]))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("damping", [Damping(), Damping(0.1, 0.01)], ids=["undamped", "damped"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_pair_out_of_reach_changes_no_bit(dim, damping):
+    mesh = block("quad" if dim == 2 else "hexahedron", 2)
+    loads = {
+        "initial_velocity": spins([0, 0, 1.0], (0.2,) * dim, v=(0.1, -0.2, 0.3)),
+        "gravity": tuple(constant(g) for g in (1.0, 0.0, -2.0)[:dim]),
+    }
+    time = Dynamics(GeneralisedAlpha.from_rho_inf(0.9), damping=damping)
+    alone = Structure([make_body("body", mesh, SOFT, **loads)], time, TIGHT)
+    body = make_body("body", mesh, SOFT, **loads)
+    paired, _ = make_contact([body], [(("body", "left"), FAR[dim])], time=time, settings=TIGHT, exchanges_mass=True)
+    assert np.array_equal(rows(paired, 5), rows(alone, 5))
+
+
+@pytest.mark.parametrize("rho_inf", [1.0, 0.7])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_momentum_and_energy_stay_when_pairs_come_and_go(dim, rho_inf):
+    """A block that turns and vibrates while the pair appears and disappears without contact."""
+    mesh = block("quad" if dim == 2 else "hexahedron", 4)
+    turning = spins([0.3, -0.2, 1.0] if dim == 3 else [0, 0, 1.0], (0.5,) * dim, v=(0.1, -0.2, 0.3))
+    vibrating = tuple(
+        partial(lambda f, i, x, t: f(x, t) + 0.1 * np.cos(3.0 * x[i]), f, i) for i, f in enumerate(turning)
+    )
+    time = Dynamics(GeneralisedAlpha.from_rho_inf(rho_inf))
+    body = make_body("body", mesh, SOFT, initial_velocity=vibrating)
+    structure, contact = make_contact(
+        [body], [(("body", "left"), FAR[dim])], time=time, settings=TIGHT, exchanges_mass=True
+    )
+    contact.find_present = lambda *_: np.array([present])
+    present, counts, found = False, [], []
+    structure.initialise(0.0, 0.005)
+    for n in range(20):
+        present = 5 <= n < 12
+        structure.begin_step(0.005 * n, 0.005)
+        counts.append(len(structure.massless))
+        structure.solve()
+        structure.end_step()
+        energy = structure.energy.kinetic + structure.energy.internal
+        centre, p, L = (probe(structure, q) for q in ("centre", "momentum", "angular_momentum"))
+        arm, p3 = (np.pad(a, (0, 3 - dim)) for a in (centre, p))
+        found.append([*p, *(L - np.cross(arm, p3)[3 - len(L) :]), energy])
+    assert counts[4] == counts[12] == 0 < counts[5]
+    found = np.array(found)
+    assert found[:, :dim] == pytest.approx(np.tile(found[0, :dim], (20, 1)), rel=1e-8)
+    assert found[:, dim:-1] == pytest.approx(
+        np.tile(found[0, dim:-1], (20, 1)), abs=2e-3 * np.abs(found[0, dim:-1]).max()
+    )
+    lost = found[:, -1] / found[0, -1] - 1.0
+    assert np.abs(lost).max() < (1e-3 if rho_inf == 1.0 else 2e-2)
+    jumps = np.abs(np.diff(found[:, -1]))[[4, 11]] / found[0, -1]
+    assert jumps.max() < 2e-3
+
+
+def test_mass_returns_after_an_impact():
+    """A block bounces off a wall: massless while they are near, and as before when they are far apart again."""
+    flies = (constant(1.0), constant(0.3))
+    body = make_body("body", block("quad", 4), SOFT, initial_velocity=flies)
+    structure, _ = make_contact(
+        [body], [(("body", "right"), wall_at(1.3))], time=Dynamics(GeneralisedAlpha.from_rho_inf(1.0)), settings=TIGHT,
+        exchanges_mass=True,
+    )  # fmt: skip
+    counts, momenta = [], []
+    for _ in advance(structure, 0.01, 150):
+        counts.append(len(structure.massless))
+        momenta.append(probe(structure, "momentum"))
+    changes = np.flatnonzero(np.diff(counts))
+    assert counts[0] == counts[-1] == 0
+    assert max(counts) == 10
+    assert len(changes) == 2
+    momenta = np.array(momenta)
+    assert momenta[:, 1] == pytest.approx(np.full(151, 0.6), rel=1e-8)
+    assert -2.0 < momenta[-1, 0] < -1.5
+    assert structure.energy.error / structure.energy.initial == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_restored_state_has_its_present_pairs():
+    """Steps repeated from a saved state give the same bits, before and after the pair has appeared."""
+
+    def create():
+        body = make_body("body", block("quad", 3), SOFT, initial_velocity=(constant(1.0), constant(0.0)))
+        time = Dynamics(GeneralisedAlpha.from_rho_inf(0.9), damping=Damping(0.1, 0.001))
+        pair = [(("body", "right"), wall_at(1.1))]
+        return make_contact([body], pair, time=time, settings=TIGHT, exchanges_mass=True)[0]
+
+    structure, states, ends = create(), [], []
+    for _ in advance(structure, 0.01, 25):
+        states.append(structure.save())
+        ends.append(structure.now.u.copy())
+    present = [bool(state["contact"]["present"].all()) for state in states]
+    assert not present[0]
+    assert present[-1]
+    first = present.index(True)
+    for n in (first - 1, first, first + 2):
+        for other in (structure, create()):
+            if other is not structure:
+                other.initialise(0.0, 0.01)
+            other.restore(states[n])
+            other.step(0.01 * n, 0.01)
+            assert np.array_equal(other.now.u, ends[n + 1])
+
+
+def test_supports_keep_their_motion():
+    """A plate that is held and driven by one end: nothing jumps when its pair appears."""
+    driven = Support("left", (constant(0.0), lambda x, t: np.full(x.shape[1], 0.2 * t)))
+    body = make_body("body", shapes.rectangle([1.0, 0.2], [8, 2]), SOFT, supports=[driven])
+    structure, contact = make_contact(
+        [body], [(("body", "top"), wall_at(9.0))], time=Dynamics(GeneralisedAlpha.from_rho_inf(1.0)), settings=TIGHT,
+        exchanges_mass=True,
+    )  # fmt: skip
+    contact.find_present = lambda *_: np.array([structure.current.t > 0.045])
+    left = np.repeat(body.points[0, : body.owned] < 1e-9, 2).reshape(-1, 2)
+    for t in advance(structure, 0.01, 10):
+        assert structure.now.u.reshape(-1, 2)[left[:, 0], 1] == pytest.approx(0.2 * t, abs=1e-14)
+    assert len(structure.massless)
+    assert abs(structure.energy.error) < 0.02 * structure.energy.exchanged
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_reach(dim):
+    """Near within twice the way and a fifth of an edge; then until twice that; with a contact force always."""
+    body = make_body("body", block("quad" if dim == 2 else "hexahedron", 4))
+    points = FAR[dim].points.copy()
+    points[:, 0], points[:, 1:] = 0.0, 40.0 * (points[:, 1:] - 3.0)
+    wall = replace(FAR[dim], points=points)
+    from coupling.contact_surfaces import contact_surface
+
+    interface = describe_interface([Pair(contact_surface([body], "body", "right"), wall)])
+    reach, x = Reach(interface), interface.nodes.points.copy()
+    slave = interface.nodes_of(interface.pairs[0].slave)
+    none, away, there = np.zeros(len(x), dtype=bool), np.array([False]), np.array([True])
+    distance = 2.0 * 0.1 + 0.2 * 0.25
+    ways = np.zeros_like(x)
+    ways[slave, 1] = -0.1
+
+    def found(gap, present, pressed=none):
+        x[slave, 0] = -gap
+        return bool(reach.find(x, ways, present, pressed)[0])
+
+    assert found(0.9 * distance, away)
+    assert not found(1.5 * distance, away)
+    assert found(1.5 * distance, there)
+    assert not found(2.5 * distance, there)
+    assert found(2.5 * distance, there, ~none)
