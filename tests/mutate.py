@@ -44,8 +44,8 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
             "solvers/fluid/history.py", "solvers/rigid/motion.py",
         ),
         (
-            "additions", "rigid", "structure_time", "fluid_history", "fluid_time", "massless", "rigid_inertia", "mass_exchange", "viscosity", "contact_motion",
-            "contact_linear", "structure_springs", "structure_supports",
+            "additions", "rigid", "structure_time", "fluid_history", "fluid_time", "massless", "contact_motion",
+            "contact_linear", "structure_springs", "structure_supports", "rigid_inertia", "mass_exchange", "viscosity",
         ),
     ),
     "mortar": (
