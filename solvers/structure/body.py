@@ -142,6 +142,10 @@ class Body:
         ]
         return fem.compile_forms(wanted, f"body '{self.name}'")
 
+    def gravity_at(self, t: float) -> Array:
+        """Gravity [m/s^2] at owned dofs and the time t [s]."""
+        return self.nodal(self.gravity, t)[: self.owned].ravel() if self.gravity else np.zeros(self.size)
+
     # ------------------------------------------------------------------------------------------------- state
 
     def nodal(self, value: Sequence[Value], t: float) -> Array:

@@ -146,16 +146,13 @@ class Structure:
         """Mass matrix of all bodies [kg], without that of massless dofs."""
         if not self._moves_mass:
             return self._all_mass
-        massless = np.zeros(self.layout.size, dtype=bool)
-        massless[self.massless] = True
+        massless = np.isin(np.arange(self.layout.size), self.massless)
         return without_mass(self._all_mass, massless, *self.piece_of_nodes)
 
     @cached_property
     def rigid(self) -> RigidInertia | None:
         """What `mass` lacks for rigid motion; None if no dofs are massless."""
-        if not self._moves_mass:
-            return None
-        return self.all_inertia()
+        return self.all_inertia() if self._moves_mass else None
 
     def all_inertia(self) -> RigidInertia:
         """The inertia of all pieces, of those with all of their mass, too."""
@@ -190,9 +187,8 @@ class Structure:
         self.current = Step(t, dt)
         if self.constraint is not None and self.exchanges_mass:
             self.constraint.present[:] = False
-            self.constraint.present = self.constraint.find_present(
-                self.at_constraint(self.now.u), self.at_constraint(self.now.v), t, dt
-            )
+            u, v = self.at_constraint(self.now.u), self.at_constraint(self.now.v)
+            self.constraint.present = self.constraint.find_present(u, v, t, dt)
             self.forget_mass()
         self._assemble_bodies()
         if self.constraint is not None and self._constrained is not None:
@@ -331,20 +327,13 @@ class Structure:
             loads[:] = body.external_force(self.current.t)
         frame, heavy = self.find_frame(), any(body.gravity for body in self.bodies)
         if heavy and self.rigid is not None and frame is not None:
-            now.loads += self.rigid.weight(frame, self._gravity(self.current.t))
+            gravity = np.concatenate([body.gravity_at(self.current.t) for body in self.bodies])
+            now.loads += self.rigid.weight(frame, gravity)
 
     def find_frame(self) -> Frames | None:
         """Set `frame` at the present displacement."""
         self.frame = None if self.rigid is None else self.rigid.frame(self.now.u)
         return self.frame
-
-    def _gravity(self, t: float) -> Array:
-        """Acceleration [m/s^2] at owned dofs."""
-        parts = [
-            body.nodal(body.gravity, t)[: body.owned].ravel() if body.gravity else np.zeros(body.size)
-            for body in self.bodies
-        ]
-        return np.concatenate(parts)
 
     def _assemble_constraint(self) -> None:
         if self.constraint is not None and self._constrained is not None:
@@ -404,7 +393,7 @@ class Structure:
         self._b.array[:] = self.right_side()
         if added is not None:
             self._b.array[:] -= added(self._x.array)
-            free = partial(_of_free_part, self.held, added)
+            free = partial(lambda product, du: product(self.held.free_part(du)), added)
         if keep and change is None and imposed is not None and not self.norm(self._x.array):
             matrix = imposed
             self._b.array[:] = self.held.free_part(self._b.array)
@@ -554,7 +543,3 @@ class Structure:
     def restore(self, state: State) -> None:
         """Restore a saved state."""
         restore_state(self, state)
-
-
-def _of_free_part(held: Held, product: Callable[[Array], Array], du: Array) -> Array:
-    return product(held.free_part(du))
