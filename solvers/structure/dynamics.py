@@ -149,7 +149,8 @@ class Dynamics:
         """Newmark's relations; for massless and impulsive dofs v = (u_{n+1} - u_n) / dt.
 
         With damping massless dofs have v = w + (w - w_n) dt / (dt + dt_n), w = (u_{n+1} - u_n) / dt and w_n that of the
-        last step, of second order at the end of the step (the backward difference of three positions).
+        last step, of second order at the end of the step (the backward difference of three positions). Where contact
+        acts, before the step or after it, v = w: velocities jump there.
         """
         old, massless, impulsive = structure.old, structure.massless, structure.impulsive
         du = structure.now.u - old.u
@@ -160,10 +161,17 @@ class Dynamics:
         a[impulsive] = (v - old.v)[impulsive] / dt
         return v, a
 
-    def _extrapolated(self, structure: Moving, dt: float) -> float:
-        """dt / (dt + dt_n); zero in the first step, and without damping, where these velocities do nothing."""
-        first = structure.damping is None or structure.last_length == 0.0
-        return 0.0 if first else dt / (dt + structure.last_length)
+    def _extrapolated(self, structure: Moving, dt: float) -> Array:
+        """dt / (dt + dt_n) at massless dofs; zero in contact, in the first step, and without damping.
+
+        Without damping these velocities do nothing.
+        """
+        massless = structure.massless
+        if structure.damping is None or structure.last_length == 0.0:
+            return np.zeros(len(massless))
+        pushed = (structure.now.constraint != 0.0) | (structure.old.constraint != 0.0)
+        at_node = np.repeat(pushed.reshape(-1, structure.dim).any(axis=1), structure.dim)[massless]
+        return np.where(at_node, 0.0, dt / (dt + structure.last_length))
 
     def rigid_force(self, structure: Moving, dt: float) -> Array:
         now, rigid, frame, before = structure.now, structure.rigid, structure.frame, structure.momenta

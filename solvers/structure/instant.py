@@ -76,6 +76,7 @@ class Moving(Protocol):
     old: Instant
     residual_force: Array
     current: Step
+    dim: int
     last_length: float  #: of the last accepted step [s], 0 at the start
 
     @property

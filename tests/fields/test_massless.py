@@ -201,7 +201,7 @@ def test_newton_with_damping_and_no_mass():
     structure.begin_step(1.0, 0.05)
     info = structure.solve()
     assert info.iterations <= 3, info.residuals
-    assert info.residuals[-1] < 1e-9 * info.residuals[0]
+    assert info.residuals[-1] < 1e-5 * info.residuals[-2]
 
 
 def test_newton_with_damping_far_from_contact():
