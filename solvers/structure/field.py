@@ -17,7 +17,7 @@ from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.blocks import Layout, block_diagonal
 from solvers.constraint import Constraint
 from solvers.largest import position_of_largest
-from solvers.newton import converge
+from solvers.newton import converge, whole_increments
 from solvers.rounding import rounding_error
 from solvers.rows import RowTransformation, TakenRows, gather, transform_rows
 from solvers.solver_settings import SolverSettings
@@ -74,6 +74,7 @@ class Structure:
         self.last_length = 0.0  #: of the last accepted step [s], 0 at the start
         self.energy = EnergyBalance()
         self._limit_point = LimitPoint()
+        self._failures = 0  #: failed attempts at this step
         self.energy_sentinel = EnergySentinel(
             self.energy, dissipates=time.dissipates or contact is not None, contact=contact is not None
         )
@@ -263,8 +264,9 @@ class Structure:
         if self.constraint is not None:
             self.constraint.begin_solve()  # other loads may have chosen the earlier sets
         try:
-            info = converge(self, self.settings.newton)
+            info = converge(self, self.settings.newton, whole=whole_increments(self._failures))
         except StepFailed as failure:
+            self._failures += 1
             self.check_deformation(failure.iteration, failure.history)
             raise failure.with_reason(failure.reason + self._limit_point.explain()) from None
         self.check_deformation(info.iterations, info.residuals)
@@ -282,6 +284,7 @@ class Structure:
 
     def end_step(self) -> None:
         """Accept the step."""
+        self._failures = 0
         pushed = np.zeros(2)
         if self.constraint is not None:
             pushed -= self.constraint.obstacle_work
