@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fsci.builder.facing import Face, face, faces, meeting
-from fsci.case import Case, CaseError
+from fsci.builder.on_first import shared
+from fsci.case import Case
 from fsci.case.contact import PairSection, Side
 from fsci.case.material import Material
 from fsci.case.supports import SupportSection
@@ -25,6 +26,9 @@ from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body
 from solvers.mesh import Mesh
 from solvers.structure.elastic_constants import young
 from solvers.values import combine, evaluate
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 Array = NDArray[np.float64]
 
@@ -49,21 +53,17 @@ class Candidate:
         return "obstacle" in self.side
 
 
-def with_pairs(case: Case, comm: MPI.Comm = MPI.COMM_SELF) -> Case:
-    """The case with all its pairs named. Raises CaseError (collective)."""
+def with_pairs(case: Case, comm: MPI.Comm | None = None) -> Case:
+    """The case with all its pairs named; comm: processes that read it together. Raises CaseError (collective)."""
     assert case.contact is not None
     if case.contact.bodies is None:
         return case
     chosen = list(case.elastic_bodies) if case.contact.bodies == "all" else list(case.contact.bodies)
-    pairs, error = {}, None
-    if comm.rank == 0:
-        try:
-            pairs = find_pairs(case, {name: read_body(case, name) for name in chosen})
-        except CaseError as problem:
-            error = problem
-    error, pairs = comm.bcast((error, pairs), root=0)
-    if error is not None:
-        raise error
+
+    def find() -> dict[str, PairSection]:
+        return find_pairs(case, {name: read_body(case, name) for name in chosen})
+
+    pairs = find() if comm is None else shared(comm, find)
     if not pairs:
         raise case.error(("contact", "bodies"), "no named surfaces of these bodies can meet: name the pairs")
     return case.model_copy(update={"contact": case.contact.model_copy(update={"pairs": pairs, "bodies": None})})

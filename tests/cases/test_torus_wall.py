@@ -58,7 +58,7 @@ def test_nothing_is_lost_on_the_way(history):
     assert history["interface.force"].max() < 1e-5  # Newton's method stops at 1e-6
     inflow = 10.0 * (4.0 / 3.0) ** 2
     assert np.abs(history["fluid.mass"]).max() < 1e-3 * inflow
-    assert history["gap"].min() > -1e-10
+    assert history["gap"].min() > -1e-3  # the mean gap around each node is zero, in facets of 0.1 to 0.2
 
 
 def test_volume_is_what_the_material_allows(run):
