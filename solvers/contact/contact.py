@@ -133,9 +133,9 @@ class Contact:
         self.slip = None
         self._own, self._increment = self.z.copy(), np.zeros_like(self.z)
 
-    def begin_solve(self) -> None:
-        """New loads: sets that the old ones chose are no sign of a cycle."""
-        self.active_set.begin_solve()
+    def begin_solve(self, *, damped: bool = False) -> None:
+        """New loads: sets that the old ones chose are no sign of a cycle; damped: see `ActiveSet.begin_solve`."""
+        self.active_set.begin_solve(damped=damped)
 
     def end_step(self, weight: float) -> None:
         """Accept the step; weight: that of the contact force at its end in the balance."""
@@ -221,8 +221,8 @@ class Contact:
             stiffness=stiffness,
             slip=np.zeros((len(which), self.dim)) if slip is None else slip.values[which],
             slip_defined=np.zeros(len(which), dtype=bool) if slip is None else slip.defined[which],
-            c_n=self.c_n * stiffness,
-            c_t=self.c_n * stiffness,
+            c_n=self.c_n * self.active_set.damping * stiffness,
+            c_t=self.c_n * self.active_set.damping * stiffness,
             touching=np.where(self.active_set.tried[which], self._touching, self._nearly),
         )
 

@@ -262,7 +262,8 @@ class Structure:
     def solve(self) -> StepInfo:
         """Newton's method to the tolerance. Raises StepFailed."""
         if self.constraint is not None:
-            self.constraint.begin_solve()  # other loads may have chosen the earlier sets
+            # other loads may have chosen the earlier sets
+            self.constraint.begin_solve(damped=whole_increments(self._failures))
         try:
             info = converge(self, self.settings.newton, whole=whole_increments(self._failures))
         except StepFailed as failure:
