@@ -91,7 +91,7 @@ def test_a_family_of_a_case_of_its_own():
     """A bar hits a wall; the errors are those of momentum and depth."""
     bar = FAMILIES["bar_impact"]
     (row,) = replace(bar, options={"": {}}, resolutions=dict([*bar.resolutions.items()][:1])).run()
-    assert row["error [%]"] == max(row["momentum.x final [%]"], row["centre.x min [%]"]) < 6.0
+    assert row["error [%]"] == max(row["momentum.x final [%]"], row["centre.x min [%]"]) < 12.0
 
 
 def test_a_study_has_its_front(tmp_path):
