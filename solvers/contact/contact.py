@@ -75,9 +75,8 @@ class Contact:
         self._gap = np.zeros(count)  # weighted gap at the latest evaluation
         self._mean_gap = np.zeros(count)  # weighted gap over D [m], zero where D is zero
         self._kept = np.zeros(count)  # mean gap that may stay in this step [m], <= 0
-        self.present = np.ones(
-            len(self.pairs), dtype=bool
-        )  #: mask of the pairs whose surfaces have no mass in dynamics
+        #: mask of the pairs whose surfaces have no mass in dynamics
+        self.present = np.ones(len(self.pairs), dtype=bool)
         self._reach: Reach | None = None
         self._constraints = Constraints(self.interface)
         self.merged = np.zeros(count, dtype=bool)  #: multipliers that are merged into another one of their node

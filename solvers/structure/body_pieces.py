@@ -13,6 +13,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.connected import connected_parts
 from solvers.mesh import Mesh
 from solvers.structure.body import Body
 
@@ -54,7 +55,7 @@ class BodyPieces:
         with np.errstate(over="ignore"):
             size, most = (np.add.reduce((a * a).reshape(-1, self._dim), axis=1) for a in (array, bound))
         failed = ~(size <= most)
-        return self._sum(np.bincount(self.of_dofs[:: self._dim], failed, self.count)) == 0.0
+        return self._sum(np.bincount(self.of_nodes, failed, self.count)) == 0.0
 
 
 def _pieces_of_nodes(body: Body) -> tuple[int, NDArray[np.int64]]:
@@ -68,13 +69,8 @@ def _pieces_of_nodes(body: Body) -> tuple[int, NDArray[np.int64]]:
 
 def _pieces_of_mesh(mesh: Mesh) -> NDArray[np.int64] | None:
     """Number of the piece of each node of a mesh, shape (nodes,); None if it has one piece."""
-    import scipy.sparse as sp
-    from scipy.sparse.csgraph import connected_components
-
     cells, n = mesh.cells, len(mesh.points)
-    first = np.repeat(cells[:, 0], cells.shape[1] - 1)
-    edges = sp.coo_matrix((np.ones(len(first), dtype=np.int8), (first, cells[:, 1:].ravel())), shape=(n, n))
-    _, label = connected_components(edges, directed=False)
+    label = connected_parts(np.repeat(cells[:, 0], cells.shape[1] - 1), cells[:, 1:].ravel(), n)
     used = np.unique(cells)
     number, of_used = np.unique(label[used], return_inverse=True)
     if len(number) == 1:
