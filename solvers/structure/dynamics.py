@@ -150,7 +150,7 @@ class Dynamics:
 
         With damping massless dofs have v = w + (w - w_n) dt / (dt + dt_n), w = (u_{n+1} - u_n) / dt and w_n that of the
         last step, of second order at the end of the step (the backward difference of three positions). Where contact
-        acts, before the step or after it, v = w: velocities jump there.
+        acts at the start of the step, v = w: velocities jump when it ends.
         """
         old, massless, impulsive = structure.old, structure.massless, structure.impulsive
         du = structure.now.u - old.u
@@ -162,14 +162,15 @@ class Dynamics:
         return v, a
 
     def _extrapolated(self, structure: Moving, dt: float) -> Array:
-        """dt / (dt + dt_n) at massless dofs; zero in contact, in the first step, and without damping.
+        """dt / (dt + dt_n) at massless dofs; zero after contact, in the first step, and without damping.
 
-        Without damping these velocities do nothing.
+        Without damping these velocities do nothing. Contact at the end of the step does not count: the force would
+        jump where contact closes, and a coupled step could have no solution.
         """
         massless = structure.massless
         if structure.damping is None or structure.last_length == 0.0:
             return np.zeros(len(massless))
-        pushed = (structure.now.constraint != 0.0) | (structure.old.constraint != 0.0)
+        pushed = structure.old.constraint != 0.0
         at_node = np.repeat(pushed.reshape(-1, structure.dim).any(axis=1), structure.dim)[massless]
         return np.where(at_node, 0.0, dt / (dt + structure.last_length))
 
