@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from fsci.stress import flow_scenes, further_scenes, scenes, space_scenes
+from fsci.stress import composed_scenes, flow_scenes, further_scenes, scenes, space_scenes
 from fsci.stress.frame import Frame
 from fsci.stress.scenes import StressScene
 
@@ -34,10 +34,21 @@ FURTHER_SCENES: dict[str, Callable[[random.Random], StressScene]] = {
     "nested": further_scenes.nested,
     "rough": further_scenes.rough,
 }
-FURTHER = 200_000  #: from this number on they are of these scenes, so that those before stay what they are
+FURTHER = 200_000  #: from this number on they are of these scenes
 
-Twin = Literal["rotated", "shifted", "rescaled", "parallel", "resumed"]
+COMPOSED_SCENES: dict[str, Callable[[random.Random], StressScene]] = {
+    "stack": composed_scenes.stack,
+    "roam": composed_scenes.roam,
+    "curl": composed_scenes.curl,
+}
+COMPOSED = 300_000  #: from this number on several kinds of contact act together
+
+Twin = Literal["rotated", "shifted", "rescaled", "parallel", "resumed", "beside"]
+#: Twins of every scene.
 TWINS: tuple[Twin, ...] = ("rotated", "shifted", "rescaled", "parallel", "resumed")
+
+#: The scenes of the numbers from a first one on, newest first: those of earlier ones stay what they are.
+SERIES = ((COMPOSED, COMPOSED_SCENES), (FURTHER, FURTHER_SCENES), (SPACE, SPACE_SCENES), (0, SCENES))
 
 
 @dataclass(frozen=True)
@@ -51,6 +62,7 @@ class Draw:
     processes: int = 1  #: of the twin
     kill_after: int = 0  #: steps after which the twin is killed and resumed
     kill_delay: float = 0.0  #: part of a step that it continues for then
+    neighbour: float = 0.0  #: stiffness of a body that stands beside the twin [Pa]; 0: there is none
 
     @property
     def how(self) -> str:
@@ -62,13 +74,17 @@ class Draw:
             "rescaled": f"units times {f.length:g}, {f.mass:g}, {f.time:g}",
             "parallel": f"{self.processes} processes",
             "resumed": f"killed after {self.kill_after} steps",
+            "beside": f"beside a body of {self.neighbour:.2g} Pa",
         }[self.twin]
 
-    def case(self, frame: Frame) -> dict[str, Any]:
-        """The content of the case file in a frame."""
+    def case(self, frame: Frame, twin: bool = False) -> dict[str, Any]:
+        """The content of the case file in a frame; twin: with the body beside it."""
+        scene = self.scene.case(frame)
+        if twin and self.neighbour and self.scene.beside:
+            scene["structure"]["bodies"]["beside"] = self.scene.beside(frame, self.neighbour)
         return {
             "title": f"{self.scene.name} {self.seed}",
-            **self.scene.case(frame),
+            **scene,
             "probes": self.scene.probes,
             "solver": scenes.SOLVER,
             "output": {"fields_every": 0, "checkpoint_every": 1 if self.twin == "resumed" else 0},
@@ -78,11 +94,11 @@ class Draw:
 def draw(seed: int, by: float = 0.0) -> Draw:
     """The draw of a number, which does not depend on earlier draws; by [m]: shift of the body against the grid."""
     chance = random.Random(seed)
-    kinds = FURTHER_SCENES if seed >= FURTHER else SPACE_SCENES if seed >= SPACE else SCENES
+    kinds = next(kinds for first, kinds in SERIES if seed >= first)
     scene = kinds[chance.choice(sorted(kinds))](chance)
     scene.move_against_grid(by)
-    twin = chance.choice(TWINS)
-    frame, processes, kill_after, delay = Frame(), 1, 0, 0.0
+    twin = chance.choice((*TWINS, "beside", "beside") if scene.beside else TWINS)
+    frame, processes, kill_after, delay, neighbour = Frame(), 1, 0, 0.0, 0.0
     if twin == "rotated":
         frame = _turned(chance, scene)
     elif twin == "shifted":
@@ -94,9 +110,11 @@ def draw(seed: int, by: float = 0.0) -> Draw:
         )  # fmt: skip
     elif twin == "parallel":
         processes = chance.choice([2, 2, 3, 4])
+    elif twin == "beside":
+        neighbour = scenes.spread(chance, 1e-2, 1e12)
     else:
         kill_after, delay = chance.randint(2, 4), chance.random()
-    return Draw(seed, scene, twin, frame, processes, kill_after, delay)
+    return Draw(seed, scene, twin, frame, processes, kill_after, delay, neighbour)
 
 
 def _turned(chance: random.Random, scene: StressScene) -> Frame:

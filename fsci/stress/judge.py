@@ -78,7 +78,7 @@ def _balances(draw: Draw, run: Ended) -> Iterator[tuple[str, float, float]]:
         solid = draw.scene.parameters.get("solid density", 0.0) * flux  # weight of a body at rest, of unit volume
         at_rest = AT_REST * max(flux, solid)
         yield "interface.momentum", _largest(history, "interface.momentum"), max(BALANCE * force, at_rest)
-    if draw.scene.name.startswith("press"):
+    if {"top", "bottom"} <= draw.scene.probes.keys():
         axes = "xyz"[: draw.scene.dim]
         sums = [history[f"top.{i}"] + history[f"bottom.{i}"] for i in axes]
         size = max(_largest(history, f"{name}.{i}") for name in ("top", "bottom") for i in axes)

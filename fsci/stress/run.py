@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from fsci.stress.draw import FURTHER_SCENES, SCENES, SPACE_SCENES, Draw, draw
+from fsci.stress.draw import SERIES, Draw, draw
 from fsci.stress.frame import Frame
 from fsci.stress.judge import (
     AGAINST_GRID,
@@ -117,7 +117,7 @@ def _rounding_decides(one: Draw, first: Ended, folder: Path) -> bool:
 
 
 def _twin(one: Draw, folder: Path, step: float) -> Ended:
-    case = one.case(one.frame)
+    case = one.case(one.frame, twin=True)
     if one.twin == "resumed":
         return run_killed(folder, case, steps=one.kill_after, delay=one.kill_delay * step)
     return run(folder, case, processes=one.processes)
@@ -133,7 +133,7 @@ def _keep(folder: Path, to: Path) -> None:
 
 def table(outcomes: Sequence[Outcome]) -> str:
     """Counts of verdicts by scene, and messages of rejections."""
-    kinds = (*SCENES, *SPACE_SCENES, *FURTHER_SCENES, "mutant")
+    kinds = (*(name for _, scenes in reversed(SERIES) for name in scenes), "mutant")
     names = [name for name in kinds if any(o.scene == name for o in outcomes)]
     counts = Counter((o.scene, o.verdict) for o in outcomes)
     lines = [f"{'scene':10}{'draws':>8}" + "".join(f"{verdict:>10}" for verdict in VERDICTS)]

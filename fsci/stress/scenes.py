@@ -27,6 +27,7 @@ class StressScene:
     any_angle: bool = False  #: no grid: it may be turned by any angle
     dim: int = 2
     must_warn: tuple[str, ...] = field(default=())  #: texts that the output of a successful run must contain
+    beside: Callable[[Frame, float], Case] | None = None  #: a body of a given stiffness that nothing touches
 
     def move_against_grid(self, by: float) -> None:
         """Shift the body by [m] along every axis of the grid; nothing without a grid."""

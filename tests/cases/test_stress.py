@@ -8,7 +8,17 @@ import pytest
 from programs import fsci
 
 from fsci.stress import long_run, program, run
-from fsci.stress.draw import FURTHER, FURTHER_SCENES, SCENES, SPACE, SPACE_SCENES, Draw, draw
+from fsci.stress.draw import (
+    COMPOSED,
+    COMPOSED_SCENES,
+    FURTHER,
+    FURTHER_SCENES,
+    SCENES,
+    SPACE,
+    SPACE_SCENES,
+    Draw,
+    draw,
+)
 from fsci.stress.frame import Frame
 from fsci.stress.judge import distance, failure_of, missing_warning, other_bits, out_of_balance
 from fsci.stress.program import NEVER_ENDED, Ended
@@ -99,6 +109,23 @@ def test_a_further_draw_of_each_scene(scene):
     verdicts = [run.judge(seed).verdict for seed in seeds[:2]]
     assert "wrong" not in verdicts
     assert "right" in verdicts
+
+
+def test_composed_draws():
+    """Each scene and twin comes up; the body beside a scene is in the twin alone."""
+    draws = [draw(COMPOSED + seed) for seed in range(100)]
+    assert {one.scene.name for one in draws} == COMPOSED_SCENES.keys()
+    assert len({one.twin for one in draws}) == 6
+    one = next(one for one in draws if one.twin == "beside")
+    bodies = [set(one.case(Frame(), twin)["structure"]["bodies"]) for twin in (False, True)]
+    assert bodies[1] - bodies[0] == {"beside"}
+
+
+@pytest.mark.parametrize("scene", sorted(COMPOSED_SCENES))
+@pytest.mark.slow
+def test_a_composed_draw_of_each_scene(scene):
+    seeds = [s for s in range(COMPOSED, COMPOSED + 60) if draw(s).scene.name == scene and draw(s).twin == "beside"]
+    assert run.judge(next(s for s in seeds if s % 5 != 4)).verdict == "right"
 
 
 def test_a_scene_at_rest_has_rounding_errors():
