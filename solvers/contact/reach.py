@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
+from solvers.cell_types import CELL_TYPES
 from solvers.contact.interface import ContactInterface
 from solvers.contact.law.tied import Tied
 from solvers.contact.surface import Surface
+from solvers.distance import distances_in_pairs
 from solvers.search import Search
 
 #: A step could bring together surfaces whose distance is at most this multiple of their ways by velocity, plus this
@@ -31,6 +33,7 @@ class Reach:
         self._watched = np.array([pair.master is not pair.slave and pair.law != Tied() for pair in interface.pairs])
         self._edges = np.array([_mean_edge(pair.slave.points, pair.slave.facets) for pair in interface.pairs])
         self._facets = [surface.facets for surface in interface.surfaces]
+        self._simplices = [np.array(CELL_TYPES[surface.facet_type].simplices) for surface in interface.surfaces]
         self._searches: dict[int, Search] = {}  # created when the boxes of two surfaces first come near
 
     def find(self, x: Array, ways: Array, present: NDArray[np.bool_], pressed: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -39,7 +42,8 @@ class Reach:
         x: positions [m], ways: displacements by the velocities in the step [m], shape (N, dim); present: the mask of
         the last step; pressed: nodes with contact forces, shape (N,).
         """
-        way = np.array([np.abs(ways[nodes]).max(initial=0.0) for nodes in self._surfaces])[self._sides].sum(axis=1)
+        lengths = np.linalg.norm(ways, axis=1)
+        way = np.array([lengths[nodes].max(initial=0.0) for nodes in self._surfaces])[self._sides].sum(axis=1)
         distance = (WAYS * way + EDGES * self._edges) * np.where(present, 2.0, 1.0)
         low, high = (np.array([end(x[nodes], axis=0) for nodes in self._surfaces]) for end in (np.min, np.max))
         slave, master = self._sides.T
@@ -51,8 +55,28 @@ class Reach:
             if pair not in self._searches:
                 self._searches[pair] = Search(*(self._facets[side] for side in sides))
             xs, xm = (np.ascontiguousarray(x[self._surfaces[side]]) for side in sides)
-            found[pair] = len(self._searches[pair].pairs(xs, xm, float(distance[pair]))) > 0
+            candidates = self._searches[pair].pairs(xs, xm, float(distance[pair]))
+            found[pair] = self._near(sides, candidates, xs, xm, float(distance[pair]))
         return found
+
+    def _near(self, sides: NDArray[np.int64], pairs: NDArray[np.int32], xs: Array, xm: Array, distance: float) -> bool:
+        """Whether a node is within a distance [m] of a facet of the other side, among pairs of facets.
+
+        The boxes of the search are those of a frame: what they find depends on how the scene is turned.
+        """
+        slave, master = (self._facets[side][number] for side, number in zip(sides, pairs.T, strict=True))
+        ways = (xs[slave], xm[master], self._simplices[sides[1]]), (xm[master], xs[slave], self._simplices[sides[0]])
+        for points, facets, simplices in ways:
+            corners = facets[:, simplices][:, None]  # (pairs, 1, simplices, dim, dim)
+            nodes = points[:, :, None]  # (pairs, nodes, 1, dim)
+            shape = (*np.broadcast_shapes(nodes.shape[:3], corners.shape[:3]), points.shape[2])
+            found = distances_in_pairs(
+                np.broadcast_to(nodes, shape).reshape(-1, shape[3]),
+                np.broadcast_to(corners, (*shape[:3], *corners.shape[3:])).reshape(-1, *corners.shape[3:]),
+            )
+            if (found <= distance).any():
+                return True
+        return False
 
 
 def _index(interface: ContactInterface, surface: Surface) -> int:

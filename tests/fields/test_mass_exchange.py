@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from contact_setup import make_body, make_contact
+from scipy.spatial.transform import Rotation
 from structure_setup import block, constant
 from test_contact_start import TIGHT, advance
 from test_rigid_inertia import FAR, probe, spins
@@ -182,3 +183,30 @@ def test_reach(dim):
     assert found(1.5 * distance, there)
     assert not found(2.5 * distance, there)
     assert found(2.5 * distance, there, ~none)
+
+
+@pytest.mark.parametrize("facet", ["line", "line3", "quad", "triangle"])
+def test_the_reach_does_not_depend_on_how_a_scene_is_turned(facet):
+    """The pair appears at the distance of a fifth of an edge, at any angle."""
+    dim = 2 if facet.startswith("line") else 3
+    mesh = {
+        "line": lambda: block("quad", 3),
+        "line3": lambda: shapes.rectangle([1.0, 1.0], [3, 3], order=2),
+        "quad": lambda: block("hexahedron", 3),
+        "triangle": lambda: block("tetrahedron", 3),
+    }[facet]()
+    for angle in (0.0, 17.0, 45.0, 90.0):
+        turned = Rotation.from_euler("z", angle, degrees=True).as_matrix()[:dim, :dim]
+        bodies = []
+        for shift in (0.0, 2.0):
+            low = np.array([shift, 0.13, 0.07][:dim])
+            bodies.append(make_body("ab"[len(bodies)], replace(mesh, points=(mesh.points + low) @ turned.T), SOFT))
+        _, contact = make_contact(bodies, [(("a", "right"), ("b", "left"))], exchanges_mass=True)
+        reach, x = Reach(contact.interface), contact.interface.nodes.points
+        at_rest, apart = np.zeros_like(x), np.array([False])
+        second = contact.interface.nodes.of_surface[1]
+        edge = 1.0 / 3.0 if facet != "triangle" else reach._edges[0]
+        for gap, found in ((0.21 * edge, False), (0.19 * edge, True)):
+            moved = x.copy()
+            moved[second] -= (1.0 - gap) * turned[:, 0]
+            assert reach.find(moved, at_rest, apart, np.zeros(len(x), dtype=bool)) == found, (angle, gap)
