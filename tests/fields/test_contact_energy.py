@@ -32,7 +32,7 @@ def disc(around, *, velocity=0.0, spin=0.0):
     mesh = shapes.disc(1.0, [around, max(2, around * 3 // 32)])
     return make_body(
         "disc",
-        replace(mesh, points=mesh.points + [-2.0, 1.0]),
+        replace(mesh, points=mesh.points + np.array([-2.0, 1.0])),
         STIFF,
         gravity=WEIGHT,
         initial_velocity=spins([0.0, 0.0, spin], (-2.0, 1.0), v=(velocity, 0.0, 0.0)),
@@ -87,7 +87,7 @@ def test_a_disc_that_rolls_with_the_speed_of_its_spin():
 
 @pytest.mark.parametrize("law", [Frictionless(), Coulomb(0.3)], ids=["frictionless", "friction"])
 def test_a_block_that_falls_flat(law):
-    """Contact of flat surfaces has no error in space: at rest the balance is exact, in impacts it falls with the step."""
+    """Contact of flat surfaces has no error in space: rest is exact, and the error of impacts falls with the step."""
     assert run([block()], law, 0.005, 0.1)[0] < 1e-4
     long, short = (run([block(height=0.02)], law, dt)[0] for dt in (0.01, 0.0025))
     assert short < min(long / 2.0, 2e-3)
