@@ -25,8 +25,8 @@ def exchange(structure: Exchanging, switch: Callable[[], None], settle: Callable
 
     settle: moves nodes that have become massless, owned dofs, to their equilibrium.
     """
-    comm, (piece, count) = structure.comm, structure.piece_of_nodes
-    before, energy = structure.all_inertia(), _internal(structure)
+    comm, piece, count = structure.comm, structure.pieces.of_nodes, structure.pieces.count
+    before, energy = structure.inertia.of_pieces(), _internal(structure)
     frame = before.frame(structure.now.u)
     motion = before.split(frame, structure.now.v)
     massless = _mask(structure)
@@ -38,7 +38,7 @@ def exchange(structure: Exchanging, switch: Callable[[], None], settle: Callable
     structure.assemble()
     if comm.allreduce(bool((now_massless & ~massless).any()), op=MPI.LOR):
         settle(np.flatnonzero(now_massless & ~massless))
-    after = structure.all_inertia()
+    after = structure.inertia.of_pieces()
     frame = after.frame(structure.now.u)
     rest = after.split(frame, structure.now.v)
     gained = after.split(frame, after.joined(frame, motion, rest.velocities)).energy - motion.energy
@@ -58,7 +58,7 @@ def exchange(structure: Exchanging, switch: Callable[[], None], settle: Callable
 def _pieces_of_bodies(structure: Exchanging) -> list[NDArray[np.int64]]:
     """Numbers of the pieces of each body (collective)."""
     ends = np.cumsum([body.owned for body in structure.bodies])[:-1]
-    parts = np.split(structure.piece_of_nodes[0], ends)
+    parts = np.split(structure.pieces.of_nodes, ends)
     return [np.unique(np.concatenate(structure.comm.allgather(part))) for part in parts]
 
 
@@ -69,7 +69,7 @@ def _internal(structure: Exchanging) -> Array:
 
 def _mask(structure: Exchanging) -> NDArray[np.bool_]:
     mask = np.zeros(structure.layout.size, dtype=bool)
-    mask[structure.massless] = True
+    mask[structure.inertia.massless] = True
     return mask
 
 

@@ -12,6 +12,7 @@ is missing in the inertia of rigid motions is added by `rigid_inertia.py`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
@@ -20,7 +21,9 @@ from petsc4py import PETSc
 
 from solvers.api import Array
 from solvers.blocks import times
-from solvers.structure.instant import Moving
+
+if TYPE_CHECKING:
+    from solvers.structure.instant import Moving
 
 #: Extent of nodes over that of their piece below which it is a rounding error (1e-30): they are one point or, in 3D, on
 #: a line. That of the nodes inside of a piece is above 1e-4 with a hundred cells across.
@@ -37,7 +40,7 @@ def massless_dofs(structure: Moving) -> tuple[NDArray[np.bool_], NDArray[np.bool
     constraint, layout, dim = structure.constraint, structure.layout, structure.bodies[0].dim
     assert constraint is not None
     points = np.concatenate([body.points[:dim, : body.owned].T for body in structure.bodies])
-    piece, count = structure.piece_of_nodes
+    piece, count = structure.pieces.of_nodes, structure.pieces.count
     size = _extent(structure.comm, points, piece, count, np.ones(len(points), dtype=bool))
     found = np.zeros(layout.size // dim, dtype=bool)
     undecided = np.ones(count, dtype=bool)

@@ -73,7 +73,7 @@ def test_momentum_and_energy_stay_when_pairs_come_and_go(dim, rho_inf):
     for n in range(20):
         present = 5 <= n < 12
         structure.begin_step(0.005 * n, 0.005)
-        counts.append(len(structure.massless))
+        counts.append(len(structure.inertia.massless))
         structure.solve()
         structure.end_step()
         energy = structure.energy.kinetic + structure.energy.internal
@@ -102,7 +102,7 @@ def test_mass_returns_after_an_impact():
     )  # fmt: skip
     counts, momenta = [], []
     for _ in advance(structure, 0.01, 150):
-        counts.append(len(structure.massless))
+        counts.append(len(structure.inertia.massless))
         momenta.append(probe(structure, "momentum"))
     changes = np.flatnonzero(np.diff(counts))
     assert counts[0] == counts[-1] == 0
@@ -152,7 +152,7 @@ def test_supports_keep_their_motion():
     left = np.repeat(body.points[0, : body.owned] < 1e-9, 2).reshape(-1, 2)
     for t in advance(structure, 0.01, 10):
         assert structure.now.u.reshape(-1, 2)[left[:, 0], 1] == pytest.approx(0.2 * t, abs=1e-14)
-    assert len(structure.massless)
+    assert len(structure.inertia.massless)
     assert abs(structure.energy.error) < 0.02 * structure.energy.exchanged
 
 
