@@ -45,7 +45,7 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
         (
             "additions", "rigid", "structure_time", "fluid_history", "fluid_time", "massless", "contact_motion",
-            "contact_linear", "structure_springs", "structure_supports", "inertia", "rigid_inertia", "mass_exchange", "viscosity",
+            "contact_linear", "structure_springs", "structure_supports", "rigid_inertia", "mass_exchange", "viscosity",
         ),
     ),
     "mortar": (
