@@ -28,7 +28,7 @@ from solvers.structure.constrained_dofs import ConstrainedDofs
 from solvers.structure.deformation import flown_off, inverted, largest_extent
 from solvers.structure.energy import EnergyBalance, EnergySentinel
 from solvers.structure.held import Held
-from solvers.structure.inertia import Inertia
+from solvers.structure.inertia import ElasticInertia
 from solvers.structure.instant import Instant
 from solvers.structure.limit_point import LimitPoint
 from solvers.structure.rayleigh import RayleighDamping
@@ -67,7 +67,7 @@ class Structure:
         self._constrained = None if contact is None else ConstrainedDofs(self.layout, contact)
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
-        self.inertia = Inertia(comm, bodies, self.pieces, lambda: self.time.massless(self))
+        self.inertia = ElasticInertia(comm, bodies, self.pieces, lambda: self.time.massless(self))
         self.current = Step(0.0, 0.0)  #: the present step, or the last one
         self.last_length = 0.0  #: of the last accepted step [s], 0 at the start
         self.energy = EnergyBalance()

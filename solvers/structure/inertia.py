@@ -14,11 +14,10 @@ from solvers.api import Array
 from solvers.blocks import block_diagonal, times
 from solvers.structure.body import Body
 from solvers.structure.body_pieces import BodyPieces
-from solvers.structure.massless import without_mass
 from solvers.structure.rigid_inertia import Frames, Momenta, RigidInertia
 
 
-class Inertia:
+class ElasticInertia:
     """Mass matrix, massless dofs, and inertia of rigid motion; all follow from the present contact pairs."""
 
     def __init__(
@@ -106,3 +105,20 @@ class Inertia:
         """Kinetic energy [J] of the velocity v [m/s] (collective)."""
         energy = 0.5 * self._comm.allreduce(float(v @ times(self.mass, v)))
         return energy if self.rigid is None or self.frame is None else energy + self.rigid.energy(self.frame, v)
+
+
+def without_mass(mass: PETSc.Mat, massless: NDArray[np.bool_], piece: NDArray[np.int64], count: int) -> PETSc.Mat:
+    """The mass matrix [kg] without rows and columns of massless dofs, scaled to the mass of each piece (collective).
+
+    The pattern is that of `mass`. massless: owned dofs, shape (n dim,); piece: number of each owned node, shape (n,).
+    """
+    moved, scale = mass.copy(), mass.createVecLeft()
+    scale.array[:] = ~massless
+    moved.diagonalScale(scale, scale)
+    at = piece.repeat(len(massless) // len(piece)) if len(piece) else piece
+    ones = np.ones(len(massless))
+    sums = np.stack([np.bincount(at, times(matrix, ones), count) for matrix in (mass, moved)])
+    before, after = mass.comm.tompi4py().allreduce(sums)
+    scale.array[:] = (before / after)[at]
+    moved.diagonalScale(scale, None)
+    return moved

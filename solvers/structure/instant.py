@@ -16,7 +16,7 @@ from solvers.step import Step
 from solvers.structure.body import Body
 from solvers.structure.body_pieces import BodyPieces
 from solvers.structure.held import Held
-from solvers.structure.inertia import Inertia
+from solvers.structure.inertia import ElasticInertia
 
 
 @dataclass
@@ -71,7 +71,7 @@ class Moving(Protocol):
     bodies: list[Body]
     layout: Layout
     pieces: BodyPieces
-    inertia: Inertia
+    inertia: ElasticInertia
     held: Held
     constraint: Constraint | None
     now: Instant

@@ -16,6 +16,7 @@ from solvers.contact.pair import Pair
 from solvers.contact.reach import Reach
 from solvers.contact.surface import Surface
 from solvers.generalised_alpha import GeneralisedAlpha
+from solvers.structure import mass_exchange
 from solvers.structure.dynamics import Dynamics
 from solvers.structure.field import Structure
 from solvers.structure.materials import NeoHooke
@@ -112,6 +113,25 @@ def test_mass_returns_after_an_impact():
     assert momenta[:, 1] == pytest.approx(np.full(151, 0.6), rel=1e-8)
     assert -2.0 < momenta[-1, 0] < -1.5
     assert structure.energy.error / structure.energy.initial == pytest.approx(0.0, abs=0.01)
+
+
+def test_bounds_of_the_scale_do_not_matter(monkeypatch):
+    """The energy of a block that vibrates after its impact, with bounds over three decades."""
+    flies = (constant(1.0), constant(0.3))
+    found = []
+    for bound in (2.0, 20.0, 2000.0):
+        monkeypatch.setattr(mass_exchange, "LEAST", 1.0 / bound)
+        monkeypatch.setattr(mass_exchange, "MOST", bound)
+        body = make_body("body", block("quad", 4), SOFT, initial_velocity=flies)
+        time = Dynamics(GeneralisedAlpha.from_rho_inf(1.0))
+        wall = [(("body", "right"), wall_at(1.1))]
+        structure, _ = make_contact([body], wall, time=time, settings=TIGHT, exchanges_mass=True)
+        for _ in advance(structure, 0.01, 60):
+            pass
+        assert not len(structure.inertia.massless)
+        found.append([structure.energy.kinetic, structure.energy.internal, probe(structure, "momentum")[0]])
+    assert found[1] == pytest.approx(found[0], rel=1e-3)
+    assert found[2] == pytest.approx(found[0], rel=1e-3)
 
 
 def test_a_restored_state_has_its_present_pairs():

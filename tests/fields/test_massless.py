@@ -16,7 +16,8 @@ from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Support
 from solvers.structure.body_pieces import BodyPieces
 from solvers.structure.dynamics import Dynamics
-from solvers.structure.massless import massless_dofs, without_mass
+from solvers.structure.inertia import without_mass
+from solvers.structure.massless import massless_dofs
 from solvers.structure.materials import StVenantKirchhoff
 from solvers.structure.rayleigh import Damping
 
