@@ -72,6 +72,7 @@ class Dynamics:
                 FirstState(structure.inertia.massless, damped=structure.damping is not None), held, t, SHORT * dt
             ):
                 structure.solve()
+        structure.now.mean[:] = structure.now.v
         self._solve_acceleration(structure)
 
     def _start_supports(self, structure: Moving, t: float, h: float) -> None:
@@ -149,8 +150,9 @@ class Dynamics:
         """Newmark's relations; for massless and impulsive dofs v = (u_{n+1} - u_n) / dt.
 
         With damping massless dofs have v = w + (w - w_n) dt / (dt + dt_n), w = (u_{n+1} - u_n) / dt and w_n that of the
-        last step, of second order at the end of the step (the backward difference of three positions). Where contact
-        acts at the start of the step, v = w: velocities jump when it ends.
+        last step, of second order at the end of the step (the backward difference of three positions). In the first
+        step w_n is the velocity at its start, and dt_n = 0. Where contact acts at the start of the step, v = w:
+        velocities jump when it ends.
         """
         old, massless, impulsive = structure.old, structure.inertia.massless, structure.inertia.impulsive
         du = structure.now.u - old.u
@@ -162,13 +164,13 @@ class Dynamics:
         return v, a
 
     def _extrapolated(self, structure: Moving, dt: float) -> Array:
-        """dt / (dt + dt_n) at massless dofs; zero after contact, in the first step, and without damping.
+        """dt / (dt + dt_n) at massless dofs; zero after contact and without damping.
 
         Without damping these velocities do nothing. Contact at the end of the step does not count: the force would
         jump where contact closes, and a coupled step could have no solution.
         """
         massless = structure.inertia.massless
-        if structure.damping is None or structure.last_length == 0.0:
+        if structure.damping is None:
             return np.zeros(len(massless))
         pushed = structure.old.constraint != 0.0
         at_node = np.repeat(pushed.reshape(-1, structure.dim).any(axis=1), structure.dim)[massless]
