@@ -65,13 +65,14 @@ class Dynamics:
         impulse in the first step would be lost.
         """
         self._start_supports(structure, t, SHORT * dt)
-        if structure.comm.allreduce(len(structure.massless)):
-            others = np.setdiff1d(np.arange(structure.layout.size), structure.massless)
+        if structure.comm.allreduce(len(structure.inertia.massless)):
+            others = np.setdiff1d(np.arange(structure.layout.size), structure.inertia.massless)
             held = structure.held.stopped(others, structure.now.u)
             with structure.by(
-                FirstState(structure.massless, damped=structure.damping is not None), held, t, SHORT * dt
+                FirstState(structure.inertia.massless, damped=structure.damping is not None), held, t, SHORT * dt
             ):
                 structure.solve()
+        structure.now.mean[:] = structure.now.v
         self._solve_acceleration(structure)
 
     def _start_supports(self, structure: Moving, t: float, h: float) -> None:
@@ -83,17 +84,17 @@ class Dynamics:
 
     def _solve_acceleration(self, structure: Moving) -> None:
         """M a_0 = f_ext - f_int - C v_0, prescribed where supports are. Raises StepFailed."""
-        now, rigid, frame, held = structure.now, structure.rigid, structure.frame, structure.held
-        x, b = structure.mass.createVecs()
+        now, rigid, frame, held = structure.now, structure.inertia.rigid, structure.inertia.frame, structure.held
+        x, b = structure.inertia.mass.createVecs()
         if structure.damping is not None:
             now.damping[:] = structure.damping.force(now.v)
         b.array[:] = now.external + now.constraint - now.internal - now.damping
         x.array[:] = now.a
-        x.array[structure.massless] = 0.0
+        x.array[structure.inertia.massless] = 0.0
         if rigid is not None and frame is not None:
             b.array[:] -= rigid.force_by_acceleration(frame, now.v, held.part(x.array))
-        matrix = held.impose(structure.mass.copy(), x, b)
-        rows = (structure.layout.start + structure.massless).astype(PETSc.IntType)
+        matrix = held.impose(structure.inertia.mass.copy(), x, b)
+        rows = (structure.layout.start + structure.inertia.massless).astype(PETSc.IntType)
         matrix.zeroRowsColumns(rows, 1.0, x, b)
         ksp = PETSc.KSP().create(structure.comm)
         if rigid is None or frame is None:
@@ -149,10 +150,11 @@ class Dynamics:
         """Newmark's relations; for massless and impulsive dofs v = (u_{n+1} - u_n) / dt.
 
         With damping massless dofs have v = w + (w - w_n) dt / (dt + dt_n), w = (u_{n+1} - u_n) / dt and w_n that of the
-        last step, of second order at the end of the step (the backward difference of three positions). Where contact
-        acts at the start of the step, v = w: velocities jump when it ends.
+        last step, of second order at the end of the step (the backward difference of three positions). In the first
+        step w_n is the velocity at its start, and dt_n = 0. Where contact acts at the start of the step, v = w:
+        velocities jump when it ends.
         """
-        old, massless, impulsive = structure.old, structure.massless, structure.impulsive
+        old, massless, impulsive = structure.old, structure.inertia.massless, structure.inertia.impulsive
         du = structure.now.u - old.u
         a, v = (rule(du, old.v, old.a, dt) for rule in (self.scheme.acceleration, self.scheme.velocity))
         w = du[massless] / dt
@@ -162,20 +164,21 @@ class Dynamics:
         return v, a
 
     def _extrapolated(self, structure: Moving, dt: float) -> Array:
-        """dt / (dt + dt_n) at massless dofs; zero after contact, in the first step, and without damping.
+        """dt / (dt + dt_n) at massless dofs; zero after contact and without damping.
 
         Without damping these velocities do nothing. Contact at the end of the step does not count: the force would
         jump where contact closes, and a coupled step could have no solution.
         """
-        massless = structure.massless
-        if structure.damping is None or structure.last_length == 0.0:
+        massless = structure.inertia.massless
+        if structure.damping is None:
             return np.zeros(len(massless))
         pushed = structure.old.constraint != 0.0
         at_node = np.repeat(pushed.reshape(-1, structure.dim).any(axis=1), structure.dim)[massless]
         return np.where(at_node, 0.0, dt / (dt + structure.last_length))
 
     def rigid_force(self, structure: Moving, dt: float) -> Array:
-        now, rigid, frame, before = structure.now, structure.rigid, structure.frame, structure.momenta
+        now, inertia = structure.now, structure.inertia
+        rigid, frame, before = inertia.rigid, inertia.frame, inertia.momenta
         if rigid is None or frame is None or before is None:
             return now.rigid
         return rigid.force(frame, now.v, now.a, before, dt, self.scheme.gamma)
@@ -185,7 +188,7 @@ class Dynamics:
 
     def balance(self, structure: Moving) -> Array:
         present, before = (self._own_forces(structure, at) - at.surface for at in (structure.now, structure.old))
-        before[structure.massless] = before[structure.impulsive] = 0.0
+        before[structure.inertia.massless] = before[structure.inertia.impulsive] = 0.0
         return self._inertia(structure, 0.0) + (1.0 - self.scheme.alpha_f) * present + self.scheme.alpha_f * before
 
     def averaged_load(self, structure: Moving) -> Array:
@@ -195,10 +198,10 @@ class Dynamics:
 
     def _inertia(self, structure: Moving, old_share: float) -> Array:
         """The mean force of inertia; old_share: weight of that at the start of the step at impulsive dofs."""
-        share, now, old, impulsive = self.scheme.alpha_m, structure.now, structure.old, structure.impulsive
+        share, now, old, impulsive = self.scheme.alpha_m, structure.now, structure.old, structure.inertia.impulsive
         a = (1.0 - share) * now.a + share * old.a
         a[impulsive] = (1.0 - self.scheme.alpha_f) * now.a[impulsive] + old_share * old.a[impulsive]
-        return times(structure.mass, a) + (1.0 - share) * now.rigid + share * old.rigid
+        return times(structure.inertia.mass, a) + (1.0 - share) * now.rigid + share * old.rigid
 
     def averaged(self, before: Array, after: Array) -> Array:
         return (1.0 - self.scheme.alpha_f) * after + self.scheme.alpha_f * before
@@ -211,32 +214,32 @@ class Dynamics:
 
     def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat:
         """mass_factor M, in rows of impulsive dofs (1 - alpha_f) / dt^2 M."""
-        matrix, (factor, _) = structure.mass.copy(), structure.mass.createVecs()
+        matrix, (factor, _) = structure.inertia.mass.copy(), structure.inertia.mass.createVecs()
         factor.array[:] = self.scheme.mass_factor(dt)
-        factor.array[structure.impulsive] = (1.0 - self.scheme.alpha_f) / dt**2
+        factor.array[structure.inertia.impulsive] = (1.0 - self.scheme.alpha_f) / dt**2
         matrix.diagonalScale(factor, None)
         return matrix
 
     def damping_slope(self, structure: Moving, dt: float) -> Array | None:
         slope = np.full(structure.layout.size, self.scheme.damping_factor(dt))
-        slope[structure.impulsive] = (1.0 - self.scheme.alpha_f) / dt
-        slope[structure.massless] = (1.0 - self.scheme.alpha_f) * (1.0 + self._extrapolated(structure, dt)) / dt
+        slope[structure.inertia.impulsive] = (1.0 - self.scheme.alpha_f) / dt
+        slope[structure.inertia.massless] = (1.0 - self.scheme.alpha_f) * (1.0 + self._extrapolated(structure, dt)) / dt
         return slope
 
     def reaction(self, structure: Moving) -> Array:
         """M a + C v + f_int - f_ext [N] at the present time."""
         now = structure.now
-        dynamic = times(structure.mass, now.a) + now.rigid + now.damping
+        dynamic = times(structure.inertia.mass, now.a) + now.rigid + now.damping
         return dynamic + now.internal - now.external - now.constraint
 
     def support_forces(self, structure: Moving) -> tuple[Array, Array]:
         """The balance of the step at both ends; at massless and impulsive dofs those of its ends."""
-        found = (structure.residual_force.copy(), structure.residual_force.copy())
+        inertia, found = structure.inertia, (structure.residual_force.copy(), structure.residual_force.copy())
         for force, at in zip(found, (structure.old, structure.now), strict=True):
             static = self._own_forces(structure, at) - at.surface
-            force[structure.massless] = static[structure.massless]
-            if len(structure.impulsive):
-                force[structure.impulsive] = (static + times(structure.mass, at.a))[structure.impulsive]
+            force[inertia.massless] = static[inertia.massless]
+            if len(inertia.impulsive):
+                force[inertia.impulsive] = (static + times(inertia.mass, at.a))[inertia.impulsive]
         return found
 
     @property
@@ -246,9 +249,7 @@ class Dynamics:
     def stopping_force(self, structure: Moving) -> Array:
         old, share = structure.old, self.scheme.alpha_m
         stopped = self.scheme.acceleration(np.zeros_like(old.u), old.v, old.a, structure.current.dt)
-        return times(structure.mass, (1.0 - share) * stopped + share * old.a)
+        return times(structure.inertia.mass, (1.0 - share) * stopped + share * old.a)
 
     def kinetic_energy(self, structure: Moving) -> float:
-        v, rigid, frame = structure.now.v, structure.rigid, structure.frame
-        energy = 0.5 * structure.comm.allreduce(float(v @ times(structure.mass, v)))
-        return energy if rigid is None or frame is None else energy + rigid.energy(frame, v)
+        return structure.inertia.energy(structure.now.v)

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from solvers import linear
 from solvers.api import Array, State, StepFailed, StepInfo
-from solvers.blocks import Layout, block_diagonal
+from solvers.blocks import Layout
 from solvers.constraint import Constraint
 from solvers.largest import position_of_largest
 from solvers.newton import converge, whole_increments
@@ -28,11 +28,10 @@ from solvers.structure.constrained_dofs import ConstrainedDofs
 from solvers.structure.deformation import flown_off, inverted, largest_extent
 from solvers.structure.energy import EnergyBalance, EnergySentinel
 from solvers.structure.held import Held
+from solvers.structure.inertia import ElasticInertia
 from solvers.structure.instant import Instant
 from solvers.structure.limit_point import LimitPoint
-from solvers.structure.massless import without_mass
 from solvers.structure.rayleigh import RayleighDamping
-from solvers.structure.rigid_inertia import Frames, Momenta, RigidInertia
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.saved import restore_state, saved_state
 from solvers.structure.solid_solver import SolidSolver
@@ -68,8 +67,7 @@ class Structure:
         self._constrained = None if contact is None else ConstrainedDofs(self.layout, contact)
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
-        self.frame: Frames | None = None
-        self.momenta: Momenta | None = None
+        self.inertia = ElasticInertia(comm, bodies, self.pieces, lambda: self.time.massless(self))
         self.current = Step(0.0, 0.0)  #: the present step, or the last one
         self.last_length = 0.0  #: of the last accepted step [s], 0 at the start
         self.energy = EnergyBalance()
@@ -94,7 +92,7 @@ class Structure:
     def _symmetric(self) -> bool:
         """Whether tangents away from contact are symmetric."""
         # follower pressures have an unsymmetric boundary term, and the velocity of massless nodes has a rule of its own
-        damped = self.damping is not None and (self._moves_mass or not self.damping.symmetric)
+        damped = self.damping is not None and (self.inertia.moves_mass or not self.damping.symmetric)
         return not (damped or any(body.pressures for body in self.bodies))
 
     @property
@@ -115,56 +113,10 @@ class Structure:
     def _extent(self) -> float:
         return largest_extent(self.comm, self.bodies)
 
-    @cached_property
-    def _touching_dofs(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        return self.time.massless(self)
-
-    @property
-    def massless(self) -> NDArray[np.int64]:
-        """Owned dofs without mass."""
-        return self._touching_dofs[0]
-
-    @property
-    def impulsive(self) -> NDArray[np.int64]:
-        """Owned dofs of pieces that touch with nodes that have mass."""
-        return self._touching_dofs[1]
-
-    @cached_property
-    def _all_mass(self) -> PETSc.Mat:
-        return block_diagonal([body.mass() for body in self.bodies])
-
-    @cached_property
-    def _moves_mass(self) -> bool:
-        return self.comm.allreduce(bool(len(self.massless)), op=MPI.LOR)
-
-    @property
-    def piece_of_nodes(self) -> tuple[NDArray[np.int64], int]:
-        """(number of the connected piece of each owned node, count of all pieces)."""
-        return self.pieces.of_nodes, self.pieces.count
-
-    @cached_property
-    def mass(self) -> PETSc.Mat:
-        """Mass matrix of all bodies [kg], without that of massless dofs."""
-        if not self._moves_mass:
-            return self._all_mass
-        massless = np.isin(np.arange(self.layout.size), self.massless)
-        return without_mass(self._all_mass, massless, *self.piece_of_nodes)
-
-    @cached_property
-    def rigid(self) -> RigidInertia | None:
-        """What `mass` lacks for rigid motion; None if no dofs are massless."""
-        return self.all_inertia() if self._moves_mass else None
-
-    def all_inertia(self) -> RigidInertia:
-        """The inertia of all pieces, of those with all of their mass, too."""
-        points = np.concatenate([body.points[: self.dim, : body.owned].T for body in self.bodies])
-        turns = np.repeat([not body.linear for body in self.bodies], [body.owned for body in self.bodies])
-        return RigidInertia(self.comm, self._all_mass, self.mass, points, self.piece_of_nodes, turns)
-
     def forget_mass(self) -> None:
         """Find the massless nodes anew, and all that follows from them."""
-        for name in ("_touching_dofs", "_moves_mass", "mass", "rigid", "_symmetric"):
-            vars(self).pop(name, None)
+        self.inertia.forget()
+        vars(self).pop("_symmetric", None)
         self._assembled_tangent.forget()
 
     def at_constraint(self, owned: Array) -> Array:
@@ -245,8 +197,7 @@ class Structure:
         for body in self.bodies:
             body.element.begin_step()
         self.current = Step(t + dt, dt)
-        if self.rigid is not None and self.frame is not None:
-            self.momenta = self.rigid.momenta(self.frame, self.old.v, self.old.a, self.old.rigid)
+        self.inertia.begin_step(self.old.v, self.old.a, self.old.rigid)
         # not part of the saved state: a resumed run must start alike
         self.rounding = self._tangent = self._imposed = self._stopping = None
         self.solver.begin_step()
@@ -329,15 +280,8 @@ class Structure:
             body.set_displacement(u)
             internal[:] = body.internal_force()
             loads[:] = body.external_force(self.current.t)
-        frame, heavy = self.find_frame(), any(body.gravity for body in self.bodies)
-        if heavy and self.rigid is not None and frame is not None:
-            gravity = np.concatenate([body.gravity_at(self.current.t) for body in self.bodies])
-            now.loads += self.rigid.weight(frame, gravity)
-
-    def find_frame(self) -> Frames | None:
-        """Set `frame` at the present displacement."""
-        self.frame = None if self.rigid is None else self.rigid.frame(self.now.u)
-        return self.frame
+        self.inertia.find_frame(now.u)
+        now.loads += self.inertia.lacking_weight(self.current.t)
 
     def _assemble_constraint(self) -> None:
         if self.constraint is not None and self._constrained is not None:
@@ -422,7 +366,7 @@ class Structure:
 
     def added_product(self) -> Callable[[Array], Array] | None:
         """The part of the tangent that `linearise` lacks, as a product with owned dofs: of the inertia `rigid`."""
-        rigid, frame, factor = self.rigid, self.frame, self.time.rigid_factor(self.current.dt)
+        rigid, frame, factor = self.inertia.rigid, self.inertia.frame, self.time.rigid_factor(self.current.dt)
         if rigid is None or frame is None or not factor:
             return None
         product = rigid.product(frame)

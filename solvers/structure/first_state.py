@@ -17,11 +17,11 @@ class SmoothAcceleration(Statics):
 
     def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
         a = (structure.now.u - structure.old.u) / dt**2
-        a[structure.massless] = 0.0
+        a[structure.inertia.massless] = 0.0
         return structure.now.v, a
 
     def rigid_force(self, structure: Moving, dt: float) -> Array:
-        now, rigid, frame = structure.now, structure.rigid, structure.frame
+        now, rigid, frame = structure.now, structure.inertia.rigid, structure.inertia.frame
         return now.rigid if rigid is None or frame is None else rigid.force_by_acceleration(frame, now.v, now.a)
 
     def rigid_factor(self, dt: float) -> float:
@@ -29,10 +29,10 @@ class SmoothAcceleration(Statics):
 
     def balance(self, structure: Moving) -> Array:
         now = structure.now
-        return self.reaction(structure) + times(structure.mass, now.a) + now.rigid + now.damping
+        return self.reaction(structure) + times(structure.inertia.mass, now.a) + now.rigid + now.damping
 
     def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat:
-        matrix = structure.mass.copy()
+        matrix = structure.inertia.mass.copy()
         matrix.scale(1.0 / dt**2)
         return matrix
 

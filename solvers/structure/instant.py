@@ -7,7 +7,6 @@ from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from solvers.api import Array
@@ -15,8 +14,9 @@ from solvers.blocks import Layout
 from solvers.constraint import Constraint
 from solvers.step import Step
 from solvers.structure.body import Body
+from solvers.structure.body_pieces import BodyPieces
 from solvers.structure.held import Held
-from solvers.structure.rigid_inertia import Frames, Momenta, RigidInertia
+from solvers.structure.inertia import ElasticInertia
 
 
 @dataclass
@@ -70,6 +70,8 @@ class Moving(Protocol):
     comm: MPI.Comm
     bodies: list[Body]
     layout: Layout
+    pieces: BodyPieces
+    inertia: ElasticInertia
     held: Held
     constraint: Constraint | None
     now: Instant
@@ -80,34 +82,6 @@ class Moving(Protocol):
     last_length: float  #: of the last accepted step [s], 0 at the start
 
     @property
-    def massless(self) -> NDArray[np.int64]:
-        """Owned dofs without mass."""
-        ...
-
-    @property
-    def piece_of_nodes(self) -> tuple[NDArray[np.int64], int]:
-        """(number of the connected piece of each owned node, count of all pieces)."""
-        ...
-
-    @property
-    def impulsive(self) -> NDArray[np.int64]:
-        """Owned dofs of pieces that touch with nodes that have mass."""
-        ...
-
-    @property
-    def mass(self) -> PETSc.Mat:
-        """Mass matrix of all bodies [kg], without that of massless dofs."""
-        ...
-
-    @property
     def damping(self) -> DampingForce | None:
         """The damping, None without any."""
         ...
-
-    @property
-    def rigid(self) -> RigidInertia | None:
-        """What `mass` lacks for rigid motion; None if no dofs are massless."""
-        ...
-
-    frame: Frames | None  #: of `rigid` at the present iterate
-    momenta: Momenta | None  #: of `rigid` at the start of the step

@@ -37,7 +37,7 @@ class Leaps:
         ones = np.ones(structure.layout.size)
         self._counts = self._sums(ones)[:, 0]
         if not isinstance(structure.time, Statics):
-            self._masses = self._sums(times(structure.mass, ones))[:, 0]
+            self._masses = self._sums(times(structure.inertia.mass, ones))[:, 0]
 
     def _sums(self, values: Array) -> Array:
         """Sums of values at owned dofs over the nodes of each body, shape (bodies, dim) (collective)."""

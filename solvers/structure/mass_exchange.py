@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from solvers.api import Array
 from solvers.structure.time_scheme import Exchanging
 
-#: Factors by which velocities besides rigid motion may be scaled. Outside of them energy is lost or gained instead.
+#: Factors by which velocities besides rigid motion may be scaled; more or less energy than that is lost or gained.
+#: They bound rounding errors that would be scaled where bodies hardly vibrate: a bouncing disc has the same energies to
+#: 1e-4 with bounds from (0.9, 1.1) to (0.0005, 2000).
 LEAST, MOST = 0.5, 2.0
 
 
@@ -25,8 +27,8 @@ def exchange(structure: Exchanging, switch: Callable[[], None], settle: Callable
 
     settle: moves nodes that have become massless, owned dofs, to their equilibrium.
     """
-    comm, (piece, count) = structure.comm, structure.piece_of_nodes
-    before, energy = structure.all_inertia(), _internal(structure)
+    comm, piece, count = structure.comm, structure.pieces.of_nodes, structure.pieces.count
+    before, energy = structure.inertia.of_pieces(), _internal(structure)
     frame = before.frame(structure.now.u)
     motion = before.split(frame, structure.now.v)
     massless = _mask(structure)
@@ -38,7 +40,7 @@ def exchange(structure: Exchanging, switch: Callable[[], None], settle: Callable
     structure.assemble()
     if comm.allreduce(bool((now_massless & ~massless).any()), op=MPI.LOR):
         settle(np.flatnonzero(now_massless & ~massless))
-    after = structure.all_inertia()
+    after = structure.inertia.of_pieces()
     frame = after.frame(structure.now.u)
     rest = after.split(frame, structure.now.v)
     gained = after.split(frame, after.joined(frame, motion, rest.velocities)).energy - motion.energy
@@ -49,7 +51,7 @@ def exchange(structure: Exchanging, switch: Callable[[], None], settle: Callable
         have = float(rest.energy_of_rest[own].sum())
         wanted = have + float(freed[body]) - float(gained[own].sum())
         factor = np.sqrt(max(wanted, 0.0) / have) if have > 0.0 else 1.0
-        factors[own] = factor if LEAST < factor < MOST else 1.0
+        factors[own] = np.clip(factor, LEAST, MOST)
     at = piece.repeat(structure.bodies[0].dim)
     v = after.joined(frame, motion, factors[at] * rest.velocities)
     structure.now.v[changed[at]] = v[changed[at]]
@@ -58,7 +60,7 @@ def exchange(structure: Exchanging, switch: Callable[[], None], settle: Callable
 def _pieces_of_bodies(structure: Exchanging) -> list[NDArray[np.int64]]:
     """Numbers of the pieces of each body (collective)."""
     ends = np.cumsum([body.owned for body in structure.bodies])[:-1]
-    parts = np.split(structure.piece_of_nodes[0], ends)
+    parts = np.split(structure.pieces.of_nodes, ends)
     return [np.unique(np.concatenate(structure.comm.allgather(part))) for part in parts]
 
 
@@ -69,7 +71,7 @@ def _internal(structure: Exchanging) -> Array:
 
 def _mask(structure: Exchanging) -> NDArray[np.bool_]:
     mask = np.zeros(structure.layout.size, dtype=bool)
-    mask[structure.massless] = True
+    mask[structure.inertia.massless] = True
     return mask
 
 

@@ -16,10 +16,8 @@ from collections.abc import Sequence
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from solvers.api import Array
-from solvers.blocks import times
 from solvers.structure.instant import Moving
 
 #: Extent of nodes over that of their piece below which it is a rounding error (1e-30): they are one point or, in 3D, on
@@ -37,7 +35,7 @@ def massless_dofs(structure: Moving) -> tuple[NDArray[np.bool_], NDArray[np.bool
     constraint, layout, dim = structure.constraint, structure.layout, structure.bodies[0].dim
     assert constraint is not None
     points = np.concatenate([body.points[:dim, : body.owned].T for body in structure.bodies])
-    piece, count = structure.piece_of_nodes
+    piece, count = structure.pieces.of_nodes, structure.pieces.count
     size = _extent(structure.comm, points, piece, count, np.ones(len(points), dtype=bool))
     found = np.zeros(layout.size // dim, dtype=bool)
     undecided = np.ones(count, dtype=bool)
@@ -63,20 +61,3 @@ def _extent(comm: MPI.Comm, points: Array, piece: NDArray[np.int64], count: int,
     x = x - (total[:, 1:] / np.maximum(total[:, :1], 1.0))[at]
     squares = sums([a * b for a in x.T for b in x.T]).reshape(count, dim, dim)
     return np.linalg.eigvalsh(squares)[:, :2].sum(axis=1)
-
-
-def without_mass(mass: PETSc.Mat, massless: NDArray[np.bool_], piece: NDArray[np.int64], count: int) -> PETSc.Mat:
-    """The mass matrix [kg] without rows and columns of massless dofs, scaled to the mass of each piece (collective).
-
-    The pattern is that of `mass`. massless: owned dofs, shape (n dim,); piece: number of each owned node, shape (n,).
-    """
-    moved, scale = mass.copy(), mass.createVecLeft()
-    scale.array[:] = ~massless
-    moved.diagonalScale(scale, scale)
-    at = piece.repeat(len(massless) // len(piece)) if len(piece) else piece
-    ones = np.ones(len(massless))
-    sums = np.stack([np.bincount(at, times(matrix, ones), count) for matrix in (mass, moved)])
-    before, after = mass.comm.tompi4py().allreduce(sums)
-    scale.array[:] = (before / after)[at]
-    moved.diagonalScale(scale, None)
-    return moved

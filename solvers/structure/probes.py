@@ -124,13 +124,12 @@ def _sums(structure: Structure, bodies: Sequence[Body], array: Array) -> Array:
 
 
 def _mass(structure: Structure, bodies: Sequence[Body]) -> float:
-    return float(_sums(structure, bodies, times(structure.mass, np.ones_like(structure.now.u)))[0])
+    return float(_sums(structure, bodies, times(structure.inertia.mass, np.ones_like(structure.now.u)))[0])
 
 
 def _momenta(structure: Structure) -> Array:
     """Momentum [kg m/s] of the nodes, with that of massless ones on the others."""
-    momenta, rigid, frame = times(structure.mass, structure.now.v), structure.rigid, structure.frame
-    return momenta if rigid is None or frame is None else momenta + rigid.times(frame, structure.now.v)
+    return structure.inertia.times(structure.now.v)
 
 
 def _positions(structure: Structure) -> Array:
@@ -139,7 +138,8 @@ def _positions(structure: Structure) -> Array:
 
 
 def _centre(structure: Structure, bodies: Sequence[Body]) -> dict[str, float]:
-    moments, rigid, frame = times(structure.mass, _positions(structure)), structure.rigid, structure.frame
+    inertia = structure.inertia
+    moments, rigid, frame = times(inertia.mass, _positions(structure)), inertia.rigid, inertia.frame
     if rigid is not None and frame is not None:
         moments = moments + rigid.on_nodes(frame, frame.first, np.zeros_like(frame.first))
     return _components(_sums(structure, bodies, moments) / _mass(structure, bodies))

@@ -9,7 +9,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from solvers.api import Array
-from solvers.blocks import block_diagonal, times
+from solvers.blocks import block_diagonal
 from solvers.structure.instant import Moving
 from solvers.structure.viscosity import Viscosity
 
@@ -42,9 +42,7 @@ class RayleighDamping:
         structure, c = self._structure, self._damping
         force = np.zeros(structure.layout.size)
         if c.mass:
-            force += c.mass * times(structure.mass, v)
-            if structure.rigid is not None and structure.frame is not None:
-                force += c.mass * structure.rigid.times(structure.frame, v)
+            force += c.mass * structure.inertia.times(v)
         if c.stiffness:
             parts = zip(self._viscosities, structure.layout.split(v), strict=True)
             force += c.stiffness * np.concatenate([viscosity.force(part) for viscosity, part in parts])
@@ -60,7 +58,7 @@ class RayleighDamping:
         columns.array[:] = slope
         parts: list[tuple[float, PETSc.Mat]] = []
         if self._damping.mass:
-            parts.append((self._damping.mass, self._structure.mass.copy()))
+            parts.append((self._damping.mass, self._structure.inertia.mass.copy()))
         if self._damping.stiffness:
             viscous = block_diagonal([viscosity.matrix() for viscosity in self._viscosities])
             parts.append((self._damping.stiffness, viscous))

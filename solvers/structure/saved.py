@@ -10,7 +10,6 @@ from solvers.api import Array, State
 from solvers.distributed import Nodal
 from solvers.structure.energy import EnergyBalance
 from solvers.structure.instant import Moving
-from solvers.structure.rigid_inertia import Frames
 from solvers.structure.solid_solver import SolidSolver
 
 
@@ -22,10 +21,6 @@ class Saved(Moving, Protocol):
 
     def forget_mass(self) -> None:
         """Find the massless nodes anew, and all that follows from them."""
-        ...
-
-    def find_frame(self) -> Frames | None:
-        """Set `frame` at the present displacement."""
         ...
 
 
@@ -49,7 +44,7 @@ def restore_state(structure: Saved, state: State) -> None:
     if structure.constraint is not None:
         structure.constraint.restore(state["contact"])
         structure.forget_mass()
-    structure.find_frame()
+    structure.inertia.find_frame(structure.now.u)
     structure.energy.restore(state["energy"])
     structure.solver.position, structure.last_length = state["linear_solver"], state["last_length"]
 

@@ -13,7 +13,6 @@ from solvers.api import Array, StepInfo
 from solvers.structure.held import Held
 from solvers.structure.instant import Moving
 from solvers.structure.rayleigh import RayleighDamping
-from solvers.structure.rigid_inertia import RigidInertia
 
 
 class Settling(Moving, Protocol):
@@ -35,10 +34,6 @@ class Exchanging(Settling, Protocol):
 
     def at_constraint(self, owned: Array) -> Array:
         """Values at the nodes of the constraint, shape (N, dim) (collective)."""
-        ...
-
-    def all_inertia(self) -> RigidInertia:
-        """The inertia of all pieces, of those with all of their mass, too."""
         ...
 
     def forget_mass(self) -> None:

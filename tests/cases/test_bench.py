@@ -88,7 +88,7 @@ def test_a_family_measures_each_option_and_resolution(tmp_path):
 
 
 def test_a_family_of_a_case_of_its_own():
-    """A bar hits a wall; the errors are those of momentum and depth."""
+    """A bar hits a wall; the errors are those of momentum and depth (10.1 % for ten cells, exact in time)."""
     bar = FAMILIES["bar_impact"]
     (row,) = replace(bar, options={"": {}}, resolutions=dict([*bar.resolutions.items()][:1])).run()
     assert row["error [%]"] == max(row["momentum.x final [%]"], row["centre.x min [%]"]) < 12.0

@@ -74,9 +74,9 @@ def test_volume_is_what_the_material_allows(run):
     structure, fluid = simulation.scheme.coupled.solid.structure, simulation.scheme.coupled.flow
     (body,), now = structure.bodies, structure.now
     x = body.points[:, : body.owned].T.ravel() + now.u
-    inertia, a = structure.mass.createVecs()
+    inertia, a = structure.inertia.mass.createVecs()
     a.array[:] = now.a
-    structure.mass.mult(a, inertia)
+    structure.inertia.mass.mult(a, inertia)
     forces = now.external + now.constraint - inertia.array
     measure = of_bodies(structure, structure.bodies, "volume")
     volume = measure()[""]

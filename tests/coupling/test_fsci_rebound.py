@@ -45,17 +45,17 @@ def test_forces_balance_and_nothing_penetrates():
     coupled = simulation.scheme.coupled
     structure, contact = coupled.solid.structure, coupled.solid.structure.constraint
     scheme, touched = structure.time.scheme, 0
-    mass = structure.mass.createVecLeft()
-    ones = structure.mass.createVecRight()
+    mass = structure.inertia.mass.createVecLeft()
+    ones = structure.inertia.mass.createVecRight()
     ones.set(1.0)
-    structure.mass.mult(ones, mass)
+    structure.inertia.mass.mult(ones, mass)
     weight, fluid_before, contact_before = -total(mass.array) * [0.0, 1.0], None, np.zeros(2)
     for step in range(14):
         old = structure.now.copy()
         simulation.scheme.step(step * DT, DT)
-        now, mean = structure.now, structure.mass.createVecRight()
+        now, mean = structure.now, structure.inertia.mass.createVecRight()
         mean.array[:] = (1.0 - scheme.alpha_m) * now.a + scheme.alpha_m * old.a
-        structure.mass.mult(mean, mass)
+        structure.inertia.mass.mult(mean, mass)
         fluid = coupled.force().sum(axis=0)
         fluid_before = np.zeros(2) if fluid_before is None else fluid_before
         load = weight + (1.0 - scheme.alpha_f) * fluid + scheme.alpha_f * fluid_before

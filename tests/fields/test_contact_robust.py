@@ -134,7 +134,7 @@ def test_a_slight_touch_turns_the_block_away():
     """Slow normal motion under fast sliding: tangential momentum stays, the normal one turns around."""
     structure, contact = flying_block(0.0005, (5.0, 0.0, -0.02))
     newton = steps(structure, 16, 0.01)
-    mass = structure.mass
+    mass = structure.inertia.mass
     x, y = mass.createVecs("right"), mass.createVecs("left")
     x.array[:] = structure.now.v
     mass.mult(x, y)

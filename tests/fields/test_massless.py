@@ -16,7 +16,8 @@ from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Support
 from solvers.structure.body_pieces import BodyPieces
 from solvers.structure.dynamics import Dynamics
-from solvers.structure.massless import massless_dofs, without_mass
+from solvers.structure.inertia import without_mass
+from solvers.structure.massless import massless_dofs
 from solvers.structure.materials import StVenantKirchhoff
 from solvers.structure.rayleigh import Damping
 
@@ -87,7 +88,7 @@ def surfaces(body, slave, master):
         bodies=[body],
         layout=layout,
         constraint=SimpleNamespace(**of),
-        piece_of_nodes=(pieces.of_nodes, pieces.count),
+        pieces=pieces,
     )
 
 
@@ -219,7 +220,7 @@ def test_motion_of_massless_surfaces():
     _, structure, _ = bar(10, dt, end=0.5)
     structure.begin_step(0.5, dt)
     structure.solve()
-    massless, moved = structure.massless, structure.now.u - structure.old.u
+    massless, moved = structure.inertia.massless, structure.now.u - structure.old.u
     assert np.abs(moved[massless]).max() > 0.01 * dt * SIZE
     assert np.array_equal(structure.now.v[massless], moved[massless] / dt)
     assert not structure.now.a[massless].any()
@@ -270,6 +271,6 @@ def test_two_bars_in_3d(slave):
     assert energy[0] == pytest.approx(0.25, rel=1e-9)
     assert energy.max() < 0.25 * 1.002
     assert energy[-1] == pytest.approx(0.25, rel=0.01)
-    momentum = structure.mass.createVecs("right")
+    momentum = structure.inertia.mass.createVecs("right")
     momentum.array[:] = structure.now.v
-    assert abs((structure.mass * momentum).array[::3].sum()) < 1e-10 * side**2 * SIZE
+    assert abs((structure.inertia.mass * momentum).array[::3].sum()) < 1e-10 * side**2 * SIZE

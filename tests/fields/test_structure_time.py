@@ -190,7 +190,7 @@ def test_acceleration_at_the_start():
     )
     structure.initialise(0.0, 0.1)
     (body,), now = structure.bodies, structure.now
-    mass = structure.mass.convert("dense").getDenseArray()
+    mass = structure.inertia.mass.convert("dense").getDenseArray()
     weight = mass @ np.tile([0.0, -10.0], len(now.u) // 2)
     parts = weight, -body.internal_force(), -now.damping
     assert min(np.abs(part).max() for part in parts) > 0.1
