@@ -51,6 +51,7 @@ class FlowTerms:
     penalties: Penalties
     gaps: GapTerms
     moved: float  #: largest motion of a vertex in the last iterate [m], infinite in the first one
+    velocity: Array  #: of the surface at the corners of pieces [m/s], (pieces, vertices, dim)
 
 
 @dataclass(frozen=True)
@@ -76,14 +77,15 @@ def cut_derivatives(
     _, first, of_cell = np.unique(local, return_index=True, return_inverse=True)
     density = _density(local[first], at.u[first], at.p[first], at.sizes[first], mu, rule, state)
 
-    velocity, slope = cut.motion.v[at.corners], normal_derivative(at.x, n)
+    slope = normal_derivative(at.x, n)
     both, slopes = _means(at, state.flow)
     du, dp, area = slopes[:, :dim], slopes[:, dim], moments.sum(axis=1)
     share = area / np.maximum(area.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-    w = both[:, :dim] - np.einsum("pc,pck->pk", share, velocity)
+    w = both[:, :dim] - np.einsum("pc,pck->pk", share, state.velocity)
     stress = mu * (du + np.swapaxes(du, 1, 2)) - both[:, dim, None, None] * identity
     load = (stress @ n[:, :, None] - at.penalty @ w[:, :, None])[..., 0]
-    changes = _penalty_changes(at, velocity.mean(axis=1) * state.convection, slope, state, state.gaps.lengths(local))
+    g = cut.motion.v[at.corners].mean(axis=1) * state.convection
+    changes = _penalty_changes(at, g, slope, state, state.gaps.lengths(local))
     more = compliant_terms(at, mu * (du + np.swapaxes(du, 1, 2)), w, slope, changes)
     of_slip = du
     if more is not None:

@@ -88,6 +88,8 @@ class FlowSystem:
         self._ghost_history = np.zeros(unknowns.local)
         self._out = np.zeros(unknowns.local)
         self.cut: Cut | None = None
+        #: velocity of facets beside that of their vertices [m/s], with its derivative, `sweep`; None: zero
+        self.sweep_velocity: Array | None = None
         self._moved = np.inf  #: largest motion of a vertex from the last cut to this one [m]
         self.slip_length: Array | None = None  #: of the facets of all surfaces [m]; None: no slip
         self.transmissivity: Array | None = None  #: of the layer on these facets [m^3]; None: no layer
@@ -219,13 +221,14 @@ class FlowSystem:
         if settings.body_force is not None:
             rate = rate + self._force.x.array / settings.density
         flow, density, alpha = self.flow.x.array, settings.density, float(self._alpha.value)
+        g = at.at_corners(cut.motion.v, self.sweep_velocity)
         if degree > 1:
-            return film_derivatives(at, self.weights, self.grid, cut, FilmFlow(flow, rate, density, alpha))
+            return film_derivatives(at, self.weights, self.grid, cut, FilmFlow(flow, rate, density, alpha, g))
         scale, convection = self._scale_velocity.x.array * settings.convection, settings.convection
         assert self.gaps is not None
         # with fluid pressure in closed contact the zone ends where the flow does, and their pressures cancel
         moved = self._moved if improved and self.may_close is None else np.inf
-        state = FlowTerms(flow, rate, scale, density, alpha, convection, settings.penalties, self.gaps, moved)
+        state = FlowTerms(flow, rate, scale, density, alpha, convection, settings.penalties, self.gaps, moved, g)
         return cut_derivatives(at, self.weights, self.grid, cut, state)
 
     @property
@@ -322,7 +325,7 @@ class FlowSystem:
         for form in [*self._residuals, *self._outer_on_cut.residuals]:
             fem.assemble_vector(form, self._out)
         if self.with_bodies and self._touched:
-            self._out += self.interface.velocity_terms(self.cut.motion.v)
+            self._out += self.interface.velocity_terms(self.cut.motion.v, self.sweep_velocity)
             for terms in self.interface.cell_blocks:
                 self._out += terms.rows(self.flow.x.array)
         if self._seepage is not None:
@@ -371,7 +374,14 @@ class FlowSystem:
     def surface_force(self) -> Array:
         """Force [N] of the fluid on the vertices of all surfaces, shape (n, dim) (collective)."""
         assert self.cut is not None
-        return self.grid.comm.allreduce(self.interface.force(self.flow.x.array, self.cut.motion.v)) + self.zone_force()
+        force = self.interface.force(self.flow.x.array, self.cut.motion.v, self.sweep_velocity)
+        return self.grid.comm.allreduce(force) + self.zone_force()
+
+    def surface_power(self) -> float:
+        """Power [W] of the force of the fluid on all surfaces, without that in closed contact (collective)."""
+        assert self.cut is not None
+        power = self.interface.power(self.flow.x.array, self.cut.motion.v, self.sweep_velocity)
+        return float(self.grid.comm.allreduce(power))
 
     def zone_force(self) -> Array:
         """The part of `surface_force` that acts in closed contact (collective)."""
