@@ -77,8 +77,10 @@ class Balances:
         rows = outer - self._inner_rows()
         force, closed = system.grid.comm.allreduce(rows[dofs].sum(axis=0)), system.zone_force()
         given = system.grid.comm.allreduce(float((rows * system.flow.x.array)[dofs].sum()))
+        of_flow = system.surface_force() - closed
+        on_bodies = float((of_flow * system.cut.motion.v).sum()) + system.sweep_power()
         outside = system.grid.comm.allreduce(float((outer * system.flow.x.array)[dofs].sum()))
-        return force + closed.sum(axis=0), given - system.surface_power(), outside
+        return force + closed.sum(axis=0), given - on_bodies, outside
 
     def _outer_rows(self, held: NDArray[np.bool_]) -> Array:
         """Forces [N] on the fluid from walls and patches at local dofs; contributions to ghosts are not added up."""

@@ -90,8 +90,9 @@ class Fluid:
         self.started = False  #: a step was accepted, hence forces exist
         self.smallest_cell = min(float(np.diff(edge).min()) for edge in grid.edges)
         self.motions: list[Motion] = []
-        self.sweep = Sweep(settings.time.times)  #: earlier positions of the surfaces
         self.surfaces = AllSurfaces([body.surface for body in self.bodies], self.dim)
+        sweep = [np.full(len(b.surface.facets), b.sweeps) for b in self.bodies]
+        self.sweep = Sweep(settings.time.times, np.concatenate([*sweep, np.empty(0, dtype=bool)]))
         self._fast_bodies = FastBodies(grid)
         self.linear_iterations = 0  #: of the last linear system
         self.steady_iteration = SteadyIteration()

@@ -121,10 +121,10 @@ class InterfaceTerms:
         np.add.at(total, self.corners, self._at_corners_of_pieces(flow, self.at_corners(g, of_facets)))
         return total
 
-    def power(self, flow: Array, g: Array, of_facets: Array | None = None) -> float:
-        """Contribution of this process to the power [W] of the force on the surfaces."""
-        g = self.at_corners(g, of_facets)
-        return float((self._at_corners_of_pieces(flow, g) * g).sum())
+    def power_on_facets(self, flow: Array, g: Array, of_facets: Array) -> float:
+        """Contribution of this process to the power [W] of the force on the velocity of facets that vertices lack."""
+        force = self._at_corners_of_pieces(flow, self.at_corners(g, of_facets)).sum(axis=1)
+        return float((force * of_facets[self.facet]).sum())
 
     def _at_corners_of_pieces(self, flow: Array, g: Array) -> Array:
         """Force [N] at the corners of pieces with the velocities g there, (pieces, vertices, dim)."""

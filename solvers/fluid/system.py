@@ -377,10 +377,12 @@ class FlowSystem:
         force = self.interface.force(self.flow.x.array, self.cut.motion.v, self.sweep_velocity)
         return self.grid.comm.allreduce(force) + self.zone_force()
 
-    def surface_power(self) -> float:
-        """Power [W] of the force of the fluid on all surfaces, without that in closed contact (collective)."""
+    def sweep_power(self) -> float:
+        """Power [W] of the force of the fluid on what facets move beside their vertices (collective)."""
         assert self.cut is not None
-        power = self.interface.power(self.flow.x.array, self.cut.motion.v, self.sweep_velocity)
+        if self.sweep_velocity is None:
+            return 0.0
+        power = self.interface.power_on_facets(self.flow.x.array, self.cut.motion.v, self.sweep_velocity)
         return float(self.grid.comm.allreduce(power))
 
     def zone_force(self) -> Array:

@@ -28,9 +28,9 @@ from solvers.tessellation import area_vectors
 class Sweep:
     """Positions of all vertices at earlier times, and what follows from them for the present step."""
 
-    def __init__(self, times: int):
-        """times: count of earlier positions in the difference formula."""
-        self._times = times
+    def __init__(self, times: int, those: NDArray[np.bool_] | None = None):
+        """times: count of earlier positions in the difference formula; those: mask of the facets; None: all."""
+        self._times, self._those = times, those
         self.past: tuple[Array, ...] = ()  #: positions [m] at earlier times, newest first; empty: nothing is swept
 
     def begin_step(self, x: Array) -> None:
@@ -38,19 +38,25 @@ class Sweep:
         self.past = (x, *self.past)[: self._times]
 
     def velocity(self, facets: NDArray[np.int64], x: Array, v: Array, difference: Difference) -> Array | None:
-        """The additional velocity c [m/s] of facets, (facets, dim), at x [m] with v [m/s]; None: it is zero."""
-        pairs = self._pairs(x, v, difference)
+        """The additional velocity c [m/s] of facets, (facets, dim), at x [m] with v [m/s]; None: it is zero.
+
+        Facets that rest may have a velocity of their own.
+        """
+        pairs = self._pairs(x, difference)
         if pairs is None:
             return None
         a = area_vectors(x[facets])
         flux = -_dot(a, v[facets].mean(axis=1))
         for beta, past in pairs:
             flux += beta * swept(past[facets], x[facets])
-        return a * (flux * _inverse_square(a))[:, None]
+        moves = np.any([(past != x).any(axis=1)[facets].any(axis=1) for _, past in pairs], axis=0)
+        if self._those is not None:
+            moves &= self._those
+        return a * np.where(moves, flux * _inverse_square(a), 0.0)[:, None]
 
     def by_motion(self, facets: NDArray[np.int64], x: Array, v: Array, difference: Difference) -> Array | None:
         """Derivative of `velocity` by x where v changes by alpha dx, (facets, component of c, vertex, direction)."""
-        pairs = self._pairs(x, v, difference)
+        pairs = self._pairs(x, difference)
         if pairs is None:
             return None
         dim, corners, g = x.shape[1], x[facets], v[facets].mean(axis=1)
@@ -65,16 +71,16 @@ class Sweep:
         found: Array = a[:, :, None, None] * of_flux[:, None] + flux[:, None, None, None] * along
         return square[:, None, None, None] * found
 
-    def _pairs(self, x: Array, v: Array, difference: Difference) -> list[tuple[float, Array]] | None:
+    def _pairs(self, x: Array, difference: Difference) -> list[tuple[float, Array]] | None:
         """(beta_k, x_k) of the formula; None if nothing is swept."""
         pairs = list(zip(difference.beta, self.past, strict=False))
-        return pairs if pairs and (v.any() or any((x != past).any() for _, past in pairs)) else None
+        return pairs if any((x != past).any() for _, past in pairs) else None
 
     def save(self) -> State:
-        return {str(k): past.copy() for k, past in enumerate(self.past)}
+        return {"count": len(self.past), "past": np.array(self.past)}
 
     def restore(self, state: State) -> None:
-        self.past = tuple(state[str(k)].copy() for k in range(len(state)))
+        self.past = tuple(np.asarray(state["past"]).copy()) if state["count"] else ()
 
 
 def swept(before: Array, now: Array) -> Array:
