@@ -47,6 +47,7 @@ class FlowTerms:
     scale: Array  #: velocity [m/s] that scales the stabilisation, zero without convection
     density: float  #: [kg/m^3]
     alpha: float  #: [1/s]
+    scale_alpha: float  #: of the scales of the stabilisation [1/s]
     convection: bool
     penalties: Penalties
     gaps: GapTerms
@@ -161,7 +162,7 @@ def _penalty_changes(at: InterfaceTerms, g: Array, slope: Array, state: FlowTerm
     inflow = state.density * (np.einsum("pk,pk->p", g, n) < 0.0)[:, None, None]
     ds = -factors.nitsche * at.mu * TRACE[dim, 1] / (reduced[:, None, None] * h**2) * dh
     ds -= inflow * (np.einsum("pk,pkcj->pcj", g, turn) + state.alpha / dim * n[:, None])
-    return PenaltyChanges(turn, ds, state.density * factors.mass * state.alpha * dh)
+    return PenaltyChanges(turn, ds, state.density * factors.mass * state.scale_alpha * dh)
 
 
 def _penalty_by_motion(at: InterfaceTerms, slope: Array, w: Array, changes: PenaltyChanges) -> Array:
@@ -190,7 +191,7 @@ def _density(cells: NDArray, u: NDArray, p: NDArray, sizes: Array, mu: float, ru
     if state.convection:
         inertia += rho * (du @ velocity[..., None])[..., 0]
     metric = 4.0 / sizes[:, None] ** 2
-    common = rho**2 * (metric * a**2).sum(axis=2, keepdims=True) + 4.0 * rho**2 * state.alpha**2
+    common = rho**2 * (metric * a**2).sum(axis=2, keepdims=True) + 4.0 * rho**2 * state.scale_alpha**2
     taus = 1.0 / np.sqrt(common + 36.0 * mu**2 * dim * metric**2)
     strong = taus * (inertia + dp)
     divergence = np.einsum("Cqkk->Cq", du)

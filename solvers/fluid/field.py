@@ -165,7 +165,7 @@ class Fluid:
         """Store the state at t; set boundary values, loads and moving bodies at t + dt. Times in [s]."""
         if self.following is not None:
             follow_bodies(self, self.following, t, dt)
-        self.current = FlowStep(t + dt, dt, self.history.difference(dt))
+        self.current = FlowStep(t + dt, dt, self.history.difference(dt), self.history.scale_alpha(dt))
         if self._behind is not None:  # the first iterate is the history, which is bounded behind walls
             mask = self.unknowns.velocity_mask
             self.flow[mask] = self.history.past[0].velocity[mask]

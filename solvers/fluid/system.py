@@ -58,10 +58,10 @@ class FlowSystem:
         self.grid, self.settings, self.boundary, self.unknowns = grid, settings, boundary, unknowns
         domain, space = grid.domain, unknowns.space
         self.flow, self.history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
-        self._alpha, self._newton = fem.constant(domain, 0.0), fem.constant(domain, 1.0)
+        self._alpha, self._scale_alpha, self._newton = (fem.constant(domain, value) for value in (0.0, 0.0, 1.0))
         self.weights = Weights(grid, settings.degree)
         parts = (unknowns.parts(f)[0] for f in (self._scale_velocity, self.history, self._force))
-        self.terms = coefficients(domain, settings, *parts, alpha=self._alpha, newton=self._newton)
+        self.terms = coefficients(domain, settings, *parts, alpha=(self._alpha, self._scale_alpha), newton=self._newton)
         #: gaps of a few cells, with first-order velocities
         self.gaps = (
             GapTerms(grid, settings.viscosity, settings.density) if with_bodies and settings.degree == 1 else None
@@ -115,6 +115,7 @@ class FlowSystem:
         incomplete; velocity [m/s]: for the scales.
         """
         self._alpha.value = step.difference.alpha
+        self._scale_alpha.value = step.difference.alpha if step.scale_alpha is None else step.scale_alpha
         if self.gaps is not None:
             self.gaps.begin_step(None if self.settings.steady else step.dt)
         self.history.x.array[:] = rate
@@ -136,7 +137,7 @@ class FlowSystem:
         self.speed = by_dof[dofs].max(axis=1) * settings.convection
         self.fastest = float(self.grid.comm.allreduce(self.speed.max(initial=0.0), op=MPI.MAX))
         if self.ghost is not None:
-            numbers = settings.viscosity, settings.density, float(self._alpha.value)
+            numbers = settings.viscosity, settings.density, float(self._scale_alpha.value)
             self.ghost.set_scales(Scales(*numbers, self.speed, speed * settings.convection))
 
     def set_cut(self, cut: Cut) -> None:
@@ -228,7 +229,8 @@ class FlowSystem:
         assert self.gaps is not None
         # with fluid pressure in closed contact the zone ends where the flow does, and their pressures cancel
         moved = self._moved if improved and self.may_close is None else np.inf
-        state = FlowTerms(flow, rate, scale, density, alpha, convection, settings.penalties, self.gaps, moved, g)
+        alphas = alpha, float(self._scale_alpha.value)
+        state = FlowTerms(flow, rate, scale, density, *alphas, convection, settings.penalties, self.gaps, moved, g)
         return cut_derivatives(at, self.weights, self.grid, cut, state)
 
     @property
@@ -302,7 +304,7 @@ class FlowSystem:
         """P of pieces [Pa s/m], shape (pieces, dim, dim)."""
         settings, cells = self.settings, cut.cut[pieces.cell]
         g = cut.motion.v[cut.facets[pieces.facet]].mean(axis=1)
-        flow = settings.viscosity, settings.density, float(self._alpha.value)
+        flow = settings.viscosity, settings.density, float(self._scale_alpha.value)
         speeds, sizes = (self.speed[cells], g * settings.convection), self.grid.sizes[cells]
         reduced = 1.0 if self.gaps is None else self.gaps.lengths(cells)
         least: Array | float = 0.0
