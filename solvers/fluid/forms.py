@@ -118,13 +118,15 @@ def bulk(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
 def residual_based(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     """Integrand of the SUPG, PSPG and grad-div terms, (rho a . grad v + grad q, T R) + (tau_C div u, div v).
 
-    tau_M = (4 rho^2 alpha_s^2 + rho^2 a . G a + 36 mu^2 G : G)^(-1/2), 144 for second degree, tau_C = 1 / (tau_M tr G),
-    G = diag(4 / h_i^2), T = tau_M I for second degree. For first degree T = diag(tau_i), with dim G_ii^2 in the place
-    of G : G. A common tau would be that of the shortest edge: it would hardly stabilise the pressure along longer ones,
-    and the error would grow with the ratio of edges. For second degree the shortest edge bounds tau, because R has a
-    viscous part: mu lap u, that of a field without divergence. For first degree this part is zero. The divergence that the method
-    leaves depends on tau, hence on the step. If tau jumped with the length of the step, so would the velocity, and
-    bodies would feel the force of this jump in one step. alpha_s follows slowly instead (`history.History.scale_alpha`).
+    tau_M = (4 rho^2 alpha_s^2 + rho^2 a . G a + 36 mu^2 G : G)^(-1/2), 144 for second degree,
+    tau_C = 1 / (tau_M tr G), G = diag(4 / h_i^2), T = tau_M I for second degree. For first degree T = diag(tau_i), with
+    dim G_ii^2 in the place of G : G. A common tau would be that of the shortest edge: it would hardly stabilise the
+    pressure along longer ones, and the error would grow with the ratio of edges. For second degree the shortest edge
+    bounds tau, because R has a viscous part: mu lap u, that of a field without divergence. For first degree this part
+    is zero.
+    The divergence that the method leaves depends on tau, hence on the step. If tau jumped with the length of the step,
+    so would the velocity, and bodies would feel the force of this jump in one step. alpha_s follows slowly
+    (`history.History.scale_alpha`).
     Source of tau by direction: Blasco, Comput. Methods Appl. Mech. Engrg. 197 (2008) 3712-3723.
     """
     test = grad(q)

@@ -19,9 +19,10 @@ Mask = NDArray[np.bool_]
 #: Grigorieff, Numer. Math. 42 (1983) 359-377.
 GROWTH = 2.0
 
-#: Largest ratio of the lengths for the scales of the stabilisation in two steps. Half of the length at once changes the
-#: force on a disc of five cells by 10 % in one step; by this ratio, it takes 15 steps with 0.7 % each.
-SCALE_CHANGE = 1.05
+#: Largest change in a step of the length for the scales of the stabilisation, over the length of the step. The
+#: divergence that the method leaves at walls is proportional to this length, so that a change acts on bodies as a force
+#: that is proportional to this ratio: with 1, 10 % of the drag of a disc of five cells. Half of a step takes 20.
+SCALE_CHANGE = 0.05
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class History:
             Past(np.zeros(size), np.ones(size, dtype=bool)) for _ in range(1 if scheme.steady else max(2, scheme.times))
         ]
         self.steps: tuple[float, ...] = ()  #: lengths [s]
-        self._scale_step = 0.0  #: length of the last step for the scales of the stabilisation [s]; zero: that of the next
+        self._scale_step = 0.0  #: that of the last step for the scales of the stabilisation [s]; zero: none
         #: change of the pressure in the last step [Pa], at local dofs; zero where it had none at the start or the end
         self.pressure_change = np.zeros(size)
         self._pressure: Array | None = None  #: at the beginning of the present step [Pa]; None: of other unknowns
@@ -62,7 +63,7 @@ class History:
 
     def _next_scale_step(self, dt: float) -> float:
         last = self._scale_step or dt
-        return min(max(dt, last / SCALE_CHANGE), last * SCALE_CHANGE)
+        return min(max(dt, last - SCALE_CHANGE * dt), last + SCALE_CHANGE * dt)
 
     def difference(self, dt: float) -> Difference:
         """The difference formula of a next step of length dt [s]."""

@@ -77,8 +77,13 @@ def history(folder, text):
 
 @pytest.mark.parametrize(
     ("scheme", "coupling"),
-    [("backward_euler", "monolithic"), ("bdf2", "monolithic"), ("bdf2_optimized", "monolithic"), ("backward_euler", "partitioned")],
-)  # fmt: skip
+    [
+        ("backward_euler", "monolithic"),
+        ("bdf2", "monolithic"),
+        ("bdf2_optimized", "monolithic"),
+        ("backward_euler", "partitioned"),
+    ],
+)
 def test_ring_keeps_its_water(tmp_path, scheme, coupling):
     """With the velocity of the vertices alone it loses 3 % of it, and the pressure is -30 Pa (backward Euler)."""
     found = history(tmp_path, RING.format(scheme=scheme, coupling=coupling, ring=ELASTIC))

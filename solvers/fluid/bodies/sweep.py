@@ -15,8 +15,6 @@ Source: Lesoinne, Farhat, Comput. Methods Appl. Mech. Engrg. 134 (1996) 71-90 (g
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -108,7 +106,7 @@ def _edges(corners: Array) -> Array:
 
 
 def _area_slope(edges: Array) -> Array:
-    """Derivative of `area_vectors` by the corners of facets with these edges, (facets, component, vertex, direction)."""
+    """Derivative of `area_vectors` by corners of facets with these edges, (facets, component, vertex, direction)."""
     if edges.shape[2] == 2:
         turn = np.broadcast_to([[0.0, 1.0], [-1.0, 0.0]], (len(edges), 2, 2))
         return np.stack([-turn, turn], axis=2)
