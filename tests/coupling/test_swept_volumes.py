@@ -40,10 +40,10 @@ structure:
       material: {law: neo_hooke, E: 5000, nu: 0.3, density: 10}
       initial_velocity: ["-3*y", "3*x"]"""
 
-#: An elastic roll whose hub is turned around a point beside its middle.
+#: A thick elastic ring, turned by its inside around its middle; what it encloses is not wetted.
 ROLL = """\
 title: A roll that is turned by its hub
-time: {{step: 0.02, end: 0.1}}
+time: {{step: 0.02, end: 0.3}}
 fluid:
   density: 1
   viscosity: 0.05
@@ -56,12 +56,12 @@ structure:
   dynamics: {{rho_inf: 0.8}}
   bodies:
     roll:
-      mesh: {{shape: ring, inner_radius: 0.1, outer_radius: 0.2, cells: [24, 2], order: 2}}
-      material: {{law: neo_hooke, E: 1e7, nu: 0.3, density: 2}}
+      mesh: {{shape: ring, inner_radius: 0.1, outer_radius: 0.3, cells: [32, 3], order: 2}}
+      material: {{law: neo_hooke, E: 1e6, nu: 0.3, density: 2}}
       supports:
         - on: inner
-          displacement: ["(x-0.05)*(cos(5*t)-1) - y*sin(5*t)", "(x-0.05)*sin(5*t) + y*(cos(5*t)-1)"]
-coupling: {{scheme: {coupling}, wetted: {{roll: outer}}}}
+          displacement: ["x*(cos(th)-1) - y*sin(th)", "x*sin(th) + y*(cos(th)-1)"]
+coupling: {{scheme: monolithic, wetted: {{roll: outer}}}}
 probes:
   out: {{quantity: flow_rate, through: open}}
 output: {{fields_every: 0}}
@@ -95,7 +95,6 @@ def test_ring_keeps_its_water(tmp_path, scheme, coupling):
 
 @pytest.mark.parametrize("scheme", ["backward_euler", "bdf2"])
 def test_roll_turned_by_its_hub_pumps_nothing(tmp_path, scheme):
-    """Its velocities alone would pump pi R^2 omega^2 dt = 0.06 m^2/s with backward Euler; the roll is nearly stiff."""
-    found = history(tmp_path, ROLL.format(scheme=scheme, coupling="monolithic"))
-    assert np.abs(found["out"][2:]).max() < 1e-3  # the start bends the roll
-    assert np.abs(found["fluid.mass"]).max() < 1e-9
+    """The velocities of vertices alone pump pi R^2 omega^2 dt = 0.05 m^2/s with backward Euler."""
+    text = ROLL.format(scheme=scheme).replace("th)", "3*ramp(t, 0, 0.1)*t)")
+    assert np.abs(history(tmp_path, text)["out"][-1]) < 1e-3
