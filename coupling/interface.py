@@ -91,9 +91,9 @@ class Interface:
         self.now = d.copy()
         return self._motions(d, self.velocity(d))
 
-    def at_start(self, velocity: Array) -> dict[str, Motion]:
-        """Motion of each surface at the present positions, with given velocities [m/s] of the vertices."""
-        return self._motions(self.now, velocity)
+    def at_start(self, velocity: Array, d: Array | None = None) -> dict[str, Motion]:
+        """Motion of each surface with given velocities [m/s] of the vertices; d: displacements [m], None: present."""
+        return self._motions(self.now if d is None else d, velocity)
 
     def _motions(self, d: Array, velocity: Array) -> dict[str, Motion]:
         motions = self._by_surface(self.points + d, velocity)

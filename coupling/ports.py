@@ -310,8 +310,11 @@ class StartOfFlow(Protocol):
         """Begin a start step of length `short`, of the solid `of_solid`; the caller solves it within the context."""
         ...
 
-    def end(self, dt: float) -> None:
-        """Restore the initial velocity, and extrapolate those before it by the rate of the last start step."""
+    def end(self, dt: float, before: Sequence[Mapping[str, Motion]]) -> None:
+        """Restore the initial velocity, and extrapolate those before it by the rate of the last start step.
+
+        before: motions of coupled surfaces at the times before the start, newest first.
+        """
         ...
 
     def end_impulse(self, dt: float) -> None:

@@ -119,6 +119,6 @@ def _share_acceleration(
     acceleration = (interface.displacement() - before) / dt**2
     force = coupled.force()
     start.solid.end()
-    start.flow.end(dt)
     interface.end_start(dt, velocity, acceleration)
+    start.flow.end(dt, [interface.at_start(velocity, past) for past in interface.past])
     coupled.balance.given = coupled.solid.reduced(force)

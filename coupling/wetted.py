@@ -66,7 +66,7 @@ def immerse(
     found = [replace(body, surface=surface) for body, surface in zip(given, wet, strict=False)]
     starts = [points for _, points in moved]
     return found + [
-        ImmersedBody(surface, None, deforms=deform, start=start)
+        ImmersedBody(surface, None, deforms=deform, start=start, sweeps=True)
         for surface, start in zip(wet[len(given) :], starts, strict=True)
     ]
 

@@ -44,7 +44,7 @@ def build_coupled(
     surfaces = [wetted_surface(structure, index, skin) for index, (skin, _) in enumerate(skins)]
     immersed = immerse([surface.at_start for surface in surfaces], build_rigid_bodies(case, comm), case.time.start)
     dry_sides = [_dry_side(s, c) for s, (_, c) in zip(surfaces, skins, strict=True) if c is not None]
-    immersed += [ImmersedBody(_dry_surface(side), None, deforms=True) for side in dry_sides]
+    immersed += [ImmersedBody(_dry_surface(side), None, deforms=True, sweeps=True) for side in dry_sides]
     fluid = build_fluid(case, comm, timer, immersed)
     seal = None if case.contact is None else case.contact.film.seal
     layers = {} if seal is None else sealing_layers(surfaces, seal)

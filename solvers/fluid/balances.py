@@ -32,7 +32,7 @@ def crossing(system: FlowSystem) -> Crossing:
     """
     assert system.cut is not None
     at = system.interface
-    u, g = system.flow.x.array[at.u], system.cut.motion.v[at.corners]
+    u, g = system.flow.x.array[at.u], at.at_corners(system.cut.motion.v, system.sweep_velocity)
     swept = np.einsum("pvw,pw->p", at.mass_of_pieces, np.einsum("pwi,pi->pw", g, at.n))
     net = np.einsum("pav,pa->p", at.fields[..., 0], np.einsum("pai,pi->pa", u, at.n)) - swept
     _, of_piece = np.unique(np.stack([at.cell, at.facet]), axis=1, return_inverse=True)
@@ -78,8 +78,9 @@ class Balances:
         force, closed = system.grid.comm.allreduce(rows[dofs].sum(axis=0)), system.zone_force()
         given = system.grid.comm.allreduce(float((rows * system.flow.x.array)[dofs].sum()))
         of_flow = system.surface_force() - closed
+        on_bodies = float((of_flow * system.cut.motion.v).sum()) + system.sweep_power()
         outside = system.grid.comm.allreduce(float((outer * system.flow.x.array)[dofs].sum()))
-        return force + closed.sum(axis=0), given - float((of_flow * system.cut.motion.v).sum()), outside
+        return force + closed.sum(axis=0), given - on_bodies, outside
 
     def _outer_rows(self, held: NDArray[np.bool_]) -> Array:
         """Forces [N] on the fluid from walls and patches at local dofs; contributions to ghosts are not added up."""

@@ -27,13 +27,17 @@ class CellForms:
 
 
 def coefficients(
-    domain: fem.Domain, settings: FlowSettings, a: Any, history: Any, force: Any, *, alpha: Any, newton: Any
+    domain: fem.Domain, settings: FlowSettings, a: Any, history: Any, force: Any, *, alpha: tuple[Any, Any], newton: Any
 ) -> forms.Coefficients:
-    """Coefficients of the terms of a flow: functions a [m/s], history [m/s^2] and force [N/m^3], and its constants."""
+    """Coefficients of the terms of a flow: functions a [m/s], history [m/s^2] and force [N/m^3], and its constants.
+
+    alpha: of the time derivative and of the scales of the stabilisation [1/s].
+    """
     return forms.Coefficients(
         rho=fem.constant(domain, settings.density),
         mu=fem.constant(domain, settings.viscosity),
-        alpha=alpha,
+        alpha=alpha[0],
+        scale_alpha=alpha[1],
         a=a,
         newton=newton,
         history=history,

@@ -45,15 +45,23 @@ def interface_entries(
     held: NDArray[np.bool_],
     vertices: NDArray[np.int64],
     shape: FilmDerivatives | CutDerivatives | None = None,
+    swept: Array | None = None,
 ) -> InterfaceEntries:
     """Entries for the motion of some vertices, in the given order.
 
     flow: velocity and pressure at local dofs; held: local dofs with rows of the identity; alpha [1/s]: dg/dd;
-    shape: derivatives by the shape of some or all pieces, which replace those of the module `shape`.
+    shape: derivatives by the shape of some or all pieces, which replace those of the module `shape`; swept: that of the
+    velocity of facets beside that of their vertices, `Sweep.by_motion`.
     """
     C, sums = operator.coupling, _Sums(operator, unknowns, vertices)
+    of_sweep = None if swept is None else _of_sweep(operator, swept[operator.facet])
     if isinstance(shape, CutDerivatives):
-        into, load_by_shape = sums.with_flow(alpha * C + shape.operator, shape.rows), shape.force
+        rows, load_by_shape = shape.rows, shape.force
+        if of_sweep is not None:
+            rows = rows + np.concatenate(
+                [of_sweep.momentum.transpose(0, 1, 3, 4, 2), of_sweep.continuity[..., None]], axis=4
+            )
+        into = sums.with_flow(alpha * C + shape.operator, rows)
     else:
         by_shape, load_by_shape = shape_derivatives(operator, flow)
         if shape is not None:
@@ -63,12 +71,30 @@ def interface_entries(
         into = sums.with_flow(alpha * C + by_shape)
         if shape is not None:
             into = into + sums.of_films(shape)
+        if of_sweep is not None:
+            into = into + sums.of_films(of_sweep)
+    if of_sweep is not None:
+        load_by_shape = load_by_shape + of_sweep.force.transpose(0, 1, 3, 2, 4)
     into.data[held[into.indices]] = 0.0
     back = sums.with_flow(replace(-1.0 * C, psi=C.psi))
     load = sums.with_surface(-alpha * operator.mass_blocks + load_by_shape)
     if unknowns.grid.comm.size > 1:
         into, back = (part.with_columns(unknowns.global_dofs, unknowns.size()) for part in (into, back))
     return InterfaceEntries(into, back, load)
+
+
+def _of_sweep(operator: InterfaceTerms, by_motion: Array) -> FilmDerivatives:
+    """Derivatives of all pieces by the velocity of their facets; by_motion: its own, (pieces, k, vertices, j)."""
+    C, D = operator.coupling, by_motion
+    of_facet = np.einsum("paf,pfik->paik", operator.fields.sum(axis=2), C.fields)
+    flux = np.einsum("pk,pkcj->pcj", C.psi, D)
+    load = np.einsum("pki,pkcj->picj", operator.penalty, D)
+    return FilmDerivatives(
+        np.arange(len(D)),
+        np.einsum("paik,pkcj->paicj", of_facet, D),
+        np.einsum("pa,pcj->pacj", operator.psi.sum(axis=2), flux),
+        -np.einsum("pv,picj->pvicj", operator.mass_of_pieces.sum(axis=2), load),
+    )
 
 
 class _Sums:

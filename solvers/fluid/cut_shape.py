@@ -47,10 +47,12 @@ class FlowTerms:
     scale: Array  #: velocity [m/s] that scales the stabilisation, zero without convection
     density: float  #: [kg/m^3]
     alpha: float  #: [1/s]
+    scale_alpha: float  #: of the scales of the stabilisation [1/s]
     convection: bool
     penalties: Penalties
     gaps: GapTerms
     moved: float  #: largest motion of a vertex in the last iterate [m], infinite in the first one
+    velocity: Array  #: of the surface at the corners of pieces [m/s], (pieces, vertices, dim)
 
 
 @dataclass(frozen=True)
@@ -76,14 +78,15 @@ def cut_derivatives(
     _, first, of_cell = np.unique(local, return_index=True, return_inverse=True)
     density = _density(local[first], at.u[first], at.p[first], at.sizes[first], mu, rule, state)
 
-    velocity, slope = cut.motion.v[at.corners], normal_derivative(at.x, n)
+    slope = normal_derivative(at.x, n)
     both, slopes = _means(at, state.flow)
     du, dp, area = slopes[:, :dim], slopes[:, dim], moments.sum(axis=1)
     share = area / np.maximum(area.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-    w = both[:, :dim] - np.einsum("pc,pck->pk", share, velocity)
+    w = both[:, :dim] - np.einsum("pc,pck->pk", share, state.velocity)
     stress = mu * (du + np.swapaxes(du, 1, 2)) - both[:, dim, None, None] * identity
     load = (stress @ n[:, :, None] - at.penalty @ w[:, :, None])[..., 0]
-    changes = _penalty_changes(at, velocity.mean(axis=1) * state.convection, slope, state, state.gaps.lengths(local))
+    g = cut.motion.v[at.corners].mean(axis=1) * state.convection
+    changes = _penalty_changes(at, g, slope, state, state.gaps.lengths(local))
     more = compliant_terms(at, mu * (du + np.swapaxes(du, 1, 2)), w, slope, changes)
     of_slip = du
     if more is not None:
@@ -159,7 +162,7 @@ def _penalty_changes(at: InterfaceTerms, g: Array, slope: Array, state: FlowTerm
     inflow = state.density * (np.einsum("pk,pk->p", g, n) < 0.0)[:, None, None]
     ds = -factors.nitsche * at.mu * TRACE[dim, 1] / (reduced[:, None, None] * h**2) * dh
     ds -= inflow * (np.einsum("pk,pkcj->pcj", g, turn) + state.alpha / dim * n[:, None])
-    return PenaltyChanges(turn, ds, state.density * factors.mass * state.alpha * dh)
+    return PenaltyChanges(turn, ds, state.density * factors.mass * state.scale_alpha * dh)
 
 
 def _penalty_by_motion(at: InterfaceTerms, slope: Array, w: Array, changes: PenaltyChanges) -> Array:
@@ -188,7 +191,7 @@ def _density(cells: NDArray, u: NDArray, p: NDArray, sizes: Array, mu: float, ru
     if state.convection:
         inertia += rho * (du @ velocity[..., None])[..., 0]
     metric = 4.0 / sizes[:, None] ** 2
-    common = rho**2 * (metric * a**2).sum(axis=2, keepdims=True) + 4.0 * rho**2 * state.alpha**2
+    common = rho**2 * (metric * a**2).sum(axis=2, keepdims=True) + 4.0 * rho**2 * state.scale_alpha**2
     taus = 1.0 / np.sqrt(common + 36.0 * mu**2 * dim * metric**2)
     strong = taus * (inertia + dp)
     divergence = np.einsum("Cqkk->Cq", du)

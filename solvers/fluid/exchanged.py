@@ -14,6 +14,7 @@ from solvers.fluid.background.grid import DistributedGrid
 from solvers.fluid.background.space import Unknowns
 from solvers.fluid.bodies.immersed import ImmersedBody
 from solvers.fluid.bodies.surface import Motion
+from solvers.fluid.bodies.sweep import Sweep
 from solvers.fluid.cutting.cut import Cutter
 from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.history import History
@@ -41,6 +42,7 @@ class ExchangedFlow(Protocol):
     sequence: SolverSequence
     linear_solver: FlowSolver
     thin: ThinBodies
+    sweep: Sweep
     following: Following | None
     current: FlowStep
     began: Began | None

@@ -26,6 +26,7 @@ from solvers.fluid.bodies.all_surfaces import AllSurfaces
 from solvers.fluid.bodies.fast_bodies import FastBodies
 from solvers.fluid.bodies.immersed import ImmersedBody, sheets_of
 from solvers.fluid.bodies.surface import Motion
+from solvers.fluid.bodies.sweep import Sweep
 from solvers.fluid.boundary.patches import Patch, periodic_axes
 from solvers.fluid.closed_contact.zone_entries import with_zone
 from solvers.fluid.coupling_entries import InterfaceEntries, interface_entries
@@ -90,6 +91,8 @@ class Fluid:
         self.smallest_cell = min(float(np.diff(edge).min()) for edge in grid.edges)
         self.motions: list[Motion] = []
         self.surfaces = AllSurfaces([body.surface for body in self.bodies], self.dim)
+        sweep = [np.full(len(b.surface.facets), b.sweeps) for b in self.bodies]
+        self.sweep = Sweep(settings.time.times, np.concatenate([*sweep, np.empty(0, dtype=bool)]))
         self._fast_bodies = FastBodies(grid)
         self.linear_iterations = 0  #: of the last linear system
         self.steady_iteration = SteadyIteration()
@@ -162,7 +165,7 @@ class Fluid:
         """Store the state at t; set boundary values, loads and moving bodies at t + dt. Times in [s]."""
         if self.following is not None:
             follow_bodies(self, self.following, t, dt)
-        self.current = FlowStep(t + dt, dt, self.history.difference(dt))
+        self.current = FlowStep(t + dt, dt, self.history.difference(dt), self.history.scale_alpha(dt))
         if self._behind is not None:  # the first iterate is the history, which is bounded behind walls
             mask = self.unknowns.velocity_mask
             self.flow[mask] = self.history.past[0].velocity[mask]
@@ -170,6 +173,7 @@ class Fluid:
         history = tuple(self.history.past)
         layers = 0 if self.system.cut is None else self.system.cut.depth
         self.began = Began(self.unknowns, self.grid.sheets, self.current, history, tuple(self.motions), layers)
+        self.sweep.begin_step(self.surfaces.together(self.motions)[1].x)
         self.thin.begin_step()
         self.cutter.begin_step()
         self.begin_system(self.current)
@@ -397,7 +401,9 @@ class Fluid:
         held = fem.share_owned(self.unknowns.space, mark) > 0.5  # of ghosts too
         operator, vertices = self.system.interface, self.surfaces.vertices_of(surfaces)
         alpha, shape = self.current.difference.alpha, self.system.shape_derivatives(improved=self._improved)
-        found = interface_entries(operator, self.unknowns, self.flow, alpha, held, vertices, shape)
+        cut, difference = self.cut, self.current.difference
+        swept = self.sweep.by_motion(cut.facets, cut.motion.x, cut.motion.v, difference)
+        found = interface_entries(operator, self.unknowns, self.flow, alpha, held, vertices, shape, swept)
         zone = self.system.zone
         return found if zone is None else with_zone(found, zone, self.unknowns, self.flow, vertices)
 

@@ -38,6 +38,9 @@ def follow_surfaces(fluid: FlowAroundSurfaces, *, with_solid: bool) -> None:
         cut = _cut(fluid)
     with fluid.timer("weights"):
         fluid.system.set_cut(cut)
+        fluid.system.sweep_velocity = fluid.sweep.velocity(
+            cut.facets, cut.motion.x, cut.motion.v, fluid.current.difference
+        )
         require_history(fluid, cut, fluid.history.missing(fluid.current.difference))
         require_within_period(fluid.unknowns, cut)
         fluid.flow[~fluid.system.active_dofs] = 0.0

@@ -45,6 +45,7 @@ class Coefficients:
     rho: Expr  #: density [kg/m^3]
     mu: Expr  #: viscosity [Pa s]
     alpha: Expr  #: d(u_t)/du [1/s]
+    scale_alpha: Expr  #: alpha for the scales of the stabilisation, of a step whose length changes slowly [1/s]
     a: Expr  #: velocity [m/s] for the scales of the stabilisation
     newton: Expr  #: 1, or 0 to linearise u . grad u about u = a without its second term (Picard)
     history: Expr  #: u_t = alpha u - history [m/s^2]
@@ -81,7 +82,7 @@ class GhostScales:
     term would be an artificial viscosity along bodies that grows as steps get smaller.
     """
 
-    phi: Expr  #: nu + |a| h + alpha h^2 [m^2/s]
+    phi: Expr  #: nu + |a| h + alpha_s h^2 [m^2/s]
     convective: Expr  #: phi_b [m^2/s]
     has_history: Expr  #: 1 in cells whose nodes all have a velocity from the last step, else 0
 
@@ -117,11 +118,15 @@ def bulk(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
 def residual_based(flow: Coefficients, u: Expr, p: Expr, v: Expr, q: Expr) -> Expr:
     """Integrand of the SUPG, PSPG and grad-div terms, (rho a . grad v + grad q, T R) + (tau_C div u, div v).
 
-    tau_M = (4 rho^2 alpha^2 + rho^2 a . G a + 36 mu^2 G : G)^(-1/2), 144 for second degree, tau_C = 1 / (tau_M tr G),
-    G = diag(4 / h_i^2), T = tau_M I for second degree. For first degree T = diag(tau_i), with dim G_ii^2 in the place
-    of G : G. A common tau would be that of the shortest edge: it would hardly stabilise the pressure along longer ones,
-    and the error would grow with the ratio of edges. For second degree the shortest edge bounds tau, because R has a
-    viscous part: mu lap u, that of a field without divergence. For first degree this part is zero.
+    tau_M = (4 rho^2 alpha_s^2 + rho^2 a . G a + 36 mu^2 G : G)^(-1/2), 144 for second degree,
+    tau_C = 1 / (tau_M tr G), G = diag(4 / h_i^2), T = tau_M I for second degree. For first degree T = diag(tau_i), with
+    dim G_ii^2 in the place of G : G. A common tau would be that of the shortest edge: it would hardly stabilise the
+    pressure along longer ones, and the error would grow with the ratio of edges. For second degree the shortest edge
+    bounds tau, because R has a viscous part: mu lap u, that of a field without divergence. For first degree this part
+    is zero.
+    The divergence that the method leaves depends on tau, hence on the step. If tau jumped with the length of the step,
+    so would the velocity, and bodies would feel the force of this jump in one step. alpha_s follows slowly
+    (`history.History.scale_alpha`).
     Source of tau by direction: Blasco, Comput. Methods Appl. Mech. Engrg. 197 (2008) 3712-3723.
     """
     test = grad(q)
@@ -175,9 +180,9 @@ def _tested(flow: Coefficients, u: Expr, p: Expr, test: Expr) -> Expr:
 
 
 def _rates(flow: Coefficients) -> tuple[list[Expr], Expr, Expr]:
-    """Diagonal of G [1/m^2], 4 rho^2 alpha^2 + rho^2 a . G a, and the factor of G : G in tau_M^-2."""
+    """Diagonal of G [1/m^2], 4 rho^2 alpha_s^2 + rho^2 a . G a, and the factor of G : G in tau_M^-2."""
     metric = [4.0 / h**2 for h in flow.sizes]
-    common = 0.0 if flow.steady else 4.0 * flow.rho**2 * flow.alpha**2
+    common = 0.0 if flow.steady else 4.0 * flow.rho**2 * flow.scale_alpha**2
     if flow.convection:
         common += flow.rho**2 * sum(g * flow.a[i] ** 2 for i, g in enumerate(metric))
     return metric, common, (36.0 if flow.degree == 1 else 144.0) * flow.mu**2

@@ -102,24 +102,37 @@ class InterfaceTerms:
             self.coupling = MotionOperator(self.coupling.fields @ R[:, None], self.n)
             self.penalty = self.penalty @ R
 
-    def velocity_terms(self, g: Array) -> Array:
-        """C g at local dofs, contributions to ghosts not added up; g [m/s], shape (vertices, dim)."""
-        g, fields, K = g[self.corners], *self._flat()
+    def at_corners(self, g: Array, of_facets: Array | None) -> Array:
+        """Velocity [m/s] at the corners of pieces; g: of vertices, (vertices, dim); of_facets: added, (facets, dim)."""
+        return g[self.corners] if of_facets is None else g[self.corners] + of_facets[self.facet, None]
+
+    def velocity_terms(self, g: Array, of_facets: Array | None = None) -> Array:
+        """C g at local dofs, contributions to ghosts not added up; velocities [m/s] as in `at_corners`."""
+        g, fields, K = self.at_corners(g, of_facets), *self._flat()
         against = fields @ (g @ np.swapaxes(K, 1, 2)).reshape(len(g), fields.shape[2], self.dim)
         leak = np.einsum("pav,pv->pa", self.psi, np.einsum("pvi,pi->pv", g, self.n))
         size = self._unknowns.local
         total: Array = np.bincount(self.u.ravel(), against.ravel(), size).astype(float)
         return total + np.bincount(self.p.ravel(), leak.ravel(), size)
 
-    def force(self, flow: Array, g: Array) -> Array:
+    def force(self, flow: Array, g: Array, of_facets: Array | None = None) -> Array:
         """Contribution of this process to the force [N] on the vertices, shape (vertices, dim); flow at local dofs."""
-        u, p, g, fields, K = flow[self.u], flow[self.p], g[self.corners], *self._flat()
-        force = np.einsum("pav,pa->pv", self.psi, p)[:, :, None] * self.n[:, None, :]
+        total = np.zeros((self.vertices, self.dim))
+        np.add.at(total, self.corners, self._at_corners_of_pieces(flow, self.at_corners(g, of_facets)))
+        return total
+
+    def power_on_facets(self, flow: Array, g: Array, of_facets: Array) -> float:
+        """Contribution of this process to the power [W] of the force on the velocity of facets that vertices lack."""
+        force = self._at_corners_of_pieces(flow, self.at_corners(g, of_facets)).sum(axis=1)
+        return float((force * of_facets[self.facet]).sum())
+
+    def _at_corners_of_pieces(self, flow: Array, g: Array) -> Array:
+        """Force [N] at the corners of pieces with the velocities g there, (pieces, vertices, dim)."""
+        u, p, fields, K = flow[self.u], flow[self.p], *self._flat()
+        force: Array = np.einsum("pav,pa->pv", self.psi, p)[:, :, None] * self.n[:, None, :]
         force -= (np.swapaxes(fields, 1, 2) @ u).reshape(*g.shape[:2], K.shape[1]) @ K
         force -= self.mass_of_pieces @ g @ self.penalty
-        total = np.zeros((self.vertices, self.dim))
-        np.add.at(total, self.corners, force)
-        return total
+        return force
 
     def _flat(self) -> tuple[Array, Array]:
         """`fields` (pieces, functions, vertices x fields) and coefficients (pieces, fields x component, motion)."""

@@ -53,7 +53,7 @@ def _restore_continuity(fluid: ExchangedFlow, changed: NDArray[np.int64], t: flo
     rate = (last.velocity - earlier.velocity) / (history.steps[0] if history.steps else dt)
     nodes = fluid.unknowns.pressure
     rows = nodes.dofs[: nodes.owned, 0][np.isin(nodes.numbers[: nodes.owned], changed)]
-    step = fluid.current = FlowStep(t, dt, history.difference(dt))
+    step = fluid.current = FlowStep(t, dt, history.difference(dt), history.scale_alpha(dt))
     fluid.prescribe(t)
     fluid.move({body.surface.name: motion for body, motion in fluid.moved() if body.motion is None})
     middle = 0.5 * (last.velocity + earlier.velocity)

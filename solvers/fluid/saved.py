@@ -39,6 +39,8 @@ def restore_state(fluid: ExchangedFlow, state: State) -> None:
     flow = fluid.flow.copy()
     fluid.move(motions)
     fluid.flow[:] = flow
+    fluid.sweep.restore(state["swept"])
+    fluid.system.sweep_velocity = state["sweep_velocity"] if len(state["sweep_velocity"]) else None
 
 
 def _cells_may_change(fluid: ExchangedFlow) -> bool:
@@ -52,6 +54,8 @@ def _by_process(fluid: ExchangedFlow) -> State:
         "time": fluid.current.t,
         "thin": fluid.thin.save(),
         "linear_solver": fluid.sequence.position,
+        "swept": fluid.sweep.save(),
+        "sweep_velocity": np.empty(0) if fluid.system.sweep_velocity is None else fluid.system.sweep_velocity,
         "motion": {body.surface.name: {"x": motion.x, "v": motion.v} for body, motion in fluid.moved()},
     }
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
 
+from solvers.api import Array
 from solvers.fluid.bodies.immersed import ImmersedBody
 from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.field import Fluid
@@ -74,20 +75,38 @@ class FlowStart:
         fluid.bodies = [b if b.motion is None else _with_later_velocity(b, b.motion, short) for b in bodies]
         try:
             fluid.begin_step(t - short, short)
+            fluid.sweep.past = ()  # nothing moves
             fluid.prescribe(t + short)
             fluid.current = FlowStep(t, short, Difference(rate, (rate,)))
             yield
         finally:
             fluid.bodies = bodies
 
-    def end(self, dt: float) -> None:
-        """Restore the initial velocity, and extrapolate those before it by the rate of the last start step."""
+    def end(self, dt: float, before: Sequence[Mapping[str, Motion]]) -> None:
+        """Restore the initial velocity, and extrapolate those before it by the rate of the last start step.
+
+        before: motions of coupled surfaces at the times before the start, newest first. Prescribed ones are
+        extrapolated by their acceleration at the start.
+        """
         fluid = self.fluid
+        fluid.sweep.past = tuple(self._positions(k * dt, dt, moved) for k, moved in enumerate(before, 1))
         found, start = fluid.system.active_dofs.copy(), fluid.history.past[0].velocity
         fluid.history.continue_back(dt, np.where(found, fluid.velocity() - start, 0.0) / (SHARE * dt), found)
         moving = fluid.unknowns.velocity_mask
         fluid.flow[moving] = start[moving]
         fluid.current = FlowStep(fluid.current.t, dt, fluid.history.difference(dt))
+
+    def _positions(self, back: float, dt: float, coupled: Mapping[str, Motion]) -> Array:
+        """Positions [m] of all vertices at a time `back` [s] before the start."""
+        fluid, t, short = self.fluid, self.fluid.current.t, SHARE * dt
+        found = [np.empty((0, fluid.dim))]
+        for body in fluid.bodies:
+            if body.motion is None:
+                found.append(coupled[body.surface.name].x)
+                continue
+            now, later = body.motion(t), body.motion(t + short)
+            found.append(now.x - back * now.v + 0.5 * back**2 * (later.v - now.v) / short)
+        return np.concatenate(found)
 
     def end_impulse(self, dt: float) -> None:
         """Take the velocity of the last start step for the initial one; dt [s]: length of the first step."""

@@ -58,10 +58,10 @@ class FlowSystem:
         self.grid, self.settings, self.boundary, self.unknowns = grid, settings, boundary, unknowns
         domain, space = grid.domain, unknowns.space
         self.flow, self.history, self._scale_velocity, self._force = (fem.function(space) for _ in range(4))
-        self._alpha, self._newton = fem.constant(domain, 0.0), fem.constant(domain, 1.0)
+        self._alpha, self._scale_alpha, self._newton = (fem.constant(domain, value) for value in (0.0, 0.0, 1.0))
         self.weights = Weights(grid, settings.degree)
         parts = (unknowns.parts(f)[0] for f in (self._scale_velocity, self.history, self._force))
-        self.terms = coefficients(domain, settings, *parts, alpha=self._alpha, newton=self._newton)
+        self.terms = coefficients(domain, settings, *parts, alpha=(self._alpha, self._scale_alpha), newton=self._newton)
         #: gaps of a few cells, with first-order velocities
         self.gaps = (
             GapTerms(grid, settings.viscosity, settings.density) if with_bodies and settings.degree == 1 else None
@@ -88,6 +88,8 @@ class FlowSystem:
         self._ghost_history = np.zeros(unknowns.local)
         self._out = np.zeros(unknowns.local)
         self.cut: Cut | None = None
+        #: velocity of facets beside that of their vertices [m/s], with its derivative, `sweep`; None: zero
+        self.sweep_velocity: Array | None = None
         self._moved = np.inf  #: largest motion of a vertex from the last cut to this one [m]
         self.slip_length: Array | None = None  #: of the facets of all surfaces [m]; None: no slip
         self.transmissivity: Array | None = None  #: of the layer on these facets [m^3]; None: no layer
@@ -113,6 +115,7 @@ class FlowSystem:
         incomplete; velocity [m/s]: for the scales.
         """
         self._alpha.value = step.difference.alpha
+        self._scale_alpha.value = step.difference.alpha if step.scale_alpha is None else step.scale_alpha
         if self.gaps is not None:
             self.gaps.begin_step(None if self.settings.steady else step.dt)
         self.history.x.array[:] = rate
@@ -134,7 +137,7 @@ class FlowSystem:
         self.speed = by_dof[dofs].max(axis=1) * settings.convection
         self.fastest = float(self.grid.comm.allreduce(self.speed.max(initial=0.0), op=MPI.MAX))
         if self.ghost is not None:
-            numbers = settings.viscosity, settings.density, float(self._alpha.value)
+            numbers = settings.viscosity, settings.density, float(self._scale_alpha.value)
             self.ghost.set_scales(Scales(*numbers, self.speed, speed * settings.convection))
 
     def set_cut(self, cut: Cut) -> None:
@@ -219,13 +222,15 @@ class FlowSystem:
         if settings.body_force is not None:
             rate = rate + self._force.x.array / settings.density
         flow, density, alpha = self.flow.x.array, settings.density, float(self._alpha.value)
+        g = at.at_corners(cut.motion.v, self.sweep_velocity)
         if degree > 1:
-            return film_derivatives(at, self.weights, self.grid, cut, FilmFlow(flow, rate, density, alpha))
+            return film_derivatives(at, self.weights, self.grid, cut, FilmFlow(flow, rate, density, alpha, g))
         scale, convection = self._scale_velocity.x.array * settings.convection, settings.convection
         assert self.gaps is not None
         # with fluid pressure in closed contact the zone ends where the flow does, and their pressures cancel
         moved = self._moved if improved and self.may_close is None else np.inf
-        state = FlowTerms(flow, rate, scale, density, alpha, convection, settings.penalties, self.gaps, moved)
+        alphas = alpha, float(self._scale_alpha.value)
+        state = FlowTerms(flow, rate, scale, density, *alphas, convection, settings.penalties, self.gaps, moved, g)
         return cut_derivatives(at, self.weights, self.grid, cut, state)
 
     @property
@@ -299,7 +304,7 @@ class FlowSystem:
         """P of pieces [Pa s/m], shape (pieces, dim, dim)."""
         settings, cells = self.settings, cut.cut[pieces.cell]
         g = cut.motion.v[cut.facets[pieces.facet]].mean(axis=1)
-        flow = settings.viscosity, settings.density, float(self._alpha.value)
+        flow = settings.viscosity, settings.density, float(self._scale_alpha.value)
         speeds, sizes = (self.speed[cells], g * settings.convection), self.grid.sizes[cells]
         reduced = 1.0 if self.gaps is None else self.gaps.lengths(cells)
         least: Array | float = 0.0
@@ -322,7 +327,7 @@ class FlowSystem:
         for form in [*self._residuals, *self._outer_on_cut.residuals]:
             fem.assemble_vector(form, self._out)
         if self.with_bodies and self._touched:
-            self._out += self.interface.velocity_terms(self.cut.motion.v)
+            self._out += self.interface.velocity_terms(self.cut.motion.v, self.sweep_velocity)
             for terms in self.interface.cell_blocks:
                 self._out += terms.rows(self.flow.x.array)
         if self._seepage is not None:
@@ -371,7 +376,16 @@ class FlowSystem:
     def surface_force(self) -> Array:
         """Force [N] of the fluid on the vertices of all surfaces, shape (n, dim) (collective)."""
         assert self.cut is not None
-        return self.grid.comm.allreduce(self.interface.force(self.flow.x.array, self.cut.motion.v)) + self.zone_force()
+        force = self.interface.force(self.flow.x.array, self.cut.motion.v, self.sweep_velocity)
+        return self.grid.comm.allreduce(force) + self.zone_force()
+
+    def sweep_power(self) -> float:
+        """Power [W] of the force of the fluid on what facets move beside their vertices (collective)."""
+        assert self.cut is not None
+        if self.sweep_velocity is None:
+            return 0.0
+        power = self.interface.power_on_facets(self.flow.x.array, self.cut.motion.v, self.sweep_velocity)
+        return float(self.grid.comm.allreduce(power))
 
     def zone_force(self) -> Array:
         """The part of `surface_force` that acts in closed contact (collective)."""

@@ -25,6 +25,7 @@ class FlowStep(step.Step):
     """A step of the flow, with its difference formula."""
 
     difference: Difference
+    scale_alpha: float | None = None  #: alpha [1/s] for the scales of the stabilisation; None: that of the difference
 
 
 @dataclass(frozen=True)

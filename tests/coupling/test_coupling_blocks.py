@@ -31,10 +31,17 @@ def disturbed():
 
 
 def rows(scheme) -> np.ndarray:
-    """Both residuals with the cut held: velocity and force of the surface follow the unknowns, its place does not."""
+    """Both residuals with the cut held: velocity and force of the surface follow the unknowns, its place does not.
+
+    The velocity is that whose flux is the volume that the surface sweeps.
+    """
     coupled = scheme.coupled
     fluid, structure, interface = coupled.flow, coupled.solid.structure, coupled.interface
-    fluid.cut.motion.v[:] = interface.velocity(interface.displacement())
+    d, cut = interface.displacement(), fluid.cut
+    cut.motion.v[:] = interface.velocity(d)
+    fluid.system.sweep_velocity = fluid.sweep.velocity(
+        cut.facets, interface.points + d, cut.motion.v, fluid.current.difference
+    )
     fluid.residual()
     coupled.solid.load(coupled.force())
     structure.residual()

@@ -24,6 +24,9 @@ class ImmersedBody:
     motion: Callable[[float], Motion] | None
     rests: bool = False  #: it never moves
     deforms: bool = False  #: its volume may change
+    #: the flux through its surface is the volume that it sweeps; False: that of its velocity, which may be another one
+    #: than that of its positions
+    sweeps: bool = False
     start: Array | None = None  #: positions of its vertices [m] at the start, if another field moves it
 
     @property
@@ -42,14 +45,15 @@ def rigid_body(
 
     points: vertices [m], shape (n, dim). facets: segments (2D) or triangles (3D) as vertex numbers, shape (m, dim);
     their right-hand normals point out of the body: in 2D they run with the body on their left.
-    motion: t [s] -> (positions [m], velocities [m/s]) of the vertices, each of shape (n, dim); None: it rests.
+    motion: t [s] -> (positions [m], velocities [m/s]) of the vertices, each of shape (n, dim); None: it rests. Where it
+    moves, the flux through its surface is the volume that it sweeps. Where it does not, a velocity is one in itself.
     """
     points = np.ascontiguousarray(points, dtype=float)
     surface = ImmersedSurface(name, np.asarray(facets, dtype=np.int64), len(points))
     if motion is None:
         return ImmersedBody(surface, lambda t: Motion(points, np.zeros_like(points)), rests=True)
     given = motion
-    return ImmersedBody(surface, lambda t: Motion(*given(t)))
+    return ImmersedBody(surface, lambda t: Motion(*given(t)), sweeps=True)
 
 
 def sheets_of(grid: Grid, bodies: Sequence[ImmersedBody]) -> Sheets | None:

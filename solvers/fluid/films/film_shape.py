@@ -49,6 +49,7 @@ class FilmFlow:
     rate: Array  #: alpha times the history and f / rho [m/s^2], at local dofs
     density: float  #: [kg/m^3]
     alpha: float  #: [1/s]
+    velocity: Array  #: of the surface at the corners of pieces [m/s], (pieces, vertices, dim)
 
 
 def film_derivatives(
@@ -69,7 +70,7 @@ def film_derivatives(
     for first in range(0, len(pieces), AT_ONCE):
         some = slice(first, first + AT_ONCE)
         moments = cut.pieces.moments[mine[pieces[some]]][:, rule.order]
-        blocks.append(_blocks(at, pieces[some], rule, moments, origin[some], sides[some], cut.motion.v, state))
+        blocks.append(_blocks(at, pieces[some], rule, moments, origin[some], sides[some], state))
     return FilmDerivatives(pieces, *(np.concatenate(parts) for parts in zip(*blocks, strict=True)))
 
 
@@ -80,7 +81,6 @@ def _blocks(
     moments: Array,
     origin: Array,
     sides: NDArray[np.bool_],
-    velocity: Array,
     state: FilmFlow,
 ) -> tuple[Array, Array, Array]:
     """Blocks of some pieces. In subscripts n: pieces, q: points, a: functions, b, c: vertices, i, k, l: components,
@@ -99,7 +99,7 @@ def _blocks(
     ddp = np.einsum("nqakj,na->nqkj", q2, p)
     stress, dstress = mu * (du + np.swapaxes(du, 2, 3)), mu * (ddu + np.swapaxes(ddu, 2, 3))
     lam = barycentric(origin[:, None] + rule.reference * sizes[:, None], x)
-    w = u - np.einsum("nqb,nbi->nqi", lam, velocity[at.corners[some]])
+    w = u - np.einsum("nqb,nbi->nqi", lam, state.velocity[some])
     crossings = crossing_moments(x, n, origin, sizes, rule.reference, sides)
 
     stretch = np.einsum("nk,nkbj->nbj", n, slope)
