@@ -192,7 +192,8 @@ class Monolithic:
         flow = self.coupled.flow
         method = flow.sequence.current
         krylov = linear.coupled_solver(self.comm, tolerance=flow.linear_tolerance, fill=method == "fill")
-        if method == "multigrid":
+        if flow.sequence.multigrid:
+            flow.sequence.limit(krylov)
             krylov.getPC().getPythonContext().second = flow.multigrid(blocks.flow)
         return krylov
 

@@ -20,6 +20,10 @@ from solvers.api import Finding, State, StepInfo
 from solvers.timing import Timer
 
 
+#: Columns of the history with the iterations of linear solvers in a step.
+LINEAR_COLUMNS = ("coupling.linear", "fluid.linear")
+
+
 @dataclass
 class Warned:
     """What a sentinel has found: the time of its first message [s], and the largest value since."""
@@ -130,6 +134,7 @@ def summarize(
             "per_step": iterations,
             "residuals": {str(step): norms for step, norms in sorted(record.residuals.items())},
         },
+        "linear": _linear(history),
         "wall": {"total": record.wall(), **record.timer.seconds},
         "memory_mb": memory,
         "probes": {
@@ -147,6 +152,14 @@ def summarize(
         "units": dict(units or {}),
         **({"contact": {"imbalance": dict(imbalance)}} if imbalance else {}),
     }
+
+
+def _linear(history: History) -> dict[str, int]:
+    """Iterations of the linear solvers of flow and coupling: in total, and the most in a step; empty without a flow."""
+    for name in LINEAR_COLUMNS:
+        if len(values := history.get(name, ())):
+            return {"total": int(np.sum(values)), "max": int(np.max(values))}
+    return {}
 
 
 def _of_numbers(statistic: Callable[[Any], float], values: NDArray[np.float64]) -> float:

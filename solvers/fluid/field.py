@@ -92,6 +92,7 @@ class Fluid:
         self.surfaces = AllSurfaces([body.surface for body in self.bodies], self.dim)
         self._fast_bodies = FastBodies(grid)
         self.linear_iterations = 0  #: of the last linear system
+        self._iterations_of_step = 0  #: of all linear systems of this step
         self.steady_iteration = SteadyIteration()
         self._first = 0.0  #: residual of the first iterate [N]
 
@@ -105,8 +106,10 @@ class Fluid:
         if in_gaps is not None and self.system.gaps is not None:
             self.system.gaps.memory = in_gaps.memory
         self.size = owned = self.unknowns.owned  #: unknowns that this process owns
-        if not self.renewals or parts.methods != self.sequence.methods:
+        if not self.renewals:
             self.sequence: SolverSequence = SolverSequence(self.comm, parts.methods, self.dofs(), self.notes.append)
+        elif parts.methods != self.sequence.methods:
+            self.sequence = self.sequence.replaced(parts.methods, self.dofs())
         self.linear_solver = FlowSolver(self.unknowns, self.sequence, self.linear_tolerance, steady=settings.steady)
         self._tangent = KeptTangent(self.system)
         self.held = np.zeros(owned, dtype=bool)  #: owned dofs with rows of the identity
@@ -179,6 +182,7 @@ class Fluid:
         self._tangent.begin_step()
         self.linear_solver.begin_step()
         self.notes.clear()
+        self._iterations_of_step = 0
         if not self._coupled:
             self.predict()
             self.move({})
@@ -240,7 +244,8 @@ class Fluid:
         self.unknowns.share(self.system.flow)
         if not self._coupled:
             self._note_fast_bodies()
-        return replace(info, notes=tuple(self.notes))
+        numbers = {**info.numbers, "fluid.linear": float(self._iterations_of_step)}
+        return replace(info, numbers=numbers, notes=tuple(self.notes))
 
     def _note_fast_bodies(self) -> None:
         if not self.settings.steady:
@@ -304,6 +309,7 @@ class Fluid:
                 self.linear_iterations = self.linear_solver.solve(
                     matrix, b, x, self.held, self.system.dofs_near_surfaces
                 )
+            self._iterations_of_step += self.linear_iterations
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         return self.update(x.array)
