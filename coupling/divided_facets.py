@@ -26,8 +26,8 @@ SAME = 1e-6
 #: Distance in sizes of a facet up to which the other side of a tie lies on it: arcs of coarse meshes are farther apart
 #: than rounding, other surfaces of the same body are a facet away.
 ON_IT = 0.5
-#: Share of a facet below which its free part, or its covered one, does not count: the edge of a bent surface ends beside
-#: that of its other side by their arcs.
+#: Share of a facet below which its free part, or its covered one, does not count: edges of both sides of a bent tie lie
+#: beside each other, by their arcs.
 LEAST = 1e-2
 #: Cosine between normals of two sides that face each other.
 FACING = -0.5

@@ -77,9 +77,7 @@ class Elastic:
             return VertexJacobian(columns, np.ones(columns.shape))
         nodes, shares = self._mixture.padded_rows()
         columns = np.swapaxes(self.dofs[nodes], 1, 2)
-        return VertexJacobian(
-            columns.reshape(-1, columns.shape[2]), np.repeat(shares, self.dofs.shape[1], axis=0)
-        )
+        return VertexJacobian(columns.reshape(-1, columns.shape[2]), np.repeat(shares, self.dofs.shape[1], axis=0))
 
     def load(self, force: Array) -> None:
         self.structure.load(self.spread(force))

@@ -7,6 +7,7 @@ cut that follows them would have fluid that comes and goes with each iterate of 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ def join_vertices(
             mine, other = first[surface] + tied[surface][mine], first[earlier] + tied[earlier][other]
             alone = source[mine] == mine
             source[mine[alone]] = source[other[alone]]
-    return [rows[source[a:b]] for a, b in zip(first, first[1:], strict=False)]
+    return [rows[source[a:b]] for a, b in pairwise(first)]
 
 
 def _same_places(x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

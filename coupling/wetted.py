@@ -111,8 +111,8 @@ def immerse(
 def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]]) -> list[ImmersedSurface]:
     """The surfaces, given with the positions of their vertices [m], with marked wet facets.
 
-    Facets with their middle in another body are not wet, nor are tied ones. Those on the boundary of the box are: cuts leave them out as
-    long as they are there (`off_boundary`). Marks that a surface has already are kept.
+    Facets with their middle in another body are not wet, nor are tied ones. Those on the boundary of the box are: cuts
+    leave them out as long as they are there (`off_boundary`). Marks that a surface has already are kept.
     """
     found = []
     for index, (surface, x) in enumerate(surfaces):

@@ -108,7 +108,7 @@ class Sparse:
         return np.repeat(np.arange(self.shape[0], dtype=np.int32), self.indptr[1:] - self.indptr[:-1])
 
     def padded_rows(self) -> tuple[Indices, Array]:
-        """(columns, entries) of all rows, each of shape (rows, largest count of a row), with zeros in column 0 behind."""
+        """(columns, entries) of all rows, of shape (rows, largest count of a row); behind them zeros in column 0."""
         counts = self.indptr[1:] - self.indptr[:-1]
         width = int(counts.max(initial=0))
         columns, entries = np.zeros((len(counts), width), dtype=np.int32), np.zeros((len(counts), width))

@@ -19,7 +19,6 @@ from fsci.run.history import History
 from solvers.api import Finding, State, StepInfo
 from solvers.timing import Timer
 
-
 #: Columns of the history with the iterations of linear solvers in a step.
 LINEAR_COLUMNS = ("coupling.linear", "fluid.linear")
 

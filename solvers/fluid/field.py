@@ -314,6 +314,16 @@ class Fluid:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         return self.update(x.array)
 
+    def suction(self) -> float:
+        """Largest pressure below zero [Pa] around bodies whose closed contact is dry (collective)."""
+        surfaces = [body.surface for body in self.bodies]
+        dry = [s.zone == "dry" and s.in_contact is not None and bool(s.in_contact.any()) for s in surfaces]
+        of_facets = np.repeat(dry, [len(s.facets) for s in surfaces])
+        pieces = self.cut.pieces
+        cells = self.cut.cut[pieces.cell[of_facets[pieces.facet]]]
+        lowest = float(self.flow[self.unknowns.cell_pressure[cells]].mean(axis=1).min(initial=0.0))
+        return float(self.comm.allreduce(-lowest, op=MPI.MAX))
+
     def keeps_tangent(self) -> bool:
         """Whether the last tangent has its rows of the identity where this iterate has them (collective)."""
         return self.comm.allreduce(self._tangent.holds(self.held), op=MPI.LAND) and not self.steady
