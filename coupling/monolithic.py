@@ -262,8 +262,9 @@ class Monolithic:
 
     def _with_cause(self, failure: StepFailed) -> StepFailed:
         """The failure of a step, with the cause where no smaller step helps (collective)."""
-        cycles, pull = self.coupled.solid.astray(0), self.coupled.flow.suction()
-        if not self.comm.allreduce(bool(cycles), op=MPI.LOR) or pull <= 0.0:
+        solid, pull = self.coupled.solid, self.coupled.flow.suction()
+        cycles = self.comm.allreduce(bool(solid.astray(0)), op=MPI.LOR)
+        if not cycles or pull <= solid.contact_pressure():  # a larger load holds contact closed
             return failure
         return failure.with_reason(f"{failure.reason}; {NO_STATE.format(pull=pull)}")
 

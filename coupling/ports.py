@@ -112,6 +112,10 @@ class Solid(Part, Protocol):
         """Displacement [m] of all vertices, surface by surface, shape (n, dim)."""
         ...
 
+    def contact_pressure(self) -> float:
+        """Largest traction [Pa] of closed contact at the latest iterate, zero without contact."""
+        ...
+
     def jacobian(self) -> VertexJacobian:
         """Derivative of the displacement of the vertices by the unknowns."""
         ...
