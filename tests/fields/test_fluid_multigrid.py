@@ -283,7 +283,7 @@ def test_a_singular_system_stays_singular():
 
 
 def test_a_stalled_solver_is_replaced_within_the_solve(monkeypatch):
-    """One iteration is not enough for multigrid: the flow is solved all the same, and a note says how."""
+    """One iteration is not enough for multigrid: the flow is solved all the same, and notes say how."""
     monkeypatch.setattr(krylov.linear, "flexible_solver", impatient(krylov.linear.flexible_solver))
     points, facets = sphere((0.07, 0.03, -0.05), 1.0, 2)
     solver = SolverSettings(Tolerance(1e-6), linear="iterative")
@@ -294,9 +294,9 @@ def test_a_stalled_solver_is_replaced_within_the_solve(monkeypatch):
     fluid.begin_step(0.0, 1.0)
     info = fluid.solve()
     assert info.residuals[-1] < 1e-6 * info.residuals[0]
-    assert len(info.notes) == 1
-    assert "stalled after 1 iteration (" in info.notes[0]
-    assert fluid.save()["linear_solver"] == 1
+    assert len(info.notes) == 2
+    assert all("stalled after 1 iteration (" in note for note in info.notes)
+    assert fluid.save()["linear_solver"] == 2
 
 
 def impatient(create):

@@ -56,7 +56,7 @@ class SolverSequence:
     def limit(self, ksp: PETSc.KSP) -> None:
         """Let a solver give up early if multigrid with stronger smoothers comes next."""
         if "smoothed" in self.methods and self.current == "multigrid":
-            ksp.setTolerances(max_it=PATIENCE)
+            ksp.setTolerances(max_it=min(PATIENCE, ksp.getTolerances()[3]))
 
     def replaced(self, methods: Sequence[linear.FlowMethod], dofs: int) -> SolverSequence:
         """The sequence for another discretisation, which begins with the first solver that has not failed yet."""
