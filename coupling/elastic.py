@@ -12,19 +12,23 @@ from petsc4py import PETSc
 from coupling.predict import Predictor
 from coupling.wetted import WettedSurface
 from solvers.api import Array, State, StepInfo
+from solvers.contact.contact import Contact
 from solvers.rows import RowTransformation, TakenRows, gather_at
+from solvers.sparse import stack
 from solvers.structure.field import Structure
 from solvers.structure.saved import from_bodies, per_body
 from solvers.vertices import VertexJacobian
 
 
 class Elastic:
-    """Implements `Solid`. Each dof of a vertex is an unknown of the structure."""
+    """Implements `Solid`. A vertex is a node of the structure, or on a facet between nodes, where a tie divides it."""
 
     def __init__(self, structure: Structure, surfaces: Sequence[WettedSurface]):
         self.structure = structure
         self.surfaces = {surface.name: surface.points for surface in surfaces}
-        self.dofs = np.concatenate([surface.dofs for surface in surfaces])  #: global ones, shape (n, dim)
+        self.dofs = np.concatenate([surface.dofs for surface in surfaces])  #: of the nodes, global, shape (m, dim)
+        mixtures = [surface.mixture for surface in surfaces if surface.mixture is not None]
+        self._mixture = stack(mixtures) if mixtures else None  #: vertices from the nodes; None: they are the same
         self.predictor = Predictor()
         self.name, self.comm, self.size = structure.name, structure.comm, structure.layout.size
 
@@ -54,6 +58,10 @@ class Elastic:
         constraint = self.structure.constraint
         return constraint is not None and bool(constraint.active().any())
 
+    def contact_pressure(self) -> float:
+        constraint = self.structure.constraint
+        return constraint.largest_traction() if isinstance(constraint, Contact) else 0.0
+
     def solve(self) -> StepInfo:
         return self.structure.solve()
 
@@ -69,14 +77,19 @@ class Elastic:
         return self.at_vertices(self.structure.now.u)
 
     def jacobian(self) -> VertexJacobian:
-        columns = self.dofs.reshape(-1, 1)
-        return VertexJacobian(columns, np.ones(columns.shape))
+        if self._mixture is None:
+            columns = self.dofs.reshape(-1, 1)
+            return VertexJacobian(columns, np.ones(columns.shape))
+        nodes, shares = self._mixture.padded_rows()
+        columns = np.swapaxes(self.dofs[nodes], 1, 2)
+        return VertexJacobian(columns.reshape(-1, columns.shape[2]), np.repeat(shares, self.dofs.shape[1], axis=0))
 
     def load(self, force: Array) -> None:
         self.structure.load(self.spread(force))
 
     def spread(self, force: Array) -> Array:
         """Forces [N] at owned dofs of the structure, from those on vertices (n, dim)."""
+        force = self._on_nodes(force)
         local = self.dofs - self.structure.layout.start
         mine = (local >= 0) & (local < self.size)
         total = np.zeros(self.size)
@@ -84,7 +97,7 @@ class Elastic:
         return total
 
     def reduced(self, force: Array) -> Array:
-        return force.ravel()
+        return self._on_nodes(force).ravel()
 
     def taken(self) -> Array:
         """The residual of inertia, damping, internal forces, own loads and contact, averaged over the step.
@@ -94,21 +107,28 @@ class Elastic:
         structure, weight = self.structure, self.force_weight
         handed_over = weight * structure.now.surface + (1.0 - weight) * structure.old.surface
         free = structure.held.free_part(structure.time.averaged_load(structure))
-        return self.at_vertices(free + structure.held.part(handed_over)).ravel()
+        return self._at_nodes(free + structure.held.part(handed_over)).ravel()
 
     def taken_at_start(self) -> Array:
         structure = self.structure
-        return self.at_vertices(structure.held.free_part(structure.time.reaction(structure))).ravel()
+        return self._at_nodes(structure.held.free_part(structure.time.reaction(structure))).ravel()
 
     def moved(self) -> Array:
-        return self.at_vertices(self.structure.now.u - self.structure.old.u).ravel()
+        return self._at_nodes(self.structure.now.u - self.structure.old.u).ravel()
 
     def exchanged(self) -> float:
         return self.structure.energy.exchanged
 
     def at_vertices(self, owned: Array) -> Array:
         """Values at the vertices from those at owned dofs of the structure, shape (n, dim)."""
+        found = self._at_nodes(owned)
+        return found if self._mixture is None else self._mixture @ found
+
+    def _at_nodes(self, owned: Array) -> Array:
         return gather_at(self.comm, owned, self.structure.layout.start, self.dofs)
+
+    def _on_nodes(self, force: Array) -> Array:
+        return force if self._mixture is None else self._mixture.T @ force
 
     # ------------------------------------------------------------------------------------- rows of a larger system
 

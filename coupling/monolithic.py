@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -34,6 +35,12 @@ from solvers.petsc_python import free_deleted
 from solvers.rounding import rounding_error
 from solvers.rows import Numbering, distributed, from_entries, gather
 from solvers.sparse import Sparse
+
+#: Contact under suction: while it is closed, its force would have to pull, and while it is open, the fluid closes it.
+NO_STATE = (
+    "a fluid at {pull:.3g} Pa below zero pulls at bodies that are dry where they touch, and may have no state open or "
+    "closed: 'contact.film.zone: wetted' gives closed contact the pressure around it"
+)
 
 
 class Monolithic:
@@ -93,9 +100,9 @@ class Monolithic:
             self._predict(t + dt, self.residual())
         try:
             info = converge(self, self.tolerance, whole=whole_increments(self._failures))
-        except StepFailed:
+        except StepFailed as failure:
             self._failures += 1
-            raise
+            raise self._with_cause(failure) from None
         self._failures = 0
         coupled.solid.check(info)
         coupled.end_step()
@@ -192,7 +199,8 @@ class Monolithic:
         flow = self.coupled.flow
         method = flow.sequence.current
         krylov = linear.coupled_solver(self.comm, tolerance=flow.linear_tolerance, fill=method == "fill")
-        if method == "multigrid":
+        if flow.sequence.multigrid:
+            flow.sequence.limit(krylov)
             krylov.getPC().getPythonContext().second = flow.multigrid(blocks.flow)
         return krylov
 
@@ -251,6 +259,14 @@ class Monolithic:
     def astray(self, rises: int) -> str:
         """Why whole increments may not converge: an active set that cycles. Residuals of two parts may well rise."""
         return self.coupled.solid.astray(0)
+
+    def _with_cause(self, failure: StepFailed) -> StepFailed:
+        """The failure of a step, with the cause where no smaller step helps (collective)."""
+        solid, pull = self.coupled.solid, self.coupled.flow.suction()
+        cycles = self.comm.allreduce(bool(solid.astray(0)), op=MPI.LOR)
+        if not cycles or pull <= solid.contact_pressure():  # a larger load holds contact closed
+            return failure
+        return failure.with_reason(f"{failure.reason}; {NO_STATE.format(pull=pull)}")
 
     def settled(self) -> bool:
         """Whether supports and active sets are fulfilled."""

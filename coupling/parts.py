@@ -10,7 +10,7 @@ from coupling.elastic_start import ElasticStart
 from coupling.interface import DrySide
 from coupling.ports import Start
 from coupling.sealing_layer import SealingLayer, sealing_layers
-from coupling.wetted import immerse, wetted_surface
+from coupling.wetted import immerse, wetted_surfaces
 from solvers.fluid.background.grid import Grid
 from solvers.fluid.bodies.immersed import ImmersedBody
 from solvers.fluid.bodies.surface import ImmersedSurface
@@ -48,11 +48,11 @@ def couple(
     seal: thickness of a tight layer on contact surfaces [m].
     """
     comm, bodies = structure.comm, structure.bodies
-    surfaces = []
-    for index, body in enumerate(bodies):
+    skins = []
+    for body in bodies:
         mesh = body.domain.source
-        skin = comm.bcast(None if mesh is None else cut_out_skin(mesh, wetted.get(body.name)), root=0)
-        surfaces.append(wetted_surface(structure, index, skin))
+        skins.append(comm.bcast(None if mesh is None else cut_out_skin(mesh, wetted.get(body.name)), root=0))
+    surfaces = wetted_surfaces(structure, skins)
     immersed = immerse([surface.at_start for surface in surfaces], rigid_bodies, start)
     fluid = Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=comm)
     layers = {} if seal is None else sealing_layers(surfaces, seal)

@@ -9,12 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coupling.contact_surfaces import global_dofs
+from coupling.divided_facets import divide_facets
+from coupling.joined_sides import join_vertices
+from coupling.ties import Tie, candidate_facets, tied_sides
 from solvers.api import Array
 from solvers.blocks import Layout
 from solvers.fluid.bodies.immersed import ImmersedBody
 from solvers.fluid.bodies.inside import winding
 from solvers.fluid.bodies.surface import ImmersedSurface, Motion
 from solvers.skin import Skin
+from solvers.sparse import Sparse
 from solvers.structure.field import Structure
 
 #: Winding number above which the middle of a facet is in another body; on the surface of the body it is one half.
@@ -27,26 +31,59 @@ class WettedSurface:
 
     name: str  #: name of the body in structure and fluid
     points: Array  #: reference positions [m] of its vertices, shape (n, dim)
-    dofs: NDArray[np.int64]  #: their global dofs in the structure, shape (n, dim)
+    dofs: NDArray[np.int64]  #: global dofs in the structure of the nodes that move them, shape (nodes, dim)
     facets: NDArray[np.int64]  #: vertices of segments or triangles, shape (m, dim)
     wet: NDArray[np.bool_] | None = None  #: wet facets; None: found by `find_wet`
     in_contact: NDArray[np.bool_] | None = None  #: facets that take part in contact
+    tied: NDArray[np.bool_] | None = None  #: facets that lie on the other side of a tie; None: no one does
+    #: vertices from the nodes of all surfaces, (n, nodes); None: each vertex is a node of this one
+    mixture: Sparse | None = None
 
     @property
     def at_start(self) -> tuple[ImmersedSurface, Array]:
         """(the surface in the flow, reference positions of its vertices [m])."""
-        return ImmersedSurface(self.name, self.facets, len(self.points), self.wet, self.in_contact), self.points
+        marks = self.wet, self.in_contact
+        return ImmersedSurface(self.name, self.facets, len(self.points), *marks, tied=self.tied), self.points
 
 
-def wetted_surface(structure: Structure, index: int, skin: Skin) -> WettedSurface:
-    """The wetted surface of a skin; index: of its body in the structure (collective)."""
+def wetted_surfaces(structure: Structure, skins: Sequence[Skin]) -> list[WettedSurface]:
+    """The wetted surfaces of all bodies of a structure, from their skins (collective)."""
+    ties = tied_sides(structure)
+    surfaces = [_wetted_surface(structure, index, skin, ties) for index, skin in enumerate(skins)]
+    return joined(surfaces, [skin.points for skin in skins]) if ties else surfaces
+
+
+def _wetted_surface(structure: Structure, index: int, skin: Skin, ties: Sequence[Tie]) -> WettedSurface:
     bodies, constraint = structure.bodies, structure.constraint
     body = bodies[index]
     layout = Layout(body.domain.comm, [other.size for other in bodies])
     dofs = global_dofs(layout, index, body, skin.nodes)
     touching = np.empty(0, dtype=np.int64) if constraint is None else constraint.touching_dofs()
     in_contact = np.isin(dofs[:, 0], touching)[skin.facets].all(axis=1)
-    return WettedSurface(body.name, skin.points, dofs, skin.facets, skin.wet, in_contact)
+    candidates = candidate_facets(body.name, skin, ties)
+    if not candidates:
+        return WettedSurface(body.name, skin.points, dofs, skin.facets, skin.wet, in_contact)
+    divided = divide_facets(skin.points, skin.facets, candidates)
+    mixture, of = divided.mixture, divided.parents
+    return WettedSurface(
+        body.name,
+        skin.points if mixture is None else mixture @ skin.points,
+        dofs,
+        divided.facets,
+        None if skin.wet is None else skin.wet[of],
+        in_contact[of],
+        divided.tied,
+        mixture,
+    )
+
+
+def joined(surfaces: Sequence[WettedSurface], nodes: Sequence[Array]) -> list[WettedSurface]:
+    """Wetted surfaces on whose ties both sides have the same vertices; nodes: positions of those of each [m]."""
+    mixtures = [(surface.mixture, len(points)) for surface, points in zip(surfaces, nodes, strict=True)]
+    tied = [np.unique(s.facets[s.tied]) if s.tied is not None else np.empty(0, dtype=np.int64) for s in surfaces]
+    together = join_vertices(mixtures, [surface.points for surface in surfaces], tied)
+    points = np.concatenate(list(nodes))
+    return [replace(s, mixture=m, points=m @ points) for s, m in zip(surfaces, together, strict=True)]
 
 
 def immerse(
@@ -74,14 +111,14 @@ def immerse(
 def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]]) -> list[ImmersedSurface]:
     """The surfaces, given with the positions of their vertices [m], with marked wet facets.
 
-    Facets with their middle in another body are not wet. Those on the boundary of the box are: cuts leave them out as
-    long as they are there (`off_boundary`). Marks that a surface has already are kept.
+    Facets with their middle in another body are not wet, nor are tied ones. Those on the boundary of the box are: cuts
+    leave them out as long as they are there (`off_boundary`). Marks that a surface has already are kept.
     """
     found = []
     for index, (surface, x) in enumerate(surfaces):
         if surface.wet is None:
             middles = x[surface.facets].mean(axis=1)
-            wet = np.ones(len(surface.facets), dtype=bool)
+            wet = np.ones(len(surface.facets), dtype=bool) if surface.tied is None else ~surface.tied
             hidden = np.zeros(len(wet), dtype=bool)
             for other, (body, at) in enumerate(surfaces):
                 if other == index:
@@ -92,5 +129,7 @@ def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]]) -> list[Immersed
                     hidden[facet] = winding(middles[facet], motion, body.facets) >= INSIDE
                     wet[facet] = not hidden[facet]
             surface = replace(surface, wet=wet, hidden=hidden)
+        elif surface.tied is not None:
+            surface = replace(surface, wet=surface.wet & ~surface.tied)
         found.append(surface)
     return found

@@ -135,7 +135,7 @@ def _multigrid(comm) -> PETSc.PC:
 
 
 #: Linear solvers of flows.
-FlowMethod = Literal["multigrid", "ilu", "fill", "direct"]
+FlowMethod = Literal["multigrid", "smoothed", "ilu", "fill", "direct"]
 
 
 def choose_flow(
@@ -152,7 +152,8 @@ def choose_flow(
 
     degree: of the velocity; incomplete factors with more fill take minutes for second degree, and are left out.
     sheets: there are several nodes in one place, which the coarse lattices of multigrid do not have; incomplete factors
-    of second degree mostly stall there. with_solids: equations of solids may belong to the system.
+    of second degree mostly stall there. smoothed: multigrid with stronger smoothers, which second degree always has.
+    with_solids: equations of solids may belong to the system.
     """
     if method == "direct" or (method == "auto" and dofs <= FLOW_DIRECT_LIMIT[dim]):
         return ("direct",)
@@ -160,8 +161,8 @@ def choose_flow(
         return ("direct",) if degree > 1 else ("ilu", "fill", "direct")
     limit = (FLOW_WITH_SOLIDS_LIMIT if with_solids else FLOW_INCOMPLETE_LIMIT)[degree]
     if method == "ilu" or (method == "auto" and not steady and dofs <= limit):
-        return ("ilu", "multigrid", "direct")
-    return ("multigrid", "direct") if degree > 1 else ("multigrid", "fill", "direct")
+        return ("ilu", "multigrid", "direct") if degree > 1 else ("ilu", "multigrid", "smoothed", "direct")
+    return ("multigrid", "direct") if degree > 1 else ("multigrid", "smoothed", "fill", "direct")
 
 
 #: Unknowns of a flow above which an iterative solver is used. In 3D it is 4 times faster at 8,000 unknowns.

@@ -107,6 +107,15 @@ class Sparse:
         """The row of each entry."""
         return np.repeat(np.arange(self.shape[0], dtype=np.int32), self.indptr[1:] - self.indptr[:-1])
 
+    def padded_rows(self) -> tuple[Indices, Array]:
+        """(columns, entries) of all rows, of shape (rows, largest count of a row); behind them zeros in column 0."""
+        counts = self.indptr[1:] - self.indptr[:-1]
+        width = int(counts.max(initial=0))
+        columns, entries = np.zeros((len(counts), width), dtype=np.int32), np.zeros((len(counts), width))
+        there = np.arange(width) < counts[:, None]
+        columns[there], entries[there] = self.indices, self.data
+        return columns, entries
+
     def with_columns(self, numbers: NDArray[np.int64], columns: int) -> Sparse:
         """Column j becomes column numbers[j] of `columns`, or is removed where that is -1."""
         target = numbers[self.indices]

@@ -16,7 +16,7 @@ from coupling.monolithic import Monolithic
 from coupling.partitioned import FixedPointTolerance, Partitioned
 from coupling.parts import coupled_bodies, coupled_elastic
 from coupling.sealing_layer import sealing_layers
-from coupling.wetted import WettedSurface, immerse, wetted_surface
+from coupling.wetted import WettedSurface, immerse, wetted_surfaces
 from fsci.builder.dry_side import Closing
 from fsci.builder.fluid import build_fluid, build_rigid_bodies
 from fsci.builder.skin import find_skin
@@ -41,7 +41,7 @@ def build_coupled(
     assert case.coupling is not None
     assert case.fluid is not None
     skins = [_skin(case, comm, body) for body in bodies]
-    surfaces = [wetted_surface(structure, index, skin) for index, (skin, _) in enumerate(skins)]
+    surfaces = wetted_surfaces(structure, [skin for skin, _ in skins])
     immersed = immerse([surface.at_start for surface in surfaces], build_rigid_bodies(case, comm), case.time.start)
     dry_sides = [_dry_side(s, c) for s, (_, c) in zip(surfaces, skins, strict=True) if c is not None]
     immersed += [ImmersedBody(_dry_surface(side), None, deforms=True, sweeps=True) for side in dry_sides]

@@ -22,6 +22,7 @@ REASONS = {
         "a finer slave surface at the edge of the contact zone",
         "in a fluid: contact.film.roughness, where flat surfaces part and nothing else lets fluid between them",
     ),
+    "pulls at bodies that are dry": ("contact.film.zone=wetted",),
     "cells in one step": ("a smaller time.step: a body should cross less than two cells in a step",),
     "periodic faces": ("a longer box, or an earlier time.end",),
     "coupling iteration did not converge": (

@@ -54,6 +54,9 @@ def _steps(summary: Mapping[str, Any], out: Path) -> Iterator[str]:
     steps, newton, wall = summary["steps"], summary["newton"], dict(summary["wall"])
     mean = newton["total"] / max(steps["accepted"], 1)
     yield f"steps          {steps['accepted']}, {steps['retried']} repeated; {mean:.1f} Newton iterations per step"
+    if linear := summary.get("linear"):
+        per_step = linear["total"] / max(steps["accepted"], 1)
+        yield f"linear         {per_step:.1f} iterations of the linear solver per step, {linear['max']} at most"
     yield f"time           {wall['total']:.3g} s: {shares(wall.pop('total'), wall)}"
     history = read_history(out / "history.csv")
     for row in np.argsort(-history.get("wall", np.empty(0)), kind="stable")[:SLOWEST]:

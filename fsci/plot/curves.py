@@ -59,6 +59,7 @@ BALANCES = {
 OWN = {
     "interface.power": ("power of the fluid on the bodies", "power"),
     "coupling.linear": ("linear iterations in a step", ""),
+    "fluid.linear": ("linear iterations in a step", ""),
     "coupling.newton": ("Newton iterations of the fields in a step", ""),
 }
 NODES = "contact nodes"  #: a panel

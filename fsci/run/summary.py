@@ -19,6 +19,9 @@ from fsci.run.history import History
 from solvers.api import Finding, State, StepInfo
 from solvers.timing import Timer
 
+#: Columns of the history with the iterations of linear solvers in a step.
+LINEAR_COLUMNS = ("coupling.linear", "fluid.linear")
+
 
 @dataclass
 class Warned:
@@ -130,6 +133,7 @@ def summarize(
             "per_step": iterations,
             "residuals": {str(step): norms for step, norms in sorted(record.residuals.items())},
         },
+        "linear": _linear(history),
         "wall": {"total": record.wall(), **record.timer.seconds},
         "memory_mb": memory,
         "probes": {
@@ -147,6 +151,14 @@ def summarize(
         "units": dict(units or {}),
         **({"contact": {"imbalance": dict(imbalance)}} if imbalance else {}),
     }
+
+
+def _linear(history: History) -> dict[str, int]:
+    """Iterations of the linear solvers of flow and coupling: in total, and the most in a step; empty without a flow."""
+    for name in LINEAR_COLUMNS:
+        if len(values := history.get(name, ())):
+            return {"total": int(np.sum(values)), "max": int(np.max(values))}
+    return {}
 
 
 def _of_numbers(statistic: Callable[[Any], float], values: NDArray[np.float64]) -> float:

@@ -351,6 +351,10 @@ class Contact:
         pressed[self.multipliers.node[self.active_set.active & ~self._tied]] = True
         return self._reach.find(x, self.positions(u, t + dt) - x + dt * v, self.present, pressed)
 
+    def largest_traction(self) -> float:
+        """Largest traction [Pa] of multipliers that are not tied."""
+        return float(np.linalg.norm(self.z[~self._tied], axis=1).max(initial=0.0))
+
     @property
     def near(self) -> bool:
         """Whether the latest `evaluate` found facets near each other."""

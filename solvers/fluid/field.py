@@ -95,6 +95,7 @@ class Fluid:
         self.sweep = Sweep(settings.time.times, np.concatenate([*sweep, np.empty(0, dtype=bool)]))
         self._fast_bodies = FastBodies(grid)
         self.linear_iterations = 0  #: of the last linear system
+        self._iterations_of_step = 0  #: of all linear systems of this step
         self.steady_iteration = SteadyIteration()
         self._first = 0.0  #: residual of the first iterate [N]
 
@@ -108,8 +109,10 @@ class Fluid:
         if in_gaps is not None and self.system.gaps is not None:
             self.system.gaps.memory = in_gaps.memory
         self.size = owned = self.unknowns.owned  #: unknowns that this process owns
-        if not self.renewals or parts.methods != self.sequence.methods:
+        if not self.renewals:
             self.sequence: SolverSequence = SolverSequence(self.comm, parts.methods, self.dofs(), self.notes.append)
+        elif parts.methods != self.sequence.methods:
+            self.sequence = self.sequence.replaced(parts.methods, self.dofs())
         self.linear_solver = FlowSolver(self.unknowns, self.sequence, self.linear_tolerance, steady=settings.steady)
         self._tangent = KeptTangent(self.system)
         self.held = np.zeros(owned, dtype=bool)  #: owned dofs with rows of the identity
@@ -183,6 +186,7 @@ class Fluid:
         self._tangent.begin_step()
         self.linear_solver.begin_step()
         self.notes.clear()
+        self._iterations_of_step = 0
         if not self._coupled:
             self.predict()
             self.move({})
@@ -244,7 +248,8 @@ class Fluid:
         self.unknowns.share(self.system.flow)
         if not self._coupled:
             self._note_fast_bodies()
-        return replace(info, notes=tuple(self.notes))
+        numbers = {**info.numbers, "fluid.linear": float(self._iterations_of_step)}
+        return replace(info, numbers=numbers, notes=tuple(self.notes))
 
     def _note_fast_bodies(self) -> None:
         if not self.settings.steady:
@@ -308,9 +313,20 @@ class Fluid:
                 self.linear_iterations = self.linear_solver.solve(
                     matrix, b, x, self.held, self.system.dofs_near_surfaces
                 )
+            self._iterations_of_step += self.linear_iterations
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, str(failure), where=self.worst()) from failure
         return self.update(x.array)
+
+    def suction(self) -> float:
+        """Largest pressure below zero [Pa] around bodies whose closed contact is dry (collective)."""
+        surfaces = [body.surface for body in self.bodies]
+        dry = [s.zone == "dry" and s.in_contact is not None and bool(s.in_contact.any()) for s in surfaces]
+        of_facets = np.repeat(dry, [len(s.facets) for s in surfaces])
+        pieces = self.cut.pieces
+        cells = self.cut.cut[pieces.cell[of_facets[pieces.facet]]]
+        lowest = float(self.flow[self.unknowns.cell_pressure[cells]].mean(axis=1).min(initial=0.0))
+        return float(self.comm.allreduce(-lowest, op=MPI.MAX))
 
     def keeps_tangent(self) -> bool:
         """Whether the last tangent has its rows of the identity where this iterate has them (collective)."""

@@ -224,7 +224,8 @@ def _facets(
     wet[np.concatenate([cut.uncut, cut.cut])] = True
     if among is not None:
         wet &= among
-    free, covered = covered_faces(grid, fluid.unknowns, cut, fluid.unknowns.degree + 1, facets, cells)
+    points = fluid.unknowns.degree + 1
+    free, covered = covered_faces(grid, fluid.unknowns, cut, points, facets, cells, boundary.wet_faces)
     return facets[wet[cells] & free], [part.only(wet) for part in covered]
 
 

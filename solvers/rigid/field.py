@@ -389,6 +389,10 @@ class RigidBodies:
 
     # ------------------------------------------------------------------------------------------- results and state
 
+    def contact_pressure(self) -> float:
+        """Largest traction of contact [Pa]: rigid bodies have none."""
+        return 0.0
+
     def in_contact(self) -> bool:
         """Whether any contact is closed."""
         return self.contact is not None and bool(self.contact.active.any())

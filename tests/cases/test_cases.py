@@ -91,7 +91,7 @@ def assert_same(folder, first, second):
     time = load_case(folder / "case.yaml").time
     assert len(one["step"]) == min(3, round((time.end - time.start) / time.step)), folder.name
     sizes = {name: np.abs(values).max() for name, values in one.items()}
-    counts = {"iterations", "coupling.linear", "coupling.newton"}
+    counts = {"iterations", "coupling.linear", "fluid.linear", "coupling.newton"}
     errors = {"residual", "interface.force", "interface.momentum", "fluid.loss", *FIELD_COLUMNS.values()}
     for name in one.keys() - {"wall", *counts, *errors}:
         # components of one vector are measured against the largest of them

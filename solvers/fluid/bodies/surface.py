@@ -29,6 +29,7 @@ class ImmersedSurface:
     zone: Zone = "dry"  #: fluid in closed contact
     #: dry facets with their middle in another body: wet, too, where the solid is the union of bodies
     hidden: NDArray[np.bool_] | None = None
+    tied: NDArray[np.bool_] | None = None  #: dry facets that lie on another body for ever; None: no one does
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,13 @@ def wetness(surfaces: Sequence[ImmersedSurface], *, unions: bool = False) -> NDA
     if unions:
         parts = [wet if s.hidden is None else wet | s.hidden for wet, s in zip(parts, surfaces, strict=True)]
     return np.concatenate([*parts, np.empty(0, dtype=bool)])
+
+
+def tied(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_] | None:
+    """Mask of the facets of all surfaces that are tied to another one; None if there are none."""
+    if all(surface.tied is None for surface in surfaces):
+        return None
+    return np.concatenate([np.zeros(len(s.facets), dtype=bool) if s.tied is None else s.tied for s in surfaces])
 
 
 def may_close(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_] | None:

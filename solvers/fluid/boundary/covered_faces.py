@@ -12,7 +12,7 @@ from solvers.api import Array
 from solvers.fluid.background.grid import FACES, DistributedGrid
 from solvers.fluid.background.space import Unknowns
 from solvers.fluid.boundary.meeting_patches import points_on_face
-from solvers.fluid.boundary.wet_faces import WetFace, wet_face
+from solvers.fluid.boundary.wet_faces import WetFace, WetFaces
 from solvers.fluid.cutting.cut import Cut
 from solvers.gauss import gauss
 
@@ -92,18 +92,19 @@ def covered_faces(
     points: int,
     facets: NDArray[np.int32],
     cells: NDArray[np.int32],
+    known: WetFaces,
 ) -> tuple[NDArray[np.bool_], list[CoveredFaces]]:
     """(mask of the facets that no body covers, the others as covered faces).
 
     points: Gauss points in each direction of a face; polynomials of the degree points - 1 are integrated exactly.
-    facets: local facets on the boundary of the box; cells: the local cell of each.
+    facets: local facets on the boundary of the box; cells: the local cell of each. known: those of earlier cuts.
     """
     free, covered = np.ones(len(facets), dtype=bool), []
     if len(cut.facets):
         middles = fem.facet_midpoints(grid.domain, facets)
         for face in FACES[: 2 * grid.dim]:
             on = grid.on_face(middles, face)
-            found = wet_face(grid.grid, face, gauss(points)[0], cut.facets, cut.motion) if on.any() else None
+            found = known.of(grid.grid, face, points, cut.facets, cut.motion) if on.any() else None
             if found is not None and len(found.cells):
                 part, touched = _covered(grid, unknowns, found, face, points, cells[on])
                 free[np.flatnonzero(on)[touched]] = False

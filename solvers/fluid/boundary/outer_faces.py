@@ -115,7 +115,9 @@ class OuterFaces:
             if term.face is not None:
                 on = self.grid.on_face(fem.facet_midpoints(self.grid.domain, facets), term.face)
                 facets, cells = facets[on], cells[on]
-            uncovered, parts = covered_faces(self.grid, self.unknowns, cut, points, facets, cells)
+            uncovered, parts = covered_faces(
+                self.grid, self.unknowns, cut, points, facets, cells, self.boundary.wet_faces
+            )
             wet = active[cells] & uncovered
             residuals.append(term.residual.on(exterior_facet=np.sort(facets[wet])))
             if term.tangent is not None:

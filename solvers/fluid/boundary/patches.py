@@ -14,6 +14,7 @@ from solvers.fluid.background.grid import FACES, DistributedGrid
 from solvers.fluid.background.space import Unknowns
 from solvers.fluid.boundary.meeting_patches import meeting_patches
 from solvers.fluid.boundary.patch_kinds import PATCH_KINDS, PatchKind
+from solvers.fluid.boundary.wet_faces import WetFaces
 from solvers.values import Value, evaluate
 
 
@@ -67,6 +68,7 @@ class Boundary:
     def __init__(self, grid: DistributedGrid, unknowns: Unknowns, patches: Sequence[Patch]):
         self.patches = list(patches)
         self._unknowns = unknowns
+        self.wet_faces = WetFaces()  #: of this box, while bodies rest
         facets, self._cells, midpoints = grid.outer_faces
         patch_of = np.full(len(facets), -1)
         for number, patch in enumerate(patches):

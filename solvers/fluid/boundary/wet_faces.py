@@ -108,3 +108,18 @@ def _plane(edges: list[Array], points: Array, x: Array, segments: Facets) -> tup
     solid = moments.fraction[:, None] * np.multiply.outer(rule, rule).ravel()
     solid[moments.cells] = moments.solid
     return solid, moments.fraction
+
+
+class WetFaces:
+    """The wet parts of the faces of the box, found once for surfaces that rest."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[str, int], tuple[Facets, Array, WetFace]] = {}
+
+    def of(self, box: Grid, face: str, points: int, facets: Facets, motion: Motion) -> WetFace:
+        """See `wet_face`; points: count of Gauss points in each direction."""
+        known = self._found.get((face, points))
+        if known is None or not (np.array_equal(known[1], motion.x) and np.array_equal(known[0], facets)):
+            known = facets, motion.x, wet_face(box, face, gauss(points)[0], facets, motion)
+            self._found[face, points] = known
+        return known[2]

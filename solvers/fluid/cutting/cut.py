@@ -14,6 +14,7 @@ from solvers.fluid.background.grid import DistributedGrid, Grid
 from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.cutting.overlaps import with_unions
 from solvers.fluid.cutting.pieces import FLUSH, NOTHING, Pieces, cells_across, in_planes, put_where_fluid_is
+from solvers.fluid.cutting.tied_slits import slivers_of, without_slits
 from solvers.fluid.films.film import Films, Walls, creeping_cells, walls_of
 from solvers.fluid.films.gaps import GapFinder, NarrowGaps
 from solvers.fluid.thin.sheet_cells import on_sheets
@@ -74,13 +75,15 @@ class Cutter:
         gaps: GapFinder | None = None,
         *,
         unions: bool = False,
+        tied: NDArray[np.bool_] | None = None,
     ):
+        """tied: mask of the facets that are tied to another body; None: no one is."""
         self.grid, self.points, self.films, self.gaps, self._unions = grid, points, films, gaps, unions
+        self._tied = tied
         self._own = grid.grid.as_box(grid.in_box)
         self._special = np.zeros(grid.grid.size, dtype=bool)
         self._depth = 0
-        sizes = grid.grid.cell_sizes()
-        self._slivers = NOTHING * sizes.prod(axis=1) / sizes.max(axis=1)  # areas of surface that are neglected
+        self._slivers = slivers_of(grid.grid)
         self._first: _First | None = None
         self._of_step: Cut | None = None
         self._whole: Cut | None = None  #: without surfaces
@@ -131,9 +134,11 @@ class Cutter:
         moments = kernels.moments(box.edges, self.points, x, facets, nearby.ravel(order="F"))
         normal = -unit_normals(motion.x[facets])
         off = off_boundary(box, motion.x[facets])
-        if self._unions:
-            moments = with_unions(box, self.points, moments, facets, x, off)
         counts = off if wet is None else off & wet
+        if self._tied is not None:
+            moments = without_slits(moments, self.points, self._tied, counts, self._slivers)
+        if self._unions:
+            moments = with_unions(box, self.points, moments, facets, x, off, self._tied)
         # on sheets, cells that are solid except for rounding have no fluid
         overlap = moments.fraction > (1.0 + NOTHING if grid.sheets is None else 1.0 - NOTHING)
         piece_normal = normal[moments.piece_facet]

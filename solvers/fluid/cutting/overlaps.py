@@ -36,13 +36,22 @@ class Moments:
     piece_mass: Array
 
 
-def with_unions(grid: Grid, points: Array, moments, facets: Indices, x: Array, bounds: NDArray[np.bool_]):
+def with_unions(
+    grid: Grid,
+    points: Array,
+    moments,
+    facets: Indices,
+    x: Array,
+    bounds: NDArray[np.bool_],
+    tied: NDArray[np.bool_] | None = None,
+):
     """Moments in 2D with the union of the bodies as solid, in cells with fluid where they overlap.
 
     moments: of `kernels.moments`, which are returned where nothing overlaps; points: of the quadrature in one
-    direction; x: vertices [m]; bounds: facets that are not on the boundary of the box.
+    direction; x: vertices [m]; bounds: facets that are not on the boundary of the box; tied: facets that are tied, in
+    whose cells nothing overlaps; None: no one is.
     """
-    found = dict(_overlapping(grid, moments, facets, x, bounds))
+    found = dict(_overlapping(grid, moments, facets, x, bounds, tied))
     if not found:
         return moments
     fraction, solid = moments.fraction.copy(), moments.solid.copy()
@@ -67,12 +76,15 @@ def with_unions(grid: Grid, points: Array, moments, facets: Indices, x: Array, b
 
 
 def _overlapping(
-    grid: Grid, moments, facets: Indices, x: Array, bounds: NDArray[np.bool_]
+    grid: Grid, moments, facets: Indices, x: Array, bounds: NDArray[np.bool_], tied: NDArray[np.bool_] | None
 ) -> list[tuple[int, list[Region]]]:
     """(row of each cell with fluid in which bodies overlap, regions of the fluid)."""
     body = connected_parts(facets[:, 0], facets[:, 1], len(x))[facets[:, 0]]
     rows, _ = np.unique(np.stack([moments.piece_cell, body[moments.piece_facet]]), axis=1)
     several, counts = np.unique(rows, return_counts=True)
+    if tied is not None:
+        here = np.unique(moments.piece_cell[tied[moments.piece_facet]])
+        counts[np.isin(several, here)] = 0
     found = []
     for row in several[counts > 1].tolist():
         cell = int(moments.cells[row])

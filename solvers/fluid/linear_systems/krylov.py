@@ -21,6 +21,7 @@ from solvers.rounded_product import RoundedProducts
 #: Names of the methods in messages.
 WORDS: dict[linear.FlowMethod, str] = {
     "multigrid": "multigrid",
+    "smoothed": "multigrid with stronger smoothers",
     "ilu": "incomplete factors",
     "fill": "incomplete factors with more fill and overlap",
     "direct": "the direct solver",
@@ -29,6 +30,9 @@ WORDS: dict[linear.FlowMethod, str] = {
 #: 470,596 and 1,000,188 unknowns (Reynolds number 200), W-cycles 4, 5, and 6 or 7. In time both take as many, and
 #: V-cycles take 8 % less time.
 STEADY_CYCLE = PETSc.PC.MGCycleType.W
+#: Iterations of multigrid after which stronger smoothers are taken: it usually takes 4 to 13, where single steps of the
+#: smoother converge. On stretched cells, and on nested ones in fast flow, these diverge, and so would 200 iterations.
+PATIENCE = 30
 #: Memory [bytes] of the factors of a 3D flow with n unknowns over n^(4/3): 490 measured for q1q1, 1,040 for q2q1.
 FACTORS = 1_100.0
 
@@ -43,6 +47,23 @@ class SolverSequence:
     @property
     def current(self) -> linear.FlowMethod:
         return self.methods[self.position]
+
+    @property
+    def multigrid(self) -> bool:
+        """Whether the current solver is multigrid, with whatever smoothers."""
+        return self.current in ("multigrid", "smoothed")
+
+    def limit(self, ksp: PETSc.KSP) -> None:
+        """Let a solver give up early if multigrid with stronger smoothers comes next."""
+        if "smoothed" in self.methods and self.current == "multigrid":
+            ksp.setTolerances(max_it=min(PATIENCE, ksp.getTolerances()[3]))
+
+    def replaced(self, methods: Sequence[linear.FlowMethod], dofs: int) -> SolverSequence:
+        """The sequence for another discretisation, which begins with the first solver that has not failed yet."""
+        failed = self.methods[: self.position]
+        found = SolverSequence(self.comm, methods, dofs, self._note)
+        found.position = next((n for n, method in enumerate(methods) if method not in failed), len(methods) - 1)
+        return found
 
     def advance(self, failure: linear.LinearSolveFailed) -> None:
         """Change to the next solver for the rest of the run. Raises LinearSolveFailed if there is none (collective)."""
@@ -78,10 +99,18 @@ class FlowSolver:
         fresh = math.inf if steady else 1  # a steady flow changes too much from iterate to iterate
         self._krylov, self._direct = Lagged(fresh=fresh), LaggedFactors(sequence.comm, fresh=fresh)
 
-    @cached_property
+    @property
     def multigrid(self) -> Multigrid:
-        """The levels of multigrid (collective)."""
+        """The levels of multigrid, with the smoothers of the current solver (collective)."""
+        return self._smoothed if self.sequence.current == "smoothed" else self._plain
+
+    @cached_property
+    def _plain(self) -> Multigrid:
         return Multigrid(self.sequence.comm, self._unknowns, self._cycle)
+
+    @cached_property
+    def _smoothed(self) -> Multigrid:
+        return Multigrid(self.sequence.comm, self._unknowns, self._cycle, smoothed=True)
 
     def for_sources(self) -> FlowSolver:
         """A solver for a right-hand side of sources of volume; its failures leave the sequence of the run as it is.
@@ -90,7 +119,8 @@ class FlowSolver:
         """
         sequence = self.sequence
         rest = sequence.methods[sequence.position :]
-        methods = rest[rest.index("multigrid") :] if "multigrid" in rest else rest
+        first = next((n for n, method in enumerate(rest) if method in ("multigrid", "smoothed")), 0)
+        methods = rest[first:]
         own = SolverSequence(sequence.comm, methods, sequence.dofs, lambda message: None)
         return FlowSolver(self._unknowns, own, self._tolerance, steady=False)
 
@@ -117,8 +147,9 @@ class FlowSolver:
 
     def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_], near: Marker) -> PETSc.KSP:
         comm, method = self.sequence.comm, self.sequence.current
-        if method != "multigrid":
+        if not self.sequence.multigrid:
             return linear.flow_solver(comm, tolerance=self._tolerance, fill=method == "fill")
         ksp = linear.flexible_solver(comm, tolerance=self._tolerance)
+        self.sequence.limit(ksp)
         ksp.setPC(self.multigrid.preconditioner(matrix, held, near, self.products.of(matrix)))
         return ksp

@@ -125,8 +125,16 @@ def _everywhere(comm: MPI.Comm, component: Component) -> Indices:
 class Multigrid:
     """The levels of one flow, the same for all cuts, and preconditioners on them."""
 
-    def __init__(self, comm: MPI.Comm, unknowns: Unknowns, cycle: PETSc.PC.MGCycleType = PETSc.PC.MGCycleType.V):
-        self.comm, self._second, self._kind = comm, unknowns.degree > 1, cycle
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        unknowns: Unknowns,
+        cycle: PETSc.PC.MGCycleType = PETSc.PC.MGCycleType.V,
+        *,
+        smoothed: bool = False,
+    ):
+        """smoothed: smoothers of first degree are those that converge on stretched cells, too."""
+        self.comm, self._second, self._kind, self._smoothed = comm, unknowns.degree > 1, cycle, smoothed
         self.levels = [finest(unknowns)]
         self._interpolations: list[PETSc.Mat] = []
         #: the finest matrix of the last preconditioner, and the coarse ones, reused while it, and thus its pattern,
@@ -196,16 +204,21 @@ class Multigrid:
         return cycle
 
     def _smooth(self, smoother: PETSc.KSP) -> None:
-        """Smoother: incomplete factors on each process with one layer of overlap, which halves the time."""
+        """Smoother: incomplete factors on each process with one layer of overlap, which halves the time.
+
+        A single step with them diverges on stretched cells, and where convection is strong on nested ones.
+        """
         prefix = "flow_second_" if self._second else "flow_first_"
         smoother.setOptionsPrefix(prefix)
         if self._second:
-            # a single step diverges on stretched cells; without reordering there are 20 iterations instead of 13
+            # without reordering there are 20 iterations instead of 13
             options = incomplete_factors(self.comm, sub_pc_factor_mat_ordering_type="rcm")
+        else:
+            options = incomplete_factors(self.comm, **BLOCKS)
+        if self._second or self._smoothed:
             smoother.setType(PETSc.KSP.Type.GMRES)
             smoother.setTolerances(max_it=2)
         else:
-            options = incomplete_factors(self.comm, **BLOCKS)
             smoother.setType(PETSc.KSP.Type.RICHARDSON)
             smoother.setTolerances(max_it=1)
         for name, value in options.items():

@@ -29,6 +29,7 @@ from solvers.api import Array
 from solvers.connected import connected_parts
 from solvers.fluid.background.box import Grid
 from solvers.fluid.cutting.pieces import in_planes
+from solvers.fluid.cutting.tied_slits import slivers_of, without_slits
 from solvers.fluid.thin.sheet_nodes import Joined, node_copies, same_nodes
 from solvers.fluid.thin.sheet_parts import AROUND, Part, facing_of, grown, links_of, parts_of_fluid
 from solvers.fluid.thin.sliced_facets import ragged
@@ -238,16 +239,20 @@ def find_sheets(
     thin: int = THIN,
     always: bool = False,
     joined: Joined = MappingProxyType({}),
+    tied: tuple[Mask, Mask] | None = None,
 ) -> Sheets | None:
     """Sheets of the fluid around surfaces with vertices at x [m]; None if no body is thin, unless `always`.
 
     bounds: facets that are not on the boundary of the box. thin: cells apart, at most, of the fluid on both sides.
-    joined: parts of fluid in these cells at these facets share their nodes.
+    joined: parts of fluid in these cells at these facets share their nodes. tied: masks of the facets that are tied and
+    of those that the flow acts on; None: no body is tied.
     """
     if not len(facets) or (grid.dim == 3 and not always and not may_be_thin(grid, facets, x, FARTHEST * (thin + 1))):
         return None
     x = in_planes(grid, x)
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
+    if tied is not None:
+        moments = without_slits(moments, gauss(3)[0], tied[0], tied[1] & bounds, slivers_of(grid))
     if grid.dim == 3:
         parts, links, special, touching = parts_in_space(grid, moments, facets, x, AROUND)
     else:

@@ -17,7 +17,7 @@ from solvers.fluid.background.carrier import Carrier
 from solvers.fluid.background.nested import Nested
 from solvers.fluid.background.space import Unknowns
 from solvers.fluid.bodies.immersed import ImmersedBody
-from solvers.fluid.bodies.surface import Motion, wetness
+from solvers.fluid.bodies.surface import Motion, tied, wetness
 from solvers.fluid.cutting.cut import off_boundary
 from solvers.fluid.history import Past
 from solvers.fluid.thin.sheet_cycles import joined_in, recurring
@@ -49,7 +49,8 @@ class ThinBodies:
 
     def __init__(self, grid: Grid, bodies: Sequence[ImmersedBody], periodic: bool, sheets: Sheets | None):
         self._grid, self.follows, self._sheets = grid, False, sheets
-        self._wet = wetness([body.surface for body in bodies])
+        surfaces = [body.surface for body in bodies]
+        self._wet, self._tied = wetness(surfaces), tied(surfaces)
         moving = bool(bodies) and not all(body.rests for body in bodies)
         touch = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
         self._thick = THICK_IN_CONTACT[grid.dim] if touch else thickest(grid.dim)
@@ -92,7 +93,8 @@ class ThinBodies:
     def _find(self, facets: NDArray[np.int64], x: Array) -> Sheets | None:
         off = off_boundary(self._grid, x[facets])
         thin, always = THIN_IF_MOVING, self.follows
-        return find_sheets(self._grid, facets, x, off, thin=thin, always=always, joined=self._joined)
+        ties = None if self._tied is None else (self._tied, self._wet)
+        return find_sheets(self._grid, facets, x, off, thin=thin, always=always, joined=self._joined, tied=ties)
 
     def _join(self, parts: dict[int, frozenset[int]]) -> bool:
         """Keep parts joined until the step ends; returns whether some are new."""
