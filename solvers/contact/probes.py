@@ -23,7 +23,7 @@ Extreme = Literal["largest", "least"]
 
 
 def at_slave(contact: Contact, pair: int, quantity: str, where: Sequence[float] | Extreme) -> Probe:
-    """Probe of the pressure [Pa], gap or mean gap [m] of a pair, at the slave node nearest to a point, or of an extreme.
+    """Probe of pressure [Pa], gap or mean gap [m] of a pair, at the slave node nearest to a point, or of an extreme.
 
     where: the point in the reference configuration [m], or 'largest' or 'least'. The pressure is the normal part of
     the traction, zero without contact.
