@@ -129,7 +129,7 @@ output: {fields_every: 0}
 def test_belt_around_a_drum(tmp_path, friction, tension):
     """Every node slips in the end, after all stuck in the first iterate: no step is repeated.
 
-    The support does not let the end turn, so that it takes a moment: the tension is that of a belt without it to 1 %.
+    The tension at the end is that of a belt without stiffness in bending to 1 %.
     """
     (tmp_path / "case.yaml").write_text(BELT.replace("FRICTION", friction))
     assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") == FINISHED
