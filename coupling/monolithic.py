@@ -30,7 +30,7 @@ from coupling.start import start_together
 from solvers import linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.lagged import Lagged, LaggedFactors
-from solvers.newton import Tolerance, converge, whole_increments
+from solvers.newton import Tolerance, converge
 from solvers.petsc_python import free_deleted
 from solvers.rounding import rounding_error
 from solvers.rows import Numbering, distributed, from_entries, gather
@@ -53,7 +53,6 @@ class Monolithic:
         self.comm = coupled.solid.comm
         self._number_unknowns()
         self._secant = Secant()
-        self._failures = 0  #: failed attempts at this step
         self._linear_iterations = 0  #: of this step
         self._linearised = False  #: in this step
         self._residual, self._on_surfaces = np.zeros(0), 0.0  #: residual by part, load of the flow on all surfaces [N]
@@ -99,11 +98,9 @@ class Monolithic:
         if not coupled.flow.steady:
             self._predict(t + dt, self.residual())
         try:
-            info = converge(self, self.tolerance, whole=whole_increments(self._failures))
+            info = converge(self, self.tolerance)
         except StepFailed as failure:
-            self._failures += 1
             raise self._with_cause(failure) from None
-        self._failures = 0
         coupled.solid.check(info)
         coupled.end_step()
         numbers = coupled.balance.numbers() | {"coupling.linear": float(self._linear_iterations)}

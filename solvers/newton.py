@@ -93,7 +93,7 @@ class Tolerance:
         return np.maximum(self.residual * forces, self.residual_absolute)
 
 
-def iterates(system: System, tolerance: Tolerance = Tolerance(), *, whole: bool = False) -> Iterator[Iterate]:
+def iterates(system: System, tolerance: Tolerance = Tolerance()) -> Iterator[Iterate]:
     """An endless sequence of Newton iterates; the caller applies tolerances and limits.
 
     The tangent is kept for an iterate that is expected to fulfil the tolerance with it. Newton's method leaves
@@ -101,7 +101,7 @@ def iterates(system: System, tolerance: Tolerance = Tolerance(), *, whole: bool 
     Source: C. T. Kelley, Solving Nonlinear Equations with Newton's Method, SIAM 2003, section 2.3 (chord method).
 
     The linear system may be solved as inexactly as `enough` says. Where a system goes astray, and with `line_search`,
-    increments are halved until the residual decreases. whole: not where it goes astray.
+    increments are halved until the residual decreases.
     """
     number, residual = 0, system.residual()
     increment, ratio = np.full(len(residual), math.inf), np.full(len(residual), math.inf)
@@ -115,7 +115,7 @@ def iterates(system: System, tolerance: Tolerance = Tolerance(), *, whole: bool 
         residual = system.residual()
         finite = bool(np.isfinite(residual).all())  # not a number: elements are inverted
         rises += bool(((residual > largest) & (residual > small)).any()) + 2 * (not finite)
-        if (tolerance.line_search and settled) or (number > 0 and not whole and system.astray(rises)):
+        if (tolerance.line_search and settled) or (number > 0 and system.astray(rises)):
             increment, residual = _halve(system, before, small, increment, residual)
         ratio = residual / np.maximum(before, NOTHING)
         largest, number = np.fmax(largest, residual), number + 1
@@ -136,14 +136,6 @@ def enough(residual: Array, ratio: Array, *, tolerance: Array) -> float:
     """
     parts = zip(residual.tolist(), ratio.tolist(), tolerance.tolist(), strict=True)  # few: arrays would take longer
     return min([ENOUGH, *(max(0.1 * q * q, 0.01 * small / r) for r, q, small in parts if r > 0.0)])
-
-
-def whole_increments(failures: int) -> bool:
-    """Whether the next attempt at a step does without a line search: after one failure, after two with one again.
-
-    Sets that are still found make the residual rise and fall. A line search takes that for a cycle and may get stuck.
-    """
-    return failures % 2 == 1
 
 
 #: Largest count of halvings of an increment in a line search. With 6 a ring with Tresca friction does not converge.
@@ -173,13 +165,13 @@ def _halve(system: System, before: Array, small: Array, increment: Array, residu
     return increment * remaining, residual
 
 
-def converge(system: System, tolerance: Tolerance, *, whole: bool = False) -> StepInfo:
+def converge(system: System, tolerance: Tolerance) -> StepInfo:
     """Iterate to the tolerance. Raises StepFailed with the residuals and the position of the largest one.
 
-    whole: see `iterates`. Residuals of parts whose last residual is rounding error are not reported.
+    Residuals of parts whose last residual is rounding error are not reported.
     """
     history: list[Array] = []
-    for iterate in iterates(system, tolerance, whole=whole):
+    for iterate in iterates(system, tolerance):
         history.append(iterate.residual)
         if not np.isfinite(iterate.residual).all():
             reason, open_parts = "the residual is not a number", np.ones(len(iterate.residual), dtype=bool)

@@ -154,7 +154,7 @@ def _of_pair(case: Case, structure: Structure, settings: Probe) -> probes.Probe:
         return first_contact(contact, index)
     if settings.quantity == "overlap":
         return overlap(contact, index)
-    extreme = settings.extreme or ("least" if settings.quantity == "gap" else "largest")
+    extreme = settings.extreme or ("largest" if settings.quantity == "pressure" else "least")
     return at_slave(contact, index, settings.quantity, settings.at or extreme)
 
 

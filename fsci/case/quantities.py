@@ -57,6 +57,13 @@ _ALL = (
     Quantity("traction", _FORCE, "vector", ("on",), meaning="integral of P N over the reference surface"),
     Quantity("area", (2, 0, 0), "one", ("on",)),
     Quantity("gap", _LENGTH, "one", ("pair",), meaning="distance of the slave nodes to the master, negative behind it"),
+    Quantity(
+        "mean_gap",
+        _LENGTH,
+        "one",
+        ("pair",),
+        meaning="gap that contact closes: the mean around each slave node, zero in contact, nan where nothing is near",
+    ),
     Quantity("overlap", _LENGTH, "one", ("pair",), meaning="largest depth of nodes of one side behind the other"),
     Quantity(
         "pressure",

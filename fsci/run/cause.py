@@ -8,6 +8,17 @@ from fsci.case import Case
 from fsci.case.expressions import missed_formula
 from solvers.api import StepFailed
 
+#: Residuals that two failures must have in common, and how closely. Two different steps have different loads: from the
+#: second residual on nothing makes them equal by chance to 1 %, and four of them are more than a failure at once gives.
+IN_COMMON, EQUAL = 4, 0.01
+
+
+def alike(one: StepFailed, other: StepFailed) -> bool:
+    """Whether two attempts at a step failed with the same residuals, whatever its length."""
+    if one.field != other.field or len(one.history) != len(other.history) or len(one.history) <= IN_COMMON:
+        return False
+    return all(abs(a - b) <= EQUAL * max(a, b) for a, b in zip(one.history[1:], other.history[1:], strict=True))
+
 
 def with_cause(failure: StepFailed, case: Case, begin: float, comm: Any) -> StepFailed:
     """The failure of a step from the time `begin` on, its reason with the setting that is not finite (collective)."""

@@ -16,7 +16,7 @@ from fsci.builder.on_first import on_first, shared
 from fsci.case import Case, CaseError, load_case
 from fsci.case.resume import changed, end_error, meshes_changed
 from fsci.case.settings import settings_of
-from fsci.run.cause import with_cause
+from fsci.run.cause import alike, with_cause
 from fsci.run.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from fsci.run.clock import Clock
 from fsci.run.files import LOCK, make_folder, require_own, write_text
@@ -247,6 +247,7 @@ class Run:
     def take_step(self) -> None:
         """Take one accepted step. Raises StepFailed if it fails after all halvings."""
         before, clock = self.record.wall(), self.clock
+        earlier: StepFailed | None = None
         while True:
             try:
                 dt = clock.dt
@@ -254,7 +255,11 @@ class Run:
                 break
             except StepFailed as failed:
                 failure = with_cause(failed, self.case, clock.time, self.comm)
-                if failure.hopeless or not clock.halve():
+                if unchanged := earlier is not None and alike(earlier, failure):
+                    failure = failure.with_reason(
+                        f"{failure.reason}; as with twice the step, so that shorter ones do not help"
+                    )
+                if failure.hopeless or unchanged or not clock.halve():
                     self._keep_failure(failure)
                     self.scheme.restore(self.state)
                     raise failure from None
@@ -262,6 +267,7 @@ class Run:
                 self.state = self.scheme.save()
                 self.record.retry()
                 self.monitor.retry(failure, clock.dt)
+                earlier = failure
         with self.stop.files:
             clock.accept()
             self.record.accept(clock.step, info)

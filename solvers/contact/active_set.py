@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.contact.law.law import OPEN, Statuses
-
-#: Factor of the complementarity parameter each time an earlier set recurs.
-ON_RECURRENCE = 0.1
+from solvers.contact.law.law import OPEN, STICK, Statuses
 
 
 class ActiveSet:
@@ -24,9 +21,8 @@ class ActiveSet:
         self.changed = False  #: whether the latest choice changed the set
         self.changes = 0  #: count of choices in this step that changed the set
         self.alternating = 0  #: nodes whose status changed when an earlier set came back in this step; 0: none did
-        self.damping = 1.0  #: factor of the complementarity parameter in this solve
-        self._damped = False
         self.tried = np.zeros(size, dtype=bool)  #: mask of the multipliers that were in contact in this solve
+        self.stuck = np.zeros(size, dtype=bool)  #: mask of the multipliers that stuck in this solve
         self._earlier: set[bytes] = set()
 
     @property
@@ -39,14 +35,10 @@ class ActiveSet:
         self.changed, self.changes = False, 0
         self.begin_solve()
 
-    def begin_solve(self, *, damped: bool = False) -> None:
-        """Discard the earlier sets, which other loads may have chosen.
-
-        damped: each time an earlier set recurs, the complementarity parameter becomes smaller.
-        """
+    def begin_solve(self) -> None:
+        """Discard the earlier sets, which other loads may have chosen."""
         self.alternating, self._earlier = 0, {self.status.tobytes()}
-        self.damping, self._damped = 1.0, damped
-        self.tried = self.active
+        self.tried, self.stuck = self.active, np.zeros_like(self.stuck)
 
     def choose(self, status: Statuses) -> None:
         """Set the statuses of this iterate."""
@@ -57,11 +49,9 @@ class ActiveSet:
             chosen = status.tobytes()
             if chosen in self._earlier:
                 self.alternating = different
-                if self._damped:
-                    self.damping *= ON_RECURRENCE
             self._earlier.add(chosen)
         self.status = status.copy()
-        self.tried = self.tried | self.active
+        self.tried, self.stuck = self.tried | self.active, self.stuck | (status == STICK)
 
     def cycle(self) -> str:
         """What cycles, for messages; empty if no earlier set of this step has come back."""

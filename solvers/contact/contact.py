@@ -132,9 +132,9 @@ class Contact:
         self.slip = None
         self._own, self._increment = self.z.copy(), np.zeros_like(self.z)
 
-    def begin_solve(self, *, damped: bool = False) -> None:
-        """New loads: sets that the old ones chose are no sign of a cycle; damped: see `ActiveSet.begin_solve`."""
-        self.active_set.begin_solve(damped=damped)
+    def begin_solve(self) -> None:
+        """New loads: sets that the old ones chose are no sign of a cycle."""
+        self.active_set.begin_solve()
 
     def end_step(self, weight: float) -> None:
         """Accept the step; weight: that of the contact force at its end in the balance."""
@@ -142,6 +142,7 @@ class Contact:
             self.work.end_step(weight, *self._force_and_slip())
         self._of_obstacles.end_step(self.force(), self.x - self.x_old)
         self._interfered.end_step(self._normal_forces(), self._integration.interference)
+        self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
         self.slip = None
 
     @property
@@ -188,7 +189,12 @@ class Contact:
                 status[which] = law.status(self.point(which))
             self._drop_dependent(status)
         self.active_set.choose(status)
-        self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
+        self._set_multipliers(np.where(self._constrained[:, None], self.z, 0.0))
+
+    @property
+    def _constrained(self) -> NDArray[np.bool_]:
+        """Mask of the multipliers with a constraint at the latest evaluation, shape (C,)."""
+        return self._covers if self.terms is not None else np.zeros(len(self.z), dtype=bool)
 
     def _own_gap(self, terms: Terms) -> Array:
         """Weighted gaps of all multipliers [m^dim], less the interference of their pairs."""
@@ -220,8 +226,9 @@ class Contact:
             stiffness=stiffness,
             slip=np.zeros((len(which), self.dim)) if slip is None else slip.values[which],
             slip_defined=np.zeros(len(which), dtype=bool) if slip is None else slip.defined[which],
-            c_n=self.c_n * self.active_set.damping * stiffness,
-            c_t=self.c_n * self.active_set.damping * stiffness,
+            stuck=self.active_set.stuck[which],
+            c_n=self.c_n * stiffness,
+            c_t=self.c_n * stiffness,
             touching=np.where(self.active_set.tried[which], self._touching, self._nearly),
         )
 
@@ -251,7 +258,11 @@ class Contact:
     def violation(self, weight: float) -> Array:
         """Norm [N] of the residual of the laws of multipliers in contact, by node, shape (N,)."""
         self._weight = weight
-        return violation(self.interface, self._spans, [] if self.terms is None else self.in_contact(), weight)
+        parts = [] if self.terms is None else self.in_contact()
+        found = violation(self.interface, self._spans, parts, weight)
+        left = np.flatnonzero(self._constrained & ~self.active_set.active)
+        squares = (weight * self._D[left]) ** 2 * np.sum(self.z[left] ** 2, axis=1)
+        return np.sqrt(found**2 + np.bincount(self.multipliers.node[left], squares, self.size))
 
     def rounding(self, weight: float) -> tuple[Array, Array]:
         """Rounding errors [N] of the contact force in the balance, shape (N, dim), and of `violation`, shape (N,).
@@ -312,7 +323,7 @@ class Contact:
         found = recover(linearised, condensed, balance, du)
         if parts:
             own[np.concatenate([part.which for part in parts])] = found.reshape(-1, self.dim)
-        self._increment = own - np.where(self._covers[:, None], self.z, 0.0)
+        self._increment = own - np.where(self._constrained[:, None], self.z, 0.0)
         self._own = own
         self._set_multipliers(own)
 
@@ -359,6 +370,11 @@ class Contact:
     def near(self) -> bool:
         """Whether the latest `evaluate` found facets near each other."""
         return self.terms is not None
+
+    @property
+    def acts(self) -> bool:
+        """Whether multipliers are in contact, or of some that left it the traction is not yet zero."""
+        return self.near and bool(self.active_set.active.any() or self.z.any())
 
     @property
     def settled(self) -> bool:

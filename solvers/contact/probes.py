@@ -1,4 +1,4 @@
-"""Probes of contact: pressure and gap at a slave node, or their extremes.
+"""Probes of contact: pressure, gap and mean gap at a slave node, or their extremes.
 
 A probe is a function without arguments that every process calls. It returns values by component.
 """
@@ -23,19 +23,19 @@ Extreme = Literal["largest", "least"]
 
 
 def at_slave(contact: Contact, pair: int, quantity: str, where: Sequence[float] | Extreme) -> Probe:
-    """Probe of the pressure [Pa] or gap [m] of a pair, at the slave node nearest to a point, or of an extreme.
+    """Probe of pressure [Pa], gap or mean gap [m] of a pair, at the slave node nearest to a point, or of an extreme.
 
     where: the point in the reference configuration [m], or 'largest' or 'least'. The pressure is the normal part of
     the traction, zero without contact.
     """
-    values = {"pressure": lambda: pressures(contact, pair), "gap": lambda: gaps(contact, pair)}[quantity]
+    values = {"pressure": pressures, "gap": gaps, "mean_gap": mean_gaps}[quantity]
     if where == "largest":
-        return lambda: {"": float(np.fmax.reduce(values()))}
+        return lambda: {"": float(np.fmax.reduce(values(contact, pair)))}
     if where == "least":
-        return lambda: {"": float(np.fmin.reduce(values()))}
+        return lambda: {"": float(np.fmin.reduce(values(contact, pair)))}
     away = np.linalg.norm(contact.pairs[pair].slave.points - np.asarray(where, dtype=float), axis=1)
     node = int(np.argmin(away))
-    return lambda: {"": float(values()[node])}
+    return lambda: {"": float(values(contact, pair)[node])}
 
 
 def pressures(contact: Contact, pair: int) -> Array:
@@ -53,9 +53,15 @@ def gaps(contact: Contact, pair: int) -> Array:
     In self contact the mean gaps, nan where nothing is near.
     """
     slave, master = contact.pairs[pair].slave, contact.pairs[pair].master
-    if master is slave:
-        return contact.interface.at_nodes(slave, contact.mean_gap(), np.fmin)
-    return _signed(contact, slave, master)
+    return mean_gaps(contact, pair) if master is slave else _signed(contact, slave, master)
+
+
+def mean_gaps(contact: Contact, pair: int) -> Array:
+    """Mean gaps [m] around the slave nodes of a pair, which contact makes zero, (n,); nan where too little is near.
+
+    Those of all masters of the slave together.
+    """
+    return contact.interface.at_nodes(contact.pairs[pair].slave, contact.mean_gap(), np.fmin)
 
 
 def overlap(contact: Contact, pair: int) -> Probe:

@@ -152,7 +152,8 @@ class Dynamics:
         With damping massless dofs have v = w + (w - w_n) dt / (dt + dt_n), w = (u_{n+1} - u_n) / dt and w_n that of the
         last step, of second order at the end of the step (the backward difference of three positions). In the first
         step w_n is the velocity at its start, and dt_n = 0. Where contact acts at the start of the step, v = w:
-        velocities jump when it ends.
+        velocities jump when it ends. What is added is at most as long as w: in the step of an impact it would turn v
+        around, and the damping would throw the body back.
         """
         old, massless, impulsive = structure.old, structure.inertia.massless, structure.inertia.impulsive
         du = structure.now.u - old.u
@@ -164,17 +165,23 @@ class Dynamics:
         return v, a
 
     def _extrapolated(self, structure: Moving, dt: float) -> Array:
-        """dt / (dt + dt_n) at massless dofs; zero after contact and without damping.
+        """The factor of w - w_n at massless dofs, dt / (dt + dt_n) where nothing limits it.
 
-        Without damping these velocities do nothing. Contact at the end of the step does not count: the force would
-        jump where contact closes, and a coupled step could have no solution.
+        Zero after contact, and without damping, where these velocities do nothing. Contact at the end of the step does
+        not count: the force would jump where contact closes, and a coupled step could have no solution.
         """
-        massless = structure.inertia.massless
+        old, massless = structure.old, structure.inertia.massless
         if structure.damping is None:
             return np.zeros(len(massless))
-        pushed = structure.old.constraint != 0.0
-        at_node = np.repeat(pushed.reshape(-1, structure.dim).any(axis=1), structure.dim)[massless]
-        return np.where(at_node, 0.0, dt / (dt + structure.last_length))
+        w, change = np.zeros_like(old.u), np.zeros_like(old.u)
+        w[massless] = (structure.now.u - old.u)[massless] / dt
+        change[massless] = w[massless] - old.mean[massless]
+        present, added, pushed = (array.reshape(-1, structure.dim) for array in (w, change, old.constraint))
+        factor = np.full(len(present), dt / (dt + structure.last_length))
+        size, most = factor * np.linalg.norm(added, axis=1), np.linalg.norm(present, axis=1)
+        factor *= np.divide(most, size, out=np.ones_like(size), where=size > most)
+        factor[(pushed != 0.0).any(axis=1)] = 0.0
+        return np.repeat(factor, structure.dim)[massless]
 
     def rigid_force(self, structure: Moving, dt: float) -> Array:
         now, inertia = structure.now, structure.inertia

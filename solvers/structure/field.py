@@ -17,7 +17,7 @@ from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.blocks import Layout
 from solvers.constraint import Constraint
 from solvers.largest import position_of_largest
-from solvers.newton import converge, whole_increments
+from solvers.newton import converge
 from solvers.rounding import rounding_error
 from solvers.rows import RowTransformation, TakenRows, gather, transform_rows
 from solvers.solver_settings import SolverSettings
@@ -72,7 +72,6 @@ class Structure:
         self.last_length = 0.0  #: of the last accepted step [s], 0 at the start
         self.energy = EnergyBalance()
         self._limit_point = LimitPoint()
-        self._failures = 0  #: failed attempts at this step
         self.energy_sentinel = EnergySentinel(
             self.energy, dissipates=time.dissipates or contact is not None, contact=contact is not None
         )
@@ -214,11 +213,10 @@ class Structure:
         """Newton's method to the tolerance. Raises StepFailed."""
         if self.constraint is not None:
             # other loads may have chosen the earlier sets
-            self.constraint.begin_solve(damped=whole_increments(self._failures))
+            self.constraint.begin_solve()
         try:
-            info = converge(self, self.settings.newton, whole=whole_increments(self._failures))
+            info = converge(self, self.settings.newton)
         except StepFailed as failure:
-            self._failures += 1
             self.check_deformation(failure.iteration, failure.history)
             raise failure.with_reason(failure.reason + self._limit_point.explain()) from None
         self.check_deformation(info.iterations, info.residuals)
@@ -236,7 +234,6 @@ class Structure:
 
     def end_step(self) -> None:
         """Accept the step."""
-        self._failures = 0
         pushed = np.zeros(2)
         if self.constraint is not None:
             pushed -= self.constraint.obstacle_work
@@ -374,8 +371,8 @@ class Structure:
 
     @property
     def _touching(self) -> bool:
-        """Whether multipliers are in contact at the present iterate."""
-        return self.constraint is not None and self.constraint.near and bool(self.constraint.active().any())
+        """Whether multipliers act at the present iterate."""
+        return self.constraint is not None and self.constraint.acts
 
     def _attach_modes(self, matrix: PETSc.Mat) -> None:
         attach_rigid_modes(matrix, self.bodies, self.now.u)
@@ -437,7 +434,7 @@ class Structure:
         """Why whole increments may not converge: an active set that cycles, or a residual that grows in contact."""
         if self.constraint is None or not self.constraint.near:
             return ""
-        return self.constraint.cycle() or ("the residual grows" if rises > 1 and self._touching else "")
+        return self.constraint.cycle() or ("the residual grows" if rises > 1 and self.constraint.active().any() else "")
 
     def settled(self) -> bool:
         """Whether the prescribed displacements are reached and the active set has not changed (collective)."""

@@ -98,28 +98,28 @@ def test_missed_verification(case, tmp_path):
 class FailsAt:
     """A scheme that fails at some calls, half way through the step."""
 
-    def __init__(self, scheme, calls):
-        self.scheme, self.calls, self.count = scheme, calls, 0
+    def __init__(self, scheme, calls, history=(1.0, 2.0)):
+        self.scheme, self.calls, self.history, self.count = scheme, calls, history, 0
 
     def step(self, t, dt):
         self.count += 1
         info = self.scheme.step(t, dt)
         if self.count in self.calls:
-            raise StepFailed("structure", "injected", iteration=3, where=(1.0, 2.0), history=(1.0, 2.0))
+            raise StepFailed("structure", "injected", iteration=3, where=(1.0, 2.0), history=self.history)
         return info
 
     def __getattr__(self, name):
         return getattr(self.scheme, name)
 
 
-def inject(monkeypatch, calls):
+def inject(monkeypatch, calls, **options):
     import fsci.builder.build
 
     original = fsci.builder.build.build
 
     def build(*arguments):
         simulation = original(*arguments)
-        return replace(simulation, scheme=FailsAt(simulation.scheme, calls))
+        return replace(simulation, scheme=FailsAt(simulation.scheme, calls, **options))
 
     monkeypatch.setattr(fsci.builder.build, "build", build)
 
@@ -161,6 +161,15 @@ def test_failure_is_named_and_kept(case, tmp_path, monkeypatch, capfd):
     assert summary["steps"] == {"accepted": 3, "retried": 2}
     expected = "step 4 from time 0.15 failed with dt = 0.0125: structure: injected at iteration 3 near (1, 2)"
     assert expected in capfd.readouterr().out
+
+
+def test_halving_stops_where_it_changes_nothing(case, tmp_path, monkeypatch, capfd):
+    """Two attempts in a row with the same residuals."""
+    inject(monkeypatch, set(range(4, 100)), history=(1.0, 5.0, 4.0, 5.0, 4.0))
+    assert run_case(load_case(case, [("time.retry.halvings", "4")]), tmp_path / "out") == FAILED
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["steps"] == {"accepted": 3, "retried": 1}
+    assert "injected; as with twice the step, so that shorter ones do not help at iteration 3" in capfd.readouterr().out
 
 
 def test_inverted_element_is_named(case, tmp_path, capfd):

@@ -46,6 +46,7 @@ contact:
 coupling: {scheme: monolithic}
 probes:
   gap: {quantity: gap, pair: wall}
+  mean_gap: {quantity: mean_gap, pair: wall}
 solver: {newton: {residual: 1.0e-8, max_iterations: 40}}
 """
 COARSER = {
@@ -68,7 +69,7 @@ def impact(folder: Path, **changes: str) -> tuple[float, float, float]:
     step = time[1] - time[0]
     assert time[-1] == pytest.approx(len(time) * step)  # none is repeated
     assert history["interface.momentum"].max() < 1e-8 * force.max()
-    assert gap.min() > -1e-3  # the mean gap around each node is zero
+    assert np.nanmin(history["mean_gap"]) > -1e-10
     before = np.flatnonzero(force > 0.0)[0] - 1
     contact = time[before] + step * gap[before] / (gap[before - 1] - gap[before])
     return float(contact), force.max(), step * force.sum()

@@ -34,6 +34,7 @@ contact:
 coupling: {scheme: monolithic}
 probes:
   gap: {quantity: gap, pair: wall}
+  mean_gap: {quantity: mean_gap, pair: wall}
 solver: {newton: {residual: 1.0e-8, max_iterations: 40}}
 """
 FACETS = {"structure.bodies.disc.mesh.cells": "[96, 8]"}
@@ -52,7 +53,7 @@ def impact(folder, **changes: str) -> tuple[float, float, float, float]:
     step = time[1] - time[0]
     assert time[-1] == pytest.approx(len(time) * step)  # none is repeated
     assert history["interface.momentum"].max() < 1e-6 * force.max()
-    assert gap.min() > -1e-3  # the mean gap around each node is zero
+    assert np.nanmin(history["mean_gap"]) > -1e-10
     before = np.flatnonzero(force > 0.0)[0] - 1
     after = (time > time[before] + 0.5 * step) & (time < time[before] + 0.05 + 0.5 * step)
     arrival = float(np.interp(-0.005, -gap[: before + 1], time[: before + 1]))

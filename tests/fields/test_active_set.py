@@ -31,6 +31,7 @@ def update(active_set, pressure, gap, covered=ALL, c=ONE):
         gap=gap,
         covered=covered,
         stiffness=one,
+        stuck=np.zeros(size, dtype=bool),
         c_n=c,
         c_t=one,
         touching=0.0 * one,

@@ -97,3 +97,44 @@ def test_mistakes_are_named(name, tmp_path):
     with pytest.raises(CaseError) as caught:
         load_case(tmp_path / "case.yaml")
     assert message in str(caught.value)
+
+
+BELT = """\
+time: {step: 1, end: 4, retry: {halvings: 0}}
+structure:
+  bodies:
+    belt:
+      mesh: {shape: ring, inner_radius: 1, outer_radius: 1.02, angle: 180, cells: [45, 1], order: 2}
+      material: {law: neo_hooke, E: 1.0e+6, nu: 0}
+      tractions: [{on: start, value: [0, -12.5*t]}]
+      supports: [{on: end, direction: [0, 1], displacement: -1.0e-4*t}]
+contact:
+  obstacles:
+    drum: {mesh: {shape: disc, radius: 1, cells: [256, 2], order: 2}, on: outer}
+  pairs:
+    drum: {slave: {body: belt, on: inner}, master: {obstacle: drum}, friction: FRICTION}
+probes:
+  end: {body: belt, quantity: reaction, on: end}
+  mean_gap: {pair: drum, quantity: mean_gap}
+solver: {newton: {residual: 1.0e-8, max_iterations: 30}, linear: {method: direct}}
+output: {fields_every: 0}
+"""
+
+
+@pytest.mark.parametrize(
+    ("friction", "tension"),
+    [("{coefficient: 0.3}", np.exp(0.3 * np.pi / 1.01)), ("{bound: 0.2}", 1.0 + 0.2 * np.pi / 1.01)],
+    ids=["coulomb", "tresca"],
+)
+def test_belt_around_a_drum(tmp_path, friction, tension):
+    """Every node slips in the end, after all stuck in the first iterate: no step is repeated.
+
+    The tension at the end is that of a belt without stiffness in bending to 1 %.
+    """
+    (tmp_path / "case.yaml").write_text(BELT.replace("FRICTION", friction))
+    assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") == FINISHED
+    history = read_history(tmp_path / "out" / "history.csv")
+    assert len(history["time"]) == 4
+    assert history["contact.sticking"][-1] == 0
+    assert -history["end.y"][-1] == pytest.approx(tension, rel=0.01)
+    assert np.abs(history["mean_gap"]).max() < 1e-10

@@ -191,6 +191,7 @@ probes:
   low: {body: c, quantity: displacement, at: [0.9961946981, -0.0871557427]}
   high: {body: c, quantity: displacement, at: [0.9961946981, 0.0871557427]}
   gap: {pair: tips, quantity: gap}
+  mean: {pair: tips, quantity: mean_gap}
 """
 
 
@@ -201,6 +202,7 @@ def test_a_closing_c(tmp_path):
     assert 1 < closed.sum() < len(closed)
     assert found["low.y"][~closed] == pytest.approx(-found["high.y"][~closed], abs=1e-9)
     assert np.abs(found["gap"][closed]).max() < 1e-12
+    assert np.array_equal(found["mean"], found["gap"], equal_nan=True)
     assert np.ptp((found["low.y"] - found["high.y"])[closed]) < 2e-3 < np.ptp(found["low.y"][~closed])
     assert found["iterations"].max() <= 8
 

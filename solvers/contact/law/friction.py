@@ -17,6 +17,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.contact.blocks import components
@@ -49,19 +50,28 @@ def trial_traction(at: Point) -> Array:
 def friction_status(law: Bound, at: Point) -> Statuses:
     """Status: contact where the trial pressure is positive, stick inside the disc.
 
-    A node whose trial traction is opposed to the present one sticks first. Otherwise its slip could reverse in every
-    Newton iteration. In the solution both have the same direction.
+    A node whose trial traction is opposed to the present one sticks first, once in a solve: its slip could reverse in
+    every Newton iteration, and in the solution both have the same direction. Only the linearisation depends on this.
     """
     q, radius = trial_traction(at), law.radius(at)
-    turned = np.einsum("nd,nd->n", q, at.z) < 0.0
-    inside = at.slip_defined & (turned | (np.linalg.norm(q, axis=1) < (1.0 - EDGE) * radius)) & (radius > 0.0)
+    turned = ~at.stuck & (np.einsum("nd,nd->n", q, at.z) < 0.0)
+    inside = at.slip_defined & (turned | _within(q, radius)) & (radius > 0.0)
     return np.where(at.covered & (at.trial_pressure > 0.0), np.where(inside, STICK, SLIP), OPEN).astype(np.int8)
 
 
 def friction_residual(law: Bound, at: Point, status: Statuses, weight: float) -> Array:
     """Residual [N]: gap times stiffness along the normal, z_t - P_s(q) along the surface, shape (m, dim)."""
-    z_t = at.z - at.pressure[:, None] * at.normals
-    missed = z_t - _on_disc(trial_traction(at), status, law.radius(at))[0]
+    q, radius = trial_traction(at), law.radius(at)
+    return _missed(at, _on_disc(q, np.where(_within(q, radius), STICK, SLIP), radius)[0], weight)
+
+
+def _within(q: Array, radius: Array) -> NDArray[np.bool_]:
+    """Mask of the trial traction inside the disc, shape (m,)."""
+    return np.linalg.norm(q, axis=1) < (1.0 - EDGE) * radius
+
+
+def _missed(at: Point, projected: Array, weight: float) -> Array:
+    missed = at.z - at.pressure[:, None] * at.normals - projected
     return (at.stiffness * at.gap)[:, None] * at.normals + (weight * at.D)[:, None] * missed
 
 
@@ -72,7 +82,7 @@ def friction_rows(law: Bound, at: Point, slopes: Slopes, status: Statuses, weigh
     tangent = along(at.normals)
     factor = (weight * at.D)[:, None, None]
     q = trial_traction(at)
-    _, by_q, by_radius = _on_disc(q, status, law.radius(at), derivatives=True)
+    projected, by_q, by_radius = _on_disc(q, status, law.radius(at), derivatives=True)
     y_n = np.einsum("nd,nd->n", at.z + at.c_t[:, None] * at.slip, at.normals)[:, None, None]
 
     # dz_t = T dz - z_n dn and dq = T (dz + c_t du) - y_n dn, both along the surface; dP = by_q dq + by_radius ds
@@ -81,7 +91,7 @@ def friction_rows(law: Bound, at: Point, slopes: Slopes, status: Statuses, weigh
     closing = at.stiffness[:, None] * at.normals - factor[:, 0] * by_gap[:, None] * by_radius
     sliding = -at.c_t[:, None, None] * (by_q @ tangent)
     in_u = _in_displacements(closing, factor * turning, factor * sliding, slopes)
-    return Rows(friction_residual(law, at, status, weight), factor * in_z, in_u)
+    return Rows(_missed(at, projected, weight), factor * in_z, in_u)
 
 
 def _in_displacements(by_gap: Array, by_normal: Array, by_slip: Array, slopes: Slopes) -> Sparse:

@@ -32,6 +32,7 @@ class Point:
     stiffness: Array  #: of slave and masters in series, per area [Pa/m], shape (m,)
     slip: Array  #: [m], shape (m, dim); with friction that of the step, of which the tangential part is used
     slip_defined: NDArray[np.bool_]  #: mask of those that a master covered at the beginning of the step, shape (m,)
+    stuck: NDArray[np.bool_]  #: mask of those that were chosen to stick in this solve, shape (m,)
     c_n: Array  #: complementarity parameter of the gap [Pa/m], (m,); the solution does not depend on it
     c_t: Array  #: complementarity parameter of the slip [Pa/m], (m,)
     touching: Array  #: gap [m] below which it is a rounding error, shape (m,)
