@@ -46,6 +46,10 @@ class Constraint(Stateful, Protocol):
         """
         ...
 
+    def approaching_dofs(self, u: Array, v: Array, t: float, dt: float) -> NDArray[np.int64]:
+        """Global dofs of the nodes that their velocities could make active in this step; arguments as above."""
+        ...
+
     def dofs(self) -> NDArray[np.int64]:
         """Global dofs of its nodes, -1 where there are none, shape (N, dim)."""
         ...

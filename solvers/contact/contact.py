@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
@@ -77,7 +78,6 @@ class Contact:
         self._kept = np.zeros(count)  # mean gap that may stay in this step [m], <= 0
         #: mask of the pairs whose surfaces have no mass in dynamics
         self.present = np.ones(len(self.pairs), dtype=bool)
-        self._reach: Reach | None = None
         self._constraints = Constraints(self.interface)
         self.merged = np.zeros(count, dtype=bool)  #: multipliers that are merged into another one of their node
         self._stiffness = np.zeros(count)  # per area [Pa/m], at the latest evaluation
@@ -351,16 +351,24 @@ class Contact:
         slaves = (self.multipliers.areas > 0.0) & ~self._tied & near[self.multipliers.node]
         return self.nodes.dofs[np.unique(self.multipliers.node[slaves])].ravel()
 
+    @cached_property
+    def _reach(self) -> Reach:
+        return Reach(self.interface)
+
     def find_present(self, u: Array, v: Array, t: float, dt: float) -> NDArray[np.bool_]:
         """Mask of the pairs that the step from t to t + dt [s] could bring into contact, or that are in contact.
 
         u, v: displacements [m] and velocities [m/s] of the deformable nodes, shape (N, dim).
         """
-        if self._reach is None:
-            self._reach = Reach(self.interface)
         x, pressed = self.positions(u, t), np.zeros(self.size, dtype=bool)
         pressed[self.multipliers.node[self.active_set.active & ~self._tied]] = True
         return self._reach.find(x, self.positions(u, t + dt) - x + dt * v, self.present, pressed)
+
+    def approaching_dofs(self, u: Array, v: Array, t: float, dt: float) -> NDArray[np.int64]:
+        """Global dofs of the nodes that their velocities could bring into contact in the step; u, v as above."""
+        x = self.positions(u, t)
+        dofs = self.nodes.dofs[self._reach.nodes(x, self.positions(u, t + dt) - x + dt * v, self.present)]
+        return dofs[dofs >= 0]
 
     def largest_traction(self) -> float:
         """Largest traction [Pa] of multipliers that are not tied."""

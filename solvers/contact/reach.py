@@ -30,6 +30,7 @@ class Reach:
         self._sides = np.array(
             [[_index(interface, side) for side in (pair.slave, pair.master)] for pair in interface.pairs]
         ).reshape(-1, 2)
+        self._selves = [pair.master is pair.slave for pair in interface.pairs]
         self._watched = np.array([pair.master is not pair.slave and pair.law != Tied() for pair in interface.pairs])
         self._edges = np.array([_mean_edge(pair.slave.points, pair.slave.facets) for pair in interface.pairs])
         self._facets = [surface.facets for surface in interface.surfaces]
@@ -56,16 +57,40 @@ class Reach:
                 self._searches[pair] = Search(*(self._facets[side] for side in sides))
             xs, xm = (np.ascontiguousarray(x[self._surfaces[side]]) for side in sides)
             candidates = self._searches[pair].pairs(xs, xm, float(distance[pair]))
-            found[pair] = self._near(sides, candidates, xs, xm, float(distance[pair]))
+            found[pair] = bool((self._distances(sides, candidates, xs, xm) <= distance[pair]).any())
         return found
 
-    def _near(self, sides: NDArray[np.int64], pairs: NDArray[np.int32], xs: Array, xm: Array, distance: float) -> bool:
-        """Whether a node is within a distance [m] of a facet of the other side, among pairs of facets.
+    def nodes(self, x: Array, ways: Array, present: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Mask of the nodes of present pairs that their velocities could bring into contact in a step, shape (N,).
+
+        Of self contact all nodes. x, ways: as in `find`.
+        """
+        found, lengths = np.zeros(len(x), dtype=bool), np.linalg.norm(ways, axis=1)
+        for pair in np.flatnonzero(present):
+            sides = self._sides[pair]
+            numbers = [self._surfaces[side] for side in sides]
+            if self._selves[pair]:
+                found[numbers[0]] = True
+            if not self._watched[pair]:
+                continue
+            distance = WAYS * float(sum(lengths[nodes].max(initial=0.0) for nodes in numbers))
+            if pair not in self._searches:
+                self._searches[pair] = Search(*(self._facets[side] for side in sides))
+            xs, xm = (np.ascontiguousarray(x[nodes]) for nodes in numbers)
+            candidates = self._searches[pair].pairs(xs, xm, distance)
+            near = candidates[self._distances(sides, candidates, xs, xm) <= distance]
+            for side, nodes, facets in zip(sides, numbers, near.T, strict=True):
+                found[nodes[self._facets[side][facets]]] = True
+        return found
+
+    def _distances(self, sides: NDArray[np.int64], pairs: NDArray[np.int32], xs: Array, xm: Array) -> Array:
+        """The least distance [m] of a node of one facet to the other one, by pairs of facets.
 
         The boxes of the search are those of a frame: what they find depends on how the scene is turned.
         """
         slave, master = (self._facets[side][number] for side, number in zip(sides, pairs.T, strict=True))
         ways = (xs[slave], xm[master], self._simplices[sides[1]]), (xm[master], xs[slave], self._simplices[sides[0]])
+        least = np.full(len(pairs), np.inf)
         for points, facets, simplices in ways:
             corners = facets[:, simplices][:, None]  # (pairs, 1, simplices, dim, dim)
             nodes = points[:, :, None]  # (pairs, nodes, 1, dim)
@@ -74,9 +99,8 @@ class Reach:
                 np.broadcast_to(nodes, shape).reshape(-1, shape[3]),
                 np.broadcast_to(corners, (*shape[:3], *corners.shape[3:])).reshape(-1, *corners.shape[3:]),
             )
-            if (found <= distance).any():
-                return True
-        return False
+            np.minimum(least, found.reshape(len(pairs), shape[1] * shape[2]).min(axis=1), out=least)
+        return least
 
 
 def _index(interface: ContactInterface, surface: Surface) -> int:

@@ -151,37 +151,34 @@ class Dynamics:
 
         With damping massless dofs have v = w + (w - w_n) dt / (dt + dt_n), w = (u_{n+1} - u_n) / dt and w_n that of the
         last step, of second order at the end of the step (the backward difference of three positions). In the first
-        step w_n is the velocity at its start, and dt_n = 0. Where contact acts at the start of the step, v = w:
-        velocities jump when it ends. What is added is at most as long as w: in the step of an impact it would turn v
-        around, and the damping would throw the body back.
+        step w_n is the velocity at its start, and dt_n = 0. Where contact may begin or end, v = w: velocities jump, and
+        the damping would throw the body back.
         """
         old, massless, impulsive = structure.old, structure.inertia.massless, structure.inertia.impulsive
         du = structure.now.u - old.u
         a, v = (rule(du, old.v, old.a, dt) for rule in (self.scheme.acceleration, self.scheme.velocity))
         w = du[massless] / dt
-        a[massless], v[massless] = 0.0, w + self._extrapolated(structure, dt) * (w - old.mean[massless])
+        a[massless], v[massless] = 0.0, w + structure.extrapolation[massless] * (w - old.mean[massless])
         v[impulsive] = du[impulsive] / dt
         a[impulsive] = (v - old.v)[impulsive] / dt
         return v, a
 
-    def _extrapolated(self, structure: Moving, dt: float) -> Array:
-        """The factor of w - w_n at massless dofs, dt / (dt + dt_n) where nothing limits it.
+    def extrapolation(self, structure: Exchanging, t: float, dt: float) -> Array:
+        """dt / (dt + dt_n) at owned dofs; zero where contact acts or may begin in this step, and without damping.
 
-        Zero after contact, and without damping, where these velocities do nothing. Contact at the end of the step does
-        not count: the force would jump where contact closes, and a coupled step could have no solution.
+        Without damping the velocities of massless dofs do nothing. The start of the step decides: if contact at its end
+        did, the force would jump where contact closes, and a coupled step could have no solution.
         """
-        old, massless = structure.old, structure.inertia.massless
-        if structure.damping is None:
-            return np.zeros(len(massless))
-        w, change = np.zeros_like(old.u), np.zeros_like(old.u)
-        w[massless] = (structure.now.u - old.u)[massless] / dt
-        change[massless] = w[massless] - old.mean[massless]
-        present, added, pushed = (array.reshape(-1, structure.dim) for array in (w, change, old.constraint))
-        factor = np.full(len(present), dt / (dt + structure.last_length))
-        size, most = factor * np.linalg.norm(added, axis=1), np.linalg.norm(present, axis=1)
-        factor *= np.divide(most, size, out=np.ones_like(size), where=size > most)
-        factor[(pushed != 0.0).any(axis=1)] = 0.0
-        return np.repeat(factor, structure.dim)[massless]
+        constraint, old = structure.constraint, structure.old
+        factor = np.zeros(structure.layout.size)
+        if structure.damping is None or constraint is None or not structure.inertia.moves_mass:
+            return factor
+        factor[:] = dt / (dt + structure.last_length)
+        u, v = (structure.at_constraint(array) for array in (old.u, old.v))
+        factor[structure.layout.among_owned(constraint.approaching_dofs(u, v, t, dt))[1]] = 0.0
+        pushed = (old.constraint.reshape(-1, structure.dim) != 0.0).any(axis=1)
+        factor[np.repeat(pushed, structure.dim)] = 0.0
+        return factor
 
     def rigid_force(self, structure: Moving, dt: float) -> Array:
         now, inertia = structure.now, structure.inertia
@@ -230,7 +227,8 @@ class Dynamics:
     def damping_slope(self, structure: Moving, dt: float) -> Array | None:
         slope = np.full(structure.layout.size, self.scheme.damping_factor(dt))
         slope[structure.inertia.impulsive] = (1.0 - self.scheme.alpha_f) / dt
-        slope[structure.inertia.massless] = (1.0 - self.scheme.alpha_f) * (1.0 + self._extrapolated(structure, dt)) / dt
+        massless = structure.inertia.massless
+        slope[massless] = (1.0 - self.scheme.alpha_f) * (1.0 + structure.extrapolation[massless]) / dt
         return slope
 
     def reaction(self, structure: Moving) -> Array:

@@ -70,6 +70,7 @@ class Structure:
         self.inertia = ElasticInertia(comm, bodies, self.pieces, lambda: self.time.massless(self))
         self.current = Step(0.0, 0.0)  #: the present step, or the last one
         self.last_length = 0.0  #: of the last accepted step [s], 0 at the start
+        self.extrapolation = np.zeros(self.layout.size)  #: of the velocities of massless dofs in this step
         self.energy = EnergyBalance()
         self._limit_point = LimitPoint()
         self.energy_sentinel = EnergySentinel(
@@ -193,6 +194,7 @@ class Structure:
         """Store the state at t [s] and predict that at t + dt."""
         self.time.prepare(self, t, dt)
         self.old = self.now.copy()
+        self.extrapolation = self.time.extrapolation(self, t, dt)
         for body in self.bodies:
             body.element.begin_step()
         self.current = Step(t + dt, dt)

@@ -80,6 +80,7 @@ class Moving(Protocol):
     current: Step
     dim: int
     last_length: float  #: of the last accepted step [s], 0 at the start
+    extrapolation: Array  #: of the velocities of massless dofs in this step, at owned dofs
 
     @property
     def damping(self) -> DampingForce | None:

@@ -73,6 +73,10 @@ class TimeScheme(Protocol):
         """Prepare a step from t to t + dt [s], before its start is stored. Raises StepFailed."""
         ...
 
+    def extrapolation(self, structure: Exchanging, t: float, dt: float) -> Array:
+        """Factor of the change of velocity of massless dofs in a step from t to t + dt [s], at owned dofs."""
+        ...
+
     def guess(self, structure: Moving, dt: float) -> Array:
         """Predictor: increment [m] of the displacement in a step of length dt, at owned dofs."""
         ...
@@ -149,6 +153,9 @@ class Statics:
     def start(self, structure: Settling, t: float, dt: float) -> None: ...
 
     def prepare(self, structure: Exchanging, t: float, dt: float) -> None: ...
+
+    def extrapolation(self, structure: Exchanging, t: float, dt: float) -> Array:
+        return np.zeros(structure.layout.size)
 
     def guess(self, structure: Moving, dt: float) -> Array:
         return np.zeros(structure.layout.size)
