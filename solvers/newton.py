@@ -145,12 +145,14 @@ HALVINGS = 14
 def _halve(system: System, before: Array, small: Array, increment: Array, residual: Array) -> tuple[Array, Array]:
     """Line search: halve the increment until the residual decreases, or take the best of the fractions tried.
 
-    Parts whose residual is small do not count. The residual has kinks, from which it may increase in all directions;
+    Parts whose residual is small or rounding errors do not count. The residual has kinks, from which it may increase in all directions;
     the way on is then that of the least increase.
     """
 
+    counts = ~system.only_rounding()
+
     def size(of: Array) -> float:
-        return math.inf if np.isnan(of).any() else float(np.linalg.norm(np.where(of > small, of, 0.0)))
+        return math.inf if np.isnan(of).any() else float(np.linalg.norm(np.where(counts & (of > small), of, 0.0)))
 
     remaining, tried, enough_below = 1.0, [size(residual)], size(before)
     while 0.0 < tried[-1] and not tried[-1] < enough_below and len(tried) <= HALVINGS:

@@ -215,6 +215,14 @@ def test_residuals_of_rounding_are_not_reported():
     assert converge(noise, Tolerance(1e-10)).residuals == (1.0,)
 
 
+def test_rounding_of_one_part_does_not_shorten_the_increments_of_another():
+    """Rounding errors that grow with each solution: no fraction of an increment reduces them."""
+    noise = Scalar(lambda x: math.exp(x), lambda x: -math.exp(x), 1.0, force=1e-3, round_off=1e9)
+    system = root_of_two()
+    info = converge(Together(noise, system), Tolerance(1e-10, line_search=True))
+    assert info.iterations == converge(root_of_two(), Tolerance(1e-10)).iterations
+
+
 def test_a_part_that_fails_is_reported():
     """x^2 + 1 = 0 beside a part that has converged, and one whose residual is rounding error."""
     noise = Scalar(lambda x: 1e6, lambda x: 1e300, 1.0, round_off=2e6)
