@@ -145,8 +145,8 @@ HALVINGS = 14
 def _halve(system: System, before: Array, small: Array, increment: Array, residual: Array) -> tuple[Array, Array]:
     """Line search: halve the increment until the residual decreases, or take the best of the fractions tried.
 
-    Parts whose residual is small or rounding errors do not count. The residual has kinks, from which it may increase in all directions;
-    the way on is then that of the least increase.
+    Parts whose residual is small or rounding errors do not count. The residual has kinks, from which it may increase in
+    all directions; the way on is then that of the least increase.
     """
 
     counts = ~system.only_rounding()

@@ -84,7 +84,6 @@ class Body:
             self._dead.add_points(point)
         self.dead_load = np.zeros(self.size)
         self._loads_at: float | None = None  #: time [s] of the loads
-        self.gravity = gravity
         self.pressures = [FollowerPressure(domain, self.space, pressure) for pressure in pressures]
         self._spring_matrix = Springs(self) if springs else None
 
@@ -141,12 +140,6 @@ class Body:
             forms.inertia(du, v, self.density, fem.volume_measure(self.domain, self.mass_degree)),
         ]
         return fem.compile_forms(wanted, f"body '{self.name}'")
-
-    def gravity_at(self, t: float) -> Array:
-        """Gravity [m/s^2] at owned dofs and the time t [s]."""
-        return self.nodal(self.gravity, t)[: self.owned].ravel() if self.gravity else np.zeros(self.size)
-
-    # ------------------------------------------------------------------------------------------------- state
 
     def nodal(self, value: Sequence[Value], t: float) -> Array:
         """Values of a vector field at all local nodes, shape (blocks, dim)."""

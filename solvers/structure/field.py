@@ -280,7 +280,6 @@ class Structure:
             internal[:] = body.internal_force()
             loads[:] = body.external_force(self.current.t)
         self.inertia.find_frame(now.u)
-        now.loads += self.inertia.lacking_weight(self.current.t)
 
     def _assemble_constraint(self) -> None:
         if self.constraint is not None and self._constrained is not None:

@@ -90,12 +90,6 @@ class ElasticInertia:
         if self.rigid is not None and self.frame is not None:
             self.momenta = self.rigid.momenta(self.frame, v, a, force)
 
-    def lacking_weight(self, t: float) -> Array | float:
-        """What the weight of `mass` has more than that of the true mass [N] at owned dofs."""
-        if self.rigid is None or self.frame is None or not any(body.gravity for body in self._bodies):
-            return 0.0
-        return self.rigid.weight(self.frame, np.concatenate([body.gravity_at(t) for body in self._bodies]))
-
     def times(self, v: Array) -> Array:
         """The true mass times a field at owned dofs, as the momentum of a velocity [kg m/s]."""
         product = times(self.mass, v)

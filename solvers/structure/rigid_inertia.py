@@ -218,13 +218,6 @@ class RigidInertia:
         """The difference of the mass matrices times a field at owned dofs (collective)."""
         return self.product(frame)(a)
 
-    def weight(self, frame: Frames, gravity: Array) -> Array:
-        """What the weight of the moved mass has more than that of the true mass [N] (collective).
-
-        Resultant and couple are those of the true mass. gravity: [m/s^2] at owned dofs.
-        """
-        return times(self._moved, gravity) - times(self._true, gravity) + self.times(frame, gravity)
-
     def force_by_acceleration(self, frame: Frames, v: Array, a: Array) -> Array:
         """f [N] of given velocities and accelerations of owned dofs (collective)."""
         (_, omega), (acceleration, spin) = self.velocities(frame, v), self.velocities(frame, a)
