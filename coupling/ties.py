@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.cell_types import CELL_TYPES
-from solvers.contact.contact import Contact
-from solvers.contact.law.tied import Tied
-from solvers.contact.surface import Surface
 from solvers.skin import Skin
 from solvers.structure.field import Structure
+
+if TYPE_CHECKING:
+    from solvers.contact.surface import Surface
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,11 @@ class Tie:
 
 def tied_sides(structure: Structure) -> list[Tie]:
     """The sides on elastic bodies of all tied pairs, two for each pair between such bodies."""
+    if structure.constraint is None:
+        return []
+    from solvers.contact.contact import Contact
+    from solvers.contact.law.tied import Tied
+
     contact = structure.constraint
     pairs = contact.pairs if isinstance(contact, Contact) else ()
     tied = [pair for pair in pairs if pair.law == Tied()]

@@ -50,6 +50,10 @@ class Constraint(Stateful, Protocol):
         """Global dofs of the nodes that their velocities could make active in this step; arguments as above."""
         ...
 
+    def largest_traction(self) -> float:
+        """Largest force per area [Pa] of the conditions that can open."""
+        ...
+
     def dofs(self) -> NDArray[np.int64]:
         """Global dofs of its nodes, -1 where there are none, shape (N, dim)."""
         ...

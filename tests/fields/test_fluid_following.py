@@ -74,7 +74,7 @@ def test_a_linear_flow_does_not_notice(element, scheme):
 
 
 def test_a_correction_that_stalls_leaves_the_solver_of_the_steps(monkeypatch):
-    """Multigrid stalls in the correction: the direct solver follows there, and steps keep incomplete factors."""
+    """Multigrid stalls in the correction, with either smoother: the direct solver follows, and steps keep theirs."""
 
     tried = []
 
@@ -92,7 +92,7 @@ def test_a_correction_that_stalls_leaves_the_solver_of_the_steps(monkeypatch):
     )  # fmt: skip
     for n in range(5):
         step(fluid, 0.04 * n, 0.04)
-    assert len(tried) == fluid.renewals - 1 > 0
+    assert len(tried) == 2 * (fluid.renewals - 1) > 0
     assert fluid.sequence.current == "ilu"
 
 
