@@ -12,7 +12,7 @@ from fsci.run.run import FINISHED, run_case
 #: Two halves of a flap in a channel.
 FLAP = """\
 title: A flap of two tied halves
-time: {{step: 0.1, end: 0.8}}
+time: {{step: 0.05, end: 0.65}}
 fluid:
   density: 1
   viscosity: 0.1
