@@ -123,6 +123,15 @@ def _parser() -> argparse.ArgumentParser:
         help="make a folder from which fsci resume computes the failed step alone",
     )
 
+    twin = command(_twin, "run a case with changes that must not change its answer, and show what they change")
+    twin.add_argument("case", metavar="CASE", type=Path, help="case file, or folder with a case.yaml")
+    settings(twin, "replace a setting of the case and of all twins")
+    twin.add_argument("-o", "--out", metavar="OUT", type=Path, required=True, help="folder for the runs and twin.json")
+    twin.add_argument("--quick", action="store_true", help="only the two twins that find most for their cost")
+    twin.add_argument(
+        "--only", metavar="NAME", action="append", default=[], help="only this twin, such as element; may be repeated"
+    )
+
     bench = command(_bench, "measure run time against error, in a copy of the repository")
     bench.add_argument("names", metavar="NAME", nargs="*", help="which benchmark, 'all', or none: list them")
     bench.add_argument("-o", "--out", metavar="FILE", type=Path, help="write the results as JSON")
@@ -284,6 +293,23 @@ def _explain(options: argparse.Namespace) -> int:
     except (OSError, ValueError) as error:
         return _fail(f"fsci explain: {error}")
     return 0
+
+
+def _twin(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError
+    from fsci.twin.twin import run_twins
+
+    try:
+        right = run_twins(
+            options.case, tuple(options.overrides), options.out, only=options.only, quickly=options.quick
+        )
+    except CaseError as error:
+        return _fail(str(error))
+    except KeyboardInterrupt:
+        return _fail("stopped; the same command goes on from here") + 1
+    except OSError as error:
+        return _fail(f"fsci twin: {error}")
+    return int(not right)
 
 
 def _bench(options: argparse.Namespace) -> int:

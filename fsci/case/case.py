@@ -59,6 +59,11 @@ class Case(Section):
         return self._document.path.parent
 
     @property
+    def settings(self) -> dict[str, Any]:
+        """What the file says, overrides applied; not to be changed."""
+        return dict(self._document.data)
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about implausible settings, with their positions."""
         return self._warnings

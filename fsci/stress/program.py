@@ -3,26 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
-import sys
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fsci.run.child import ENVIRONMENT, command
 from fsci.run.history import History, read_history
 
-ENVIRONMENT = {
-    **os.environ,
-    "OPENBLAS_NUM_THREADS": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_rmaps_base_oversubscribe": "1",
-    "OMPI_MCA_mpi_yield_when_idle": "1",
-    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
-}
 NEVER_ENDED = -1000  #: code of a run that was given up
 PATIENCE = 600.0  #: [s] until then; draws take seconds alone on a core, but a busy machine must not look like a hang
 
@@ -84,12 +74,6 @@ def steps_done(folder: Path) -> int:
     """Steps that a run has written so far."""
     path = folder / "out" / "history.csv"
     return path.read_bytes().count(b"\n") - 1 if path.exists() else 0
-
-
-def command(*arguments: str, processes: int = 1) -> list[str]:
-    """The command that starts the program."""
-    launcher = ["mpirun", "-n", str(processes)] if processes > 1 else []
-    return [*launcher, sys.executable, "-m", "fsci", *arguments]
 
 
 def _ended(folder: Path, arguments: list[str], patience: float) -> Ended:

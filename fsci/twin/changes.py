@@ -1,0 +1,153 @@
+"""Changes of a case that must not change its answer: what its answer changes by is an error, or a defect."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from fsci.case import Case
+from fsci.case.contact import PairSection
+from fsci.twin.grids import Settings, coarser, low_discrepancy, shifted
+
+#: What a difference means: the error of cells or steps, the scatter by where cells lie, contact that depends on the
+#: roles of its surfaces, or a defect of the program.
+Meaning = Literal["space", "time", "scatter", "roles", "defect"]
+SHIFTS = 8
+
+
+@dataclass(frozen=True)
+class Twin:
+    """The case with some settings changed."""
+
+    name: str
+    words: str  #: what is other
+    meaning: Meaning
+    settings: Settings = ()
+    processes: int = 1
+    opposite: tuple[str, ...] = ()  #: columns whose values change their sign
+
+
+def twins(case: Case) -> list[Twin]:
+    """All twins that a case has."""
+    found = (_elements, _schemes, _steps, _shifts, _facets, _orders_of_cells, _roles, _orders_of_bodies, _c_n)
+    return [twin for make in found for twin in make(case)] + [
+        Twin("processes", "two processes", "defect", processes=2)
+    ]
+
+
+def quick(all_twins: list[Twin]) -> list[Twin]:
+    """The two that find most for their cost: one for the error in space or of roles, one for that in time."""
+    ranks = ("coarse", "scheme", "exchange", "facets", "step", "order", "element")
+    return sorted((twin for twin in all_twins if twin.name in ranks), key=lambda twin: ranks.index(twin.name))[:2]
+
+
+def _elements(case: Case) -> Iterator[Twin]:
+    if case.fluid is None:
+        return
+    if case.fluid.element == "q2q1":
+        yield Twin("element", "element q1q1", "space", (("fluid.element", "q1q1"),))
+        return
+    other: Settings = (("fluid.element", "q2q1"), *((("fluid.narrow_gaps", "false"),) * case.fluid.narrow_gaps))
+    yield Twin("coarse", "element q2q1, cells twice as large", "space", (*other, *coarser(case.fluid.grid)))
+    yield Twin("element", "element q2q1", "space", other)
+
+
+def _schemes(case: Case) -> Iterator[Twin]:
+    settings: list[tuple[str, str]] = []
+    words: list[str] = []
+    if case.fluid is not None and case.fluid.scheme != "steady":
+        other = "bdf2_optimized" if case.fluid.scheme == "bdf2" else "bdf2"
+        settings.append(("fluid.scheme", other))
+        words.append(other)
+    dynamics = None if case.structure is None else case.structure.dynamics
+    if dynamics is not None and dynamics.rho_inf is not None:
+        settings.append(("structure.dynamics.rho_inf", str(_other_radius(dynamics.rho_inf))))
+        words.append(f"rho_inf {_other_radius(dynamics.rho_inf)}")
+    if settings:
+        yield Twin("scheme", ", ".join(words), "time", tuple(settings))
+
+
+def _other_radius(rho_inf: float) -> float:
+    """A spectral radius with other damping, which the time integration is stable with."""
+    return 0.9 if rho_inf < 0.7 else 0.5
+
+
+def _steps(case: Case) -> Iterator[Twin]:
+    if case.fluid is None or case.fluid.scheme != "steady" or case.elastic_bodies:
+        yield Twin("step", "half of the step", "time", (("time.step", repr(case.time.shared_step / 2.0)),))
+
+
+def _shifts(case: Case) -> Iterator[Twin]:
+    if case.fluid is None or not (case.fluid.bodies or case.elastic_bodies):
+        return
+    for number, shares in enumerate(low_discrepancy(case.fluid.grid.dimension, SHIFTS), 1):
+        words = f"planes moved by {', '.join(f'{share:+.2f}' for share in shares)} cells"
+        yield Twin(f"shift_{number}", words, "scatter", shifted(case.fluid.grid, shares.tolist()))
+
+
+def _facets(case: Case) -> Iterator[Twin]:
+    """Rigid bodies and obstacles of built-in shapes: only their surfaces count."""
+    rigid = {"fluid.bodies": {} if case.fluid is None else case.fluid.bodies}
+    obstacles = {"contact.obstacles": {} if case.contact is None else case.contact.obstacles}
+    settings = tuple(
+        (f"{group}.{name}.mesh.cells", json.dumps([2 * count for count in body.mesh.cells]))
+        for group, bodies in (rigid | obstacles).items()
+        for name, body in bodies.items()
+        if getattr(body.mesh, "shape", None) not in (None, "rectangle", "box", "beam")
+    )
+    if settings:
+        yield Twin("facets", "twice as many facets along rigid surfaces", "space", settings)
+
+
+def _orders_of_cells(case: Case) -> Iterator[Twin]:
+    """Bodies of first order from scripts and built-in shapes get cells of second order; other files have their own."""
+    settings = tuple(
+        (f"structure.bodies.{name}.mesh.order", "2")
+        for name, body in case.elastic_bodies.items()
+        if body.mesh.order == 1 and (not hasattr(body.mesh, "file") or body.mesh.file.endswith(".geo"))
+    )
+    if settings:
+        yield Twin("order", "elastic bodies of second order", "space", settings)
+
+
+def _roles(case: Case) -> Iterator[Twin]:
+    pairs = {} if case.contact is None else case.contact.pairs
+    swapped = [name for name, pair in pairs.items() if _can_be_swapped(pair)]
+    given = _section(case, "contact", "pairs")
+    settings = tuple(
+        (f"contact.pairs.{name}.{side}", json.dumps(given[name][other]))
+        for name in swapped
+        for side, other in (("slave", "master"), ("master", "slave"))
+    )
+    if settings:
+        columns = tuple(f"contact.{name}.{axis}" for name in swapped for axis in "xyz")
+        yield Twin("exchange", "slave and master exchanged", "roles", settings, opposite=columns)
+
+
+def _can_be_swapped(pair: PairSection) -> bool:
+    return pair.itself is None and pair.master is not None and pair.master.body is not None
+
+
+def _orders_of_bodies(case: Case) -> Iterator[Twin]:
+    settings = tuple(
+        (".".join(keys), json.dumps(dict(reversed(members.items()))))
+        for keys in (("structure", "bodies"), ("fluid", "bodies"), ("contact", "pairs"))
+        if len(members := _section(case, *keys)) > 1
+    )
+    if settings:
+        yield Twin("reversed", "bodies and pairs in the opposite order", "defect", settings)
+
+
+def _c_n(case: Case) -> Iterator[Twin]:
+    if case.contact is not None:
+        yield Twin("c_n", "ten times c_n", "defect", (("contact.c_n", repr(10.0 * case.contact.c_n)),))
+
+
+def _section(case: Case, *keys: str) -> dict[str, Any]:
+    """A section as the file says it; empty if it does not."""
+    section: Any = case.settings
+    for key in keys:
+        section = (section or {}).get(key)
+    return section or {}

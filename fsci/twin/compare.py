@@ -1,0 +1,85 @@
+"""How far the values of two runs of a case differ."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fsci.run.history import History
+
+
+@dataclass(frozen=True)
+class Value:
+    """A probe's column, or a number that `verify` looks at.
+
+    `curve` is the column over the time of the run and None of a number; changes are relative to `scale`.
+    """
+
+    value: float
+    scale: float
+    time: Any = None
+    curve: Any = None
+
+
+@dataclass(frozen=True)
+class Change:
+    """What a twin changes of a value, relative to its scale."""
+
+    value: float  #: of the last one
+    curve: float  #: the largest over time
+
+
+def values(history: History, summary: Mapping[str, Any], opposite: Collection[str] = ()) -> dict[str, Value]:
+    """All that can be compared of a run: columns of probes, and numbers of `verify` with a reference.
+
+    The scale of a column is the largest number in the columns of its probe, that of a number its own size. What
+    `verify` compares with zero is an error of the method, and no value. Columns in `opposite` have the other sign.
+    """
+    columns = [name for name in summary.get("probes", ()) if name in history]
+    found = {}
+    for name in columns:
+        of_probe = [history[other] for other in columns if _probe(other) == _probe(name)]
+        curve = history[name] * (-1.0 if name in opposite else 1.0)
+        found[name] = Value(float(curve[-1]), max(map(_largest, of_probe)), history["time"], curve)
+    for check in summary.get("verify", ()):
+        if check["value"] is not None and check["reference"] != 0.0 and check["name"].split()[0] not in columns:
+            sign = -1.0 if check["name"].split()[0] in opposite else 1.0
+            found[check["name"]] = Value(sign * check["value"], abs(check["value"]))
+    return found
+
+
+def changes(base: Mapping[str, Value], twin: Mapping[str, Value]) -> dict[str, Change]:
+    """By value; infinite where only one of both has it or is finite, zero where neither is."""
+    return {name: _change(value, twin.get(name)) for name, value in base.items()}
+
+
+def _change(base: Value, twin: Value | None) -> Change:
+    if twin is None:
+        return Change(math.inf, math.inf)
+    last = _relative(twin.value - base.value, base, twin)
+    if base.curve is None:
+        return Change(last, abs(last))
+    inside = (base.time >= twin.time[0]) & (base.time <= twin.time[-1])
+    other = np.interp(base.time[inside], twin.time, twin.curve)
+    both = np.isfinite(other) & np.isfinite(base.curve[inside])
+    difference = np.abs(other - base.curve[inside])[both].max(initial=0.0)
+    return Change(last, max(_relative(float(difference), base, twin), abs(last)))
+
+
+def _relative(difference: float, base: Value, twin: Value) -> float:
+    if math.isnan(difference):
+        return 0.0 if math.isnan(base.value) and math.isnan(twin.value) else math.inf
+    scale = max(base.scale, twin.scale)
+    return difference / scale if scale else 0.0
+
+
+def _probe(column: str) -> str:
+    return column.rsplit(".", 1)[0]
+
+
+def _largest(values: Any) -> float:
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))

@@ -1,0 +1,93 @@
+"""The runs of twins: each is a program of its own, as many at a time as there are cores, and none twice."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fsci.case import Case, CaseError, load_case
+from fsci.run.child import ENVIRONMENT, command
+from fsci.run.history import History, read_history
+from fsci.run.kept_case import copies
+from fsci.twin.changes import Twin
+from fsci.twin.grids import Settings
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How the run of a twin has ended: its results, or the message that says why there are none."""
+
+    twin: Twin
+    checksum: str = ""  #: of its case and of the files that this names
+    message: str = ""
+    history: History = field(default_factory=dict)
+    summary: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def seconds(self) -> float | None:
+        """What it took, on the clock."""
+        wall = self.summary.get("wall", {}).get("total")
+        return None if wall is None else float(wall)
+
+
+def run_all(
+    case: Case, overrides: Settings, twins: Sequence[Twin], out: Path, known: Mapping[str, str]
+) -> Iterator[Ended]:
+    """The ends of all runs, each as soon as it is there, with results in the folders of their names in `out`.
+
+    `overrides` are those that the case was read with. A twin whose checksum is in `known` has been run. An exception,
+    as KeyboardInterrupt, starts no more runs; those under way get the signal, too, and end by themselves.
+    """
+    cores = len(os.sched_getaffinity(0))
+    with ThreadPoolExecutor(max(1, cores // max((twin.processes for twin in twins), default=1))) as pool:
+        runs = []
+        for twin in twins:
+            settings = (*overrides, *twin.settings)
+            try:
+                checksum = _checksum(load_case(case.path, settings), twin.processes)
+            except CaseError as error:
+                yield Ended(twin, message=str(error))
+                continue
+            done = checksum == known.get(twin.name) and (out / twin.name / "summary.json").exists()
+            runs.append(pool.submit(_read if done else _run, case.path, settings, twin, out / twin.name, checksum))
+        try:
+            for run in as_completed(runs):
+                yield run.result()
+        finally:
+            for run in runs:
+                run.cancel()
+
+
+def _run(case: Path, settings: Settings, twin: Twin, folder: Path, checksum: str) -> Ended:
+    arguments = [f"--set={name}={value}" for name, value in settings]
+    ended = subprocess.run(
+        command("run", str(case), "-o", str(folder), *arguments, processes=twin.processes),
+        capture_output=True,
+        text=True,
+        env=ENVIRONMENT,
+    )
+    if not (folder / "summary.json").exists() or ended.returncode not in (0, 1):
+        return Ended(twin, message=(ended.stderr or ended.stdout).strip())
+    return _read(case, settings, twin, folder, checksum)
+
+
+def _read(case: Path, settings: Settings, twin: Twin, folder: Path, checksum: str) -> Ended:
+    summary = json.loads((folder / "summary.json").read_text())
+    if summary["status"] != "finished":
+        return Ended(twin, message=str(summary["message"] or summary["status"]), summary=summary)
+    return Ended(twin, checksum, "", read_history(folder / "history.csv"), summary)
+
+
+def _checksum(case: Case, processes: int) -> str:
+    """Of the text of a case, of the files that it names, and of the number of processes."""
+    found = hashlib.sha256(f"{processes}\n{case.dump()}".encode())
+    for file, _ in copies(case):
+        found.update(file.read_bytes())
+    return found.hexdigest()

@@ -1,0 +1,130 @@
+"""Twins of cases: their settings are cases, and change what they say and nothing else."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fsci.case import load_case
+from fsci.case.grid import GridSection
+from fsci.twin.changes import twins
+from fsci.twin.grids import low_discrepancy
+
+CASES = sorted(path.parent for path in (Path(__file__).parents[2] / "cases").glob("*/case.yaml"))
+FLOW = """
+time: {step: 0.1, end: 1}
+fluid:
+  density: 1
+  viscosity: 1
+  narrow_gaps: true
+  grid:
+    from: [0, -1]
+    to: [4, 1]
+    cells: [10, null]
+    y: [{to: 0, cells: 5, ratio: 2}, {to: 1, cells: 4}]
+    refine: [{around: disc, layers: 5}]
+  patches: {all: {on: [x-, x+, y-, y+], no_slip: true}}
+  bodies:
+    disc: {mesh: {shape: disc, radius: 0.3, cells: [24, 2]}}
+    box: {mesh: {shape: rectangle, origin: [2, 0], size: [0.3, 0.3], cells: [2, 2]}}
+"""
+
+
+@pytest.mark.parametrize("folder", CASES, ids=lambda folder: folder.name)
+def test_twins_are_cases(folder):
+    case = load_case(folder)
+    found = twins(case)
+    assert len({twin.name for twin in found}) == len(found)
+    for twin in found:
+        other = load_case(folder, twin.settings)
+        assert (json.dumps(other.settings) != json.dumps(case.settings)) == bool(twin.settings), twin.name
+
+
+@pytest.fixture
+def flow(tmp_path):
+    path = tmp_path / "case.yaml"
+    path.write_text(FLOW)
+
+    def other(name):
+        case = load_case(path)
+        return case, load_case(path, next(twin.settings for twin in twins(case) if twin.name == name))
+
+    return other
+
+
+def test_cells_twice_as_large(flow):
+    _, other = flow("coarse")
+    assert other.fluid.element == "q2q1"
+    assert not other.fluid.narrow_gaps
+    assert other.fluid.grid.shape == (5, 5)
+    assert other.fluid.grid.refine[0].layers == 3
+
+
+@pytest.mark.parametrize("number", range(1, 9))
+def test_planes_are_moved_by_less_than_half_a_cell(flow, number):
+    case, other = flow(f"shift_{number}")
+    for before, after in zip(case.fluid.grid.planes, other.fluid.grid.planes, strict=True):
+        assert len(before) == len(after)
+        assert (before[[0, -1]] == after[[0, -1]]).all()
+        share = (after - before)[1:-1] / ((before[2:] - before[:-2]) / 2.0)
+        assert share == pytest.approx(share[0])
+        assert 0.0 < abs(share[0]) <= 0.5
+
+
+def test_equal_cells_have_three_stretches(flow):
+    _, other = flow("shift_1")
+    assert [stretch.cells for stretch in other.fluid.grid.x] == [1, 8, 1]
+
+
+def test_facets_of_round_bodies(flow):
+    case, other = flow("facets")
+    assert other.fluid.bodies["disc"].mesh.cells == (48, 4)
+    assert other.fluid.bodies["box"] == case.fluid.bodies["box"]
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_points_fill_the_cube(dimension):
+    """The first one is the golden ratio's; the mean of the points goes to the middle as 1/N, at random as N^-1/2."""
+    points = low_discrepancy(dimension, 64)
+    assert np.abs(points).max() <= 0.5
+    assert np.abs(points.mean(axis=0)).max() < 0.03
+    if dimension == 1:
+        assert points[:, 0] == pytest.approx((0.5 + np.arange(1, 65) * 2.0 / (1.0 + 5.0**0.5)) % 1.0 - 0.5)
+
+
+def test_direction_with_one_cell_stays(tmp_path):
+    grid = GridSection(**{"from": [0, 0], "to": [1, 1], "cells": [1, 2]})
+    from fsci.twin.grids import shifted
+
+    changed = dict(shifted(grid, (0.4, 0.4)))
+    assert changed["fluid.grid.x"] == '[{"to": 1.0, "cells": 1}]'
+
+
+CONTACT = """
+time: {step: 1, end: 1}
+structure:
+  bodies:
+    low: {mesh: {shape: rectangle, size: [1, 1], cells: [2, 2]}, material: {law: neo_hooke, E: 1, nu: 0.3}}
+    high: {mesh: {shape: rectangle, size: [1, 1], origin: [0, 1], cells: [3, 3], order: 2}, material: {law: neo_hooke, E: 1, nu: 0.3}}
+contact:
+  obstacles: {floor: {mesh: {shape: rectangle, size: [9, 1], origin: [-4, -1], cells: [1, 1]}, on: top}}
+  pairs:
+    blocks: {slave: {body: high, on: bottom}, master: {body: low, on: top}, friction: {coefficient: 0.3}}
+    support: {slave: {body: low, on: bottom}, master: {obstacle: floor}}
+"""
+
+
+def test_roles(tmp_path):
+    path = tmp_path / "case.yaml"
+    path.write_text(CONTACT)
+    found = {twin.name: twin for twin in twins(load_case(path))}
+    assert set(found) == {"step", "order", "exchange", "reversed", "c_n", "processes"}
+    pair = load_case(path, found["exchange"].settings).contact.pairs
+    assert (pair["blocks"].slave.body, pair["blocks"].master.body) == ("low", "high")
+    assert pair["blocks"].friction.coefficient == 0.3
+    assert pair["support"].slave.body == "low"
+    assert found["exchange"].opposite == ("contact.blocks.x", "contact.blocks.y", "contact.blocks.z")
+    bodies = load_case(path, found["order"].settings).structure.bodies
+    assert [body.mesh.order for body in bodies.values()] == [2, 2]
+    assert list(load_case(path, found["reversed"].settings).contact.pairs) == ["support", "blocks"]
