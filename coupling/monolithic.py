@@ -28,7 +28,7 @@ from coupling.divided import lengths, step_in_parts
 from coupling.secant import Secant
 from coupling.start import start_together
 from solvers import linear
-from solvers.api import Array, State, StepFailed, StepInfo
+from solvers.api import Array, NoResidual, State, StepFailed, StepInfo
 from solvers.lagged import Lagged, LaggedFactors
 from solvers.newton import Tolerance, converge
 from solvers.petsc_python import free_deleted
@@ -92,10 +92,25 @@ class Monolithic:
         return step_in_parts(self._take, t, lengths(dt, self.coupled.flow.history.longest_step))
 
     def _take(self, t: float, dt: float) -> StepInfo:
+        """A step from its predictor, or from the state before it where the predictor leads astray.
+
+        Extrapolated displacements stretch a thin shell that turns. Newton's increment from there may be a hundred times
+        too long.
+        """
+        before = self.save()
+        try:
+            return self._take_from(t, dt, predicted=not self.coupled.flow.steady)
+        except NoResidual:
+            if self.coupled.flow.steady:
+                raise
+            self.restore(before)
+            return self._take_from(t, dt, predicted=False)
+
+    def _take_from(self, t: float, dt: float, *, predicted: bool) -> StepInfo:
         coupled = self.coupled
         coupled.begin_step(t, dt)
         self._begin_system()
-        if not coupled.flow.steady:
+        if predicted:
             self._predict(t + dt, self.residual())
         try:
             info = converge(self, self.tolerance)

@@ -300,9 +300,7 @@ def _twin(options: argparse.Namespace) -> int:
     from fsci.twin.twin import run_twins
 
     try:
-        right = run_twins(
-            options.case, tuple(options.overrides), options.out, only=options.only, quickly=options.quick
-        )
+        right = run_twins(options.case, tuple(options.overrides), options.out, only=options.only, quickly=options.quick)
     except CaseError as error:
         return _fail(str(error))
     except KeyboardInterrupt:

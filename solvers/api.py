@@ -87,7 +87,7 @@ class StepFailed(Exception):
 
     def with_reason(self, reason: str) -> StepFailed:
         """The same failure with another reason."""
-        return StepFailed(
+        return type(self)(
             self.field, reason, iteration=self.iteration, where=self.where, history=self.history, finding=self.finding
         )
 
@@ -95,6 +95,10 @@ class StepFailed(Exception):
     def hopeless(self) -> bool:
         """Whether a smaller step cannot help."""
         return self.finding is not None and self.finding.worthless == "end"
+
+
+class NoResidual(StepFailed):
+    """An iterate has none: elements are inverted, or surfaces are farther away than the flow can follow in a step."""
 
 
 class Stateful(Protocol):

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array, StepFailed, StepInfo
+from solvers.api import Array, NoResidual, StepFailed, StepInfo
 from solvers.counted import counted
 
 Flags = NDArray[np.bool_]
@@ -176,16 +176,17 @@ def converge(system: System, tolerance: Tolerance) -> StepInfo:
     for iterate in iterates(system, tolerance):
         history.append(iterate.residual)
         if not np.isfinite(iterate.residual).all():
-            reason, open_parts = "the residual is not a number", np.ones(len(iterate.residual), dtype=bool)
-        elif iterate.settled and (within := _within(iterate, system, tolerance)) is not None:
+            norms = _norms(history, np.ones(len(iterate.residual), dtype=bool))
+            reason = "the residual is not a number"
+            raise NoResidual(system.name, reason, iteration=iterate.number, where=system.worst(), history=norms)
+        if iterate.settled and (within := _within(iterate, system, tolerance)) is not None:
             return StepInfo(iterate.number, _norms(history, within))
-        elif iterate.number == tolerance.max_iterations:
-            open_parts = ~system.only_rounding()
-            size = _norms(history, open_parts)[-1]
-            reason = f"Newton did not converge in {counted(iterate.number, 'iteration')} (residual {size:.3g})"
-            reason += f": {cycle}" if (cycle := system.astray(0)) else ""
-        else:
+        if iterate.number < tolerance.max_iterations:
             continue
+        open_parts = ~system.only_rounding()
+        size = _norms(history, open_parts)[-1]
+        reason = f"Newton did not converge in {counted(iterate.number, 'iteration')} (residual {size:.3g})"
+        reason += f": {cycle}" if (cycle := system.astray(0)) else ""
         norms = _norms(history, open_parts)
         raise StepFailed(system.name, reason, iteration=iterate.number, where=system.worst(), history=norms)
     raise AssertionError("unreachable: iterates() has no end")

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from fsci.run.history import History, read_history
 from fsci.run.child import ENVIRONMENT, command
+from fsci.run.history import History, read_history
 from fsci.stress.program import steps_done, write
 
 #: A disc in a basin whose weight changes its sign every half second: it is pressed onto the floor, and lifted off.

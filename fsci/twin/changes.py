@@ -9,12 +9,17 @@ from typing import Any, Literal
 
 from fsci.case import Case
 from fsci.case.contact import PairSection
+from fsci.case.mesh import FileMesh
+from fsci.case.shapes.plane import Rectangle
+from fsci.case.shapes.solid import Beam, Box
 from fsci.twin.grids import Settings, coarser, low_discrepancy, shifted
 
 #: What a difference means: the error of cells or steps, the scatter by where cells lie, contact that depends on the
 #: roles of its surfaces, or a defect of the program.
 Meaning = Literal["space", "time", "scatter", "roles", "defect"]
 SHIFTS = 8
+#: Shapes whose facets are exact.
+FLAT = Rectangle | Box | Beam
 
 
 @dataclass(frozen=True)
@@ -32,9 +37,7 @@ class Twin:
 def twins(case: Case) -> list[Twin]:
     """All twins that a case has."""
     found = (_elements, _schemes, _steps, _shifts, _facets, _orders_of_cells, _roles, _orders_of_bodies, _c_n)
-    return [twin for make in found for twin in make(case)] + [
-        Twin("processes", "two processes", "defect", processes=2)
-    ]
+    return [twin for make in found for twin in make(case)] + [Twin("processes", "two processes", "defect", processes=2)]
 
 
 def quick(all_twins: list[Twin]) -> list[Twin]:
@@ -89,13 +92,14 @@ def _shifts(case: Case) -> Iterator[Twin]:
 
 def _facets(case: Case) -> Iterator[Twin]:
     """Rigid bodies and obstacles of built-in shapes: only their surfaces count."""
-    rigid = {"fluid.bodies": {} if case.fluid is None else case.fluid.bodies}
-    obstacles = {"contact.obstacles": {} if case.contact is None else case.contact.obstacles}
+    rigid = {} if case.fluid is None else {f"fluid.bodies.{name}": body for name, body in case.fluid.bodies.items()}
+    obstacles = {} if case.contact is None else case.contact.obstacles
+    meshes = {name: body.mesh for name, body in rigid.items()}
+    meshes |= {f"contact.obstacles.{name}": obstacle.mesh for name, obstacle in obstacles.items()}
     settings = tuple(
-        (f"{group}.{name}.mesh.cells", json.dumps([2 * count for count in body.mesh.cells]))
-        for group, bodies in (rigid | obstacles).items()
-        for name, body in bodies.items()
-        if getattr(body.mesh, "shape", None) not in (None, "rectangle", "box", "beam")
+        (f"{name}.mesh.cells", json.dumps([2 * count for count in mesh.cells]))
+        for name, mesh in meshes.items()
+        if not isinstance(mesh, FileMesh | FLAT)
     )
     if settings:
         yield Twin("facets", "twice as many facets along rigid surfaces", "space", settings)
@@ -106,7 +110,7 @@ def _orders_of_cells(case: Case) -> Iterator[Twin]:
     settings = tuple(
         (f"structure.bodies.{name}.mesh.order", "2")
         for name, body in case.elastic_bodies.items()
-        if body.mesh.order == 1 and (not hasattr(body.mesh, "file") or body.mesh.file.endswith(".geo"))
+        if body.mesh.order == 1 and (not isinstance(body.mesh, FileMesh) or body.mesh.file.endswith(".geo"))
     )
     if settings:
         yield Twin("order", "elastic bodies of second order", "space", settings)

@@ -90,7 +90,9 @@ def _progress(one: Ended) -> str:
     return f"{one.twin.name:10} {seconds:10} {one.message or one.twin.words}"
 
 
-def _compared(runs: Sequence[Twin], ended: Mapping[str, Ended]) -> tuple[dict[str, Value], dict[str, dict[str, Change]]]:
+def _compared(
+    runs: Sequence[Twin], ended: Mapping[str, Ended]
+) -> tuple[dict[str, Value], dict[str, dict[str, Change]]]:
     """Values of the case itself, and what each twin changes of them."""
     base = ended.get(BASE.name)
     if base is None or base.message:
@@ -148,11 +150,15 @@ def _table(runs: Sequence[Twin], ended: Mapping[str, Ended]) -> list[str]:
             worst[kind] = max(worst[kind], (change, name))
             row += f"{_percent(change):>11}"
         lines.append(row)
-    lines.append("Largest changes over the time of the run, relative to the largest value of the probe; shifts: their mean.")
+    lines.append(
+        "Largest changes over the time of the run, relative to the largest value of the probe; shifts: their mean."
+    )
     for kind, members in kinds.items():
         change, name = worst[kind]
         words = members[0].words if len(members) == 1 else f"planes of the grid moved, {len(members)} times"
-        saying = "nothing changes" if change <= AGREEMENT else f"{name} {_percent(change)}: {SAYINGS[members[0].meaning]}"
+        saying = (
+            "nothing changes" if change <= AGREEMENT else f"{name} {_percent(change)}: {SAYINGS[members[0].meaning]}"
+        )
         lines.append(f"{kind}: {words}: {saying}")
     return lines
 

@@ -55,3 +55,22 @@ def test_predictors_are_taken_back_to_the_start_of_the_step():
     scheme.retreat(1.0)
     assert coupled.solid.structure.now.u == pytest.approx(before.u, abs=1e-14)
     assert coupled.flow.flow == pytest.approx(before.flow, abs=1e-12)
+
+
+def test_predictors_out_of_reach_are_dropped(monkeypatch):
+    """The step is then that from the state before it, at its full length."""
+    from test_fsci_rebound import DT, start
+
+    found = []
+    for far in (0.0, 1.0):
+        scheme = start().scheme
+        for step in range(3):
+            scheme.step(step * DT, DT)
+
+        def predict(_, coupled=scheme.coupled, far=far, **__):
+            coupled.solid.structure.now.u += far
+
+        monkeypatch.setattr(scheme.coupled, "predict", predict)
+        scheme.step(3 * DT, DT)
+        found.append(scheme.coupled.solid.structure.now.u.copy())
+    assert found[1] == pytest.approx(found[0], abs=1e-13)

@@ -106,7 +106,9 @@ time: {step: 1, end: 1}
 structure:
   bodies:
     low: {mesh: {shape: rectangle, size: [1, 1], cells: [2, 2]}, material: {law: neo_hooke, E: 1, nu: 0.3}}
-    high: {mesh: {shape: rectangle, size: [1, 1], origin: [0, 1], cells: [3, 3], order: 2}, material: {law: neo_hooke, E: 1, nu: 0.3}}
+    high:
+      mesh: {shape: rectangle, size: [1, 1], origin: [0, 1], cells: [3, 3], order: 2}
+      material: {law: neo_hooke, E: 1, nu: 0.3}
 contact:
   obstacles: {floor: {mesh: {shape: rectangle, size: [9, 1], origin: [-4, -1], cells: [1, 1]}, on: top}}
   pairs:

@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from solvers.api import StepFailed
+from solvers.api import NoResidual, StepFailed
 from solvers.fluid.background.grid import DistributedGrid
 from solvers.fluid.background.nested import FINE_LAYERS
 from solvers.fluid.background.space import Unknowns
@@ -67,7 +67,7 @@ def require_history(fluid: FlowInMotion, cut: Cut, missing: NDArray[np.bool_]) -
         raise moved_too_far(fluid, max(fluid.began.layers, 1), tuple(places[0][0]))
 
 
-def moved_too_far(fluid: FlowInMotion, cells: int, place: tuple[float, ...] | None = None) -> StepFailed:
+def moved_too_far(fluid: FlowInMotion, cells: int, place: tuple[float, ...] | None = None) -> NoResidual:
     """The failure of a step in which a body moved by more than some cells, or else fluid appears at a place [m]."""
     assert fluid.began is not None
     ways = [
@@ -79,13 +79,13 @@ def moved_too_far(fluid: FlowInMotion, cells: int, place: tuple[float, ...] | No
     if way <= cells and place is not None:
         where = ", ".join(f"{x:.4g}" for x in place)
         reason = f"fluid appears near ({where}) where there was none, though no body moved by more than {cells} cells"
-        return StepFailed("fluid", f"{reason}: take a smaller time step, or finer cells there", where=place)
+        return NoResidual("fluid", f"{reason}: take a smaller time step, or finer cells there", where=place)
     vertex = int(ways[farthest].argmax())
     reason = (
         f"body '{fluid.bodies[farthest].surface.name}' moved by {way:.3g} cells in one step; velocities are "
         f"extrapolated to {cells} behind its surface: take a time step below {fluid.current.dt * cells / way:.2g}"
     )
-    return StepFailed("fluid", reason, where=tuple(fluid.motions[farthest].x[vertex].tolist()))
+    return NoResidual("fluid", reason, where=tuple(fluid.motions[farthest].x[vertex].tolist()))
 
 
 def require_finest(cutter: Cutter, comm: MPI.Comm) -> None:
