@@ -95,7 +95,7 @@ def _resolution(summary: Mapping[str, Any]) -> str:
             _number(found["error"]),
             found["message"],
         )
-        for found in summary["resolution"]
+        for found in summary.get("resolution", ())
     ]
     words = ("", "body", "gap to", "cells", "across, or at least", "error in the benchmark [%]", "message")
     return table(words, rows)

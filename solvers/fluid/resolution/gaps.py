@@ -1,7 +1,7 @@
 """Gaps between surfaces, and between surfaces and the box, in cells.
 
 The gap at a point x of a surface is the diameter of the largest ball in front of it that touches the surface there and
-has no other point of a surface in it. Balls shrink: as long as a point q is in the ball around x + r n, the one
+has no other point of a facing surface in it. Balls shrink: as long as a point q is in the ball around x + r n, the one
 through q, r = |q - x|^2 / (2 n (q - x)), takes its place.
 Source: J. Ma, S. W. Bae, S. Choi, The Visual Computer 28 (2012) 7-19.
 """
@@ -23,6 +23,8 @@ from solvers.tessellation import area_vectors
 FACING = 0.7
 #: Parts of the edges of a facet at most, where facets are larger than cells.
 PARTS = 64
+#: Points closest to the middle of a ball, of which one that faces the wall counts first. At corners others are as close.
+NEAREST = 8
 #: Balls that are tried at most: five to ten are needed.
 TRIED = 40
 
@@ -101,23 +103,26 @@ def _to_surfaces(samples: Samples, farthest: float) -> tuple[Array, NDArray[np.i
     """(widths [m], infinite where no facing sample is closer than the farthest, numbers of the facing samples)."""
     count = len(samples.x)
     width, partner, radius = np.full(count, np.inf), np.arange(count), np.full(count, 0.5 * farthest)
-    left, tree = np.arange(count), cKDTree(samples.x) if count else None
+    left, nearest = np.arange(count), min(NEAREST, count)
+    tree = cKDTree(samples.x) if count else None
     for _ in range(TRIED):
         if tree is None or not len(left):
             break
         x, n, r = samples.x[left], samples.normal[left], radius[left]
-        distance, q = tree.query(x + r[:, None] * n)
-        inside = distance < r * (1.0 - 1e-6)
-        left, q, x, n = left[inside], q[inside], x[inside], n[inside]
+        distance, q = (found.reshape(len(left), nearest) for found in tree.query(x + r[:, None] * n, nearest))
+        inside = distance < (r * (1.0 - 1e-6))[:, None]
+        facing = -np.einsum("ni,nki->nk", n, samples.normal[q])
+        first = np.argmax(inside & (facing > FACING), axis=1)  # the closest that faces it, else the closest
+        some = np.flatnonzero(inside[:, 0])
+        left, x, n, q, facing = left[some], x[some], n[some], q[some, first[some]], facing[some, first[some]]
         away = samples.x[q] - x
         along = np.einsum("ni,ni->n", away, n)
         radius[left] = np.divide((away**2).sum(axis=1), 2.0 * along, out=0.5 * radius[left], where=along > 0.0)
         # the plane of the other facet is closer than its point, where points are farther apart than the gap is wide
-        facing = -np.einsum("ni,ni->n", n, samples.normal[q])
         plane = -2.0 * np.einsum("ni,ni->n", away, samples.normal[q]) / (1.0 + np.maximum(facing, 0.0))
         found = (facing > FACING) & (plane > 0.0)
-        width[left] = np.where(found, np.minimum(plane, 2.0 * radius[left]), np.inf)
-        partner[left] = np.where(found, q, left)
+        width[left[found]] = np.minimum(plane, 2.0 * radius[left])[found]
+        partner[left[found]] = q[found]
     return width, partner
 
 

@@ -15,7 +15,7 @@ from solvers.fluid.resolution.gaps import Gaps, Plane, Samples, gaps, samples_of
 from solvers.tessellation import unit_normals
 
 #: Gaps up to so many cells count as such; the flow in wider ones is that around the body.
-NARROW = 8.0
+NARROW = 5.0
 #: Cosine of the least angle between facets that meet in an edge of the body.
 EDGE = 0.7
 
