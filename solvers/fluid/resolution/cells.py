@@ -13,7 +13,7 @@ class GapCells:
     to: str  #: name of the other body, or of the face
     cells: float  #: geometric mean, weighted by what acts there
     least: float  #: cells at the narrowest place
-    share: float  #: of the force on the body
+    share: float  #: of the force on the body, as far as a flow explains it
 
 
 @dataclass(frozen=True)
@@ -25,5 +25,5 @@ class BodyCells:
     layer: float  #: cells in its boundary layer; infinite: no shear acts, nan: the flow is not known
     sharp: bool  #: it has edges
     facets: float  #: facets per cell, by their edge lengths
-    share: float  #: of the force that does not act in narrow gaps
+    share: float  #: of the force that does not act in narrow gaps, as far as a flow explains it
     gaps: tuple[GapCells, ...]

@@ -23,7 +23,7 @@ from solvers.tessellation import area_vectors
 FACING = 0.7
 #: Parts of the edges of a facet at most, where facets are larger than cells.
 PARTS = 64
-#: Points closest to the middle of a ball, of which one that faces the wall counts first. At corners others are as close.
+#: Points closest to the middle of a ball, of which one that faces the wall counts first: at corners, others are close.
 NEAREST = 8
 #: Balls that are tried at most: five to ten are needed.
 TRIED = 40

@@ -16,66 +16,59 @@ from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.fluid.field import Fluid
 from solvers.fluid.resolution.cells import BodyCells
-from solvers.fluid.resolution.gaps import Gaps, Samples, gaps, samples_of
-from solvers.fluid.resolution.shape import NARROW, shape_of, walls_of_box
+from solvers.fluid.resolution.shape import NARROW, Scene, present, scene_of, shape_of, walls_of_box
 from solvers.tessellation import unit_normals
+
+#: Force that friction and dynamic pressure may explain, in multiples of them: the pressure in a film is by its length
+#: over its height larger than its shear. Fluid at rest has neither, whatever the pressure in it.
+EXPLAINED = 100.0
 
 
 def measure(fluid: Fluid) -> list[BodyCells]:
     """Of all bodies with wet surfaces, in the present cut and flow (collective)."""
     if not fluid.bodies or fluid.system.cut is None:
         return []
-    cut, names = fluid.cut, [body.surface.name for body in fluid.bodies]
-    force, wet = fluid.system.force_on_facets()
-    corners, grid = cut.motion.x[cut.facets], fluid.grid.grid
-    samples = samples_of(grid, corners)
-    samples = samples[wet[samples.facet] > 0.0]
+    cut, starts = fluid.cut, np.cumsum([len(body.surface.facets) for body in fluid.bodies])[:-1]
+    corners = np.split(cut.motion.x[cut.facets], starts)
+    bodies = [(body.surface.name, part) for body, part in zip(fluid.bodies, corners, strict=True)]
     walls = walls_of_box((patch.faces, patch.record) for patch in fluid.patches)
-    owner = np.repeat(np.arange(len(names)), [len(body.surface.facets) for body in fluid.bodies])
-    found = gaps(grid, samples, [plane for plane, _ in walls])
-    normal = unit_normals(corners)
-    return [
-        _of_body(fluid, number, samples, found, owner, [*names, *(face for _, face in walls)], force, wet, normal)
-        for number in np.unique(owner[samples.facet]).tolist()
-    ]
+    force, wet = fluid.system.force_on_facets()
+    scene = scene_of(fluid.grid.grid, walls, bodies, wet > 0.0)
+    return [_of_body(fluid, scene, body, force, wet) for body in present(scene)]
 
 
-def _of_body(
-    fluid: Fluid, number: int, samples: Samples, found: Gaps, owner: NDArray[np.int64], names: list[str],
-    force: Array, wet: Array, normal: Array,
-) -> BodyCells:  # fmt: skip
-    facets = owner == number
+def _of_body(fluid: Fluid, scene: Scene, body: int, force: Array, wet: Array) -> BodyCells:
+    normal, speed = unit_normals(scene.corners), _speed(fluid, body)
     along = np.einsum("fi,fi->f", force, normal)
-    level = _median(along[facets & (wet > 0.0)] / wet[facets & (wet > 0.0)], wet[facets & (wet > 0.0)])
+    level = _median(along / np.maximum(wet, 1e-300), np.where(scene.owner == body, wet, 0.0))
     acting = np.linalg.norm(force - level * wet[:, None] * normal, axis=1)
     shear = np.linalg.norm(force - along[:, None] * normal, axis=1)
-    total = np.bincount(samples.facet, samples.area, len(facets))
-    part = samples.area / total[samples.facet]
-    corners = fluid.cut.motion.x[fluid.cut.facets]
-    body = shape_of(number, samples, found, owner, names, (acting[samples.facet] * part), corners)
-    free = (owner[samples.facet] == number) & (found.cells >= NARROW)
-    drag, area = (float((values[samples.facet] * part)[free].sum()) for values in (shear, wet))
-    layer = np.inf
-    if drag > 0.0:
-        across = area / float((part * wet[samples.facet] / samples.across)[free].sum())
-        layer = fluid.settings.viscosity * _speed(fluid, number) * area / drag / across
-    return replace(body, layer=float(layer))
+    dynamic = fluid.settings.density * speed**2 * wet if fluid.settings.convection else 0.0
+    counts = np.minimum(acting, EXPLAINED * (shear + dynamic))
+    found = shape_of(scene, body, scene.of_samples(acting), scene.of_samples(counts))
+    samples = scene.samples
+    free = (scene.owner[samples.facet] == body) & (scene.gaps.cells >= NARROW)
+    area, drag = scene.of_samples(wet)[free], float(scene.of_samples(shear)[free].sum())
+    if drag == 0.0:
+        return replace(found, layer=np.inf)
+    across = float((area / samples.across[free]).sum())  # the area in cells along the normal
+    return replace(found, layer=fluid.settings.viscosity * speed * across / drag)
 
 
 def _median(values: Array, weights: Array) -> float:
+    """The value with half of the weight below it."""
     order = np.argsort(values)
     sums = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(sums, 0.5 * sums[-1])])
 
 
-def _speed(fluid: Fluid, number: int) -> float:
+def _speed(fluid: Fluid, body: int) -> float:
     """Largest velocity relative to a body within half of its extent around it [m/s] (collective)."""
-    motion, nodes = fluid.motions[number], fluid.unknowns.velocity
+    motion, nodes = fluid.motions[body], fluid.unknowns.velocity
     low, high = motion.x.min(axis=0), motion.x.max(axis=0)
     margin = 0.5 * (high - low).max()
     x = nodes.points[: nodes.owned, : fluid.dim]

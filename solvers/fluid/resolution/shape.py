@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,74 +34,106 @@ def walls_of_box(patches: Iterable[tuple[Sequence[str], PatchKind]]) -> list[tup
     ]
 
 
-def at_start(grid: Grid, planes: Sequence[tuple[Plane, str]], surfaces: Sequence[tuple[str, Array]]) -> list[BodyCells]:
-    """Of bodies by (name, corners of their facets (facets, dim, dim) [m]), without a flow; planes: walls and names.
+@dataclass(frozen=True)
+class Scene:
+    """Surfaces in the box, with the gaps in front of them."""
 
-    Shares of the force are those of a film: what acts is proportional to 1 / gap^2.
+    bodies: list[str]
+    faces: list[str]  #: names of the walls of the box, in the order of the planes
+    corners: Array  #: of the facets of all bodies, (facets, dim, dim) [m]
+    owner: NDArray[np.int64]  #: body of each facet
+    samples: Samples
+    gaps: Gaps
+
+    def of_samples(self, by_facet: Array) -> Array:
+        """Values that are spread over facets, at the samples: in proportion to their areas."""
+        facet, area = self.samples.facet, self.samples.area
+        return by_facet[facet] * area / np.bincount(facet, area, len(self.owner))[facet]
+
+
+def scene_of(
+    grid: Grid,
+    walls: Sequence[tuple[Plane, str]],
+    bodies: Sequence[tuple[str, Array]],
+    wet: NDArray[np.bool_] | None = None,
+) -> Scene:
+    """Of bodies by (name, corners of their facets).
+
+    walls: of the box, with names; wet: mask of the facets that count.
     """
-    if not surfaces:
+    corners = np.concatenate([corners for _, corners in bodies])
+    owner = np.repeat(np.arange(len(bodies)), [len(corners) for _, corners in bodies])
+    samples = samples_of(grid, corners)
+    if wet is not None:
+        samples = samples[wet[samples.facet]]
+    found = gaps(grid, samples, [plane for plane, _ in walls])
+    return Scene([name for name, _ in bodies], [face for _, face in walls], corners, owner, samples, found)
+
+
+def at_start(grid: Grid, walls: Sequence[tuple[Plane, str]], bodies: Sequence[tuple[str, Array]]) -> list[BodyCells]:
+    """Of bodies as in `scene_of`, without a flow.
+
+    Shares of the force are those of films: what acts is proportional to 1 / gap^2.
+    """
+    if not bodies:
         return []
-    corners = np.concatenate([corners for _, corners in surfaces])
-    owner = np.repeat(np.arange(len(surfaces)), [len(corners) for _, corners in surfaces])
-    samples, names = samples_of(grid, corners), [name for name, _ in surfaces]
-    found = gaps(grid, samples, [plane for plane, _ in planes])
-    names += [face for _, face in planes]
-    weight = samples.area / np.minimum(found.cells, 1e6) ** 2
-    return [
-        shape_of(number, samples, found, owner, names, weight, corners)
-        for number in np.unique(owner[samples.facet]).tolist()
-    ]
+    scene = scene_of(grid, walls, bodies)
+    acting = scene.samples.area / np.minimum(scene.gaps.cells, 1e6) ** 2
+    return [shape_of(scene, body, acting, acting) for body in present(scene)]
 
 
-def shape_of(
-    number: int, samples: Samples, found: Gaps, owner: NDArray[np.int64], names: list[str], weight: Array,
-    corners: Array,
-) -> BodyCells:  # fmt: skip
-    """Of one body; owner: of each facet; names: of bodies and planes; weight: what acts at each sample."""
-    some = np.flatnonzero(owner[samples.facet] == number)
-    facets = np.unique(samples.facet[some])
-    points = corners[owner == number].reshape(-1, corners.shape[2])
+def present(scene: Scene) -> list[int]:
+    """Numbers of the bodies with samples."""
+    found: list[int] = np.unique(scene.owner[scene.samples.facet]).tolist()
+    return found
+
+
+def shape_of(scene: Scene, body: int, acting: Array, counts: Array) -> BodyCells:
+    """Of one body; acting: size of the force at each sample; counts: the part of it that shares are of."""
+    samples = scene.samples
+    some = np.flatnonzero(scene.owner[samples.facet] == body)
+    corners = scene.corners[np.unique(samples.facet[some])]
+    points = scene.corners[scene.owner == body].reshape(-1, scene.corners.shape[2])
     extent = np.sort(np.ptp(points, axis=0))[1]
-    across = np.average(1.0 / samples.across[some], weights=samples.area[some])
-    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)[facets].mean()
-    total = max(float(weight[some].sum()), 1e-300)
-    gap_list = tuple(_gaps_of(number, some, found, owner[samples.facet], names, weight / total))
-    share = 1.0 - sum(gap.share for gap in gap_list)
-    sharp = has_edges(corners[facets])
+    per_length = np.average(1.0 / samples.across[some], weights=samples.area[some])
+    edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean()
+    share = counts / max(float(acting[some].sum()), 1e-300)
+    narrow = scene.gaps.cells[some] < NARROW
     return BodyCells(
-        names[number], float(extent * across), np.nan, sharp, float(1.0 / (edges * across)), share, gap_list
+        scene.bodies[body],
+        across=float(extent * per_length),
+        layer=np.nan,
+        sharp=has_edges(corners),
+        facets=float(1.0 / (edge * per_length)),
+        share=float(share[some[~narrow]].sum()),
+        gaps=tuple(_gaps_of(scene, body, some[narrow], share)),
     )
 
 
-def _gaps_of(
-    number: int, some: NDArray[np.int64], found: Gaps, owner: NDArray[np.int64], names: list[str], weight: Array
-) -> Iterator[GapCells]:
-    """The narrow gaps of a body, by what is opposite."""
-    some = some[found.cells[some] < NARROW]
-    bodies = len(names) - max((-found.partner).max(initial=0), 0)
-    opposite = np.where(found.partner < 0, bodies - 1 - found.partner, owner[np.maximum(found.partner, 0)])
-    for other in np.unique(opposite[some]).tolist():
-        here = some[opposite[some] == other]
-        w, cells = weight[here], np.maximum(found.cells[here], 1e-6)
-        share = float(w.sum())
-        mean = float(np.exp(np.average(np.log(cells), weights=w))) if share > 0.0 else float(cells.min())
-        yield GapCells(names[number], names[other], mean, float(cells.min()), share)
+def _gaps_of(scene: Scene, body: int, some: NDArray[np.int64], share: Array) -> Iterator[GapCells]:
+    """Gaps in front of some samples, by what is opposite."""
+    partner = scene.gaps.partner[some]
+    of_bodies = scene.owner[scene.samples.facet[np.maximum(partner, 0)]]
+    opposite = np.where(partner < 0, len(scene.bodies) - 1 - partner, of_bodies)
+    names = [*scene.bodies, *scene.faces]
+    for other in np.unique(opposite).tolist():
+        here = some[opposite == other]
+        weight, cells = share[here], np.maximum(scene.gaps.cells[here], 1e-6)
+        total = float(weight.sum())
+        mean = float(np.exp((weight * np.log(cells)).sum() / total)) if total > 0.0 else float(cells.min())
+        yield GapCells(scene.bodies[body], names[other], mean, float(cells.min()), total)
 
 
 def has_edges(corners: Array) -> bool:
     """Whether facets meet at an angle; corners: (facets, dim, dim), those that meet have equal corners."""
-    normal = unit_normals(corners)
-    dim = corners.shape[2]
+    normal, dim = unit_normals(corners), corners.shape[2]
     _, vertex = np.unique(corners.reshape(-1, dim), axis=0, return_inverse=True)
     vertex = vertex.reshape(corners.shape[:2])
-    sides = (
-        vertex
-        if dim == 2
-        else np.sort(np.concatenate([vertex[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))]), axis=1)
-    )
-    keys = sides.reshape(-1) if dim == 2 else sides[:, 0] * (vertex.max(initial=0) + 1) + sides[:, 1]
-    facet = np.repeat(np.arange(len(corners)), 2) if dim == 2 else np.tile(np.arange(len(corners)), 3)
-    order = np.argsort(keys, kind="stable")
-    keys, facet = keys[order], facet[order]
-    meet = keys[1:] == keys[:-1]
+    # what two facets share: in 2D a vertex, in space an edge
+    pairs = [[0], [1]] if dim == 2 else [[0, 1], [1, 2], [0, 2]]
+    sides = np.sort(np.concatenate([vertex[:, pair] for pair in pairs]), axis=1)
+    _, side = np.unique(sides, axis=0, return_inverse=True)
+    order = np.argsort(side.ravel(), kind="stable")
+    facet = np.tile(np.arange(len(corners)), len(pairs))[order]
+    meet = np.diff(side.ravel()[order]) == 0
     return bool((np.einsum("ni,ni->n", normal[facet[1:]], normal[facet[:-1]])[meet] < EDGE).any())
