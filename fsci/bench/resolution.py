@@ -22,7 +22,7 @@ BODIES = (
     ("sharp", "plate", (0.13, 1.0), (0, 20)),
 )
 #: Cells along the diameter, and those of the reference, which q2q1 computes.
-CELLS = {"q1q1": (5, 8, 12, 20), "q2q1": (4, 6, 10)}
+CELLS = {"q1q1": (5, 8, 12, 20), "q2q1": (2, 3, 4, 6, 10)}
 FINEST = 32
 #: Cells in the gap of a cylinder that approaches a wall, `GAP` radii high.
 GAP = 0.1

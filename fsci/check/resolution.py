@@ -19,7 +19,10 @@ from solvers.tessellation import tessellate
 
 
 def coarse(case: Case, bodies: list[Placed]) -> Iterator[Said]:
-    """What errors such bodies and films had at best: of bodies at the start, and of driven ones at the end, too."""
+    """What errors rigid bodies and their films had at best, at the start, and of driven ones at the end, too.
+
+    Of elastic bodies it is not known which forces count.
+    """
     assert case.fluid is not None
     dry = () if case.coupling is None else case.coupling.dry_side
     placed = [body for body in bodies if body.name not in dry]
@@ -31,6 +34,8 @@ def coarse(case: Case, bodies: list[Placed]) -> Iterator[Said]:
     start = case.time.start + (case.time.step if case.fluid.scheme == "steady" else 0.0)
     for t in (start, case.time.end) if driven else (start,):
         for body in at_start(grid, walls, [(body.name, _corners(case, body, t)) for body in placed]):
+            if body.body not in case.fluid.bodies:
+                continue
             for about, text in before_the_run(body, case.fluid.element, films=body.body in films):
                 if about not in said:
                     said.add(about)

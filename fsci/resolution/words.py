@@ -14,6 +14,8 @@ from solvers.fluid.resolution.cells import BodyCells, GapCells
 #: Error [%] from which on a message is a warning. The table is known to a factor of two: what is above 5 % warns, and
 #: what is below 1 % does not, with any value from 2 to 3.
 WARNED = 2.5
+#: The same before the flow is known: what acts on the body may be another force.
+SURE = 5.0
 #: Error [%] that the remedy aims at.
 GOOD = 1.0
 
@@ -48,22 +50,22 @@ def resolved(bodies: Sequence[BodyCells], element: str) -> list[Resolved]:
 
 
 def before_the_run(body: BodyCells, element: str, *, films: bool) -> Iterator[tuple[tuple[str, str], str]]:
-    """(body and what a gap is to, warning) when nothing but the shape is known: the least error of the scenes.
+    """(body and what a gap is to, warning) about a rigid body, when nothing but the shape is known.
 
-    films: the body moves in its narrow gaps.
+    Across the body it is the least error of the scenes. films: the body moves in its narrow gaps.
     """
 
     def errors(element: str, cells: float) -> float:
         return least_error(_kind(body), element, cells)
 
     off = errors(element, body.across)
-    if off >= WARNED:
+    if off >= SURE:
         more = f"{_number(cells_for(partial(errors, element), GOOD, body.across))} cells"
         words = f"forces were {_number(off)} % off in the benchmark, or more"
         text = f"{_number(body.across)} cells across the body: {words}{_remedy(errors, element, body.across, more)}"
         yield (body.body, ""), text
     if films:
-        yield from (((found.body, found.to), found.message) for found in _of_gaps(body, element) if found.warns)
+        yield from (((found.body, found.to), found.message) for found in _of_gaps(body, element) if found.error >= SURE)
 
 
 def _kind(body: BodyCells) -> Kind:

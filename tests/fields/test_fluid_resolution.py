@@ -110,6 +110,10 @@ def test_bodies_before_the_flow():
     assert (first.across, second.across) == pytest.approx((40, 10))
     assert [(gap.to, round(gap.least, 6)) for gap in second.gaps] == [("long", 2.0)]
     assert [gap.to for gap in first.gaps] == ["small"]  # 11 cells to the face are no narrow gap
+    half = block((0.5, 2), (3, 0))
+    for mirror, across in ((False, 20), (True, 40)):
+        (found,) = at_start(grid, [(Plane(1, 0, mirror), "y-")], [("half", half)])
+        assert found.across == pytest.approx(across)
 
 
 # -------------------------------------------------------------------------------------------------------- in the flow

@@ -44,6 +44,7 @@ class Scene:
     owner: NDArray[np.int64]  #: body of each facet
     samples: Samples
     gaps: Gaps
+    mirrors: list[tuple[int, float]]  #: axis and position [m] of the planes of symmetry
 
     def of_samples(self, by_facet: Array) -> Array:
         """Values that are spread over facets, at the samples: in proportion to their areas."""
@@ -67,7 +68,9 @@ def scene_of(
     if wet is not None:
         samples = samples[wet[samples.facet]]
     found = gaps(grid, samples, [plane for plane, _ in walls])
-    return Scene([name for name, _ in bodies], [face for _, face in walls], corners, owner, samples, found)
+    mirrors = [(plane.axis, float(grid.edges[plane.axis][-plane.side])) for plane, _ in walls if plane.mirror]
+    names, faces = [name for name, _ in bodies], [face for _, face in walls]
+    return Scene(names, faces, corners, owner, samples, found, mirrors)
 
 
 def at_start(grid: Grid, walls: Sequence[tuple[Plane, str]], bodies: Sequence[tuple[str, Array]]) -> list[BodyCells]:
@@ -94,14 +97,17 @@ def shape_of(scene: Scene, body: int, acting: Array, counts: Array) -> BodyCells
     some = np.flatnonzero(scene.owner[samples.facet] == body)
     corners = scene.corners[np.unique(samples.facet[some])]
     points = scene.corners[scene.owner == body].reshape(-1, scene.corners.shape[2])
-    extent = np.sort(np.ptp(points, axis=0))[1]
+    extent = np.ptp(points, axis=0)
+    for axis, position in scene.mirrors:  # half of a body, or a quarter
+        if np.abs(points[:, axis] - position).min() < 1e-6 * extent[axis]:
+            extent[axis] *= 2.0
     per_length = np.average(1.0 / samples.across[some], weights=samples.area[some])
     edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean()
     share = counts / max(float(acting[some].sum()), 1e-300)
     narrow = scene.gaps.cells[some] < NARROW
     return BodyCells(
         scene.bodies[body],
-        across=float(extent * per_length),
+        across=float(np.sort(extent)[1] * per_length),
         layer=np.nan,
         sharp=has_edges(corners),
         facets=float(1.0 / (edge * per_length)),
