@@ -23,9 +23,10 @@ from solvers.fluid.resolution.cells import BodyCells
 from solvers.fluid.resolution.shape import NARROW, Scene, present, scene_of, shape_of, walls_of_box
 from solvers.tessellation import unit_normals
 
-#: Force that friction and dynamic pressure may explain, in multiples of them: the pressure in a film is by its length
-#: over its height larger than its shear. Fluid at rest has neither, whatever the pressure in it.
-EXPLAINED = 100.0
+#: Force that friction and dynamic pressure may explain, in multiples of them, around bodies and in films. Around bodies
+#: friction is a third of the drag or more, else dynamic pressure counts; in films the pressure is by their length over
+#: their height larger. What is more is weight or inertia of the fluid, which needs no boundary layer.
+AROUND, IN_FILMS = 3.0, 100.0
 
 
 def measure(fluid: Fluid) -> list[BodyCells]:
@@ -48,10 +49,12 @@ def _of_body(fluid: Fluid, scene: Scene, body: int, force: Array, wet: Array) ->
     acting = np.linalg.norm(force - level * wet[:, None] * normal, axis=1)
     shear = np.linalg.norm(force - along[:, None] * normal, axis=1)
     dynamic = fluid.settings.density * speed**2 * wet if fluid.settings.convection else 0.0
-    counts = np.minimum(acting, EXPLAINED * (shear + dynamic))
-    found = shape_of(scene, body, scene.of_samples(acting), scene.of_samples(counts))
-    samples = scene.samples
+    samples, of_flow = scene.samples, scene.of_samples(shear + dynamic)
+    all_of_it = scene.of_samples(acting)
     free = (scene.owner[samples.facet] == body) & (scene.gaps.cells >= NARROW)
+    around = AROUND * float(of_flow[free].sum()) / max(float(all_of_it[free].sum()), 1e-300)
+    counts = np.where(free, min(1.0, around) * all_of_it, np.minimum(all_of_it, IN_FILMS * of_flow))
+    found = shape_of(scene, body, all_of_it, counts)
     area, drag = scene.of_samples(wet)[free], float(scene.of_samples(shear)[free].sum())
     if drag == 0.0:
         return replace(found, layer=np.inf)
