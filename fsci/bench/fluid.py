@@ -73,9 +73,12 @@ def cylinder_grid(cells: int) -> Grid:
 
 def cylinder(
     grid: Grid, element: str, mean: float, scheme: str = "steady", timer: Timer | None = None, *, segments: int = 800,
-    tolerance: float = 1e-8, varying: bool = False,
+    tolerance: float = 1e-8, varying: bool = False, shape: Array | None = None, convection: bool = True,
 ) -> Fluid:  # fmt: skip
-    """Schaefer and Turek's channel with inflow of largest velocity 1.5 `mean`; `varying` times sin(pi t / 8)."""
+    """Schaefer and Turek's channel with inflow of largest velocity 1.5 `mean`; `varying` times sin(pi t / 8).
+
+    shape: corners of another body than the cylinder.
+    """
 
     def inflow(x: Array, t: float) -> Array:
         return 6.0 * mean * x[1] * (HEIGHT - x[1]) / HEIGHT**2 * (math.sin(math.pi * t / 8.0) if varying else 1.0)
@@ -85,8 +88,8 @@ def cylinder(
         Patch("out", ("x+",), "outflow"),
         Patch("walls", ("y-", "y+"), "no_slip"),
     ]
-    body = disc("cylinder", polygon(CENTRE, DIAMETER / 2, segments))
-    flow = FlowSettings(1.0, 1e-3, element=element, scheme=scheme)  # type: ignore[arg-type]
+    body = disc("cylinder", polygon(CENTRE, DIAMETER / 2, segments) if shape is None else shape)
+    flow = FlowSettings(1.0, 1e-3, element=element, scheme=scheme, convection=convection)  # type: ignore[arg-type]
     return Fluid(grid, flow, patches, [body], SolverSettings(Tolerance(tolerance)), timer=timer, comm=MPI.COMM_SELF)
 
 

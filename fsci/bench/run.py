@@ -10,7 +10,22 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fsci.bench import contact, cook, cost, flag, fluid, hertz, idle, linear, moments, processes, profile, small, static
+from fsci.bench import (
+    contact,
+    cook,
+    cost,
+    flag,
+    fluid,
+    hertz,
+    idle,
+    linear,
+    moments,
+    processes,
+    profile,
+    resolution,
+    small,
+    static,
+)
 from fsci.bench.compare import compare
 from fsci.bench.families import FAMILIES
 from fsci.bench.front_plot import plot_front
@@ -37,6 +52,7 @@ BENCHMARKS: dict[str, tuple[str, Callable[[], list[Row]]]] = {
     "cut_stokes": ("Stokes flow around a disc by the direct solver: seconds by size", fluid.run_stokes),
     "profile": ("one Newton step of flows by part: microseconds per unknown, and what memory allows", profile.run),
     "processes": ("a flow on 1 to 16 processes: cells, neighbours and exchanged bytes of each", processes.run),
+    "resolution": ("error of forces by the cells in boundary layers and gaps: what a run warns from", resolution.run),
     "channel": ("a ring moves through a channel in 3D: seconds of one time step by part", fluid.run_channel),
     **{name: (f"{family.words}: error against time", family.run) for name, family in FAMILIES.items()},
 }

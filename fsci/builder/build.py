@@ -20,6 +20,7 @@ from solvers.timing import Timer
 if TYPE_CHECKING:
     from solvers.contact.contact import Contact
     from solvers.contact.results import PartFields
+    from solvers.fluid.resolution.cells import BodyCells
     from solvers.structure.body import Body
     from solvers.structure.field import Structure
 
@@ -38,6 +39,7 @@ class Simulation:
     sentinels: dict[str, Sentinel] = field(default_factory=dict)  #: by a name in the saved state
     take_materials: Callable[[], None] = lambda: None  #: go on from a restored state with other materials
     imbalance: Callable[[], Numbers] = dict  #: of contact work, with facets dealt out evenly and as it was
+    resolution: Callable[[], list[BodyCells]] = list  #: cells across the bodies in the flow, their layers and gaps
 
 
 def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
@@ -114,6 +116,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder.dry_side import outlines
     from fsci.builder.sentinels import build_sentinels
     from fsci.builder.watch_flow import WatchedFlow
+    from solvers.fluid.resolution.measure import measure
     from solvers.fluid.snapshot import snapshots as of_fluid
     from solvers.structure.snapshot import snapshots as of_structure
 
@@ -145,6 +148,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         },
         take_materials=structure.take_materials,
         imbalance=lambda: {} if contact is None else contact.imbalance,
+        resolution=partial(measure, fluid),
     )
 
 
@@ -154,6 +158,7 @@ def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder.coupling import build_coupled_rigid, start
     from fsci.builder.sentinels import build_sentinels
     from fsci.builder.watch_flow import WatchedFlow
+    from solvers.fluid.resolution.measure import measure
     from solvers.fluid.snapshot import snapshots
 
     bodies = build_rigid.build_free_bodies(case, comm, timer)
@@ -172,12 +177,14 @@ def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
             **watched.sentinels,
             "interface": scheme.coupled.sentinel,
         },
+        resolution=partial(measure, fluid),
     )
 
 
 def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder.fluid import build_fluid, build_probes, build_rigid_bodies
     from fsci.builder.watch_flow import WatchedFlow
+    from solvers.fluid.resolution.measure import measure
     from solvers.fluid.snapshot import snapshots
 
     fluid = build_fluid(case, comm, timer, build_rigid_bodies(case, comm))
@@ -190,6 +197,7 @@ def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         balances=watched.numbers,
         sentinels=watched.sentinels,
         dofs={"fluid": fluid.dofs()},
+        resolution=partial(measure, fluid),
     )
 
 

@@ -49,6 +49,7 @@ def report(out: Path, summary: Mapping[str, Any], drawn: Sequence[Path]) -> str:
             paragraph(str(summary["message"])),
             section("Why it failed", _failure(out, summary)),
             section("Warnings", _warnings(summary)),
+            section("Resolution", _resolution(summary)),
             section("Run", _run(summary)),
             section("Verification", _verification(summary)),
             section("Pictures", pictures(file for file in drawn if file not in curves)),
@@ -81,6 +82,23 @@ def _warnings(summary: Mapping[str, Any]) -> str:
         for found in summary["warnings"]
     ]
     return table(("kind", "body", "first at", "largest", "message"), rows)
+
+
+def _resolution(summary: Mapping[str, Any]) -> str:
+    rows = [
+        (
+            ("coarse", "bad") if found["warns"] else ("ok", "ok"),
+            found["body"],
+            found["to"] or "",
+            _number(found["cells"]) if found["cells"] is not None else "no shear",
+            _number(found["least"]),
+            _number(found["error"]),
+            found["message"],
+        )
+        for found in summary.get("resolution", ())
+    ]
+    words = ("", "body", "gap to", "cells", "across, or at least", "error in the benchmark [%]", "message")
+    return table(words, rows)
 
 
 def _failure(out: Path, summary: Mapping[str, Any]) -> str:

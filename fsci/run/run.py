@@ -16,6 +16,7 @@ from fsci.builder.on_first import on_first, shared
 from fsci.case import Case, CaseError, load_case
 from fsci.case.resume import changed, end_error, meshes_changed
 from fsci.case.settings import settings_of
+from fsci.resolution.words import resolved
 from fsci.run.cause import alike, with_cause
 from fsci.run.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from fsci.run.clock import Clock
@@ -272,6 +273,8 @@ class Run:
             clock.accept()
             self.record.accept(clock.step, info)
             self._note(dt, info, before)
+            if _counts(clock.step):
+                self._measure_resolution()
             every = self.case.output.fields_every
             if clock.done or (every and clock.step % every == 0):
                 self._write_fields()
@@ -301,6 +304,13 @@ class Run:
                 self.monitor.say(note)
             for finding in self.record.warn(clock.time, [*info.findings, *not_numbers(self.case, numbers)]):
                 self.monitor.warn(finding.message)
+
+    def _measure_resolution(self) -> None:
+        """Note how well the grid resolves the present flow: at steps 1, 2, 4, 8, ... and at the end (collective)."""
+        with self.record.timer("resolution"):
+            found = self.simulation.resolution()
+        if found and self.case.fluid is not None:
+            self.record.note_resolution(resolved(found, self.case.fluid.element))
 
     # ------------------------------------------------------------------------------------------------- files
 
@@ -355,6 +365,8 @@ class Run:
         """Checkpoint, summary and verification; the exit code is the same on all processes."""
         with self.stop.files:
             self.stop.ended()
+            if status != "failed" and not _counts(self.clock.step):
+                self._measure_resolution()
             self._write_checkpoint()
             memory = max(self.comm.allgather(memory_mb()))
             code = None
@@ -406,15 +418,23 @@ class Run:
             kind = "earlier result" if result["regression"] else "reference"
             found = f"{result['value']:.6g}, {kind} {result['reference']:.6g} +- {result['tolerance']:.2g}"
             self.monitor.say(f"verify {word} {result['name']}: {found} {result['message']}".rstrip())
+        coarse = [one["message"] for one in self.record.resolution.values() if one["warns"]]
+        for message in coarse:
+            self.monitor.warn(message)
         missed = any(not result["ok"] for result in results)
         if status == "finished":
             message = f"finished in {self.record.wall():.3g} s; results in {self.out}"
-            if count := len(self.record.warnings):
+            if count := len(self.record.warnings) + len(coarse):
                 message += f"; {count} warning{'s' * (count > 1)} above and in summary.json"
             message += "; the verification failed" if missed else ""
             self.monitor.say(f"time: {shares(self.record.wall(), self.record.timer.seconds)}")
         self.monitor.finish(message, ok=status == "finished" and not missed)
         return {"finished": FAILED if missed else FINISHED, "stopped": STOPPED, "failed": FAILED}[status]
+
+
+def _counts(step: int) -> bool:
+    """Whether the resolution is measured after a step: 1, 2, 4, 8, ..."""
+    return step & (step - 1) == 0
 
 
 def _entry(state: State, name: str) -> Any:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.resolution.words import Resolved
 from fsci.run.files import write_text
 from fsci.run.history import History
 from solvers.api import Finding, State, StepInfo
@@ -40,6 +41,7 @@ class RunRecord:
     residuals: dict[int, list[float]] = field(default_factory=dict)  #: step -> residual norms, first to last
     retried: int = 0  #: attempts that failed and were repeated with a smaller step
     warnings: dict[tuple[str, str], Warned] = field(default_factory=dict)  #: by kind and body
+    resolution: dict[str, dict[str, Any]] = field(default_factory=dict)  #: by body, or body and what a gap is to
     timer: Timer = field(default_factory=Timer)
     begin: float = field(default_factory=time.perf_counter)
     earlier: float = 0.0  #: wall time of the run before it was resumed [s]
@@ -69,6 +71,13 @@ class RunRecord:
         """The warnings as plain data."""
         return [{"kind": kind, "body": body, **vars(known)} for (kind, body), known in self.warnings.items()]
 
+    def note_resolution(self, found: Sequence[Resolved]) -> None:
+        """Keeps the last flow around each body, and of each narrow gap the one with the largest error."""
+        for one in found:
+            name = f"{one.body}|{one.to}"
+            if not one.to or one.error >= self.resolution.get(name, {}).get("error", 0.0):
+                self.resolution[name] = one.plain()
+
     def wall(self) -> float:
         """Wall time since the run began [s], without the pauses between stop and resume."""
         return self.earlier + time.perf_counter() - self.begin
@@ -79,6 +88,7 @@ class RunRecord:
             "retried": self.retried,
             "residuals": {str(step): norms for step, norms in self.residuals.items()},
             "warnings": [[kind, body, *vars(known).values()] for (kind, body), known in self.warnings.items()],
+            "resolution": self.resolution,
             "seconds": dict(self.timer.seconds),
             "wall": self.wall(),
         }
@@ -88,6 +98,7 @@ class RunRecord:
         self.retried = state["retried"]
         self.residuals = {int(step): norms for step, norms in state["residuals"].items()}
         self.warnings = {(kind, body): Warned(*known) for kind, body, *known in state["warnings"]}
+        self.resolution = state["resolution"]
         now = self.timer.seconds
         self.timer.seconds = {
             name: now.get(name, 0.0) + state["seconds"].get(name, 0.0) for name in state["seconds"] | now
@@ -147,6 +158,7 @@ def summarize(
             if name in balances
         },
         "warnings": record.warned(),
+        "resolution": list(record.resolution.values()),
         "verify": [dict(result) for result in verify],
         "units": dict(units or {}),
         **({"contact": {"imbalance": dict(imbalance)}} if imbalance else {}),

@@ -70,7 +70,7 @@ class Fluid:
     ):
         """following: how nested cells follow bodies; None: they stay."""
         self.comm, self.settings, self.solver, self.timer = comm, settings, solver, timer or Timer()
-        self.bodies, self.dim, self.box, self._patches = list(bodies), grid.dim, grid, patches
+        self.bodies, self.dim, self.box, self.patches = list(bodies), grid.dim, grid, patches
         self.following = following
         periodic = bool(periodic_axes(patches))
         sheets = None if periodic else sheets_of(grid, self.bodies)
@@ -103,7 +103,7 @@ class Fluid:
         """Create grid, unknowns and equations; sheets: separate cells on each side of thin bodies, None: none."""
         settings = self.settings
         in_gaps = self.system.gaps if self.renewals else None
-        parts = discretise(self.comm, self.box, sheets, settings, self._patches, self.bodies, self.solver)
+        parts = discretise(self.comm, self.box, sheets, settings, self.patches, self.bodies, self.solver)
         self.grid, self.unknowns, self.boundary = parts.grid, parts.unknowns, parts.boundary
         self.system, self.cutter, self.levels, self._behind = parts.system, parts.cutter, parts.levels, parts.behind
         if in_gaps is not None and self.system.gaps is not None:
@@ -219,7 +219,7 @@ class Fluid:
 
     def outside(self, surfaces: Mapping[str, Motion]) -> set[str]:
         """Names of the surfaces that lie outside of the box, which have nothing to do with the flow."""
-        repeated = periodic_axes(self._patches)
+        repeated = periodic_axes(self.patches)
         edges = [(axis, edge[0], edge[-1]) for axis, edge in enumerate(self.box.edges) if axis not in repeated]
         away = {name: [(m.x[:, i].max() < a, m.x[:, i].min() > b) for i, a, b in edges] for name, m in surfaces.items()}
         return {name for name, sides in away.items() if np.any(sides)}

@@ -121,6 +121,14 @@ class InterfaceTerms:
         np.add.at(total, self.corners, self._at_corners_of_pieces(flow, self.at_corners(g, of_facets)))
         return total
 
+    def force_on_facets(self, flow: Array, g: Array, facets: int, of_facets: Array | None) -> tuple[Array, Array]:
+        """Contribution of this process to the force [N] on each of the facets, (facets, dim), and to their wet area."""
+        force = self._at_corners_of_pieces(flow, self.at_corners(g, of_facets)).sum(axis=1)
+        total, area = np.zeros((facets, self.dim)), np.zeros(facets)
+        np.add.at(total, self.facet, force)
+        np.add.at(area, self.facet, self.mass_of_pieces.sum(axis=(1, 2)))
+        return total, area
+
     def power_on_facets(self, flow: Array, g: Array, of_facets: Array) -> float:
         """Contribution of this process to the power [W] of the force on the velocity of facets that vertices lack."""
         force = self._at_corners_of_pieces(flow, self.at_corners(g, of_facets)).sum(axis=1)

@@ -379,6 +379,15 @@ class FlowSystem:
         force = self.interface.force(self.flow.x.array, self.cut.motion.v, self.sweep_velocity)
         return self.grid.comm.allreduce(force) + self.zone_force()
 
+    def force_on_facets(self) -> tuple[Array, Array]:
+        """(force [N] on each facet without that of closed contact, (facets, dim); its wet area) (collective)."""
+        assert self.cut is not None
+        found = self.interface.force_on_facets(
+            self.flow.x.array, self.cut.motion.v, len(self.cut.facets), self.sweep_velocity
+        )
+        force, area = (self.grid.comm.allreduce(part) for part in found)
+        return force, area
+
     def sweep_power(self) -> float:
         """Power [W] of the force of the fluid on what facets move beside their vertices (collective)."""
         assert self.cut is not None

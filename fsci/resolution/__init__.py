@@ -1,0 +1,1 @@
+"""The error that the resolution of a flow had in the benchmark."""

@@ -1,0 +1,1 @@
+"""How many cells the grid has across bodies, gaps and boundary layers."""
