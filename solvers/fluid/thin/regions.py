@@ -121,9 +121,9 @@ def chords_of(grid: Grid, cell: int, x: Array, facets: NDArray[np.int64], number
     low = np.array([grid.edges[0][i], grid.edges[1][j]])
     size = np.array([grid.edges[0][i + 1], grid.edges[1][j + 1]]) - low
     pieces = {}
-    for number in numbers:
-        a, b = (x[facets[number]] - low) / size
-        inside = _clip(a, b)
+    corners = (x[facets[list(numbers)]] - low) / size
+    for number, (a, b) in zip(numbers, corners, strict=True):
+        inside = _clip(a.tolist(), b.tolist())
         if inside is not None:
             pieces[int(facets[number][0])] = (number, int(facets[number][1]), a, b, *inside)
     followers = {end for _, end, _, _, _, t in pieces.values() if t == 1.0}
@@ -141,7 +141,7 @@ def chords_of(grid: Grid, cell: int, x: Array, facets: NDArray[np.int64], number
     return None if pieces else chords  # facets that are left form a closed line
 
 
-def _clip(a: Array, b: Array) -> tuple[float, float] | None:
+def _clip(a: list[float], b: list[float]) -> tuple[float, float] | None:
     """Parameters from 0 at a to 1 at b where the segment enters and leaves the unit square; None if it misses it."""
     t0, t1 = 0.0, 1.0
     for p, q in zip(a, b, strict=True):
@@ -156,12 +156,13 @@ def _clip(a: Array, b: Array) -> tuple[float, float] | None:
 
 def on_perimeter(x: Array) -> float:
     """Arc length of a point on the perimeter of the unit square, counterclockwise from (0, 0); NaN if it is off it."""
-    off = np.abs([x[1], 1.0 - x[0], 1.0 - x[1], x[0]])
-    side = int(np.argmin(off))
-    if off[side] > SAME:
+    a, b = float(x[0]), float(x[1])  # arrays of two numbers take ten times as long
+    off = abs(b), abs(1.0 - a), abs(1.0 - b), abs(a)
+    side = off.index(min(off))
+    if not off[side] <= SAME:
         return math.nan
-    along = [x[0], x[1], 1.0 - x[0], 1.0 - x[1]][side]
-    return side + float(np.clip(along, 0.0, 1.0))
+    along = (a, b, 1.0 - a, 1.0 - b)[side]
+    return side + min(max(along, 0.0), 1.0)
 
 
 def wet_faces(s: float, to: float) -> list[tuple[tuple[int, int], float, float]]:
@@ -177,4 +178,4 @@ def wet_faces(s: float, to: float) -> list[tuple[tuple[int, int], float, float]]
 
 def area_of(polygon: Array) -> float:
     x, y = polygon.T
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    return 0.5 * float(x @ np.concatenate([y[1:], y[:1]]) - y @ np.concatenate([x[1:], x[:1]]))
