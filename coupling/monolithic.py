@@ -27,6 +27,7 @@ from coupling.coupled import Coupled
 from coupling.divided import lengths, step_in_parts
 from coupling.secant import Secant
 from coupling.start import start_together
+from coupling.suction import with_cause
 from solvers import linear
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.lagged import Lagged, LaggedFactors
@@ -35,12 +36,6 @@ from solvers.petsc_python import free_deleted
 from solvers.rounding import rounding_error
 from solvers.rows import Numbering, distributed, from_entries, gather
 from solvers.sparse import Sparse
-
-#: Contact under suction: while it is closed, its force would have to pull, and while it is open, the fluid closes it.
-NO_STATE = (
-    "a fluid at {pull:.3g} Pa below zero pulls at bodies that are dry where they touch, and may have no state open or "
-    "closed: 'contact.film.zone: wetted' gives closed contact the pressure around it"
-)
 
 
 class Monolithic:
@@ -100,7 +95,8 @@ class Monolithic:
         try:
             info = converge(self, self.tolerance)
         except StepFailed as failure:
-            raise self._with_cause(failure) from None
+            cycles = self.comm.allreduce(bool(coupled.solid.astray(0)), op=MPI.LOR)
+            raise with_cause(coupled, failure, cycles=cycles) from None
         coupled.solid.check(info)
         coupled.end_step()
         numbers = coupled.balance.numbers() | {"coupling.linear": float(self._linear_iterations)}
@@ -256,14 +252,6 @@ class Monolithic:
     def astray(self, rises: int) -> str:
         """Why whole increments may not converge: an active set that cycles. Residuals of two parts may well rise."""
         return self.coupled.solid.astray(0)
-
-    def _with_cause(self, failure: StepFailed) -> StepFailed:
-        """The failure of a step, with the cause where no smaller step helps (collective)."""
-        solid, pull = self.coupled.solid, self.coupled.flow.suction()
-        cycles = self.comm.allreduce(bool(solid.astray(0)), op=MPI.LOR)
-        if not cycles or pull <= solid.contact_pressure():  # a larger load holds contact closed
-            return failure
-        return failure.with_reason(f"{failure.reason}; {NO_STATE.format(pull=pull)}")
 
     def settled(self) -> bool:
         """Whether supports and active sets are fulfilled."""
