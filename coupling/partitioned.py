@@ -138,7 +138,9 @@ class Partitioned:
 
 
 def _contact_changes(
-    last: CouplingIterate | None, touching: NDArray[np.bool_] | None, ends: tuple[CouplingIterate, CouplingIterate] | None
+    last: CouplingIterate | None,
+    touching: NDArray[np.bool_] | None,
+    ends: tuple[CouplingIterate, CouplingIterate] | None,
 ) -> bool:
     """Whether the nodes in contact are others than at the last iterate, or differ between both ends of the segment."""
     bracketed = ends is not None and not ends[0].same_contact(ends[1])

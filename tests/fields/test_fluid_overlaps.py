@@ -1,5 +1,7 @@
 """Bodies that overlap, as a flag clamped in a cylinder: the flow sees their union."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, step
@@ -105,7 +107,7 @@ def balanced(fluid, area):
 def test_slit_between_two_bodies(gap, turns):
     """Two bodies fill a cell but for a slit, or overlap: fluid is where the slit is, however narrow."""
     up, chords = np.array([[0.4, 0.0], [0.5, 0.4], [0.4, 1.0]]), []
-    for facet, corners in enumerate((up, up[::-1] + [gap, 0.0])):
+    for facet, corners in enumerate((up, up[::-1] + np.array([gap, 0.0]))):
         for _ in range(turns):
             corners = np.stack([1.0 - corners[:, 1], corners[:, 0]], axis=1)
         chords.append((corners, [2 * facet, 2 * facet + 1]))
@@ -129,6 +131,6 @@ def test_overlaps_that_rest_and_overlaps_that_move():
         several.begin_step()
         assert np.array_equal(found.fluid, exact.fluid)
         assert np.array_equal(found.pieces.moments, exact.pieces.moments)
-        area = 1.0 - sum(area_of(x[a:b]) for a, b in zip(starts, starts[1:], strict=False))
+        area = 1.0 - sum(area_of(x[a:b]) for a, b in pairwise(starts))
         area += overlap(x[: starts[1]], x[starts[1] : starts[2]]) + overlap(x[starts[2] :], x[starts[1] : starts[2]])
         assert (found.share.sum() / 400) == pytest.approx(area, abs=1e-12)

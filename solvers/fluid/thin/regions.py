@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +85,7 @@ def regions_in_cell(cell: int, fluid: float, chords: Sequence[Chord]) -> list[Re
     perimeter of the unit square and have the solid on their left.
     None if chords do not form closed boundaries, with rounding or with bodies that overlap.
     """
+    chords = _divided_where_they_touch(chords)
     begins, ends = ([on_perimeter(chord[end]) for chord, _ in chords] for end in (0, -1))
     if np.isnan([*begins, *ends]).any():
         return None
@@ -98,6 +100,9 @@ def regions_in_cell(cell: int, fluid: float, chords: Sequence[Chord]) -> list[Re
             facets += list(there)
             s = begins[now]
             ahead = [(end - s + SAME) % 4.0 for end in ends]
+            for k, way in enumerate(ahead):
+                if way < 2.0 * SAME and _solid_between(chords[k][0], line):
+                    ahead[k] = 4.0
             following = int(np.argmin(ahead))
             to = s + max(0.0, ahead[following] - SAME)
             polygon += [CORNERS[k % 4] for k in range(int(np.floor(s)) + 1, int(np.ceil(to)))]
@@ -110,6 +115,24 @@ def regions_in_cell(cell: int, fluid: float, chords: Sequence[Chord]) -> list[Re
     if abs(sum(region.share for region in found) - fluid) > SAME or min(r.share for r in found) < -SAME:
         return None
     return found
+
+
+def _divided_where_they_touch(chords: Sequence[Chord]) -> list[Chord]:
+    """The chords, divided at corners that touch the perimeter; segments along it are left as they are."""
+    found: list[Chord] = []
+    for line, of in chords:
+        inside = [math.isnan(on_perimeter(0.5 * (a + b))) for a, b in pairwise(line)]
+        cuts = [
+            k for k in range(1, len(line) - 1) if inside[k - 1] and inside[k] and not math.isnan(on_perimeter(line[k]))
+        ]
+        found += [(line[a : b + 1], of[a:b]) for a, b in pairwise([0, *cuts, len(line) - 1])]
+    return found
+
+
+def _solid_between(end: Array, begin: Array) -> bool:
+    """Whether solid is between a chord that ends and one that begins there: a corner of it touches the perimeter."""
+    (a, b), (c, d) = begin[1] - begin[0], end[-2] - end[-1]
+    return bool(a * d - b * c > 0.0)
 
 
 def chords_of(grid: Grid, cell: int, x: Array, facets: NDArray[np.int64], numbers: Sequence[int]):
