@@ -22,7 +22,8 @@ Mask = NDArray[np.bool_]
 def may_touch(grid: Grid, facets: Indices, x: Array) -> bool:
     """Whether there are several bodies, or one reaches the boundary of the box; x: vertices [m]."""
     used = np.unique(facets)
-    if len(np.unique(connected_parts(*facets[:, :2].T, len(x))[used])) > 1:
+    edges = np.concatenate([facets[:, k : k + 2] for k in range(facets.shape[1] - 1)])
+    if len(np.unique(connected_parts(edges[:, 0], edges[:, 1], len(x))[used])) > 1:
         return True
     near = [FLUSH * float(np.diff(edge).min()) for edge in grid.edges]
     return any(
