@@ -93,8 +93,9 @@ class Monolithic:
         if not coupled.flow.steady:
             self._predict(t + dt, self.residual())
         try:
-            info = converge(self, self.tolerance)
+            info = self._converge()
         except StepFailed as failure:
+            self._require_numbers(failure)
             cycles = self.comm.allreduce(bool(coupled.solid.astray(0)), op=MPI.LOR)
             raise with_cause(coupled, failure, cycles=cycles) from None
         coupled.solid.check(info)
@@ -102,6 +103,24 @@ class Monolithic:
         numbers = coupled.balance.numbers() | {"coupling.linear": float(self._linear_iterations)}
         numbers.update(coupled.solid.numbers())
         return StepInfo(info.iterations, info.residuals, numbers, coupled.take_notes())
+
+    def _converge(self) -> StepInfo:
+        """Newton's method, from the last step where the residual of the predictor is not a number."""
+        try:
+            return converge(self, self.tolerance)
+        except StepFailed as failure:
+            if failure.iteration > 0 or self.coupled.flow.steady or np.isfinite(self._residual).all():
+                raise
+        self.retreat(1.0)  # an extrapolated motion inverts elements
+        return converge(self, self.tolerance)
+
+    def _require_numbers(self, failure: StepFailed) -> None:
+        """Raise StepFailed with the cause of a residual that is not a number, or with the part that has it."""
+        if np.isfinite(self._residual).all():
+            return
+        self.coupled.solid.check(StepInfo(failure.iteration, failure.history))
+        part = "solid" if np.isfinite(self._residual[-1]) else "flow"
+        raise failure.with_reason(f"the residual of the {part} is not a number")
 
     def _predict(self, t: float, unmoved: Array) -> None:
         """Set the predictors for the time t [s]; in closed contact with films only if they reduce the residuals [N].
