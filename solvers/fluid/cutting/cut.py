@@ -78,7 +78,7 @@ class Cutter:
         tied: NDArray[np.bool_] | None = None,
     ):
         """tied: mask of the facets that are tied to another body; None: no one is."""
-        self.grid, self.points, self.films, self.gaps, self._unions = grid, points, films, gaps, unions
+        self.grid, self.points, self.films, self.gaps, self.unions = grid, points, films, gaps, unions
         self._tied = tied
         self._own = grid.grid.as_box(grid.in_box)
         self._special = np.zeros(grid.grid.size, dtype=bool)
@@ -138,7 +138,7 @@ class Cutter:
         counts = off if wet is None else off & wet
         if self._tied is not None:
             moments = without_slits(moments, self.points, self._tied, counts, self._slivers)
-        if self._unions:
+        if self.unions:
             moments = with_unions(box, self.points, moments, facets, x, off, self._tied, self._overlaps)
         # on sheets, cells that are solid except for rounding have no fluid
         overlap = moments.fraction > (1.0 + NOTHING if grid.sheets is None else 1.0 - NOTHING)
