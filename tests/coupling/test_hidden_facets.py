@@ -105,8 +105,9 @@ def test_elements_that_invert_are_named(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_rod_in_space_that_comes_out(tmp_path):
-    """Facets count as a whole, by their middles: within some per cent."""
+def test_rod_in_space_that_comes_out(tmp_path, capsys):
+    """Facets count as a whole, by their middles: most of its volume leaves, and the run says what is lost."""
     left, less, _ = pushed(tmp_path, SPACE)
     assert less.sum() > 0.03
-    assert left.sum() == pytest.approx(less.sum(), rel=0.1)
+    assert left.sum() == pytest.approx(less.sum(), rel=0.3)
+    assert "of fluid were lost" in capsys.readouterr().out
