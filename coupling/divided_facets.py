@@ -24,10 +24,10 @@ Indices = NDArray[np.int64]
 #: Length in sizes of a facet below which its parts have no extent.
 SAME = 1e-6
 #: Distance in sizes of a facet up to which the other side of a tie lies on it: arcs of coarse meshes are farther apart
-#: than rounding, other surfaces of the same body are a facet away.
+#: than rounding, other surfaces of the same body are a facet away. From 0.05 on the tests do not depend on it.
 ON_IT = 0.5
 #: Share of a facet below which its free part, or its covered one, does not count: edges of both sides of a bent tie lie
-#: beside each other, by their arcs.
+#: beside each other, by their arcs. From 1e-5 on the tests do not depend on it.
 LEAST = 1e-2
 #: Cosine between normals of two sides that face each other.
 FACING = -0.5

@@ -16,7 +16,8 @@ from scipy.spatial import cKDTree
 from solvers.api import Array
 from solvers.sparse import Sparse, diagonal, stack
 
-#: Distance of two vertices that are one, relative to that to the next vertex of the same side.
+#: Distance of two vertices that are one, relative to that to the next vertex of the same side. From 0.03 to 0.3 nothing
+#: depends on it.
 CLOSE = 0.3
 
 

@@ -27,6 +27,7 @@ from coupling.coupled import Coupled
 from coupling.divided import lengths, step_in_parts
 from coupling.secant import Secant
 from coupling.start import start_together
+from coupling.suction import with_cause
 from solvers import linear
 from solvers.api import Array, NoResidual, State, StepFailed, StepInfo
 from solvers.lagged import Lagged, LaggedFactors
@@ -35,12 +36,6 @@ from solvers.petsc_python import free_deleted
 from solvers.rounding import rounding_error
 from solvers.rows import Numbering, distributed, from_entries, gather
 from solvers.sparse import Sparse
-
-#: Contact under suction: while it is closed, its force would have to pull, and while it is open, the fluid closes it.
-NO_STATE = (
-    "a fluid at {pull:.3g} Pa below zero pulls at bodies that are dry where they touch, and may have no state open or "
-    "closed: 'contact.film.zone: wetted' gives closed contact the pressure around it"
-)
 
 
 class Monolithic:
@@ -103,8 +98,8 @@ class Monolithic:
         except NoResidual:
             if self.coupled.flow.steady:
                 raise
-            self.restore(before)
-            return self._take_from(t, dt, predicted=False)
+        self.restore(before)
+        return self._take_from(t, dt, predicted=False)
 
     def _take_from(self, t: float, dt: float, *, predicted: bool) -> StepInfo:
         coupled = self.coupled
@@ -115,12 +110,24 @@ class Monolithic:
         try:
             info = converge(self, self.tolerance)
         except StepFailed as failure:
-            raise self._with_cause(failure) from None
+            if predicted and isinstance(failure, NoResidual):
+                raise
+            self._require_numbers(failure)
+            cycles = self.comm.allreduce(bool(coupled.solid.astray(0)), op=MPI.LOR)
+            raise with_cause(coupled, failure, cycles=cycles) from None
         coupled.solid.check(info)
         coupled.end_step()
         numbers = coupled.balance.numbers() | {"coupling.linear": float(self._linear_iterations)}
         numbers.update(coupled.solid.numbers())
         return StepInfo(info.iterations, info.residuals, numbers, coupled.take_notes())
+
+    def _require_numbers(self, failure: StepFailed) -> None:
+        """Raise StepFailed with the cause of a residual that is not a number, or with the part that has it."""
+        if np.isfinite(self._residual).all():
+            return
+        self.coupled.solid.check(StepInfo(failure.iteration, failure.history))
+        part = "solid" if np.isfinite(self._residual[-1]) else "flow"
+        raise failure.with_reason(f"the residual of the {part} is not a number")
 
     def _predict(self, t: float, unmoved: Array) -> None:
         """Set the predictors for the time t [s]; in closed contact with films only if they reduce the residuals [N].
@@ -271,14 +278,6 @@ class Monolithic:
     def astray(self, rises: int) -> str:
         """Why whole increments may not converge: an active set that cycles. Residuals of two parts may well rise."""
         return self.coupled.solid.astray(0)
-
-    def _with_cause(self, failure: StepFailed) -> StepFailed:
-        """The failure of a step, with the cause where no smaller step helps (collective)."""
-        solid, pull = self.coupled.solid, self.coupled.flow.suction()
-        cycles = self.comm.allreduce(bool(solid.astray(0)), op=MPI.LOR)
-        if not cycles or pull <= solid.contact_pressure():  # a larger load holds contact closed
-            return failure
-        return failure.with_reason(f"{failure.reason}; {NO_STATE.format(pull=pull)}")
 
     def settled(self) -> bool:
         """Whether supports and active sets are fulfilled."""

@@ -9,7 +9,7 @@ Sources: Kuttler, Wall, Comput. Mech. 43 (2008) 61-72; for pockets Kuttler, Fors
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from coupling.bracket import CouplingIterate, brackets, halved
 from coupling.coupled import Coupled
 from coupling.divided import lengths, step_in_parts
 from coupling.start import start_together
+from coupling.suction import with_cause
 from solvers.api import Array, State, StepFailed, StepInfo
 from solvers.counted import counted
 
@@ -94,7 +95,8 @@ class Partitioned:
             if not math.isfinite(residual) or len(history) == self.tolerance.max_iterations:
                 taken = counted(len(history), "iteration")
                 reason = f"the coupling iteration did not converge in {taken} (residual {residual:.3g})"
-                raise StepFailed("coupling", reason, iteration=len(history), history=tuple(history))
+                failure = StepFailed("coupling", reason, iteration=len(history), history=tuple(history))
+                raise with_cause(coupled, failure, cycles=_contact_changes(last, coupled.solid.touching(), ends))
             before = np.concatenate([d.ravel(), levels])
             now = CouplingIterate(before, np.append(found, levels + squeezed), coupled.solid.touching())
             if ends is not None:
@@ -133,6 +135,16 @@ class Partitioned:
         self.coupled.restore(state)
         self.accelerator.restore(state["accelerator"])
         self._pockets = int(state["pockets"])
+
+
+def _contact_changes(
+    last: CouplingIterate | None,
+    touching: NDArray[np.bool_] | None,
+    ends: tuple[CouplingIterate, CouplingIterate] | None,
+) -> bool:
+    """Whether the nodes in contact are others than at the last iterate, or differ between both ends of the segment."""
+    bracketed = ends is not None and not ends[0].same_contact(ends[1])
+    return bracketed or (last is not None and not last.same_contact(replace(last, touching=touching)))
 
 
 def _mean(vectors: Array) -> float:

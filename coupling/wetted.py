@@ -14,15 +14,12 @@ from coupling.joined_sides import join_vertices
 from coupling.ties import Tie, candidate_facets, tied_sides
 from solvers.api import Array
 from solvers.blocks import Layout
+from solvers.fluid.bodies.hidden import hidden_facets
 from solvers.fluid.bodies.immersed import ImmersedBody
-from solvers.fluid.bodies.inside import winding
-from solvers.fluid.bodies.surface import ImmersedSurface, Motion
+from solvers.fluid.bodies.surface import ImmersedSurface
 from solvers.skin import Skin
 from solvers.sparse import Sparse
 from solvers.structure.field import Structure
-
-#: Winding number above which the middle of a facet is in another body; on the surface of the body it is one half.
-INSIDE = 0.75
 
 
 @dataclass(frozen=True)
@@ -111,24 +108,15 @@ def immerse(
 def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]]) -> list[ImmersedSurface]:
     """The surfaces, given with the positions of their vertices [m], with marked wet facets.
 
-    Facets with their middle in another body are not wet, nor are tied ones. Those on the boundary of the box are: cuts
-    leave them out as long as they are there (`off_boundary`). Marks that a surface has already are kept.
+    Facets with their middle in another body are not wet until they come out, tied ones never. Those on the boundary of
+    the box are: cuts leave them out as long as they are there (`off_boundary`). Marks that a surface has already stay.
     """
-    found = []
-    for index, (surface, x) in enumerate(surfaces):
+    found, every, positions = [], [surface for surface, _ in surfaces], [x for _, x in surfaces]
+    for index, surface in enumerate(every):
         if surface.wet is None:
-            middles = x[surface.facets].mean(axis=1)
-            wet = np.ones(len(surface.facets), dtype=bool) if surface.tied is None else ~surface.tied
-            hidden = np.zeros(len(wet), dtype=bool)
-            for other, (body, at) in enumerate(surfaces):
-                if other == index:
-                    continue
-                near = np.all((middles > at.min(axis=0)) & (middles < at.max(axis=0)), axis=1)
-                motion = Motion(at, np.zeros_like(at))
-                for facet in np.flatnonzero(near & wet):
-                    hidden[facet] = winding(middles[facet], motion, body.facets) >= INSIDE
-                    wet[facet] = not hidden[facet]
-            surface = replace(surface, wet=wet, hidden=hidden)
+            free = np.ones(len(surface.facets), dtype=bool) if surface.tied is None else ~surface.tied
+            hidden = hidden_facets(index, every, positions, free)
+            surface = replace(surface, wet=free & ~hidden, hidden=hidden)
         elif surface.tied is not None:
             surface = replace(surface, wet=surface.wet & ~surface.tied)
         found.append(surface)

@@ -147,13 +147,15 @@ def choose_flow(
     steady: bool,
     sheets: bool = False,
     with_solids: bool = False,
+    rough: bool = False,
 ) -> tuple[FlowMethod, ...]:
     """The sequence of solvers for a flow: each is used when those before it have failed.
 
     degree: of the velocity; incomplete factors with more fill take minutes for second degree, and are left out.
     sheets: there are several nodes in one place, which the coarse lattices of multigrid do not have; incomplete factors
     of second degree mostly stall there. smoothed: multigrid with stronger smoothers, which second degree always has.
-    with_solids: equations of solids may belong to the system.
+    with_solids: equations of solids may belong to the system. rough: single steps of smoothers diverge in steady flow,
+    as on stretched cells.
     """
     if method == "direct" or (method == "auto" and dofs <= FLOW_DIRECT_LIMIT[dim]):
         return ("direct",)
@@ -162,7 +164,9 @@ def choose_flow(
     limit = (FLOW_WITH_SOLIDS_LIMIT if with_solids else FLOW_INCOMPLETE_LIMIT)[degree]
     if method == "ilu" or (method == "auto" and not steady and dofs <= limit):
         return ("ilu", "multigrid", "direct") if degree > 1 else ("ilu", "multigrid", "smoothed", "direct")
-    return ("multigrid", "direct") if degree > 1 else ("multigrid", "smoothed", "fill", "direct")
+    if degree > 1:
+        return ("multigrid", "direct")
+    return ("smoothed", "fill", "direct") if steady and rough else ("multigrid", "smoothed", "fill", "direct")
 
 
 #: Unknowns of a flow above which an iterative solver is used. In 3D it is 4 times faster at 8,000 unknowns.

@@ -21,6 +21,7 @@ from solvers.fluid.cutting.pressure_level import PressureLevels
 from solvers.fluid.films.film import films_of
 from solvers.fluid.films.gaps import gap_finder
 from solvers.fluid.flow_settings import FlowSettings
+from solvers.fluid.linear_systems.rough_cells import is_rough
 from solvers.fluid.system import FlowSystem
 from solvers.fluid.thin.sheets import Sheets
 from solvers.solver_settings import SolverSettings
@@ -65,6 +66,7 @@ def discretise(
         steady=settings.steady,
         sheets=sheets is not None,
         with_solids=any(body.motion is None for body in bodies),
+        rough=is_rough(grid, convection=settings.convection),
     )
     system = FlowSystem(
         distributed,

@@ -178,6 +178,7 @@ class Fluid:
         self.began = Began(self.unknowns, self.grid.sheets, self.current, history, tuple(self.motions), layers)
         self.sweep.begin_step(self.surfaces.together(self.motions)[1].x)
         self.thin.begin_step()
+        self.surfaces.begin_step()
         self.cutter.begin_step()
         self.begin_system(self.current)
         self.prescribe(self.current.t)

@@ -51,13 +51,15 @@ def follow_surfaces(fluid: FlowAroundSurfaces, *, with_solid: bool) -> None:
 
 
 def _cut(fluid: FlowAroundSurfaces) -> Cut:
+    fluid.surfaces.follow(fluid.motions)
     facets, motion = fluid.surfaces.together(fluid.motions)
     follow_sheets(fluid, fluid.thin.sheets(facets, motion), facets, motion)
     if fluid.settings.steady and fluid.steady_iteration.scales_follow:
         # roots belong to the final position of the bodies, not to the initial one
         fluid.cutter.begin_step()
         fluid.system.forget_roots()
-    wet = fluid.surfaces.wet if fluid.grid.sheets is None else fluid.surfaces.wet_in_unions
+    unions = fluid.cutter.unions or fluid.grid.sheets is not None
+    wet = fluid.surfaces.wet_in_unions if unions else fluid.surfaces.wet
     cut = fluid.cutter(facets, motion, _layers(fluid, motion), wet)
     require_finest(fluid.cutter, fluid.comm)
     return cut

@@ -34,18 +34,19 @@ contact:
     floor: {{mesh: {{shape: rectangle, size: [3, 0.2], cells: [1, 1], origin: [-0.5, -0.2]}}, on: top}}
   pairs:
     floor: {{slave: {{body: block, on: bottom}}, master: {{obstacle: floor}}}}
-coupling: {{scheme: monolithic}}
+coupling: {{scheme: {scheme}}}
 output: {{fields_every: 0}}
 """
 
 
-def run(folder, **settings):
-    (folder / "case.yaml").write_text(BLOCK.format(**settings))
+def run(folder, scheme="monolithic", **settings):
+    (folder / "case.yaml").write_text(BLOCK.format(scheme=scheme, **settings))
     return run_case(load_case(folder / "case.yaml"), folder / "run")
 
 
-def test_without_a_state_the_failure_says_why(tmp_path, capsys):
-    assert run(tmp_path, zone="dry", pull=10) == FAILED
+@pytest.mark.parametrize("scheme", ["monolithic", pytest.param("partitioned", marks=pytest.mark.slow)])
+def test_without_a_state_the_failure_says_why(tmp_path, capsys, scheme):
+    assert run(tmp_path, scheme, zone="dry", pull=10) == FAILED
     said = capsys.readouterr()
     words = said.out + said.err
     assert "below zero pulls at bodies that are dry where they touch" in words

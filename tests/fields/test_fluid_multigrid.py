@@ -21,6 +21,7 @@ from solvers.fluid.linear_systems import krylov
 from solvers.fluid.linear_systems.krylov import SolverSequence
 from solvers.fluid.linear_systems.level_grid import LevelGrid
 from solvers.fluid.linear_systems.multigrid import coarsen, finest, interpolation
+from solvers.fluid.linear_systems.rough_cells import is_rough
 from solvers.linear import LinearSolveFailed
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
@@ -230,7 +231,7 @@ def test_a_stall_is_remembered_when_the_unknowns_change():
 
 
 def test_stretched_cells_need_stronger_smoothers():
-    """A sphere near a wall, far away walls: plain multigrid stalls, and incomplete factors did after it."""
+    """A sphere near a wall, far away walls: plain multigrid and incomplete factors would stall."""
     growth = np.cumsum(1.35 ** np.arange(9))
     fine = np.linspace(0.0, 0.8, 9)
     ends = np.append(fine, fine[-1] + (12.0 - fine[-1]) * growth / growth[-1])
@@ -247,7 +248,8 @@ def test_stretched_cells_need_stronger_smoothers():
     fluid = make_fluid(grid, patches, [ball], solver=solver, scheme="steady", convection=False)
     fluid.begin_step(0.0, 1.0)
     info = fluid.solve()
-    assert fluid.sequence.current == "smoothed"
+    assert fluid.sequence.methods[0] == "smoothed"
+    assert info.notes == ()
     assert info.numbers["fluid.linear"] < 20 * info.iterations
 
 
@@ -265,6 +267,16 @@ def test_method_is_chosen_by_size():
     assert linear.choose_flow("iterative", 3, 10**5, degree=2, steady=False, sheets=True) == ("direct",)
     assert linear.choose_flow("iterative", 3, 10, degree=1, steady=False) == ("multigrid", "smoothed", "fill", "direct")
     assert linear.choose_flow("direct", 3, 10**6, degree=1, steady=False) == ("direct",)
+
+
+def test_rough_cells_in_steady_flow_begin_with_stronger_smoothers():
+    cubes, flat = uniform([0, 0, 0], [2, 1, 1], [20, 10, 10]), uniform([0, 0, 0], [2, 1, 1], [20, 10, 40])
+    finer = refined(cubes, [RefinedBox(np.array([0.4, 0.4, 0.4]), np.array([0.6, 0.6, 0.6]), 1)])
+    found = [is_rough(grid, convection=fast) for grid in (cubes, flat, finer) for fast in (False, True)]
+    assert found == [False, False, True, True, False, True]
+    assert linear.choose_flow("auto", 3, 20_000, degree=1, steady=True, rough=True) == ("smoothed", "fill", "direct")
+    with_time = linear.choose_flow("auto", 3, 30_000, degree=1, steady=False, rough=True)
+    assert with_time == ("multigrid", "smoothed", "fill", "direct")
 
 
 def test_the_direct_solver_needs_memory(monkeypatch):

@@ -1,14 +1,19 @@
 """Bodies that overlap, as a flag clamped in a cylinder: the flow sees their union."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
-from fluid_setup import block, body, field, loop, make_fluid, step
+from fluid_setup import block, body, circle, field, loop, make_fluid, step
 from test_fluid_touching import overlap
 
 from solvers.fluid.background.grid import uniform
+from solvers.fluid.bodies.surface import Motion
 from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.cutting.cut import Cutter
 from solvers.fluid.probes import of_fluid
 from solvers.fluid.thin.regions import area_of
+from solvers.fluid.thin.touching_regions import TOUCHING, touching_regions
 
 WEIGHT = 3.0
 
@@ -95,3 +100,37 @@ def balanced(fluid, area):
     assert np.abs(fluid.velocity()).max() < 1e-8
     force = sum(each.sum(axis=0) for each in fluid.force().values())
     assert force == pytest.approx([0.0, WEIGHT * (1.0 - area)], abs=1e-8)
+
+
+@pytest.mark.parametrize("turns", range(4))
+@pytest.mark.parametrize("gap", [-0.2, -3.0 * TOUCHING, 3.0 * TOUCHING, 0.2])
+def test_slit_between_two_bodies(gap, turns):
+    """Two bodies fill a cell but for a slit, or overlap: fluid is where the slit is, however narrow."""
+    up, chords = np.array([[0.4, 0.0], [0.5, 0.4], [0.4, 1.0]]), []
+    for facet, corners in enumerate((up, up[::-1] + np.array([gap, 0.0]))):
+        for _ in range(turns):
+            corners = np.stack([1.0 - corners[:, 1], corners[:, 0]], axis=1)
+        chords.append((corners, [2 * facet, 2 * facet + 1]))
+    found = touching_regions(0, 1.0 - gap, chords)
+    assert sum(region.share for region in found) == pytest.approx(max(gap, 0.0), abs=1e-14)
+
+
+def test_overlaps_that_rest_and_overlaps_that_move():
+    """What is kept from one cut to the next does not change a bit, wherever bodies move, rest or come back."""
+    flag, facets = block([0.5, 0.45], [0.82, 0.58])
+    lines = [disc([0.4, 0.5], 0.2, 60), flag, circle([0.8, 0.52], 0.1, 20)]
+    starts = np.cumsum([0, *(len(line) for line in lines)])
+    facets = np.concatenate([loop(60), facets + starts[1], loop(20) + starts[2]])
+    fluid = make_fluid(uniform([0, 0], [1, 1], [20, 20]), [Patch("open", ("x-", "x+", "y-", "y+"), "outflow")])
+    points = fluid.system.weights.points
+    several = Cutter(fluid.grid, points, unions=True)
+    for shift in ([0.0, 0.0], [0.013, 0.0], [0.013, -0.04], [0.0, 0.0]):
+        x = np.concatenate([lines[0], lines[1], lines[2] + shift])
+        motion = Motion(x, np.zeros_like(x))
+        found, exact = several(facets, motion, 0), Cutter(fluid.grid, points, unions=True)(facets, motion, 0)
+        several.begin_step()
+        assert np.array_equal(found.fluid, exact.fluid)
+        assert np.array_equal(found.pieces.moments, exact.pieces.moments)
+        area = 1.0 - sum(area_of(x[a:b]) for a, b in pairwise(starts))
+        area += overlap(x[: starts[1]], x[starts[1] : starts[2]]) + overlap(x[starts[2] :], x[starts[1] : starts[2]])
+        assert (found.share.sum() / 400) == pytest.approx(area, abs=1e-12)

@@ -57,9 +57,9 @@ def rigid_body(
 
 
 def sheets_of(grid: Grid, bodies: Sequence[ImmersedBody]) -> Sheets | None:
-    """Sheets of the fluid around thin bodies at rest; None if there are none, or where cells are nested."""
+    """Sheets of the fluid around bodies at rest that are thin or close a way; None if none is, or in nested cells."""
     if isinstance(grid, Nested) or not bodies or not all(body.rests for body in bodies):
         return None
     motions = [body.motion(0.0) for body in bodies if body.motion is not None]
     facets, motion = together([body.surface for body in bodies], motions, grid.dim)
-    return find_sheets(grid, facets, motion.x, off_boundary(grid, motion.x[facets]))
+    return find_sheets(grid, facets, motion.x, off_boundary(grid, motion.x[facets]), closing=True)

@@ -12,7 +12,7 @@ from solvers import kernels
 from solvers.api import Array
 from solvers.fluid.background.grid import DistributedGrid, Grid
 from solvers.fluid.bodies.surface import Motion
-from solvers.fluid.cutting.overlaps import with_unions
+from solvers.fluid.cutting.overlaps import Known, with_unions
 from solvers.fluid.cutting.pieces import FLUSH, NOTHING, Pieces, cells_across, in_planes, put_where_fluid_is
 from solvers.fluid.cutting.tied_slits import slivers_of, without_slits
 from solvers.fluid.films.film import Films, Walls, creeping_cells, walls_of
@@ -78,7 +78,7 @@ class Cutter:
         tied: NDArray[np.bool_] | None = None,
     ):
         """tied: mask of the facets that are tied to another body; None: no one is."""
-        self.grid, self.points, self.films, self.gaps, self._unions = grid, points, films, gaps, unions
+        self.grid, self.points, self.films, self.gaps, self.unions = grid, points, films, gaps, unions
         self._tied = tied
         self._own = grid.grid.as_box(grid.in_box)
         self._special = np.zeros(grid.grid.size, dtype=bool)
@@ -87,6 +87,7 @@ class Cutter:
         self._first: _First | None = None
         self._of_step: Cut | None = None
         self._whole: Cut | None = None  #: without surfaces
+        self._overlaps: dict[int, Known] = {}  #: of the last cut
 
     def on_coarse_cells(self, layers: int) -> bool:
         """Whether a coarser cell is within some layers of those with ghost penalty, among the cells of this process."""
@@ -137,8 +138,8 @@ class Cutter:
         counts = off if wet is None else off & wet
         if self._tied is not None:
             moments = without_slits(moments, self.points, self._tied, counts, self._slivers)
-        if self._unions:
-            moments = with_unions(box, self.points, moments, facets, x, off, self._tied)
+        if self.unions:
+            moments = with_unions(box, self.points, moments, facets, x, off, self._tied, self._overlaps)
         # on sheets, cells that are solid except for rounding have no fluid
         overlap = moments.fraction > (1.0 + NOTHING if grid.sheets is None else 1.0 - NOTHING)
         piece_normal = normal[moments.piece_facet]

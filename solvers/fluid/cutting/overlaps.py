@@ -36,6 +36,10 @@ class Moments:
     piece_mass: Array
 
 
+#: What the regions of a cell depend on, as bytes, and these regions; None: nothing overlaps where there is fluid.
+Known = tuple[tuple[bytes, ...], list[Region] | None]
+
+
 def with_unions(
     grid: Grid,
     points: Array,
@@ -43,15 +47,17 @@ def with_unions(
     facets: Indices,
     x: Array,
     bounds: NDArray[np.bool_],
-    tied: NDArray[np.bool_] | None = None,
+    tied: NDArray[np.bool_] | None,
+    known: dict[int, Known],
 ):
     """Moments in 2D with the union of the bodies as solid, in cells with fluid where they overlap.
 
     moments: of `kernels.moments`, which are returned where nothing overlaps; points: of the quadrature in one
     direction; x: vertices [m]; bounds: facets that are not on the boundary of the box; tied: facets that are tied, in
-    whose cells nothing overlaps; None: no one is.
+    whose cells nothing overlaps; None: no one is; known: by cells of the box, those of the cut before, which this one
+    replaces: where nothing has moved they are used again.
     """
-    found = dict(_overlapping(grid, moments, facets, x, bounds, tied))
+    found = dict(_overlapping(grid, moments, facets, x, bounds, tied, known))
     if not found:
         return moments
     fraction, solid = moments.fraction.copy(), moments.solid.copy()
@@ -76,31 +82,49 @@ def with_unions(
 
 
 def _overlapping(
-    grid: Grid, moments, facets: Indices, x: Array, bounds: NDArray[np.bool_], tied: NDArray[np.bool_] | None
+    grid: Grid,
+    moments,
+    facets: Indices,
+    x: Array,
+    bounds: NDArray[np.bool_],
+    tied: NDArray[np.bool_] | None,
+    known: dict[int, Known],
 ) -> list[tuple[int, list[Region]]]:
     """(row of each cell with fluid in which bodies overlap, regions of the fluid)."""
     body = connected_parts(facets[:, 0], facets[:, 1], len(x))[facets[:, 0]]
-    rows, _ = np.unique(np.stack([moments.piece_cell, body[moments.piece_facet]]), axis=1)
+    rows = np.unique(moments.piece_cell * len(x) + body[moments.piece_facet]) // max(len(x), 1)
     several, counts = np.unique(rows, return_counts=True)
     if tied is not None:
         here = np.unique(moments.piece_cell[tied[moments.piece_facet]])
         counts[np.isin(several, here)] = 0
-    found = []
+    found, before = [], dict(known)
+    known.clear()
+    ends = np.searchsorted(moments.piece_cell, np.arange(len(moments.cells) + 1))
     for row in several[counts > 1].tolist():
         cell = int(moments.cells[row])
-        numbers = moments.piece_facet[moments.piece_cell == row]
-        chords = chords_of(grid, cell, x, facets, numbers[bounds[numbers]].tolist())
-        regions = touching_regions(cell, float(moments.fraction[cell]), chords) if chords else None
-        if not regions:
-            continue
-        twice = sum(region.share for region in regions) + moments.fraction[cell] > 1.0 + NOTHING
-        bounding = sum(
-            length(region.surface[:, 1:].reshape(-1, 2, 2)) for region in regions if region.surface is not None
-        )
-        hidden = sum(length(np.stack([line[:-1], line[1:]], axis=1)) for line, _ in chords) - bounding > SAME
-        if twice or hidden:
+        numbers = moments.piece_facet[ends[row] : ends[row + 1]]
+        numbers = numbers[bounds[numbers]]
+        key = numbers.tobytes(), x[facets[numbers]].tobytes(), moments.fraction[cell].tobytes()
+        if cell not in before or before[cell][0] != key:
+            before[cell] = key, _regions(grid, cell, float(moments.fraction[cell]), facets, x, numbers.tolist())
+        known[cell] = before[cell]
+        if (regions := known[cell][1]) is not None:
             found.append((row, regions))
     return found
+
+
+def _regions(
+    grid: Grid, cell: int, fraction: float, facets: Indices, x: Array, numbers: list[int]
+) -> list[Region] | None:
+    """Regions of the fluid in a cell in which bodies overlap; None if they do not, or if there is no fluid."""
+    chords = chords_of(grid, cell, x, facets, numbers)
+    regions = touching_regions(cell, fraction, chords) if chords else None
+    if not chords or not regions:
+        return None
+    twice = sum(region.share for region in regions) + fraction > 1.0 + NOTHING
+    bounding = sum(length(region.surface[:, 1:].reshape(-1, 2, 2)) for region in regions if region.surface is not None)
+    hidden = sum(length(np.stack([line[:-1], line[1:]], axis=1)) for line, _ in chords) - bounding > SAME
+    return regions if twice or hidden else None
 
 
 def length(ends: Array) -> float:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +85,7 @@ def regions_in_cell(cell: int, fluid: float, chords: Sequence[Chord]) -> list[Re
     perimeter of the unit square and have the solid on their left.
     None if chords do not form closed boundaries, with rounding or with bodies that overlap.
     """
+    chords = _divided_where_they_touch(chords)
     begins, ends = ([on_perimeter(chord[end]) for chord, _ in chords] for end in (0, -1))
     if np.isnan([*begins, *ends]).any():
         return None
@@ -98,6 +100,9 @@ def regions_in_cell(cell: int, fluid: float, chords: Sequence[Chord]) -> list[Re
             facets += list(there)
             s = begins[now]
             ahead = [(end - s + SAME) % 4.0 for end in ends]
+            for k, way in enumerate(ahead):
+                if way < 2.0 * SAME and _solid_between(chords[k][0], line):
+                    ahead[k] = 4.0
             following = int(np.argmin(ahead))
             to = s + max(0.0, ahead[following] - SAME)
             polygon += [CORNERS[k % 4] for k in range(int(np.floor(s)) + 1, int(np.ceil(to)))]
@@ -112,6 +117,24 @@ def regions_in_cell(cell: int, fluid: float, chords: Sequence[Chord]) -> list[Re
     return found
 
 
+def _divided_where_they_touch(chords: Sequence[Chord]) -> list[Chord]:
+    """The chords, divided at corners that touch the perimeter; segments along it are left as they are."""
+    found: list[Chord] = []
+    for line, of in chords:
+        inside = [math.isnan(on_perimeter(0.5 * (a + b))) for a, b in pairwise(line)]
+        cuts = [
+            k for k in range(1, len(line) - 1) if inside[k - 1] and inside[k] and not math.isnan(on_perimeter(line[k]))
+        ]
+        found += [(line[a : b + 1], of[a:b]) for a, b in pairwise([0, *cuts, len(line) - 1])]
+    return found
+
+
+def _solid_between(end: Array, begin: Array) -> bool:
+    """Whether solid is between a chord that ends and one that begins there: a corner of it touches the perimeter."""
+    (a, b), (c, d) = begin[1] - begin[0], end[-2] - end[-1]
+    return bool(a * d - b * c > 0.0)
+
+
 def chords_of(grid: Grid, cell: int, x: Array, facets: NDArray[np.int64], numbers: Sequence[int]):
     """The surface in a cell as polylines in its reference coordinates, each with the numbers of its facets.
 
@@ -121,9 +144,9 @@ def chords_of(grid: Grid, cell: int, x: Array, facets: NDArray[np.int64], number
     low = np.array([grid.edges[0][i], grid.edges[1][j]])
     size = np.array([grid.edges[0][i + 1], grid.edges[1][j + 1]]) - low
     pieces = {}
-    for number in numbers:
-        a, b = (x[facets[number]] - low) / size
-        inside = _clip(a, b)
+    corners = (x[facets[list(numbers)]] - low) / size
+    for number, (a, b) in zip(numbers, corners, strict=True):
+        inside = _clip(a.tolist(), b.tolist())
         if inside is not None:
             pieces[int(facets[number][0])] = (number, int(facets[number][1]), a, b, *inside)
     followers = {end for _, end, _, _, _, t in pieces.values() if t == 1.0}
@@ -141,7 +164,7 @@ def chords_of(grid: Grid, cell: int, x: Array, facets: NDArray[np.int64], number
     return None if pieces else chords  # facets that are left form a closed line
 
 
-def _clip(a: Array, b: Array) -> tuple[float, float] | None:
+def _clip(a: list[float], b: list[float]) -> tuple[float, float] | None:
     """Parameters from 0 at a to 1 at b where the segment enters and leaves the unit square; None if it misses it."""
     t0, t1 = 0.0, 1.0
     for p, q in zip(a, b, strict=True):
@@ -156,12 +179,13 @@ def _clip(a: Array, b: Array) -> tuple[float, float] | None:
 
 def on_perimeter(x: Array) -> float:
     """Arc length of a point on the perimeter of the unit square, counterclockwise from (0, 0); NaN if it is off it."""
-    off = np.abs([x[1], 1.0 - x[0], 1.0 - x[1], x[0]])
-    side = int(np.argmin(off))
-    if off[side] > SAME:
+    a, b = float(x[0]), float(x[1])  # arrays of two numbers take ten times as long
+    off = abs(b), abs(1.0 - a), abs(1.0 - b), abs(a)
+    side = off.index(min(off))
+    if not off[side] <= SAME:
         return math.nan
-    along = [x[0], x[1], 1.0 - x[0], 1.0 - x[1]][side]
-    return side + float(np.clip(along, 0.0, 1.0))
+    along = (a, b, 1.0 - a, 1.0 - b)[side]
+    return side + min(max(along, 0.0), 1.0)
 
 
 def wet_faces(s: float, to: float) -> list[tuple[tuple[int, int], float, float]]:
@@ -177,4 +201,4 @@ def wet_faces(s: float, to: float) -> list[tuple[tuple[int, int], float, float]]
 
 def area_of(polygon: Array) -> float:
     x, y = polygon.T
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    return 0.5 * float(x @ np.concatenate([y[1:], y[:1]]) - y @ np.concatenate([x[1:], x[:1]]))

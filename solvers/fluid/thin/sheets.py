@@ -30,6 +30,7 @@ from solvers.connected import connected_parts
 from solvers.fluid.background.box import Grid
 from solvers.fluid.cutting.pieces import in_planes
 from solvers.fluid.cutting.tied_slits import slivers_of, without_slits
+from solvers.fluid.thin.closing import are_apart, close_a_way, may_touch, uncut_cells
 from solvers.fluid.thin.sheet_nodes import Joined, node_copies, same_nodes
 from solvers.fluid.thin.sheet_parts import AROUND, Part, facing_of, grown, links_of, parts_of_fluid
 from solvers.fluid.thin.sliced_facets import ragged
@@ -238,19 +239,29 @@ def find_sheets(
     *,
     thin: int = THIN,
     always: bool = False,
+    closing: bool = False,
     joined: Joined = MappingProxyType({}),
     tied: tuple[Mask, Mask] | None = None,
 ) -> Sheets | None:
     """Sheets of the fluid around surfaces with vertices at x [m]; None if no body is thin, unless `always`.
 
+    closing: also where bodies close a way, however thick they are.
+
     bounds: facets that are not on the boundary of the box. thin: cells apart, at most, of the fluid on both sides.
     joined: parts of fluid in these cells at these facets share their nodes. tied: masks of the facets that are tied and
     of those that the flow acts on; None: no body is tied.
     """
-    if not len(facets) or (grid.dim == 3 and not always and not may_be_thin(grid, facets, x, FARTHEST * (thin + 1))):
+    if not len(facets):
+        return None
+    may_close = closing and may_touch(grid, facets, x)
+    may_part = always or grid.dim == 2 or may_be_thin(grid, facets, x, FARTHEST * (thin + 1))
+    if not (may_part or may_close):
         return None
     x = in_planes(grid, x)
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
+    may_close &= are_apart(grid, uncut_cells(grid, moments))
+    if not (may_part or may_close):
+        return None
     if tied is not None:
         moments = without_slits(moments, gauss(3)[0], tied[0], tied[1] & bounds, slivers_of(grid))
     if grid.dim == 3:
@@ -265,7 +276,9 @@ def find_sheets(
         close, facing = np.flatnonzero(grown(grid, special, 1)[cells]), facing_of(parts, x[facets])
         if grid.dim == 3:
             close = _opposed(grid, cells, facing, close, thin)
-        if not _is_thin(grid, parts, links, facing, close, thin):
+        if not (may_part and _is_thin(grid, parts, links, facing, close, thin)) and not (
+            may_close and close_a_way(grid, moments, cells, links)
+        ):
             return None
     copies = node_copies(grid, parts, links, same_nodes(parts, joined), special)
     moved = (copies > 0).any(axis=1)

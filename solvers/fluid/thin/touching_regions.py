@@ -8,7 +8,7 @@ Springer 2008, chapter 2).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import pairwise, permutations
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,16 +26,17 @@ ROUNDING = 10.0**-DECIMALS
 
 def meet(chords: Sequence[Chord], body: NDArray[np.int64]) -> bool:
     """Whether chords of two bodies cross, or a corner or an end of one touches the other; body: of each facet."""
-    for (one, of), (other, of_other) in permutations(chords, 2):
-        if body[of[0]] == body[of_other[0]]:
-            continue
-        if (one.min(axis=0) > other.max(axis=0) + TOUCHING).any() or (
-            other.min(axis=0) > one.max(axis=0) + TOUCHING
-        ).any():
-            continue
-        if len(_crossings(one, other)[0]) or len(_near(one, other)[0]):
+    for (one, of), (other, of_other) in combinations(chords, 2):
+        if body[of[0]] != body[of_other[0]] and _touch(one, other):
             return True
     return False
+
+
+def _touch(one: Array, other: Array) -> bool:
+    """Whether two chords cross, or a corner or an end of one touches the other."""
+    if (one.min(axis=0) > other.max(axis=0) + TOUCHING).any() or (other.min(axis=0) > one.max(axis=0) + TOUCHING).any():
+        return False
+    return len(_crossings(one, other)[0]) + len(_near(one, other)[0]) + len(_near(other, one)[0]) > 0
 
 
 def touching_regions(cell: int, solid: float, chords: Sequence[Chord]) -> list[Region] | None:
@@ -47,12 +48,14 @@ def touching_regions(cell: int, solid: float, chords: Sequence[Chord]) -> list[R
         return None
     chords = [_rounded(*chord) for chord in chords]
     wet = _wet(solid, chords)
+    if not wet(np.concatenate([_beside(line[:-1], line[1:]) for line, _ in chords])).any() and not any(
+        _touch(one, other) for (one, _), (other, _) in combinations(chords, 2)
+    ):
+        return []  # surfaces that do not meet have the solid on both sides as a whole
     ends, facets = _divided(chords)
     _, single = np.unique(ends.round(DECIMALS).reshape(-1, 4), axis=0, return_index=True)  # bodies with common sides
     ends, facets = ends[np.sort(single)], facets[np.sort(single)]
-    middle, along = ends.mean(axis=1), ends[:, 1] - ends[:, 0]
-    outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
-    open_side = wet(middle + TOUCHING * outward)
+    open_side = wet(_beside(ends[:, 0], ends[:, 1]))
     ends, facets = ends[open_side][:, ::-1], facets[open_side]  # with the fluid on the left
     round_it = _perimeter_between(np.concatenate([*(line[[0, -1]] for line, _ in chords), ends.reshape(-1, 2)]))
     inward = round_it[:, 1] - round_it[:, 0]
@@ -80,7 +83,14 @@ def _rounded(line: Array, of: Sequence[int]) -> Chord:
     """The chord with points on the perimeter that are beside it by rounding, without segments of no length."""
     line = np.where(np.abs(line - line.round()) < ROUNDING, line.round(), line)
     long = np.abs(np.diff(line, axis=0)).max(axis=1) > 0.0
-    return line[np.r_[True, long]], [facet for facet, kept in zip(of, long, strict=True) if kept]
+    return line[np.concatenate([[True], long])], [facet for facet, kept in zip(of, long, strict=True) if kept]
+
+
+def _beside(begin: Array, end: Array) -> Array:
+    """Points beside the middles of segments, out of the solid."""
+    along = end - begin
+    outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
+    return np.asarray(0.5 * (begin + end) + TOUCHING * outward)
 
 
 def _wet(solid: float, chords: Sequence[Chord]) -> Callable[[Array], NDArray[np.bool_]]:
