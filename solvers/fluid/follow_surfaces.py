@@ -55,7 +55,7 @@ def _cut(fluid: FlowAroundSurfaces) -> Cut:
     follow_sheets(fluid, fluid.thin.sheets(facets, motion), facets, motion)
     if fluid.settings.steady and fluid.steady_iteration.scales_follow:
         # roots belong to the final position of the bodies, not to the initial one
-        fluid.cutter.begin_step()
+        fluid.cutter.forget()
         fluid.system.forget_roots()
     wet = fluid.surfaces.wet if fluid.grid.sheets is None else fluid.surfaces.wet_in_unions
     cut = fluid.cutter(facets, motion, _layers(fluid, motion), wet)
