@@ -274,6 +274,7 @@ class Monolithic:
         """Take back a fraction of the last increment."""
         self.coupled.solid.retreat(fraction)
         self.coupled.flow.retreat(fraction)
+        self._secant.retreat(fraction)
 
     def astray(self, rises: int) -> str:
         """Why whole increments may not converge: an active set that cycles. Residuals of two parts may well rise."""

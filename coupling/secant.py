@@ -22,10 +22,15 @@ class Secant:
 
     def __init__(self) -> None:
         self._before: tuple[Array, Array, Array] | None = None  #: r', d', s'
+        self._share = 1.0  #: of s' that was added
 
     def forget(self) -> None:
         """Discard the iterate before: the map has changed."""
         self._before = None
+
+    def retreat(self, fraction: float) -> None:
+        """Take back a fraction of the last increment."""
+        self._share -= fraction
 
     def corrected(self, increment: Array, displacement: Array) -> Array:
         """s from r, at owned unknowns; displacement [m]: d, the same on every process."""
@@ -35,6 +40,6 @@ class Secant:
             change = displacement - d
             size = float(change @ change)
             if size > 0.0:
-                corrected = increment - float(displacement @ change) / size * (s + increment - r)
-        self._before = increment.copy(), displacement.copy(), corrected.copy()
+                corrected = increment - float(displacement @ change) / size * (self._share * s + increment - r)
+        self._before, self._share = (increment.copy(), displacement.copy(), corrected.copy()), 1.0
         return corrected

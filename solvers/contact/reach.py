@@ -36,6 +36,8 @@ class Reach:
         self._facets = [surface.facets for surface in interface.surfaces]
         self._simplices = [np.array(CELL_TYPES[surface.facet_type].simplices) for surface in interface.surfaces]
         self._searches: dict[int, Search] = {}  # created when the boxes of two surfaces first come near
+        #: latest search of each pair: positions [m], reach [m], facets (slave, master) and their distances [m]
+        self._latest: dict[int, tuple[Array, Array, float, NDArray[np.int32], Array]] = {}
 
     def find(self, x: Array, ways: Array, present: NDArray[np.bool_], pressed: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Mask of the pairs that are present in a step.
@@ -52,12 +54,7 @@ class Reach:
         touching = present & np.array([pressed[self._surfaces[side]].any() for side in slave], dtype=bool)
         found = ~self._watched | touching | (apart <= distance)
         for pair in np.flatnonzero(found & self._watched & ~touching):
-            sides = self._sides[pair]
-            if pair not in self._searches:
-                self._searches[pair] = Search(*(self._facets[side] for side in sides))
-            xs, xm = (np.ascontiguousarray(x[self._surfaces[side]]) for side in sides)
-            candidates = self._searches[pair].pairs(xs, xm, float(distance[pair]))
-            found[pair] = bool((self._distances(sides, candidates, xs, xm) <= distance[pair]).any())
+            found[pair] = len(self._within(pair, x, float(distance[pair]))) > 0
         return found
 
     def nodes(self, x: Array, ways: Array, present: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -74,14 +71,26 @@ class Reach:
             if not self._watched[pair]:
                 continue
             distance = WAYS * float(sum(lengths[nodes].max(initial=0.0) for nodes in numbers))
-            if pair not in self._searches:
-                self._searches[pair] = Search(*(self._facets[side] for side in sides))
-            xs, xm = (np.ascontiguousarray(x[nodes]) for nodes in numbers)
-            candidates = self._searches[pair].pairs(xs, xm, distance)
-            near = candidates[self._distances(sides, candidates, xs, xm) <= distance]
+            near = self._within(pair, x, distance)
             for side, nodes, facets in zip(sides, numbers, near.T, strict=True):
                 found[nodes[self._facets[side][facets]]] = True
         return found
+
+    def _within(self, pair: int, x: Array, distance: float) -> NDArray[np.int32]:
+        """Facets (slave, master) of a pair up to a distance [m] at the positions x [m] of all nodes, shape (p, 2).
+
+        `find` and `nodes` ask at the same positions in a step, `nodes` for no larger distance: one search serves both.
+        """
+        sides = self._sides[pair]
+        xs, xm = (np.ascontiguousarray(x[self._surfaces[side]]) for side in sides)
+        known = self._latest.get(pair)
+        if known is None or known[2] < distance or not (np.array_equal(known[0], xs) and np.array_equal(known[1], xm)):
+            if pair not in self._searches:
+                self._searches[pair] = Search(*(self._facets[side] for side in sides))
+            candidates = self._searches[pair].pairs(xs, xm, distance)
+            known = xs, xm, distance, candidates, self._distances(sides, candidates, xs, xm)
+            self._latest[pair] = known
+        return known[3][known[4] <= distance]
 
     def _distances(self, sides: NDArray[np.int64], pairs: NDArray[np.int32], xs: Array, xm: Array) -> Array:
         """The least distance [m] of a node of one facet to the other one, by pairs of facets.

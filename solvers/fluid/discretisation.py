@@ -14,7 +14,7 @@ from solvers.fluid.background.partition import partition
 from solvers.fluid.background.space import Unknowns
 from solvers.fluid.behind import BehindWalls
 from solvers.fluid.bodies.immersed import ImmersedBody
-from solvers.fluid.bodies.surface import by_facets, may_close, seeping, tied
+from solvers.fluid.bodies.surface import by_facets, dry_contact, may_close, seeping, tied
 from solvers.fluid.boundary.patches import Boundary, Patch, periodic_axes
 from solvers.fluid.cutting.cut import Cutter
 from solvers.fluid.cutting.pressure_level import PressureLevels
@@ -86,7 +86,10 @@ def discretise(
     gaps = gap_finder(patches, settings.penalties) if settings.with_gaps and sheets is None else None
     in_contact = any(surface.in_contact is not None and surface.in_contact.any() for surface in surfaces)
     unions = grid.dim == 2 and sheets is None and len(bodies) > 1 and not in_contact
-    cutter = Cutter(distributed, system.weights.points, films, gaps, unions=unions, tied=tied(surfaces))
+    closing = dry_contact(surfaces) if settings.steady else None  # unsteady flows have a history on each side
+    cutter = Cutter(
+        distributed, system.weights.points, films, gaps, unions=unions, tied=tied(surfaces), closing=closing
+    )
     levels = PressureLevels(system, bodies)
     moved = not settings.steady and not all(body.rests for body in bodies)
     behind = BehindWalls(unknowns) if moved and settings.degree == 2 and sheets is None else None

@@ -49,6 +49,7 @@ class ExchangedFlow(Protocol):
     prescribed_at: float
     smallest_cell: float
     residual_rows: Array
+    before: Array
     increment: Array
 
     @property

@@ -98,6 +98,7 @@ class Fluid:
         self._iterations_of_step = 0  #: of all linear systems of this step
         self.steady_iteration = SteadyIteration()
         self._first = 0.0  #: residual of the first iterate [N]
+        self._share = 1.0  #: of the last increment that the iterate has
 
     def discretise(self, sheets: Sheets | None) -> None:
         """Create grid, unknowns and equations; sheets: separate cells on each side of thin bodies, None: none."""
@@ -117,6 +118,7 @@ class Fluid:
         self._tangent = KeptTangent(self.system)
         self.held = np.zeros(owned, dtype=bool)  #: owned dofs with rows of the identity
         self.residual_rows, self.increment = np.zeros(owned), np.zeros(owned)
+        self.before = np.zeros(owned)  #: flow before the last increment
         self._balances: Balances | None = None
         self.renewals += 1
 
@@ -212,11 +214,11 @@ class Fluid:
 
         with_pressure: the pressure, too, for first degree. With second degree, that of films follows their height.
         """
-        before = self.flow[: self.unknowns.owned].copy()
+        self.before, self._share = self.flow[: self.unknowns.owned].copy(), 1.0
         if not self.steady:
             first_degree, fixed = self.settings.degree == 1, self.boundary.dofs
             self.history.extrapolate(self.flow, self.current.dt, fixed, with_pressure=with_pressure and first_degree)
-        self.increment = self.flow[: self.unknowns.owned] - before
+        self.increment = self.flow[: self.unknowns.owned] - self.before
 
     def outside(self, surfaces: Mapping[str, Motion]) -> set[str]:
         """Names of the surfaces that lie outside of the box, which have nothing to do with the flow."""
@@ -350,7 +352,8 @@ class Fluid:
     def update(self, increment: Array) -> Array:
         """Add an increment of the owned dofs; returns its norm relative to that of the flow, shape (1,)."""
         self.increment, self._improved = increment.copy(), True
-        self._add(self.increment)
+        self.before, self._share = self.flow[: self.unknowns.owned].copy(), 1.0
+        self._add_share()
         size = self._norm(self._tangent.diagonal * self.flow[: self.unknowns.owned])
         return np.array([self._norm(self._tangent.diagonal * self.increment) / size if size > 0.0 else 0.0])
 
@@ -363,8 +366,8 @@ class Fluid:
         """The tangent as it multiplies vectors in a Krylov method; the next call overwrites it (collective)."""
         return self.linear_solver.products.of(matrix)
 
-    def _add(self, owned: Array) -> None:
-        self.flow[: self.unknowns.owned] += owned
+    def _add_share(self) -> None:
+        self.flow[: self.unknowns.owned] = self.before + self._share * self.increment
         self.unknowns.share(self.system.flow)
 
     def astray(self, rises: int) -> str:
@@ -372,8 +375,12 @@ class Fluid:
         return ""
 
     def retreat(self, fraction: float) -> None:
-        """Take back a fraction of the last increment."""
-        self._add(-fraction * self.increment)
+        """Take back a fraction of the last increment.
+
+        The state before is kept: a cut that covers nodes, or holds their pressure, overwrites their values.
+        """
+        self._share -= fraction
+        self._add_share()
 
     def squeezed(self) -> Array:
         """Mean distance [m] by which elastic bodies squeeze each closed pocket in this step, after `solve`."""

@@ -56,7 +56,7 @@ def _cut(fluid: FlowAroundSurfaces) -> Cut:
     follow_sheets(fluid, fluid.thin.sheets(facets, motion), facets, motion)
     if fluid.settings.steady and fluid.steady_iteration.scales_follow:
         # roots belong to the final position of the bodies, not to the initial one
-        fluid.cutter.begin_step()
+        fluid.cutter.forget()
         fluid.system.forget_roots()
     unions = fluid.cutter.unions or fluid.grid.sheets is not None
     wet = fluid.surfaces.wet_in_unions if unions else fluid.surfaces.wet

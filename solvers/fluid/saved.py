@@ -35,6 +35,8 @@ def restore_state(fluid: ExchangedFlow, state: State) -> None:
     _set_nodal_state(fluid, state)
     fluid.current = FlowStep(state["time"], 0.0, STEADY)
     fluid.sequence.position = state["linear_solver"]
+    fluid.cutter.closed[:] = False
+    fluid.cutter.closed[state["closed"]] = True
     fluid.cutter.begin_step()
     flow = fluid.flow.copy()
     fluid.move(motions)
@@ -56,6 +58,7 @@ def _by_process(fluid: ExchangedFlow) -> State:
         "linear_solver": fluid.sequence.position,
         "swept": fluid.sweep.save(),
         "sweep_velocity": np.empty(0) if fluid.system.sweep_velocity is None else fluid.system.sweep_velocity,
+        "closed": np.unique(np.concatenate(fluid.comm.allgather(np.flatnonzero(fluid.cutter.closed)))),
         "motion": {body.surface.name: {"x": motion.x, "v": motion.v} for body, motion in fluid.moved()},
     }
 

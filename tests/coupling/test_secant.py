@@ -31,6 +31,18 @@ def test_one_wrong_direction_takes_two_more_iterates():
     assert max(errors[2:]) < 1e-14
 
 
+def test_part_of_an_increment_that_was_taken_back_does_not_count():
+    """The same with only a quarter of the first increment: the secant is that of the states."""
+    n = np.array([0.6, 0.8])
+    exact = np.eye(2) + 0.54 * np.outer(n, n)
+    b, x, secant = np.array([1.0, -0.3]), np.zeros(2), Secant()
+    for share in (0.25, 1.0, 1.0, 1.0):
+        r = b - exact @ x
+        x = x + share * secant.corrected(r, r)
+        secant.retreat(1.0 - share)
+    assert np.linalg.norm(b - exact @ x) < 1e-14
+
+
 def test_no_change_is_no_division():
     secant = Secant()
     for _ in range(2):

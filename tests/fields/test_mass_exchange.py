@@ -17,6 +17,7 @@ from solvers.contact.pair import Pair
 from solvers.contact.reach import Reach
 from solvers.contact.surface import Surface
 from solvers.generalised_alpha import GeneralisedAlpha
+from solvers.search import Search
 from solvers.structure import mass_exchange
 from solvers.structure.dynamics import Dynamics
 from solvers.structure.field import Structure
@@ -203,6 +204,29 @@ def test_reach(dim):
     assert found(1.5 * distance, there)
     assert not found(2.5 * distance, there)
     assert found(2.5 * distance, there, ~none)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_pairs_and_nodes_in_reach_take_one_search(dim, monkeypatch):
+    """The nodes are those of a search of their own, as long as nothing moves."""
+    cell = "quad" if dim == 2 else "hexahedron"
+    low, high = (block(cell, n) for n in (3, 4))
+    tilt = 1.05 + 0.4 * high.points[:, :1]
+    high = replace(high, points=high.points + tilt * np.eye(dim)[-1])
+    _, contact = make_contact([make_body("a", low), make_body("b", high)], [(("b", "bottom"), ("a", "top"))])
+    searches, pairs = [], Search.pairs
+    monkeypatch.setattr(Search, "pairs", lambda *given: searches.append(1) or pairs(*given))
+    x, rng = contact.interface.nodes.points.copy(), np.random.default_rng(3)
+    ways, none, there = rng.uniform(-0.03, 0.03, x.shape), np.zeros(len(x), dtype=bool), np.array([True])
+    reach = Reach(contact.interface)
+    for moved, count in ((x, 1), (x, 1), (x - 0.02 * (x > 1.0), 2)):
+        reach.find(moved, ways, there, none)
+        found = reach.nodes(moved, ways, there)
+        assert len(searches) == count
+        with monkeypatch.context() as apart:
+            apart.setattr(Search, "pairs", pairs)
+            assert np.array_equal(found, Reach(contact.interface).nodes(moved, ways, there))
+        assert 0 < found.sum() < len(x)
 
 
 @pytest.mark.parametrize("facet", ["line", "line3", "quad", "triangle"])

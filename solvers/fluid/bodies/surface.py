@@ -69,6 +69,17 @@ def tied(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_] | None:
     return np.concatenate([np.zeros(len(s.facets), dtype=bool) if s.tied is None else s.tied for s in surfaces])
 
 
+def dry_contact(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_] | None:
+    """Mask of the facets of all surfaces without fluid in closed contact; None if there are none."""
+    if not any(surface.zone == "dry" and surface.in_contact is not None for surface in surfaces):
+        return None
+    parts = [
+        s.in_contact if s.zone == "dry" and s.in_contact is not None else np.zeros(len(s.facets), dtype=bool)
+        for s in surfaces
+    ]
+    return np.concatenate(parts)
+
+
 def may_close(surfaces: Sequence[ImmersedSurface]) -> NDArray[np.bool_] | None:
     """Mask of the facets of all surfaces with fluid pressure in closed contact; None if there are none."""
     if all(surface.zone == "dry" for surface in surfaces):

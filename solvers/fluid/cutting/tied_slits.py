@@ -33,13 +33,17 @@ def without_slits(
     cell = moments.cells[moments.piece_cell]
     area = moments.piece_mass.sum(axis=(1, 2)) * counts[moments.piece_facet]
     bounds = np.bincount(cell, area, len(slivers)) > slivers
-    filled = np.zeros(len(slivers), dtype=bool)
-    filled[cell[tied[moments.piece_facet]]] = True
-    filled &= ~bounds
+    whole = np.zeros(len(slivers), dtype=bool)
+    whole[cell[tied[moments.piece_facet]]] = True
+    return filled(moments, points, whole & ~bounds)
+
+
+def filled(moments, points: Array, whole: NDArray[np.bool_]) -> Moments:
+    """Moments with whole solid cells; whole: mask of these among the cells of the box."""
     fraction, solid = moments.fraction.copy(), moments.solid.copy()
-    fraction[filled] = 1.0
+    fraction[whole] = 1.0
     dim = moments.piece_mass.shape[1]
-    solid[filled[moments.cells]] = tensor_weights(len(points), dim)
-    kept = ~filled[cell]
+    solid[whole[moments.cells]] = tensor_weights(len(points), dim)
+    kept = ~whole[moments.cells[moments.piece_cell]]
     pieces = (moments.piece_cell, moments.piece_facet, moments.piece_moments, moments.piece_mass)
     return Moments(fraction, moments.cells, solid, *(part[kept] for part in pieces))

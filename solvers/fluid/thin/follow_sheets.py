@@ -27,7 +27,8 @@ def follow_sheets(fluid: ExchangedFlow, sheets: Sheets | None, facets: NDArray[n
     if began is not None and not fluid.settings.steady:  # a steady flow has no history
         if began.way(motion.x) > AROUND * fluid.smallest_cell:
             raise moved_too_far(fluid, AROUND)
-    now, old, flow, increment = fluid.grid.sheets, fluid.unknowns, fluid.flow, fluid.increment
+    now, old, flow = fluid.grid.sheets, fluid.unknowns, fluid.flow
+    before, increment = fluid.before, fluid.increment
     if now is not None and now.same_unknowns(sheets):
         fluid.grid.sheets = sheets
         return
@@ -35,7 +36,10 @@ def follow_sheets(fluid: ExchangedFlow, sheets: Sheets | None, facets: NDArray[n
     carry = Carrying(fluid.unknowns, facets, motion)
     carrier = carry(old, now)
     fluid.flow[:] = carrier.flow(flow)
-    fluid.increment = carrier.flow(np.pad(increment, (0, old.local - old.owned)))[: fluid.unknowns.owned]
+    fluid.before, fluid.increment = (
+        carrier.flow(np.pad(values, (0, old.local - old.owned)))[: fluid.unknowns.owned]
+        for values in (before, increment)
+    )
     if began is not None and began.unknowns is not old:
         carrier = carry(began.unknowns, began.sheets)
     history = fluid.history
