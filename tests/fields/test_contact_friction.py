@@ -83,7 +83,7 @@ def test_linearisation_is_the_derivative_of_the_residual(cell_type, law, edge, h
     dz = 1e3 * rng.uniform(-1, 1, (len(L.active), contact.dim))
     tangents = np.eye(contact.dim) - np.einsum("ni,nj->nij", *[contact.terms.normals[L.active]] * 2)
     normals = contact.terms.normals[L.active].copy()
-    frozen = contact.point(L.active)  # the factors D of the rows are parameters
+    frozen = contact.point(L.active)  # the factor of the gap is a parameter, and with it the D in it
 
     def residual(step):
         structure.now.u[:] = u + step * du
@@ -92,9 +92,10 @@ def test_linearisation_is_the_derivative_of_the_residual(cell_type, law, edge, h
         structure.residual()
         assert np.array_equal(contact.active_set.status[L.active], status)
         point = contact.point(L.active)
+        point = replace(point, c_n=frozen.c_n * point.D / frozen.D)
         missed = law.residual(point, status, 1.0) / point.D[:, None]  # the rows at fixed factor D
         missed -= np.einsum("nd,nd->n", missed, point.normals)[:, None] * point.normals
-        gap = point.stiffness * point.gap * frozen.D / point.D  # the mean gap
+        gap = point.stiffness * point.gap
         across = np.einsum("nij,nj->ni", tangents, missed) * frozen.D[:, None]
         return structure.residual_force.copy(), gap[:, None] * normals + across
 

@@ -53,14 +53,14 @@ class Point:
 class Slopes:
     """Derivatives with respect to the displacements of all nodes, dim * N columns."""
 
-    gap: Sparse  #: of the mean gap, times D, shape (m, dim * N)
+    gap: Sparse  #: shape (m, dim * N)
     normals: Sparse  #: shape (dim * m, dim * N)
     slip: Sparse  #: shape (dim * m, dim * N)
 
 
 @dataclass(frozen=True)
 class Rows:
-    """residual + by_z dz + by_u du = 0: dim equations [N] for every multiplier in contact, at fixed factors D."""
+    """residual + by_z dz + by_u du = 0: dim equations [N] for every multiplier in contact."""
 
     residual: Array  #: shape (m, dim)
     by_z: Array  #: shape (m, dim, dim)
