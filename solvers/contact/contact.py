@@ -285,22 +285,13 @@ class Contact:
     def linearised(self, parts: Sequence[ActiveMultipliers], weight: float) -> Linearised:
         """Contribution of the multipliers in contact to a Newton iteration, linearised."""
         assert self.terms is not None
-        count, n, dgap = len(self.z), self.dim * self.size, self._closing(self.terms)
+        count, n, dgap = len(self.z), self.dim * self.size, self._redistributed(self.terms.dgap)
         slip = nothing((self.dim * count, n)) if self.slip is None else self.slip.slopes
         slopes = Slopes(gap=dgap, normals=self.terms.dnormals, slip=slip)
         force = force_matrix(self.interface, self.terms)
         if self._shared is not None:
             force = force + force @ self._shared
         return linearise(self.interface, self._spans, parts, slopes, force, self.terms.dforce, weight)
-
-    def _closing(self, terms: Terms) -> Sparse:
-        """Derivative of the mean gap at present areas, D d(gap / D) = d(gap) - (gap / D) dD, shape (C, dim * N).
-
-        That of the weighted gap would have a closing gap overshoot by its depth times the strain of the surface.
-        """
-        D, gap = self._redistributed(terms.D), self._redistributed(terms.gap)
-        mean = np.divide(gap, D, out=np.zeros_like(gap), where=D > 0.0)
-        return self._redistributed(terms.dgap) + self._redistributed(terms.dD).scaled_rows(-mean)
 
     def condense(self, weight: float) -> RowTransformation:
         """The transformation that eliminates the multipliers from the linearised balance without contact force.

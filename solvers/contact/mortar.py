@@ -36,7 +36,6 @@ class MortarTerms:
     M: Sparse  #: coupling [m^(dim-1)], shape (ns, nm)
     gap: Array  #: weighted gap [m^dim], positive where open, shape (ns,)
     dgap: Sparse  #: shape (ns, dim * (ns + nm))
-    dD: Sparse  #: derivative of D, shape (ns, dim * (ns + nm))
     dforce: Sparse  #: derivative of the contact force at fixed multipliers, shape (dim * (ns + nm),) * 2
     area: Array  #: covered area of each slave facet [m^(dim-1)], shape (k,)
     used: NDArray[np.int32]  #: facet pairs that contributed, shape (p, 2)
@@ -203,7 +202,6 @@ class Mortar:
             M=sparse(result.M, (ns, nm)),
             gap=result.gap,
             dgap=self._total(result.dgap, result.dgap_dn, dnormals, ns, columns),
-            dD=self._total(result.dD, result.dD_dn, dnormals, ns, columns),
             dforce=dforce,
             area=result.area,
             used=facet_pairs[result.used.astype(bool)],
@@ -221,7 +219,7 @@ class Mortar:
         result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(0.0))
         W = sparse(result.W, (ns, ns)) @ self.patch.basis()[1]
         M = sparse(result.M, (ns, nm))
-        none = nothing((ns, columns)), nothing((ns, columns)), nothing((columns, columns))
+        none = nothing((ns, columns)), nothing((columns, columns))
         used = facet_pairs[result.used.astype(bool)]
         return MortarTerms(result.D, M, np.zeros(ns), *none, result.area, used), W, M
 

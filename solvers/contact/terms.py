@@ -39,7 +39,6 @@ class Terms:
     gap: Array  #: weighted gap [m^dim], shape (C,)
     normals: Array  #: shape (C, dim)
     dgap: Sparse  #: shape (C, dim * N)
-    dD: Sparse  #: shape (C, dim * N)
     dforce: Sparse  #: derivative of the contact force at fixed multipliers, shape (dim * N,) * 2
     dnormals: Sparse  #: shape (dim * C, dim * N)
 
@@ -73,7 +72,7 @@ def total_terms(
     pairs, C, N = sizes
     dim = normals.values.shape[1]
     D, gap, D_of_pair = np.zeros(C), np.zeros(C), np.zeros((pairs, C))
-    all_M, all_dgap, all_dD, all_dforce = [], [], [], []
+    all_M, all_dgap, all_dforce = [], [], []
     for mortar, found in pieces:
         slave, multiplier, master = mortar.patch.nodes, mortar.patch.multipliers, mortar.masters.nodes
         columns = components(np.concatenate([slave, master]), dim)
@@ -83,12 +82,11 @@ def total_terms(
             D_of_pair[pair, multiplier] += found.M @ (mortar.masters.pair == pair).astype(float)
         all_M.append((found.M, multiplier, master))
         all_dgap.append((found.dgap, multiplier, columns))
-        all_dD.append((found.dD, multiplier, columns))
         all_dforce.append((found.dforce, columns, columns))
     M, dgap = add_up(all_M, (C, N)), add_up(all_dgap, (C, dim * N))
-    dD, dforce = add_up(all_dD, (C, dim * N)), add_up(all_dforce, (dim * N, dim * N))
-    D, gap, D_of_pair, M, dgap, dD, dforce = shares.total_of(D, gap, D_of_pair, M, dgap, dD, dforce)
-    return Terms(D, D_of_pair, M, gap, normals.values, dgap, dD, dforce, normals.slopes)
+    dforce = add_up(all_dforce, (dim * N, dim * N))
+    D, gap, D_of_pair, M, dgap, dforce = shares.total_of(D, gap, D_of_pair, M, dgap, dforce)
+    return Terms(D, D_of_pair, M, gap, normals.values, dgap, dforce, normals.slopes)
 
 
 def renumber(matrix: Sparse, rows: NDArray, columns: NDArray, shape: tuple[int, int]) -> Sparse:
