@@ -26,7 +26,7 @@ class Value:
 
 
 @dataclass(frozen=True)
-class Change:
+class TwinChange:
     """What a twin changes of a value, relative to its scale."""
 
     value: float  #: of the last one
@@ -52,22 +52,22 @@ def values(history: History, summary: Mapping[str, Any], opposite: Collection[st
     return found
 
 
-def changes(base: Mapping[str, Value], twin: Mapping[str, Value]) -> dict[str, Change]:
+def changes(base: Mapping[str, Value], twin: Mapping[str, Value]) -> dict[str, TwinChange]:
     """By value; infinite where only one of both has it or is finite, zero where neither is."""
     return {name: _change(value, twin.get(name)) for name, value in base.items()}
 
 
-def _change(base: Value, twin: Value | None) -> Change:
+def _change(base: Value, twin: Value | None) -> TwinChange:
     if twin is None:
-        return Change(math.inf, math.inf)
+        return TwinChange(math.inf, math.inf)
     last = _relative(twin.value - base.value, base, twin)
     if base.curve is None:
-        return Change(last, abs(last))
+        return TwinChange(last, abs(last))
     inside = (base.time >= twin.time[0]) & (base.time <= twin.time[-1])
     other = np.interp(base.time[inside], twin.time, twin.curve)
     both = np.isfinite(other) & np.isfinite(base.curve[inside])
     difference = np.abs(other - base.curve[inside])[both].max(initial=0.0)
-    return Change(last, max(_relative(float(difference), base, twin), abs(last)))
+    return TwinChange(last, max(_relative(float(difference), base, twin), abs(last)))
 
 
 def _relative(difference: float, base: Value, twin: Value) -> float:

@@ -21,7 +21,7 @@ from fsci.twin.grids import Settings
 
 
 @dataclass(frozen=True)
-class Ended:
+class TwinEnded:
     """How the run of a twin has ended: its results, or the message that says why there are none."""
 
     twin: Twin
@@ -39,7 +39,7 @@ class Ended:
 
 def run_all(
     case: Case, overrides: Settings, twins: Sequence[Twin], out: Path, known: Mapping[str, str]
-) -> Iterator[Ended]:
+) -> Iterator[TwinEnded]:
     """The ends of all runs, each as soon as it is there, with results in the folders of their names in `out`.
 
     `overrides` are those that the case was read with. A twin whose checksum is in `known` has been run. An exception,
@@ -53,7 +53,7 @@ def run_all(
             try:
                 checksum = _checksum(load_case(case.path, settings), twin.processes)
             except CaseError as error:
-                yield Ended(twin, message=str(error))
+                yield TwinEnded(twin, message=str(error))
                 continue
             done = checksum == known.get(twin.name) and (out / twin.name / "summary.json").exists()
             runs.append(pool.submit(_read if done else _run, case.path, settings, twin, out / twin.name, checksum))
@@ -65,7 +65,7 @@ def run_all(
                 run.cancel()
 
 
-def _run(case: Path, settings: Settings, twin: Twin, folder: Path, checksum: str) -> Ended:
+def _run(case: Path, settings: Settings, twin: Twin, folder: Path, checksum: str) -> TwinEnded:
     arguments = [f"--set={name}={value}" for name, value in settings]
     ended = subprocess.run(
         command("run", str(case), "-o", str(folder), *arguments, processes=twin.processes),
@@ -74,15 +74,15 @@ def _run(case: Path, settings: Settings, twin: Twin, folder: Path, checksum: str
         env=ENVIRONMENT,
     )
     if not (folder / "summary.json").exists() or ended.returncode not in (0, 1):
-        return Ended(twin, message=(ended.stderr or ended.stdout).strip())
+        return TwinEnded(twin, message=(ended.stderr or ended.stdout).strip())
     return _read(case, settings, twin, folder, checksum)
 
 
-def _read(case: Path, settings: Settings, twin: Twin, folder: Path, checksum: str) -> Ended:
+def _read(case: Path, settings: Settings, twin: Twin, folder: Path, checksum: str) -> TwinEnded:
     summary = json.loads((folder / "summary.json").read_text())
     if summary["status"] != "finished":
-        return Ended(twin, message=str(summary["message"] or summary["status"]), summary=summary)
-    return Ended(twin, checksum, "", read_history(folder / "history.csv"), summary)
+        return TwinEnded(twin, message=str(summary["message"] or summary["status"]), summary=summary)
+    return TwinEnded(twin, checksum, "", read_history(folder / "history.csv"), summary)
 
 
 def _checksum(case: Case, processes: int) -> str:

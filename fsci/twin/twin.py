@@ -15,9 +15,9 @@ from fsci.case.errors import Place, Problem, did_you_mean
 from fsci.run.files import write_text
 from fsci.run.summary import plain
 from fsci.twin.changes import Meaning, Twin, quick, twins
-from fsci.twin.compare import Change, Value, changes, values
+from fsci.twin.compare import TwinChange, Value, changes, values
 from fsci.twin.grids import Settings
-from fsci.twin.runs import Ended, run_all
+from fsci.twin.runs import TwinEnded, run_all
 
 RESULTS = "twin.json"
 BASE = Twin("case", "the case itself", "defect")
@@ -48,7 +48,7 @@ def run_twins(
     out.mkdir(parents=True, exist_ok=True)
     known = _known(out / RESULTS)
     say(f"{case.path}: {len(chosen)} twins in {out}")
-    ended: dict[str, Ended] = {}
+    ended: dict[str, TwinEnded] = {}
     runs = [BASE, *(Twin(**{**vars(twin), "settings": (*twin.settings, *NO_FIELDS)}) for twin in chosen)]
     for one in run_all(case, overrides, runs, out, known):
         ended[one.twin.name] = one
@@ -85,14 +85,14 @@ def _known(path: Path) -> dict[str, str]:
         return {}
 
 
-def _progress(one: Ended) -> str:
+def _progress(one: TwinEnded) -> str:
     seconds = "" if one.seconds is None else f"{one.seconds:8.1f} s"
     return f"{one.twin.name:10} {seconds:10} {one.message or one.twin.words}"
 
 
 def _compared(
-    runs: Sequence[Twin], ended: Mapping[str, Ended]
-) -> tuple[dict[str, Value], dict[str, dict[str, Change]]]:
+    runs: Sequence[Twin], ended: Mapping[str, TwinEnded]
+) -> tuple[dict[str, Value], dict[str, dict[str, TwinChange]]]:
     """Values of the case itself, and what each twin changes of them."""
     base = ended.get(BASE.name)
     if base is None or base.message:
@@ -106,7 +106,7 @@ def _compared(
     return own, found
 
 
-def _results(runs: Sequence[Twin], ended: Mapping[str, Ended], known: Mapping[str, str]) -> dict[str, Any]:
+def _results(runs: Sequence[Twin], ended: Mapping[str, TwinEnded], known: Mapping[str, str]) -> dict[str, Any]:
     own, found = _compared(runs, ended)
     return {
         "runs": {
@@ -132,7 +132,7 @@ def _results(runs: Sequence[Twin], ended: Mapping[str, Ended], known: Mapping[st
     }
 
 
-def _table(runs: Sequence[Twin], ended: Mapping[str, Ended]) -> list[str]:
+def _table(runs: Sequence[Twin], ended: Mapping[str, TwinEnded]) -> list[str]:
     """Values by twins, then a sentence on each twin."""
     own, found = _compared(runs, ended)
     kinds: dict[str, list[Twin]] = {}

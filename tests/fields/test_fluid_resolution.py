@@ -21,7 +21,7 @@ from solvers.fluid.boundary.patches import Patch
 from solvers.fluid.field import Fluid
 from solvers.fluid.flow_settings import FlowSettings
 from solvers.fluid.resolution.cells import BodyCells, GapCells
-from solvers.fluid.resolution.gaps import Plane, gaps, samples_of
+from solvers.fluid.resolution.gaps import WallPlane, gaps, samples_of
 from solvers.fluid.resolution.measure import measure
 from solvers.fluid.resolution.shape import at_start, has_edges
 from solvers.newton import Tolerance
@@ -77,7 +77,7 @@ def test_cells_are_counted_where_they_are():
     samples = samples_of(grid, block((1, 0.5), (1.01, 0.7)))
     below = np.isclose(samples.x[:, 1], 0.7)
     for mirror, cells in ((False, 3.0), (True, 6.0)):
-        found = gaps(grid, samples, [Plane(1, 0, mirror)])
+        found = gaps(grid, samples, [WallPlane(1, 0, mirror)])
         assert found.cells[below] == pytest.approx(cells)
         assert (found.partner[below] == -1).all()
 
@@ -106,13 +106,13 @@ def test_bodies_before_the_flow():
     """Across: the longer side of a rectangle; shares in films by 1 / gap^2, whatever else is in front."""
     grid = uniform([0, 0], [10, 10], [100, 100])
     long, small = block((4, 1), (3, 1.1)), block((1, 1), (3, 2.3))
-    first, second = at_start(grid, [(Plane(1, 0), "y-")], [("long", long), ("small", small)])
+    first, second = at_start(grid, [(WallPlane(1, 0), "y-")], [("long", long), ("small", small)])
     assert (first.across, second.across) == pytest.approx((40, 10))
     assert [(gap.to, round(gap.least, 6)) for gap in second.gaps] == [("long", 2.0)]
     assert [gap.to for gap in first.gaps] == ["small"]  # 11 cells to the face are no narrow gap
     half = block((0.5, 2), (3, 0))
     for mirror, across in ((False, 20), (True, 40)):
-        (found,) = at_start(grid, [(Plane(1, 0, mirror), "y-")], [("half", half)])
+        (found,) = at_start(grid, [(WallPlane(1, 0, mirror), "y-")], [("half", half)])
         assert found.across == pytest.approx(across)
 
 

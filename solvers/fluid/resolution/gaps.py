@@ -30,7 +30,7 @@ TRIED = 40
 
 
 @dataclass(frozen=True)
-class Samples:
+class SurfaceSamples:
     """Points on facets, about a cell apart at most."""
 
     x: Array  #: (n, dim) [m]
@@ -39,12 +39,12 @@ class Samples:
     facet: NDArray[np.int64]
     across: Array  #: length of a cell along the normal [m]
 
-    def __getitem__(self, some: NDArray) -> Samples:
-        return Samples(self.x[some], self.normal[some], self.area[some], self.facet[some], self.across[some])
+    def __getitem__(self, some: NDArray) -> SurfaceSamples:
+        return SurfaceSamples(self.x[some], self.normal[some], self.area[some], self.facet[some], self.across[some])
 
 
 @dataclass(frozen=True)
-class Plane:
+class WallPlane:
     """A face of the box as a wall; mirror: a plane of symmetry, with the image of the surface behind it."""
 
     axis: int
@@ -53,14 +53,14 @@ class Plane:
 
 
 @dataclass(frozen=True)
-class Gaps:
+class SampledGaps:
     """The gap in front of each sample."""
 
     cells: Array  #: across the gap; infinite where nothing is opposite
     partner: NDArray[np.int64]  #: number of the sample opposite, -1 - number of the plane, or of itself: nothing
 
 
-def samples_of(grid: Grid, corners: Array) -> Samples:
+def samples_of(grid: Grid, corners: Array) -> SurfaceSamples:
     """Points on facets in the box, one at least on each; corners: (facets, dim, dim) [m]."""
     vector = area_vectors(corners)
     area = np.linalg.norm(vector, axis=1)
@@ -77,13 +77,13 @@ def samples_of(grid: Grid, corners: Array) -> Samples:
     share = 1.0 / np.maximum(np.bincount(facet, minlength=len(corners)), 1)[facet]
     normal = np.divide(vector, area[:, None], out=np.zeros_like(vector), where=area[:, None] > 0.0)[facet]
     across = 1.0 / np.maximum(np.linalg.norm(normal / _sizes(grid, x), axis=1), 1e-300)
-    found = Samples(x, normal, area[facet] * share, facet, across)
+    found = SurfaceSamples(x, normal, area[facet] * share, facet, across)
     low, high = (np.array([edge[end] for edge in grid.edges]) for end in (0, -1))
     near = 1e-6 * (high - low)
     return found[((x > low + near) & (x < high - near)).all(axis=1) & (found.area > 0.0)]
 
 
-def gaps(grid: Grid, samples: Samples, planes: Sequence[Plane]) -> Gaps:
+def gaps(grid: Grid, samples: SurfaceSamples, planes: Sequence[WallPlane]) -> SampledGaps:
     """The gap in front of each sample, to another one that faces it or to a wall of the box."""
     width, partner = _to_surfaces(samples, float(max(edge[-1] - edge[0] for edge in grid.edges)))
     for number, plane in enumerate(planes):
@@ -96,10 +96,10 @@ def gaps(grid: Grid, samples: Samples, planes: Sequence[Plane]) -> Gaps:
     way = np.where(mirrored, 0.5, 1.0) * np.where(np.isfinite(width), width, 0.0)
     ends = samples.x + way[:, None] * samples.normal
     passed = np.linalg.norm(_index(grid, ends) - _index(grid, samples.x), axis=1)
-    return Gaps(np.where(np.isfinite(width), np.where(mirrored, 2.0, 1.0) * passed, np.inf), partner)
+    return SampledGaps(np.where(np.isfinite(width), np.where(mirrored, 2.0, 1.0) * passed, np.inf), partner)
 
 
-def _to_surfaces(samples: Samples, farthest: float) -> tuple[Array, NDArray[np.int64]]:
+def _to_surfaces(samples: SurfaceSamples, farthest: float) -> tuple[Array, NDArray[np.int64]]:
     """(widths [m], infinite where no facing sample is closer than the farthest, numbers of the facing samples)."""
     count = len(samples.x)
     width, partner, radius = np.full(count, np.inf), np.arange(count), np.full(count, 0.5 * farthest)

@@ -20,7 +20,7 @@ from mpi4py import MPI
 from solvers.api import Array
 from solvers.fluid.field import Fluid
 from solvers.fluid.resolution.cells import BodyCells
-from solvers.fluid.resolution.shape import NARROW, Scene, present, scene_of, shape_of, walls_of_box
+from solvers.fluid.resolution.shape import NARROW, SurfaceScene, present, scene_of, shape_of, walls_of_box
 from solvers.tessellation import unit_normals
 
 #: Force that friction and dynamic pressure may explain, in multiples of them, around bodies and in films. Around bodies
@@ -42,7 +42,7 @@ def measure(fluid: Fluid) -> list[BodyCells]:
     return [_of_body(fluid, scene, body, force, wet) for body in present(scene)]
 
 
-def _of_body(fluid: Fluid, scene: Scene, body: int, force: Array, wet: Array) -> BodyCells:
+def _of_body(fluid: Fluid, scene: SurfaceScene, body: int, force: Array, wet: Array) -> BodyCells:
     normal, speed = unit_normals(scene.corners), _speed(fluid, body)
     along = np.einsum("fi,fi->f", force, normal)
     level = _median(along / np.maximum(wet, 1e-300), np.where(scene.owner == body, wet, 0.0))

@@ -12,7 +12,7 @@ from solvers.api import Array
 from solvers.fluid.background.box import Grid
 from solvers.fluid.boundary.patch_kinds import PatchKind
 from solvers.fluid.resolution.cells import BodyCells, GapCells
-from solvers.fluid.resolution.gaps import Gaps, Plane, Samples, gaps, samples_of
+from solvers.fluid.resolution.gaps import SampledGaps, SurfaceSamples, WallPlane, gaps, samples_of
 from solvers.tessellation import unit_normals
 
 #: Gaps up to so many cells count as such; the flow in wider ones is that around the body.
@@ -21,13 +21,13 @@ NARROW = 5.0
 EDGE = 0.7
 
 
-def walls_of_box(patches: Iterable[tuple[Sequence[str], PatchKind]]) -> list[tuple[Plane, str]]:
+def walls_of_box(patches: Iterable[tuple[Sequence[str], PatchKind]]) -> list[tuple[WallPlane, str]]:
     """Faces of the box that hold the normal velocity, with their names; those that hold no other one mirror the flow.
 
     patches: faces and kind of each.
     """
     return [
-        (Plane("xyz".index(face[0]), int(face[1] == "+"), kind.prescribed == "normal"), face)
+        (WallPlane("xyz".index(face[0]), int(face[1] == "+"), kind.prescribed == "normal"), face)
         for faces, kind in patches
         if kind.normal_given
         for face in faces
@@ -35,15 +35,15 @@ def walls_of_box(patches: Iterable[tuple[Sequence[str], PatchKind]]) -> list[tup
 
 
 @dataclass(frozen=True)
-class Scene:
+class SurfaceScene:
     """Surfaces in the box, with the gaps in front of them."""
 
     bodies: list[str]
     faces: list[str]  #: names of the walls of the box, in the order of the planes
     corners: Array  #: of the facets of all bodies, (facets, dim, dim) [m]
     owner: NDArray[np.int64]  #: body of each facet
-    samples: Samples
-    gaps: Gaps
+    samples: SurfaceSamples
+    gaps: SampledGaps
     mirrors: list[tuple[int, float]]  #: axis and position [m] of the planes of symmetry
 
     def of_samples(self, by_facet: Array) -> Array:
@@ -54,10 +54,10 @@ class Scene:
 
 def scene_of(
     grid: Grid,
-    walls: Sequence[tuple[Plane, str]],
+    walls: Sequence[tuple[WallPlane, str]],
     bodies: Sequence[tuple[str, Array]],
     wet: NDArray[np.bool_] | None = None,
-) -> Scene:
+) -> SurfaceScene:
     """Of bodies by (name, corners of their facets).
 
     walls: of the box, with names; wet: mask of the facets that count.
@@ -70,10 +70,12 @@ def scene_of(
     found = gaps(grid, samples, [plane for plane, _ in walls])
     mirrors = [(plane.axis, float(grid.edges[plane.axis][-plane.side])) for plane, _ in walls if plane.mirror]
     names, faces = [name for name, _ in bodies], [face for _, face in walls]
-    return Scene(names, faces, corners, owner, samples, found, mirrors)
+    return SurfaceScene(names, faces, corners, owner, samples, found, mirrors)
 
 
-def at_start(grid: Grid, walls: Sequence[tuple[Plane, str]], bodies: Sequence[tuple[str, Array]]) -> list[BodyCells]:
+def at_start(
+    grid: Grid, walls: Sequence[tuple[WallPlane, str]], bodies: Sequence[tuple[str, Array]]
+) -> list[BodyCells]:
     """Of bodies as in `scene_of`, without a flow.
 
     Shares of the force are those of films: what acts is proportional to 1 / gap^2.
@@ -85,13 +87,13 @@ def at_start(grid: Grid, walls: Sequence[tuple[Plane, str]], bodies: Sequence[tu
     return [shape_of(scene, body, acting, acting) for body in present(scene)]
 
 
-def present(scene: Scene) -> list[int]:
+def present(scene: SurfaceScene) -> list[int]:
     """Numbers of the bodies with samples."""
     found: list[int] = np.unique(scene.owner[scene.samples.facet]).tolist()
     return found
 
 
-def shape_of(scene: Scene, body: int, acting: Array, counts: Array) -> BodyCells:
+def shape_of(scene: SurfaceScene, body: int, acting: Array, counts: Array) -> BodyCells:
     """Of one body; acting: size of the force at each sample; counts: the part of it that shares are of."""
     samples = scene.samples
     some = np.flatnonzero(scene.owner[samples.facet] == body)
@@ -116,7 +118,7 @@ def shape_of(scene: Scene, body: int, acting: Array, counts: Array) -> BodyCells
     )
 
 
-def _gaps_of(scene: Scene, body: int, some: NDArray[np.int64], share: Array) -> Iterator[GapCells]:
+def _gaps_of(scene: SurfaceScene, body: int, some: NDArray[np.int64], share: Array) -> Iterator[GapCells]:
     """Gaps in front of some samples, by what is opposite."""
     partner = scene.gaps.partner[some]
     of_bodies = scene.owner[scene.samples.facet[np.maximum(partner, 0)]]
