@@ -161,7 +161,7 @@ def test_bodies_against_the_grid():
     assert "the body is 0.3 thick" in check_meshes(load(short)).warnings[0], "both sides share unknowns at its ends"
     assert "thick" not in " ".join(check_meshes(load(plate)).warnings), "it rests: it may be as thin as it likes"
     found = check_meshes(load(plate.replace("slip: true", "periodic: true")))
-    assert len(found.warnings) == 1
+    assert sum("thick" in warning for warning in found.warnings) == 1
     assert found.warnings[0].startswith("case.yaml:14:19: the body is 0.3 thick, 1.2 of the smallest cells")
     found = check_meshes(load(FLOW.replace("[1.01, 0.51]", "[5, 0]")))
     assert found.warnings == ["case.yaml:14:12: the body is outside of the fluid's box"]
