@@ -6,10 +6,12 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fsci.resolution.table import Kind, cells_for, error, least_error
-from solvers.fluid.resolution.cells import BodyCells, GapCells
+
+if TYPE_CHECKING:
+    from solvers.fluid.resolution.cells import BodyCells, GapCells
 
 #: Error [%] from which on a message is a warning. The table is known to a factor of two: what is above 5 % warns, and
 #: what is below 1 % does not, with any value from 2 to 3.

@@ -16,7 +16,6 @@ from fsci.builder.on_first import on_first, shared
 from fsci.case import Case, CaseError, load_case
 from fsci.case.resume import changed, end_error, meshes_changed
 from fsci.case.settings import settings_of
-from fsci.resolution.words import resolved
 from fsci.run.cause import alike, with_cause
 from fsci.run.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from fsci.run.clock import Clock
@@ -307,9 +306,13 @@ class Run:
 
     def _measure_resolution(self) -> None:
         """Note how well the grid resolves the present flow: at steps 1, 2, 4, 8, ... and at the end (collective)."""
+        if self.case.fluid is None:
+            return
+        from fsci.resolution.words import resolved
+
         with self.record.timer("resolution"):
             found = self.simulation.resolution()
-        if found and self.case.fluid is not None:
+        if found:
             self.record.note_resolution(resolved(found, self.case.fluid.element))
 
     # ------------------------------------------------------------------------------------------------- files

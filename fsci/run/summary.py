@@ -9,16 +9,18 @@ import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.resolution.words import Resolved
 from fsci.run.files import write_text
 from fsci.run.history import History
 from solvers.api import Finding, State, StepInfo
 from solvers.timing import Timer
+
+if TYPE_CHECKING:
+    from fsci.resolution.words import Resolved
 
 #: Columns of the history with the iterations of linear solvers in a step.
 LINEAR_COLUMNS = ("coupling.linear", "fluid.linear")

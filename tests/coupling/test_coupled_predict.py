@@ -7,6 +7,7 @@ import pytest
 
 from coupling.coupled import Coupled
 from coupling.monolithic import Monolithic
+from coupling.secant import Secant
 
 
 class Part:
@@ -31,7 +32,7 @@ def test_predictors_that_increase_the_residual_in_a_film_in_contact(contact, fil
     coupled = Coupled.__new__(Coupled)
     coupled.flow, coupled.solid = flow, solid
     scheme = Monolithic.__new__(Monolithic)
-    scheme.coupled, scheme.residual = coupled, lambda: np.array([residual, 0.5])
+    scheme.coupled, scheme.residual, scheme._secant = coupled, lambda: np.array([residual, 0.5]), Secant()
     scheme._predict(0.5, np.array([1.0, 1.0]))
     back = contact and films and not residual < 1.0
     assert flow.calls == solid.calls == (["predict", 1.0] if back else ["predict"])
