@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -49,6 +49,15 @@ class Resolved:
 def resolved(bodies: Sequence[BodyCells], element: str) -> list[Resolved]:
     """One for each body and each of its narrow gaps."""
     return [found for body in bodies for found in (_of_body(body, element), *_of_gaps(body, element))]
+
+
+def worst_by_body(found: Iterable[Mapping[str, Any]]) -> list[str]:
+    """For each body the message of the largest error, if it warns."""
+    worst: dict[str, Mapping[str, Any]] = {}
+    for one in found:
+        if one["warns"] and one["error"] > worst.get(one["body"], {"error": 0.0})["error"]:
+            worst[one["body"]] = one
+    return [one["message"] for one in worst.values()]
 
 
 def before_the_run(body: BodyCells, element: str, *, films: bool) -> Iterator[tuple[tuple[str, str], str]]:
@@ -101,7 +110,7 @@ def _of_gaps(body: BodyCells, element: str) -> Iterator[Resolved]:
         )
         if off >= WARNED:
             finer = cells_for(partial(errors, element), GOOD, gap.cells) / gap.cells
-            text += _remedy(errors, element, gap.cells, f"{_number(finer * gap.least)} cells at its narrowest")
+            text += _remedy(errors, element, gap.cells, f"{_number(finer)} times as many cells there")
         yield Resolved(body.body, gap.to, gap.cells, gap.least, body.facets, gap.share, off, text)
 
 

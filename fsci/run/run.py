@@ -16,6 +16,7 @@ from fsci.builder.on_first import on_first, shared
 from fsci.case import Case, CaseError, load_case
 from fsci.case.resume import changed, end_error, meshes_changed
 from fsci.case.settings import settings_of
+from fsci.resolution.words import resolved, worst_by_body
 from fsci.run.cause import alike, with_cause
 from fsci.run.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
 from fsci.run.clock import Clock
@@ -308,8 +309,6 @@ class Run:
         """Note how well the grid resolves the present flow: at steps 1, 2, 4, 8, ... and at the end (collective)."""
         if self.case.fluid is None:
             return
-        from fsci.resolution.words import resolved
-
         with self.record.timer("resolution"):
             found = self.simulation.resolution()
         if found:
@@ -421,7 +420,7 @@ class Run:
             kind = "earlier result" if result["regression"] else "reference"
             found = f"{result['value']:.6g}, {kind} {result['reference']:.6g} +- {result['tolerance']:.2g}"
             self.monitor.say(f"verify {word} {result['name']}: {found} {result['message']}".rstrip())
-        coarse = [one["message"] for one in self.record.resolution.values() if one["warns"]]
+        coarse = worst_by_body(self.record.resolution.values())
         for message in coarse:
             self.monitor.warn(message)
         missed = any(not result["ok"] for result in results)

@@ -17,6 +17,7 @@ from solvers import wall_thickness
 from solvers.cell_types import CELL_TYPES
 from solvers.contact import dual_tree, mortar, overlap_at_start, self_search, share, sharp_edges
 from solvers.contact.sharp_edges import split_nodes
+from solvers.fluid.bodies import hidden
 from solvers.fluid.bodies.surface import ImmersedSurface
 from solvers.fluid.films import film, gaps
 from solvers.fluid.poorly_cut import extension
@@ -109,7 +110,7 @@ def test_winding_number_of_what_is_inside(monkeypatch, inside):
         facets, nodes = tessellate(mesh)
         surfaces.append((ImmersedSurface(f"{len(surfaces)}", facets, len(nodes)), mesh.points[nodes]))
     wanted = [surface.wet for surface in wetted.find_wet(surfaces)]
-    monkeypatch.setattr(wetted, "INSIDE", inside)
+    monkeypatch.setattr(hidden, "HIDDEN", inside)
     found = [surface.wet for surface in wetted.find_wet(surfaces)]
     assert not all(wet.all() for wet in wanted)
     assert all(np.array_equal(a, b) for a, b in zip(found, wanted, strict=True))

@@ -246,7 +246,7 @@ def test_words_of_gaps(simple):
     ]
     assert found[1].message == (
         "body 'ball': 1.5 cells in the gap to 'wall' at its narrowest, 2 where the force acts, "
-        "with which forces were 10 % off in the benchmark; take element: q2q1, or 4.8 cells at its narrowest"
+        "with which forces were 10 % off in the benchmark; take element: q2q1, or 3.2 times as many cells there"
     )
     assert "in the gap to itself" in found[2].message
     assert "in the gap to face y-" in found[3].message
