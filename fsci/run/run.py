@@ -273,7 +273,7 @@ class Run:
             clock.accept()
             self.record.accept(clock.step, info)
             self._note(dt, info, before)
-            if _counts(clock.step):
+            if _is_power_of_two(clock.step):
                 self._measure_resolution()
             every = self.case.output.fields_every
             if clock.done or (every and clock.step % every == 0):
@@ -367,7 +367,7 @@ class Run:
         """Checkpoint, summary and verification; the exit code is the same on all processes."""
         with self.stop.files:
             self.stop.ended()
-            if status != "failed" and not _counts(self.clock.step):
+            if status != "failed" and not _is_power_of_two(self.clock.step):
                 self._measure_resolution()
             self._write_checkpoint()
             memory = max(self.comm.allgather(memory_mb()))
@@ -434,8 +434,8 @@ class Run:
         return {"finished": FAILED if missed else FINISHED, "stopped": STOPPED, "failed": FAILED}[status]
 
 
-def _counts(step: int) -> bool:
-    """Whether the resolution is measured after a step: 1, 2, 4, 8, ..."""
+def _is_power_of_two(step: int) -> bool:
+    """The steps after which the resolution is measured: 1, 2, 4, 8, ..."""
     return step & (step - 1) == 0
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,7 @@ def run_twins(
     known = _known(out / RESULTS)
     say(f"{case.path}: {len(chosen)} twins in {out}")
     ended: dict[str, TwinEnded] = {}
-    runs = [BASE, *(Twin(**{**vars(twin), "settings": (*twin.settings, *NO_FIELDS)}) for twin in chosen)]
+    runs = [BASE, *(replace(twin, settings=(*twin.settings, *NO_FIELDS)) for twin in chosen)]
     for one in run_all(case, overrides, runs, out, known):
         ended[one.twin.name] = one
         known[one.twin.name] = one.checksum
@@ -78,9 +79,9 @@ def _kind(twin: Twin) -> str:
 
 
 def _known(path: Path) -> dict[str, str]:
-    """Checksums of the runs that a former twin.json lists."""
+    """Checksums of all runs that are in the folder, by a former twin.json."""
     try:
-        return {name: run["checksum"] for name, run in json.loads(path.read_text())["runs"].items()}
+        return dict(json.loads(path.read_text())["checksums"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return {}
 
@@ -109,12 +110,12 @@ def _compared(
 def _results(runs: Sequence[Twin], ended: Mapping[str, TwinEnded], known: Mapping[str, str]) -> dict[str, Any]:
     own, found = _compared(runs, ended)
     return {
+        "checksums": known,
         "runs": {
             twin.name: {
                 "words": twin.words,
                 "settings": dict(twin.settings),
                 "processes": twin.processes,
-                "checksum": known[twin.name],
                 "seconds": ended[twin.name].seconds,
                 "message": ended[twin.name].message,
             }

@@ -67,6 +67,7 @@ def test_a_flow(tmp_path):
     assert "processes: two processes: nothing changes" in ended.stdout
     times = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("*/history.csv")}
     twin(tmp_path, FLOW, "--quick")
+    twin(tmp_path, FLOW, "--only", "element", "--only", "processes")
     for path, before in times.items():
         assert path.stat().st_mtime_ns == before
     assert {path.parent.name for path in (tmp_path / "out").glob("*/history.csv")} == {
