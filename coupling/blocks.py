@@ -9,10 +9,10 @@ import numpy as np
 from petsc4py import PETSc
 
 from coupling.ports import Solid
-from solvers.added_product import with_product
+from solvers.algebra.added_product import with_product
+from solvers.algebra.gauss_seidel import TwoFields, matrix_of
+from solvers.algebra.rows import Numbering, RowTransformation, TakenRows, transform_rows
 from solvers.api import Array
-from solvers.gauss_seidel import TwoFields, matrix_of
-from solvers.rows import Numbering, RowTransformation, TakenRows, transform_rows
 
 
 @dataclass

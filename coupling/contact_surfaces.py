@@ -8,10 +8,10 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from solvers.blocks import Layout
-from solvers.cell_types import CELL_TYPES
+from solvers.algebra.blocks import Layout
 from solvers.contact.surface import Surface
-from solvers.mesh_topology import cut_out
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.topology import cut_out
 from solvers.structure.body import Body
 from solvers.structure.supports import prescribe, symmetric_dofs
 
@@ -21,18 +21,33 @@ def contact_surface(bodies: Sequence[Body], body: str, *surfaces: str) -> Surfac
 
     bodies: all bodies of the structure, in the order in which their dofs are numbered.
     """
+    mesh = next(other for other in bodies if other.name == body).domain.source
+    facets = None
+    if mesh is not None:
+        _, local, nodes = cut_out(mesh, surfaces)
+        facets = nodes[local]
+    return contact_surface_of(bodies, body, ".".join([body, *surfaces]), facets)
+
+
+def contact_surface_of(bodies: Sequence[Body], body: str, name: str, facets: NDArray[np.int64] | None) -> Surface:
+    """Facets of one body, given by the numbers of all their nodes in its mesh on rank 0, as a contact surface.
+
+    As `contact_surface` (collective).
+    """
     index = next(i for i, other in enumerate(bodies) if other.name == body)
     chosen, comm = bodies[index], bodies[index].domain.comm
     layout = Layout(comm, [other.size for other in bodies])
-    mesh = chosen.domain.source
-    found = None if mesh is None else (*cut_out(mesh, surfaces), mesh.unmoved)
-    points, facets, nodes, unmoved = comm.bcast(found, root=0)
+    mesh, found = chosen.domain.source, None
+    if mesh is not None and facets is not None:
+        nodes, local = np.unique(facets, return_inverse=True)
+        found = mesh.points[nodes], local.reshape(facets.shape).astype(np.int64), nodes, mesh.unmoved
+    points, local, nodes, unmoved = comm.bcast(found, root=0)
     dofs = global_dofs(layout, index, chosen, nodes)
     start = layout.start + layout.offsets[index]
     return Surface(
-        ".".join([body, *surfaces]),
+        name,
         points,
-        facets,
+        local,
         CELL_TYPES[chosen.domain.cell_type].facet,
         dofs,
         held=_held(comm, start, chosen, dofs),

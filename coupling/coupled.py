@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
-from coupling.balance import Balance
+from coupling.balance import Balance, InterfaceSentinel
 from coupling.interface import DrySide, Interface
 from coupling.ports import Flow, Solid, Start
 from coupling.sealing_layer import SealingLayer
-from coupling.sentinel import InterfaceSentinel
-from solvers.api import Array, State
+from solvers.api import Array, FailureKind, State, StepFailed
+
+if TYPE_CHECKING:
+    from coupling.near_walls import NearWalls
+
+#: While contact is closed, its force would have to pull, and while it is open, the fluid closes it.
+NO_STATE = (
+    "a fluid at {pull:.3g} Pa below zero pulls at bodies that are dry where they touch, and may have no state open or "
+    "closed: 'contact.film.zone: wetted' gives closed contact the pressure around it"
+)
 
 
 class Coupled:
@@ -22,15 +31,20 @@ class Coupled:
         dry_sides: Sequence[DrySide] = (),
         start: Start | None = None,
         layers: Mapping[str, SealingLayer] = {},
+        walls: NearWalls | None = None,
     ):
-        self.flow, self.solid, self.start = flow, solid, start
+        """walls: faces of the box that elastic bodies may reach."""
+        self.flow, self.solid, self.start, self.walls = flow, solid, start, walls
         self.notes: list[str] = []  #: notes to the user on the start
-        self.interface = Interface(solid, flow.scheme.times, dry_sides, layers)
+        self._dt = 0.0  #: length of the present step [s]
+        self.interface = Interface(solid, flow.times, dry_sides, layers)
         self.balance = Balance(flow, solid, self.interface)
         self.sentinel = InterfaceSentinel(self.balance, solid, steady=flow.steady)
 
     def initialise(self, t: float, dt: float, *, with_solid: bool = False) -> None:
         """Set both parts to the first time, and cut the flow by the solid; with_solid: see `Flow.move`."""
+        if self.walls is not None:
+            self.notes += self.walls.start(t, dt)
         self.solid.initialise(t, dt)
         self.interface.initialise()
         self.flow.initialise(t, dt)
@@ -39,8 +53,11 @@ class Coupled:
 
     def begin_step(self, t: float, dt: float) -> None:
         """Set boundary values and loads to t + dt; both parts keep their state at t."""
+        self._dt = dt
+        if self.walls is not None:
+            self.notes += self.walls.approach(dt)
         self.flow.begin_step(t, dt)
-        self.interface.begin_step(self.flow.current.difference)
+        self.interface.begin_step(self.flow.difference)
         self.solid.begin_step(t, dt)
 
     def predict(self, t: float, *, with_pressure: bool = False) -> None:
@@ -52,10 +69,12 @@ class Coupled:
         self.solid.predict(t)
 
     def end_step(self) -> None:
-        """Accept the step."""
+        """Accept the step. Raises WallPassed."""
+        if self.walls is not None:
+            self.walls.require_apart()
         self.solid.end_step()
         self.flow.end_step()
-        self.balance.add_step(self.flow.current.dt)
+        self.balance.add_step(self._dt)
 
     def take_notes(self) -> tuple[str, ...]:
         """Notes to the user on this step; those on the start are returned once."""
@@ -73,10 +92,26 @@ class Coupled:
             "structure": self.solid.save(),
             "interface": self.interface.save(),
             "balance": self.balance.save(),
+            **({} if self.walls is None else {"walls": self.walls.save()}),
         }
 
     def restore(self, state: State) -> None:
+        if self.walls is not None:
+            self.walls.begin_restore(state["walls"])
         self.solid.restore(state["structure"])
         self.flow.restore(state["fluid"])
         self.interface.restore(state["interface"])
         self.balance.restore(state["balance"])
+        if self.walls is not None:
+            self.walls.end_restore()
+
+
+def with_cause(coupled: Coupled, failure: StepFailed, *, cycles: bool) -> StepFailed:
+    """The failure of a step, with the cause where no smaller step helps (collective).
+
+    cycles: contact opens and closes again and again, on any process.
+    """
+    pull = coupled.flow.suction()
+    if not cycles or pull <= coupled.solid.contact_pressure():  # a larger load holds contact closed
+        return failure
+    return failure.with_reason(f"{failure.reason}; {NO_STATE.format(pull=pull)}", FailureKind.SUCTION)

@@ -14,23 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from solvers.api import Array
-from solvers.connected import connected_parts
-from solvers.sparse import Sparse, sparse_from_entries
-from solvers.tessellation import unit_normals
-
-Indices = NDArray[np.int64]
+from solvers.algebra.connected import connected_parts
+from solvers.algebra.sparse import Sparse, sparse_from_entries
+from solvers.api import Array, Indices
+from solvers.mesh.search import OPPOSED
+from solvers.mesh.tessellation import unit_normals
 
 #: Length in sizes of a facet below which its parts have no extent.
-SAME = 1e-6
+NO_LENGTH = 1e-6
 #: Distance in sizes of a facet up to which the other side of a tie lies on it: arcs of coarse meshes are farther apart
 #: than rounding, other surfaces of the same body are a facet away. From 0.05 on the tests do not depend on it.
 ON_IT = 0.5
 #: Share of a facet below which its free part, or its covered one, does not count: edges of both sides of a bent tie lie
 #: beside each other, by their arcs. From 1e-5 on the tests do not depend on it.
-LEAST = 1e-2
-#: Cosine between normals of two sides that face each other.
-FACING = -0.5
+LEAST_PART = 1e-2
 
 
 @dataclass(frozen=True)
@@ -55,9 +52,9 @@ def divide_facets(x: Array, facets: Indices, candidates: Sequence[tuple[NDArray[
     for facet in np.flatnonzero(np.any([mask for mask, _ in candidates], axis=0)).tolist():
         others = np.concatenate([other for mask, other in candidates if mask[facet]])
         free, covered = _divide(x[facets[facet]], others)
-        if not covered or _size(covered) < LEAST:
+        if not covered or _size(covered) < LEAST_PART:
             continue
-        free = [] if free and _size(free) < LEAST else free
+        free = [] if free and _size(free) < LEAST_PART else free
         if not free and len(covered) == 1:
             tied[facet] = True
             continue
@@ -97,7 +94,7 @@ def _once(x: Array, facets: Indices, more: Array) -> tuple[Indices, Indices]:
     size = float(np.linalg.norm(x[facets] - np.roll(x[facets], 1, axis=1), axis=2).min())
     corners = np.unique(facets)
     at = np.concatenate([corners, len(x) + np.arange(len(more))])
-    pairs = cKDTree(np.concatenate([x[corners], more])).query_pairs(10.0 * SAME * size, output_type="ndarray")
+    pairs = cKDTree(np.concatenate([x[corners], more])).query_pairs(10.0 * NO_LENGTH * size, output_type="ndarray")
     part = connected_parts(pairs[:, 0], pairs[:, 1], len(at))
     _, first = np.unique(part, return_index=True)
     vertex = np.arange(len(x) + len(more))
@@ -133,7 +130,7 @@ def _divide(corners: Array, others: Array) -> tuple[list[Array], list[Array]]:
     margin = ON_IT * size
     low, high = corners.min(axis=0) - margin, corners.max(axis=0) + margin
     near = np.all((others.max(axis=1) >= low) & (others.min(axis=1) <= high), axis=1)
-    near &= unit_normals(others) @ unit_normals(corners) < FACING
+    near &= unit_normals(others) @ unit_normals(corners) < OPPOSED
     others = others[near]
     distance = (others - corners[0]) @ unit_normals(corners)
     free, covered = [np.eye(dim)], []
@@ -180,7 +177,7 @@ def _sides(other: Array) -> list[Array]:
 def _split(part: Array, inward: Array) -> tuple[Array, Array]:
     """(part with negative distance, part with positive distance) of a convex part, empty if without extent."""
     distance = part @ inward
-    distance[np.abs(distance) < SAME] = 0.0
+    distance[np.abs(distance) < NO_LENGTH] = 0.0
     if (distance >= 0.0).all():
         return part[:0], part
     if (distance <= 0.0).all():

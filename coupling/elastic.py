@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from mpi4py import MPI
@@ -11,12 +13,14 @@ from petsc4py import PETSc
 
 from coupling.predict import Predictor
 from coupling.wetted import WettedSurface
+from solvers.algebra.rows import RowTransformation, TakenRows, gather_at
+from solvers.algebra.sparse import Sparse, stack
+from solvers.algebra.vertices import VertexJacobian
 from solvers.api import Array, State, StepInfo
-from solvers.rows import RowTransformation, TakenRows, gather_at
-from solvers.sparse import stack
+from solvers.generalised_alpha import BACKWARD_EULER
+from solvers.structure.dynamics import Dynamics
 from solvers.structure.field import Structure
 from solvers.structure.saved import from_bodies, per_body
-from solvers.vertices import VertexJacobian
 
 
 class Elastic:
@@ -25,15 +29,25 @@ class Elastic:
     def __init__(self, structure: Structure, surfaces: Sequence[WettedSurface]):
         self.structure = structure
         self.surfaces = {surface.name: surface.points for surface in surfaces}
-        self.dofs = np.concatenate([surface.dofs for surface in surfaces])  #: of the nodes, global, shape (m, dim)
+        none = np.empty((0, structure.dim), dtype=np.int64)  # without a flow
+        self.dofs = np.concatenate([none, *(surface.dofs for surface in surfaces)])  #: of the nodes, (m, dim)
         mixtures = [surface.mixture for surface in surfaces if surface.mixture is not None]
         self._mixture = stack(mixtures) if mixtures else None  #: vertices from the nodes; None: they are the same
         self.predictor = Predictor()
+        #: whether the next step takes the impulse of an impulsive start, by backward Euler, or the last one did
+        self.impulse: Literal["none", "next", "last"] = "none"
         self.name, self.comm, self.size = structure.name, structure.comm, structure.layout.size
+        self._time = structure.time  #: the scheme of all other steps
 
     @property
     def force_weight(self) -> float:
         return self.structure.time.force_weight
+
+    def mean_load(self, before: Array, after: Array) -> Array:
+        return self.force_weight * after + (1.0 - self.force_weight) * before
+
+    def weighted(self, rows: Sparse) -> Sparse:
+        return self.force_weight * rows
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -41,8 +55,18 @@ class Elastic:
         self.structure.initialise(t, dt)
 
     def begin_step(self, t: float, dt: float) -> None:
+        self.choose_scheme()
+        if self.impulse == "next":
+            self.structure.now.a[:] = 0.0  # Newmark's relations are those of backward Euler then
+        before = self.structure.now.u.copy()  # surfaces that lose their mass move to their equilibrium, by a leap
         self.structure.begin_step(t, dt)
-        self.predictor.add(t, self.structure.old.u)
+        self.predictor.add(t, before)
+
+    def choose_scheme(self) -> None:
+        """Set the time scheme of the structure: its own one, or backward Euler."""
+        self.structure.time = own = self._time
+        if self.impulse == "next" and isinstance(own, Dynamics):
+            self.structure.time = replace(own, scheme=BACKWARD_EULER)
 
     def predict(self, t: float) -> None:
         """Extrapolate displacements by a parabola, unless the structure has a predictor of its own."""
@@ -69,6 +93,8 @@ class Elastic:
 
     def end_step(self) -> None:
         self.structure.end_step()
+        if self.impulse == "next":
+            self.impulse = "last"
 
     # ---------------------------------------------------------------------------------------------- the surface
 
@@ -131,6 +157,9 @@ class Elastic:
 
     # ------------------------------------------------------------------------------------- rows of a larger system
 
+    def follow(self) -> None:
+        self.structure.follow()
+
     def residual(self) -> Array:
         return self.structure.residual()
 
@@ -173,11 +202,18 @@ class Elastic:
     def worst(self) -> tuple[float, ...] | None:
         return self.structure.worst()
 
-    def row_transformation(self) -> RowTransformation | None:
-        return self.structure.row_transformation()
+    @property
+    def near_contact(self) -> bool:
+        """Whether contact changes the rows at this iterate."""
+        return self.structure.constraint is not None and self.structure.constraint.near
 
-    def recover(self, taken: TakenRows, du: Array) -> None:
-        self.structure.recover(taken, du)
+    def row_transformations(self) -> list[RowTransformation]:
+        change = self.structure.row_transformation()
+        return [] if change is None else [change]
+
+    def recover(self, taken: Sequence[TakenRows], du: Array) -> None:
+        for rows in taken:
+            self.structure.recover(rows, du)
 
     def missing(self) -> Array:
         return self.structure.missing_displacement()
@@ -199,10 +235,13 @@ class Elastic:
         """All states have three displacements of the predictor, so that they have the same parts."""
         displacements = [*self.predictor.displacements, *[self.structure.now.u] * 3][:3]
         by_name: State = {str(i): per_body(self.structure, u) for i, u in enumerate(displacements)}
-        return self.structure.save() | {"predictor": by_name | {"times": list(self.predictor.times)}}
+        of_start = {"impulse": self.impulse}
+        return self.structure.save() | of_start | {"predictor": by_name | {"times": list(self.predictor.times)}}
 
     def restore(self, state: State) -> None:
         self.structure.restore(state)
+        self.impulse = state["impulse"]
+        self.choose_scheme()
         saved, self.predictor.times = state["predictor"], list(state["predictor"]["times"])
         self.predictor.displacements = [
             from_bodies(self.structure, saved[str(i)]) for i in range(len(self.predictor.times))

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from coupling.ports import Solid
 from coupling.sealing_layer import SealingLayer
 from solvers.api import Array, State
-from solvers.fluid.bodies.surface import Motion
-from solvers.fluid.time_scheme import STEADY, Difference
+from solvers.exchange import STEADY, Difference, Motion
 
 
 @dataclass(frozen=True)
@@ -52,6 +51,7 @@ class Interface:
         self._ends = np.cumsum([len(points) for points in solid.surfaces.values()])[:-1]
         self.now = np.zeros_like(self.points)
         self.past = [self.now] * max(1, times)  #: displacements [m] at earlier times, newest first
+        self.begun = self.now  #: displacements [m] at the start of the step
         self._difference = STEADY
 
     def initialise(self) -> None:
@@ -61,7 +61,8 @@ class Interface:
 
     def begin_start(self, difference: Difference, velocity: Array) -> None:
         """Begin a start step: g = velocity + alpha (d - d_0), with the present displacement d_0 and velocity [m/s]."""
-        self.past[0], self._difference = self.displacement() - velocity / difference.alpha, difference
+        self.begun = self.displacement()
+        self.past[0], self._difference = self.begun - velocity / difference.alpha, difference
 
     def end_start(self, dt: float, velocity: Array, acceleration: Array) -> None:
         """End the start: extrapolate displacements back by velocity [m/s] and acceleration [m/s^2], in steps dt [s]."""
@@ -72,7 +73,7 @@ class Interface:
     def begin_step(self, difference: Difference) -> None:
         """Store the displacements at the start of a step; difference: its formula."""
         self.past = [self.now, *self.past][: len(self.past)]
-        self._difference = difference
+        self.begun, self._difference = self.now, difference
 
     def displacement(self) -> Array:
         """Present displacement [m] of the vertices, shape (n, dim) (collective)."""

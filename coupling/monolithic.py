@@ -5,17 +5,18 @@
 
 du: unknowns of the solid, dw: velocity and pressure. K, A: tangents of solid and flow. B: derivative of the vertices of
 the surfaces by du. w: weight of the load at the end of the step in the solid's balance. C, S, M: coupling block, change
-of sign and mass of `solvers.fluid.interface`; the velocity of the surface is g = alpha d - (earlier displacements).
+of sign and mass of `fluid.terms.interface`; the velocity of the surface is g = alpha d - (earlier displacements).
 
-The derivatives by the shape of the fluid (`solvers.fluid.shape`, or `cut_shape`) are added to alpha C and M. In steady
-flows, where alpha = 0, they are the whole dependence of the flow on du, and `coupling.secant` corrects what they lack.
-In unsteady flows they halve the number of Newton iterations.
+The derivatives by the shape of the fluid (`fluid.terms.shape_derivatives`) are added to alpha C and M. In steady flows,
+where alpha = 0, they are the whole dependence of the flow on du, and `coupling.secant` corrects what they lack. In
+unsteady flows they halve the number of Newton iterations.
 Source: Schott, Ager, Wall, Int. J. Numer. Meth. Engng 119 (2019) 757-796.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -23,30 +24,41 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from coupling.blocks import Blocks
-from coupling.coupled import Coupled
+from coupling.coupled import Coupled, with_cause
 from coupling.divided import lengths, step_in_parts
+from coupling.ports import IterativeFlow
 from coupling.secant import Secant
-from coupling.start import start_together
-from coupling.suction import with_cause
-from solvers import linear
-from solvers.api import Array, NoResidual, State, StepFailed, StepInfo
-from solvers.lagged import Lagged, LaggedFactors
+from coupling.start import start_again, start_together
+from coupling.wall_passed import WallPassed
+from solvers.algebra import linear
+from solvers.algebra.lagged import Lagged, LaggedFactors
+from solvers.algebra.petsc_python import free_deleted
+from solvers.algebra.rounding import rounding_error
+from solvers.algebra.rows import Numbering, distributed, from_entries, gather
+from solvers.algebra.sparse import Sparse
+from solvers.api import Array, FailureKind, NoResidual, State, StepFailed, StepInfo
 from solvers.newton import Tolerance, converge
-from solvers.petsc_python import free_deleted
-from solvers.rounding import rounding_error
-from solvers.rows import Numbering, distributed, from_entries, gather
-from solvers.sparse import Sparse
+
+
+@dataclass(frozen=True)
+class _Solvers:
+    """Numbers of the unknowns of both parts, and the solvers of systems with them."""
+
+    numbering: Numbering
+    renewals: int  #: of the flow that has these unknowns
+    direct: LaggedFactors
+    krylov: Lagged
 
 
 class Monolithic:
-    """Implements `Scheme`, and `System` for Newton's method: residual, advance, retreat, settled."""
+    """Implements `Scheme`, and `System` for Newton's method: follow, residual, advance, retreat, settled."""
 
     name = "fluid-structure system"
 
     def __init__(self, coupled: Coupled, tolerance: Tolerance = Tolerance()):
         self.coupled, self.tolerance = coupled, tolerance
         self.comm = coupled.solid.comm
-        self._number_unknowns()
+        self._solvers = self._number_unknowns()
         self._secant = Secant()
         self._linear_iterations = 0  #: of this step
         self._linearised = False  #: in this step
@@ -55,13 +67,13 @@ class Monolithic:
         #: tangent of the flow, into_flow, into_solid and the derivative of the force by the motion, of the last iterate
         self._of_flow: tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat, PETSc.Mat] | None = None
 
-    def _number_unknowns(self) -> None:
+    def _number_unknowns(self) -> _Solvers:
         """Number the unknowns of both parts; the linear solvers start anew."""
         solid, flow = self.coupled.solid, self.coupled.flow
-        self._numbering, self._numbered = Numbering(self.comm, solid.size, flow.size), flow.renewals
         # unsteady: the factors of the first iterate do not precondition the later ones well enough
-        self._direct = LaggedFactors(self.comm, fresh=math.inf if flow.steady else 2)
-        self._krylov = Lagged(fresh=math.inf if flow.steady else 1)
+        direct = LaggedFactors(self.comm, fresh=math.inf if flow.steady else 2)
+        krylov = Lagged(fresh=math.inf if flow.steady else 1)
+        return _Solvers(Numbering(self.comm, solid.size, flow.size), flow.renewals, direct, krylov)
 
     # ------------------------------------------------------------------------------------------------- steps
 
@@ -74,8 +86,8 @@ class Monolithic:
         """Discard derivatives and preconditioners of the last step."""
         self._linear_iterations, self._linearised = 0, False
         self._prepared = self._of_flow = None
-        self._krylov.begin_step()
-        self._direct.begin_step()
+        self._solvers.krylov.begin_step()
+        self._solvers.direct.begin_step()
         self._secant.forget()
 
     def _solve_unpredicted(self) -> None:
@@ -84,7 +96,7 @@ class Monolithic:
 
     def step(self, t: float, dt: float) -> StepInfo:
         """Take one, in parts if it is much longer than the last. Raises StepFailed."""
-        return step_in_parts(self._take, t, lengths(dt, self.coupled.flow.history.longest_step))
+        return step_in_parts(self._take, t, lengths(dt, self.coupled.flow.longest_step))
 
     def _take(self, t: float, dt: float) -> StepInfo:
         """A step from its predictor, or from the state before it where the predictor leads astray.
@@ -92,9 +104,14 @@ class Monolithic:
         Extrapolated displacements stretch a thin shell that turns. Newton's increment from there may be a hundred times
         too long.
         """
+        if self.coupled.start is not None and self.coupled.start.solid.took_impulse:
+            start_again(self.coupled, t, dt, self._solve_unpredicted, with_solid=True)
         before = self.save()
         try:
             return self._take_from(t, dt, predicted=not self.coupled.flow.steady)
+        except WallPassed:
+            self.restore(before)
+            return self._take(t, dt)
         except NoResidual:
             if self.coupled.flow.steady:
                 raise
@@ -106,7 +123,7 @@ class Monolithic:
         coupled.begin_step(t, dt)
         self._begin_system()
         if predicted:
-            self._predict(t + dt, self.residual())
+            self._predict(t + dt)
         try:
             info = converge(self, self.tolerance)
         except StepFailed as failure:
@@ -127,30 +144,39 @@ class Monolithic:
             return
         self.coupled.solid.check(StepInfo(failure.iteration, failure.history))
         part = "solid" if np.isfinite(self._residual[-1]) else "flow"
-        raise failure.with_reason(f"the residual of the {part} is not a number")
+        raise failure.with_reason(f"the residual of the {part} is not a number", FailureKind.NOT_FINITE)
 
-    def _predict(self, t: float, unmoved: Array) -> None:
+    def _predict(self, t: float) -> None:
         """Set the predictors for the time t [s]; in closed contact with films only if they reduce the residuals [N].
 
         An extrapolated surface may open parts of the contact. The film there has hardly any height, and the pressure
         for which its first increment takes it moves the surface out of reach.
         """
+        self.follow()
+        unmoved = self.residual()
         doubtful = self.coupled.solid.in_contact() and self.coupled.flow.has_films()
         self.coupled.predict(t, with_pressure=True)
         if doubtful:
+            self.follow()
             now, before = (np.array([np.linalg.norm(r[:-1]), r[-1]]) for r in (self.residual(), unmoved))
             if not (now < before).all():
                 self.retreat(1.0)
 
     # ---------------------------------------------------------------------------- the system that Newton solves
 
+    def follow(self) -> None:
+        """Move the surfaces to the displacements of the iterate; number the unknowns anew if the flow has others."""
+        flow, interface = self.coupled.flow, self.coupled.interface
+        self.coupled.solid.follow()
+        flow.move(interface.move(interface.displacement()), with_solid=True)
+        if flow.renewals > self._solvers.renewals:
+            self._solvers = self._number_unknowns()
+            self._prepared = self._of_flow = None
+        flow.follow()
+
     def residual(self) -> Array:
         """Norm of the residual [N] of each part: those of the solid, then the flow."""
-        flow, solid, interface = self.coupled.flow, self.coupled.solid, self.coupled.interface
-        flow.move(interface.move(interface.displacement()), with_solid=True)
-        if flow.renewals > self._numbered:
-            self._number_unknowns()
-            self._prepared = self._of_flow = None
+        flow, solid = self.coupled.flow, self.coupled.solid
         of_flow, force = flow.residual(), self.coupled.force()
         solid.load(force)
         self._on_surfaces = float(np.linalg.norm(force))
@@ -173,24 +199,23 @@ class Monolithic:
         b, x = blocks.create_vectors()
         own = solid.size
         b.array[:own], b.array[own:] = solid.right_side(), flow.right_side()
-        change = solid.row_transformation()
-        taken = None if change is None else blocks.transform(change, b, self._numbering)
+        taken = [blocks.transform(change, b, self._solvers.numbering) for change in solid.row_transformations()]
         x.array[:own] = solid.missing()
         blocks.hold(solid, b, x)
         try:
             with flow.timer("solve"):
                 self._solve(blocks, b, x)
         except linear.LinearSolveFailed as failure:
-            raise StepFailed(self.name, str(failure), where=self.worst()) from failure
+            raise StepFailed(self.name, failure.kind, str(failure), where=self.worst()) from failure
         increment = self._corrected(x.array)
-        if taken is not None:
-            solid.recover(taken, self._numbering.gather(self.comm, increment))
+        if taken:
+            solid.recover(taken, self._solvers.numbering.gather(self.comm, increment))
         return np.concatenate([solid.update(increment[:own]), flow.update(increment[own:])])
 
     def _corrected(self, increment: Array) -> Array:
         """The increment of both parts, corrected by a secant once stabilisation of a steady flow and contact stay."""
         solid, flow = self.coupled.solid, self.coupled.flow
-        if not flow.steady or flow.steady_iteration.scales_follow:
+        if not flow.steady or flow.equations_change:
             return increment
         if not solid.settled():
             self._secant.forget()
@@ -199,25 +224,24 @@ class Monolithic:
         return self._secant.corrected(increment, moved)
 
     def _solve(self, blocks: Blocks, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        sequence = self.coupled.flow.sequence
-        while sequence.current != "direct":
+        flow = self.coupled.flow.iterative
+        while flow is not None and flow.sequence.current != "direct":
             try:
-                matrix = blocks.product(self._numbering, self.coupled.flow.product(blocks.flow))
+                matrix = blocks.product(self._solvers.numbering, flow.product(blocks.flow))
                 whole = blocks.with_added(matrix)
-                iterations = self._krylov.solve_again(whole, b, x)
+                iterations = self._solvers.krylov.solve_again(whole, b, x)
                 if iterations is None:
-                    iterations = self._krylov.solve(self._krylov_solver(blocks), whole, b, x, matrix)
+                    iterations = self._solvers.krylov.solve(self._krylov_solver(flow, blocks), whole, b, x, matrix)
                 self._linear_iterations += iterations
                 return
             except linear.LinearSolveFailed as failure:
-                sequence.advance(failure)
+                flow.sequence.advance(failure)
         matrix = blocks.assembled()
-        self._direct.solve(blocks.with_added(matrix), b, x, matrix)
+        self._solvers.direct.solve(blocks.with_added(matrix), b, x, matrix)
 
-    def _krylov_solver(self, blocks: Blocks) -> PETSc.KSP:
-        flow = self.coupled.flow
-        method = flow.sequence.current
-        krylov = linear.coupled_solver(self.comm, tolerance=flow.linear_tolerance, fill=method == "fill")
+    def _krylov_solver(self, flow: IterativeFlow, blocks: Blocks) -> PETSc.KSP:
+        fill = flow.sequence.current == "fill"
+        krylov = linear.coupled_solver(self.comm, tolerance=flow.linear_tolerance, fill=fill)
         if flow.sequence.multigrid:
             flow.sequence.limit(krylov)
             krylov.getPC().getPythonContext().second = flow.multigrid(blocks.flow)
@@ -255,13 +279,13 @@ class Monolithic:
     def coupling_blocks(self) -> tuple[PETSc.Mat, PETSc.Mat, PETSc.Mat]:
         """alpha C B, -w B^T C^T S and w alpha B^T M B; rows of held dofs of the flow are empty."""
         flow, solid = self.coupled.flow, self.coupled.solid
-        entries, w = flow.interface_entries(self.coupled.interface.surfaces), solid.force_weight
-        B = solid.jacobian().transposed(self._numbering.first.getSize())
+        entries = flow.interface_entries(self.coupled.interface.surfaces)
+        B = solid.jacobian().transposed(self._solvers.numbering.first.getSize())
         into_flow, force_by_motion = B @ entries.into_flow, B @ (B @ entries.force_by_motion).T
         return (
             self._matrix((flow.size, solid.size), into_flow.T),
-            self._matrix((solid.size, flow.size), (-w * (B @ entries.force_by_flow)).ordered()),
-            self._matrix((solid.size, solid.size), -w * force_by_motion.T),
+            self._matrix((solid.size, flow.size), solid.weighted(-(B @ entries.force_by_flow)).ordered()),
+            self._matrix((solid.size, solid.size), solid.weighted(-force_by_motion.T)),
         )
 
     def _matrix(self, owned: tuple[int, int], parts: Sparse) -> PETSc.Mat:

@@ -1,26 +1,24 @@
 """Partitioned Dirichlet-Neumann coupling: the flow takes the motion of the surface, the solid the force of the flow.
 
-Displacement d_k -> flow around the surface at d_k -> force f_k -> solid under f_k -> D(d_k), until D(d) = d.
-A closed pocket of incompressible fluid has a pressure level q that the flow does not determine. It is another unknown
-of the iteration: q -> q + s(d), until s(d) = 0, the distance by which the bodies squeeze the pocket.
-Sources: Kuttler, Wall, Comput. Mech. 43 (2008) 61-72; for pockets Kuttler, Forster, Wall, ibid. 38 (2006) 417-429.
+Displacement d_k -> flow around the surface at d_k -> force f_k -> solid under f_k -> D(d_k), until D(d) = d. The
+pressure levels of closed pockets are further unknowns (docs/theory_coupling.md, Partitioned).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coupling.accelerate import Accelerator, QuasiNewton
 from coupling.bracket import CouplingIterate, brackets, halved
-from coupling.coupled import Coupled
+from coupling.coupled import Coupled, with_cause
 from coupling.divided import lengths, step_in_parts
-from coupling.start import start_together
-from coupling.suction import with_cause
-from solvers.api import Array, State, StepFailed, StepInfo
+from coupling.start import start_again, start_together
+from coupling.wall_passed import WallPassed
+from solvers.api import Array, FailureKind, State, StepFailed, StepInfo
 from solvers.counted import counted
 
 
@@ -53,9 +51,26 @@ class Partitioned:
 
     def step(self, t: float, dt: float) -> StepInfo:
         """Take one, in parts if it is much longer than the last. Raises StepFailed."""
-        return step_in_parts(self._take, t, lengths(dt, self.coupled.flow.history.longest_step))
+        return step_in_parts(self._take, t, lengths(dt, self.coupled.flow.longest_step))
+
+    def _start_again(self, t: float, dt: float) -> None:
+        """Start anew after the step of an impulse; increments of other steps say nothing of this start."""
+        if self.coupled.start is not None and self.coupled.start.solid.took_impulse:
+            self.accelerator.forget()
+            start_again(self.coupled, t, dt, self._iterate)
+            self.accelerator.forget()
 
     def _take(self, t: float, dt: float) -> StepInfo:
+        walls = self.coupled.walls
+        before = self.save() if walls is not None and walls.waiting else {}
+        try:
+            return self._take_once(t, dt)
+        except WallPassed:
+            self.restore(before)
+            return self._take(t, dt)
+
+    def _take_once(self, t: float, dt: float) -> StepInfo:
+        self._start_again(t, dt)
         coupled, interface = self.coupled, self.coupled.interface
         coupled.begin_step(t, dt)
         if not coupled.flow.steady:
@@ -75,6 +90,7 @@ class Partitioned:
         newton = 0
         ends: tuple[CouplingIterate, CouplingIterate] | None = None
         last: CouplingIterate | None = None
+        changes = 0  # of the contact between iterates
         while True:
             motions = interface.move(d)
             coupled.flow.move(motions)
@@ -95,10 +111,13 @@ class Partitioned:
             if not math.isfinite(residual) or len(history) == self.tolerance.max_iterations:
                 taken = counted(len(history), "iteration")
                 reason = f"the coupling iteration did not converge in {taken} (residual {residual:.3g})"
-                failure = StepFailed("coupling", reason, iteration=len(history), history=tuple(history))
-                raise with_cause(coupled, failure, cycles=_contact_changes(last, coupled.solid.touching(), ends))
+                failure = StepFailed(
+                    "coupling", FailureKind.COUPLING, reason, iteration=len(history), history=tuple(history)
+                )
+                raise with_cause(coupled, failure, cycles=changes > 1)  # once is a contact that closes or opens
             before = np.concatenate([d.ravel(), levels])
             now = CouplingIterate(before, np.append(found, levels + squeezed), coupled.solid.touching())
+            changes += last is not None and not last.same_contact(now)
             if ends is not None:
                 ends = halved(*ends, now)
             elif last is not None and brackets(last, now):
@@ -124,7 +143,7 @@ class Partitioned:
         apart: mask of the vertices of surfaces outside of the flow, however far they move.
         """
         interface = self.coupled.interface
-        moved = _mean((found - interface.past[0])[~apart])
+        moved = _mean((found - interface.begun)[~apart])
         rounding = 4.0 * np.finfo(float).eps * _mean((interface.points + found)[~apart])
         return max(self.tolerance.relative * moved, self.tolerance.absolute, float(rounding))
 
@@ -135,16 +154,6 @@ class Partitioned:
         self.coupled.restore(state)
         self.accelerator.restore(state["accelerator"])
         self._pockets = int(state["pockets"])
-
-
-def _contact_changes(
-    last: CouplingIterate | None,
-    touching: NDArray[np.bool_] | None,
-    ends: tuple[CouplingIterate, CouplingIterate] | None,
-) -> bool:
-    """Whether the nodes in contact are others than at the last iterate, or differ between both ends of the segment."""
-    bracketed = ends is not None and not ends[0].same_contact(ends[1])
-    return bracketed or (last is not None and not last.same_contact(replace(last, touching=touching)))
 
 
 def _mean(vectors: Array) -> float:

@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from coupling.coupled import Coupled
 from coupling.elastic import Elastic
 from coupling.elastic_start import ElasticStart
+from coupling.immersed import immerse, in_fluid
 from coupling.interface import DrySide
 from coupling.ports import Start
 from coupling.sealing_layer import SealingLayer, sealing_layers
-from coupling.wetted import immerse, wetted_surfaces
-from solvers.fluid.background.grid import Grid
-from solvers.fluid.bodies.immersed import ImmersedBody
-from solvers.fluid.bodies.surface import ImmersedSurface
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.field import Fluid
-from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.start import FlowStart
+from coupling.wetted import wetted_surfaces
+from solvers.fluid.flow.field import Fluid
+from solvers.fluid.flow.start import FlowStart
+from solvers.fluid.grid.box import Grid
+from solvers.fluid.settings.flow_settings import FlowSettings
+from solvers.fluid.surfaces.immersed import ImmersedBody
+from solvers.fluid.surfaces.surface import ImmersedSurface
+from solvers.fluid.terms.boundary.patches import Patch
+from solvers.mesh.skin import cut_out_skin
 from solvers.rigid.field import RigidBodies
 from solvers.rigid.start import RigidStart
-from solvers.skin import cut_out_skin
 from solvers.solver_settings import SolverSettings
 from solvers.structure.field import Structure
 from solvers.structure.time_scheme import Statics
 from solvers.timing import Timer
+
+if TYPE_CHECKING:
+    from coupling.near_walls import NearWalls
 
 
 def couple(
@@ -53,7 +58,7 @@ def couple(
         mesh = body.domain.source
         skins.append(comm.bcast(None if mesh is None else cut_out_skin(mesh, wetted.get(body.name)), root=0))
     surfaces = wetted_surfaces(structure, skins)
-    immersed = immerse([surface.at_start for surface in surfaces], rigid_bodies, start)
+    immersed = immerse([in_fluid(surface) for surface in surfaces], rigid_bodies, start)
     fluid = Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=comm)
     layers = {} if seal is None else sealing_layers(surfaces, seal)
     return coupled_elastic(fluid, Elastic(structure, surfaces), layers=layers)
@@ -72,20 +77,24 @@ def couple_rigid(
 ) -> Coupled:
     """Rigid bodies that the flow moves, for `Monolithic` or `Partitioned`; all else as in `couple` (collective)."""
     moved = [(ImmersedSurface(body.name, body.facets, len(body.points)), body.points) for body in bodies.bodies]
-    immersed = immerse(moved, rigid_bodies, start, deform=False)
+    immersed = immerse(moved, rigid_bodies, start, rigid=bodies.surfaces)
     return coupled_bodies(Fluid(grid, flow, patches, immersed, solver, timer=timer, comm=bodies.comm), bodies)
 
 
 def coupled_elastic(
-    fluid: Fluid, elastic: Elastic, dry_sides: Sequence[DrySide] = (), layers: Mapping[str, SealingLayer] = {}
+    fluid: Fluid,
+    elastic: Elastic,
+    dry_sides: Sequence[DrySide] = (),
+    layers: Mapping[str, SealingLayer] = {},
+    walls: NearWalls | None = None,
 ) -> Coupled:
     """A structure in a flow. There is a start (`coupling.start`) if the solid has inertia and the flow uses BDF2.
 
-    layers: on surfaces of bodies, by their names.
+    layers: on surfaces of bodies, by their names; walls: faces of the box that the bodies may reach.
     """
     inertia = not isinstance(elastic.structure.time, Statics)
     start = Start(FlowStart(fluid), ElasticStart(elastic)) if inertia and fluid.scheme.times > 1 else None
-    return Coupled(fluid, elastic, dry_sides, start, layers)
+    return Coupled(fluid, elastic, dry_sides, start, layers, walls)
 
 
 def coupled_bodies(fluid: Fluid, bodies: RigidBodies) -> Coupled:

@@ -17,17 +17,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from solvers.algebra.linear import LinearSolveFailed
+from solvers.algebra.rows import RowTransformation, TakenRows
+from solvers.algebra.sparse import Sparse
+from solvers.algebra.vertices import VertexJacobian
 from solvers.api import Array, Stateful, StepInfo
-from solvers.fluid.bodies.surface import Motion
-from solvers.fluid.coupling_entries import InterfaceEntries
-from solvers.fluid.history import History
-from solvers.fluid.linear_systems.krylov import SolverSequence
-from solvers.fluid.steady_iteration import SteadyIteration
-from solvers.fluid.time_scheme import FlowStep, FlowTimeScheme
+from solvers.exchange import Difference, InterfaceEntries, Motion
 from solvers.newton import System
-from solvers.rows import RowTransformation, TakenRows
 from solvers.timing import Timer
-from solvers.vertices import VertexJacobian
 
 
 class Part(System, Stateful, Protocol):
@@ -95,9 +92,12 @@ class Solid(Part, Protocol):
         """Names of the surfaces in the flow -> reference positions [m] of their vertices, shape (n, dim)."""
         ...
 
-    @property
-    def force_weight(self) -> float:
-        """Weight w of the load at the end of the step in the balance; that at the start has 1 - w."""
+    def mean_load(self, before: Array, after: Array) -> Array:
+        """w after + (1 - w) before: the generalised load in the balance by those at both ends of the step, (m,)."""
+        ...
+
+    def weighted(self, rows: Sparse) -> Sparse:
+        """Rows of all unknowns of the solid, multiplied by the weight w that a load at the end of the step has."""
         ...
 
     def predict(self, t: float) -> None:
@@ -144,12 +144,12 @@ class Solid(Part, Protocol):
         """Energy [J] that has changed its form or its body so far: half of the sum of all |changes| and works."""
         ...
 
-    def row_transformation(self) -> RowTransformation | None:
-        """The transformation of its rows that eliminates contact multipliers; None if no surfaces are near."""
+    def row_transformations(self) -> Sequence[RowTransformation]:
+        """Transformations of its rows, one after the other, that eliminate contact multipliers."""
         ...
 
-    def recover(self, taken: TakenRows, du: Array) -> None:
-        """Recover the multipliers from the rows before the transformation and the increment of all unknowns."""
+    def recover(self, taken: Sequence[TakenRows], du: Array) -> None:
+        """Recover the multipliers from the rows before each transformation and the increment of all unknowns."""
         ...
 
     def added_product(self) -> Callable[[Array], Array] | None:
@@ -186,18 +186,38 @@ class Flow(Part, Protocol):
     @property
     def steady(self) -> bool: ...
 
-    renewals: int  #: how often its unknowns have changed, because bodies went to other cells
+    @property
+    def renewals(self) -> int:
+        """Count that grows where its unknowns change, because bodies went to other cells."""
+        ...
+
     timer: Timer
     notes: list[str]  #: notes to the user on this step
 
     @property
-    def scheme(self) -> FlowTimeScheme:
-        """The time scheme."""
+    def times(self) -> int:
+        """Largest count of earlier displacements in the difference formulas of its time scheme."""
         ...
 
-    history: History  #: velocities and lengths of earlier steps
-    current: FlowStep  #: the present step, with its difference formula
-    steady_iteration: SteadyIteration  #: how far the iteration to a steady flow is
+    @property
+    def difference(self) -> Difference:
+        """The formula of the present step, by which surfaces get their velocities."""
+        ...
+
+    @property
+    def longest_step(self) -> float:
+        """[s]; longer ones are divided into parts."""
+        ...
+
+    @property
+    def equations_change(self) -> bool:
+        """Whether the equations of a steady flow change from iterate to iterate, such as scales of stabilisation."""
+        ...
+
+    @property
+    def iterative(self) -> IterativeFlow | None:
+        """What Krylov methods need to know of it; None: systems with it are solved by their factors."""
+        ...
 
     def predict(self, *, with_pressure: bool = False) -> None:
         """Set the predictor for the end of the step; `retreat` takes it back.
@@ -240,30 +260,63 @@ class Flow(Part, Protocol):
         ...
 
     def balances(self) -> tuple[Array, float, float]:
-        """(force [N] on all bodies by the balance of momentum, (dim,); power [W] lost by the method; of patches)."""
+        """(force [N] on all bodies by the balance of momentum, (dim,); power [W] lost by the method; of patches).
+
+        Of the step that has ended.
+        """
         ...
 
     def unsolved(self) -> tuple[float, float]:
         """Sums of |residual|: of the momentum [N] and of the continuity equations [m^3/s]."""
         ...
 
-    sequence: SolverSequence  #: linear solvers, from fast to robust
-
-    @property
-    def linear_tolerance(self) -> float: ...
-
     def suction(self) -> float:
         """Largest pressure below zero [Pa] around bodies whose closed contact is dry (collective)."""
         ...
 
-    def multigrid(self, matrix: PETSc.Mat) -> PETSc.PC: ...
-    def product(self, matrix: PETSc.Mat) -> PETSc.Mat: ...
+
+class LinearSolvers(Protocol):
+    """The linear solvers of a flow, from fast to robust; one that fails is replaced by the next one."""
+
+    @property
+    def current(self) -> str:
+        """Name of the method: direct for factors, fill for incomplete factors with more fill."""
+        ...
+
+    @property
+    def multigrid(self) -> bool:
+        """Whether the current solver is multigrid."""
+        ...
+
+    def limit(self, ksp: PETSc.KSP) -> None:
+        """Let a solver give up early if a better one comes next."""
+        ...
+
+    def advance(self, failure: LinearSolveFailed) -> None:
+        """Change to the next solver for the rest of the run. Raises `failure` if there is none (collective)."""
+        ...
+
+
+class IterativeFlow(Protocol):
+    """A flow whose tangent Krylov methods can solve with."""
+
+    @property
+    def sequence(self) -> LinearSolvers: ...
+
+    @property
+    def linear_tolerance(self) -> float: ...
+
+    def multigrid(self, matrix: PETSc.Mat) -> PETSc.PC:
+        """A cycle of multigrid for the tangent."""
+        ...
+
+    def product(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """The tangent as it multiplies vectors in a Krylov method."""
+        ...
 
 
 class StartOfSolid(Protocol):
     """Start steps of a solid, with the acceleration a = (u - u_n) / dt^2."""
-
-    impulsive: bool  #: whether its velocity jumps as a whole when an impulse acts on the surface
 
     @property
     def steps(self) -> int:
@@ -278,6 +331,10 @@ class StartOfSolid(Protocol):
         """Velocity [m/s] of all vertices, shape (n, dim)."""
         ...
 
+    def gained(self, t: float, dt: float) -> float:
+        """Velocity [m/s] that it gains in the first step, as far as that is known before (collective)."""
+        ...
+
     def acceleration(self) -> float:
         """Largest acceleration without fluid [m/s^2] of the bodies in the flow (collective)."""
         ...
@@ -286,12 +343,29 @@ class StartOfSolid(Protocol):
         """Begin a start step of length dt; the caller solves it within the context."""
         ...
 
+    def repeat(self) -> None:
+        """Prepare a further start step."""
+        ...
+
     def end(self) -> None:
         """Set the state from the acceleration, the load and the deformation of the start steps."""
         ...
 
-    def end_impulse(self, dt: float) -> None:
-        """Restore the displacement, and add the velocity a dt of a start step of length dt [s]."""
+    @property
+    def took_impulse(self) -> bool:
+        """Whether the last step took the impulse of an impulsive start, by backward Euler."""
+        ...
+
+    def begin(self) -> None:
+        """Begin a start after such a step."""
+        ...
+
+    def take_impulse(self, step: Callable[[], float], jump: float) -> bool:
+        """Take the impulse of a start with this jump [m/s]; False: in the first steps of the run, True: at once.
+
+        step: solves a start step of the length dt [s] that it returns. The solid then restores its displacement, and
+        adds the velocity a dt.
+        """
         ...
 
 
@@ -310,8 +384,11 @@ class StartOfFlow(Protocol):
         """Whether its time scheme uses the acceleration at the start."""
         ...
 
-    def at_once(self, surfaces: Mapping[str, Motion]) -> bool:
-        """Whether boundary or surfaces have another velocity than the flow: an impulsive start (collective)."""
+    def jump(self, surfaces: Mapping[str, Motion], gained: float) -> float:
+        """Largest difference [m/s] of boundary and surfaces from the flow at an impulsive start, else 0.0 (collective).
+
+        gained: velocity [m/s] that the solid gains in the first step.
+        """
         ...
 
     def step(self, t: float, short: float, of_solid: float) -> AbstractContextManager[None]:

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from coupling.wetted import WettedSurface
 from solvers.api import Array
-from solvers.tessellation import area_vectors
+from solvers.mesh.tessellation import area_vectors
 
 #: Largest displacement of a vertex in thicknesses. At edges below 60 degrees the layer is thinner than elsewhere.
-FARTHEST = 2.0
+LARGEST_MOVE = 2.0
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class SealingLayer:
         size = np.linalg.norm(total, axis=1)
         some = size > 0.0
         way = np.zeros_like(x)
-        reach = np.minimum(area[some] / size[some], FARTHEST)
+        reach = np.minimum(area[some] / size[some], LARGEST_MOVE)
         way[some] = self.thickness * (reach / size[some])[:, None] * total[some]
         return x + way
 

@@ -1,15 +1,9 @@
 """Secant correction of Newton increments whose tangent is not exact, for steady coupled flow.
 
-The tangent of the coupled system has the derivative by the shape of the fluid domain for a flow that fulfils its
-equations pointwise (`solvers.fluid.shape`). That of the discrete flow differs by a few per cent, because errors of the
-discretisation depend on where the surface cuts the grid. Newton's method then converges linearly. The difference
-matters for few displacements, in FSI1 for the deflection of the flag, so that the last iterate corrects it:
-
     s = r - c (s' + r - r'),   c = argmin |d - c (d - d')|
 
 r: increment by the tangent; s: the one that is added; d: displacement of the interface by r; prime: the iterate before.
-This is Anderson's method of depth one for the map x -> x + r. The order of convergence is that of secants, 1.6 for one
-such displacement. Source: Anderson, J. ACM 12 (1965) 547-560.
+See docs/theory_coupling.md, Correction by secants. Source: Anderson, J. ACM 12 (1965) 547-560.
 """
 
 from __future__ import annotations

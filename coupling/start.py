@@ -1,41 +1,18 @@
 """The initial state of a coupled run: velocities of both fields that agree, and consistent accelerations.
 
-Where rigid bodies or the boundary have another velocity than the flow at their surface, the flow starts impulsively: an
-impulse of the pressure gives both the velocity that they share. It is found by one step of backward Euler of a length k
-in which nothing moves,
+Formulas and exceptions: docs/theory_coupling.md, Start. Without an impulse, a body that is thrown into fluid at rest
+would have its own velocity in the first step's displacement and that of the fluid at its end, oscillate, and BDF2 would
+lose half of the difference of the first two velocities of the fluid. With the acceleration of the structure alone, a
+solid in a fluid of its own density would start 1.7 times too fast.
 
-    M (v - v_0) / k = f_fluid,    rho (w - w_0) / k + ... = 0,    w = v on the surface,
-
-so that momentum is kept. Without it, a body that is thrown into fluid at rest would have its own velocity in the first
-step's displacement and that of the fluid at its end, oscillate, and BDF2 would lose half of the difference of the first
-two velocities of the fluid. Such a flow has no acceleration at the start.
-
-Else the accelerations have to agree.
-
-With the acceleration of the structure alone, and no force of the fluid, a solid in a fluid of its own density would
-start 1.7 times too fast. An elastic body would also oscillate, because the force of the fluid acts on its boundary
-only. Motions that steps of length h do not resolve have to be in equilibrium from the start. One step of backward Euler
-to the same time,
-
-    M (u - u_0) / h^2 + f_int(u) = f_ext(t) + f_fluid,   rho (w - w_0) / k + ... = 0,   w = v_0 + k (u - u_0) / h^2,
-
-gives an acceleration a = (u - u_0) / h^2 in which motions of frequency omega have the share F = 1 / (1 + (omega h)^2).
-n such steps, each from the displacement of the last one and from the same velocities, leave the share F^n. The run
-starts with
-
-    u_0 + sum_k (du_k - du_n),   a = du_n / h^2,   the force of the last step,
-
-which changes slow motions by a term of order h^4, and rigid motions not at all.
-
-The grid is cut at the first position of the bodies during the start, so that they must not move by a cell there:
-n h^2 a < the shortest edge, with the acceleration a of the solid alone. Where h = dt is too long for that, h = dt / 2^m
-is the first part of the first step (`coupling.divided`).
+The grid is cut at the first position of the bodies during the start, so that they must not move by a cell there.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -62,44 +39,74 @@ def start_together(
 
     solve: solves a step of both fields that has begun; with_solid: as one system.
     The initial state is kept in these cases: the solid has no inertia; the flow starts impulsively around elastic
-    bodies; the flow uses backward Euler, whose velocities are those of the middle of a step, and does not start
-    impulsively; a start step does not converge, with a note to the user.
+    bodies, which take the first step by backward Euler; the flow uses backward Euler, whose velocities are those of
+    the middle of a step, and does not start impulsively; a start step does not converge, with a note to the user.
     """
-    if coupled.start is None:
-        return
-    flow, solid, interface = coupled.start.flow, coupled.start.solid, coupled.interface
+    if coupled.start is not None:
+        flow, solid = coupled.start.flow, coupled.start.solid
+        jump = flow.jump(coupled.interface.at_start(solid.velocity()), solid.gained(t, dt))
+        _start(coupled, coupled.start, t, dt, solve, with_solid=with_solid, jump=jump)
+
+
+def start_again(
+    coupled: Coupled, t: float, dt: float, solve: Callable[[], object], *, with_solid: bool = False
+) -> None:
+    """Start anew for a step of length dt [s], after one that took the impulse of an impulsive start (collective)."""
+    assert coupled.start is not None
+    solid = coupled.start.solid
+    solid.begin()
+    if not _start(coupled, coupled.start, t, dt, solve, with_solid=with_solid, jump=0.0):
+        solid.take_impulse(lambda: dt, math.inf)  # in one more step: its acceleration is that of the impulse still
+
+
+def _start(
+    coupled: Coupled,
+    start: Start,
+    t: float,
+    dt: float,
+    solve: Callable[[], object],
+    *,
+    with_solid: bool,
+    jump: float,
+) -> bool:
+    """Start; False: a start step does not converge.
+
+    jump: velocity [m/s] of an impulsive start, zero: none; the others as in `start_together`.
+    """
+    flow, solid, interface = start.flow, start.solid, coupled.interface
     velocity, initial = solid.velocity(), coupled.save()
     surfaces = interface.at_start(velocity)
-    at_once = flow.at_once(surfaces)
     solid.leave_out(coupled.flow.outside(surfaces))
     try:
-        if at_once and solid.impulsive:
-            _share_momentum(coupled, coupled.start, t, dt, velocity, solve)
-        elif flow.accelerates and not at_once:
-            _share_acceleration(coupled, coupled.start, t, dt, velocity, solve)
+        if jump > 0.0:
+            if not solid.take_impulse(partial(_impulse, coupled, start, t, dt, velocity, solve), jump):
+                return True
+            flow.end_impulse(dt)
+            interface.initialise()
+            coupled.solid.load(np.zeros_like(velocity))
+        elif flow.accelerates:
+            _share_acceleration(coupled, start, t, dt, velocity, solve)
         else:
-            return
+            return True
     except StepFailed as failure:
         coupled.restore(initial)
-        coupled.notes.append((NO_IMPULSE if at_once else NO_BALANCE).format(failure.reason))
-        return
+        coupled.notes.append((NO_IMPULSE if jump > 0.0 else NO_BALANCE).format(failure.reason))
+        return False
     flow.forget_step()
     coupled.flow.move(interface.move(interface.now), with_solid=with_solid)
+    return True
 
 
-def _share_momentum(
+def _impulse(
     coupled: Coupled, start: Start, t: float, dt: float, velocity: Array, solve: Callable[[], object]
-) -> None:
-    """Set the velocities after the impulse; velocity: of the vertices before it [m/s]."""
+) -> float:
+    """Solve a start step with the impulse, and return its length [s]; velocity: of the vertices before it [m/s]."""
     short = start.flow.share * dt
     with start.flow.step(t, short, short):
-        coupled.interface.begin_start(coupled.flow.current.difference, velocity)
+        coupled.interface.begin_start(coupled.flow.difference, velocity)
         with start.solid.step(t, short):
             solve()
-    start.solid.end_impulse(short)
-    start.flow.end_impulse(dt)
-    coupled.interface.initialise()
-    coupled.solid.load(np.zeros_like(velocity))
+    return short
 
 
 def _share_acceleration(
@@ -110,10 +117,12 @@ def _share_acceleration(
     moved = start.solid.steps * dt**2 * start.solid.acceleration()
     if moved > start.flow.smallest_cell:
         dt = lengths(dt, dt * math.sqrt(start.flow.smallest_cell / moved))[0]
-    for _ in range(start.solid.steps):
+    for number in range(start.solid.steps):
+        if number > 0:
+            start.solid.repeat()
         before = interface.displacement()
         with start.flow.step(t, start.flow.share * dt, dt):
-            interface.begin_start(coupled.flow.current.difference, velocity)
+            interface.begin_start(coupled.flow.difference, velocity)
             with start.solid.step(t, dt):
                 solve()
     acceleration = (interface.displacement() - before) / dt**2

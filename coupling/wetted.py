@@ -10,15 +10,11 @@ from numpy.typing import NDArray
 
 from coupling.contact_surfaces import global_dofs
 from coupling.divided_facets import divide_facets
-from coupling.joined_sides import join_vertices
-from coupling.ties import Tie, candidate_facets, tied_sides
+from coupling.ties import Tie, candidate_facets, join_vertices, tied_sides
+from solvers.algebra.blocks import Layout
+from solvers.algebra.sparse import Sparse
 from solvers.api import Array
-from solvers.blocks import Layout
-from solvers.fluid.bodies.hidden import hidden_facets
-from solvers.fluid.bodies.immersed import ImmersedBody
-from solvers.fluid.bodies.surface import ImmersedSurface
-from solvers.skin import Skin
-from solvers.sparse import Sparse
+from solvers.mesh.skin import Skin
 from solvers.structure.field import Structure
 
 
@@ -35,12 +31,6 @@ class WettedSurface:
     tied: NDArray[np.bool_] | None = None  #: facets that lie on the other side of a tie; None: no one does
     #: vertices from the nodes of all surfaces, (n, nodes); None: each vertex is a node of this one
     mixture: Sparse | None = None
-
-    @property
-    def at_start(self) -> tuple[ImmersedSurface, Array]:
-        """(the surface in the flow, reference positions of its vertices [m])."""
-        marks = self.wet, self.in_contact
-        return ImmersedSurface(self.name, self.facets, len(self.points), *marks, tied=self.tied), self.points
 
 
 def wetted_surfaces(structure: Structure, skins: Sequence[Skin]) -> list[WettedSurface]:
@@ -81,43 +71,3 @@ def joined(surfaces: Sequence[WettedSurface], nodes: Sequence[Array]) -> list[We
     together = join_vertices(mixtures, [surface.points for surface in surfaces], tied)
     points = np.concatenate(list(nodes))
     return [replace(s, mixture=m, points=m @ points) for s, m in zip(surfaces, together, strict=True)]
-
-
-def immerse(
-    moved: Sequence[tuple[ImmersedSurface, Array]],
-    given: Sequence[ImmersedBody],
-    t: float = 0.0,
-    *,
-    deform: bool = True,
-) -> list[ImmersedBody]:
-    """All bodies in the fluid: first those with prescribed motion, `given`, then those that a solid moves, `moved`.
-
-    moved: surfaces with the positions of their vertices [m] at the start; t: the first time [s]; deform: the volume of
-    the moved ones may change.
-    """
-    at_start = [(body.surface, body.motion(t).x) for body in given if body.motion is not None]
-    wet = find_wet([*at_start, *moved])
-    found = [replace(body, surface=surface) for body, surface in zip(given, wet, strict=False)]
-    starts = [points for _, points in moved]
-    return found + [
-        ImmersedBody(surface, None, deforms=deform, start=start, sweeps=True)
-        for surface, start in zip(wet[len(given) :], starts, strict=True)
-    ]
-
-
-def find_wet(surfaces: Sequence[tuple[ImmersedSurface, Array]]) -> list[ImmersedSurface]:
-    """The surfaces, given with the positions of their vertices [m], with marked wet facets.
-
-    Facets with their middle in another body are not wet until they come out, tied ones never. Those on the boundary of
-    the box are: cuts leave them out as long as they are there (`off_boundary`). Marks that a surface has already stay.
-    """
-    found, every, positions = [], [surface for surface, _ in surfaces], [x for _, x in surfaces]
-    for index, surface in enumerate(every):
-        if surface.wet is None:
-            free = np.ones(len(surface.facets), dtype=bool) if surface.tied is None else ~surface.tied
-            hidden = hidden_facets(index, every, positions, free)
-            surface = replace(surface, wet=free & ~hidden, hidden=hidden)
-        elif surface.tied is not None:
-            surface = replace(surface, wet=surface.wet & ~surface.tied)
-        found.append(surface)
-    return found

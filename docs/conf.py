@@ -11,7 +11,7 @@ release = _project["version"]
 extensions = ["myst_parser", "sphinx.ext.mathjax"]
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "notes"]
 # Anchors on pages of code hosts are made by scripts; a server that is busy gets a second chance.
 linkcheck_anchors = False
 linkcheck_retries = 2

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.plot.curves import COLOURS, STYLE
+from fsci.plot.curves import COLOURS, CURVE_STYLE
 from fsci.plot.render import ROUND, SUPERSAMPLING, View, face_edges, frame, import_pyvista, photograph, polylines
 from fsci.run.history import read_history
 from fsci.run.output import read_collection
@@ -139,7 +139,7 @@ def panel(
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    with rc_context({**STYLE, "axes.grid": False}):
+    with rc_context({**CURVE_STYLE, "axes.grid": False}):
         figure = Figure((PIXELS / 150, rows * (pixels[1] + 45) / 150), dpi=150)
         for place, (time, grid) in enumerate(zip(times, grids, strict=True)):
             row, column = divmod(place, columns)
@@ -201,7 +201,7 @@ def draw_balances(folder: Path) -> None:
     history = read_history(folder / "history.csv")
     time = history["time"]
     total, momentum = history["energy.total"], history["momentum.x"]
-    with rc_context(STYLE):
+    with rc_context(CURVE_STYLE):
         figure = Figure((10, 4.2), dpi=150, layout="constrained")
         left, middle, right = figure.subplots(1, 3)
         for part, colour in zip(("total", "kinetic", "internal"), COLOURS, strict=False):
@@ -240,7 +240,7 @@ def draw_shear(folder: Path, cylinder: dict[float, Path]) -> None:
     peak = 2.0 * across / (np.pi * a)
     exact = peak / a * np.sqrt(a**2 - s**2)
     inner = mu * peak / a * np.sqrt(np.maximum(c**2 - s**2, 0.0))
-    with rc_context(STYLE):
+    with rc_context(CURVE_STYLE):
         figure = Figure((8, 4.5), dpi=150, layout="constrained")
         axes = figure.subplots()
         middle = x.mean()

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.bench.program import run_case
-from fsci.plot.curves import COLOURS, STYLE
+from fsci.plot.curves import COLOURS, CURVE_STYLE
 from fsci.run.history import read_history
 from fsci.run.output import read_collection
 from fsci.run.verify import amplitude, frequency, mean, window
@@ -48,10 +48,8 @@ def main(results: Path) -> None:
     draw_static("csm_meshes.png", static)
     write_table("static", static_rows(static))
     write_table("swing", swing_rows(swings))
-    write_table("tones", tone_rows(swings))
     write_table("orders", orders("structure_orders.png"))
     write_table("time", time_orders("structure_time.png"))
-    write_table("energy", energy_rows(swings))
 
 
 # ------------------------------------------------------------------------------------------------------------ runs
@@ -114,51 +112,11 @@ def swing_rows(runs: dict[tuple[int, float], History]) -> list[list[str]]:
     return [*rows, ["Turek and Hron", "0.005", "-14.305 +- 14.305", "-63.607 +- 65.160", "1.0995"]]
 
 
-def tone_rows(runs: dict[tuple[int, float], History]) -> list[list[str]]:
-    rows = [["step [s]", "level [mm]", "first mode", "second mode"]]
-    for (refine, dt), history in sorted(runs.items(), key=lambda item: -item[0][1]):
-        if refine == 1:
-            frequencies, sizes = tones(history["time"], 1e3 * history["A.y"])
-            modes = (f"{size:.3f} mm, {f:.4f} Hz" for size, f in zip(sizes[1:], frequencies, strict=True))
-            rows.append([f"{dt:g}", f"{sizes[0]:.3f}", *modes])
-    return rows
-
-
-def tones(time: Array, values: Array) -> tuple[Array, list[float]]:
-    """Frequencies of the first two modes, and (level, amplitude, amplitude): least squares over the whole series.
-
-    The fit has four harmonics of the first frequency f, and g, g - f, g + f for the second one, g.
-    """
-    from scipy.optimize import least_squares
-
-    def columns(f: float, g: float) -> Array:
-        found = [np.ones_like(time)]
-        for tone in (f, g, 2 * f, 3 * f, 4 * f, g - f, g + f):
-            found += [np.cos(2 * np.pi * tone * time), np.sin(2 * np.pi * tone * time)]
-        return np.stack(found, axis=1)
-
-    def fit(f: float, g: float) -> Array:
-        return np.linalg.lstsq(columns(f, g), values, rcond=None)[0]
-
-    best = least_squares(lambda fg: columns(*fg) @ fit(*fg) - values, [1.096, 6.55]).x
-    size = fit(*best)
-    return best, [float(size[0]), float(np.hypot(*size[1:3])), float(np.hypot(*size[3:5]))]
-
-
-def energy_rows(runs: dict[tuple[int, float], History]) -> list[list[str]]:
-    rows = [["step [s]", "largest error of the balance", "at the end"]]
-    for (refine, dt), history in sorted(runs.items(), key=lambda item: -item[0][1]):
-        if refine == 1:
-            error = np.abs(history["structure.energy"]) / history["energy.internal"].max()
-            rows.append([f"{dt:g}", f"{error.max():.1e}", f"{error[-1]:.1e}"])
-    return rows
-
-
 # ------------------------------------------------------------------------------------------------ orders in space
 
 
 def orders(picture: str) -> list[list[str]]:
-    """Errors of the manufactured solution of the tests, and a picture of them."""
+    """Errors of the manufactured solution of the tests on the finest meshes, and a picture of all."""
     from structure_setup import CELL_TYPES
     from test_structure_orders import errors
 
@@ -181,10 +139,9 @@ def orders(picture: str) -> list[list[str]]:
         counts = counts if cell_type in linear or cell_type in plane else (1, 2, 4, 6)
         found = np.array([errors(cell_type, count) for count in counts])
         rates = np.diff(np.log(found), axis=0) / -np.diff(np.log(counts))[:, None]
-        for index, count in enumerate(counts):
-            l2, h1 = (f"{error:.2e}" for error in found[index])
-            order_l2, order_h1 = ("", "") if index == 0 else (f"{rate:.2f}" for rate in rates[index - 1])
-            rows.append([names[cell_type] if index == 0 else "", str(count), l2, order_l2, h1, order_h1])
+        l2, h1 = (f"{error:.2e}" for error in found[-1])
+        order_l2, order_h1 = (f"{rate:.2f}" for rate in rates[-1])
+        rows.append([names[cell_type], str(counts[-1]), l2, order_l2, h1, order_h1])
         curves[names[cell_type]] = 1.0 / np.array(counts), found
     draw(picture, lambda figure: draw_orders(figure, curves), (8, 3.6))
     return rows
@@ -255,7 +212,7 @@ def draw(name: str, content: Callable[[Any], None], size: tuple[float, float]) -
     import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context({**STYLE, "font.size": 10}):
+    with matplotlib.rc_context({**CURVE_STYLE, "font.size": 10}):
         figure = Figure(size, dpi=DOTS, layout="constrained")
         content(figure)
         figure.savefig(DOCS / "pictures" / name)

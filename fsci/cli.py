@@ -132,8 +132,41 @@ def _parser() -> argparse.ArgumentParser:
         "--only", metavar="NAME", action="append", default=[], help="only this twin, such as element; may be repeated"
     )
 
+    converge = command(_converge, "run a case with coarser and finer levels, and estimate the errors of its values")
+    converge.add_argument("case", metavar="CASE", type=Path, help="case file, or folder with a case.yaml")
+    settings(converge, "replace a setting of the case and of all runs")
+    converge.add_argument(
+        "-o",
+        "--out",
+        metavar="OUT",
+        type=Path,
+        required=True,
+        help="folder for the runs, converge.json and report.html",
+    )
+    converge.add_argument(
+        "--probe",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="only the values of this probe, column or check, such as drag.x; may be repeated",
+    )
+    converge.add_argument(
+        "--tolerance",
+        metavar="SHARE",
+        type=_share,
+        help="go to finer levels until all errors are smaller, and write the cheapest case for it: --tolerance 2%%",
+    )
+    converge.add_argument(
+        "--budget", metavar="TIME", type=_duration, help="leave out runs that would not end within it: --budget 20min"
+    )
+
     bench = command(_bench, "measure run time against error, in a copy of the repository")
-    bench.add_argument("names", metavar="NAME", nargs="*", help="which benchmark, 'all', or none: list them")
+    bench.add_argument(
+        "names",
+        metavar="NAME",
+        nargs="*",
+        help="a benchmark, a file of families, results (.json), 'all', or none: list them",
+    )
     bench.add_argument("-o", "--out", metavar="FILE", type=Path, help="write the results as JSON")
     bench.add_argument("--against", metavar="FILE", type=Path, help="compare with the results in this file")
     bench.add_argument("--plot", metavar="FOLDER", type=Path, help="draw error against time, unknowns and memory")
@@ -142,6 +175,7 @@ def _parser() -> argparse.ArgumentParser:
     stress.add_argument("draws", metavar="N", type=_count, nargs="?", default=20, help="number of cases (default: 20)")
     stress.add_argument("--seed", metavar="S", type=_count, default=0, help="seed of the first case (default: 0)")
     stress.add_argument("-o", "--out", metavar="FILE", type=Path, help="write all results as JSON")
+    stress.add_argument("--scenes", metavar="FILE", type=Path, help="draw from scenes of your own, a YAML file")
     stress.add_argument("--keep", metavar="FOLDER", type=Path, help="keep the cases with wrong results")
     stress.add_argument(
         "--steps",
@@ -166,6 +200,29 @@ def _count(text: str) -> int:
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f"write a whole number, not '{text}'")
     return int(text)
+
+
+def _share(text: str) -> float:
+    number, percent, _ = text.partition("%")
+    try:
+        share = float(number) / (100.0 if percent else 1.0)
+    except ValueError:
+        share = 0.0
+    if not 0.0 < share < 1.0:
+        raise argparse.ArgumentTypeError(f"write a share between 0 and 1 such as 0.02 or 2%, not '{text}'")
+    return share
+
+
+def _duration(text: str) -> float:
+    units = {"min": 60.0, "h": 3600.0, "s": 1.0}
+    unit = next((name for name in units if text.endswith(name)), "")
+    try:
+        seconds = float(text.removesuffix(unit)) * units.get(unit, 1.0)
+    except ValueError:
+        seconds = 0.0
+    if not 0.0 < seconds < float("inf"):
+        raise argparse.ArgumentTypeError(f"write a time such as 30s, 20min or 2h, not '{text}'")
+    return seconds
 
 
 def _version() -> str:
@@ -199,7 +256,7 @@ def _check(options: argparse.Namespace) -> int:
             raise CaseError(found.problems)
     except CaseError as error:
         return _fail(str(error))
-    print(f"{case.path}\n{summary(case, found.meshes, found.pairs)}")
+    print(f"{case.path}\n{summary(case, found.meshes, found.pairs, found.walls)}")
     if cost := in_words(case, found.meshes):
         print(f"  estimate: {cost}")
     for kind, lines in (("note", found.notes), ("warning", [*case.warnings, *found.warnings])):
@@ -310,6 +367,29 @@ def _twin(options: argparse.Namespace) -> int:
     return int(not right)
 
 
+def _converge(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError
+    from fsci.converge.converge import converge
+
+    try:
+        right = converge(
+            options.case,
+            tuple(options.overrides),
+            options.out,
+            only=options.probe,
+            tolerance=options.tolerance,
+            budget=options.budget,
+            say=lambda line: print(line, flush=True),
+        )
+    except CaseError as error:
+        return _fail(str(error))
+    except KeyboardInterrupt:
+        return _fail("stopped; the same command goes on from here") + 1
+    except OSError as error:
+        return _fail(f"fsci converge: {error}")
+    return int(not right)
+
+
 def _bench(options: argparse.Namespace) -> int:
     try:
         from fsci.bench.run import BenchmarkError, describe, run
@@ -328,13 +408,18 @@ def _bench(options: argparse.Namespace) -> int:
 
 
 def _stress(options: argparse.Namespace) -> int:
+    from fsci.expression import ExpressionError
+    from fsci.stress.frame import FrameError
     from fsci.stress.run import stress, stress_long, table, write
+    from fsci.stress.scene import SCENES, SceneError
 
     if options.steps is not None:
         return stress_long(options.steps, options.out)
-    outcomes = stress(
-        range(options.seed, options.seed + options.draws), lambda line: print(line, flush=True), options.keep
-    )
+    seeds, scenes = range(options.seed, options.seed + options.draws), options.scenes or SCENES
+    try:
+        outcomes = stress(seeds, lambda line: print(line, flush=True), options.keep, scenes)
+    except (SceneError, FrameError, ExpressionError, OSError) as error:
+        return _fail(f"fsci stress: {error}")
     print(table(outcomes))
     if options.out is not None:
         write(outcomes, options.out)

@@ -62,8 +62,9 @@ COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
     "!=": np.not_equal,
 }
 KEYWORDS = ("and", "or", "not")
-RESERVED = frozenset((*VARIABLES, *CONSTANTS, *FUNCTIONS, *KEYWORDS))  #: names that functions of the user cannot have
-TOKEN = re.compile(
+#: Names that functions of the user cannot have.
+RESERVED_WORDS = frozenset((*VARIABLES, *CONSTANTS, *FUNCTIONS, *KEYWORDS))
+FORMULA_TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
     r"|(?P<name>[A-Za-z_][A-Za-z_0-9]*)"
     r"|(?P<sign>\*\*|<=|>=|==|!=|[-+*/^<>(),])"
@@ -148,7 +149,7 @@ class _Parser:
         self.functions = FUNCTIONS | {name: (1, 1, function) for name, function in functions.items()}
         self.uses: set[str] = set()
         self.tokens: list[tuple[str, str, int]] = []  # kind, text, column
-        for match in TOKEN.finditer(text):
+        for match in FORMULA_TOKEN.finditer(text):
             kind = match.lastgroup or "wrong"
             self.tokens.append((kind, match[kind], match.start(kind) + 1))
         self.tokens.append(("end", "", len(text.rstrip()) + 1))

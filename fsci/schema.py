@@ -28,7 +28,7 @@ length, mass and time.
 """
 
 #: settings of every mesh, listed after its own
-COMMON = ("order", "cell", "rotate", "translate")
+COMMON = ("order", "cell", "mirror", "rotate", "translate")
 
 
 def json_schema() -> str:

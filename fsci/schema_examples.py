@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from fsci.case.material import MATERIAL_EXAMPLES
+from fsci.case.shapes import SHAPE_EXAMPLES
+
 CASE = """\
 title: A block under its weight
 time: {step: 0.5, end: 1}
@@ -53,6 +56,8 @@ contact:
 """
 
 EXAMPLES = {
+    **SHAPE_EXAMPLES,
+    **MATERIAL_EXAMPLES,
     "Case": CASE,
     "Units": "units: {length: mm, mass: t, time: s}   # stresses are in MPa",
     "Time": "time: {step: 0.01, end: 2}",
@@ -64,24 +69,6 @@ EXAMPLES = {
     "Body": BODY,
     "FileMesh": "mesh: {file: flag.geo, order: 2, parameters: {refine: 2}}",
     "Rotation": "rotate: [{angle: 90, axis: [0, 0, 1]}, {angle: 30, axis: [1, 0, 0]}]",
-    "Rectangle": "mesh: {shape: rectangle, size: [2, 0.5], cells: [8, 2], order: 2}",
-    "Disc": "mesh: {shape: disc, radius: 0.5, cells: [32, 4], translate: [0, 1]}",
-    "Ring": "mesh: {shape: ring, inner_radius: 0.9, outer_radius: 1, angle: 90, cells: [16, 2]}",
-    "Box": "mesh: {shape: box, size: [1, 1, 0.2], cells: [8, 8, 2]}",
-    "Beam": "mesh: {shape: beam, length: 2, width: 0.1, height: 0.1, cells: [20, 2, 2], order: 2}",
-    "Cylinder": "mesh: {shape: cylinder, radius: 0.5, height: 2, cells: [16, 2, 10]}",
-    "Tube": "mesh: {shape: tube, inner_radius: 0.9, outer_radius: 1, height: 2, cells: [32, 2, 10]}",
-    "SolidTorus": "mesh: {shape: solid_torus, major_radius: 0.5, minor_radius: 0.2, cells: [24, 12]}",
-    "HollowTorus": (
-        "mesh: {shape: hollow_torus, major_radius: 76, inner_radius: 19.5, outer_radius: 24, cells: [40, 20, 1]}"
-    ),
-    "HollowSphere": "mesh: {shape: hollow_sphere, inner_radius: 9, outer_radius: 10, cells: [8, 1]}",
-    "Sphere": "mesh: {shape: sphere, radius: 1, cells: [4, 3]}",
-    "Leaflet": (
-        "mesh: {shape: leaflet, radius: 1, thickness: 0.06, height: 1.2, lip: 0.4, post: 0.2, cells: [8, 1, 6]}"
-    ),
-    "Elastic": "material: {law: neo_hooke, E: 4000, nu: 0.4, density: 1000}",
-    "MooneyRivlin": "material: {law: mooney_rivlin, c10: 3e5, c01: 1e5, bulk: 5e8, density: 1100}",
     "Support": (
         'supports:\n  - {on: bottom, displacement: [0, 0, 0]}\n  - {on: top, displacement: [null, null, "-0.1*t"]}\n'
         "  - {on: left, symmetry: true}"
@@ -101,8 +88,15 @@ EXAMPLES = {
     "RigidBody": "bodies:\n  cylinder: {mesh: {shape: disc, radius: 0.05, cells: [120, 1], translate: [0.2, 0.2]}}",
     "Movement": 'motion: {displacement: [0, "0.02*sin(2*pi*t)"]}',
     "Turn": 'rotation: {centre: [0.2, 0.2], angle: "30*sin(2*pi*t)"}',
-    "Free": "free: {density: 1120, gravity: [0, 0, -9.81], held: [x, y, rotation]}",
-    "PointSpring": "springs:\n  - {at: [0, 0, 0], stiffness: [1, 1, 1], damping: 0.1}",
+    "Free": "free: {density: 1120, gravity: [0, 0, -9.81], held: [x, y], initial_angular_velocity: [0, 0, 90]}",
+    "PointSpring": "springs:\n  - {at: [0, 0, 0], stiffness: [1, 1, 1], damping: 0.1}\n"
+    "  - {at: [0, 0, 0], stiffness: 40, to: {body: other, at: [1, 0, 0]}, length: 0.8}",
+    "SpringEnd": "to: {body: other, at: [1, 0]}",
+    "RigidLoad": 'loads:\n  - {force: [0, "-100*ramp(t, 0, 1)"], at: [0.1, 0]}\n  - {moment: 5}',
+    "Rigid": "rigid:\n  gravity: [0, -9.81]\n  bodies:\n"
+    "    bar: {mesh: {shape: rectangle, size: [1, 0.1], cells: [1, 1]}, density: 1000, pivot: [0, 0.05]}",
+    "FreeBody": "bodies:\n  ball: {mesh: {shape: sphere, radius: 0.1, cells: [4, 2]}, density: 1120}",
+    "FreeMotion": 'free: {density: 7800, held: [x, rotation], loads: [{force: [0, "-1e4*ramp(t, 0, 1)"]}]}',
     "RigidDynamics": "dynamics: {rho_inf: 0.8}",
     "Coupling": "coupling: {scheme: partitioned, accelerator: iqn, tolerance: 1e-7}",
     "Contact": CONTACT,

@@ -4,19 +4,43 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol
+from enum import Enum
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Indices32 = NDArray[np.int32]
+Mask = NDArray[np.bool_]
+
+#: Rounding error of a number in double precision, relative to it.
+EPS = float(np.finfo(float).eps)
 
 #: A state to continue from: nested names, with arrays in an order that does not depend on the partition, numbers, text.
 State = dict[str, Any]
 
 
-#: What helps against a result that means nothing: a smaller step may, or cannot; empty: the result has a meaning.
-Helps = Literal["", "repeat", "end"]
+class FailureKind(Enum):
+    """The cause of a step without a solution: what a user can do about it depends on this alone."""
+
+    NOT_FINITE = "not finite"  #: a residual, a force, a motion or a position is not a number
+    NEWTON = "newton"  #: Newton's method does not converge, for none of the causes below
+    COUPLING = "coupling"  #: the iteration between fields does not converge
+    ACTIVE_SET = "active set"  #: contact opens and closes from iterate to iterate
+    SUCTION = "suction"  #: contact under suction has no state, open or closed
+    LIMIT_POINT = "limit point"  #: statics beyond the last equilibrium
+    UNSUPPORTED = "unsupported"  #: bodies without supports: a singular system, or displacements without bound
+    INVERTED = "inverted"  #: an element is inside out
+    LINEAR_SOLVER = "linear solver"  #: an iterative linear solver stalls
+    MOTION = "motion"  #: a body moves or turns too far in one step
+    COARSE_CELLS = "coarse cells"  #: a body is close to cells that are not of the finest level
+    PERIODIC_FACES = "periodic faces"  #: a body reaches the end of the period
+    NO_ROOM = "no room"  #: no motion of rigid bodies opens all of their overlaps
+    JAMMED = "jammed"  #: friction of rigid bodies that no contact forces fulfil
+    PASSAGE = "passage"  #: a sentinel: a body has leapt or passed through another one, in too long a step
+    NOT_HELD = "not held"  #: a sentinel: nothing holds a body where it has passed
 
 
 @dataclass(frozen=True)
@@ -27,9 +51,17 @@ class Finding:
     body: str  #: name of the body, pocket or field
     value: float  #: how large it is, in the unit that the message has
     message: str  #: what is wrong, where, and what helps
-    #: not empty: the state means nothing, so the step fails
-    worthless: Helps = ""
+    worthless: FailureKind | None = None  #: the state means nothing, so the step fails for this
     where: tuple[float, ...] | None = None  #: a point [m]
+    ends_run: bool = False  #: the run is to end after this step
+
+
+@dataclass(frozen=True)
+class Step:
+    """The time step from t - dt to t."""
+
+    t: float  #: its end [s]
+    dt: float  #: its length [s]
 
 
 @dataclass(frozen=True)
@@ -58,15 +90,17 @@ class Snapshot:
 
 
 class StepFailed(Exception):
-    """A time step without a solution: field, reason, iteration, position and residuals.
+    """A time step without a solution: field, kind of failure, reason, iteration, position and residuals.
 
-    where: a point [m], such as that of the largest residual or of an inverted element, or None; history: the residual
-    norms so far; finding: that of the sentinel which rejected the solution.
+    reason: for the user; nothing depends on its words. where: a point [m], such as that of the largest residual or of
+    an inverted element, or None; history: the residual norms so far; finding: that of the sentinel which rejected the
+    solution.
     """
 
     def __init__(
         self,
         field: str,
+        kind: FailureKind,
         reason: str,
         *,
         iteration: int = 0,
@@ -76,25 +110,18 @@ class StepFailed(Exception):
     ):
         place = "" if where is None else " near (" + ", ".join(f"{c:.6g}" for c in where) + ")"
         super().__init__(f"{field}: {reason}" if finding else f"{field}: {reason} at iteration {iteration}{place}")
-        self.field, self.reason, self.iteration, self.where, self.history = (
-            field,
-            reason,
-            iteration,
-            where,
-            history,
-        )
-        self.finding = finding
+        self.field, self.kind, self.reason = field, kind, reason
+        self.iteration, self.where, self.history, self.finding = iteration, where, history, finding
 
-    def with_reason(self, reason: str) -> StepFailed:
-        """The same failure with another reason."""
-        return type(self)(
-            self.field, reason, iteration=self.iteration, where=self.where, history=self.history, finding=self.finding
-        )
+    def with_reason(self, reason: str, kind: FailureKind | None = None) -> StepFailed:
+        """The same failure with another reason, and another kind if one is given."""
+        same = {name: getattr(self, name) for name in ("iteration", "where", "history", "finding")}
+        return type(self)(self.field, kind or self.kind, reason, **same)
 
     @property
     def hopeless(self) -> bool:
         """Whether a smaller step cannot help."""
-        return self.finding is not None and self.finding.worthless == "end"
+        return self.kind is FailureKind.NOT_HELD
 
 
 class NoResidual(StepFailed):

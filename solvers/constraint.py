@@ -7,8 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.rows import RowTransformation
 from solvers.api import Array, Stateful
-from solvers.rows import RowTransformation
 
 
 class Constraint(Stateful, Protocol):

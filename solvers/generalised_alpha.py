@@ -44,3 +44,7 @@ class GeneralisedAlpha:
     def damping_factor(self, dt: float) -> float:
         """d(v_{n+1-alpha_f}) / d(u_{n+1}) [1/s]."""
         return (1.0 - self.alpha_f) * self.gamma / (self.beta * dt)
+
+
+#: Backward Euler where the acceleration at the start of the step counts as zero.
+BACKWARD_EULER = GeneralisedAlpha(alpha_m=0.0, alpha_f=0.0, beta=1.0, gamma=1.0)

@@ -10,13 +10,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array, NoResidual, StepFailed, StepInfo
+from solvers.api import Array, FailureKind, NoResidual, StepFailed, StepInfo
 from solvers.counted import counted
 
 Flags = NDArray[np.bool_]
 
 #: Residual [N] in the place of zero in divisions; ratios to it are numbers.
-NOTHING = 1e-150
+ZERO_RESIDUAL = 1e-150
 
 
 class System(Protocol):
@@ -26,6 +26,13 @@ class System(Protocol):
     """
 
     name: str
+
+    def follow(self) -> None:
+        """Put to the iterate what lies where it says: surfaces, cells, numbers of unknowns; else do nothing.
+
+        Newton's method does so for each iterate, before its residual. Raises StepFailed.
+        """
+        ...
 
     def residual(self) -> Array:
         """Assemble the residual; returns its norm [N] over the rows that are solved for, by part."""
@@ -96,14 +103,11 @@ class Tolerance:
 def iterates(system: System, tolerance: Tolerance = Tolerance()) -> Iterator[Iterate]:
     """An endless sequence of Newton iterates; the caller applies tolerances and limits.
 
-    The tangent is kept for an iterate that is expected to fulfil the tolerance with it. Newton's method leaves
-    r_1 = f'' dx^2 / 2. With the same tangent the next residual is f'' dx dx_1 = 2 (r_1 / r_0) r_1.
-    Source: C. T. Kelley, Solving Nonlinear Equations with Newton's Method, SIAM 2003, section 2.3 (chord method).
-
-    The linear system may be solved as inexactly as `enough` says. Where a system goes astray, and with `line_search`,
-    increments are halved until the residual decreases.
+    The tangent is kept for an iterate that is expected to fulfil the tolerance with it (the chord method;
+    docs/theory_coupling.md, Kept tangents). The linear system may be solved as inexactly as `enough` says. Where a
+    system goes astray, and with `line_search`, increments are halved until the residual decreases.
     """
-    number, residual = 0, system.residual()
+    number, residual = 0, _residual(system)
     increment, ratio = np.full(len(residual), math.inf), np.full(len(residual), math.inf)
     largest, rises = residual, 0
     while True:
@@ -112,13 +116,19 @@ def iterates(system: System, tolerance: Tolerance = Tolerance()) -> Iterator[Ite
         before = residual
         keep = number > 0 and bool((2.0 * ratio * residual <= small).all())
         increment = system.advance(keep=keep, reduction=enough(residual, ratio, tolerance=small))
-        residual = system.residual()
+        residual = _residual(system)
         finite = bool(np.isfinite(residual).all())  # not a number: elements are inverted
         rises += bool(((residual > largest) & (residual > small)).any()) + 2 * (not finite)
         if (tolerance.line_search and settled) or (number > 0 and system.astray(rises)):
             increment, residual = _halve(system, before, small, increment, residual)
-        ratio = residual / np.maximum(before, NOTHING)
+        ratio = residual / np.maximum(before, ZERO_RESIDUAL)
         largest, number = np.fmax(largest, residual), number + 1
+
+
+def _residual(system: System) -> Array:
+    """That of a new iterate."""
+    system.follow()
+    return system.residual()
 
 
 #: Reduction of the residual of a linear system that is enough while nothing is known of the convergence. Measured with
@@ -140,7 +150,7 @@ def enough(residual: Array, ratio: Array, *, tolerance: Array) -> float:
 
 #: Largest count of halvings of an increment in a line search. From 7 to 30 a belt with Tresca friction, a ring that
 #: closes, a press fit and a strip on a corner take the same steps (34, 54 to 59, 10, 87).
-HALVINGS = 14
+HALVINGS_OF_INCREMENT = 14
 
 
 def _halve(system: System, before: Array, small: Array, increment: Array, residual: Array) -> tuple[Array, Array]:
@@ -156,15 +166,15 @@ def _halve(system: System, before: Array, small: Array, increment: Array, residu
         return math.inf if np.isnan(of).any() else float(np.linalg.norm(np.where(counts & (of > small), of, 0.0)))
 
     remaining, tried, enough_below = 1.0, [size(residual)], size(before)
-    while 0.0 < tried[-1] and not tried[-1] < enough_below and len(tried) <= HALVINGS:
+    while 0.0 < tried[-1] and not tried[-1] < enough_below and len(tried) <= HALVINGS_OF_INCREMENT:
         system.retreat(0.5 * remaining)
         remaining *= 0.5
-        residual = system.residual()
+        residual = _residual(system)
         tried.append(size(residual))
     if 0.0 < tried[-1] and not tried[-1] < enough_below:
         best = 0.5 ** int(np.argmin(tried))
         system.retreat(remaining - best)
-        remaining, residual = best, system.residual()
+        remaining, residual = best, _residual(system)
     return increment * remaining, residual
 
 
@@ -179,7 +189,8 @@ def converge(system: System, tolerance: Tolerance) -> StepInfo:
         if not np.isfinite(iterate.residual).all():
             norms = _norms(history, np.ones(len(iterate.residual), dtype=bool))
             reason = "the residual is not a number"
-            raise NoResidual(system.name, reason, iteration=iterate.number, where=system.worst(), history=norms)
+            kind = FailureKind.NOT_FINITE
+            raise NoResidual(system.name, kind, reason, iteration=iterate.number, where=system.worst(), history=norms)
         if iterate.settled and (within := _within(iterate, system, tolerance)) is not None:
             return StepInfo(iterate.number, _norms(history, within))
         if iterate.number < tolerance.max_iterations:
@@ -187,9 +198,10 @@ def converge(system: System, tolerance: Tolerance) -> StepInfo:
         open_parts = ~system.only_rounding()
         size = _norms(history, open_parts)[-1]
         reason = f"Newton did not converge in {counted(iterate.number, 'iteration')} (residual {size:.3g})"
-        reason += f": {cycle}" if (cycle := system.astray(0)) else ""
-        norms = _norms(history, open_parts)
-        raise StepFailed(system.name, reason, iteration=iterate.number, where=system.worst(), history=norms)
+        kind, norms = FailureKind.NEWTON, _norms(history, open_parts)
+        if cycle := system.astray(0):
+            kind, reason = FailureKind.ACTIVE_SET, f"{reason}: {cycle}"
+        raise StepFailed(system.name, kind, reason, iteration=iterate.number, where=system.worst(), history=norms)
     raise AssertionError("unreachable: iterates() has no end")
 
 

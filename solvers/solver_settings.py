@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from solvers.linear import Maker, Method
+from solvers.algebra.linear import Maker, Method
 from solvers.newton import Tolerance
 
 

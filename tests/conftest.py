@@ -1,4 +1,5 @@
 import os
+import subprocess
 import time
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -13,6 +14,11 @@ NO_TIME = "no time is left"
 
 def pytest_addoption(parser):
     parser.addoption("--minutes", type=float, help="begin no test after so many")
+
+
+def pytest_collection_modifyitems(items):
+    """What takes minutes comes last, the longest at the end: where time ends before the tests do, few are left out."""
+    items.sort(key=lambda item: max((mark.kwargs.get("seconds", 0) for mark in item.iter_markers("slow")), default=0))
 
 
 def pytest_runtest_setup(item):
@@ -34,3 +40,15 @@ def pytest_terminal_summary(terminalreporter):
 def in_new_folder(tmp_path, monkeypatch):
     """The present folder is an empty one."""
     monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def runs_in_copies(monkeypatch):
+    """Runs that `fsci twin`, `converge` and `stress` start on one process need no new process."""
+    from types import SimpleNamespace
+
+    from programs import run_command
+
+    for module in ("fsci.twin.runs", "fsci.stress.program"):
+        changed = SimpleNamespace(**{**vars(subprocess), "run": run_command})
+        monkeypatch.setattr(f"{module}.subprocess", changed)

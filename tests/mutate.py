@@ -23,7 +23,7 @@ SWAPPED = {"+": "-", "-": "+", "*": "/", "/": "*", "<": ">", ">": "<"}
 #: part -> (its sources, their tests, the fast ones first)
 GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "flow": (
-        ("solvers/fluid/forms.py", "solvers/fluid/nitsche.py", "solvers/fluid/boundary/patch_kinds.py"),
+        tuple(f"solvers/fluid/terms/{name}.py" for name in ("forms", "nitsche", "boundary/patch_kinds")),
         (
             "fluid_patch", "fluid_tangent", "fluid_ghost", "fluid_covered_faces", "fluid_slip", "fluid_stretched",
             "fluid_nitsche", "fluid_slip_bodies", "fluid_film", "fluid_time", "fluid_reactions", "constants",
@@ -40,8 +40,8 @@ GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "time": (
         (
-            "solvers/generalised_alpha.py", "solvers/structure/dynamics.py", "solvers/fluid/time_scheme.py",
-            "solvers/fluid/history.py", "solvers/rigid/motion.py",
+            "solvers/generalised_alpha.py", "solvers/structure/dynamics.py", "solvers/fluid/settings/time_scheme.py",
+            "solvers/fluid/flow/history.py", "solvers/rigid/motion.py",
         ),
         (
             "additions", "rigid", "structure_time", "fluid_history", "fluid_time", "massless", "contact_motion",

@@ -38,7 +38,7 @@ def _is_cost(column: str) -> bool:
 
 
 def _is_word(column: str, value: object) -> bool:
-    return isinstance(value, str) and column != "front"
+    return isinstance(value, str) and value != "" and column != "front"
 
 
 def _key(row: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:

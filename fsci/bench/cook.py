@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from time import process_time
 
 import numpy as np
@@ -10,7 +11,7 @@ from mpi4py import MPI
 
 from fsci import shapes
 from fsci.bench.table import Row
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body, Support, Traction
 from solvers.structure.elastic_constants import lame
@@ -18,39 +19,33 @@ from solvers.structure.elements import Formulation
 from solvers.structure.field import Structure
 from solvers.structure.materials import LinearElastic
 
-#: cell, order, element, cells along an edge
-MESHES: tuple[tuple[str, int, Formulation, tuple[int, ...]], ...] = (
-    ("quad", 1, "displacement", (8, 16, 32, 64)),
-    ("quad", 1, "mixed", (8, 16, 32, 64)),
-    ("tri", 2, "displacement", (4, 8, 16, 32)),
-    ("quad", 2, "displacement", (4, 8, 16, 32)),
-    ("quad", 2, "mixed", (4, 8, 16, 32)),
-)
-FINEST = 96
 
-
-def run() -> list[Row]:
+def measure(cell: str, order: int, element: Formulation, cells: int) -> Row:
     """Rise of the upper right corner, its error against the finest mesh, processor time of assembly and solution."""
-    finest, _ = solve(membrane("quad", 2, FINEST), "mixed")
-    rows: list[Row] = []
-    for cell, order, element, numbers in MESHES:
-        solve(membrane(cell, order, 2), element)  # compiles the forms, which is not measured
-        for cells in numbers:
-            mesh = membrane(cell, order, cells)
-            rise, seconds = solve(mesh, element)
-            nodes = {("quad", 1): "quad4", ("quad", 2): "quad9", ("tri", 2): "tri6"}[cell, order]
-            rows.append(
-                {
-                    "cell": nodes,
-                    "element": element,
-                    "cells": cells,
-                    "dofs": mesh.points.size,
-                    "corner u_y": round(rise, 3),
-                    "error [%]": 100 * (1 - rise / finest),
-                    "time [ms]": 1e3 * seconds,
-                }
-            )
-    return rows
+    _compile(cell, order, element)
+    mesh = membrane(cell, order, cells)
+    rise, seconds = solve(mesh, element)
+    nodes = {("quad", 1): "quad4", ("quad", 2): "quad9", ("tri", 2): "tri6"}[cell, order]
+    return {
+        "cell": nodes,
+        "element": element,
+        "cells": cells,
+        "dofs": mesh.points.size,
+        "corner u_y": round(rise, 3),
+        "error [%]": 100 * (1 - rise / _finest()),
+        "time [ms]": 1e3 * seconds,
+    }
+
+
+@cache
+def _finest() -> float:
+    return solve(membrane("quad", 2, 96), "mixed")[0]
+
+
+@cache
+def _compile(cell: str, order: int, element: Formulation) -> None:
+    """The forms, which is not measured."""
+    solve(membrane(cell, order, 2), element)
 
 
 def membrane(cell: str, order: int, cells: int) -> Mesh:
@@ -73,7 +68,3 @@ def solve(mesh: Mesh, element: Formulation) -> tuple[float, float]:
     seconds = process_time() - begin
     corner = int(np.argmax(body.points[0] + body.points[1]))
     return float(body.u.x.array.reshape(-1, 2)[corner, 1]), seconds
-
-
-def constant(value: float):
-    return lambda x, t: np.full(x.shape[1], value)

@@ -10,12 +10,12 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fsci.bench.table import Row
-from solvers.fluid.background.grid import Grid, uniform
-from solvers.fluid.bodies.immersed import ImmersedBody, rigid_body
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.field import Fluid
-from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.probes import at_point, difference
+from solvers.fluid.flow.field import Fluid
+from solvers.fluid.flow.probes import at_point, difference
+from solvers.fluid.grid.box import Grid, uniform
+from solvers.fluid.settings.flow_settings import FlowSettings
+from solvers.fluid.surfaces.immersed import ImmersedBody, rigid_body
+from solvers.fluid.terms.boundary.patches import Patch
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.timing import Timer
@@ -25,9 +25,6 @@ Array = NDArray[np.float64]
 #: Schaefer and Turek's channel [m], and the flow 2D-1: http://www.mathematik.tu-dortmund.de/~featflow/en/benchmarks
 LENGTH, HEIGHT, DIAMETER, CENTRE = 2.2, 0.41, 0.1, (0.2, 0.2)
 DRAG, LIFT, PRESSURE = 5.57953523384, 0.010618948146, 0.11752016697
-
-#: (element, cells along the diameter) of the table of 2D-1
-STEADY_RUNS = (*(("q1q1", n) for n in (10, 20, 30, 40)), *(("q2q1", n) for n in (5, 10, 15, 20)))
 
 
 def zero(x: Array, t: float) -> Array:
@@ -93,12 +90,8 @@ def cylinder(
     return Fluid(grid, flow, patches, [body], SolverSettings(Tolerance(tolerance)), timer=timer, comm=MPI.COMM_SELF)
 
 
-def run_steady() -> list[Row]:
-    """2D-1: errors of drag, lift and pressure difference against wall time, of four meshes for both elements."""
-    return [steady(element, cells) for element, cells in STEADY_RUNS]
-
-
 def steady(element: str, cells: int) -> Row:
+    """2D-1: errors of drag, lift and pressure difference, and wall time."""
     timer, mean, grid = Timer(), 0.2, cylinder_grid(cells)
     begin = perf_counter()
     fluid = cylinder(grid, element, mean, timer=timer)
@@ -126,12 +119,8 @@ def steady(element: str, cells: int) -> Row:
 # ------------------------------------------------------------------------------------------------ one linear system
 
 
-def run_stokes() -> list[Row]:
-    """Stokes flow around a disc by the direct solver, all of it from the grid on: seconds by size."""
-    return [stokes(cells) for cells in (58, 116, 231)]
-
-
 def stokes(cells: int) -> Row:
+    """Stokes flow around a disc by the direct solver, all of it from the grid on: seconds by part."""
     timer, begin = Timer(), perf_counter()
 
     def lid(x: Array, t: float) -> Array:
@@ -155,11 +144,6 @@ def parts(timer: Timer, total: float) -> dict[str, float]:
 
 
 # ---------------------------------------------------------------------------------------------------- a step in 3D
-
-
-def run_channel() -> list[Row]:
-    """A ring moves through a channel, backward Euler: seconds of one time step by part."""
-    return [channel(cells, 3) for cells in (20, 30, 36)]
 
 
 def ring(count: int, around: int, radius: float, thickness: float, tilt: float) -> tuple[Array, NDArray[np.int64]]:
@@ -195,6 +179,7 @@ def ring_in_channel(cells: int, timer: Timer, comm: MPI.Comm = MPI.COMM_SELF, *,
 
 
 def channel(cells: int, steps: int, dt: float = 0.05) -> Row:
+    """A ring moves through a channel, backward Euler: seconds of one time step by part."""
     timer = Timer()
     fluid = ring_in_channel(cells, timer)
     fluid.initialise(0.0, dt)
@@ -210,6 +195,6 @@ def channel(cells: int, steps: int, dt: float = 0.05) -> Row:
         "dofs": fluid.dofs(),
         "cut cells": len(fluid.cut.cut),
         "newton per step": newton / steps,
-        "krylov, last": fluid.linear_iterations,
+        "krylov, last": fluid.iterate.linear_iterations,
         **seconds,
     }

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from fsci.bench.family import ERROR, FRONT, MEMORY, TIME, UNKNOWNS
-from fsci.bench.table import Row
+from fsci.bench.table import ERROR, FRONT, MEMORY, TIME, UNKNOWNS, Row
 
 
 def plot_front(rows: Sequence[Row], title: str, path: Path) -> None:
@@ -17,16 +16,16 @@ def plot_front(rows: Sequence[Row], title: str, path: Path) -> None:
     import matplotlib.pyplot as plt
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-    from fsci.plot.curves import COLOURS, DOTS, STYLE
+    from fsci.plot.curves import COLOURS, CURVE_DOTS, CURVE_STYLE
 
-    with plt.rc_context(STYLE):
+    with plt.rc_context(CURVE_STYLE):
         costs = [cost for cost in (TIME, UNKNOWNS, MEMORY) if cost in rows[0]]
         size = (4.0 * len(costs), 4.2)
         figure, panels = plt.subplots(1, len(costs), figsize=size, sharey=True, layout="constrained")
-        options = list(dict.fromkeys(str(row["option"]) for row in rows))
+        options = list(dict.fromkeys(str(row.get("option", "")) for row in rows))
         for panel, cost in zip(panels, costs, strict=True):
             for number, option in enumerate(options):
-                points = [(float(row[cost]), float(row[ERROR])) for row in rows if row["option"] == option]
+                points = [(float(row[cost]), float(row[ERROR])) for row in rows if str(row.get("option", "")) == option]
                 panel.loglog(*zip(*points, strict=True), "o-", color=COLOURS[number % len(COLOURS)], label=option)
             best = [(float(row[cost]), float(row[ERROR])) for row in rows if row[FRONT]]
             panel.loglog(*zip(*best, strict=True), "o", ms=12, mfc="none", mec="black", label="front of time and error")
@@ -40,5 +39,5 @@ def plot_front(rows: Sequence[Row], title: str, path: Path) -> None:
         panels[0].set_ylabel("largest error of all values [%]")
         panels[0].legend()
         figure.suptitle(title)
-        figure.savefig(path, dpi=DOTS)
+        figure.savefig(path, dpi=CURVE_DOTS)
         plt.close(figure)

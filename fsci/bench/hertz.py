@@ -6,7 +6,6 @@ Source of the solution: K. L. Johnson, Contact Mechanics (1985), chapter 4.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter, process_time
 
@@ -16,12 +15,11 @@ from scipy.optimize import brentq
 
 from coupling.contact_surfaces import contact_surface
 from fsci import shapes
-from fsci.bench.family import ERROR, TIME, UNKNOWNS
-from fsci.bench.table import Row
+from fsci.bench.table import ERROR, TIME, UNKNOWNS, Row
 from solvers.contact.contact import Contact
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body, Support
@@ -122,42 +120,21 @@ def build(mesh: Mesh) -> tuple[Structure, Contact]:
     return Structure([body], settings=solver, contact=contact), contact
 
 
-def _value(number: float) -> Callable[[Array, float], Array]:
-    return lambda x, t: np.full(x.shape[1], number)
+def measure_step(per_radius: int, outer: int) -> Row:
+    """One load step; the meshes of the family have the sizes of those measured with other programs."""
+    found = solve(per_radius, outer)
+    return {
+        "cells per radius": per_radius,
+        "dofs": found.structure.dofs(),
+        "newton": found.newton,
+        "wall [s]": found.wall,
+        "cpu [s]": found.cpu,
+        "peak error": found.peak_error,
+        "pressure error (L2)": found.pressure_error,
+    }
 
 
-def run() -> list[Row]:
-    """One load step by cells per radius of contact; the meshes have the sizes of those measured with other programs."""
-    rows: list[Row] = []
-    for per_radius, outer in ((2, 6), (4, 9), (8, 14)):
-        found = solve(per_radius, outer)
-        rows.append(
-            {
-                "cells per radius": per_radius,
-                "dofs": found.structure.dofs(),
-                "newton": found.newton,
-                "wall [s]": found.wall,
-                "cpu [s]": found.cpu,
-                "peak error": found.peak_error,
-                "pressure error (L2)": found.pressure_error,
-            }
-        )
-    return rows
-
-
-def measure() -> list[Row]:
-    """First and second order: error of the pressure (L2) against time of the load step."""
-    runs = [
-        ("hex8", 1, 2, 6),
-        ("hex8", 1, 4, 9),
-        ("hex8", 1, 8, 14),
-        ("hex27", 2, 1, 3),
-        ("hex27", 2, 2, 6),
-        ("hex27", 2, 4, 9),
-    ]
-    rows: list[Row] = []
-    for cell, order, per_radius, outer in runs:
-        found = solve(per_radius, outer, order)
-        measured = {UNKNOWNS: found.structure.dofs(), TIME: found.cpu, ERROR: 100.0 * found.pressure_error}
-        rows.append({"option": cell, "resolution": f"{per_radius} cells per radius", **measured})
-    return rows
+def measure(order: int, per_radius: int, outer: int) -> Row:
+    """Error of the pressure (L2) and time of the load step."""
+    found = solve(per_radius, outer, order)
+    return {UNKNOWNS: found.structure.dofs(), TIME: found.cpu, ERROR: 100.0 * found.pressure_error}

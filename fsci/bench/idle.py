@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import json
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import process_time
 
 import numpy as np
 from mpi4py import MPI
 
-from fsci.bench.small import BLOCK, DISC, FLOW, POST
+from fsci.bench.family import FamilyScene, Settings
 from fsci.bench.table import Row
 from fsci.builder.build import Simulation, build
 from fsci.case import load_case
@@ -19,87 +19,21 @@ from fsci.run.watch import Watched
 from solvers.api import Scheme
 from solvers.timing import Timer
 
-STEPS = 60
 BEGIN = 5  #: steps that do not count: they compile and build trees
 
-CUBE = """\
-time: {step: 0.005, end: 1}
-structure:
-  dynamics: {rho_inf: 0.9}
-  bodies:
-    block:
-      mesh: {shape: box, size: [1, 1, 1], cells: [8, 8, 8], origin: [0, 0, 50]}
-      material: {law: neo_hooke, E: 1000, nu: 0.3, density: 1}
-      gravity: [0, 0, -10]
-contact:
-  obstacles:
-    floor: {mesh: {shape: box, size: [3, 3, 0.2], cells: [3, 3, 1], origin: [-1, -1, -0.2]}, on: top}
-  pairs:
-    floor: {slave: {body: block, on: bottom}, master: {obstacle: floor}}
-"""
 
-#: More than five cells wide: the flow around thinner ones has unknowns of each side, unless they may touch.
-WIDE_POST = POST.replace("size: [0.23,", "size: [0.63,")
+def measure(scene: FamilyScene, steps: int = 60) -> Row:
+    """Milliseconds of the processor per Newton step with and without a part of the case, or its sentinels.
 
-ROOF = """\
-contact:
-  obstacles:
-    roof: {mesh: {shape: rectangle, size: [3, 0.2], cells: [3, 1], origin: [-1, 9]}, on: bottom}
-  pairs:
-    roof: {slave: {body: post, on: top}, master: {obstacle: roof}}
-"""
-
-OUTSIDE = """\
-  bodies:
-    disc: {mesh: {shape: disc, radius: 0.2, cells: [16, 2], translate: [5, 5]}}
-"""
-
-MOVED = """\
-  bodies:
-    disc:
-      mesh: {shape: disc, radius: 0.2, cells: [16, 2], translate: [0.78, 0.51]}
-      motion: {displacement: ["0.1*sin(t)", 0]}
-"""
-
-#: name -> (scene, the part that it does not use)
-SCENES = {
-    "block, a pair that never meets": (BLOCK.replace("0.001", "50"), "contact"),
-    "cube, a pair that never meets": (CUBE, "contact"),
-    "post in a flow, a pair that never meets": (FLOW + WIDE_POST + ROOF, "contact"),
-    "flow, a body outside of the box": (FLOW + OUTSIDE, "  bodies"),
-}
-
-
-#: name -> scene with sentinels
-WATCHED = {
-    "block, sentinels": BLOCK,
-    "flow around a disc, sentinels": FLOW + DISC,
-    "flow with a moved disc, sentinels": FLOW + MOVED,
-    "post in a flow, sentinels": FLOW + POST,
-}
-
-
-def run() -> list[Row]:
-    """Milliseconds of the processor per time step with and without the part, and their ratio."""
-    rows = [measure(name, text, part) for name, (text, part) in SCENES.items()]
-    return rows + [measure_sentinels(name, text) for name, text in WATCHED.items()]
-
-
-def measure(name: str, text: str, part: str, steps: int = STEPS) -> Row:
-    """The row of a scene with and without a part of its text."""
-    return _measure(name, [_simulation(scene) for scene in (text, text.split(f"{part}:")[0])], steps)
-
-
-def measure_sentinels(name: str, text: str, steps: int = STEPS) -> Row:
-    """The row of a scene with and without sentinels; both compute the columns of the history."""
-    return _measure(name, [_simulation(text, watched=watched) for watched in (True, False)], steps)
-
-
-def _measure(name: str, both: Sequence[tuple[Simulation, Scheme, Timer, float]], steps: int) -> Row:
-    """Medians over the steps, which the two scenes take by turns: others who use the machine disturb both.
-
-    The last column is the largest difference of a part of the time, such as assembly, over the whole time.
+    Medians over the steps, which the two take by turns: others who use the machine disturb both. Runs with and without
+    sentinels both compute the columns of the history. The last column is the largest difference of a part of the time,
+    such as assembly, over the whole time.
     """
+    steps, part = scene.given.get("steps", steps), scene.given["without"]
+    if part == "sentinels":
+        both = [_simulation(scene.folder, scene.settings, watched=watched) for watched in (True, False)]
+    else:
+        both = [_simulation(scene.folder, settings) for settings in (scene.settings, _without(scene, part))]
     spent, newton = np.zeros((2, steps)), np.zeros((2, steps))
     parts: dict[str, np.ndarray] = {}
     for number in range(steps):
@@ -116,7 +50,6 @@ def _measure(name: str, both: Sequence[tuple[Simulation, Scheme, Timer, float]],
     by_part = {kind: 1e3 * np.median((s / newton)[:, BEGIN:], axis=1) for kind, s in parts.items()}
     largest = max(by_part, key=lambda kind: abs(by_part[kind][0] - by_part[kind][1]))
     return {
-        "scene": name,
         "unknowns": sum(both[0][0].dofs.values()),
         "newton with": newton[0].mean(),
         "newton without": newton[1].mean(),
@@ -140,12 +73,18 @@ class ProcessorTimer(Timer):
             self.seconds[name] = self.seconds.get(name, 0.0) + process_time() - begin
 
 
-def _simulation(text: str, *, watched: bool = False) -> tuple[Simulation, Scheme, Timer, float]:
+def _without(scene: FamilyScene, part: str) -> Settings:
+    """Settings that take a part away."""
+    others = {name: value for name, value in scene.settings.items() if not name.startswith(part)}
+    return {**others, part: {} if "." in part else None}  # a section, or the bodies in one
+
+
+def _simulation(
+    folder: Path, settings: Settings, *, watched: bool = False
+) -> tuple[Simulation, Scheme, ProcessorTimer, float]:
     timer = ProcessorTimer()
-    with TemporaryDirectory() as folder:
-        (Path(folder) / "case.yaml").write_text("title: a scene\n" + text)
-        case = load_case(Path(folder), [])
-        simulation = build(case, MPI.COMM_WORLD, timer)
+    case = load_case(folder, [(name, json.dumps(value)) for name, value in settings.items()])
+    simulation = build(case, MPI.COMM_WORLD, timer)
     scheme = Watched(simulation.scheme, simulation.sentinels if watched else {}, timer)
     simulation.initialise(0.0, case.time.step)
     scheme.start(0.0)

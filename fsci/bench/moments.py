@@ -9,16 +9,9 @@ import numpy as np
 from fsci.bench.table import Row
 from solvers.kernels import Moments, moments
 
-#: (triangles around the torus, across it, cells per direction)
-SIZES = [(64, 32, 20), (256, 128, 40)]
-
-
-def run() -> list[Row]:
-    """Best of five calls, in microseconds per pair of a triangle and a cell that meet, outputs included."""
-    return [measure(*size, points) for size in SIZES for points in (3, 5)]
-
 
 def measure(around: int, across: int, cells: int, points: int) -> Row:
+    """Microseconds per pair of a triangle of the torus and a cell that meet, outputs included; best of five calls."""
     vertices, facets = torus(around, across)
     lines = [np.linspace(-1.0, 1.0, cells + 1)] * 3
     gauss = (np.polynomial.legendre.leggauss(points)[0] + 1) / 2

@@ -16,20 +16,15 @@ from mpi4py import MPI
 
 from fsci.bench import fluid
 from fsci.bench.table import Row
-from solvers.fluid.field import Fluid
+from solvers.fluid.flow.field import Fluid
 from solvers.timing import Timer
-
-#: Processes, and cells of the ring's channel in one direction.
-PROCESSES, CELLS = (1, 2, 4, 8, 16), 16
-
-
-def run() -> list[Row]:
-    """A ring in a channel."""
-    return [row(processes, CELLS) for processes in PROCESSES]
 
 
 def row(processes: int, cells: int) -> Row:
-    """The smallest and largest of all processes; work: largest of uncut + 3 cut cells over the mean."""
+    """A ring in a channel: the smallest and largest of all processes.
+
+    work: largest of uncut + 3 cut cells over the mean.
+    """
     command = ["mpirun", "-n", str(processes), sys.executable, "-m", "mpi4py", "-m", __name__, str(cells)]
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
@@ -62,7 +57,7 @@ def measure(comm: MPI.Comm, cells: int) -> dict:
     return {
         "unknowns": flow.dofs(),
         "newton": newton,
-        "krylov": flow.linear_iterations,
+        "krylov": flow.iterate.linear_iterations,
         "by process": {name: [counts[name] for counts in by_process] for name in by_process[0]},
     }
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from functools import wraps
-from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
@@ -18,17 +17,19 @@ from coupling import monolithic
 from coupling.blocks import Blocks
 from coupling.monolithic import Monolithic
 from fsci.bench import fluid
+from fsci.bench.family import CASES
 from fsci.bench.table import Row
 from fsci.builder.build import build
 from fsci.case.load import load_case
-from solvers import fem, linear, unlocked
-from solvers.fluid import kept_tangent
-from solvers.fluid.cutting.cut import Cutter
-from solvers.fluid.cutting.weights import Weights
-from solvers.fluid.field import Fluid
-from solvers.fluid.interface import InterfaceTerms
-from solvers.fluid.linear_systems.multigrid import Multigrid
-from solvers.fluid.system import FlowSystem
+from solvers import fem
+from solvers.algebra import linear, unlocked
+from solvers.fluid.cut.cut import Cutter
+from solvers.fluid.cut.weights import Weights
+from solvers.fluid.flow.field import Fluid
+from solvers.fluid.solve import kept_tangent
+from solvers.fluid.solve.linear_systems.multigrid import Multigrid
+from solvers.fluid.solve.system import FlowSystem
+from solvers.fluid.terms.interface import InterfaceTerms
 from solvers.timing import Timer
 
 #: Part -> functions that belong to it; what one calls that belongs to another part counts there alone.
@@ -53,9 +54,6 @@ PARTS: dict[str, list[tuple[Any, str]]] = {
     ],
     "set-up": [(Multigrid, "preconditioner"), (Monolithic, "_krylov_solver")],
 }
-
-#: What `cases` are run for, with these steps.
-CASES = {"torus_wall": 6, "fsi3": 10}
 
 
 @dataclass
@@ -121,13 +119,8 @@ def measured() -> Iterator[Parts]:
         yield parts
 
 
-def run() -> list[Row]:
-    """A ring in a channel, and cases of the repository."""
-    rows = [channel(cells, 2) for cells in (30, 48)]
-    return [row for pair in [*rows, *(case(name, steps) for name, steps in CASES.items())] for row in pair]
-
-
 def channel(cells: int, steps: int) -> list[Row]:
+    """A ring in a channel."""
     flow = fluid.ring_in_channel(cells, Timer())
     flow.initialise(0.0, 0.05)
 
@@ -139,7 +132,7 @@ def channel(cells: int, steps: int) -> list[Row]:
 
 def case(name: str, steps: int) -> list[Row]:
     """The first steps of a case, without output."""
-    given = load_case(Path("cases") / name)
+    given = load_case(CASES / name)
     simulation = build(given, MPI.COMM_SELF, Timer())
     start, dt = given.time.start, given.time.step
     simulation.initialise(start, dt)

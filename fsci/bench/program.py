@@ -12,6 +12,10 @@ from resource import RUSAGE_CHILDREN, getrusage
 from typing import Any
 
 
+class RunFailed(RuntimeError):
+    """A run that did not come to its end."""
+
+
 def run_case(case: Path, out: Path, settings: Mapping[str, Any]) -> dict[str, Any]:
     """summary.json of a run with some settings replaced (dotted names), without `verify`."""
     return run_timed(case, out, {"verify": [], **settings})[0]
@@ -20,7 +24,7 @@ def run_case(case: Path, out: Path, settings: Mapping[str, Any]) -> dict[str, An
 def run_timed(case: Path, out: Path, settings: Mapping[str, Any]) -> tuple[dict[str, Any], float]:
     """(summary.json, seconds of the processor) of a run that may miss its reference values.
 
-    Raises RuntimeError if it does not come to its end.
+    Raises RunFailed if it does not come to its end.
     """
     arguments = [f"--set={name}={json.dumps(value)}" for name, value in settings.items()]
     command = [sys.executable, "-m", "fsci", "run", str(case), "-o", str(out), "--force", *arguments]
@@ -30,7 +34,7 @@ def run_timed(case: Path, out: Path, settings: Mapping[str, Any]) -> tuple[dict[
     seconds = _seconds() - begin
     summary = json.loads((out / "summary.json").read_text()) if (out / "summary.json").exists() else {}
     if done.returncode not in (0, 1) or summary.get("status") != "finished":
-        raise RuntimeError(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
+        raise RunFailed(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
     return summary, seconds
 
 

@@ -7,9 +7,18 @@ from time import perf_counter
 
 import numpy as np
 
+from fsci.bench.table import Row
 from solvers.api import Array
 from solvers.kernels import KdopTree3
-from solvers.search import Facets
+from solvers.mesh.search import Facets
+
+
+def measure(facets: int) -> Row:
+    """Microseconds per facet to build, refit and query the trees and to compare the boxes of the surfaces."""
+    found = measure_search(facets)
+    count = int(found["facets"])
+    times = {f"{part} [us]": 1e6 * found[part] / count for part in ("build", "refit", "query", "box")}
+    return {"facets": count, **times, "pairs": int(found["pairs"]), "tests": int(found["tests"])}
 
 
 def measure_search(facets: int) -> dict[str, float]:

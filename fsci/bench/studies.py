@@ -10,47 +10,41 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fsci import shapes
-from fsci.bench.family import ERROR, TIME, UNKNOWNS
+from fsci.bench.bands import ELEMENTS, level
 from fsci.bench.fluid import graded, polygon, zero
-from fsci.bench.table import Row
+from fsci.bench.table import ERROR, LEVEL, TIME, UNKNOWNS, Row
 from solvers.api import Array
-from solvers.fluid.background.grid import Grid, uniform
-from solvers.fluid.bodies.immersed import rigid_body
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.field import Fluid
-from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.probes import interpolation
+from solvers.fluid.flow.field import Fluid
+from solvers.fluid.flow.probes import interpolation
+from solvers.fluid.grid.box import Grid, uniform
+from solvers.fluid.settings.flow_settings import FlowSettings
+from solvers.fluid.surfaces.immersed import rigid_body
+from solvers.fluid.terms.boundary.patches import Patch
+from solvers.mesh.tessellation import tessellate
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
-from solvers.tessellation import tessellate
 
-#: Gap between cylinder and wall, in radii
-GAP = 0.02
-FILM_CELLS = (0.2, 0.1, 0.05, 0.02, 0.01)
-
-#: The same of the sphere, and (element, cell) of its runs
-SPHERE_GAP = 0.1
-SPHERE_RUNS = (*(("q1q1", h) for h in (0.4, 0.2, 0.1)), *(("q2q1", h) for h in (0.4, 0.2)))
+GAP, SPHERE_GAP = 0.02, 0.1  #: between cylinder, sphere and wall, in radii
 
 
-def film() -> list[Row]:
-    """Half a cylinder of radius 1 moves towards a wall: cells of 10 to 0.5 gaps, of the film and below the cylinder."""
-    rows: list[Row] = []
-    for element in ("q1q1", "q2q1"):
-        for h in FILM_CELLS:
-            begin = process_time()
-            fluid = approaching(element, h, GAP)
-            error = error_of_drag(fluid, GAP)
-            found = {UNKNOWNS: fluid.dofs(), TIME: process_time() - begin, ERROR: error}
-            rows.append({"option": element, "resolution": f"gap of {GAP / h:g} cells", **found})
-    return rows
+def film(element: str, h: float) -> Row:
+    """Half a cylinder of radius 1 moves towards a wall: cells h of the film and below the cylinder."""
+    begin = process_time()
+    return _of_drag(fluid := approaching(element, h, GAP), drag_of_film(fluid, GAP), h, process_time() - begin)
 
 
-def error_of_drag(fluid: Fluid, gap: float) -> float:
-    """Of `approaching` [%]."""
+def _of_drag(fluid: Fluid, drag: float, h: float, seconds: float) -> Row:
+    """The row of a drag over the exact one, with cells h."""
+    error = 100.0 * abs(drag - 1.0)
+    methods = {"element": ELEMENTS.index(fluid.settings.element)}
+    return {UNKNOWNS: fluid.dofs(), TIME: seconds, ERROR: error, LEVEL: level({"drag": drag}, {"cells": h}, methods)}
+
+
+def drag_of_film(fluid: Fluid, gap: float) -> float:
+    """That of `approaching` over the exact one."""
     alpha = np.arccosh(1.0 + gap)
     exact = 4.0 * np.pi / (alpha - np.tanh(alpha))  # Jeffrey and Onishi (1981)
-    return float(100.0 * abs(2.0 * fluid.force()["cylinder"].sum(axis=0)[1] / exact - 1.0))
+    return float(2.0 * fluid.force()["cylinder"].sum(axis=0)[1] / exact)
 
 
 def approaching(element: str, h: float, gap: float) -> Fluid:
@@ -62,20 +56,15 @@ def approaching(element: str, h: float, gap: float) -> Fluid:
     return _falling("cylinder", points, np.stack([count, np.roll(count, -1)], axis=1), (x, y), element)
 
 
-def sphere() -> list[Row]:
-    """A quarter of a sphere of radius 1 moves towards a wall: cells of 4 gaps to one."""
-    exact = 6.0 * np.pi * brenner(SPHERE_GAP)
-    rows: list[Row] = []
-    for element, h in SPHERE_RUNS:
-        begin = process_time()
-        x = graded(0.0, 8.0, (0.0, 1.2), h, 1.3, 2.0)
-        facets, nodes = tessellate(mesh := shapes.sphere(1.0, [32, 1]))
-        points = mesh.points[nodes] + [0.0, 0.0, 1.0 + SPHERE_GAP]
-        fluid = _falling("sphere", points, facets, (x, x, x), element)
-        force = 4.0 * fluid.force()["sphere"].sum(axis=0)[2]
-        found = {UNKNOWNS: fluid.dofs(), TIME: process_time() - begin, ERROR: 100.0 * abs(force / exact - 1.0)}
-        rows.append({"option": element, "resolution": f"gap of {SPHERE_GAP / h:g} cells", **found})
-    return rows
+def sphere(element: str, h: float) -> Row:
+    """A quarter of a sphere of radius 1 moves towards a wall."""
+    begin = process_time()
+    x = graded(0.0, 8.0, (0.0, 1.2), h, 1.3, 2.0)
+    facets, nodes = tessellate(mesh := shapes.sphere(1.0, [32, 1]))
+    points = mesh.points[nodes] + [0.0, 0.0, 1.0 + SPHERE_GAP]
+    fluid = _falling("sphere", points, facets, (x, x, x), element)
+    force, exact = 4.0 * fluid.force()["sphere"].sum(axis=0)[2], 6.0 * np.pi * brenner(SPHERE_GAP)
+    return _of_drag(fluid, float(force / exact), h, process_time() - begin)
 
 
 def brenner(gap: float) -> float:
@@ -134,18 +123,11 @@ def _component(i: int) -> Callable[[Array, float], Array]:
 VELOCITY = tuple(_component(i) for i in range(3))
 
 
-def beltrami() -> list[Row]:
-    """A decaying flow whose velocity is given on the box and on a sphere in it; the step is 0.4 of a cell."""
-    rows: list[Row] = []
-    for element, scheme in (("q1q1", "backward_euler"), ("q1q1", "bdf2"), ("q2q1", "backward_euler"), ("q2q1", "bdf2")):
-        for cells in (4, 8) if element == "q2q1" else (8, 12, 16):
-            found = decay(element, scheme, cells)
-            rows.append({"option": f"{element}, {scheme}", "resolution": f"{cells}^3, {cells // 2} steps", **found})
-    return rows
-
-
 def decay(element: str, scheme: str, cells: int) -> Row:
-    """One run of it: unknowns, seconds of the processor, error of the velocity over its size."""
+    """A decaying flow whose velocity is given on the box and on a sphere in it: error of the velocity over its size.
+
+    The step is 0.4 of a cell.
+    """
     begin, steps = process_time(), cells // 2
     facets, nodes = tessellate(mesh := shapes.sphere(0.453, [16, 1]))
     points = mesh.points[nodes] + [0.03, -0.04, 0.01]

@@ -12,12 +12,12 @@ from fsci.builder.overlap import PlacedSide
 from fsci.case import Case
 from fsci.meshes.valid import BadMesh, require_positive
 from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
 from solvers.contact.overlap_at_start import SolidSide
 from solvers.counted import counted
-from solvers.distance import nearest_points
-from solvers.mesh import Mesh
-from solvers.penetration import inside
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.distance import nearest_points
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.penetration import inside
 
 #: How far from a node, in sizes of a facet, the point lies that is looked for in the master's body.
 ASIDE = 1e-6

@@ -3,12 +3,13 @@
 Candidates are the named surfaces of the bodies that no support holds across. Two of them are a pair if they face each
 other (see `facing`), at any distance: a pair that is far apart costs no more than the bounds of its motion. The softer
 body is the slave; of two that are equally stiff the one with the smaller facets; then the first one in the case.
-Obstacles and rigid bodies of the flow are masters. Bodies that a pair of the case names are left to such pairs.
+Obstacles, rigid bodies and closed faces of the flow's box are masters. Bodies that a pair of the case names are
+left to such pairs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -16,14 +17,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fsci.builder.box_obstacles import with_faces
 from fsci.builder.facing import Face, face, faces, meeting
 from fsci.builder.on_first import shared
 from fsci.case import Case
-from fsci.case.contact import PairSection, Side
+from fsci.case.contact import Friction, ObstacleSection, PairSection, Side
 from fsci.case.material import Material
 from fsci.case.supports import SupportSection
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 from solvers.structure.elastic_constants import young
 from solvers.values import combine, evaluate
 
@@ -32,8 +34,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Difference of two stiffnesses or sizes that is none.
-EQUAL = 1e-6
+#: Relative difference of two stiffnesses or sizes that is none: above the rounding of meshes that are moved, below what
+#: a user would set. From 1e-12 to 1e-3 the slaves are the same in cases.
+EQUAL_SIZES = 1e-6
 
 
 @dataclass(frozen=True)
@@ -54,32 +57,49 @@ class Candidate:
 
 
 def with_pairs(case: Case, comm: MPI.Comm | None = None) -> Case:
-    """The case with all its pairs named; comm: processes that read it together. Raises CaseError (collective)."""
+    """The case with all its pairs named, with their friction; comm: processes that read it together.
+
+    Raises CaseError (collective).
+    """
     assert case.contact is not None
-    if case.contact.bodies is None:
-        return case
+    if case.contact.bodies is None or not case.elastic_bodies:  # rigid bodies touch each other without pairs
+        contact = case.contact.model_copy(update={"pairs": case.contact.complete_pairs, "bodies": None})
+        return case.model_copy(update={"contact": contact})
     chosen = list(case.elastic_bodies) if case.contact.bodies == "all" else list(case.contact.bodies)
 
-    def find() -> dict[str, PairSection]:
-        return find_pairs(case, {name: read_body(case, name) for name in chosen})
+    def find() -> tuple[dict[str, PairSection], dict[str, ObstacleSection]]:
+        meshes = {name: read_body(case, name) for name in chosen}
+        walled = with_faces(case, meshes)
+        assert walled.contact is not None
+        assert case.contact is not None
+        pairs, own = find_pairs(walled, meshes), case.contact
+        touched = {side.obstacle for pair in pairs.values() for _, side in pair.sides}
+        new = {name: one for name, one in walled.contact.obstacles.items() if name in touched - own.obstacles.keys()}
+        return {name: pair for name, pair in pairs.items() if name not in own.pairs}, new
 
-    pairs = find() if comm is None else shared(comm, find)
+    # what the case names stays where it is: its formulas cannot be sent
+    found, faces = find() if comm is None else shared(comm, find)
+    pairs, obstacles = case.contact.complete_pairs | found, case.contact.obstacles | faces
     if not pairs:
         raise case.error(("contact", "bodies"), "no named surfaces of these bodies can meet: name the pairs")
-    return case.model_copy(update={"contact": case.contact.model_copy(update={"pairs": pairs, "bodies": None})})
+    return case.model_copy(
+        update={"contact": case.contact.model_copy(update={"pairs": pairs, "obstacles": obstacles, "bodies": None})}
+    )
 
 
 def find_pairs(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, PairSection]:
     """Pairs by name: those that the case names, then those of the bodies with these meshes, and of rigid ones."""
     assert case.contact is not None
-    found = dict(case.contact.pairs)
+    found = case.contact.complete_pairs
     named = [{_owner(side) for _, side in pair.sides} for pair in found.values()]
+    tied = [pair.sides[0][1] for pair in found.values() if pair.tied]
     for first, second in combinations(candidates(case, meshes), 2):
         if first.rigid or not first.faces or not second.faces or {first.name, second.name} in named:
             continue
         for pair in meeting(first.faces, second.faces, case.contact.reach):
-            name, settings = _pair(case, (first, second), pair)
-            found[name] = settings
+            name, settings = _pair(case, (first, second), pair, tied)
+            if settings.slave not in tied:
+                found[name] = settings
     return found
 
 
@@ -87,29 +107,38 @@ def candidates(case: Case, meshes: Mapping[str, Mesh]) -> list[Candidate]:
     """Bodies with these meshes, obstacles and rigid bodies, in this order."""
     found = [_body(case, name, mesh) for name, mesh in meshes.items()]
     found += [_obstacle(case, name) for name in ({} if case.contact is None else case.contact.obstacles)]
-    return found + [_rigid_body(case, name) for name in ({} if case.fluid is None else case.fluid.bodies)]
+    return found + [_rigid_body(case, name) for name, one in case.rigid_surfaces.items() if one.keys[0] != "contact"]
 
 
-def _pair(case: Case, bodies: tuple[Candidate, Candidate], pair: tuple[Face, Face]) -> tuple[str, PairSection]:
+def _pair(
+    case: Case, bodies: tuple[Candidate, Candidate], pair: tuple[Face, Face], tied: Sequence[Side]
+) -> tuple[str, PairSection]:
+    """tied: slaves of ties; their multipliers cannot be those of contact, so that the other surface is the slave."""
     assert case.contact is not None
     sides = list(zip(bodies, pair, strict=True))
     if not _is_slave(sides[0], sides[1]):
         sides.reverse()
+    found = [_side(*side) for side in sides]
+    if found[0] in tied and found[1] not in tied and not sides[1][0].rigid:
+        sides.reverse()
+        found.reverse()
     words = []
-    found = []
     for body, surface in sides:
         words += [*body.side.values(), *([] if body.rigid else [surface.name])]
-        found.append(Side(**body.side, on=None if body.rigid else (surface.name,)))
     name = "_".join("".join(c if c.isalnum() or c in "_-" else "_" for c in word) for word in words)
-    return name, PairSection(slave=found[0], master=found[1], friction=case.contact.friction)
+    return name, PairSection(slave=found[0], master=found[1], friction=case.contact.friction or Friction())
+
+
+def _side(body: Candidate, surface: Face) -> Side:
+    return Side(**body.side, on=None if body.rigid else (surface.name,))
 
 
 def _is_slave(first: tuple[Candidate, Face], second: tuple[Candidate, Face]) -> bool:
     """The first one against the second: softer, then finer."""
     stiffness = first[0].stiffness, second[0].stiffness
-    if second[0].rigid or not np.isclose(*stiffness, rtol=EQUAL, atol=0.0):
+    if second[0].rigid or not np.isclose(*stiffness, rtol=EQUAL_SIZES, atol=0.0):
         return stiffness[0] < stiffness[1]
-    return first[1].size <= second[1].size * (1.0 + EQUAL)
+    return first[1].size <= second[1].size * (1.0 + EQUAL_SIZES)
 
 
 def _owner(side: Side) -> str:
@@ -119,9 +148,8 @@ def _owner(side: Side) -> str:
 def _body(case: Case, name: str, mesh: Mesh) -> Candidate:
     settings = case.elastic_bodies[name]
     held = [support for support in settings.supports if support.on is not None]
-    free = [face for face in faces(mesh) if not any(_holds(support, face) for support in held)]
-    middles = mesh.points[mesh.cells].mean(axis=1).T
-    return Candidate({"body": name}, free, _youngs_modulus(settings.material, middles))
+    free = [face for face in faces(mesh) if not any(holds(support, face) for support in held)]
+    return Candidate({"body": name}, free, mean_stiffness(settings.material, mesh))
 
 
 def _obstacle(case: Case, name: str) -> Candidate:
@@ -132,12 +160,11 @@ def _obstacle(case: Case, name: str) -> Candidate:
 
 
 def _rigid_body(case: Case, name: str) -> Candidate:
-    assert case.fluid is not None
-    found = [face(read_rigid_body(case, name)[0], case.fluid.bodies[name].on)]
+    found = [face(read_rigid_body(case, name)[0], case.rigid_surfaces[name].on)]
     return Candidate({"obstacle": name}, found, np.inf)
 
 
-def _holds(support: SupportSection, face: Face) -> bool:
+def holds(support: SupportSection, face: Face) -> bool:
     """Whether a support prescribes the displacement normal to a surface."""
     if face.name not in (support.on or ()):
         return False
@@ -153,6 +180,7 @@ def _holds(support: SupportSection, face: Face) -> bool:
     return bool(share.min() > 0.5)
 
 
-def _youngs_modulus(material: Material, points: Array) -> float:
-    """The mean of Young's modulus [Pa] at these points, shape (dim, n), for small strains."""
-    return float(np.mean(evaluate(combine(young, *material.lame), points, 0.0)))
+def mean_stiffness(material: Material, mesh: Mesh) -> float:
+    """The mean of Young's modulus [Pa] in the middles of all cells, for small strains."""
+    middles = mesh.points[mesh.cells].mean(axis=1).T
+    return float(np.mean(evaluate(combine(young, *material.lame), middles, 0.0)))

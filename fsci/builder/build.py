@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
-from fsci.builder.columns import Numbers
+from fsci.builder.columns import Numbers, build_probes, joined
 from fsci.case import Case
 from solvers.api import Scheme, Sentinel, Snapshot
 from solvers.timing import Timer
@@ -20,7 +20,8 @@ from solvers.timing import Timer
 if TYPE_CHECKING:
     from solvers.contact.contact import Contact
     from solvers.contact.results import PartFields
-    from solvers.fluid.resolution.cells import BodyCells
+    from solvers.fluid.flow.resolution.cells import BodyCells
+    from solvers.rigid.field import RigidBodies
     from solvers.structure.body import Body
     from solvers.structure.field import Structure
 
@@ -54,14 +55,16 @@ def build(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
         on_first(comm, partial(require_outlet, case))
     if case.coupling is not None:
-        return _coupled_rigid(case, comm, timer) if case.rigid else _coupled(case, comm, timer)
+        return _coupled(case, comm, timer) if case.structure is not None else _coupled_rigid(case, comm, timer)
     if case.fluid is not None:
         return _fluid_alone(case, comm, timer)
-    return _structure_alone(case, comm, timer)
+    if case.rigid and case.structure is not None:
+        return _structure_and_rigid(case, comm, timer)
+    return _rigid_alone(case, comm, timer) if case.rigid else _structure_alone(case, comm, timer)
 
 
 def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
-    from fsci.builder.structure import build_bodies, build_probes, build_structure
+    from fsci.builder.structure import STRUCTURE_PROBES, build_bodies, build_structure
     from solvers.structure.snapshot import snapshots
 
     bodies = build_bodies(case, comm)
@@ -70,13 +73,64 @@ def _structure_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     return Simulation(
         scheme=structure,
         initialise=structure.initialise,
-        snapshots=lambda: snapshots(structure, _contact_fields(contact)),
-        probes=build_probes(case, structure),
+        snapshots=lambda: snapshots(structure, _contact_fields(structure)),
+        probes=build_probes(case, "structure", STRUCTURE_PROBES, structure),
         balances=lambda: {"structure.energy": structure.energy.error},
         dofs={"structure": structure.dofs()},
         notes=_notes(bodies),
         sentinels={
             **_of_bodies(case, comm, structure, contact),
+            "energy": structure.energy_sentinel,
+        },
+        take_materials=structure.take_materials,
+        imbalance=partial(_imbalance, structure),
+    )
+
+
+def _rigid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
+    from fsci.builder.rigid import RIGID_PROBES, build_free_bodies
+    from fsci.builder.sentinels import build_sentinels
+    from solvers.rigid.snapshot import snapshots
+
+    bodies = build_free_bodies(case, comm, timer)
+    return Simulation(
+        scheme=bodies,
+        initialise=bodies.initialise,
+        snapshots=lambda: snapshots(bodies),
+        probes=build_probes(case, "rigid", RIGID_PROBES, bodies),
+        balances=dict,
+        dofs={"rigid": bodies.unknowns},
+        sentinels=build_sentinels(case, comm, rigid=bodies),
+    )
+
+
+def _structure_and_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
+    from coupling.composite import Composite
+    from coupling.elastic import Elastic
+    from fsci.builder.rigid import RIGID_PROBES, build_free_bodies
+    from fsci.builder.sentinels import build_sentinels
+    from fsci.builder.structure import STRUCTURE_PROBES, build_bodies, build_structure
+    from solvers.rigid.snapshot import snapshots as of_rigid
+    from solvers.structure.snapshot import snapshots as of_structure
+
+    rigid, bodies = build_free_bodies(case, comm, timer), build_bodies(case, comm)
+    contact = _contact(case, comm, bodies, rigid)
+    structure = build_structure(case, comm, bodies, contact, timer)
+    scheme = Composite(Elastic(structure, ()), rigid)
+    probes = [
+        build_probes(case, "structure", STRUCTURE_PROBES, structure),
+        build_probes(case, "rigid", RIGID_PROBES, rigid),
+    ]
+    return Simulation(
+        scheme=scheme,
+        initialise=scheme.initialise,
+        snapshots=lambda: of_structure(structure, _contact_fields(structure)) + of_rigid(rigid),
+        probes=joined(probes),
+        balances=lambda: {"structure.energy": structure.energy.error},
+        dofs={"structure": structure.dofs(), "rigid": rigid.unknowns},
+        notes=_notes(bodies),
+        sentinels={
+            **build_sentinels(case, comm, structure=structure, contact=contact, rigid=rigid),
             "energy": structure.energy_sentinel,
         },
         take_materials=structure.take_materials,
@@ -93,20 +147,31 @@ def _of_bodies(case: Case, comm: MPI.Comm, structure: Structure, contact: Contac
     return build_sentinels(case, comm, structure=structure, contact=contact)
 
 
-def _contact(case: Case, comm: MPI.Comm, bodies: list[Body]) -> Contact | None:
-    if case.contact is None:
+def _contact(case: Case, comm: MPI.Comm, bodies: list[Body], rigid: RigidBodies | None = None) -> Contact | None:
+    if case.contact is None or not case.contact.pairs:  # rigid bodies alone may touch
         return None
     from fsci.builder.contact import build_contact
 
-    return build_contact(case, comm, bodies)
+    return build_contact(case, comm, bodies, rigid)
 
 
-def _contact_fields(contact: Contact | None) -> PartFields | None:
-    if contact is None:
+def _contact_fields(structure: Structure) -> PartFields | None:
+    if structure.constraint is None:
         return None
+    from solvers.contact.contact import Contact
     from solvers.contact.results import surface_fields
 
-    return surface_fields(contact)
+    assert isinstance(structure.constraint, Contact)
+    return surface_fields(structure.constraint)
+
+
+def _imbalance(structure: Structure) -> Numbers:
+    if structure.constraint is None:
+        return {}
+    from solvers.contact.contact import Contact
+
+    assert isinstance(structure.constraint, Contact)
+    return structure.constraint.imbalance
 
 
 def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
@@ -116,40 +181,59 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder.dry_side import outlines
     from fsci.builder.sentinels import build_sentinels
     from fsci.builder.watch_flow import WatchedFlow
-    from solvers.fluid.resolution.measure import measure
-    from solvers.fluid.snapshot import snapshots as of_fluid
+    from solvers.fluid.flow.probes import Forces
+    from solvers.fluid.flow.resolution.measure import measure
+    from solvers.fluid.flow.snapshot import snapshots as of_fluid
     from solvers.structure.snapshot import snapshots as of_structure
 
+    rigid = _free_bodies(case, comm, timer)
+
     bodies = build_structure.build_bodies(case, comm)
-    contact = _contact(case, comm, bodies)
+    contact = _contact(case, comm, bodies, rigid)
     structure = build_structure.build_structure(case, comm, bodies, contact, timer)
-    scheme, fluid = build_coupled(case, comm, bodies, structure, timer)
+    scheme, fluid = build_coupled(case, comm, bodies, structure, timer, rigid)
     coupled = scheme.coupled
     watched = WatchedFlow(fluid)
-    probes = [build_structure.build_probes(case, structure), build_fluid.build_probes(case, fluid)]
+    probes = [
+        build_probes(case, "structure", build_structure.STRUCTURE_PROBES, structure),
+        build_probes(case, "fluid", build_fluid.FLUID_PROBES, Forces(fluid)),
+    ]
+    if rigid is not None:
+        from fsci.builder.rigid import RIGID_PROBES
+
+        probes.append(build_probes(case, "rigid", RIGID_PROBES, rigid))
 
     def snapshots() -> list[Snapshot]:
         dry = outlines(fluid, coupled.interface.dry_sides)
-        return of_structure(structure, _contact_fields(contact)) + of_fluid(fluid) + dry
+        return of_structure(structure, _contact_fields(structure)) + of_fluid(fluid) + dry
 
     return Simulation(
         scheme=scheme,
         initialise=partial(start, case, scheme, fluid),
         snapshots=snapshots,
-        probes=lambda: {column: value for measure in probes for column, value in measure().items()},
+        probes=joined(probes),
         balances=lambda: {"structure.energy": structure.energy.error, **watched.numbers(), **coupled.balance.numbers()},
-        dofs={"fluid": fluid.dofs(), "structure": structure.dofs()},
+        dofs={"fluid": fluid.dofs(), "structure": structure.dofs()}
+        | ({} if rigid is None else {"rigid": rigid.unknowns}),
         notes=_notes(bodies),
         sentinels={
-            **build_sentinels(case, comm, structure=structure, contact=contact, given=fluid.bodies),
+            **build_sentinels(case, comm, structure=structure, contact=contact, rigid=rigid, given=fluid.bodies),
             **watched.sentinels,
             "energy": structure.energy_sentinel,
             "interface": coupled.sentinel,
         },
         take_materials=structure.take_materials,
-        imbalance=lambda: {} if contact is None else contact.imbalance,
+        imbalance=partial(_imbalance, structure),
         resolution=partial(measure, fluid),
     )
+
+
+def _free_bodies(case: Case, comm: MPI.Comm, timer: Timer) -> RigidBodies | None:
+    if not case.rigid:
+        return None
+    from fsci.builder.rigid import build_free_bodies
+
+    return build_free_bodies(case, comm, timer)
 
 
 def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
@@ -158,18 +242,22 @@ def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder.coupling import build_coupled_rigid, start
     from fsci.builder.sentinels import build_sentinels
     from fsci.builder.watch_flow import WatchedFlow
-    from solvers.fluid.resolution.measure import measure
-    from solvers.fluid.snapshot import snapshots
+    from solvers.fluid.flow.probes import Forces
+    from solvers.fluid.flow.resolution.measure import measure
+    from solvers.fluid.flow.snapshot import snapshots
 
     bodies = build_rigid.build_free_bodies(case, comm, timer)
     scheme, fluid = build_coupled_rigid(case, comm, bodies, timer)
     watched = WatchedFlow(fluid)
-    probes = [build_rigid.build_probes(case, bodies), build_fluid.build_probes(case, fluid)]
+    probes = [
+        build_probes(case, "rigid", build_rigid.RIGID_PROBES, bodies),
+        build_probes(case, "fluid", build_fluid.FLUID_PROBES, Forces(fluid)),
+    ]
     return Simulation(
         scheme=scheme,
         initialise=partial(start, case, scheme, fluid),
         snapshots=lambda: snapshots(fluid),
-        probes=lambda: {column: value for measure in probes for column, value in measure().items()},
+        probes=joined(probes),
         balances=lambda: {**watched.numbers(), **scheme.coupled.balance.numbers()},
         dofs={"fluid": fluid.dofs(), "rigid": bodies.unknowns},
         sentinels={
@@ -182,10 +270,11 @@ def _coupled_rigid(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
 
 def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
-    from fsci.builder.fluid import build_fluid, build_probes, build_rigid_bodies
+    from fsci.builder.fluid import FLUID_PROBES, build_fluid, build_rigid_bodies
     from fsci.builder.watch_flow import WatchedFlow
-    from solvers.fluid.resolution.measure import measure
-    from solvers.fluid.snapshot import snapshots
+    from solvers.fluid.flow.probes import Forces
+    from solvers.fluid.flow.resolution.measure import measure
+    from solvers.fluid.flow.snapshot import snapshots
 
     fluid = build_fluid(case, comm, timer, build_rigid_bodies(case, comm))
     watched = WatchedFlow(fluid)
@@ -193,7 +282,7 @@ def _fluid_alone(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
         scheme=fluid,
         initialise=fluid.initialise,
         snapshots=lambda: snapshots(fluid),
-        probes=build_probes(case, fluid),
+        probes=build_probes(case, "fluid", FLUID_PROBES, Forces(fluid)),
         balances=watched.numbers,
         sentinels=watched.sentinels,
         dofs={"fluid": fluid.dofs()},

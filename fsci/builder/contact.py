@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
@@ -14,39 +16,52 @@ from fsci.builder.obstacle_motion import motion_of_obstacle
 from fsci.builder.overlap import facets_in_each_other
 from fsci.case import Case, CaseError
 from fsci.case.contact import PairSection
-from fsci.meshes.of_case import read_obstacle, read_rigid_body
+from fsci.meshes.of_case import read_rigid_side
 from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
 from solvers.contact import law as laws
 from solvers.contact.contact import Contact
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
-from solvers.mesh_topology import cut_out
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.topology import cut_out
 from solvers.structure.body import Body
 
+if TYPE_CHECKING:
+    from solvers.rigid.field import RigidBodies
 
-def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body]) -> Contact:
-    """All pairs of a case. Raises CaseError (collective)."""
+
+def build_contact(case: Case, comm: MPI.Comm, bodies: Sequence[Body], rigid: RigidBodies | None = None) -> Contact:
+    """All pairs of a case; rigid: free bodies. Raises CaseError (collective)."""
+    assert case.contact is not None
+    return contact_of(case, comm, list(case.contact.pairs), _pairs(case, comm, bodies, rigid))
+
+
+def contact_of(case: Case, comm: MPI.Comm, names: Sequence[str], pairs: Sequence[Pair]) -> Contact:
+    """Contact of pairs with the settings of a case."""
+    assert case.structure is not None
+    moves, c_n = case.structure.dynamics is not None, 1.0 if case.contact is None else case.contact.c_n
+    return Contact(pairs, names=names, c_n=c_n, keep_overlap=moves, comm=comm)
+
+
+def _pairs(case: Case, comm: MPI.Comm, bodies: Sequence[Body], rigid: RigidBodies | None) -> list[Pair]:
     assert case.contact is not None
     found: dict[tuple[str, ...], Surface] = {}
     pairs = []
+    in_flow = case.coupling is not None
     meshes = {body.name: body.domain.source for body in bodies}
     for settings in case.contact.pairs.values():
         sides = []
         for _, side in settings.sides:
             key = (side.body or "", *(side.on or ()), side.obstacle or "")
             if key not in found and side.obstacle is not None:
-                found[key] = _obstacle(case, comm, side.obstacle)
+                found[key] = _obstacle(case, comm, side.obstacle, rigid)
             elif key not in found:
                 found[key] = contact_surface(bodies, side.body or "", *(side.on or ()))
             sides.append(found[key])
         law = named(laws, settings.law)(*settings.law_parameters)
         deep = facets_in_each_other(case, comm, settings, meshes)
-        pairs.append(Pair(sides[0], sides[1], settings.integration, law, deep, _interference(settings)))
-    assert case.structure is not None
-    moves = case.structure.dynamics is not None
-    names = tuple(case.contact.pairs)
-    return Contact(pairs, names=names, c_n=case.contact.c_n, keep_overlap=moves, comm=comm)
+        pairs.append(Pair(sides[0], sides[1], settings.integration, law, deep, _interference(settings), always=in_flow))
+    return pairs
 
 
 def _interference(pair: PairSection) -> Callable[[float], float] | None:
@@ -55,8 +70,8 @@ def _interference(pair: PairSection) -> Callable[[float], float] | None:
     return None if formula is None else lambda t: float(formula(np.zeros((3, 1)), t)[0])
 
 
-def _obstacle(case: Case, comm: MPI.Comm, name: str) -> Surface:
-    """The rigid surface of an obstacle or of a rigid body in the flow, whole on every process."""
+def _obstacle(case: Case, comm: MPI.Comm, name: str, rigid: RigidBodies | None) -> Surface:
+    """The rigid surface of an obstacle or of a rigid body, whole on every process."""
     assert case.contact is not None
     found, error = None, None
     if comm.rank == 0:
@@ -68,17 +83,14 @@ def _obstacle(case: Case, comm: MPI.Comm, name: str) -> Surface:
     if error is not None:
         raise error
     points, facets, facet_type = comm.bcast(found, root=0)
+    if rigid is not None and name in rigid.surfaces:
+        index = list(rigid.surfaces).index(name)
+        return Surface(name, points, facets, facet_type, None, motion=partial(rigid.points_of, index, points))
     return Surface(name, points, facets, facet_type, None, motion=motion_of_obstacle(case, name, points))
 
 
 def _rigid_mesh(case: Case, name: str) -> tuple[Array, NDArray[np.int64], str]:
     """(points [m], facets, facet type) of a rigid surface."""
-    assert case.contact is not None
-    if name in case.contact.obstacles:
-        mesh = read_obstacle(case, name)
-        points, facets, _ = cut_out(mesh, case.contact.obstacles[name].on)
-    else:
-        assert case.fluid is not None
-        mesh = read_rigid_body(case, name)[0]
-        points, facets, _ = cut_out(mesh, case.fluid.bodies[name].on)
+    mesh, on = read_rigid_side(case, name)
+    points, facets, _ = cut_out(mesh, on)
     return points, facets, CELL_TYPES[mesh.cell_type].facet

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Snapshot
-from solvers.fluid.bodies.inside import winding
-from solvers.fluid.bodies.surface import Motion
+from solvers.fluid.surfaces.inside import winding
+from solvers.fluid.surfaces.surface import Motion
 
 if TYPE_CHECKING:
     from coupling.interface import DrySide
-    from solvers.fluid.field import Fluid
+    from solvers.fluid.flow.field import Fluid
 
 Array = NDArray[np.float64]
 Facets = NDArray[np.int64]
@@ -95,7 +95,7 @@ def outlines(fluid: Fluid, dry_sides: Sequence[DrySide]) -> list[Snapshot]:
     for side in dry_sides:
         if len(edges) == 3:
             continue
-        wet = fluid.cut.motion.x[fluid.surfaces.vertices_of([side.behind])]
+        wet = fluid.cut.motion.x[fluid.moving.surfaces.vertices_of([side.behind])]
         closing = Closing(side.ends, np.clip(side.corners, low, high), side.facets)
         points, lines = closing.together(wet, surfaces[side.behind].facets)
         found.append(Snapshot(side.name, np.pad(points, ((0, 0), (0, 1))), lines, "line", {}))

@@ -8,21 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.mesh import Mesh
-from solvers.mesh_topology import surface_facets
-from solvers.tessellation import area_vectors, is_closed, tessellate
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.tessellation import area_vectors, is_closed, tessellate
+from solvers.mesh.topology import surface_facets
 
 Array = NDArray[np.float64]
 
 #: How far facets may lie behind each other and still see each other, as a share of their size: surfaces that touch, of
 #: meshes that do not match, cross a little.
-CROSSING = 0.05
+CROSSING_FACETS = 0.05
 
-#: Product of the normals of facets that face each other: less than this.
-OPPOSED = -0.2
+#: Product of the normals of facets that face each other: less than this. From -0.05 to -0.5 results are the same.
+FACING_NORMALS = -0.2
 
 #: Facets of one surface that are looked at together.
-CHUNK = 256
+FACING_AT_ONCE = 256
 
 
 @dataclass(frozen=True)
@@ -79,11 +79,11 @@ def meeting(first: Sequence[Face], second: Sequence[Face], reach: float | None =
 
 def face_each_other(a: Face, b: Face, reach: float | None = None) -> bool:
     """Some of their facets face each other, each in front of the other, at most so far [m] apart (None: at will)."""
-    behind = CROSSING * min(a.size, b.size)
-    for start in range(0, len(a.middles), CHUNK):
-        part = slice(start, start + CHUNK)
+    behind = CROSSING_FACETS * min(a.size, b.size)
+    for start in range(0, len(a.middles), FACING_AT_ONCE):
+        part = slice(start, start + FACING_AT_ONCE)
         away = b.middles[None] - a.middles[part, None]
-        found = a.normals[part] @ b.normals.T < OPPOSED
+        found = a.normals[part] @ b.normals.T < FACING_NORMALS
         if reach is not None:
             found &= np.linalg.norm(away, axis=2) <= reach
         found &= np.einsum("ijd,id->ij", away, a.normals[part]) > -behind

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fsci.builder.columns import Numbers, columns
+from fsci.builder.columns import Table
 from fsci.builder.on_first import shared
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
@@ -19,14 +19,14 @@ from fsci.case.probes import Reference
 from fsci.case.rigid_motion import finite, rigid_motion
 from fsci.meshes.nested import following, read_grid
 from fsci.meshes.of_case import read_rigid_body, require_inside_period
-from solvers.fluid import probes
-from solvers.fluid.background.grid import Grid
-from solvers.fluid.bodies.immersed import ImmersedBody, rigid_body
-from solvers.fluid.bodies.inside import PointInBody
-from solvers.fluid.boundary.patches import Patch, UncoveredFaces
-from solvers.fluid.extreme_pressure import extreme_pressure
-from solvers.fluid.field import Fluid
-from solvers.fluid.flow_settings import FlowSettings
+from solvers.fluid.flow import probes
+from solvers.fluid.flow.extreme_pressure import extreme_pressure
+from solvers.fluid.flow.field import Fluid
+from solvers.fluid.grid.box import Grid
+from solvers.fluid.settings.flow_settings import FlowSettings
+from solvers.fluid.surfaces.immersed import ImmersedBody, rigid_body
+from solvers.fluid.surfaces.inside import PointInBody
+from solvers.fluid.terms.boundary.patches import Patch, UncoveredFaces
 from solvers.solver_settings import SolverSettings
 from solvers.timing import Timer
 from solvers.values import Value
@@ -128,38 +128,63 @@ def _body(case: Case, name: str, comm: MPI.Comm) -> ImmersedBody:
 # ---------------------------------------------------------------------------------------------------------- probes
 
 
-def build_probes(case: Case, fluid: Fluid) -> Callable[[], Numbers]:
-    """The probes of the fluid. Raises CaseError (collective)."""
-    forces = probes.Forces(fluid)
-    found: dict[str, probes.Probe] = {}
-    for name, settings in case.probes.items():
-        if settings.field != "fluid":
-            continue
-        if settings.at is not None:
-            found[name] = _at(case, fluid, name, "at")
-            if settings.minus is not None:
-                found[name] = probes.difference(found[name], _at(case, fluid, name, "minus"))
-        elif patch := settings.on or settings.through:
-            found[name] = probes.on_patch(fluid, settings.quantity, patch)
-        elif settings.quantity == "pressure":
-            found[name] = extreme_pressure(fluid, settings.extreme or "largest")
-        elif settings.quantity in ("force", "moment"):
-            found[name] = forces.probe(settings.quantity, settings.body, settings.about)
-        elif settings.reference is not None:
-            scale = _coefficient(case, settings.reference, settings.quantity)
-            found[name] = forces.coefficient(settings.body, scale)
-        else:
-            found[name] = probes.of_fluid(fluid, settings.quantity)
-    measure = columns(found)
-
-    def all_probes() -> Numbers:
-        forces.forget()
-        return measure()
-
-    return all_probes
+def _at(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
+    """Raises CaseError."""
+    if case.probes[name].minus is None:
+        return _at_point(case, forces.fluid, name, "at")
+    return probes.difference(*(_at_point(case, forces.fluid, name, key) for key in ("at", "minus")))
 
 
-def _coefficient(case: Case, reference: Reference, quantity: str) -> Array:
+def _at_point(case: Case, fluid: Fluid, name: str, key: str) -> probes.Probe:
+    settings = case.probes[name]
+    try:
+        return probes.at_point(fluid, settings.quantity, getattr(settings, key), case.time.start)
+    except PointInBody as error:
+        raise case.error(("probes", name, key), str(error)) from None
+
+
+def _on_patch(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
+    settings = case.probes[name]
+    return probes.on_patch(forces.fluid, settings.quantity, settings.on or settings.through or "")
+
+
+def _extreme(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
+    return extreme_pressure(forces.fluid, case.probes[name].extreme or "largest")
+
+
+def _force(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
+    settings = case.probes[name]
+    return forces.probe(settings.quantity, settings.body, settings.about)
+
+
+def _coefficient(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
+    settings = case.probes[name]
+    assert settings.reference is not None
+    return forces.coefficient(settings.body, _scale(case, settings.reference, settings.quantity))
+
+
+def _whole(case: Case, forces: probes.Forces, name: str) -> probes.Probe:
+    return probes.of_fluid(forces.fluid, case.probes[name].quantity)
+
+
+#: How the probes of a fluid are made.
+FLUID_PROBES: Table[probes.Forces] = {
+    ("velocity", "at"): _at,
+    ("pressure", "at"): _at,
+    ("pressure", "on"): _on_patch,
+    ("flow_rate", "through"): _on_patch,
+    ("pressure", ""): _extreme,
+    ("force", ""): _force,
+    ("moment", ""): _force,
+    ("drag_coefficient", ""): _coefficient,
+    ("lift_coefficient", ""): _coefficient,
+    ("volume", ""): _whole,
+    ("kinetic_energy", ""): _whole,
+    ("dissipation", ""): _whole,
+}
+
+
+def _scale(case: Case, reference: Reference, quantity: str) -> Array:
     """e / (1/2 rho U^2 L), with which the force gives a coefficient [1/N]."""
     assert case.fluid is not None
     dim = case.fluid.grid.dimension
@@ -170,11 +195,3 @@ def _coefficient(case: Case, reference: Reference, quantity: str) -> Array:
     size = reference.length if dim == 2 else reference.area
     assert size is not None
     return direction / np.linalg.norm(direction) / (0.5 * density * reference.velocity**2 * size)
-
-
-def _at(case: Case, fluid: Fluid, name: str, key: str) -> probes.Probe:
-    settings = case.probes[name]
-    try:
-        return probes.at_point(fluid, settings.quantity, getattr(settings, key), case.time.start)
-    except PointInBody as error:
-        raise case.error(("probes", name, key), str(error)) from None

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fsci.case import Case
+from fsci.case.fluid import Movement
 from fsci.case.rigid_motion import rigid_motion
 from solvers.api import Array
 
@@ -15,13 +16,14 @@ def motion_of_obstacle(case: Case, name: str, points: Array) -> Callable[[float]
     """A function: time [s] -> positions of the points [m]; None if they are at rest."""
     assert case.contact is not None
     if name in case.contact.obstacles:
-        displacement = case.contact.obstacles[name].motion
-        if displacement is None:
-            return None
-        return lambda t: points + np.stack([component(points.T, t) for component in displacement], axis=1)
-    assert case.fluid is not None
-    movement = case.fluid.bodies[name].motion
+        movement = case.contact.obstacles[name].motion
+        if isinstance(movement, tuple):
+            components = movement
+            return lambda t: points + np.stack([component(points.T, t) for component in components], axis=1)
+    else:
+        movement = None if case.fluid is None or name not in case.fluid.bodies else case.fluid.bodies[name].motion
     if movement is None:
         return None
+    assert isinstance(movement, Movement)
     moved = rigid_motion(points, movement, case.time.start, case.time.step)
     return lambda t: moved(t)[0]

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.builder.dry_side import Closing, DrySideError
-from solvers.fluid.bodies.inside import winding
-from solvers.fluid.bodies.surface import Motion
+from solvers.fluid.surfaces.inside import winding
+from solvers.fluid.surfaces.surface import Motion
 
 Array = NDArray[np.float64]
 Facets = NDArray[np.int64]
 
 #: Points of the body that are tested for lying in the solid.
-SAMPLES = 64
+SAMPLED_POINTS = 64
 
 
 def surround(points: Array, facets: Facets, inside: Array, box: tuple[Array, Array]) -> Closing:
@@ -34,7 +34,7 @@ def surround(points: Array, facets: Facets, inside: Array, box: tuple[Array, Arr
     for rim in rims:
         closing = closing.joined(_lid(points, rim, box))
     seen = inside[((inside > low) & (inside < high)).all(axis=1)]
-    turns = _turns(seen[:: 1 + len(seen) // SAMPLES], points, facets, closing)
+    turns = _turns(seen[:: 1 + len(seen) // SAMPLED_POINTS], points, facets, closing)
     if turns == 0:
         unit, around = _UNIT_BOX[len(low)]
         margin: Array = 0.1 * (high - low)

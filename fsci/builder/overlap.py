@@ -13,13 +13,13 @@ from fsci.builder.obstacle_motion import motion_of_obstacle
 from fsci.builder.on_first import shared
 from fsci.case import Case
 from fsci.case.contact import PairSection, Side
-from fsci.meshes.of_case import read_obstacle, read_rigid_body
+from fsci.meshes.of_case import read_rigid_side
 from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
 from solvers.contact.overlap_at_start import SolidSide, overlapping_facets
-from solvers.mesh import Mesh
-from solvers.mesh_topology import cut_out
-from solvers.tessellation import tessellate
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.tessellation import tessellate
+from solvers.mesh.topology import cut_out
 
 
 def facets_in_each_other(
@@ -55,11 +55,8 @@ class PlacedSide:
             found = meshes[name]
             assert found is not None, "the first process has the meshes"
             mesh, on = found, side.on
-        elif case.contact is not None and name in case.contact.obstacles:
-            mesh, on = read_obstacle(case, name), case.contact.obstacles[name].on
         else:
-            assert case.fluid is not None
-            mesh, on = read_rigid_body(case, name)[0], case.fluid.bodies[name].on
+            mesh, on = read_rigid_side(case, name)
         self.mesh, self._on = mesh, on
         self.x = mesh.points + _displacement(case, side, mesh.points)  #: positions of its nodes [m], shape (n, dim)
 

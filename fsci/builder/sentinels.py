@@ -10,21 +10,21 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fsci.builder.closed_faces import closed_faces
 from fsci.builder.on_first import shared
 from fsci.case import Case
-from fsci.case.fluid import PatchSection
 from fsci.meshes.of_case import read_obstacle
 from solvers.api import Sentinel
-from solvers.cell_types import CELL_TYPES
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.tessellation import tessellate
 from solvers.sentinels.bodies import MovingBody
 from solvers.sentinels.overlaps import Meeting, Overlaps
 from solvers.sentinels.self_overlaps import SelfOverlaps
-from solvers.sentinels.walls import BoxWalls, Wall
-from solvers.tessellation import tessellate
+from solvers.sentinels.walls import BoxWalls
 
 if TYPE_CHECKING:
     from solvers.contact.contact import Contact
-    from solvers.fluid.bodies.immersed import ImmersedBody
+    from solvers.fluid.surfaces.immersed import ImmersedBody
     from solvers.rigid.field import RigidBodies
     from solvers.structure.field import Structure
 
@@ -41,22 +41,24 @@ def build_sentinels(
     given: list[ImmersedBody] | None = None,
 ) -> dict[str, Sentinel]:
     """Those that the case needs (collective); given: rigid bodies in the flow that it does not move."""
-    bodies = list(_elastic(structure)) if structure is not None else list(_free(rigid)) if rigid is not None else []
-    walls = list(_walls(case)) if bodies else []
+    elastic = [] if structure is None else list(_elastic(structure))
+    bodies = [*elastic, *([] if rigid is None else _free(rigid))]
+    walls = list(closed_faces(case)) if bodies else []
     rest = [*_given(given or []), *_obstacles(case, comm)] if bodies else []
     found: dict[str, Sentinel] = {}
     if len(bodies) + len(rest) > 1:
         meetings, tied = _meetings(case, structure)
-        found["overlaps"] = Overlaps([*bodies, *rest], meetings, tied)
+        found["overlaps"] = Overlaps([*bodies, *rest], meetings, tied | case.joined)
     if structure is not None and (len(bodies) > 1 or contact is not None):
-        found["self_overlaps"] = SelfOverlaps(bodies, _with_themselves(case))
+        found["self_overlaps"] = SelfOverlaps(elastic, _with_themselves(case))
     if case.fluid is not None and bodies:
         box = np.array(case.fluid.grid.start), np.array(case.fluid.grid.to)
-        found["walls"] = BoxWalls(bodies, walls, box)
+        ending = [name for name, body in case.fluid.bodies.items() if body.free and body.free.leaves == "stop"]
+        found["walls"] = BoxWalls(bodies, walls, box, ending)
     if structure is not None and contact is not None:
         from solvers.structure.leaps import Leaps
 
-        found["leaps"] = Leaps(structure, partial(_way_of_obstacles, contact))
+        found["leaps"] = Leaps(structure, partial(_way_of_obstacles, structure))
     return found
 
 
@@ -65,8 +67,8 @@ def build_sentinels(
 
 def _elastic(structure: Structure) -> Iterator[MovingBody]:
     from coupling.contact_surfaces import global_dofs
-    from solvers.blocks import Layout
-    from solvers.rows import gather_at
+    from solvers.algebra.blocks import Layout
+    from solvers.algebra.rows import gather_at
 
     comm = structure.comm
     layout = Layout(comm, [body.size for body in structure.bodies])
@@ -114,7 +116,7 @@ def _obstacles(case: Case, comm: MPI.Comm) -> Iterator[MovingBody]:
         return
     from fsci.builder.obstacle_motion import motion_of_obstacle
 
-    for name in case.contact.obstacles:
+    for name in (name for name, settings in case.contact.obstacles.items() if settings.free is None):
         facets, _, points = shared(comm, partial(_obstacle, case, name))
         motion = motion_of_obstacle(case, name, points) or partial(_at_rest, points)
         yield MovingBody(name, facets, motion, free=False)
@@ -177,36 +179,11 @@ def _facets_on(structure: Structure, body: str, surfaces: tuple[str, ...]) -> ND
     return structure.comm.bcast(mask, root=0)
 
 
-def _way_of_obstacles(contact: Contact) -> float:
+def _way_of_obstacles(structure: Structure) -> float:
     """The largest way of a rigid node in the step [m]."""
+    from solvers.contact.contact import Contact
+
+    contact = structure.constraint
+    assert isinstance(contact, Contact)
     rigid = contact.nodes.dofs[:, 0] < 0
     return float(np.linalg.norm((contact.x - contact.x_old)[rigid], axis=1).max(initial=0.0))
-
-
-# ------------------------------------------------------------------------------------------------------------- walls
-
-
-def _walls(case: Case) -> Iterator[Wall]:
-    """Faces of the box, or parts of them, through which no fluid passes."""
-    if case.fluid is None:
-        return
-    grid = case.fluid.grid
-    for name, patch in case.fluid.patches.items():
-        for face in patch.on:
-            axis = "xyz".index(face[0])
-            position = (grid.start if face[1] == "-" else grid.to)[axis]
-            if _closed(patch, axis):
-                yield Wall(name, face, float(position), None if patch.where is None else _within(patch))
-
-
-def _closed(patch: PatchSection, axis: int) -> bool:
-    if patch.kind == "velocity":
-        assert patch.velocity is not None
-        return patch.velocity[axis].constant == 0.0
-    return patch.kind in ("no_slip", "slip", "slip_length", "symmetry")
-
-
-def _within(patch: PatchSection) -> Callable[[Array], NDArray[np.bool_]]:
-    where = patch.where
-    assert where is not None
-    return lambda x: np.broadcast_to(where(x, 0.0), x.shape[1]) > 0.0

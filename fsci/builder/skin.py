@@ -8,9 +8,9 @@ from fsci.builder.dry_side import Closing, DrySideError, close
 from fsci.builder.outside import surround
 from fsci.case import Case
 from fsci.meshes.mesh import MeshError, require_surface
-from solvers.mesh import Mesh
-from solvers.skin import Skin, cut_out_skin
-from solvers.tessellation import tessellate
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.skin import Skin, cut_out_skin
+from solvers.mesh.tessellation import tessellate
 
 
 def find_skin(case: Case, name: str, mesh: Mesh) -> tuple[Skin, Closing | None]:

@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
-from fsci.builder.columns import Numbers, columns
+from fsci.builder.columns import Table
 from fsci.builder.loads import build_loads
 from fsci.builder.named import named
 from fsci.builder.solver import build_tolerance
 from fsci.case import Case
+from fsci.case.checks import VECTORS
 from fsci.case.probes import Probe
 from fsci.case.structure import BodySection
 from fsci.case.values import value_of
 from fsci.meshes.locations import Locations, find_locations
-from fsci.meshes.of_case import VECTORS, read_body
+from fsci.meshes.of_case import read_body
 from solvers.constraint import Constraint
-from solvers.generalised_alpha import GeneralisedAlpha
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 from solvers.solver_settings import SolverSettings
 from solvers.structure import materials, probes
 from solvers.structure.body import Body
-from solvers.structure.dynamics import Dynamics
 from solvers.structure.elastic_constants import plane_stress_lambda
 from solvers.structure.field import Structure
 from solvers.structure.materials import (
@@ -32,11 +31,13 @@ from solvers.structure.materials import (
     PlaneStressLinearElastic,
     PlaneStressStVenantKirchhoff,
 )
-from solvers.structure.rayleigh import Damping
 from solvers.structure.supports import SupportError
 from solvers.structure.time_scheme import Statics, TimeScheme
 from solvers.timing import Timer
 from solvers.values import combine
+
+if TYPE_CHECKING:
+    from solvers.contact.contact import Contact
 
 
 def build_bodies(case: Case, comm: MPI.Comm) -> list[Body]:
@@ -65,15 +66,7 @@ def build_structure(
 def _time_scheme(case: Case) -> TimeScheme:
     assert case.structure is not None
     dynamics = case.structure.dynamics
-    if dynamics is None:
-        return Statics()
-    if dynamics.rho_inf is not None:
-        scheme = GeneralisedAlpha.from_rho_inf(dynamics.rho_inf)
-    else:
-        alphas: list[Any] = [dynamics.alpha_m, dynamics.alpha_f, dynamics.beta, dynamics.gamma]
-        scheme = GeneralisedAlpha(*alphas)
-    damping = Damping(dynamics.damping.mass, dynamics.damping.stiffness)
-    return Dynamics(scheme, damping=damping, predictor=dynamics.predictor)
+    return Statics() if dynamics is None else dynamics.time_scheme()
 
 
 def _body(case: Case, name: str, comm: MPI.Comm, mesh: Mesh | None, locations: Locations) -> Body:
@@ -120,43 +113,84 @@ def _material(body: BodySection, plane: str) -> Material:
 # ---------------------------------------------------------------------------------------------------------- probes
 
 
-def build_probes(case: Case, structure: Structure) -> Callable[[], Numbers]:
-    """The probes of the structure. Raises CaseError (collective)."""
-    by_name = {body.name: body for body in structure.bodies}
-    found: dict[str, probes.Probe] = {}
-    for name, settings in _probes(case):
-        if settings.pair is not None:
-            found[name] = _of_pair(case, structure, settings)
-        elif settings.at is not None:
-            try:
-                found[name] = probes.at_point(structure, by_name[settings.body or ""], settings.quantity, settings.at)
-            except probes.PointOutside as error:
-                raise case.error(("probes", name, "at"), str(error)) from None
-        elif settings.on is not None:
-            found[name] = probes.on_surface(structure, by_name[settings.body or ""], settings.quantity, settings.on)
-        else:
-            chosen = structure.bodies if settings.body is None else [by_name[settings.body]]
-            found[name] = probes.of_bodies(structure, chosen, settings.quantity)
-    return columns(found)
+def _at(case: Case, structure: Structure, name: str) -> probes.Probe:
+    """Raises CaseError."""
+    settings = case.probes[name]
+    assert settings.at is not None
+    try:
+        return probes.at_point(structure, _probed(structure, settings), settings.quantity, settings.at)
+    except probes.PointOutside as error:
+        raise case.error(("probes", name, "at"), str(error)) from None
 
 
-def _of_pair(case: Case, structure: Structure, settings: Probe) -> probes.Probe:
-    from solvers.contact.contact import Contact
-    from solvers.contact.probes import at_slave, first_contact, overlap
+def _on(case: Case, structure: Structure, name: str) -> probes.Probe:
+    settings = case.probes[name]
+    assert settings.on is not None
+    return probes.on_surface(structure, _probed(structure, settings), settings.quantity, settings.on)
 
-    contact, pairs = structure.constraint, [] if case.contact is None else list(case.contact.pairs)
-    assert isinstance(contact, Contact)
-    if settings.pair not in pairs:
-        name = next(key for key, probe in case.probes.items() if probe is settings)
-        raise case.error(("probes", name, "pair"), f"unknown pair '{settings.pair}' (available: {', '.join(pairs)})")
-    index = pairs.index(settings.pair)
-    if settings.quantity == "first_contact":
-        return first_contact(contact, index)
-    if settings.quantity == "overlap":
-        return overlap(contact, index)
+
+def _whole(case: Case, structure: Structure, name: str) -> probes.Probe:
+    settings = case.probes[name]
+    chosen = structure.bodies if settings.body is None else [_probed(structure, settings)]
+    return probes.of_bodies(structure, chosen, settings.quantity)
+
+
+def _probed(structure: Structure, settings: Probe) -> Body:
+    return next(body for body in structure.bodies if body.name == settings.body)
+
+
+def _of_pair(case: Case, structure: Structure, name: str) -> probes.Probe:
+    from solvers.contact.probes import at_slave
+
+    settings = case.probes[name]
     extreme = settings.extreme or ("largest" if settings.quantity == "pressure" else "least")
-    return at_slave(contact, index, settings.quantity, settings.at or extreme)
+    quantity, where = settings.quantity, settings.at or extreme
+    return _on_pair(case, structure, name, lambda contact, pair: at_slave(contact, pair, quantity, where))
 
 
-def _probes(case: Case) -> list[tuple[str, Probe]]:
-    return [(name, probe) for name, probe in case.probes.items() if probe.field == "structure"]
+def _first_contact(case: Case, structure: Structure, name: str) -> probes.Probe:
+    from solvers.contact.probes import first_contact
+
+    return _on_pair(case, structure, name, first_contact)
+
+
+def _overlap(case: Case, structure: Structure, name: str) -> probes.Probe:
+    from solvers.contact.probes import overlap
+
+    return _on_pair(case, structure, name, overlap)
+
+
+def _on_pair(
+    case: Case, structure: Structure, name: str, of_contact: Callable[[Contact, int], probes.Probe]
+) -> probes.Probe:
+    """The probe of a pair of the present contact, which grows when a body comes near to a wall. Raises CaseError."""
+    from solvers.contact.contact import Contact
+
+    pairs, wanted = [] if case.contact is None else list(case.contact.pairs), case.probes[name].pair
+    if wanted not in pairs:
+        raise case.error(("probes", name, "pair"), f"unknown pair '{wanted}' (available: {', '.join(pairs)})")
+
+    def probe() -> dict[str, float]:
+        assert isinstance(structure.constraint, Contact)
+        return of_contact(structure.constraint, pairs.index(wanted))()
+
+    return probe
+
+
+#: How the probes of a structure are made.
+STRUCTURE_PROBES: Table[Structure] = {
+    ("displacement", "at"): _at,
+    ("velocity", "at"): _at,
+    ("acceleration", "at"): _at,
+    ("displacement", "on"): _on,
+    ("reaction", "on"): _on,
+    ("traction", "on"): _on,
+    ("area", "on"): _on,
+    ("gap", "pair"): _of_pair,
+    ("mean_gap", "pair"): _of_pair,
+    ("pressure", "pair"): _of_pair,
+    ("overlap", "pair"): _overlap,
+    ("first_contact", "pair"): _first_contact,
+    **{(quantity, ""): _whole for quantity in probes.OF_BODIES},
+    ("volume", ""): _whole,
+}

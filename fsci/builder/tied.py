@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from fsci.case import Case
-from fsci.meshes.of_case import read_obstacle
-from solvers.cell_types import CELL_TYPES
+from fsci.meshes.of_case import read_rigid_side
 from solvers.contact.law.tied import Tied
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
 from solvers.contact.ties import relocated
-from solvers.mesh import Mesh
-from solvers.mesh_topology import cut_out
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.topology import cut_out
 
 #: Motion of nodes, relative to the surface, that is none.
-ROUNDING = 1e-13
+LEAST_MOTION = 1e-13
 
 
 def join_tied(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
@@ -33,8 +33,10 @@ def join_tied(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
         assert contact is not None
         sides, nodes = [], []
         for _, side in settings.sides:
-            mesh = meshes[side.body] if side.body is not None else read_obstacle(case, side.obstacle or "")
-            names = side.on or contact.obstacles[side.obstacle or ""].on
+            if side.body is not None:
+                mesh, names = meshes[side.body], side.on
+            else:
+                mesh, names = read_rigid_side(case, side.obstacle or "")
             points, facets, at = cut_out(mesh, names)
             sides.append(Surface(name, points, facets, CELL_TYPES[mesh.cell_type].facet, None))
             nodes.append(at)
@@ -44,7 +46,7 @@ def join_tied(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, Mesh]:
                 ("contact", "pairs", name), "the surfaces do not touch at the start: there is nothing to tie"
             )
         body = settings.sides[0][1].body or ""
-        if np.abs(moved - sides[0].points).max() < ROUNDING * np.ptp(moved, axis=0).max():
+        if np.abs(moved - sides[0].points).max() < LEAST_MOTION * np.ptp(moved, axis=0).max():
             continue
         points = found[body].points.copy()
         points[nodes[0]] = moved

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from fsci.builder.columns import Numbers
 from solvers.api import Sentinel
-from solvers.fluid.conservation.pockets import Pockets
-from solvers.fluid.conservation.regions import RegionsOfCut
-from solvers.fluid.conservation.volume_balance import VolumeBalance
-from solvers.fluid.conservation.volumes import Volumes
-from solvers.fluid.field import Fluid
+from solvers.fluid.flow.conservation.pockets import Pockets
+from solvers.fluid.flow.conservation.regions import RegionsOfCut
+from solvers.fluid.flow.conservation.volume_balance import VolumeBalance
+from solvers.fluid.flow.conservation.volumes import Volumes
+from solvers.fluid.flow.field import Fluid
 
 
 class WatchedFlow:

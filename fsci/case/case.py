@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import PrivateAttr
 
@@ -14,21 +15,32 @@ from fsci.case.curve import Curve, CurveName
 from fsci.case.document import Document, override
 from fsci.case.errors import CaseError, Place
 from fsci.case.fluid import FluidSection
-from fsci.case.free_body import Free
+from fsci.case.free_body import FreeMotion
+from fsci.case.mesh import Mesh
 from fsci.case.output import Output
 from fsci.case.probes import Probe
+from fsci.case.rigid import RigidSection
 from fsci.case.section import Section, setting
-from fsci.case.shapes import Shape
+from fsci.case.shapes import ShapeSection
 from fsci.case.solver import Solver
 from fsci.case.structure import BodySection, StructureSection
 from fsci.case.time import Time
 from fsci.case.units import Units
-from fsci.case.values import Name, Text
+from fsci.case.values import Name, OrNone, Surfaces, Text
 from fsci.case.verify import Check
 
 
+@dataclass(frozen=True)
+class RigidSurface:
+    """Where a case describes the closed surface of a rigid body."""
+
+    keys: tuple[str, ...]  #: of its section
+    mesh: Mesh
+    on: Surfaces | None  #: names of the surfaces that enclose it; None: all of the mesh
+
+
 class Case(Section):
-    """One simulation of structure, fluid, contact, or all of them."""
+    """One simulation of structure, fluid, rigid bodies, contact, or all of them."""
 
     title: Text = setting("", "title of the case, for pictures and tables")
     units: Units = setting(Units, "units of all numbers")
@@ -36,8 +48,14 @@ class Case(Section):
     curves: dict[CurveName, Curve] = setting(dict, "functions that expressions may call, by name")
     structure: StructureSection | None = setting(None, "elastic bodies")
     fluid: FluidSection | None = setting(None, "incompressible flow")
+    rigid_section: RigidSection | None = setting(
+        None, "free rigid bodies without a fluid; in a flow they are 'fluid.bodies' with 'free'", name="rigid"
+    )
     coupling: Coupling | None = setting(None, "how fluid and structure are solved together")
-    contact: ContactSection | None = setting(None, "surfaces that may touch")
+    contact: Annotated[ContactSection | None, OrNone()] = setting(
+        None,
+        "surfaces that may touch; none: free rigid bodies pass walls, other rigid bodies, and each other",
+    )
     probes: dict[Name, Probe] = setting(dict, "quantities that every step records, by name")
     output: Output = setting(Output, "which files are written, and how often")
     verify: tuple[Check, ...] = setting(tuple, "results that the run must reach")
@@ -47,6 +65,11 @@ class Case(Section):
     _places: Document | None = PrivateAttr(default=None)  # whose positions messages give; None: those of the document
     _warnings: tuple[str, ...] = PrivateAttr(default=())
     _meshes: dict[str, str] = PrivateAttr(default_factory=dict)
+
+    @property
+    def contact_off(self) -> bool:
+        """The case says `contact: none`."""
+        return bool(self.settings.get("contact") == "none")
 
     @property
     def path(self) -> Path:
@@ -88,9 +111,41 @@ class Case(Section):
         return {*named, *(side.body for side in sides if side.body is not None)}
 
     @property
-    def rigid(self) -> dict[str, Free] | None:
-        """Rigid bodies that the flow moves; None without any."""
-        return (self.fluid.free_bodies or None) if self.fluid is not None else None
+    def rigid(self) -> dict[str, FreeMotion] | None:
+        """Free rigid bodies of the flow, of the section `rigid`, and free obstacles; None without any."""
+        found: dict[str, FreeMotion] = {}
+        for section in (self.fluid, self.rigid_section):
+            found |= section.free_bodies if section is not None else {}
+        obstacles = {} if self.contact is None else self.contact.obstacles
+        gravity = None if self.rigid_section is None else self.rigid_section.gravity
+        found |= {name: one.free.with_gravity(gravity) for name, one in obstacles.items() if one.free is not None}
+        return found or None
+
+    @property
+    def joined(self) -> set[frozenset[str]]:
+        """Free bodies, by twos, that a spring without length joins."""
+        return {
+            frozenset((name, spring.to.body))
+            for name, free in (self.rigid or {}).items()
+            for spring in free.springs
+            if spring.to is not None and spring.to.body is not None and spring.free_length == 0.0
+        }
+
+    @property
+    def rigid_surfaces(self) -> dict[str, RigidSurface]:
+        """Closed surfaces of rigid bodies: all of the flow, those of the section `rigid`, and free obstacles."""
+        fluid = {} if self.fluid is None else self.fluid.bodies
+        loose = {} if self.rigid_section is None else self.rigid_section.bodies
+        obstacles = {} if self.contact is None else self.contact.obstacles
+        return {
+            **{name: RigidSurface(("fluid", "bodies", name), body.mesh, body.on) for name, body in fluid.items()},
+            **{name: RigidSurface(("rigid", "bodies", name), body.mesh, body.on) for name, body in loose.items()},
+            **{
+                name: RigidSurface(("contact", "obstacles", name), one.mesh, None)
+                for name, one in obstacles.items()
+                if one.free is not None
+            },
+        }
 
     @property
     def dimension(self) -> int | None:
@@ -98,7 +153,8 @@ class Case(Section):
         if self.fluid is not None:
             return self.fluid.grid.dimension
         meshes: list[Any] = [body.mesh for body in self.elastic_bodies.values()]
-        return next((mesh.dimension for mesh in meshes if isinstance(mesh, Shape)), None)
+        meshes += [surface.mesh for surface in self.rigid_surfaces.values()]
+        return next((mesh.plan.dimension for mesh in meshes if isinstance(mesh, ShapeSection)), None)
 
     def with_places_of(self, other: Case) -> Case:
         """The same case, whose messages give positions in the file of another one of the same settings."""

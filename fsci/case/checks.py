@@ -9,11 +9,13 @@ from fsci.case.case import Case
 from fsci.case.contact import ContactSection, Side
 from fsci.case.coupling_checks import coupling_mistakes
 from fsci.case.errors import did_you_mean
-from fsci.case.fluid_checks import fluid_mistakes
+from fsci.case.fluid import Movement
+from fsci.case.fluid_checks import fluid_mistakes, movement_mistakes
+from fsci.case.free_checks import free_mistakes
 from fsci.case.material import has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, mesh_mistakes, surfaces_mistakes
 from fsci.case.probe_checks import probe_mistakes, verify_mistakes
-from fsci.case.shapes import Shape
+from fsci.case.shapes import ShapeSection
 from fsci.case.structure import NO_MIXED_SIMPLICES, BodySection, StructureSection
 from fsci.case.yaml_text import Keys
 
@@ -29,13 +31,18 @@ def mistakes(case: Case) -> Iterator[Mistake]:
         yield from fluid_mistakes(case, case.fluid)
     if case.contact is not None:
         yield from _contact(case, case.contact)
+    yield from _loose(case)
     yield from probe_mistakes(case)
     yield from verify_mistakes(case)
 
 
+#: Settings of 'contact' for free rigid bodies.
+OF_FREE_BODIES = ("friction", "restitution", "obstacles", "bodies")
+
+
 def _sections(case: Case) -> Iterator[Mistake]:
-    if case.structure is None and case.fluid is None:
-        yield (), "a case needs a section 'structure' or 'fluid'"
+    if case.structure is None and case.fluid is None and case.rigid_section is None:
+        yield (), "a case needs a section 'structure', 'fluid' or 'rigid'"
     elif case.structure is not None and case.fluid is not None and case.coupling is None:
         yield (
             ("fluid",),
@@ -44,7 +51,47 @@ def _sections(case: Case) -> Iterator[Mistake]:
     if case.coupling is not None:
         yield from coupling_mistakes(case, case.coupling)
     if case.contact is not None and case.structure is None:
+        yield from _contact_of_free_bodies(case, case.contact)
+
+
+def _contact_of_free_bodies(case: Case, contact: ContactSection) -> Iterator[Mistake]:
+    """Free bodies find what they touch: without elastic bodies, the section has friction and restitution alone."""
+    if case.rigid is None:
         yield ("contact",), "'contact' needs the section 'structure'"
+        return
+    for name in sorted(contact.model_fields_set - set(OF_FREE_BODIES)):
+        yield ("contact", name), f"'{name}' needs the section 'structure': it is not for contact of free bodies"
+    if contact.friction is not None and contact.friction.bound is not None:
+        yield ("contact", "friction", "bound"), "free rigid bodies have Coulomb's friction: give 'coefficient'"
+
+
+def _loose(case: Case) -> Iterator[Mistake]:
+    """Mistakes of free bodies that are not in a flow."""
+    others, free = case.rigid or {}, case.rigid_surfaces
+    for name, surface in free.items():
+        keys: Keys = surface.keys
+        if keys[0] == "fluid":
+            continue
+        whole = keys if keys[0] == "rigid" else (*keys, "free")
+        if case.fluid is not None:
+            yield (
+                whole,
+                "free bodies of a case with 'fluid' are in the flow: put it into 'fluid.bodies', with 'free'",
+            )
+        elif case.structure is not None and case.structure.dynamics is None:
+            for setting in ("initial_velocity", "initial_angular_velocity"):
+                if getattr(others[name], setting):
+                    yield (*whole, setting), f"'{setting}' needs 'dynamics' in 'structure'"
+        if name in case.elastic_bodies:
+            yield keys, f"'{name}' is already the name of an elastic body; give this rigid body another one"
+        if keys[0] == "rigid":
+            if case.contact is not None and name in case.contact.obstacles:
+                yield keys, f"'{name}' is also the name of an obstacle; give this rigid body another one"
+            yield from mesh_mistakes(surface.mesh, case.dimension, case.folder, (*keys, "mesh"))
+            yield from surfaces_mistakes(surface.mesh, surface.on or (), (*keys, "on"))
+        yield from free_mistakes(others[name], case.dimension, others, whole)
+    if case.rigid_section is not None:
+        yield from length_mistakes(case.rigid_section.gravity, case.dimension, ("rigid", "gravity"))
 
 
 def _structure(case: Case, structure: StructureSection) -> Iterator[Mistake]:
@@ -52,7 +99,7 @@ def _structure(case: Case, structure: StructureSection) -> Iterator[Mistake]:
     for name, body in structure.bodies.items():
         keys: Keys = ("structure", "bodies", name)
         yield from mesh_mistakes(body.mesh, case.dimension, case.folder, (*keys, "mesh"))
-        if isinstance(body.mesh, Shape) and body.region is not None:
+        if isinstance(body.mesh, ShapeSection) and body.region is not None:
             yield (*keys, "region"), "'region' is for mesh files; a built-in shape is one region"
         yield from _element(case, structure, body, keys)
         yield from _surfaces(body, keys)
@@ -75,7 +122,7 @@ def _element(case: Case, structure: StructureSection, body: BodySection, keys: K
         return
     if case.dimension == 2 and structure.plane == "stress":
         yield (*keys, "element"), "'mixed' is not available in plane stress, which does not lock; take 'displacement'"
-    elif isinstance(body.mesh, Shape) and body.mesh.cell in ("tri", "tet"):
+    elif isinstance(body.mesh, ShapeSection) and body.mesh.cell in ("tri", "tet"):
         yield (*keys, "element"), NO_MIXED_SIMPLICES
 
 
@@ -85,7 +132,7 @@ def _surfaces(body: BodySection, keys: Keys) -> Iterator[Mistake]:
             yield from surfaces_mistakes(body.mesh, item.on or (), (*keys, kind, i, "on"))
     for kind, word in (("line_forces", "lines"), ("point_forces", "points")):
         for i, item in enumerate(getattr(body, kind)):
-            if item.on is not None and isinstance(body.mesh, Shape):
+            if item.on is not None and isinstance(body.mesh, ShapeSection):
                 hint = "; give its position with 'at'" if word == "points" else ""
                 yield (*keys, kind, i, "on"), f"a built-in shape has no {word} with names{hint}"
 
@@ -124,37 +171,40 @@ def _needs(case: Case, structure: StructureSection, body: BodySection, keys: Key
 
 
 def _contact(case: Case, contact: ContactSection) -> Iterator[Mistake]:
-    if not contact.pairs and contact.bodies is None:
+    of_free_bodies = case.rigid is not None
+    if not contact.pairs and contact.bodies is None and not of_free_bodies:
         missing: Keys = ("contact", "pairs") if "pairs" in contact.model_fields_set else ("contact",)
         yield missing, "'contact' needs 'pairs', or 'bodies: all' for automatic pairs"
+    if "restitution" in contact.model_fields_set and case.rigid is None:
+        yield ("contact", "restitution"), "'restitution' is for free rigid bodies, which this case has not"
     film = contact.film
     if (film.value or film.seal or film.closed != "dry") and case.fluid is None:
         yield ("contact", "film"), "'film' describes the fluid between surfaces and needs the section 'fluid'"
-    for setting in ("friction", "reach"):
-        if setting in contact.model_fields_set and contact.bodies is None:
-            yield (
-                ("contact", setting),
-                f"'{setting}' applies only to the pairs that 'bodies' finds; give 'bodies', too, or remove it",
-            )
+    if contact.reach is not None and contact.bodies is None:
+        message = "'reach' applies only to the pairs that 'bodies' finds; give 'bodies', too, or remove it"
+        yield ("contact", "reach"), message
     for i, name in enumerate(() if contact.bodies in (None, "all") else contact.bodies or ()):
         if name not in case.elastic_bodies:
             yield ("contact", "bodies", i), f"unknown body '{name}'{did_you_mean(name, case.elastic_bodies)}"
     for name, obstacle in contact.obstacles.items():
         keys: Keys = ("contact", "obstacles", name)
-        yield from length_mistakes(obstacle.motion, case.dimension, (*keys, "motion"))
+        if isinstance(obstacle.motion, Movement):
+            yield from movement_mistakes(obstacle.motion, case.dimension, (*keys, "motion"))
+        else:
+            yield from length_mistakes(obstacle.motion, case.dimension, (*keys, "motion"))
         yield from surfaces_mistakes(obstacle.mesh, obstacle.on, (*keys, "on"))
         if case.fluid is not None and name in case.fluid.bodies:
             remedy = "remove the obstacle and take the body as master"
             yield keys, f"'{name}' is also the name of a rigid body of the flow; {remedy}"
-    for name, pair in contact.pairs.items():
+    pairs = contact.complete_pairs
+    for name, pair in pairs.items():
         (_, slave), (_, master) = pair.sides
         for where, side in dict(pair.sides).items():
             yield from _side(case, contact, side, ("contact", "pairs", name, where))
-        first = next(other for other in contact.pairs if contact.pairs[other].sides[0][1] == slave)
-        for setting in ("friction", "tied"):
-            if getattr(contact.pairs[first], setting) != getattr(pair, setting):
-                message = f"pair '{first}' has the same slave: both need the same '{setting}'"
-                yield ("contact", "pairs", name, *([setting] if setting in pair.model_fields_set else [])), message
+        first = next(other for other in pairs if pairs[other].sides[0][1] == slave)
+        if pairs[first].tied != pair.tied:
+            given = ["tied"] if "tied" in contact.pairs[name].model_fields_set else []
+            yield ("contact", "pairs", name, *given), f"pair '{first}' has the same slave: both need the same 'tied'"
         if pair.itself is None and slave.body == master.body and set(slave.on or ()) & set(master.on or ()):
             message = "a surface that may touch itself is not a slave and a master: write 'self: {body, on}'"
             yield ("contact", "pairs", name, "master"), message
@@ -163,7 +213,7 @@ def _contact(case: Case, contact: ContactSection) -> Iterator[Mistake]:
 def _side(case: Case, contact: ContactSection, side: Side, keys: Keys) -> Iterator[Mistake]:
     bodies = case.elastic_bodies
     if side.body is None:
-        rigid = [*contact.obstacles, *([] if case.fluid is None else case.fluid.bodies)]
+        rigid = dict.fromkeys([*contact.obstacles, *case.rigid_surfaces])
         if side.obstacle not in rigid:
             hint = did_you_mean(side.obstacle or "", rigid)
             yield (*keys, "obstacle"), f"unknown obstacle '{side.obstacle}'{hint}"

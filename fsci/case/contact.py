@@ -2,21 +2,39 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import model_validator
+from pydantic import Discriminator, Tag, model_validator
 
+from fsci.case.fluid import Movement
+from fsci.case.free_body import FreeMotion
 from fsci.case.mesh import Mesh
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import Name, NotNegative, Positive, Surfaces, SwitchOrNotNegative, TimeFormula, Vector
+from fsci.case.values import (
+    Name,
+    NotNegative,
+    OrNone,
+    Positive,
+    Share,
+    Surfaces,
+    SwitchOrNotNegative,
+    TimeFormula,
+    Vector,
+)
+
+#: Displacement by components, or a rigid motion.
+ObstacleMotion = Annotated[
+    Annotated[Movement, Tag("rigid motion")] | Annotated[Vector, Tag("displacement")],
+    Discriminator(lambda value: "rigid motion" if isinstance(value, dict | Movement) else "displacement"),
+]
 
 
 class Side(Section):
-    """A surface of a body, or an obstacle, which may be a rigid body in the flow."""
+    """A surface of a body, or an obstacle, which may be a rigid body."""
 
     body: Name | None = setting(None, "name of the body")
     on: Surfaces | None = setting(None, "name of its surface, or list of names that are one surface together")
-    obstacle: Name | None = setting(None, "name of the obstacle, or of a rigid body of the flow")
+    obstacle: Name | None = setting(None, "name of the obstacle, or of a rigid body")
 
     @model_validator(mode="after")
     def _one_kind(self) -> Side:
@@ -63,7 +81,9 @@ class PairSection(Section):
         "segments", "segments: exact on each overlap of two facets; elements: fixed points on each slave facet, faster"
     )
 
-    friction: Friction = setting(Friction, "friction law; default: none")
+    friction: Annotated[Friction | None, OrNone(Friction())] = setting(
+        None, "friction law, or none; default: that of 'contact'"
+    )
     interference: TimeFormula | None = setting(
         None,
         "overlap of the bodies that their meshes do not show, as of a press fit: contact holds the surfaces of the"
@@ -82,9 +102,9 @@ class PairSection(Section):
         """Name of its law, of a file in solvers/contact/law/."""
         if self.tied:
             return "tied"
-        if self.friction.coefficient is not None:
-            return "coulomb"
-        return "frictionless" if self.friction.bound is None else "tresca"
+        if self.friction is None or not self.friction.some:
+            return "frictionless"
+        return "tresca" if self.friction.coefficient is None else "coulomb"
 
     @property
     def moves_nodes(self) -> bool:
@@ -94,7 +114,7 @@ class PairSection(Section):
     @property
     def law_parameters(self) -> tuple[float, ...]:
         """The arguments of the law."""
-        given = () if self.tied else (self.friction.coefficient, self.friction.bound)
+        given = () if self.tied or self.friction is None else (self.friction.coefficient, self.friction.bound)
         return tuple(value for value in given if value is not None)
 
     @property
@@ -117,7 +137,7 @@ class PairSection(Section):
         where, slave = self.sides[0]
         if slave.obstacle is not None:
             raise fault("the slave must be a surface of a body: make the obstacle the master", where)
-        if self.tied and self.friction.some:
+        if self.tied and self.friction is not None and self.friction.some:
             raise fault("tied surfaces do not slide: remove 'friction' or 'tied'", "friction")
         if self.tied and self.interference is not None:
             raise fault("tied surfaces stay where they are: remove 'interference' or 'tied'", "interference")
@@ -130,11 +150,22 @@ class PairSection(Section):
 
 
 class ObstacleSection(Section):
-    """A rigid surface, at rest or moved as a whole."""
+    """A rigid surface, at rest, moved as given, or free: a tool on which given forces act."""
 
     mesh: Mesh = setting(..., "mesh file or built-in shape that has the surface")
     on: Surfaces = setting(..., "name of the surface, or list of names that are one surface together")
-    motion: Vector | None = setting(None, "displacement; default: at rest", unit="m")
+    motion: ObstacleMotion | None = setting(
+        None, "displacement, or a rigid motion with its rotation; default: at rest", unit="m"
+    )
+    free: FreeMotion | None = setting(
+        None, "instead of 'motion': the solid in the mesh moves under its weight, contact, springs and 'loads'"
+    )
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> ObstacleSection:
+        if self.motion is not None and self.free is not None:
+            raise fault("give either 'motion' or 'free', not both", "free")
+        return self
 
 
 class FilmSection(Section):
@@ -198,7 +229,16 @@ class ContactSection(Section):
         "all, or names of elastic bodies: the program finds the pairs of their surfaces, also with rigid "
         "bodies and obstacles",
     )
-    friction: Friction = setting(Friction, "friction law of the pairs that 'bodies' finds")
+    friction: Annotated[Friction | None, OrNone(Friction())] = setting(
+        None,
+        "friction law of all pairs without one of their own, also of those that 'bodies' finds and of free rigid bodies"
+        " with each other, with bodies of given motion and with walls; default: none",
+    )
+    restitution: Share = setting(
+        0.0,
+        "of free rigid bodies: speed away from each other after an impact over that towards each other before",
+        unit="1",
+    )
     reach: Positive | None = setting(
         None,
         "largest distance of two surfaces at the start that 'bodies' makes a pair; default: any",
@@ -209,3 +249,14 @@ class ContactSection(Section):
         FilmSection, "rough or porous layer on the surfaces, through which fluid passes; default: none"
     )
     c_n: Positive = setting(1.0, "factor of the complementarity parameter; the result does not depend on it", unit="1")
+
+    @property
+    def complete_pairs(self) -> dict[str, PairSection]:
+        """The pairs by name, each with its friction: its own, or that of the section; tied surfaces have none."""
+        default = self.friction or Friction()
+        return {
+            name: pair.model_copy(update={"friction": Friction() if pair.tied else default})
+            if pair.friction is None
+            else pair
+            for name, pair in self.pairs.items()
+        }

@@ -9,7 +9,7 @@ from fsci.case.coupling import Coupling
 from fsci.case.errors import did_you_mean, listed
 from fsci.case.mesh_checks import Mistake, surface_mistakes
 from fsci.case.yaml_text import Keys
-from solvers.fluid.boundary.patch_kinds import PATCH_KINDS
+from solvers.fluid.terms.boundary.patch_kinds import PATCH_KINDS
 
 
 def coupling_mistakes(case: Case, coupling: Coupling) -> Iterator[Mistake]:

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, PrivateAttr, ValidationInfo, model_validator
 
-from fsci.case.errors import distinct
 from fsci.case.plain_file import Unreadable, read_file
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import EntryCount, Name, Number, Switch, Text
-from fsci.expression import RESERVED
+from fsci.distinct import distinct
+from fsci.expression import RESERVED_WORDS
 
 #: Size [bytes] of a file of points. It has a million of them, more than a run has time steps, and is read in a second.
-MOST_BYTES = 30_000_000
+MOST_BYTES_OF_CURVE = 30_000_000
 
 Array = NDArray[np.float64]
 Point = Annotated[tuple[Number, ...], EntryCount(2, 2)]
@@ -85,7 +85,7 @@ def _not_later(points: Array) -> tuple[float, float] | None:
 
 def _read_csv(folder: Path, name: str) -> Array:
     try:
-        raw = read_file(folder / name, MOST_BYTES)
+        raw = read_file(folder / name, MOST_BYTES_OF_CURVE)
         lines = raw.decode("utf-8-sig").splitlines()
     except Unreadable as error:
         raise fault(f": '{name}' {error}", "csv") from None
@@ -136,7 +136,7 @@ def _is_number(word: str) -> bool:
 
 
 def _callable(name: str) -> str:
-    if name in RESERVED:
+    if name in RESERVED_WORDS:
         raise fault(f"must be another name: '{name}' is built into expressions")
     if "-" in name:
         raise fault(f"must be a name without '-', which means minus in expressions, not '{name}'")

@@ -135,13 +135,13 @@ def _written(yaml: Any, data: Any) -> str:
 
 
 #: Size [bytes] of a case file: the reader takes a minute for more.
-MOST_BYTES = 1_000_000
+MOST_BYTES_OF_CASE = 1_000_000
 
 
 def read_document(path: Path) -> Document:
     """Read a case file; raises CaseError."""
     try:
-        raw = read_file(path, MOST_BYTES)
+        raw = read_file(path, MOST_BYTES_OF_CASE)
         text = raw.decode("utf-8-sig").replace("\r\n", "\n")
     except Unreadable as error:
         raise CaseError([Problem(Place(str(path)), str(error))]) from None

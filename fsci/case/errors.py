@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-WIDTH = 200  #: characters of a line that a message shows, those around the column
+SHOWN_WIDTH = 200  #: characters of a line that a message shows, those around the column
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class Problem:
         first = f"{self.place}: {message}"
         if not self.line:
             return first
-        start = max(0, min(self.place.column - 1 - WIDTH // 2, len(self.line) - WIDTH))
-        line, column = self.line[start : start + WIDTH], self.place.column - 1 - start
+        start = max(0, min(self.place.column - 1 - SHOWN_WIDTH // 2, len(self.line) - SHOWN_WIDTH))
+        line, column = self.line[start : start + SHOWN_WIDTH], self.place.column - 1 - start
         # tabs before the caret stay tabs, so that it stands below its column
         before = "".join(c if c == "\t" else " " for c in line[:column])
         return f"{first}\n  {line}\n  {before.ljust(column)}^"
@@ -59,12 +59,6 @@ def did_you_mean(word: str, options: Iterable[str]) -> str:
     if close := get_close_matches(word.lower(), lower, n=1):
         return f"; did you mean '{lower[close[0]]}'?"
     return f" (available: {', '.join(names) or 'none'})"
-
-
-def distinct(a: float, b: float) -> tuple[str, str]:
-    """Two numbers in as few digits as tell them apart, six at least."""
-    pairs = ((f"{a:.{digits}g}", f"{b:.{digits}g}") for digits in range(6, 18))
-    return next((pair for pair in pairs if pair[0] != pair[1] or a == b), (repr(a), repr(b)))
 
 
 def listed(words: Sequence[str], last: str = "or") -> str:

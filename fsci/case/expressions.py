@@ -18,7 +18,8 @@ from fsci.expression import Expression
 
 Array = NDArray[np.float64]
 
-#: Times at which formulas of time alone are evaluated, and those of position and time: steps of a run, evenly chosen.
+#: Times at which formulas and motions in time alone are evaluated, and formulas of position and time: steps of a run,
+#: evenly chosen.
 MOST_TIMES, FEW_TIMES = 20_000, 20
 #: Points of a face of the box at which its formulas are evaluated.
 MOST_POINTS = 10_000

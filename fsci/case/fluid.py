@@ -27,11 +27,10 @@ from fsci.case.values import (
     TimeVector,
     Vector,
 )
-from solvers.fluid.boundary.patch_kinds import PATCH_KINDS
+from solvers.fluid.terms.boundary.patch_kinds import PATCH_KINDS
 
-FACES = ("x-", "x+", "y-", "y+", "z-", "z+")
 Face = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
-KINDS = tuple(PATCH_KINDS)
+KINDS_OF_PATCH = tuple(PATCH_KINDS)
 
 
 class PatchSection(Section):
@@ -65,8 +64,8 @@ class PatchSection(Section):
 
     @model_validator(mode="after")
     def _one_kind(self) -> PatchSection:
-        given = [kind for kind in KINDS if getattr(self, kind) not in (None, False)]
-        words = listed(KINDS)
+        given = [kind for kind in KINDS_OF_PATCH if getattr(self, kind) not in (None, False)]
+        words = listed(KINDS_OF_PATCH)
         if not given:
             raise fault(f"a patch needs one of {words}")
         if len(given) > 1:
@@ -86,7 +85,7 @@ class PatchSection(Section):
     @property
     def kind(self) -> str:
         """The name of its condition in `PATCH_KINDS`."""
-        return next(kind for kind in KINDS if getattr(self, kind) not in (None, False))
+        return next(kind for kind in KINDS_OF_PATCH if getattr(self, kind) not in (None, False))
 
     @property
     def value(self) -> tuple[Any, ...] | None:
@@ -204,8 +203,9 @@ class FluidSection(Section):
 
     @property
     def free_bodies(self) -> dict[str, Free]:
-        """Bodies that move freely in the flow."""
-        return {name: body.free for name, body in self.bodies.items() if body.free is not None}
+        """Bodies that move freely in the flow, with its gravity where they have none of their own."""
+        found = {name: body.free for name, body in self.bodies.items() if body.free is not None}
+        return {name: free.with_gravity(self.gravity) for name, free in found.items()}
 
     @property
     def dofs(self) -> int:

@@ -8,10 +8,12 @@ import numpy as np
 
 from fsci.case.case import Case
 from fsci.case.errors import did_you_mean, listed
-from fsci.case.fluid import FACES, FluidSection, RigidBodySection
-from fsci.case.free_body import HELD, PLANE, Free
+from fsci.case.fluid import FluidSection, Movement, RigidBodySection
+from fsci.case.free_body import Free
+from fsci.case.free_checks import free_mistakes
 from fsci.case.mesh_checks import Mistake, axis_mistakes, length_mistakes, mesh_mistakes, surface_mistakes
 from fsci.case.yaml_text import Keys
+from solvers.fluid.grid.box import FACES
 
 
 def fluid_mistakes(case: Case, fluid: FluidSection) -> Iterator[Mistake]:
@@ -98,48 +100,22 @@ def _free(case: Case, fluid: FluidSection, free: Free, keys: Keys) -> Iterator[M
     dimension = fluid.grid.dimension
     if case.coupling is None:
         yield keys, "a free body needs the section 'coupling'; 'coupling: {}' for its defaults"
-    if case.structure is not None:
-        yield keys, "a case has either free rigid bodies or elastic ones: make this one elastic, or give it a 'motion'"
     if fluid.scheme == "steady":
         yield keys, "a free body needs a time-dependent flow: choose the scheme bdf2"
-    for name in ("gravity", "initial_velocity"):
-        yield from length_mistakes(getattr(free, name), dimension, (*keys, name))
-    for i, spring in enumerate(free.springs):
-        for name in ("at", "stiffness"):
-            yield from length_mistakes(getattr(spring, name), dimension, (*keys, "springs", i, name))
-    for i, way in enumerate(free.held):
-        if dimension == 2 and way not in PLANE:
-            yield (*keys, "held", i), f"a body in 2D has no degree of freedom '{way}'; choose {listed(PLANE)}"
-    spins = 1 if dimension == 2 else 3
-    if free.initial_spin is not None and len(free.initial_spin) != spins:
-        wanted = "1 entry" if spins == 1 else f"{spins} entries"
-        given = len(free.initial_spin)
-        yield (*keys, "initial_spin"), f"'initial_spin' must have {wanted} in {dimension}D, not {given}"
-    else:
-        yield from _held_but_moving(free, dimension, keys)
-
-
-def _held_but_moving(free: Free, dimension: int, keys: Keys) -> Iterator[Mistake]:
-    """A body does not begin to move in a way that is held."""
-    held = {way for word in free.held for way in HELD[word]}
-    turns = ("rotation_z",) if dimension == 2 else HELD["rotation"]
-    starts = (("initial_velocity", "xyz", free.initial_velocity), ("initial_spin", turns, free.initial_spin))
-    for setting, ways, values in starts:
-        for i, (way, value) in enumerate(zip(ways, values or (), strict=False)):
-            if way in held and value != 0.0:
-                word = next(word for word in free.held if way in HELD[word])
-                yield (
-                    (*keys, setting, i),
-                    f"the body begins to move in a way that is held: remove '{word}' from 'held', or give 0 here",
-                )
+    yield from free_mistakes(free, dimension, case.rigid or (), keys)
 
 
 def _motion(fluid: FluidSection, body: RigidBodySection, keys: Keys) -> Iterator[Mistake]:
     if body.motion is None:
         return
-    dimension, keys = fluid.grid.dimension, (*keys, "motion")
+    yield from movement_mistakes(body.motion, fluid.grid.dimension, (*keys, "motion"))
+
+
+def movement_mistakes(movement: Movement, dimension: int | None, keys: Keys) -> Iterator[Mistake]:
+    """Vectors of a rigid motion, and its axis, do not fit the dimension; None: it is not known."""
     for name in ("displacement", "velocity"):
-        yield from length_mistakes(getattr(body.motion, name), dimension, (*keys, name))
-    if body.motion.rotation is not None:
-        yield from axis_mistakes(body.motion.rotation.axis, dimension, (*keys, "rotation"))
-        yield from length_mistakes(body.motion.rotation.centre, dimension, (*keys, "rotation", "centre"))
+        yield from length_mistakes(getattr(movement, name), dimension, (*keys, name))
+    if movement.rotation is not None:
+        if dimension is not None:
+            yield from axis_mistakes(movement.rotation.axis, dimension, (*keys, "rotation"))
+        yield from length_mistakes(movement.rotation.centre, dimension, (*keys, "rotation", "centre"))

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from fsci.case.errors import distinct
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import Count, EntryCount, Name, Number, NumberVector, Positive
+from fsci.distinct import distinct
 
-MOST_CELLS = 100_000  #: along one direction
+MOST_CELLS_ALONG = 100_000  #: along one direction
 MOST_GROWTH = 1e6  #: of cells within a stretch
 MOST_LEVELS = 10  #: of cells in cells
 MOST_FINE = 10**8  #: cells of the finest level in the whole box: there are arrays of that size
@@ -135,8 +135,8 @@ class GridSection(Section):
                 raise fault(words, "to", axis)
             self._check_direction(axis)
         for axis, (count, name) in enumerate(zip(self.shape, "xyz", strict=False)):
-            if count > MOST_CELLS:
-                raise fault(f"{count} cells along {name} are too many: {MOST_CELLS} are the most")
+            if count > MOST_CELLS_ALONG:
+                raise fault(f"{count} cells along {name} are too many: {MOST_CELLS_ALONG} are the most")
             if not np.all(np.diff(self.edges(axis)) > 0.0):
                 raise fault(f"the cells along {name} are smaller than rounding errors of their coordinates")
         self._check_refinements()

@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.case.case import Case
-from fsci.case.expressions import expressions, run_times
+from fsci.case.expressions import MOST_TIMES, expressions, run_times
 from fsci.case.messages import subject
 from fsci.case.yaml_text import Keys
 from fsci.expression import Expression
 
 Array = NDArray[np.float64]
 
-#: Times at which a motion is sampled, and those in a step if there are fewer steps.
-MOST_TIMES, PER_STEP = 20_000, 8
+#: Times in a step at which a motion is sampled, if the run has few steps.
+PER_STEP = 8
 
 #: Halvings of an interval between two samples, as far as the numbers allow it.
-HALVINGS = 48
+HALVED = 48
 
 
 def find_jump(formula: Callable[[Array], Array], times: Array) -> tuple[float, float] | None:
@@ -32,8 +32,8 @@ def find_jump(formula: Callable[[Array], Array], times: Array) -> tuple[float, f
     first, last = formula(begin), formula(end)
     earlier = np.abs(last - first)
     # where the numbers end, so do the halvings
-    possible = np.floor(np.log2((end - begin) / np.spacing(np.maximum(np.abs(begin), np.abs(end))))).clip(0, HALVINGS)
-    for count in range(HALVINGS):
+    possible = np.floor(np.log2((end - begin) / np.spacing(np.maximum(np.abs(begin), np.abs(end))))).clip(0, HALVED)
+    for count in range(HALVED):
         earlier = np.where(count == possible // 2, np.abs(last - first), earlier)
         middle = 0.5 * (begin + end)
         at = formula(middle)

@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from fsci.case.errors import distinct
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import NotNegativeFormula, PoissonFormula, PositiveFormula, SpaceFormula, chosen, value_of
+from fsci.distinct import distinct
 from fsci.expression import Expression
 from solvers.structure import elastic_constants as constants
 from solvers.values import Value, combine
@@ -106,3 +106,9 @@ def has_mass(material: ElasticSection | MooneyRivlinSection) -> bool:
 
 LAWS = ("st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke", "mooney_rivlin")
 Material = Annotated[ElasticSection | MooneyRivlinSection, Field(discriminator="law"), chosen("law", LAWS)]
+
+#: Section -> an example of it.
+MATERIAL_EXAMPLES = {
+    "Elastic": "material: {law: neo_hooke, E: 4000, nu: 0.4, density: 1000}",
+    "MooneyRivlin": "material: {law: mooney_rivlin, c10: 3e5, c01: 1e5, bulk: 5e8, density: 1100}",
+}

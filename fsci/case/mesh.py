@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
 from fsci.case.section import fault, setting
-from fsci.case.shapes import PlacedMesh, Shape
-from fsci.case.values import Name, Number, Order, Text, chosen, describe_value
+from fsci.case.shapes import AnyShape, PlacedMesh
+from fsci.case.values import CountOrZero, Name, Number, Order, Positive, Text, chosen, describe_value
+from fsci.shapes import SHAPES
 
 
 class FileMesh(PlacedMesh):
@@ -22,9 +23,15 @@ class FileMesh(PlacedMesh):
     file: Text = setting(..., "path of the file, relative to the case file")
     order: Order = setting(1, "polynomial order of the cells (.geo only; other files have theirs)")
     parameters: dict[Name, Number] = setting(dict, "values for the script's DefineConstant names (.geo only)")
-
-
-SHAPES = [name for shape in get_args(Shape) for name in get_args(shape.model_fields["shape"].annotation)]
+    size_factor: Positive = setting(
+        1.0,
+        "edges of cells are so many times as long as the script says, also along transfinite curves; layers of "
+        "extrusions stay (.geo only)",
+        unit="1",
+    )
+    refine: CountOrZero = setting(
+        0, "how often edges are halved, so that each cell becomes four, in 3D eight; the surface stays what it is"
+    )
 
 
 def _file_or_shape(value: Any) -> Any:
@@ -40,7 +47,7 @@ def _file_or_shape(value: Any) -> Any:
 # The tags are no names of settings, so that an error's path cannot be misread.
 Mesh = Annotated[
     Annotated[FileMesh, Tag("mesh file")]
-    | Annotated[Shape, Field(discriminator="shape"), chosen("shape", SHAPES), Tag("built-in mesh")],
+    | Annotated[AnyShape, Field(discriminator="shape"), chosen("shape", list(SHAPES)), Tag("built-in mesh")],
     Discriminator(lambda value: "mesh file" if "file" in value else "built-in mesh"),
     BeforeValidator(_file_or_shape),
 ]

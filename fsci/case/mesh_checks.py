@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fsci.case.errors import did_you_mean
 from fsci.case.mesh import FileMesh, Mesh
-from fsci.case.shapes import Shape
+from fsci.case.shapes import ShapeSection
 from fsci.case.yaml_text import Keys
 
 Mistake = tuple[Keys, str]  #: path of the setting, message
@@ -17,11 +17,13 @@ def mesh_mistakes(
     mesh: Mesh, dimension: int | None, folder: Path, keys: Keys, other: str = "another body"
 ) -> Iterator[Mistake]:
     """Mistakes in the dimension of the mesh of a body; other: the part of the case that has the right one."""
-    if isinstance(mesh, Shape):
-        if mesh.dimension != dimension:
-            yield (*keys, "shape"), f"this shape is {mesh.dimension}D, but {other} is {dimension}D"
+    if isinstance(mesh, ShapeSection):
+        if mesh.plan.dimension != dimension:
+            yield (*keys, "shape"), f"this shape is {mesh.plan.dimension}D, but {other} is {dimension}D"
     else:
         yield from _file(mesh, folder, keys)
+    if mesh.mirror == "z" and dimension == 2:
+        yield (*keys, "mirror"), "'mirror' must be x or y in 2D"
     for i, rotation in enumerate(mesh.rotate):
         yield from axis_mistakes(rotation.axis, dimension, (*keys, "rotate", i))
     if mesh.translate is not None:
@@ -40,11 +42,11 @@ def axis_mistakes(axis: tuple[float, ...] | None, dimension: int | None, keys: K
 
 def surface_mistakes(mesh: Mesh, name: str, keys: Keys) -> Iterator[Mistake]:
     """Mistakes in the names of surfaces of built-in shapes."""
-    if isinstance(mesh, Shape) and name not in mesh.surfaces:
-        there = ", ".join(mesh.surfaces)
-        hint = did_you_mean(name, mesh.surfaces)
+    if isinstance(mesh, ShapeSection) and name not in (surfaces := mesh.plan.surfaces):
+        there = ", ".join(surfaces)
+        hint = did_you_mean(name, surfaces)
         hint = f"{hint} (available: {there})" if hint.startswith(";") else hint
-        yield keys, f"'{mesh.shape}' has no surface '{name}'{hint}"  # type: ignore[attr-defined]
+        yield keys, f"'{mesh.shape}' has no surface '{name}'{hint}"
 
 
 def surfaces_mistakes(mesh: Mesh, names: Sequence[str], keys: Keys) -> Iterator[Mistake]:

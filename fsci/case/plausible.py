@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fsci.case.case import Case
-from fsci.case.errors import distinct
 from fsci.case.jumps import jump_warnings
 from fsci.case.material import Material
 from fsci.case.mesh import FileMesh
 from fsci.case.plausible_flow import flow_warnings, in_si
-from fsci.case.shapes import Shape
+from fsci.case.plausible_gravity import gravity_warnings
+from fsci.case.shapes import ShapeSection
 from fsci.case.structure import BodySection
 from fsci.case.yaml_text import Keys
+from fsci.distinct import distinct
 from solvers.structure.elastic_constants import poisson, young
 
-DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from aerogel to osmium, with a margin
+SOLID_DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from aerogel to osmium, with a margin
 STIFFNESSES = (1.0, 2e12)  #: [Pa] Young's modulus from the softest gel to diamond, with a margin
 
 #: Poisson's ratio from which on the error of first-order cells in bending is more than twice that at 0.3.
@@ -32,11 +33,19 @@ def warnings(case: Case) -> Iterator[tuple[Keys, str]]:
         keys: Keys = ("structure", "bodies", name)
         yield from _material(case, body.material, (*keys, "material"))
         yield from _locking(body, (*keys, "mesh"))
-        if isinstance(body.mesh, Shape) and (ratio := body.mesh.aspect) > 50:
+        if isinstance(body.mesh, ShapeSection) and (ratio := body.mesh.plan.aspect) > 50:
             yield (*keys, "mesh", "cells"), f"the cells are {ratio:.0f} times longer than wide"
     yield from jump_warnings(case)
+    if case.rigid is not None and case.contact is not None and case.contact.friction is not None:
+        if case.contact.friction.bound is not None:
+            yield (
+                ("contact", "friction"),
+                "free rigid bodies touch each other, bodies of given motion and walls without friction: "
+                "a bound of tractions needs elastic surfaces; give a 'coefficient'",
+            )
     if case.fluid is not None:
         yield from flow_warnings(case, case.fluid)
+        yield from gravity_warnings(case, case.fluid)
 
 
 def _locking(body: BodySection, keys: Keys) -> Iterator[tuple[Keys, str]]:
@@ -46,7 +55,7 @@ def _locking(body: BodySection, keys: Keys) -> Iterator[tuple[Keys, str]]:
     nu = poisson(*constants)
     if nu < LOCKING:
         return
-    simplices = isinstance(body.mesh, Shape) and body.mesh.cell in ("tri", "tet")
+    simplices = isinstance(body.mesh, ShapeSection) and body.mesh.cell in ("tri", "tet")
     remedy = "'order: 2'" if simplices else "'element: mixed' or 'order: 2'"
     yield keys, f"first-order cells lock for nearly incompressible material (nu = {nu:.4g}); take {remedy}"
 
@@ -58,7 +67,7 @@ def _order_from_file(mesh: object) -> bool:
 def _material(case: Case, material: Material, keys: Keys) -> Iterator[tuple[Keys, str]]:
     units = case.units
     density = None if material.density is None else material.density.constant
-    if density and not DENSITIES[0] <= density * units.density <= DENSITIES[1]:
+    if density and not SOLID_DENSITIES[0] <= density * units.density <= SOLID_DENSITIES[1]:
         value = in_si(density, units.density, f"{units.mass}/{units.length}^3", "kg/m^3")
         yield (*keys, "density"), f"implausible density: {value}; check 'units'"
     constants = _constants(material)

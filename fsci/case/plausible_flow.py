@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from fsci.case.case import Case
 from fsci.case.fluid import FluidSection, Movement, PatchSection
 from fsci.case.rigid_motion import rigid_motion
-from fsci.case.shapes import Shape
+from fsci.case.shapes import ShapeSection
 from fsci.case.yaml_text import Keys
-from solvers.fluid.bodies.fast_bodies import MOST_CELLS
-from solvers.fluid.thin.thickness import free_length
+from solvers.fluid.geometry.thin.thickness import free_length
+from solvers.fluid.surfaces.fast_bodies import MOST_CELLS_PASSED
 
 MOST_CELLS_PER_STEP = 10.0  #: above which `check` warns: cells that a flow or a body crosses in a time step
 #: Cells across a body that both of its sides need to share no unknowns: with fewer, fluid passes through the body.
@@ -28,13 +28,13 @@ NO_SLIP_IN_THE_LAYER = (
 )
 #: Thicknesses of a boundary layer, L / sqrt(Re), in the smallest cell above which `check` warns.
 MOST_LAYERS_PER_CELL = 10.0
-DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
+FLOW_DENSITIES = (1e-2, 3e4)  #: [kg/m^3] from thin gas to heavy liquid metal, with a margin
 
 
 def flow_warnings(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
     """Paths of settings with a warning about each."""
     density = fluid.density * case.units.density
-    if not DENSITIES[0] <= density <= DENSITIES[1]:
+    if not FLOW_DENSITIES[0] <= density <= FLOW_DENSITIES[1]:
         value = in_si(fluid.density, case.units.density, f"{case.units.mass}/{case.units.length}^3", "kg/m^3")
         yield ("fluid", "density"), f"implausible density: {value}; check 'units'"
     else:
@@ -82,11 +82,11 @@ def fast_body(case: Case, fluid: FluidSection, motion: Movement, points: NDArray
         (before, _), (after, velocity) = moved(t), moved(t + time.step)
         ways = np.maximum(np.abs(after - before), np.abs(velocity) * time.step)
         cells = max(cells, float((ways / smallest).max()))
-    if cells <= MOST_CELLS * (1.0 + 1e-9):
+    if cells <= MOST_CELLS_PASSED * (1.0 + 1e-9):
         return None
     return (
         f"the body crosses {cells:.2g} cells in a time step: forces are inaccurate; "
-        f"a 'step' below {MOST_CELLS * time.step / cells:.2g} keeps it below {MOST_CELLS:g} cells"
+        f"a 'step' below {MOST_CELLS_PASSED * time.step / cells:.2g} keeps it below {MOST_CELLS_PASSED:g} cells"
     )
 
 
@@ -97,10 +97,10 @@ def _thin_bodies(case: Case, fluid: FluidSection) -> Iterator[tuple[Keys, str]]:
     elastic = {("structure", "bodies", name): (body.mesh, True) for name, body in case.elastic_bodies.items()}
     one_sided = set(case.coupling.dry_side) if case.coupling is not None else set()
     for (section, kind, name), (mesh, moves) in (moving | elastic).items():
-        if not isinstance(mesh, Shape) or name in one_sided:
+        if not isinstance(mesh, ShapeSection) or name in one_sided:
             continue
-        length = sorted(mesh.extents)[-1 if fluid.grid.dimension == 2 else -2]
-        if warning := thin_body(case, fluid, mesh.thickness, length, moves=moves):
+        length = sorted(mesh.plan.extents)[-1 if fluid.grid.dimension == 2 else -2]
+        if warning := thin_body(case, fluid, mesh.plan.thickness, length, moves=moves):
             yield (section, kind, name, "mesh"), warning
 
 

@@ -9,7 +9,7 @@ from fsci.case.errors import did_you_mean, listed
 from fsci.case.fluid import FluidSection
 from fsci.case.material import has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, surface_mistakes
-from fsci.case.probes import RESERVED, Probe, Reference
+from fsci.case.probes import RESERVED_COLUMNS, Probe, Reference
 from fsci.case.structure import StructureSection
 from fsci.case.verify import (
     BODY_COLUMN,
@@ -41,7 +41,7 @@ def probe_mistakes(case: Case) -> Iterator[Mistake]:
     """Mistakes in all probes."""
     for name, probe in case.probes.items():
         keys: Keys = ("probes", name)
-        if set(probe.columns(name, 3)) & set(RESERVED):
+        if set(probe.columns(name, 3)) & set(RESERVED_COLUMNS):
             yield keys, f"a probe cannot be called '{name}': history.csv has a column of this name"
         yield from length_mistakes(probe.at, case.dimension, (*keys, "at"))
         pairs = {} if case.contact is None else case.contact.pairs
@@ -148,12 +148,16 @@ def verify_mistakes(case: Case) -> Iterator[Mistake]:
         columns.append(BODY_COLUMN)
     if case.coupling is not None:
         columns += COUPLING_COLUMNS
+    if case.rigid is not None and not case.contact_off:
+        columns += [f"contact.on_{name}.{axis}" for name in case.rigid for axis in "xyz"[: case.dimension or 3]]
+        columns.append(CONTACT_COLUMNS[0])
     if case.contact is not None:
         columns += [f"contact.{name}.{axis}" for name in case.contact.pairs for axis in "xyz"[: case.dimension or 3]]
         columns += CONTACT_COLUMNS
         columns += [SEEPAGE_COLUMN] if case.contact.film.closed == "seeping" else []
-        if any(pair.friction.some for pair in case.contact.pairs.values()):
+        if any(pair.law in ("coulomb", "tresca") for pair in case.contact.complete_pairs.values()):
             columns += FRICTION_COLUMNS
+    columns += _of_walls(case)
     for i, check in enumerate(case.verify):
         keys: Keys = ("verify", i)
         found_later = case.contact is not None and case.contact.bodies is not None and check.value[:8] == "contact."
@@ -164,3 +168,16 @@ def verify_mistakes(case: Case) -> Iterator[Mistake]:
         if check.start is not None and not case.time.start <= check.start < case.time.end:
             span = f"{case.time.start:g} to {case.time.end:g}"
             yield (*keys, "from"), f"'from' must be a time of the run, {span}, not {check.start:g}"
+
+
+def _of_walls(case: Case) -> list[str]:
+    """Columns of elastic bodies that meet faces of the box, whichever of them may."""
+    if case.fluid is None or case.coupling is None or case.contact_off or not case.elastic_bodies:
+        return []
+    faces = [(name, face) for name, patch in case.fluid.patches.items() for face in patch.on]
+    names = [f"{name}_{face[0]}_{'low' if face[1] == '-' else 'high'}" for name, face in faces]
+    axes = "xyz"[: case.fluid.grid.dimension]
+    return [
+        *CONTACT_COLUMNS,
+        *(f"contact.{body}_{name}.{axis}" for body in case.elastic_bodies for name in names for axis in axes),
+    ]

@@ -11,7 +11,7 @@ from fsci.case.section import Section, fault, setting
 from fsci.case.values import Name, NumberVector, Positive, Text
 
 #: columns of history.csv that cannot be names of probes
-RESERVED = ("step", "time", "dt", "iterations", "wall", "residual")
+RESERVED_COLUMNS = ("step", "time", "dt", "iterations", "wall", "residual")
 
 if TYPE_CHECKING:
     QuantityName: TypeAlias = str
@@ -42,7 +42,7 @@ Of the structure, points being those of the reference configuration:
 
 Of a pair of contact it is the `extreme` of all slave nodes, or the value of the node nearest to the point `at`.
 
-Of a rigid `body` that the flow moves, points being those of the start:
+Of a free rigid `body`, points being those of the start:
 
 {described("rigid")}
 

@@ -31,7 +31,7 @@ class Quantity:
     fluid: tuple[str, ...] = ()  #: settings of locations in a fluid
     needs: tuple[str, ...] = ()  #: of a structure dynamics or density; of a fluid body or reference
     meaning: str = ""  #: explanation for the input reference
-    rigid: tuple[str, ...] = ()  #: settings of locations on a rigid body that the flow moves
+    rigid: tuple[str, ...] = ()  #: settings of locations on a free rigid body
 
     def locations(self, field: Field) -> tuple[str, ...]:
         """The settings of its locations in a field."""
@@ -47,7 +47,7 @@ class Quantity:
 
 
 _LENGTH, _SPEED, _FORCE, _ENERGY, _STRESS = (1, 0, 0), (1, 0, -1), (1, 1, -2), (2, 1, -2), (-1, 1, -2)
-_ALL = (
+_QUANTITIES = (
     Quantity(
         "displacement", _LENGTH, "vector", ("at", "on"), meaning="of a surface the mean over its area", rigid=("at",)
     ),
@@ -92,7 +92,7 @@ _ALL = (
     Quantity("kinetic_energy", _ENERGY, "one", (), (WHOLE,), meaning="of all fluid"),
     Quantity("dissipation", (2, 1, -3), "one", (), (WHOLE,), meaning="power of the viscous stress in all fluid"),
 )
-QUANTITIES = {quantity.name: quantity for quantity in _ALL}
+QUANTITIES = {quantity.name: quantity for quantity in _QUANTITIES}
 
 
 def described(field: Field) -> str:
@@ -109,7 +109,7 @@ def _lines(field: Field) -> Iterator[str]:
         WHOLE: "with none of them, of the whole",
     }
     for place, beginning in words.items():
-        there = [q for q in _ALL if place in q.locations(field)]
+        there = [q for q in _QUANTITIES if place in q.locations(field)]
         if there:
             listed = ", ".join(q.name + (f" ({q.meaning})" if q.meaning else "") for q in there)
             yield f"- {beginning}: {listed}"

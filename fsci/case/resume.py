@@ -8,7 +8,7 @@ from typing import Any
 
 from fsci.case.case import Case
 from fsci.case.errors import CaseError, Place, Problem
-from fsci.case.fluid import KINDS
+from fsci.case.fluid import KINDS_OF_PATCH
 from fsci.case.settings import Settings, differences, in_words, settings_of
 
 Keys = tuple[str | int, ...]
@@ -31,10 +31,15 @@ CHANGEABLE = (
         )
     ),
     *(f"fluid.{name}" for name in ("density", "viscosity", "gravity", "body_force", "dynamics")),
-    *(f"fluid.patches.*.{kind}" for kind in KINDS if kind != "periodic"),
+    *(f"fluid.patches.*.{kind}" for kind in KINDS_OF_PATCH if kind != "periodic"),
     *(f"fluid.bodies.*.{name}" for name in ("motion", "slip_length")),
-    *(f"fluid.bodies.*.free.{name}" for name in ("density", "gravity", "springs", "held")),
-    *(f"contact.{name}" for name in ("friction", "obstacles.*.motion", "c_n")),
+    *(
+        f"{body}.{name}"
+        for body in ("fluid.bodies.*.free", "rigid.bodies.*", "contact.obstacles.*.free")
+        for name in ("density", "gravity", "springs", "loads", "held", "leaves")
+    ),
+    *(f"rigid.{name}" for name in ("gravity", "dynamics")),
+    *(f"contact.{name}" for name in ("friction", "restitution", "obstacles.*.motion", "c_n")),
     *(f"contact.pairs.*.{name}" for name in ("friction", "interference")),
     *(f"coupling.{name}" for name in ("relaxation", "reuse", "tolerance", "tolerance_absolute", "max_iterations")),
     "probes",
@@ -44,10 +49,11 @@ CHANGEABLE = (
 )
 
 #: Why others stay, by the last name of the setting.
-_REASONS = {
+_REASONS_TO_STAY = {
     "start": "the run has begun at that time",
     **dict.fromkeys(
-        ("initial_displacement", "initial_velocity", "initial_spin"), "it counts at the start only, which is over"
+        ("initial_displacement", "initial_velocity", "initial_angular_velocity"),
+        "it counts at the start only, which is over",
     ),
 }
 _REASON = "the state of the run belongs to it"
@@ -101,7 +107,7 @@ def end_error(case: Case, changes: Sequence[tuple[str, str]], reached: float) ->
 
 
 def _refusal(keys: Keys, old: object, new: object) -> str:
-    reason = _REASONS.get(str(keys[-1]), _REASON)
+    reason = _REASONS_TO_STAY.get(str(keys[-1]), _REASON)
     was = f"{_dotted(keys)} was {in_words(old)}, is {in_words(new)}"
     return f"{was}: it cannot change when a run is resumed, {reason}; {_ANEW}"
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fsci.case.fluid import Movement, Turn
 from fsci.expression import Expression
 from fsci.rotation import rotation_matrix
-from solvers.api import StepFailed
+from solvers.api import FailureKind, StepFailed
 
 Array = NDArray[np.float64]
 ValueAndRate = Callable[[float], tuple[float, float]]  #: t -> (value, its rate)
@@ -52,7 +52,9 @@ def finite(motion: Callable[[float], tuple[Array, Array]], name: str) -> Callabl
     def moved(t: float) -> tuple[Array, Array]:
         x, v = motion(t)
         if not (np.isfinite(x).all() and np.isfinite(v).all()):
-            raise StepFailed("fluid", f"the motion of body '{name}' is not a number at t = {t:.6g}")
+            raise StepFailed(
+                "fluid", FailureKind.NOT_FINITE, f"the motion of body '{name}' is not a number at t = {t:.6g}"
+            )
         return x, v
 
     return moved

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, model_validator
 
@@ -20,6 +20,10 @@ from fsci.case.values import (
     Text,
     Vector,
 )
+
+if TYPE_CHECKING:
+    from solvers.generalised_alpha import GeneralisedAlpha
+    from solvers.structure.time_scheme import TimeScheme
 
 ALPHAS = ("alpha_m", "alpha_f", "beta", "gamma")
 
@@ -61,6 +65,23 @@ class DynamicsSection(Section):
             absent = [name for name in ALPHAS if name not in given]
             raise fault(f"alpha_m, alpha_f, beta and gamma belong together; missing: {', '.join(absent)}", given[0])
         return data if given or data.get("rho_inf") is not None else data | {"rho_inf": 1.0}
+
+    def generalised_alpha(self) -> GeneralisedAlpha:
+        """Its parameters."""
+        from solvers.generalised_alpha import GeneralisedAlpha
+
+        alphas: list[Any] = [getattr(self, name) for name in ALPHAS]
+        return GeneralisedAlpha(*alphas) if self.rho_inf is None else GeneralisedAlpha.from_rho_inf(self.rho_inf)
+
+    def time_scheme(self) -> TimeScheme:
+        """The scheme with these settings."""
+        from solvers.structure.dynamics import Damping, Dynamics
+
+        return Dynamics(
+            self.generalised_alpha(),
+            damping=Damping(self.damping.mass, self.damping.stiffness),
+            predictor=self.predictor,
+        )
 
 
 #: Why a body of triangles or tetrahedra cannot have mixed elements.
@@ -104,7 +125,8 @@ def _not_empty(value: Any) -> Any:
     return value
 
 
-def _some(value: Any) -> Any:
+def some(value: Any) -> Any:
+    """The value, unless it is an empty section."""
     if value == {}:
         raise fault("needs at least one body")
     return value
@@ -119,4 +141,4 @@ class StructureSection(Section):
     dynamics: Annotated[DynamicsSection | None, BeforeValidator(_not_empty)] = setting(
         None, "time integration; absent: static, without inertia"
     )
-    bodies: Annotated[dict[Name, BodySection], BeforeValidator(_some)] = setting(..., "the bodies by name")
+    bodies: Annotated[dict[Name, BodySection], BeforeValidator(some)] = setting(..., "the bodies by name")

@@ -7,13 +7,13 @@ from math import floor
 
 from pydantic import model_validator
 
-from fsci.case.errors import distinct
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import Count, CountOrZero, Number, Positive
+from fsci.distinct import distinct
 
 #: Share of a step below which what is left at the end is no step of its own: difference formulas over steps of such
 #: different lengths divide by the short one.
-LEAST = 0.1
+LEAST_STEP = 0.1
 
 
 class Retry(Section):
@@ -55,7 +55,7 @@ def shared(length: float, step: float) -> float:
     """The step [s] nearest to a given one with which a length [s] has no last step shorter than a tenth of it."""
     count = floor(length / step * (1.0 + 1e-9))
     rest = length - count * step
-    return length / count if count and abs(rest) > 1e-9 * step and rest < LEAST * step else step
+    return length / count if count and abs(rest) > 1e-9 * step and rest < LEAST_STEP * step else step
 
 
 def number_of_steps(length: float, step: float) -> int:

@@ -8,7 +8,7 @@ from fsci.case.section import Section, setting
 
 LENGTHS = {"km": 1e3, "m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6}  #: in m
 MASSES = {"t": 1e3, "kg": 1.0, "g": 1e-3, "mg": 1e-6}  #: in kg
-TIMES = {"h": 3600.0, "min": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}  #: in s
+UNITS_OF_TIME = {"h": 3600.0, "min": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}  #: in s
 
 
 class Units(Section):
@@ -29,4 +29,4 @@ class Units(Section):
     @property
     def stress(self) -> float:
         """The unit of stress [Pa]."""
-        return MASSES[self.mass] / LENGTHS[self.length] / TIMES[self.time] ** 2
+        return MASSES[self.mass] / LENGTHS[self.length] / UNITS_OF_TIME[self.time] ** 2

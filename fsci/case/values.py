@@ -26,7 +26,7 @@ from fsci.expression import VARIABLES, Expression, ExpressionError
 from solvers.values import Value
 
 #: Size above which cubes of a number and products of three overflow.
-LARGEST = 1e100
+LARGEST_NUMBER = 1e100
 
 
 def describe_value(value: Any) -> str:
@@ -76,8 +76,8 @@ def _number(allowed: Callable[[float], bool], words: str) -> BeforeValidator:
         assert number is not None, "an expression without variables is constant"
         if not allowed(number):
             raise fault(f"must be {words}, not {describe_value(float(number))}")
-        if abs(number) > LARGEST:
-            raise fault(f"must be at most {LARGEST:g} in size, not {describe_value(float(number))}")
+        if abs(number) > LARGEST_NUMBER:
+            raise fault(f"must be at most {LARGEST_NUMBER:g} in size, not {describe_value(float(number))}")
         return float(number)
 
     return BeforeValidator(read)
@@ -127,8 +127,8 @@ Count = Annotated[int, _whole(1), _schema("whole number >= 1", minimum=1)]
 CountOrZero = Annotated[int, _whole(0), _schema("whole number >= 0", minimum=0)]
 Order = Annotated[Literal[1, 2], _whole(1)]
 
-_SPACE, _ALL = "xyz", "".join(VARIABLES)
-Formula = Annotated[Expression, _formula(_ALL), _schema("expression of x, y, z, t")]
+_SPACE, _VARIABLES = "xyz", "".join(VARIABLES)
+Formula = Annotated[Expression, _formula(_VARIABLES), _schema("expression of x, y, z, t")]
 SpaceFormula = Annotated[Expression, _formula(_SPACE), _schema("expression of x, y, z")]
 TimeFormula = Annotated[Expression, _formula("t"), _schema("expression of t")]
 PositiveFormula = Annotated[
@@ -182,6 +182,22 @@ class OneOrMany:
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         many = handler(schema)
         return {"anyOf": [many["items"], many]}
+
+
+@dataclass(frozen=True)
+class OrNone:
+    """A section, or the word `none` for no section, or for another value."""
+
+    meaning: Any = None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return no_info_before_validator_function(
+            lambda value: self.meaning if value == "none" else value, handler(source)
+        )
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        section = handler(schema)
+        return {**section, "anyOf": [*section["anyOf"], {"const": "none"}]}
 
 
 Vector = Annotated[tuple[Formula, ...], EntryCount(2, 3)]

@@ -6,9 +6,9 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from fsci.case.errors import distinct
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import NotNegative, Number, Switch, Text
+from fsci.distinct import distinct
 
 #: columns of history.csv that every run has
 RUN_COLUMNS = ("iterations", "residual")

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from fsci.case import Case
-from fsci.case.contact import PairSection
+from fsci.case.contact import Friction, PairSection
 from fsci.case.fluid import FluidSection
 from fsci.case.mesh import Mesh
-from fsci.case.shapes import Shape
+from fsci.case.shapes import ShapeSection
 from fsci.case.structure import StructureSection
 from fsci.meshes.nested import cells_of, fluid_dofs
-from solvers.mesh import Mesh as BodyMesh
+from solvers.mesh.mesh import Mesh as BodyMesh
 
 Row = tuple[str, str]
 
 
-def summary(case: Case, meshes: Mapping[str, BodyMesh] = {}, pairs: Mapping[str, PairSection] = {}) -> str:
+def summary(
+    case: Case,
+    meshes: Mapping[str, BodyMesh] = {},
+    pairs: Mapping[str, PairSection] = {},
+    walls: Mapping[str, Sequence[str]] = {},
+) -> str:
     """A few lines: steps, fields and bodies with their size where it is known, pairs of contact, probes, checks.
 
-    `meshes`: of elastic bodies, by name, as far as they were read; `pairs`: also those that the case does not name.
+    `meshes`: of elastic bodies, by name, as far as they were read; `pairs`: also those that the case does not name;
+    `walls`: names of the pairs of each elastic body with faces of the box.
     """
     time = case.time
     rows = [
@@ -33,10 +39,13 @@ def summary(case: Case, meshes: Mapping[str, BodyMesh] = {}, pairs: Mapping[str,
         rows += _structure(case, case.structure, meshes)
     if case.fluid is not None:
         rows += _fluid(case, case.fluid)
+    else:
+        rows += [(f"body {name}", f"{_name(case.rigid_surfaces[name].mesh)}, rigid, free") for name in case.rigid or ()]
     if case.coupling is not None:
         scheme, by = case.coupling.scheme, case.coupling.accelerator
         rows.append(("coupling", scheme if scheme == "monolithic" else f"{scheme}, {by}"))
     rows += [(f"pair {name}", _sides(pair)) for name, pair in pairs.items()]
+    rows += [(f"walls of {name}", f"pairs {', '.join(found)}, once it is near") for name, found in walls.items()]
     if case.probes:
         rows.append(("probes", ", ".join(case.probes)))
     if case.verify:
@@ -55,8 +64,8 @@ def _structure(case: Case, structure: StructureSection, meshes: Mapping[str, Bod
     yield "structure", motion + (f", plane {structure.plane}" if dimension == 2 else "")
     for name, body in structure.bodies.items():
         text = f"{_name(body.mesh)}, {body.material.law}"
-        if isinstance(body.mesh, Shape):
-            text += f", {_count(body.mesh.counts[0], 'cell')} (order {body.mesh.order} {body.mesh.cell})"
+        if isinstance(body.mesh, ShapeSection):
+            text += f", {_count(body.mesh.plan.counts[0], 'cell')} (order {body.mesh.order} {body.mesh.cell})"
         elif name in meshes:
             mesh = meshes[name]
             text += f", {_count(len(mesh.cells), 'cell')} ({mesh.cell_type})"
@@ -70,8 +79,8 @@ def structure_dofs(structure: StructureSection, meshes: Mapping[str, BodyMesh]) 
     """Unknowns of all elastic bodies; None if a mesh file cannot be read."""
     total = 0
     for name, body in structure.bodies.items():
-        if isinstance(body.mesh, Shape):
-            total += body.mesh.counts[1] * body.mesh.dimension
+        if isinstance(body.mesh, ShapeSection):
+            total += body.mesh.plan.counts[1] * body.mesh.plan.dimension
         elif name in meshes:
             total += meshes[name].points.size
         else:
@@ -89,6 +98,7 @@ def _fluid(case: Case, fluid: FluidSection) -> Iterator[Row]:
     yield "patches", ", ".join(kinds)
     for name, body in fluid.bodies.items():
         kind = "free" if body.free else "moved" if body.motion else "at rest"
+        kind += ", gravity of the flow" if body.free and body.free.gravity is None and fluid.gravity else ""
         yield f"body {name}", f"{_name(body.mesh)}, rigid, {kind}"
     yield "dofs", f"{fluid_dofs(case):,} with those inside of bodies"
 
@@ -101,15 +111,14 @@ def _finer(case: Case) -> str:
 
 def _sides(pair: PairSection) -> str:
     sides = [side.obstacle or f"{side.body}.{' + '.join(side.on or ())}" for _, side in pair.sides]
-    friction = pair.friction
-    law = ", tied" if pair.tied else ""
+    law, friction = ", tied" if pair.tied else "", pair.friction or Friction()
     law += f", friction {friction.coefficient:g}" if friction.coefficient else ""
     law += f", friction up to {friction.bound:g}" if friction.bound is not None else ""
     return f"{sides[0]} on itself{law}" if pair.itself is not None else f"{sides[0]} (slave) on {sides[1]}{law}"
 
 
 def _name(mesh: Mesh) -> str:
-    return mesh.shape if isinstance(mesh, Shape) else mesh.file
+    return mesh.shape if isinstance(mesh, ShapeSection) else mesh.file
 
 
 def _count(number: int, word: str) -> str:

@@ -15,13 +15,13 @@ from pathlib import Path
 from fsci.case import Case
 from fsci.check.check import structure_dofs
 from fsci.meshes.nested import fluid_dofs
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 
 Point = tuple[float, float, float]  #: unknowns, seconds of a step, memory [MB]
 Table = Mapping[str, Sequence[Point]]
 
 #: Of another machine: `fsci bench cost -o` this file.
-OWN = Path.home() / ".cache" / "fsci" / "cost.json"
+OWN_COSTS = Path.home() / ".cache" / "fsci" / "cost.json"
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,8 @@ def estimate(case: Case, structure: int | None, table: Table, dimension: int | N
         parts[f"structure {dim}D"] = structure
     if case.fluid is not None:
         parts[f"fluid {dim}D {case.fluid.element}"] = fluid_dofs(case)
+    if not parts:
+        return None  # rigid bodies cost next to nothing
     seconds = {kind: _seconds(table[kind], dofs) for kind, dofs in parts.items()}
     if case.contact is not None and structure is not None:
         seconds[f"structure {dim}D"] *= _factor(table["contact"], table["structure 2D"], structure)
@@ -68,7 +70,7 @@ def in_words(case: Case, meshes: Mapping[str, Mesh]) -> str:
 def costs() -> Table:
     """Measured costs of this machine, or if there are none those of the machine of the developers."""
     try:
-        rows = json.loads(OWN.read_text())["results"]["cost"]
+        rows = json.loads(OWN_COSTS.read_text())["results"]["cost"]
         own: dict[str, list[Point]] = {}
         for row in rows:
             own.setdefault(row["kind"], []).append((row["dofs"], row["step [s]"], row["memory [MB]"]))

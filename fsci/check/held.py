@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 
 from fsci.case import Case
 from fsci.meshes.locations import find_locations
-from solvers.cell_types import CELL_TYPES
-from solvers.mesh import Mesh
-from solvers.mesh_topology import surface_facets
-from solvers.tessellation import area_vectors, tessellate
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.tessellation import area_vectors, tessellate
+from solvers.mesh.topology import surface_facets
 
 Array = NDArray[np.float64]
 
 #: Size of a motion at the supports, relative to that of the body, below which they do not hold it.
-FREE = 1e-6
+UNHELD = 1e-6
 
 
 def free_motions(case: Case, name: str, mesh: Mesh) -> str | None:
@@ -38,10 +38,10 @@ def free_motions(case: Case, name: str, mesh: Mesh) -> str | None:
     modes = dim + (1 if dim == 2 else 3)
     matrix = np.array(conditions).reshape(-1, modes)
     names = [*(f"translation along {axis}" for axis in "xyz"[:dim]), *_rotations(dim)]
-    free = modes - int(np.linalg.matrix_rank(matrix, tol=FREE * max(len(matrix), 1) ** 0.5)) if len(matrix) else modes
+    free = modes - int(np.linalg.matrix_rank(matrix, tol=UNHELD * max(len(matrix), 1) ** 0.5)) if len(matrix) else modes
     if not free:
         return None
-    alone = [word for word, column in zip(names, matrix.T, strict=True) if np.abs(column).max(initial=0.0) < FREE]
+    alone = [word for word, column in zip(names, matrix.T, strict=True) if np.abs(column).max(initial=0.0) < UNHELD]
     # a rotation about another point than the centre, or a translation along no axis
     words = [*alone, *(["a combination of translation and rotation"] if free > len(alone) else [])]
     return f"no support, spring or pair holds {_listed(words)} of the body, which static equilibrium does not determine"
@@ -86,7 +86,7 @@ def _points(mesh: Mesh, place: Any) -> tuple[Array, Array | None]:
     corners = CELL_TYPES[CELL_TYPES[mesh.cell_type].facet].corners
     ends = mesh.points[np.unique(surface_facets(mesh, place)[:, :corners])]
     # the nodes of a plane surface, whose normal is that of its facets; of a curved one the middles of its facets
-    if np.abs(normals - normals[0]).max() < FREE:
+    if np.abs(normals - normals[0]).max() < UNHELD:
         return ends, np.broadcast_to(normals[0], ends.shape)
     return x.mean(axis=1), normals
 

@@ -32,12 +32,12 @@ from fsci.meshes.of_case import (
     require_inside_period,
     slave_surfaces,
 )
-from solvers.fluid.bodies.inside import PointInBody, require_outside
-from solvers.fluid.bodies.surface import ImmersedSurface, Motion
-from solvers.locate import locate
-from solvers.mesh import Mesh
-from solvers.mesh_topology import signed_volumes, surface_facets
-from solvers.tessellation import tessellate
+from solvers.fluid.surfaces.inside import PointInBody, require_outside
+from solvers.fluid.surfaces.surface import ImmersedSurface, Motion
+from solvers.mesh.locate import locate
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.tessellation import tessellate
+from solvers.mesh.topology import signed_volumes, surface_facets
 
 Array = NDArray[np.float64]
 Keys = tuple[str | int, ...]
@@ -53,6 +53,7 @@ class Findings:
     notes: list[str] = field(default_factory=list)
     meshes: dict[str, Mesh] = field(default_factory=dict)  #: of elastic bodies that were read
     pairs: dict[str, PairSection] = field(default_factory=dict)  #: of contact, also those that the case does not name
+    walls: dict[str, list[str]] = field(default_factory=dict)  #: elastic body -> its pairs with faces of the box
 
     def attempt(self, read: Callable[[], T]) -> T | None:
         """The result, or None after a mistake, which is kept."""
@@ -106,7 +107,7 @@ def _check(case: Case) -> Findings:
 
 def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...] | None) -> None:
     """Bodies in the wrong place, or that nothing holds; chosen: bodies whose pairs the program finds."""
-    rigid = {} if case.fluid is None else case.fluid.bodies
+    rigid = case.rigid_surfaces
     for name in case.elastic_bodies:
         if name not in found.meshes and (mesh := found.attempt(partial(read_body, case, name))) is not None:
             found.meshes[name] = mesh
@@ -119,9 +120,9 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
         bodies.append(Placed(name, keys, True, True, found.meshes[name]))
         if (warning := free_motions(case, name, found.meshes[name])) is not None:
             found.warnings.append(f"{case.place(*keys)}: {warning}")
-    for name, body in rigid.items():
+    for name, surface in rigid.items():
         mesh = read[name][0]  # type: ignore[index]
-        bodies.append(Placed(name, ("fluid", "bodies", name), body.free is not None, False, mesh))
+        bodies.append(Placed(name, surface.keys, name in (case.rigid or ()), False, mesh))
     said = [*pair_sizes(bodies, found.pairs), *around_box(case, bodies)]
     found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in said]
     for only_note, keys, text in overlaps(case, bodies, found.pairs):
@@ -131,12 +132,19 @@ def _scene(case: Case, found: Findings, chosen: Literal["all"] | tuple[str, ...]
 
         found.warnings += [f"{case.place(*keys)}: {text}" for keys, text in coarse(case, bodies)]
     if case.elastic_bodies:
+        from fsci.builder.wall_pairs import wall_pairs
+        from fsci.check.stiff_slaves import stiff_slaves
         from fsci.check.unpaired import unpaired
+
+        for pair in wall_pairs(case, {name: found.meshes[name] for name in case.elastic_bodies}):
+            found.walls.setdefault(pair.body, []).append(pair.name)
 
         names = list(case.elastic_bodies) if chosen in (None, "all") else chosen
         meshes = {name: found.meshes[name] for name in names}
         at = case.place("structure" if case.contact is None else "contact")
         found.notes += [f"{at}: {text}" for text in unpaired(case, meshes, found.pairs)]
+        stiff = stiff_slaves(case, found.meshes, found.pairs)  # none of those that the program finds
+        found.warnings += [f"{case.place('contact', 'pairs', name)}: {text}" for name, text in stiff]
 
 
 def _elastic(case: Case, found: Findings) -> None:

@@ -13,9 +13,9 @@ from fsci.case.rigid_motion import rigid_motion
 from fsci.check.scene import Keys, Placed, Said
 from fsci.meshes.nested import read_grid
 from fsci.resolution.words import before_the_run
-from solvers.fluid.boundary.patch_kinds import PATCH_KINDS
-from solvers.fluid.resolution.shape import at_start, walls_of_box
-from solvers.tessellation import tessellate
+from solvers.fluid.flow.resolution.shape import at_start, walls_of_box
+from solvers.fluid.terms.boundary.patch_kinds import PATCH_KINDS
+from solvers.mesh.tessellation import tessellate
 
 
 def coarse(case: Case, bodies: list[Placed]) -> Iterator[Said]:

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from fsci.case import Case
 from fsci.case.contact import PairSection
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.tessellation import tessellate
 from solvers.sentinels.bodies import MovingBody
 from solvers.sentinels.overlaps import Overlaps
-from solvers.tessellation import tessellate
 
 Array = NDArray[np.float64]
 Keys = tuple[str | int, ...]
@@ -50,7 +50,7 @@ def overlaps(case: Case, bodies: list[Placed], pairs: dict[str, PairSection]) ->
     by_name = {body.name: body for body in bodies if body.moves}
     if len(by_name) < 2:
         return
-    found = Overlaps([_at_rest(body) for body in by_name.values()], {}, set())
+    found = Overlaps([_at_rest(body) for body in by_name.values()], {}, case.joined)
     found.start(case.time.start)
     for one, other, depth in found.overlapping():
         first, second = by_name[one], by_name[other]

@@ -14,8 +14,9 @@ from fsci.builder.facing import meeting
 from fsci.case import Case
 from fsci.case.contact import PairSection
 from fsci.case.errors import listed
+from fsci.case.fluid import Movement
 from fsci.expression import Expression
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
 
@@ -96,13 +97,15 @@ def _motions(case: Case, name: str, dim: int) -> list[Array]:
             if isinstance(support.displacement, tuple):
                 found.append(_values(support.displacement, end, dim) - _values(support.displacement, begin, dim))
         return found
-    motion = None
+    motion: Movement | Sequence[Expression] | None = None
     if case.contact is not None and name in case.contact.obstacles:
         motion = case.contact.obstacles[name].motion
-    elif case.fluid is not None and (moved := case.fluid.bodies[name].motion) is not None:
-        if moved.velocity is not None:
-            return [_values(moved.velocity, end, dim)]
-        motion = moved.displacement
+    elif case.fluid is not None and name in case.fluid.bodies:
+        motion = case.fluid.bodies[name].motion
+    if isinstance(motion, Movement):
+        if motion.velocity is not None:
+            return [_values(motion.velocity, end, dim)]
+        motion = motion.displacement
     return [] if motion is None else [_values(motion, end, dim) - _values(motion, begin, dim)]
 
 

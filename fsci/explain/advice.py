@@ -1,47 +1,69 @@
-"""Advice by the reason of a failure and its residuals, or by the parts that take most of the time of a run."""
+"""Advice by the kind of a failure and its residuals, or by the parts that take most of the time of a run."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from fsci.case import Case
-from fsci.explain.residuals import Convergence
+from fsci.case.solver import Newton
+from fsci.explain.residuals import convergence_of
+from solvers.api import FailureKind
 
-#: Part of a reason -> advice.
-REASONS = {
-    "inverted": (
-        "a smaller time.step: the load or the motion of a step is too large for the elements",
-        "a finer mesh, or rounder corners, where the element is",
+SHORTER = "a smaller time.step"
+SMOOTH_LOADS = "loads and inflow that grow from zero, such as ramp(t, 0, 0.5)"
+
+OF_KIND: dict[FailureKind, tuple[str, ...]] = {
+    FailureKind.NOT_FINITE: (SHORTER, SMOOTH_LOADS),
+    FailureKind.NEWTON: (),  # as the residuals converge
+    FailureKind.COUPLING: (
+        "coupling.scheme=monolithic",
+        "coupling.accelerator=iqn, or a larger coupling.max_iterations",
     ),
-    "far larger than the body": ("supports or weak springs: a static body without them has no unique solution",),
-    "no equilibrium beyond": ("structure.dynamics: past a limit point a structure snaps, and has inertia",),
-    "active set cycles": (
-        "a smaller time.step",
+    FailureKind.ACTIVE_SET: (
+        SHORTER,
         "slave and master exchanged: the slave should be the softer or finer side",
         "a finer slave surface at the edge of the contact zone",
         "in a fluid: contact.film.roughness, where flat surfaces part and nothing else lets fluid between them",
     ),
-    "pulls at bodies that are dry": ("contact.film.zone=wetted",),
-    "cells in one step": ("a smaller time.step: a body should cross less than two cells in a step",),
-    "periodic faces": ("a longer box, or an earlier time.end",),
-    "coupling iteration did not converge": (
-        "coupling.scheme=monolithic",
-        "coupling.accelerator=iqn, or a larger coupling.max_iterations",
+    FailureKind.SUCTION: ("contact.film.zone=wetted",),
+    FailureKind.LIMIT_POINT: ("structure.dynamics: past a limit point a structure snaps, and has inertia",),
+    FailureKind.UNSUPPORTED: ("supports or weak springs: a static body without them has no unique solution",),
+    FailureKind.INVERTED: (
+        f"{SHORTER}: the load or the motion of a step is too large for the elements",
+        "a finer mesh, or rounder corners, where the element is",
     ),
-    "not finite": ("a smaller time.step", "loads and inflow that grow from zero, such as ramp(t, 0, 0.5)"),
-    "not a number": ("a smaller time.step", "loads and inflow that grow from zero, such as ramp(t, 0, 0.5)"),
-    "singular": ("supports or weak springs: a static body without them has no unique solution",),
-    "linear solver": ("solver.linear.method=direct", "solver.linear.tolerance=1e-6"),
+    FailureKind.LINEAR_SOLVER: ("solver.linear.method=direct", "solver.linear.tolerance=1e-6"),
+    FailureKind.MOTION: (
+        f"{SHORTER}: a body should cross less than two cells in a step, and turn by less than 180 degrees",
+    ),
+    FailureKind.COARSE_CELLS: ("fluid.grid.refine: a box that holds the body wherever it goes",),
+    FailureKind.PERIODIC_FACES: ("a longer box, or an earlier time.end",),
+    FailureKind.NO_ROOM: ("room for the bodies: one that is free or softer, or motions that leave a gap",),
+    FailureKind.JAMMED: (
+        "contact.friction: a smaller coefficient",
+        "an elastic body in the place of a rigid one",
+        SHORTER,
+    ),
+    FailureKind.PASSAGE: (f"{SHORTER}: contact finds what bodies touch within it",),
+    FailureKind.NOT_HELD: ("a pair of contact for what should hold the body",),
+}
+
+#: Kinds of an iteration that has not reached its tolerance, so that the course of its residuals tells more.
+NOT_CONVERGED = {
+    FailureKind.NEWTON,
+    FailureKind.COUPLING,
+    FailureKind.ACTIVE_SET,
+    FailureKind.SUCTION,
+    FailureKind.LIMIT_POINT,
 }
 
 #: Convergence of the residuals -> meaning and advice.
 OF_CONVERGENCE = {
     "not finite": ("the residual is not a number: it cannot be evaluated at the last iterate", ()),
-    "diverges": ("the residuals grow", ("a smaller time.step", "loads that grow from zero: ramp(t, 0, 0.5)")),
+    "diverges": ("the residuals grow", (SHORTER, SMOOTH_LOADS)),
     "oscillates": (
         "the residuals go up and down: the active set or an interface changes from iterate to iterate",
-        ("a smaller time.step", "a finer slave surface, or slave and master exchanged"),
+        (SHORTER, "a finer slave surface, or slave and master exchanged"),
     ),
     "stagnates": (
         "the residuals do not fall any more: rounding error, or a kink in a law or an expression",
@@ -53,19 +75,21 @@ OF_CONVERGENCE = {
 MOST_MORE = 25
 
 
-def of_failure(reason: str, convergence: Convergence, residuals: tuple[float, ...], case: Case) -> Iterator[str]:
-    """Suggestions for a failed step."""
-    for part, words in REASONS.items():
-        if part in reason:
-            yield from words
-    if convergence.kind in OF_CONVERGENCE and "did not converge" in reason:
-        yield from OF_CONVERGENCE[convergence.kind][1]
-    if convergence.kind == "none" and "Newton did not converge" in reason:
+def of_failure(kind: FailureKind, residuals: tuple[float, ...], newton: Newton) -> Iterator[str]:
+    """Suggestions for a failed step, with the residuals of its last iteration."""
+    yield from OF_KIND[kind]
+    if kind not in NOT_CONVERGED:
+        return
+    convergence = convergence_of(residuals)
+    yield from OF_CONVERGENCE.get(convergence.kind, ("", ()))[1]
+    if kind is FailureKind.COUPLING:
+        return
+    if convergence.kind == "none":
         yield f"solver.newton.max_iterations={MOST_MORE}: a step of a nonlinear problem takes several iterations"
-    goal = case.solver.newton.residual * max(residuals, default=0.0)
+    goal = newton.residual * max(residuals, default=0.0)
     more = convergence.remaining(residuals[-1], goal) if residuals else None
     if more is not None and more <= MOST_MORE:
-        most = case.solver.newton.max_iterations + more
+        most = newton.max_iterations + more
         yield f"solver.newton.max_iterations={most}: at this rate it takes {more} iterations more"
 
 

@@ -17,6 +17,7 @@ from fsci.explain.residuals import convergence_of, curve
 from fsci.run.files import require_own
 from fsci.run.history import read_history
 from fsci.run.summary import shares
+from solvers.api import FailureKind
 from solvers.counted import counted
 
 SLOWEST = 3  #: steps that are named
@@ -85,7 +86,15 @@ def _failure(folder: Path, what: Mapping[str, Any], case: Case) -> Iterator[str]
         words = advice.OF_CONVERGENCE.get(found.kind, (f"the residuals fall by a factor of {found.rate:.2g}",))[0]
         yield f"residuals      {words if found.kind in (*advice.OF_CONVERGENCE, 'converges') else found.kind}"
         yield from curve(residuals)
-    yield from _suggestions(advice.of_failure(what["reason"], found, residuals, case))
+    yield from _suggestions(advice.of_failure(_kind(what), residuals, case.solver.newton))
+
+
+def _kind(what: Mapping[str, Any]) -> FailureKind:
+    """Raises ValueError for a failure that another version of fsci wrote."""
+    try:
+        return FailureKind(what["kind"])
+    except (KeyError, ValueError):
+        raise ValueError("another version of fsci wrote failure.json: run the case again") from None
 
 
 def _suggestions(words: Iterator[str]) -> list[str]:

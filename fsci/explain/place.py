@@ -13,7 +13,7 @@ from fsci.case import Case
 
 #: What is written as zero: a distance relative to the extent of the body, a component relative to the largest one.
 #: Single precision has a rounding error of 1e-7, double precision one of 1e-16; nodes are further apart than either.
-ROUNDING = 1e-9
+WRITTEN_AS_ZERO = 1e-9
 
 
 @dataclass(frozen=True)
@@ -57,11 +57,11 @@ def pairs_of(case: Case, body: str) -> list[str]:
 
 def describe(near: Nearest, case: Case) -> list[str]:
     """Lines of text on body, node, cell and fields at the position."""
-    away = "at this place" if near.distance <= ROUNDING * near.extent else f"{near.distance:.3g} m away"
+    away = "at this place" if near.distance <= WRITTEN_AS_ZERO * near.extent else f"{near.distance:.3g} m away"
     lines = [f"nearest node   {near.node} of {near.part}, in its cell {near.cell}, {away}"]
     for name, value in near.values.items():
         components = np.atleast_1d(value)
-        rounding = ROUNDING * np.abs(components).max(initial=0.0)
+        rounding = WRITTEN_AS_ZERO * np.abs(components).max(initial=0.0)
         numbers = ", ".join(f"{0.0 if abs(each) <= rounding else each:.4g}" for each in components)
         lines.append(f"  {name:17s} {numbers}")
     if pairs := pairs_of(case, near.part):

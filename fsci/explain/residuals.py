@@ -12,9 +12,9 @@ from typing import Literal
 Kind = Literal["none", "not finite", "diverges", "stagnates", "oscillates", "converges"]
 
 WINDOW = 6  #: last iterations that decide
-GROWTH = 10.0  #: of the residual over its least value that is called divergence
+GROWTH_OF_DIVERGENCE = 10.0  #: of the residual over its least value that is called divergence
 STILL = 0.9  #: rate from which an iteration stagnates
-WIDTH = 40  #: characters of the largest bar
+BAR_WIDTH = 40  #: characters of the largest bar
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def convergence_of(residuals: Sequence[float]) -> Convergence:
     turns = sum((a > 1) != (b > 1) for a, b in pairwise(ratios))
     if len(ratios) > 2 and turns >= len(ratios) - 2 and max(ratios) > 1 and residuals[-1] < max(residuals):
         return Convergence("oscillates", rate)
-    if residuals[-1] > GROWTH * min(residuals):
+    if residuals[-1] > GROWTH_OF_DIVERGENCE * min(residuals):
         return Convergence("diverges", rate)
     if len(ratios) < 2 and rate > STILL:  # one iteration does not show that the next ones do not help
         return Convergence("none")
@@ -60,5 +60,5 @@ def curve(residuals: Sequence[float]) -> list[str]:
     lines = []
     for number, r in enumerate(residuals):
         share = (math.log10(r) - low) / span if math.isfinite(r) and r > 0 else 0.0
-        lines.append(f"  {number:3d}  {r:9.2e}  {'#' * round(1 + share * (WIDTH - 1))}")
+        lines.append(f"  {number:3d}  {r:9.2e}  {'#' * round(1 + share * (BAR_WIDTH - 1))}")
     return lines

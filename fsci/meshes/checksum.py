@@ -6,7 +6,7 @@ import zlib
 
 import numpy as np
 
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 
 #: Binary digits of coordinates that count, relative to the size of the mesh: rounding differs between computers.
 DIGITS = 26

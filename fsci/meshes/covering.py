@@ -11,23 +11,23 @@ from numpy.typing import NDArray
 
 from fsci.meshes.boxes import in_boxes
 from fsci.meshes.jacobians import inverses
-from solvers.cell_types import CELL_TYPES
-from solvers.locate import shape_functions
-from solvers.mesh import Mesh
-from solvers.mesh_topology import boundary_rows, cell_facets
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.locate import shape_functions
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.topology import boundary_rows, cell_facets
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 #: Depth, in sizes of the smaller cell, up to which cells may lie in each other: where curved surfaces of parts that are
 #: not connected touch, and their facets turn by an angle a, they cross by a / 8 of a facet.
-CROSSING = 0.1
+CROSSING_CELLS = 0.1
 
 #: Distance from the unit cell up to which a point may lie in a cell whose map is not linear, by the map that is.
 DISTORTION = 0.5
 
 #: From such a point: errors of a tenth are squared four times.
-NEWTON_STEPS = 5
+STEPS_TO_POINT = 5
 
 
 def covering(mesh: Mesh, maps: tuple[Array, Array]) -> tuple[int, int] | None:
@@ -39,7 +39,7 @@ def covering(mesh: Mesh, maps: tuple[Array, Array]) -> tuple[int, int] | None:
     apart[corner[(mesh.cells[cells[corner]] == nodes[which[corner], None]).any(axis=1)]] = False
     which, cells = which[apart], cells[apart]
     size = 1.0 / np.linalg.norm(maps[1], axis=(1, 2))
-    least = CROSSING * np.minimum(size[cells], size[owners[which]]) / size[cells]
+    least = CROSSING_CELLS * np.minimum(size[cells], size[owners[which]]) / size[cells]
     reference = _linearised(mesh, maps, points[which], cells)
     near = _depth(mesh.cell_type, reference) > (least if _affine(mesh) else -DISTORTION)
     which, cells, least, reference = which[near], cells[near], least[near], reference[near]
@@ -66,7 +66,7 @@ def _newton(mesh: Mesh, points: Array, cells: Indices, reference: Array) -> tupl
     """(reference coordinates of points in cells (n, dim), length of the last step) by Newton's method."""
     nodes = mesh.points[mesh.cells[cells]]
     step = np.zeros_like(reference)
-    for _ in range(NEWTON_STEPS):
+    for _ in range(STEPS_TO_POINT):
         values, gradients = shape_functions(mesh.cell_type, reference)
         jacobian = np.einsum("naj,nai->nij", gradients, nodes)
         with np.errstate(all="ignore"):

@@ -16,10 +16,10 @@ from fsci.case import Case, CaseError
 from fsci.case.expressions import face_middles, run_times
 from fsci.case.fluid import FluidSection, PatchSection
 from fsci.case.rigid_motion import rigid_motion
-from fsci.case.shapes import Shape
+from fsci.case.shapes import ShapeSection
 from fsci.expression import Expression
 from fsci.meshes.nested import body_surface
-from solvers.tessellation import area_vectors
+from solvers.mesh.tessellation import area_vectors
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -29,10 +29,10 @@ Surface = tuple[Array, NDArray[np.int64]]  #: points [m], segments or triangles
 UNBALANCED = 0.005
 
 #: Share of solid from which on a cell has no fluid.
-FULL = 1.0 - 1e-9
+FULL_OF_SOLID = 1.0 - 1e-9
 
 #: Times of the run at which flows into enclosed fluid are added up.
-TIMES = 10
+ADDED_TIMES = 10
 
 
 def require_outlet(case: Case) -> None:
@@ -81,8 +81,8 @@ class Places:
     def solid(self, surface: Surface) -> Array:
         """Share of solid of each cell of the grid, without its finer cells, one axis per direction."""
         from solvers import kernels
-        from solvers.fluid.background.box import Grid
-        from solvers.fluid.cutting.pieces import in_planes
+        from solvers.fluid.geometry.pieces import in_planes
+        from solvers.fluid.grid.box import Grid
 
         grid = Grid(self.fluid.grid.planes)
         moments = kernels.moments(grid.edges, np.array([0.25, 0.75]), in_planes(grid, surface[0]), surface[1])
@@ -103,19 +103,23 @@ class Places:
         shared = [np.minimum(x.max(axis=0), high) - np.maximum(x.min(axis=0), low) for x, _ in surfaces]
         if sum(float(np.prod(np.maximum(size, 0.0))) for size in shared) < whole * (1.0 - 1e-9):
             return False
-        return bool(np.sum([self.solid(surface) for surface in surfaces], axis=0).min() >= FULL)
+        return bool(np.sum([self.solid(surface) for surface in surfaces], axis=0).min() >= FULL_OF_SOLID)
 
     def _most_volume(self, name: str) -> float:
         """The volume of a body is not larger: of a built-in shape by its extents, which need not be read."""
         mesh = self.case.elastic_bodies[name].mesh if name in self.case.elastic_bodies else self.fluid.bodies[name].mesh
-        return float(np.linalg.norm(mesh.extents)) ** mesh.dimension if isinstance(mesh, Shape) else np.inf
+        return (
+            float(np.linalg.norm(mesh.plan.extents)) ** mesh.plan.dimension
+            if isinstance(mesh, ShapeSection)
+            else np.inf
+        )
 
 
 def _closed_box(case: Case, fluid: FluidSection, places: Places) -> None:
     """A box without an open boundary."""
     velocities = [name for name, patch in fluid.patches.items() if patch.velocity is not None]
     moved = [name for name in places.names(moved=True) if fluid.scheme != "steady"]
-    times, step = run_times(case, TIMES + 1)[1:], case.time.step
+    times, step = run_times(case, ADDED_TIMES + 1)[1:], case.time.step
     largest, error = 0.0, None
     for t in times if velocities or moved else ():
         flows = {name: _flow(fluid, name, t) for name in velocities}
@@ -144,13 +148,13 @@ def _pockets(case: Case, fluid: FluidSection, places: Places) -> None:
         return
     fluid_cells = np.ones(fluid.grid.shape, dtype=bool)
     for surface in walls.values():
-        fluid_cells &= places.solid(surface) < FULL
+        fluid_cells &= places.solid(surface) < FULL_OF_SOLID
     labels, count = ndimage.label(fluid_cells, np.ones((3,) * fluid.grid.dimension))
     opened = {0} | {int(part) for patch in fluid.patches.values() if patch.open for part in _at(fluid, patch, labels)}
     for name in case.elastic_bodies:
         opened |= set(np.unique(labels[_box_of(fluid, places.surface(name)[0])]).tolist())
     # bodies that move may open a pocket later
-    times = run_times(case, TIMES + 1)[1:] if not places.names(moved=True) else [case.time.start + case.time.step]
+    times = run_times(case, ADDED_TIMES + 1)[1:] if not places.names(moved=True) else [case.time.start + case.time.step]
     for part in range(1, count + 1):
         if part in opened:
             continue

@@ -15,14 +15,10 @@ from numpy.typing import NDArray
 
 from fsci.meshes.parts import beside
 from fsci.meshes.scripts import GMSH, SCRIPTS, RefusedScript, require_harmless
-from fsci.meshes.serendipity import FULL, complete
-from solvers.cell_types import CELL_TYPES, reference_nodes
-from solvers.mesh import Mesh
-from solvers.mesh_topology import (
-    boundary_facets,
-    find_facets,
-    signed_volumes,
-)
+from fsci.meshes.serendipity import COMPLETE, complete
+from solvers.mesh.cell_types import CELL_TYPES, reference_nodes
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.topology import boundary_facets, find_facets, signed_volumes
 
 Indices = NDArray[np.int64]
 
@@ -67,8 +63,10 @@ class Content:
     point_sets: dict[str, Indices] = field(default_factory=dict)  #: name -> nodes
 
 
-def read_mesh(path: Path, order: int | None = None, parameters: Mapping[str, float] | None = None) -> Mesh:
-    """The mesh of a file; `order` (1 or 2) and `parameters` (for DefineConstant) are for gmsh's .geo scripts.
+def read_mesh(
+    path: Path, order: int | None = None, parameters: Mapping[str, float] | None = None, size_factor: float = 1.0
+) -> Mesh:
+    """The mesh of a file; `order` (1 or 2), `parameters` (for DefineConstant) and `size_factor` are for .geo scripts.
 
     Raises MeshError: file missing or unreadable, unknown parameter, several cell types or a foreign one, a script that
     would do more than make a mesh.
@@ -81,9 +79,11 @@ def read_mesh(path: Path, order: int | None = None, parameters: Mapping[str, flo
         except RefusedScript as refused:
             raise MeshError(str(refused)) from None
     if path.suffix in SCRIPTS:
-        content = _read_gmsh(path, order, parameters or {})
+        content = _read_gmsh(path, order, parameters or {}, size_factor)
     elif parameters:
         raise MeshError(f"parameters are for .geo files, {path.name} has none")
+    elif size_factor != 1.0:
+        raise MeshError(f"'size_factor' is for .geo files, the cells of {path.name} have their sizes")
     elif path.suffix == ".msh":
         content = _read_gmsh(path, None, {})
     else:
@@ -128,12 +128,12 @@ def _mesh(content: Content, *, scripted: bool) -> Mesh:
 
 def _completed(content: Content) -> tuple[Content, str]:
     """Convert cells of 8 and 20 nodes to those of 9 and 27, with a note to the user."""
-    types = sorted({(-block.dim, block.cell_type) for block in content.blocks if block.cell_type in FULL})
+    types = sorted({(-block.dim, block.cell_type) for block in content.blocks if block.cell_type in COMPLETE})
     if not types:
         return content, ""
     points, done = complete(content.points, [(block.cell_type, block.nodes) for block in content.blocks])
     blocks = [replace(b, cell_type=name, nodes=nodes) for b, (name, nodes) in zip(content.blocks, done, strict=True)]
-    note = f"its {types[0][1]} cells became {FULL[types[0][1]]}: nodes were added in the middle of cells and faces"
+    note = f"its {types[0][1]} cells became {COMPLETE[types[0][1]]}: nodes were added in the middle of cells and faces"
     return replace(content, points=points, blocks=blocks), note
 
 
@@ -231,7 +231,7 @@ def _nodes(content: Content, index: Indices) -> dict[str, Indices]:
     return {name: nodes for name, nodes in inside.items() if len(nodes)}
 
 
-def _read_gmsh(path: Path, order: int | None, parameters: Mapping[str, float]) -> Content:
+def _read_gmsh(path: Path, order: int | None, parameters: Mapping[str, float], size_factor: float = 1.0) -> Content:
     import gmsh
 
     # interruptible would take the signal handlers that end a run cleanly
@@ -246,6 +246,10 @@ def _read_gmsh(path: Path, order: int | None, parameters: Mapping[str, float]) -
             if order is not None:
                 gmsh.option.setNumber("Mesh.ElementOrder", order)
                 gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 0)
+            if size_factor != 1.0:
+                own = gmsh.option.getNumber("Mesh.MeshSizeFactor")
+                gmsh.option.setNumber("Mesh.MeshSizeFactor", size_factor * own)
+                gmsh.option.setNumber("Mesh.FlexibleTransfinite", 1)  # so that it counts for transfinite curves, too
             gmsh.model.mesh.generate(gmsh.model.getDimension())
         return _gmsh_content()
     except MeshError:
@@ -331,7 +335,7 @@ def _gmsh_type(kind: int) -> tuple[str, Indices]:
         return "vertex", np.arange(count)
     if kind not in names:
         return name, np.arange(count)
-    ours = reference_nodes(FULL.get(names[kind], names[kind]))[:count]
+    ours = reference_nodes(COMPLETE.get(names[kind], names[kind]))[:count]
     theirs = positions.reshape(count, dim)
     if not name.startswith(("Triangle", "Tetrahedron")):
         theirs = (theirs + 1) / 2  # from -1 to 1, as gmsh has lines, quadrilaterals and hexahedra

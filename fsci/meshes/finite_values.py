@@ -13,9 +13,9 @@ from fsci.case.expressions import FEW_TIMES, MOST_POINTS, expressions, first_not
 from fsci.case.messages import subject
 from fsci.expression import Expression
 from fsci.meshes.locations import Locations
-from solvers.cell_types import CELL_TYPES
-from solvers.mesh import Mesh
-from solvers.mesh_topology import surface_facets
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.topology import surface_facets
 
 Array = NDArray[np.float64]
 Keys = tuple[str | int, ...]

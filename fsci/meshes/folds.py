@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.cell_types import CELL_TYPES
-from solvers.mesh import Mesh
-from solvers.mesh_topology import cell_facets
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.topology import cell_facets
 
 Indices = NDArray[np.int64]
 

@@ -1,7 +1,7 @@
 """The sign of the Jacobian determinant in all points of cells, by its Bernstein coefficients.
 
 The determinant is a polynomial. It is at least the smallest of its Bernstein coefficients, and at corners equal to one
-of them. Where that leaves its sign open, the cell is halved along all axes, up to `HALVINGS` times.
+of them. Where that leaves its sign open, the cell is halved along all axes, up to `HALVINGS_OF_CELL` times.
 Source: Johnen, Remacle, Geuzaine, Geometrical validity of curvilinear finite elements, J. Comput. Phys. 233 (2013).
 """
 
@@ -14,21 +14,20 @@ from math import comb, factorial
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.cell_types import CELL_TYPES
-from solvers.locate import shape_functions
-from solvers.mesh import Mesh
-from solvers.mesh_topology import determinant
+from solvers.api import EPS
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.locate import shape_functions
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.topology import determinant
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-EPS = float(np.finfo(float).eps)
-
 #: After these the coefficients differ from the determinant by less than 4^-8 = 2e-5 of its curvature.
-HALVINGS = 8
+HALVINGS_OF_CELL = 8
 
 #: Cells whose determinants are computed at once.
-CHUNK = 2048
+CELLS_AT_ONCE = 2048
 
 
 def inverted(mesh: Mesh) -> Indices:
@@ -40,8 +39,8 @@ def inverted(mesh: Mesh) -> Indices:
     gradients = shape_functions(mesh.cell_type, points)[1]
     growth = float(np.abs(to_coefficients).sum(axis=1).max())
     found = []
-    for start in range(0, len(mesh.cells), CHUNK):
-        x = mesh.points[mesh.cells[start : start + CHUNK]]
+    for start in range(0, len(mesh.cells), CELLS_AT_ONCE):
+        x = mesh.points[mesh.cells[start : start + CELLS_AT_ONCE]]
         rounding = growth * _rounding(x)
         coefficients = _determinants(x, gradients) @ to_coefficients.T
         doubtful = np.flatnonzero(~(coefficients.min(axis=1) >= -rounding))
@@ -80,7 +79,7 @@ def _decide(coefficients: Array, rounding: Array, to_coefficients: Array, halves
     corners = np.flatnonzero((np.abs(to_coefficients) > 1e-9).sum(axis=1) == 1)  # the polynomial's values at corners
     wrong = np.zeros(len(coefficients), dtype=bool)
     cell, parts = np.arange(len(coefficients)), coefficients
-    for _ in range(HALVINGS):
+    for _ in range(HALVINGS_OF_CELL):
         wrong[cell[(parts[:, corners] < -rounding[cell, None]).any(axis=1)]] = True
         left = ~wrong[cell] & (parts.min(axis=1) < -rounding[cell])
         cell, parts = cell[left], parts[left]

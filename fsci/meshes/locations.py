@@ -11,25 +11,25 @@ from numpy.typing import NDArray
 from fsci.case import Case
 from fsci.meshes.files import unknown
 from fsci.meshes.mesh import MeshError, require_surface
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 
 #: A named surface, or nodes by their numbers.
 Where = str | NDArray[np.int64]
 
 #: Distance, in sizes of the body, within which a node is the one that is meant.
-TOLERANCE = 1e-6
+MEANT_NODE = 1e-6
 
 
 #: (setting of the body, number of the entry) -> where it acts: a surface, nodes, or (nodes, positions) of lines
 Locations = dict[tuple[str, int], list[Any]]
 
-KINDS = {"supports": ("surface", "line", "points"), "springs": ("surface", "points"), "point_forces": ("points",)}
+PLACE_KINDS = {"supports": ("surface", "line", "points"), "springs": ("surface", "points"), "point_forces": ("points",)}
 
 
 def find_locations(case: Case, name: str, mesh: Mesh) -> Locations:
     """Surfaces and nodes on which supports, springs and loads of a body act. Raises CaseError."""
     body, locations = case.elastic_bodies[name], {}
-    for section in (*KINDS, "tractions", "pressures", "line_forces"):
+    for section in (*PLACE_KINDS, "tractions", "pressures", "line_forces"):
         for index, entry in enumerate(getattr(body, section)):
             at = getattr(entry, "at", None)
             key = "on" if at is None else "at"
@@ -51,7 +51,7 @@ def _find(mesh: Mesh, section: str, entry: Any, name: str) -> Any:
         lines = find_lines(mesh, name)
         return lines, mesh.points[lines]
     flat = getattr(entry, "normal", False) or getattr(entry, "symmetry", False)
-    return find_group(mesh, name, ("surface",) if flat else KINDS[section])
+    return find_group(mesh, name, ("surface",) if flat else PLACE_KINDS[section])
 
 
 def find_node(mesh: Mesh, at: Sequence[float]) -> NDArray[np.int64]:
@@ -61,7 +61,7 @@ def find_node(mesh: Mesh, at: Sequence[float]) -> NDArray[np.int64]:
         raise MeshError(f"'at' has {len(at)} entries, but the mesh is of {dim} dimensions")
     distance = np.linalg.norm(mesh.points - np.asarray(at, dtype=float), axis=1)
     nearest = int(np.argmin(distance))
-    if distance[nearest] > TOLERANCE * np.ptp(mesh.points, axis=0).max():
+    if distance[nearest] > MEANT_NODE * np.ptp(mesh.points, axis=0).max():
         place, there = (", ".join(f"{x:.6g}" for x in point) for point in (at, mesh.points[nearest]))
         raise MeshError(f"no node is at ({place}); the nearest one is at ({there})")
     return np.array([nearest])

@@ -4,38 +4,50 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from inspect import signature
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci import shapes
 from fsci.meshes.files import MeshError, read_mesh, unknown
+from fsci.meshes.refine import refined
 from fsci.rotation import rotation_matrix
-from solvers.cell_types import CELL_TYPES
-from solvers.mesh import Mesh
-from solvers.mesh_topology import find_facets
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.topology import find_facets
+
+MOST_CELLS = 10**8  #: of a refined mesh
 
 
 def build_mesh(settings: Any, folder: Path) -> Mesh:
     """The mesh of a case's `mesh:` section; file names count from `folder`. Raises MeshError."""
     if getattr(settings, "shape", None) is not None:
-        mesh = _shape(settings)
+        mesh = settings.plan.mesh()
     else:
         order, parameters = getattr(settings, "order", None), getattr(settings, "parameters", None)
-        mesh = read_mesh(folder / settings.file, order, parameters)
+        mesh = read_mesh(folder / settings.file, order, parameters, getattr(settings, "size_factor", 1.0))
+        mesh = _refined(mesh, getattr(settings, "refine", 0))
+    if getattr(settings, "mirror", None) is not None:
+        mesh = mirrored(mesh, "xyz".index(settings.mirror))
     return place(mesh, getattr(settings, "rotate", None), getattr(settings, "translate", None))
 
 
-def _shape(settings: Any) -> Mesh:
-    function = getattr(shapes, settings.shape)
-    given = {name: getattr(settings, name, None) for name in signature(function).parameters}
-    try:
-        return function(**{name: value for name, value in given.items() if value is not None})
-    except ValueError as error:
-        raise MeshError(f"{settings.shape}: {error}") from None
+def _refined(mesh: Mesh, times: int) -> Mesh:
+    cells = len(mesh.cells) * 2.0 ** min(mesh.points.shape[1] * times, 100)
+    if times and cells > MOST_CELLS:
+        raise MeshError(f"'refine: {times}' would make {cells:.2g} cells: {MOST_CELLS:.0e} are the most")
+    for _ in range(times):
+        mesh = refined(mesh)
+    return mesh
+
+
+def mirrored(mesh: Mesh, axis: int) -> Mesh:
+    """Mirrored at the plane where the coordinate is zero; cells are numbered so that their volumes stay positive."""
+    if axis >= mesh.points.shape[1]:
+        raise MeshError("'mirror: z' is for meshes of three dimensions")
+    points = mesh.points * np.where(np.arange(mesh.points.shape[1]) == axis, -1.0, 1.0)
+    return replace(mesh, points=points, cells=mesh.cells[:, CELL_TYPES[mesh.cell_type].mirror])
 
 
 def place(mesh: Mesh, rotate: Any = None, translate: Sequence[float] | None = None) -> Mesh:

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from fsci.case import Case
 from fsci.case.grid import Refinement
 from fsci.meshes.of_case import read_body, read_rigid_body
-from solvers.fluid.background.box import Grid
-from solvers.tessellation import tessellate
+from solvers.fluid.grid.box import Grid
+from solvers.mesh.tessellation import tessellate
 
 if TYPE_CHECKING:  # SciPy, which cases without nested cells do not need to be checked
-    from solvers.fluid.background.following import Following
-    from solvers.fluid.background.nested import Nested, RefinedRegion
+    from solvers.fluid.grid.following import Following
+    from solvers.fluid.grid.nested import Nested, RefinedRegion
 
 Surface = tuple[NDArray[np.float64], NDArray[np.int64]]
 
@@ -29,7 +29,7 @@ def read_grid(case: Case) -> Grid:
 
 def following(case: Case) -> Following | None:
     """How nested cells follow the bodies that they are around and that move; None if they do not."""
-    from solvers.fluid.background.following import Following, RefinedBody
+    from solvers.fluid.grid.following import Following, RefinedBody
 
     assert case.fluid is not None
     section = case.fluid.grid
@@ -65,7 +65,7 @@ def fluid_dofs(case: Case) -> int:
 
 def _refined(case: Case, grid: Grid) -> Nested:
     """Raises CaseError if a body is too close to coarse cells."""
-    from solvers.fluid.background.nested import FINE_LAYERS, Nested, RefinedSurface, refined
+    from solvers.fluid.grid.nested import FINE_LAYERS, Nested, RefinedSurface, refined
 
     assert case.fluid is not None
     section = case.fluid.grid
@@ -84,7 +84,7 @@ def _refined(case: Case, grid: Grid) -> Nested:
 
 
 def _region(refinement: Refinement, surfaces: dict[str, Surface]) -> RefinedRegion:
-    from solvers.fluid.background.nested import RefinedBox, RefinedSurface
+    from solvers.fluid.grid.nested import RefinedBox, RefinedSurface
 
     if refinement.box is not None:
         low, high = refinement.box

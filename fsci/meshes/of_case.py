@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.case import Case
-from fsci.case.checks import load_vectors
+from fsci.case.checks import VECTORS, load_vectors
+from fsci.case.free_checks import free_mistakes
 from fsci.case.mesh import FileMesh
 from fsci.case.mesh import Mesh as MeshSection
 from fsci.case.structure import NO_MIXED_SIMPLICES
@@ -24,15 +25,13 @@ from fsci.meshes.finite_values import require_finite
 from fsci.meshes.locations import find_locations
 from fsci.meshes.mesh import MeshError, build_mesh, extract_region, require_surface
 from fsci.meshes.valid import BadMesh, require_positive, require_valid
-from solvers.mesh import Mesh
-from solvers.mesh_topology import surface_facets
-from solvers.tessellation import is_closed, tessellate
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.tessellation import is_closed, tessellate
+from solvers.mesh.topology import surface_facets
 
 Array = NDArray[np.float64]
 Keys = tuple[str | int, ...]
 T = TypeVar("T")
-
-VECTORS = ("gravity", "body_force", "initial_displacement", "initial_velocity")
 
 
 _READ: ContextVar[dict[Any, Any] | None] = ContextVar("meshes that are read once", default=None)
@@ -151,14 +150,14 @@ def _check_lengths(case: Case, name: str, dim: int) -> None:
 @_once
 def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int64]]:
     """(mesh, points [m], segments or triangles) of a rigid body's closed surface. Raises CaseError."""
-    assert case.fluid is not None
-    settings, dim = case.fluid.bodies[name], case.fluid.grid.dimension
-    base: Keys = ("fluid", "bodies", name)
+    settings, dim = case.rigid_surfaces[name], case.dimension
+    base: Keys = settings.keys
     keys = (*base, "mesh")
     try:
         mesh = build_mesh(settings.mesh, case.folder)
-        if mesh.points.shape[1] != dim:
-            raise MeshError(f"the mesh is {mesh.points.shape[1]}D, but the grid is {dim}D")
+        if mesh.points.shape[1] != (dim or mesh.points.shape[1]):
+            other = "the grid" if case.fluid is not None else "another body"
+            raise MeshError(f"the mesh is {mesh.points.shape[1]}D, but {other} is {dim}D")
         _require_valid(settings.mesh, mesh)
         keys = (*base, "on")
         for surface in settings.on or ():
@@ -168,7 +167,11 @@ def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int6
             raise MeshError("these surfaces do not enclose the body: name all of them")
     except (MeshError, ValueError) as error:
         raise case.error(keys, str(error)) from None
-    case.meshes[f"fluid.bodies.{name}"] = mesh_checksum(mesh)
+    case.meshes[".".join(settings.keys)] = mesh_checksum(mesh)
+    if dim is None and (free := (case.rigid or {}).get(name)) is not None:
+        whole = base if base[0] == "rigid" else (*base, "free")
+        for place, message in free_mistakes(free, mesh.points.shape[1], case.rigid or (), whole):
+            raise case.error(place, message)
     return mesh, mesh.points[nodes], facets
 
 
@@ -191,6 +194,13 @@ def read_obstacle(case: Case, name: str) -> Mesh:
         raise case.error(keys, str(error)) from None
     case.meshes[f"contact.obstacles.{name}"] = mesh_checksum(mesh)
     return mesh
+
+
+def read_rigid_side(case: Case, name: str) -> tuple[Mesh, tuple[str, ...] | None]:
+    """(mesh, names of its surfaces in contact, None: all) of an obstacle or a rigid body. Raises CaseError."""
+    if case.contact is not None and name in case.contact.obstacles:
+        return read_obstacle(case, name), case.contact.obstacles[name].on
+    return read_rigid_body(case, name)[0], case.rigid_surfaces[name].on
 
 
 def require_inside_period(case: Case, keys: Keys, points: Array) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from fsci.meshes.scripts import GEOMETRY, GMSH, TOKEN, is_mesh
+from fsci.meshes.scripts import GEOMETRY, GMSH, SCRIPT_TOKEN, is_mesh
 
 XDMF = (".xdmf", ".xmf")
 ABAQUS = (".inp",)
@@ -62,7 +62,7 @@ def _of_script(path: Path) -> Iterator[Named]:
     yield from _of_the_same_name(path, path.with_name(path.name + ".opt"))
     if path.suffix.lower() in GEOMETRY or is_mesh(path):
         return
-    for match in TOKEN.finditer(path.read_bytes().decode("latin-1")):
+    for match in SCRIPT_TOKEN.finditer(path.read_bytes().decode("latin-1")):
         if match.lastgroup == "text" and _exists(path.parent, name := _decoded(match.group()[1:-1])):
             yield Named(path.parent / name, (match.start() + 1, match.end() - 1))
 

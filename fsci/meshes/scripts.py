@@ -32,7 +32,7 @@ GMSH = (*SCRIPTS, ".msh")
 #: Characters of a text; gmsh's parser ends longer ones in the middle, after 1023.
 LONGEST_TEXT = 1000
 
-TOKEN = re.compile(
+SCRIPT_TOKEN = re.compile(
     r"(?P<space>[ \t\r\f\n]+)|(?P<comment>//[^\n]*|/\*.*?\*/)|(?P<text>\"[^\"]*\"|'[^']*')|(?P<open>/\*|[\"'])"
     r"|(?P<number>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<other>.)",
     re.DOTALL,
@@ -86,7 +86,7 @@ def _tokens(path: Path, text: str) -> Iterator[Token]:
     comment or a text, comments of several lines must have a first line of their own, and texts end in their line.
     """
     line, code_on_line = 1, False
-    for match in TOKEN.finditer(text):
+    for match in SCRIPT_TOKEN.finditer(text):
         kind, word = str(match.lastgroup), match.group()
         if "\0" in word or kind == "open":
             raise RefusedScript(f"{path.name}:{line}: this comment or text has no end")

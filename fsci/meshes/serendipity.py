@@ -9,16 +9,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.cell_types import CELL_TYPES
+from solvers.mesh.cell_types import CELL_TYPES
 
 Indices = NDArray[np.int64]
 
-FULL = {"quad8": "quad9", "hexahedron20": "hexahedron27"}
+COMPLETE = {"quad8": "quad9", "hexahedron20": "hexahedron27"}
 
 
 def missing(cell_type: str) -> list[tuple[list[int], NDArray[np.float64]]]:
     """(nodes, their weights) of each node that the full cell has besides, in its order."""
-    nodes, given = CELL_TYPES[FULL[cell_type]].nodes, int(cell_type.removeprefix("quad").removeprefix("hexahedron"))
+    nodes, given = CELL_TYPES[COMPLETE[cell_type]].nodes, int(cell_type.removeprefix("quad").removeprefix("hexahedron"))
     place = {frozenset(group): index for index, group in enumerate(nodes[:given])}
     found = []
     for corners in nodes[given:]:
@@ -37,7 +37,7 @@ def complete(
     done = []
     for cell_type, cells in blocks:
         columns = [cells]
-        for local, weights in missing(cell_type) if cell_type in FULL else []:
+        for local, weights in missing(cell_type) if cell_type in COMPLETE else []:
             column = np.empty(len(cells), dtype=np.int64)
             for row, nodes in enumerate(cells[:, local]):
                 key = tuple(sorted(nodes.tolist()))
@@ -46,5 +46,5 @@ def complete(
                     added.append(weights @ points[nodes])
                 column[row] = numbers[key]
             columns.append(column[:, None])
-        done.append((FULL.get(cell_type, cell_type), np.concatenate(columns, axis=1)))
+        done.append((COMPLETE.get(cell_type, cell_type), np.concatenate(columns, axis=1)))
     return np.concatenate([points, np.array(added).reshape(-1, points.shape[1])]), done

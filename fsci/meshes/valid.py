@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from fsci.meshes.covering import covering
 from fsci.meshes.folds import folded
-from fsci.meshes.jacobians import EPS, inverted, middle_maps
-from solvers.cell_types import CELL_TYPES
-from solvers.mesh import Mesh
-from solvers.mesh_topology import facet_ids
+from fsci.meshes.jacobians import inverted, middle_maps
+from solvers.api import EPS
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.topology import facet_ids
 
 #: Change of the strain by rounded positions above which a cell is flat, cube root of the unit roundoff: a cell on the
 #: bound has a height of 4e-11 of the largest coordinate.

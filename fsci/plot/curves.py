@@ -12,11 +12,11 @@ from fsci.case.quantities import QUANTITIES
 from fsci.run.files import replacing
 from fsci.run.history import COLUMNS, History
 
-SIZE = (8.0, 5.0)  #: of a picture in inches; 1600 x 1000 pixels
+CURVE_SIZE = (8.0, 5.0)  #: of a picture in inches; 1600 x 1000 pixels
 PANEL = 2.2  #: height of each of several panels [inch]
-DOTS = 200  #: per inch
+CURVE_DOTS = 200  #: per inch
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")  #: told apart by colour-blind readers
-STYLE: Any = {
+CURVE_STYLE: Any = {
     "font.size": 12,
     "axes.linewidth": 0.8,
     "axes.formatter.limits": (-3, 4),
@@ -56,14 +56,14 @@ BALANCES = {
     "interface.force": ("relative error of the forces at the interface", ""),
 }
 #: other columns of the program's own -> what they are
-OWN = {
+OWN_COLUMNS = {
     "interface.power": ("power of the fluid on the bodies", "power"),
     "coupling.linear": ("linear iterations in a step", ""),
     "fluid.linear": ("linear iterations in a step", ""),
     "coupling.newton": ("Newton iterations of the fields in a step", ""),
 }
 NODES = "contact nodes"  #: a panel
-CONTACT = "contact."  #: prefix of the columns of contact
+CONTACT_PREFIX = "contact."  #: prefix of the columns of contact
 NEGLIGIBLE, SMALL = (
     1e-3,
     0.05,
@@ -119,9 +119,9 @@ def plot_history(folder: Path, history: History, quantities: Mapping[str, str], 
         return []
     families: dict[str, list[str]] = {}
     for name in history:
-        if name in OWN and not np.any(history[name]):  # no count of what the solver of this run has not
+        if name in OWN_COLUMNS and not np.any(history[name]):  # no count of what the solver of this run has not
             continue
-        if name not in (*COLUMNS, *BALANCES, "residual") and not name.startswith(CONTACT):
+        if name not in (*COLUMNS, *BALANCES, "residual") and not name.startswith(CONTACT_PREFIX):
             families.setdefault(name.rpartition(".")[0] or name, []).append(name)
     time, below = history["time"], label("time", "time", units)
     drawn = []
@@ -129,10 +129,10 @@ def plot_history(folder: Path, history: History, quantities: Mapping[str, str], 
         quantity = quantities.get(family, family)
         text = quantity if quantity == family else f"{quantity} of {family}"
         if len(columns) == 1 and family not in quantities:
-            text, quantity = OWN.get(columns[0], (columns[0].replace(".", " "), quantity))
+            text, quantity = OWN_COLUMNS.get(columns[0], (columns[0].replace(".", " "), quantity))
         curves = {name.rpartition(".")[2]: history[name] for name in columns}
         drawn.append(plot_curves(folder / f"history_{family}.png", time, curves, below, label(text, quantity, units)))
-    if any(name.startswith(CONTACT) for name in history):
+    if any(name.startswith(CONTACT_PREFIX) for name in history):
         drawn.append(plot_panels(folder / "history_contact.png", time, contact_panels(history, units), below))
     balances = {
         label(text, quantity, units): {"": np.abs(history[name])}
@@ -148,8 +148,8 @@ def contact_panels(history: History, units: Mapping[str, str]) -> dict[str, dict
     """Label -> curves: the force of each pair of surfaces, then other numbers of theirs, then counts of nodes."""
     panels: dict[str, dict[str, Any]] = {}
     for name, values in history.items():
-        pair, _, number = name.removeprefix(CONTACT).rpartition(".")
-        if not name.startswith(CONTACT):
+        pair, _, number = name.removeprefix(CONTACT_PREFIX).rpartition(".")
+        if not name.startswith(CONTACT_PREFIX):
             continue
         if number in ("x", "y", "z"):
             panels.setdefault(label(f"contact force of {pair}", "force", units), {})[number] = values
@@ -169,9 +169,9 @@ def plot_panels(
     import matplotlib
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(STYLE):
-        height = max(SIZE[1], PANEL * len(panels))
-        figure = Figure((SIZE[0], height), dpi=DOTS, layout="constrained")
+    with matplotlib.rc_context(CURVE_STYLE):
+        height = max(CURVE_SIZE[1], PANEL * len(panels))
+        figure = Figure((CURVE_SIZE[0], height), dpi=CURVE_DOTS, layout="constrained")
         rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         marker = "o" if len(time) < 30 else ""
         for axes, (beside, curves) in zip(rows, panels.items(), strict=True):
@@ -182,7 +182,7 @@ def plot_panels(
                 axes.plot(time, np.where(values > 0, values, np.nan) if scaled else values, **style, **steps)
             if scaled:
                 axes.set_yscale("log")
-            axes.set_title(beside, loc="left", fontsize=STYLE["font.size"])
+            axes.set_title(beside, loc="left", fontsize=CURVE_STYLE["font.size"])
             if len(curves) > 1:
                 add_legend(axes)
         rows[-1].set_xlabel(below)
@@ -204,16 +204,16 @@ def plot_curves(path: Path, time: Any, curves: Mapping[str, Any], below: str, be
     ranges = [spread for values in finite if len(values) and (spread := float(np.ptp(values))) > 0]
     ranges = [spread for spread in ranges if spread > NEGLIGIBLE * max(ranges)]
     apart = len(ranges) > 1 and min(ranges) < SMALL * max(ranges)
-    with matplotlib.rc_context(STYLE):
-        height = max(SIZE[1], PANEL * len(curves)) if apart else SIZE[1]
-        figure = Figure((SIZE[0], height), dpi=DOTS, layout="constrained")
+    with matplotlib.rc_context(CURVE_STYLE):
+        height = max(CURVE_SIZE[1], PANEL * len(curves)) if apart else CURVE_SIZE[1]
+        figure = Figure((CURVE_SIZE[0], height), dpi=CURVE_DOTS, layout="constrained")
         panels = figure.subplots(len(curves) if apart else 1, 1, sharex=True, squeeze=False)[:, 0]
         marker = "o" if len(time) < 30 else ""
         for index, (name, values) in enumerate(curves.items()):
             axes = panels[index if apart else 0]
             axes.plot(time, values, color=COLOURS[index % len(COLOURS)], marker=marker, label=literal(name))
         panels[-1].set_xlabel(below)
-        figure.supylabel(beside, fontsize=STYLE["font.size"])
+        figure.supylabel(beside, fontsize=CURVE_STYLE["font.size"])
         if len(curves) > 1:
             for axes in panels:
                 add_legend(axes)
@@ -227,8 +227,8 @@ def plot_convergence(path: Path, residuals: Mapping[str, Sequence[float]]) -> Pa
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
 
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(SIZE, dpi=DOTS, layout="constrained")
+    with matplotlib.rc_context(CURVE_STYLE):
+        figure = Figure(CURVE_SIZE, dpi=CURVE_DOTS, layout="constrained")
         axes = figure.subplots()
         for index, (step, norms) in enumerate(residuals.items()):
             colour = COLOURS[index % len(COLOURS)]

@@ -18,7 +18,7 @@ from fsci.plot.render import import_pyvista
 from fsci.run.output import Series
 
 AXES = "xyz"
-ROUNDING = 1e-6  #: part of a mesh, relative to its size, that may be beyond the plane
+BEYOND_PLANE = 1e-6  #: part of a mesh, relative to its size, that may be beyond the plane
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def read_plane(text: str) -> Plane:
 def with_reflection(mesh: Any, plane: Plane) -> Any:
     """A mesh and its reflection as one mesh, joined at the nodes in the plane."""
     low, high = mesh.bounds[2 * plane.axis : 2 * plane.axis + 2]
-    if min(high - plane.at, plane.at - low) > ROUNDING * mesh.length:
+    if min(high - plane.at, plane.at - low) > BEYOND_PLANE * mesh.length:
         raise ValueError(f"a part lies on both sides of {plane.name}, from {low:.6g} to {high:.6g}")
     return mesh.merge(reflection(mesh, plane), merge_points=True, tolerance=1e-9 * mesh.length)
 

@@ -12,7 +12,7 @@ from fsci.plot.scene import animate, compose
 from fsci.run.files import replacing
 
 FRAMES = 200  #: at most; of a longer series every second, third, ... time is shown
-DOTS = 120  #: pixels per inch: 960 x 600
+MOVIE_DOTS = 120  #: pixels per inch: 960 x 600
 MILLISECONDS = 50  #: per frame
 
 
@@ -27,7 +27,7 @@ def plot_movie(
             yield moment[0][0], load_state([file for _, file in moment], field)
 
     scene = compose((state for _, state in states()), field, title, units)
-    write_gif(path, animate(scene, states(), dots=DOTS))
+    write_gif(path, animate(scene, states(), dots=MOVIE_DOTS))
     return path
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fsci.plot.curves import DOTS, plot_convergence, plot_history, save_figure
+from fsci.plot.curves import CURVE_DOTS, plot_convergence, plot_history, save_figure
 from fsci.plot.mirror import Mirror, read_plane
 from fsci.plot.movie import plot_movie
 from fsci.plot.render import ISOMETRIC, Array, import_pyvista, load_body
@@ -24,9 +24,9 @@ from fsci.run.results_folder import list_pictures
 
 STRUCTURE_FIELDS = ("displacement",)  #: default field of structures
 FLUID_FIELDS = ("velocity", "pressure")
-PRESSURE = "contact_pressure"
-OBLIQUE = 0.8  #: sideways component of the view of a contact surface, relative to its normal
-CROP = 1.0  #: percent of the points of a flow in space whose values may lie above the colour bar
+CONTACT_PRESSURE = "contact_pressure"
+SIDEWAYS = 0.8  #: sideways component of the view of a contact surface, relative to its normal
+FLOW_CROP = 1.0  #: percent of the points of a flow in space whose values may lie above the colour bar
 
 Moment = tuple[tuple[float, Path], ...]  #: (time, VTU file) of each part at one output time
 
@@ -140,28 +140,28 @@ def plot_state(path: Path, moment: Moment, name: str, labels: Labels) -> Path:
     """Draws the state of all bodies at one time, coloured by the field `name`."""
     time, first = moment[0]
     state = load_state([file for _, file in moment], name)
-    crop = CROP if is_flow(first) else 0.0
+    crop = FLOW_CROP if is_flow(first) else 0.0
     scene = compose([state], name, labels.title, labels.units, crop=crop)
-    save_figure(draw(scene, state, time, dots=DOTS), path)
+    save_figure(draw(scene, state, time, dots=CURVE_DOTS), path)
     return path
 
 
 def plot_mesh(path: Path, moment: Moment, labels: Labels) -> Path:
     """Draws the elements of all bodies and the cells of a flow."""
     state = load_meshes([file for _, file in moment])
-    save_figure(draw(compose([state], None, labels.title, labels.units), state, moment[0][0], dots=DOTS), path)
+    save_figure(draw(compose([state], None, labels.title, labels.units), state, moment[0][0], dots=CURVE_DOTS), path)
     return path
 
 
 def plot_pressure(path: Path, moment: Moment, labels: Labels) -> Path:
     """Draw the contact pressure on the bodies that have one, viewed from the side on which it acts."""
-    loaded = [load_body(file, PRESSURE) for time, file in moment if has_contact(((time, file),))]
+    loaded = [load_body(file, CONTACT_PRESSURE) for time, file in moment if has_contact(((time, file),))]
     # between the nodes of second-order cells the interpolated pressure may be negative
     bodies = [replace(body, values=np.maximum(body.values, 0.0)) for body in loaded if body.values is not None]
     towards = np.sum([np.sum(body.surface.point_data["contact_traction"], axis=0) for body in bodies], axis=0)
     away = look_at(-towards)
-    scene = compose([bodies], PRESSURE, labels.title, labels.units, away=away, colours="Reds")
-    save_figure(draw(scene, bodies, moment[0][0], dots=DOTS), path)
+    scene = compose([bodies], CONTACT_PRESSURE, labels.title, labels.units, away=away, colours="Reds")
+    save_figure(draw(scene, bodies, moment[0][0], dots=CURVE_DOTS), path)
     return path
 
 
@@ -171,14 +171,14 @@ def look_at(normal: Array) -> Array:
     if length == 0.0:
         return ISOMETRIC
     normal = normal / length
-    away = normal + OBLIQUE * (ISOMETRIC - (ISOMETRIC @ normal) * normal)
+    away = normal + SIDEWAYS * (ISOMETRIC - (ISOMETRIC @ normal) * normal)
     return np.asarray(away / np.linalg.norm(away))
 
 
 def has_contact(moment: Moment) -> bool:
     """Whether any body has contact pressure."""
     data = [import_pyvista().read(file).point_data for _, file in moment]
-    return any(PRESSURE in fields and fields[PRESSURE].max() > 0 for fields in data)
+    return any(CONTACT_PRESSURE in fields and fields[CONTACT_PRESSURE].max() > 0 for fields in data)
 
 
 def read_labels(out: Path) -> Labels:

@@ -20,9 +20,10 @@ EDGES_UP_TO = 20_000  #: faces of a body; beyond that its element edges would co
 SUPERSAMPLING = 2  #: pixels rendered per pixel shown, along each side
 BARE = "lightgray"  #: colour of bodies that do not have the field
 ISOMETRIC = np.array([1.0, -1.0, 0.8]) / np.sqrt(2.64)  #: from the bodies to the camera
-CORNERS = {5: 3, 9: 4, 22: 3, 23: 4, 28: 4}  #: VTK type of a face -> its corners; second-order edges have a midnode
+#: VTK type of a face -> its corners; second-order edges have a midnode.
+CORNERS_OF_FACE = {5: 3, 9: 4, 22: 3, 23: 4, 28: 4}
 
-FLAT: Any = {"lighting": False}
+FLAT_SHADING: Any = {"lighting": False}
 ROUND: Any = {"smooth_shading": True, "split_sharp_edges": True, "feature_angle": 40.0, "ambient": 0.4, "diffuse": 0.65}
 
 
@@ -37,6 +38,7 @@ class DrawnBody:
     line_colour: str = "black"  #: of the edges
     shaded: bool = True  #: in 3D with shading; else its colours are exactly those of the colour bar
     opacity: float = 1.0  #: of the surface
+    rigid: bool = False  #: no field colours it
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,7 @@ def face_edges(faces: Any) -> tuple[Array, NDArray[np.bool_]]:
     """
     found = []
     for kind, cells in faces.cells_dict.items():
-        corners = CORNERS[kind]
+        corners = CORNERS_OF_FACE[kind]
         for first in range(corners):
             a, b = cells[:, first], cells[:, (first + 1) % corners]
             middle = cells[:, corners + first] if cells.shape[1] > corners else np.full_like(a, -1)
@@ -150,7 +152,7 @@ def render(
     lift = 0.005 * view.half_height * away  # keeps edges clear of the surface they lie in
     for index, body in enumerate(bodies):
         surface = body.surface.copy(deep=False)
-        shading = {**(ROUND if body.shaded and not flat else FLAT), "opacity": body.opacity}
+        shading = {**(ROUND if body.shaded and not flat else FLAT_SHADING), "opacity": body.opacity}
         if flat:  # a later body covers an earlier one
             surface = surface.translate(2 * index * lift, inplace=False)
         if body.values is None:

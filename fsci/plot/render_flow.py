@@ -18,7 +18,7 @@ RESOLUTION = 400  #: points along the diagonal at which the plane flow is sample
 SHORTEST = 8  #: streamlines in the plane that extend over fewer of these points are left out
 SEEDS = 5  #: streamlines in space start from so many points along each edge of the middle cross-section,
 BODY_SEEDS = 6  #: and from so many along each edge of a rectangle
-AROUND = 1.2  #: that is so many times as large as a body
+SEEDED_EXTENT = 1.2  #: that is so many times as large as a body
 SLICE_WITH_TUBES, SLICE = 0.3, 0.8  #: opacity of the slice through a flow in space, with stream tubes and without
 TUBES = 0.0025  #: their radius, as part of the box's diagonal
 LINE, TRIANGLE = 3, 5  #: VTK's numbers of cell types
@@ -100,9 +100,9 @@ def _on_back(faces: Any) -> NDArray[np.int64]:
 def _load_body(mesh: Any, field: str) -> list[DrawnBody]:
     """The surface of a rigid body, or an elastic body."""
     if set(np.unique(mesh.celltypes)) == {LINE}:
-        return [fill_lines(mesh.points, mesh.cells.reshape(-1, 3)[:, 1:])]
+        return [replace(fill_lines(mesh.points, mesh.cells.reshape(-1, 3)[:, 1:]), rigid=True)]
     if set(np.unique(mesh.celltypes)) == {TRIANGLE} and not is_flat(mesh):
-        return [DrawnBody(mesh.extract_surface(algorithm="dataset_surface"), NO_LINES, NO_LINES, None)]
+        return [DrawnBody(mesh.extract_surface(algorithm="dataset_surface"), NO_LINES, NO_LINES, None, rigid=True)]
     return [load_body(mesh, field)]
 
 
@@ -214,7 +214,7 @@ def _tubes(mesh: Any, bodies: Sequence[Any]) -> Any:
         centre = surface.points.mean(axis=0)
         axes = np.linalg.svd(surface.points - centre, full_matrices=False)[2].T  # the last one is a torus's
         extent = np.ptp((surface.points - centre) @ axes, axis=0)
-        around = _lattice(centre, axes, AROUND * extent * [1, 1, 0], BODY_SEEDS)
+        around = _lattice(centre, axes, SEEDED_EXTENT * extent * [1, 1, 0], BODY_SEEDS)
         seeds.append(around[~_inside(around, surface)])
     lines = mesh.streamlines_from_source(
         import_pyvista().PolyData(np.concatenate(seeds)),

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fsci.plot.curves import SIZE, STYLE, label, literal
+from fsci.plot.curves import CURVE_SIZE, CURVE_STYLE, label, literal
 from fsci.plot.render import ISOMETRIC, Array, DrawnBody, Pixels, View, axes_of_view, frame, render
 
 Rectangle = tuple[float, float, float, float]  #: left, bottom, width, height in parts of the figure
@@ -54,10 +54,11 @@ def compose(
 
     Bodies in space are seen from the direction `away`. Without a field nothing has colours. `crop`: percent of the
     points whose values may lie above the colour bar, and of those with negative ones below it. Raises ValueError if no
-    body has the field.
+    body has the field, unless all are rigid: then nothing has colours.
     """
     states = iter(states)
     first = next(states)
+    field = None if all(body.rigid for body in first) else field
     spans = np.max([np.ptp(body.surface.points, axis=0) for body in first], axis=0)
     flat = bool(spans[2] <= 1e-9 * spans.max())
     axes = axes_of_view(flat, away)
@@ -81,7 +82,7 @@ def compose(
     elif least == most:
         most = least + (abs(least) or 1.0)
     width, height = (high - low)[:2]
-    size, layout = SIZE, UPRIGHT if flat else SPATIAL
+    size, layout = CURVE_SIZE, UPRIGHT if flat else SPATIAL
     if flat and width > LONG_FROM * height:
         size, layout = long_layout(height / width, below=1.4 if field else 0.75)
     if not flat and height > TALL_FROM * width:
@@ -108,9 +109,9 @@ def long_layout(slope: float, below: float) -> tuple[tuple[float, float], tuple[
 
     `below`: inches below the picture.
     """
-    picture = max(0.845 * SIZE[0] * slope, 0.8)
+    picture = max(0.845 * CURVE_SIZE[0] * slope, 0.8)
     height = picture + below + 0.45
-    return (SIZE[0], height), (
+    return (CURVE_SIZE[0], height), (
         (0.125, below / height, 0.845, picture / height),
         (0.25, 0.6 / height, 0.5, 0.125 / height),
     )
@@ -152,7 +153,7 @@ def lay_out(scene: Scene, dots: int) -> tuple[Any, Any, Any]:
     view = scene.view
     x, y = float(view.centre @ view.right), float(view.centre @ view.up)
     extent = (x - view.half_width, x + view.half_width, y - view.half_height, y + view.half_height)
-    with matplotlib.rc_context({**STYLE, "axes.grid": False}):
+    with matplotlib.rc_context({**CURVE_STYLE, "axes.grid": False}):
         figure = Figure(scene.size, dpi=dots)
         axes = figure.add_axes(scene.layout[0])
         image = axes.imshow(np.full((1, 1, 3), 255), extent=extent, interpolation="none", aspect="auto")

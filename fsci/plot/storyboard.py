@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fsci.plot.curves import DOTS, STYLE, label, literal, save_figure
+from fsci.plot.curves import CURVE_DOTS, CURVE_STYLE, label, literal, save_figure
 from fsci.plot.render import Array, DrawnBody, Pixels, View, import_pyvista, render
 from fsci.plot.render_flow import (
     NO_LINES,
@@ -24,11 +24,11 @@ from fsci.plot.render_flow import (
 from fsci.plot.scene import draw_colour_bar, field_label
 
 PANELS = 6  #: at most
-WIDTH = 9.0  #: of the picture, inches
+BOARD_WIDTH = 9.0  #: of the picture, inches
 SHAPE = 1.4  #: width over height that the panels together come close to
 BESIDE, BELOW, BAR, TITLE, GAP = 0.75, 0.6, 1.2, 0.45, 0.45  #: inches left of, below, right of, above, between panels
 HEAD = 0.32  #: inches for the time above each panel
-CROP = {True: 0.3, False: 1.0}  #: percent of the points in the plane, on a slice, with values above the colour bar
+BOARD_CROP = {True: 0.3, False: 1.0}  #: percent of the points in the plane, on a slice, above the colour bar
 
 Axes = tuple[str, str]  #: names of the coordinates to the right and upwards
 
@@ -49,25 +49,25 @@ def plot_story(
     bounds = np.array([surface.bounds for surface in shown])
     low, high = bounds[:, :4:2].min(axis=0), bounds[:, 1:4:2].max(axis=0)
     names, plane = states[0][1:]
-    crop = CROP[not plane]
+    crop = BOARD_CROP[not plane]
     limits = (0.0, max(float(np.percentile(speed, 100 - crop)) for speed in speeds) or 1.0)
     columns, rows = arrange(len(states), *(high - low))
-    width = (WIDTH - BESIDE - BAR - (columns - 1) * GAP) / columns
+    width = (BOARD_WIDTH - BESIDE - BAR - (columns - 1) * GAP) / columns
     height = width * float(np.divide(*(high - low)[::-1]))
     total = BELOW + TITLE + rows * (height + HEAD) + (rows - 1) * GAP
-    with matplotlib.rc_context({**STYLE, "axes.grid": False}):
-        figure = Figure((WIDTH, total), dpi=DOTS)
+    with matplotlib.rc_context({**CURVE_STYLE, "axes.grid": False}):
+        figure = Figure((BOARD_WIDTH, total), dpi=CURVE_DOTS)
         for index, (moment, (bodies, *_)) in enumerate(zip(moments, states, strict=True)):
             row, column = divmod(index, columns)
             left = BESIDE + column * (width + GAP)
             bottom = BELOW + (rows - 1 - row) * (height + HEAD + GAP)
-            axes = figure.add_axes((left / WIDTH, bottom / total, width / WIDTH, height / total))
+            axes = figure.add_axes((left / BOARD_WIDTH, bottom / total, width / BOARD_WIDTH, height / total))
             extent = (low[0], high[0], low[1], high[1])
             axes.imshow(snapshot(bodies, low, high, limits, width), extent=extent, aspect="auto", interpolation="none")
             axes.spines[:].set_visible(True)
             axes.xaxis.set_major_locator(MaxNLocator(max(2, round(width / 0.7)), steps=[1, 2, 5, 10]))
             axes.yaxis.set_major_locator(MaxNLocator(max(2, round(height / 0.5)), steps=[1, 2, 5, 10]))
-            axes.set_title(literal(f"t = {moment[0][0]:.3g} {units['time']}"), fontsize=STYLE["font.size"], pad=5)
+            axes.set_title(literal(f"t = {moment[0][0]:.3g} {units['time']}"), fontsize=CURVE_STYLE["font.size"], pad=5)
             axes.tick_params(labelleft=column == 0, labelbottom=index + columns >= len(states))
             if column == 0:
                 axes.set_ylabel(label(names[1], "displacement", units))
@@ -76,7 +76,7 @@ def plot_story(
         figure.suptitle(literal(f"{title}, {plane} {units['length']}" if plane else title), y=1 - 0.1 / total, va="top")
         tall = min(total - BELOW - TITLE - HEAD, 4.0)
         middle = BELOW + (total - BELOW - TITLE - HEAD) / 2
-        place = ((WIDTH - BAR + 0.2) / WIDTH, (middle - tall / 2) / total, 0.14 / WIDTH, tall / total)
+        place = ((BOARD_WIDTH - BAR + 0.2) / BOARD_WIDTH, (middle - tall / 2) / total, 0.14 / BOARD_WIDTH, tall / total)
         draw_colour_bar(figure, place, limits, "viridis", field_label("velocity", flows, units), extend="max")
         save_figure(figure, path)
     return path
@@ -150,5 +150,5 @@ def snapshot(bodies: list[DrawnBody], low: Array, high: Array, limits: tuple[flo
     """The plane from `low` to `high`, at the given width in inches."""
     half = (high - low) / 2
     view = View(np.array([*(low + half), 0.0]), np.array([1.0, 0, 0]), np.array([0.0, 1, 0]), *half)
-    size = (round(width * DOTS), round(width * DOTS * half[1] / half[0]))
+    size = (round(width * CURVE_DOTS), round(width * CURVE_DOTS * half[1] / half[0]))
     return render(bodies, view, size=size, limits=limits, colours="viridis")

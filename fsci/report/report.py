@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fsci.report.html import bars, folded, heading, page, paragraph, pictures, preformatted, section, table
+from fsci.report.html import REPORT_FILE, bars, folded, heading, page, paragraph, pictures, preformatted, section, table
 from fsci.run.files import require_own, write_text
 
-NAME = "report.html"
 LOG_LINES = 40  #: of the log that are shown
 
 
@@ -24,8 +23,8 @@ def write_report(out: Path) -> Path:
     require_own(out)
     summary = read_summary(out)
     drawn = plot_run(out)
-    write_text(out / NAME, report(out, summary, drawn))
-    return out / NAME
+    write_text(out / REPORT_FILE, report(out, summary, drawn))
+    return out / REPORT_FILE
 
 
 def read_summary(out: Path) -> dict[str, Any]:

@@ -24,7 +24,7 @@ PATH = Path(__file__).parent / "table.json"
 #: Power of the cells with which errors fall beyond the table: that of the elements; at edges the pressure is singular.
 ORDER = {"smooth": 2.0, "sharp": 1.0, "film": 2.0}
 #: Errors below this [%] are not told apart.
-NOTHING = 0.01
+LEAST_ERROR = 0.01
 
 
 @cache
@@ -38,7 +38,7 @@ def curves(rows: Sequence[Mapping[str, float | int | str]], by: str) -> Table:
     scenes: dict[tuple[str, str], dict[str, list[tuple[float, float]]]] = {}
     for row in rows:
         points = scenes.setdefault((str(row["kind"]), str(row["element"])), {}).setdefault(str(row["scene"]), [])
-        points.append((float(row[by]), max(float(row["error [%]"]), NOTHING)))
+        points.append((float(row[by]), max(float(row["error [%]"]), LEAST_ERROR)))
     return {key: [sorted(points) for points in found.values()] for key, found in scenes.items()}
 
 
@@ -70,6 +70,6 @@ def _on_curve(curve: Curve, cells: float, order: float) -> float:
     if cells <= first:
         return largest
     if cells >= last:
-        return max(least * (last / cells) ** order, NOTHING)
+        return max(least * (last / cells) ** order, LEAST_ERROR)
     (x0, y0), (x1, y1) = next(part for part in pairwise(curve) if cells <= part[1][0])
     return y0 * (y1 / y0) ** (math.log(cells / x0) / math.log(x1 / x0))

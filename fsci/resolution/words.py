@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from fsci.resolution.table import Kind, cells_for, error, least_error
 
 if TYPE_CHECKING:
-    from solvers.fluid.resolution.cells import BodyCells, GapCells
+    from solvers.fluid.flow.resolution.cells import BodyCells, GapCells
 
 #: Error [%] from which on a message is a warning. The table is known to a factor of two: what is above 5 % warns, and
 #: what is below 1 % does not, with any value from 2 to 3.
@@ -19,7 +19,7 @@ WARNED = 2.5
 #: The same before the flow is known: what acts on the body may be another force.
 SURE = 5.0
 #: Error [%] that the remedy aims at.
-GOOD = 1.0
+GOOD_ERROR = 1.0
 
 Errors = Callable[[str, float], float]  #: (element, cells) -> error [%]
 
@@ -71,7 +71,7 @@ def before_the_run(body: BodyCells, element: str, *, films: bool) -> Iterator[tu
 
     off = errors(element, body.across)
     if off >= SURE:
-        more = f"{_number(cells_for(partial(errors, element), GOOD, body.across))} cells"
+        more = f"{_number(cells_for(partial(errors, element), GOOD_ERROR, body.across))} cells"
         words = f"forces were {_number(off)} % off in the benchmark, or more"
         text = f"{_number(body.across)} cells across the body: {words}{_remedy(errors, element, body.across, more)}"
         yield (body.body, ""), text
@@ -92,7 +92,7 @@ def _of_body(body: BodyCells, element: str) -> Resolved:
         f"body '{body.body}': {_cells(body.layer)} in its boundary layer, {_number(body.across)} across it, {_off(off)}"
     )
     if off >= WARNED:
-        finer = cells_for(partial(errors, element), GOOD, body.layer) / body.layer
+        finer = cells_for(partial(errors, element), GOOD_ERROR, body.layer) / body.layer
         text += _remedy(errors, element, body.layer, f"{_number(finer * body.across)} cells across it")
     return Resolved(body.body, "", body.layer, body.across, body.facets, body.share, off, text)
 
@@ -109,7 +109,7 @@ def _of_gaps(body: BodyCells, element: str) -> Iterator[Resolved]:
             f"{_number(gap.cells)} where the force acts, {_off(off)}"
         )
         if off >= WARNED:
-            finer = cells_for(partial(errors, element), GOOD, gap.cells) / gap.cells
+            finer = cells_for(partial(errors, element), GOOD_ERROR, gap.cells) / gap.cells
             text += _remedy(errors, element, gap.cells, f"{_number(finer)} times as many cells there")
         yield Resolved(body.body, gap.to, gap.cells, gap.least, body.facets, gap.share, off, text)
 
@@ -127,7 +127,7 @@ def _off(off: float) -> str:
 
 def _remedy(errors: Errors, element: str, cells: float, more: str) -> str:
     """The other element, where that is enough, and how many cells are."""
-    other = element == "q1q1" and errors("q2q1", cells) < GOOD
+    other = element == "q1q1" and errors("q2q1", cells) < GOOD_ERROR
     return f"; take {'element: q2q1, or ' if other else ''}{more}"
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fsci.case.time import LEAST, shared
+from fsci.case.time import LEAST_STEP, shared
 from solvers.api import State
 
 
@@ -41,7 +41,7 @@ class Clock:
     def at(self, tick: int) -> float:
         """Time [s] of a tick; the last step ends at `end` exactly."""
         time = self.start + self.nominal * (tick / 2**self.halvings)
-        return self.end if self.end - time < LEAST * self.size else time
+        return self.end if self.end - time < LEAST_STEP * self.size else time
 
     @property
     def time(self) -> float:

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ History = dict[str, NDArray[np.float64]]
 
 class HistoryWriter:
     """Appends to a history file; the first row decides which columns follow the fixed ones.
+
+    Later rows may have more: what begins then, as contact with a wall that comes near, was zero before.
 
     Given `resume_after`, rows of later steps and a half-written last one are dropped and writing continues there;
     otherwise an existing file is replaced. A resumed run may have other columns: new ones are the last and nan in
@@ -35,28 +38,30 @@ class HistoryWriter:
         if resume_after is not None and path.exists() and (lines := complete_lines(path)):
             self.columns = column_names(path, lines[0])[len(COLUMNS) :]
             self._earlier = [line for line in lines[1:] if _step(path, line) <= resume_after]
-            self._begin([*COLUMNS, *self.columns], self._earlier)
+            self.file = self._begin([*COLUMNS, *self.columns], self._earlier)
         else:
-            self._begin([], [])
+            self.file = self._begin([], [])
 
-    def _begin(self, names: Sequence[str], rows: Sequence[str]) -> None:
-        """Replace the file."""
+    def _begin(self, names: Sequence[str], rows: Sequence[str]) -> TextIO:
+        """Replace the file; returns it, to append to."""
         write_text(self.path, "".join(f"{line}\n" for line in (*([",".join(names)] if names else []), *rows)))
-        self.file = open_to_append(self.path)
+        return open_to_append(self.path)
 
     def write(
         self, step: int, time: float, dt: float, iterations: int, wall: float, numbers: Mapping[str, float]
     ) -> None:
-        """Adds one step that took `wall` seconds; raises ValueError if the columns differ from the first."""
+        """Adds one step that took `wall` seconds; raises ValueError if columns are missing or come back."""
         if self.columns is None:
             self.columns = list(numbers)
             print(*COLUMNS, *self.columns, sep=",", file=self.file)
         elif self._earlier is not None:
             self._continue(numbers, self._earlier)
             self._earlier = None
-        if numbers.keys() != set(self.columns) - self._absent:
+        if numbers.keys() & set(self.columns) != set(self.columns) - self._absent:
             different = ", ".join(sorted(numbers.keys() ^ (set(self.columns) - self._absent)))
             raise ValueError(f"history.csv: step {step} and the first one differ in the columns {different}")
+        if new := [name for name in numbers if name not in self.columns]:
+            self._widen(new, "0.0", complete_lines(self.path)[1:])
         fixed = [str(int(step)), repr(float(time)), repr(float(dt)), str(int(iterations)), repr(float(wall))]
         print(
             *fixed,
@@ -71,10 +76,15 @@ class HistoryWriter:
         assert self.columns is not None
         new = [name for name in numbers if name not in self.columns]
         self._absent = set(self.columns) - numbers.keys()
-        self.columns += new
         if new:
-            self.file.close()
-            self._begin([*COLUMNS, *self.columns], [line + ",nan" * len(new) for line in earlier])
+            self._widen(new, "nan", earlier)
+
+    def _widen(self, new: Sequence[str], value: str, earlier: Sequence[str]) -> None:
+        """Add columns, with this value in earlier rows."""
+        assert self.columns is not None
+        self.columns += new
+        self.file.close()
+        self.file = self._begin([*COLUMNS, *self.columns], [line + f",{value}" * len(new) for line in earlier])
 
     def close(self) -> None:
         self.file.close()

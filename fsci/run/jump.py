@@ -14,7 +14,7 @@ from solvers.api import State
 
 #: Part of the body's size that formulas may differ by where one takes over from another: rounding is below 1e-12, and
 #: a distance that matters is above 1e-3.
-ROUNDING = 1e-7
+NO_JUMP = 1e-7
 
 
 def require_continuous(case: Case, state: State) -> None:
@@ -33,7 +33,7 @@ def _jumps(case: Case, state: State) -> Iterator[Problem]:
         movement, there = body.motion, np.asarray(motions[name]["x"])
         here = points if movement is None else rigid_motion(points, movement, case.time.start, case.time.step)(time)[0]
         jump = float(np.linalg.norm(here - there, axis=1).max())
-        if jump > ROUNDING * float(np.ptp(points, axis=0).max()):
+        if jump > NO_JUMP * float(np.ptp(points, axis=0).max()):
             remedy = f"'where(t > {time:.12g}, NEW, OLD)', with the formula that it had as OLD"
             message = f"the body would jump by {jump:.3g} at {time:.6g}, the time of the checkpoint: write {remedy}"
             yield from case.error(("fluid", "bodies", name, "motion"), message).problems

@@ -14,7 +14,7 @@ from fsci.meshes.parts import Named, all_files, real
 from fsci.run.files import FILES, FOLDERS, LOCK, MARKER, UNFINISHED, copy_file, make_folder, replacing, write_text
 
 #: Names that copies cannot have at the top of a results folder, as file systems that ignore case see them.
-RESERVED = {name.casefold() for name in (*FILES, *FOLDERS, MARKER, LOCK)}
+RESERVED_FILES = {name.casefold() for name in (*FILES, *FOLDERS, MARKER, LOCK)}
 
 Targets = dict[Path, Path]  #: file -> name of its copy in the folder
 
@@ -79,6 +79,7 @@ def _named_files(case: Case) -> Iterator[tuple[str, str, str]]:
     groups: dict[str, Mapping[str, Any]] = {
         "structure.bodies": case.elastic_bodies,
         "fluid.bodies": {} if case.fluid is None else case.fluid.bodies,
+        "rigid.bodies": {} if case.rigid_section is None else case.rigid_section.bodies,
         "contact.obstacles": {} if case.contact is None else case.contact.obstacles,
     }
     found = [
@@ -92,7 +93,7 @@ def _named_files(case: Case) -> Iterator[tuple[str, str, str]]:
 
 def _reserved(kept: Path) -> bool:
     names = {kept.parts[0].casefold(), kept.name.casefold()}
-    return kept.parts[0].casefold() in RESERVED or any(name.endswith(UNFINISHED) for name in names)
+    return kept.parts[0].casefold() in RESERVED_FILES or any(name.endswith(UNFINISHED) for name in names)
 
 
 def _free(targets: Targets, taken: Targets) -> bool:

@@ -6,7 +6,7 @@ import os
 from typing import Any
 
 from fsci.case import Case
-from fsci.case.shapes import Shape
+from fsci.case.shapes import ShapeSection
 from fsci.case.yaml_text import Keys
 
 #: Memory [bytes] that an unknown takes at least: its row of a matrix in 2D with its nine neighbours, twice. In 3D with
@@ -21,8 +21,8 @@ def unknowns(case: Case) -> dict[Keys, int]:
     """Setting that determines the count -> unknowns, as far as no mesh file is needed."""
     found: dict[Keys, int] = {}
     for name, body in case.elastic_bodies.items():
-        if isinstance(body.mesh, Shape):
-            found["structure", "bodies", name, "mesh"] = body.mesh.counts[1] * body.mesh.dimension
+        if isinstance(body.mesh, ShapeSection):
+            found["structure", "bodies", name, "mesh"] = body.mesh.plan.counts[1] * body.mesh.plan.dimension
     if case.fluid is not None:
         found["fluid", "grid"] = case.fluid.dofs
     return found

@@ -13,7 +13,7 @@ from solvers.api import StepFailed, StepInfo
 
 ACTIVE = "contact.active"  #: the number of StepInfo that counts active contact nodes
 HEADER_EVERY = 40  #: lines between two table headers
-COLUMNS = {
+COLUMN_WIDTHS = {
     "step": 6,
     "time": 10,
     "dt": 9,
@@ -40,6 +40,8 @@ class Monitor:
         self.live = live and self.stream.isatty()
         self.log = open_to_append(log) if enabled and log else None
         self.progress: Any = None  # rich's progress bar, on a terminal
+        self.task: Any = None  # that of the bar
+        self.begin = self.end = 0.0
         self.lines = 0
         self.columns: Collection[str] = ()
         self.pace = 0.0  # wall time per unit of simulated time, averaged over the last steps
@@ -140,7 +142,7 @@ class Monitor:
 
 def align(cells: Mapping[str, str]) -> str:
     """One line of the table."""
-    return " ".join(f"{text:>{COLUMNS[name]}}" for name, text in cells.items())
+    return " ".join(f"{text:>{COLUMN_WIDTHS[name]}}" for name, text in cells.items())
 
 
 def duration(seconds: float) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
@@ -18,7 +18,9 @@ Series = list[tuple[float, Path]]  #: (time, VTU file) of each output, in order 
 
 
 class FieldWriter:
-    """Writes the snapshots of a run into `folder` as <body>_<step>.vtu and keeps <body>.pvd up to date.
+    """Writes the snapshots of a run into `folder` as <body>_<step>.vtu, and keeps <body>.pvd up to date.
+
+    What else `FORMATS` has stands beside it.
 
     A file gets its name only when it is complete, and a collection lists only such files: what a killed run
     leaves is readable.
@@ -42,14 +44,16 @@ class FieldWriter:
             write_collection(listed, kept)
             for later, path in entries:
                 if later > time:  # `read_collection` knows it to be an output in this folder
-                    path.unlink(missing_ok=True)
+                    for suffix in FORMATS:
+                        path.with_suffix(suffix).unlink(missing_ok=True)
         return writer
 
     def write(self, step: int, time: float, snapshots: Sequence[Snapshot]) -> None:
         """Adds the fields of all bodies at one time."""
         for snapshot in snapshots:
             path = self.folder / f"{snapshot.name}_{step:06d}.vtu"
-            write_vtu(path, snapshot)
+            for suffix, write in FORMATS.items():
+                write(path.with_suffix(suffix), snapshot)
             self.series.setdefault(snapshot.name, []).append((time, path))
             lines = self._lines.setdefault(snapshot.name, [])
             lines.append(data_set(time, path))
@@ -71,6 +75,10 @@ def write_vtu(path: Path, snapshot: Snapshot) -> None:
     )
     with replacing(path) as unfinished:
         meshio.write(unfinished, mesh, file_format="vtu", binary=True, compression="zlib")
+
+
+#: End of the names of files -> function that writes one body. Each run writes all of them.
+FORMATS: Mapping[str, Callable[[Path, Snapshot], None]] = {".vtu": write_vtu}
 
 
 def write_collection(path: Path, series: Series) -> None:
@@ -102,9 +110,9 @@ def read_collection(path: Path) -> Series:
     return [(time, path.parent / name) for time, name in entries]
 
 
-def is_output_of(part: str, name: str) -> bool:
-    """Whether this is the name of a file that `FieldWriter` writes for a body or the fluid."""
-    return re.fullmatch(rf"{re.escape(part)}_\d{{6,}}\.vtu", name) is not None
+def is_output_of(part: str, name: str, formats: Iterable[str] = (".vtu",)) -> bool:
+    """Whether this is the name of a file that `FieldWriter` writes for a body or the fluid in one of the formats."""
+    return re.fullmatch(rf"{re.escape(part)}_\d{{6,}}({'|'.join(map(re.escape, formats))})", name) is not None
 
 
 def pad(values: ArrayLike) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 #: Time [s] within which a failure of all processes has reached all of them.
-PATIENCE = 5.0
+SECONDS_TO_FAIL = 5.0
 
 
 @contextmanager
@@ -44,7 +44,7 @@ def describe(error: BaseException) -> str:
 
 def _all_are_here(comm: Any) -> bool:
     """All processes have called this within some time."""
-    here, end = comm.Ibarrier(), time.monotonic() + PATIENCE
+    here, end = comm.Ibarrier(), time.monotonic() + SECONDS_TO_FAIL
     while not here.Test():
         if time.monotonic() > end:
             return False

@@ -10,7 +10,7 @@ from fsci.case import Case, CaseError
 from fsci.run.files import FILES, FOLDERS, LOCK, MARKER, UNFINISHED, refused, require_own, write_text
 from fsci.run.kept_case import copies, keep_case
 from fsci.run.lock import Lock
-from fsci.run.output import is_output_of
+from fsci.run.output import FORMATS, is_output_of
 
 MARKER_TEXT = "The results of a run of fsci. Another run into this folder replaces the files that runs write.\n"
 
@@ -117,6 +117,7 @@ def _fields(folder: Path) -> list[Path]:
     """The collections, and the files of the parts that they name."""
     found: list[Path] = []
     for collection in folder.glob("*.pvd"):
-        steps = [path for path in folder.iterdir() if is_output_of(collection.stem, path.name.removesuffix(UNFINISHED))]
+        names = {path: path.name.removesuffix(UNFINISHED) for path in folder.iterdir()}
+        steps = [path for path, name in names.items() if is_output_of(collection.stem, name, FORMATS)]
         found += [*steps, collection] if steps else []
     return found

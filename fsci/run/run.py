@@ -35,7 +35,7 @@ from fsci.run.stop import StopWatch
 from fsci.run.summary import RunRecord, memory_mb, shares, summarize, write_summary
 from fsci.run.verify import evaluate
 from fsci.run.watch import Watched
-from solvers.api import State, StepFailed, StepInfo
+from solvers.api import Finding, State, StepFailed, StepInfo
 
 if TYPE_CHECKING:
     from fsci.builder.build import Simulation
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 FINISHED, FAILED, BAD_CASE, STOPPED = 0, 1, 2, 3  #: exit codes
 
 #: Settings that decide where rigid bodies are, and those that decide which forces and energies a state has.
-MOVING = ("fluid.bodies.*.motion", "curves", "time.step")
+SETTINGS_OF_MOTION = ("fluid.bodies.*.motion", "curves", "time.step")
 MATERIALS = ("structure.bodies.*.material", "structure.bodies.*.springs")
 
 _NO_START = (
@@ -106,6 +106,12 @@ class Run:
     good_at: State = field(default_factory=dict)  #: its step and time
     lock: Lock | None = None  #: of the folder, on rank 0
     before: State = field(default_factory=dict)  #: settings and meshes of the checkpoint, if the run is resumed
+    simulation: Simulation = field(init=False)  #: what is computed, from when it is built
+    scheme: Watched = field(init=False)  #: its scheme, with the sentinels
+    ended_by: Finding | None = field(init=False, default=None)  #: what ends it after the step it was found in
+    described: str = field(init=False)  #: settings and meshes as text, for checkpoints
+    history: HistoryWriter = field(init=False)  #: on rank 0
+    fields: FieldWriter = field(init=False)  #: on rank 0
 
     def __post_init__(self) -> None:
         time = self.case.time
@@ -116,6 +122,7 @@ class Run:
         self.clock = Clock(time.start, time.end, time.step, halvings, time.retry.recover_after)
         self.record.residual_steps = self.case.output.residuals
         self.stop = StopWatch(self._give_up if self.root else None)
+        self.monitor = Monitor(enabled=self.root, live=self.comm.size == 1, log=self.out / "log.txt")
 
     # ------------------------------------------------------------------------------------------------- start
 
@@ -143,12 +150,12 @@ class Run:
 
     def from_checkpoint(self, state: State) -> int:
         """Compute from a checkpoint. Raises OSError for one of another version of fsci."""
-        from solvers.distributed import scatter
+        from solvers.mesh.distributed import scatter
 
         with self._shown():
             self.before = json.loads(_entry(state, "case"))
             changes = changed(self.case, self.before["settings"])
-            if any(change.concerns(*MOVING) for change in changes):
+            if any(change.concerns(*SETTINGS_OF_MOTION) for change in changes):
                 on_first(self.comm, lambda: require_continuous(self.case, state))
             self._initialise(self._build())
             with self.record.timer("start"):
@@ -174,7 +181,6 @@ class Run:
         """Show messages to the user and write them to the log."""
         from solvers import fem
 
-        self.monitor = Monitor(enabled=self.root, live=self.comm.size == 1, log=self.out / "log.txt")
         with self.monitor, fem.listening(self.monitor.say):
             yield
 
@@ -185,7 +191,7 @@ class Run:
             self.simulation = build(self.case, self.comm, self.record.timer)
         self.scheme = Watched(self.simulation.scheme, self.simulation.sentinels, self.record.timer)
         on_first(self.comm, self._require_meshes)
-        self._described = json.dumps({"settings": settings_of(self.case), "meshes": self.case.meshes})
+        self.described = json.dumps({"settings": settings_of(self.case), "meshes": self.case.meshes})
         return self.simulation
 
     def _require_meshes(self) -> None:
@@ -240,6 +246,8 @@ class Run:
                 self.take_step()
             except StepFailed as failure:
                 return self._fail(failure)
+            if self.ended_by is not None:
+                return self._end("finished", f"{self.ended_by.message}, at time {self.clock.time:g}")
             if every and self.clock.step % every == 0:
                 with self.stop.files:
                     self._write_checkpoint()
@@ -271,23 +279,24 @@ class Run:
                 earlier = failure
         with self.stop.files:
             clock.accept()
+            self.ended_by = next((finding for finding in info.findings if finding.ends_run), None)
             self.record.accept(clock.step, info)
             self._note(dt, info, before)
             if _is_power_of_two(clock.step):
                 self._measure_resolution()
             every = self.case.output.fields_every
-            if clock.done or (every and clock.step % every == 0):
+            if clock.done or self.ended_by is not None or (every and clock.step % every == 0):
                 self._write_fields()
             self._keep()
 
     def _keep(self) -> None:
         """Store the state of the last accepted step, for retries and checkpoints."""
-        from solvers.distributed import gather
+        from solvers.mesh.distributed import gather
 
         with self.record.timer("checkpoint"):
             self.state = self.scheme.save()
             clock = self.clock
-            self.good = {"scheme": gather(self.comm, self.state), "clock": clock.save(), "case": self._described}
+            self.good = {"scheme": gather(self.comm, self.state), "clock": clock.save(), "case": self.described}
             self.good_at = {"step": clock.step, "time": clock.time, "title": self.case.title}
 
     def _note(self, dt: float, info: StepInfo, before: float) -> None:
@@ -340,6 +349,7 @@ class Run:
         keep_case(self.case, folder)
         what = {
             "field": failure.field,
+            "kind": failure.kind.value,
             "reason": failure.reason,
             "iteration": failure.iteration,
             "where": failure.where,
@@ -425,7 +435,8 @@ class Run:
             self.monitor.warn(message)
         missed = any(not result["ok"] for result in results)
         if status == "finished":
-            message = f"finished in {self.record.wall():.3g} s; results in {self.out}"
+            reason = f"{message}; " if message else ""
+            message = f"{reason}finished in {self.record.wall():.3g} s; results in {self.out}"
             if count := len(self.record.warnings) + len(coarse):
                 message += f"; {count} warning{'s' * (count > 1)} above and in summary.json"
             message += "; the verification failed" if missed else ""

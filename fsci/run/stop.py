@@ -31,13 +31,15 @@ class StopWatch:
         self.requested = False
         self.files = threading.RLock()
         self._give_up, self._ended = give_up, threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="signals", daemon=True)
+        self._read = self._write = self._before = -1  # file descriptors, of the pipe and of another one before
+        self._handlers: dict[signal.Signals, Any] = {}
 
     def __enter__(self) -> StopWatch:
         self._read, self._write = os.pipe()
         os.set_blocking(self._write, False)
         self._handlers = {number: signal.signal(number, self._on_signal) for number in SIGNALS}
         self._before = signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
-        self._thread = threading.Thread(target=self._watch, name="signals", daemon=True)
         self._thread.start()
         return self
 

@@ -29,10 +29,9 @@ class Watched:
         with self._timer("sentinels"):
             found = tuple(finding for sentinel in self._sentinels.values() for finding in sentinel.look(t + dt, dt))
         for finding in found:
-            if finding.worthless:
-                raise StepFailed(
-                    finding.kind, finding.message, where=finding.where, history=info.residuals, finding=finding
-                )
+            if (kind := finding.worthless) is not None:
+                history, where = info.residuals, finding.where
+                raise StepFailed(finding.kind, kind, finding.message, where=where, history=history, finding=finding)
         return replace(info, findings=(*info.findings, *found)) if found else info
 
     def save(self) -> State:

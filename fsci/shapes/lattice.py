@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.cell_types import CELL_TYPES, reference_nodes
-from solvers.mesh import Mesh
-from solvers.mesh_topology import boundary_facets
+from solvers.mesh.cell_types import CELL_TYPES, reference_nodes
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.topology import boundary_facets
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -26,40 +26,69 @@ LATTICE_CELLS = {
 
 
 @dataclass(frozen=True)
-class Lattice:
-    """Blocks of nodes; a cell takes `order` intervals of its block in every direction."""
+class NodeBlocks:
+    """NodeBlocks of nodes; a cell takes `order` intervals of its block in every direction."""
 
     points: Array  #: node positions or parameters, shape (n, any)
     blocks: tuple[Indices, ...]  #: node numbers, each of shape (order * cells + 1, ...) with one axis per direction
     sides: dict[str, Indices]  #: name of a part of the boundary -> its nodes
     order: int  #: 1 or 2
 
-    def mapped(self, function: Callable[..., Sequence[Array]]) -> Lattice:
-        """The same lattice with its points moved: `function(x, y, ...)` gives the new coordinates."""
+    def mapped(self, function: Callable[..., Sequence[Array]]) -> NodeBlocks:
+        """The same blocks with their points moved: `function(x, y, ...)` gives the new coordinates."""
         return replace(self, points=np.column_stack(function(*self.points.T)))
 
 
+@dataclass(frozen=True)
+class Lattice:
+    """Counts and sides of blocks of nodes that are made when they are needed."""
+
+    cells: int
+    nodes: int
+    directions: int
+    sides: tuple[str, ...]  #: names
+    order: int  #: 1 or 2
+    make: Callable[[], NodeBlocks]
+
+    def mapped(self, function: Callable[..., Sequence[Array]]) -> Lattice:
+        """The same lattice with its points moved: `function(x, y, ...)` gives the new coordinates."""
+        return replace(self, make=lambda: self.make().mapped(function))
+
+
 def line(cells: int, order: int, sides: tuple[str, str] | None = None) -> Lattice:
-    """Parameter 0 to 1 in equal steps; without sides it is closed: its end is its start."""
-    if sides is None and cells < 3:
-        raise ValueError(f"at least 3 cells are needed all the way around, got {cells}")
+    """Parameter 0 to 1 in equal steps; without sides it is closed, of three cells at least: its end is its start."""
     steps = order * cells
-    parameter = np.arange(steps + 1) / steps
-    if sides is None:
-        return Lattice(parameter[:-1, None], (np.arange(steps + 1) % steps,), {}, order)
-    ends = {sides[0]: np.array([0]), sides[1]: np.array([steps])}
-    return Lattice(parameter[:, None], (np.arange(steps + 1),), ends, order)
+
+    def make() -> NodeBlocks:
+        parameter = np.arange(steps + 1) / steps
+        if sides is None:
+            return NodeBlocks(parameter[:-1, None], (np.arange(steps + 1) % steps,), {}, order)
+        ends = {sides[0]: np.array([0]), sides[1]: np.array([steps])}
+        return NodeBlocks(parameter[:, None], (np.arange(steps + 1),), ends, order)
+
+    return Lattice(cells, steps + (sides is not None), 1, sides or (), order, make)
 
 
 def product(first: Lattice, second: Lattice) -> Lattice:
     """Every node of the first with every node of the second: coordinates, directions and sides of both."""
+    return Lattice(
+        first.cells * second.cells,
+        first.nodes * second.nodes,
+        first.directions + second.directions,
+        first.sides + second.sides,
+        first.order,
+        lambda: _product(first.make(), second.make()),
+    )
+
+
+def _product(first: NodeBlocks, second: NodeBlocks) -> NodeBlocks:
     size, along = len(second.points), np.arange(len(second.points))
     points = np.hstack([np.repeat(first.points, size, axis=0), np.tile(second.points, (len(first.points), 1))])
     blocks = tuple(np.add.outer(a * size, b) for a in first.blocks for b in second.blocks)
     across = np.arange(len(first.points)) * size
     sides = {name: np.add.outer(nodes * size, along).ravel() for name, nodes in first.sides.items()}
     sides |= {name: np.add.outer(across, nodes).ravel() for name, nodes in second.sides.items()}
-    return Lattice(points, blocks, sides, first.order)
+    return NodeBlocks(points, blocks, sides, first.order)
 
 
 def disc(around: int, radial: int, order: int) -> Lattice:
@@ -67,8 +96,12 @@ def disc(around: int, radial: int, order: int) -> Lattice:
 
     `around` counts the cells on the circle, a multiple of 4: each side of the core has a quarter of them.
     """
-    if around % 4 or around < 4:
-        raise ValueError(f"the number of cells around must be a multiple of 4, got {around}")
+    quarter = around // 4
+    cells, nodes = quarter**2 + around * radial, (order * quarter + 1) ** 2 + order * around * order * radial
+    return Lattice(cells, nodes, 2, ("outer",), order, lambda: _disc(around, radial, order))
+
+
+def _disc(around: int, radial: int, order: int) -> NodeBlocks:
     quarter = around // 4
     edge, turn, layers = order * quarter, order * around, order * radial
 
@@ -90,11 +123,15 @@ def disc(around: int, radial: int, order: int) -> Lattice:
     shell = np.vstack([rim, core.size + np.arange(layers * turn).reshape(layers, turn)])
     shell = np.column_stack([shell, shell[:, 0]])
     points = np.vstack([square, shell_points.reshape(-1, 2)])
-    return Lattice(points, (core, shell), {"outer": shell[-1, :-1]}, order)
+    return NodeBlocks(points, (core, shell), {"outer": shell[-1, :-1]}, order)
 
 
 def sphere(cells: int, order: int) -> Lattice:
     """Unit sphere: the six faces of a cube, `cells` per edge, at equal angles (equiangular gnomonic)."""
+    return Lattice(6 * cells**2, 6 * (order * cells) ** 2 + 2, 2, (), order, lambda: _sphere(cells, order))
+
+
+def _sphere(cells: int, order: int) -> NodeBlocks:
     steps = order * cells
     cube = np.arange((steps + 1) ** 3).reshape(3 * (steps + 1,))
     faces = [cube[0].T, cube[-1], cube[:, 0], cube[:, -1].T, cube[:, :, 0].T, cube[:, :, -1]]
@@ -102,14 +139,20 @@ def sphere(cells: int, order: int) -> Lattice:
     index = np.column_stack(np.unravel_index(used, cube.shape))
     points = np.tan(np.pi / 4 * (2 * index / steps - 1))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
-    return Lattice(points, tuple(np.searchsorted(used, face) for face in faces), {}, order)
+    return NodeBlocks(points, tuple(np.searchsorted(used, face) for face in faces), {}, order)
 
 
 def ball(cells: int, radial: int, order: int) -> Lattice:
     """Unit ball: a cubic core with bulged sides, `cells` per edge, inside a shell of `radial` layers; side `outer`."""
+    faces, edge = 6 * cells**2, order * cells
+    nodes = (edge + 1) ** 3 + (6 * edge**2 + 2) * order * radial
+    return Lattice(cells**3 + faces * radial, nodes, 3, ("outer",), order, lambda: _ball(cells, radial, order))
+
+
+def _ball(cells: int, radial: int, order: int) -> NodeBlocks:
     edge, layers = order * cells, order * radial
     cube = np.arange((edge + 1) ** 3).reshape(3 * (edge + 1,))
-    faces = sphere(cells, order)
+    faces = _sphere(cells, order)
     rim = np.flatnonzero((np.stack(np.unravel_index(cube.ravel(), cube.shape)) % edge == 0).any(axis=0))
     inner = np.column_stack(np.unravel_index(cube.ravel(), cube.shape)) * 2 / edge - 1
 
@@ -126,10 +169,10 @@ def ball(cells: int, radial: int, order: int) -> Lattice:
     number = np.vstack([rim, cube.size + np.arange(layers * len(rim)).reshape(layers, -1)])
     blocks = tuple(np.moveaxis(number[:, face], 0, -1) for face in faces.blocks)
     points = np.vstack([core, shell.reshape(-1, 3)])
-    return Lattice(points, (cube, *blocks), {"outer": number[-1]}, order)
+    return NodeBlocks(points, (cube, *blocks), {"outer": number[-1]}, order)
 
 
-def mesh(lattice: Lattice, cell: str) -> Mesh:
+def mesh(lattice: NodeBlocks, cell: str) -> Mesh:
     """The mesh of a lattice of 2 directions (cell quad or tri) or 3 (hex or tet), its sides as surfaces."""
     directions = lattice.blocks[0].ndim
     if cell not in LATTICE_CELLS[directions]:

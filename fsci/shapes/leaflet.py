@@ -4,55 +4,63 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import radians
+from typing import Annotated
 
 import numpy as np
 
 from fsci.shapes import lattice
-from solvers.mesh import Mesh
+from fsci.shapes.declaration import MeshPlan, ShapeError, Shapes, counts, meshed, not_negative, positive
 
 
+@meshed
 def leaflet(
-    radius: float,
-    thickness: float,
-    height: float,
-    lip: float,
-    post: float,
-    cells: Sequence[int],
-    angle: float = 120,
-    gap: float = 0,
+    radius: Annotated[
+        float, positive("radius at which the lips end; the edge below them is one thickness farther out")
+    ],
+    thickness: Annotated[float, positive("thickness of the leaflet")],
+    height: Annotated[float, positive("from the lowest point of the edge at the wall, z = 0, to the top of the lips")],
+    lip: Annotated[float, positive("height of the upright lips")],
+    post: Annotated[float, positive("height of the sides at the wall below the lips")],
+    cells: Annotated[
+        Sequence[int],
+        counts(
+            3,
+            "number of cells along the wall (even), through the thickness, and up (at least 2)",
+            {0: (2, "along the wall")},
+        ),
+    ],
+    angle: Annotated[float, positive("angle of the sector, at most 180", "degrees")] = 120.0,
+    gap: Annotated[float, not_negative("distance at the axis between the lips of leaflets side by side")] = 0.0,
     *,
     order: int = 1,
     cell: str = "hex",
-) -> Mesh:
-    """Leaflet about the z axis, middle on the x axis: from an arc of `radius` at z = 0 up to its lips at `height` [m].
+) -> MeshPlan:
+    """Leaflet of a valve in a tube about the z axis; surfaces inner, lips, outer, bottom, top, start, end.
 
-    It fills a sector of `angle` degrees. The lips are upright, `lip` high, parallel to the straight sides of the sector
-    and half of the `gap` away from them at the axis, nothing at the wall, so that leaflets side by side touch there.
-    Below they go over into a pouch, a parabola from the lips down to the wall. Its edge at the wall is half of an
-    ellipse, up to `post` below the lips, on a cylinder of `radius + thickness`.
-
-    `cells` counts them along the wall (even), through the thickness, and up, at least two: the lips are whole rows of
-    them. Surfaces inner (of the pouch, towards the inflow), lips (towards those of the other leaflets), outer, bottom
-    (at the wall), top, start and end (upright, at the wall).
+    Lips are the upright part of the inner side, whole rows of cells. Bottom, start and end are at the wall, the middle
+    is on the x axis. The lips are half of the gap away from the straight sides of the sector at the axis, nothing at
+    the wall.
     """
+    if angle > 180:
+        raise ShapeError(f"must be at most 180 degrees, not {angle:g}", "angle")
+    if cells[2] < 2:
+        raise ShapeError(f"the number of cells up must be at least 2, not {cells[2]}", "cells", 2)
+    if lip + post >= height:
+        raise ShapeError(f"'lip' and 'post' must be lower together than 'height', {height:g}", "lip")
+    if thickness + gap / 2 >= radius / 2:
+        raise ShapeError(f"must be less than half of 'radius', {radius:g}, with half of 'gap'", "thickness")
     around, through, up = cells
-    if up < 2:
-        raise ValueError(f"the number of cells up must be at least 2, got {up}")
-    if around % 2:
-        raise ValueError(f"the number of cells along the wall must be even, got {around}")
-    if not lip + post < height:
-        raise ValueError(f"lip and post, {lip:g} and {post:g}, must be lower together than {height:g}")
-    half = np.radians(angle / 2)
     nodes = lattice.product(
         lattice.product(
             lattice.line(through, order, ("inner", "outer")), lattice.line(around, order, ("start", "end"))
         ),
         lattice.line(up, order, ("bottom", "top")),
     )
-
+    half = np.radians(angle / 2)
     rows = min(max(1, round(up * lip / height)), up - 1)  # of the lips
     edge = 1 - rows / up  # the part of t below the lips
-    upright = np.flatnonzero(nodes.points[:, 2] > edge - 0.25 / (order * up))
+    half_row = 0.25 / (order * up)
 
     def place(depth: lattice.Array, s: lattice.Array, t: lattice.Array) -> list[lattice.Array]:
         side, share = np.sign(2 * s - 1), np.abs(2 * s - 1)
@@ -76,10 +84,14 @@ def leaflet(
             ),
         ]
 
-    whole = lattice.mesh(nodes.mapped(place), cell)
-    inner = whole.surfaces["inner"]
-    of_lips = np.isin(inner, upright).all(axis=1)
-    return replace(whole, surfaces=whole.surfaces | {"inner": inner[~of_lips], "lips": inner[of_lips]})
+    def with_lips(straight: lattice.NodeBlocks) -> lattice.NodeBlocks:
+        inner, height = straight.sides["inner"], straight.points[straight.sides["inner"], 2]
+        lips = {"inner": inner[height < edge + half_row], "lips": inner[height > edge - half_row]}
+        return replace(straight, sides=straight.sides | lips)
+
+    sides = "inner", "lips", "outer", "bottom", "top", "start", "end"
+    made = replace(nodes, sides=sides, make=lambda: with_lips(nodes.make()).mapped(place))
+    return MeshPlan(made, cells, cell, (radians(angle) * radius, thickness, height), thickness)
 
 
 def _lips(share: lattice.Array, distance: lattice.Array, radius: float, half: float) -> tuple[lattice.Array, ...]:
@@ -87,3 +99,8 @@ def _lips(share: lattice.Array, distance: lattice.Array, radius: float, half: fl
     first = distance / np.tan(half)
     along = first + share * (np.sqrt(radius**2 - distance**2) - first)
     return along * np.cos(half) + distance * np.sin(half), along * np.sin(half) - distance * np.cos(half)
+
+
+LEAFLET_SHAPES: Shapes = {
+    "leaflet": (leaflet, "radius: 1, thickness: 0.06, height: 1.2, lip: 0.4, post: 0.2, cells: [8, 1, 6]"),
+}

@@ -3,52 +3,18 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Literal
 
-from fsci.stress import composed_scenes, flow_scenes, further_scenes, scenes, space_scenes
 from fsci.stress.frame import Frame
-from fsci.stress.scenes import StressScene
+from fsci.stress.scene import SCENES, StressScene, draw_scene, series, spread
 
-SCENES: dict[str, Callable[[random.Random], StressScene]] = {
-    "beam": scenes.beam,
-    "press": scenes.press,
-    "drop": scenes.drop,
-    "moved": flow_scenes.moved,
-    "gate": flow_scenes.gate,
-    "post": flow_scenes.post,
-    "fall": flow_scenes.fall,
-}
-
-SPACE_SCENES: dict[str, Callable[[random.Random], StressScene]] = {
-    "press 3D": space_scenes.press,
-    "drop 3D": space_scenes.drop,
-    "moved 3D": space_scenes.moved,
-    "post 3D": space_scenes.post,
-}
-SPACE = 100_000  #: from this number on draws are in space
-
-FURTHER_SCENES: dict[str, Callable[[random.Random], StressScene]] = {
-    "free": further_scenes.free,
-    "nested": further_scenes.nested,
-    "rough": further_scenes.rough,
-}
-FURTHER = 200_000  #: from this number on they are of these scenes
-
-COMPOSED_SCENES: dict[str, Callable[[random.Random], StressScene]] = {
-    "stack": composed_scenes.stack,
-    "roam": composed_scenes.roam,
-    "curl": composed_scenes.curl,
-}
-COMPOSED = 300_000  #: from this number on several kinds of contact act together
+SOLVER = {"newton": {"residual": 1e-10, "max_iterations": 25}}
 
 Twin = Literal["rotated", "shifted", "rescaled", "parallel", "resumed", "beside"]
 #: Twins of every scene.
 TWINS: tuple[Twin, ...] = ("rotated", "shifted", "rescaled", "parallel", "resumed")
-
-#: The scenes of the numbers from a first one on, newest first: those of earlier ones stay what they are.
-SERIES = ((COMPOSED, COMPOSED_SCENES), (FURTHER, FURTHER_SCENES), (SPACE, SPACE_SCENES), (0, SCENES))
 
 
 @dataclass(frozen=True)
@@ -77,27 +43,31 @@ class Draw:
             "beside": f"beside a body of {self.neighbour:.2g} Pa",
         }[self.twin]
 
+    def moved(self, by: float) -> Draw:
+        """The same with the body shifted along every axis of the grid [m]; nothing without a grid."""
+        return replace(self, scene=replace(self.scene, by=by))
+
     def case(self, frame: Frame, twin: bool = False) -> dict[str, Any]:
         """The content of the case file in a frame; twin: with the body beside it."""
         scene = self.scene.case(frame)
-        if twin and self.neighbour and self.scene.beside:
+        if twin and self.neighbour:
             scene["structure"]["bodies"]["beside"] = self.scene.beside(frame, self.neighbour)
         return {
             "title": f"{self.scene.name} {self.seed}",
             **scene,
-            "probes": self.scene.probes,
-            "solver": scenes.SOLVER,
+            "time": {"retry": {"halvings": 2}, **scene["time"]},  # failed steps are halved twice
+            "solver": SOLVER,
             "output": {"fields_every": 0, "checkpoint_every": 1 if self.twin == "resumed" else 0},
         }
 
 
-def draw(seed: int, by: float = 0.0) -> Draw:
-    """The draw of a number, which does not depend on earlier draws; by [m]: shift of the body against the grid."""
+def draw(seed: int, path: Path = SCENES) -> Draw:
+    """The draw of a number, which does not depend on earlier draws. Raises SceneError, ExpressionError."""
     chance = random.Random(seed)
-    kinds = next(kinds for first, kinds in SERIES if seed >= first)
-    scene = kinds[chance.choice(sorted(kinds))](chance)
-    scene.move_against_grid(by)
-    twin = chance.choice((*TWINS, "beside", "beside") if scene.beside else TWINS)
+    kinds = series(seed, path)
+    name = chance.choice(sorted(kinds))
+    scene = draw_scene(name, kinds[name], chance)
+    twin = chance.choice((*TWINS, "beside", "beside") if scene.body_beside else TWINS)
     frame, processes, kill_after, delay, neighbour = Frame(), 1, 0, 0.0, 0.0
     if twin == "rotated":
         frame = _turned(chance, scene)
@@ -111,7 +81,7 @@ def draw(seed: int, by: float = 0.0) -> Draw:
     elif twin == "parallel":
         processes = chance.choice([2, 2, 3, 4])
     elif twin == "beside":
-        neighbour = scenes.spread(chance, 1e-2, 1e12)
+        neighbour = spread(chance, 1e-2, 1e12)
     else:
         kill_after, delay = chance.randint(2, 4), chance.random()
     return Draw(seed, scene, twin, frame, processes, kill_after, delay, neighbour)

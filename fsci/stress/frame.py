@@ -2,23 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import cos, radians, sin
-from typing import Any
+from typing import Any, get_args, get_origin
 
 import numpy as np
 
+from fsci.case.case import Case
 from fsci.case.quantities import QUANTITIES
+from fsci.case.section import Section
 from fsci.run.history import History
 
 Powers = tuple[int, int, int]  #: of length, mass and time
 
-LENGTH, SPEED, ACCELERATION = (1, 0, 0), (1, 0, -1), (1, 0, -2)
-DENSITY, STRESS, VISCOSITY = (-3, 1, 0), (-1, 1, -2), (-1, 1, -1)
+#: Units of settings. Those of forces in 2D are per depth, and no scene has any.
+POWERS: dict[str, Powers] = {
+    "m": (1, 0, 0),
+    "m^3": (3, 0, 0),
+    "s": (0, 0, 1),
+    "1/s": (0, 0, -1),
+    "m/s": (1, 0, -1),
+    "m/s^2": (1, 0, -2),
+    "kg/m^3": (-3, 1, 0),
+    "Pa": (-1, 1, -2),
+    "Pa s": (-1, 1, -1),
+}
+SAME = ("", "1", "degrees")  #: units of what is the same in all frames of a plane
+#: Settings with the unit m that are points, not displacements.
+POINTS = ("at", "minus", "about", "centre", "translate", "origin")
 
 #: Quantities that are not per metre of depth in 2D.
-LOCAL = ("displacement", "velocity", "acceleration", "gap", "pressure", "centre", "first_contact")
+LOCAL = (
+    "displacement",
+    "velocity",
+    "acceleration",
+    "gap",
+    "mean_gap",
+    "overlap",
+    "pressure",
+    "centre",
+    "first_contact",
+)
+
+
+class FrameError(ValueError):
+    """A case that cannot be seen in another frame."""
 
 
 @dataclass(frozen=True)
@@ -49,34 +79,34 @@ class Frame:
     def unit(self, powers: Powers) -> float:
         return self.length ** powers[0] * self.mass ** powers[1] * self.time ** powers[2]
 
-    def number(self, value: float, powers: Powers) -> float:
-        return float(value * self.unit(powers))
+    def number(self, value: float | str, powers: Powers) -> float | str:
+        """A number, or a function of place and time."""
+        unit = self.unit(powers)
+        return f"{unit!r}*({self.function(value)})" if isinstance(value, str) else float(value * unit)
 
-    def vector(self, values: Sequence[float], powers: Powers, over_time: str = "") -> list[Any]:
-        """Components; `over_time`: a function of s, the time in the scene's own unit, that they are multiplied by."""
-        turned = [float(v) for v in self.unit(powers) * self.turned(values)]
-        if not over_time:
-            return turned
-        return [f"{v!r}*({self.function(over_time)})" for v in turned]
+    def vector(self, values: Sequence[float | str], powers: Powers) -> list[Any]:
+        """Components, which may be functions of place and time."""
+        turn, unit, dim = self.rotation, self.unit(powers), len(values)
+        if not any(isinstance(value, str) for value in values):
+            return [float(v) for v in unit * self.turned(values)]  # type: ignore[arg-type]
+        parts = [(j, self.function(str(value))) for j, value in enumerate(values) if value != 0]
+        sums = [[(float(unit * turn[i, j]), text) for j, text in parts if turn[i, j]] for i in range(dim)]
+        return [" + ".join(f"{factor!r}*({text})" for factor, text in one) or 0.0 for one in sums]
 
-    def function(self, over_time: str) -> str:
-        """A function of s as one of t."""
-        return over_time.replace("s_", f"(t/{self.time!r})")
+    def function(self, text: str) -> str:
+        """A function of x, y, z and t of the scene as one of those of the frame."""
+        return re.sub(r"\b[xyzt]\b", lambda found: self._own(found[0]), text)
+
+    def _own(self, name: str) -> str:
+        """A coordinate of the scene, or its time, by those of the frame."""
+        if name == "t":
+            return f"(t/{self.time!r})"
+        i = "xyz".index(name)
+        parts = (f"{float(r) / self.length!r}*{axis}" for r, axis in zip(self.rotation[:, i], "xyz", strict=True) if r)
+        return f"({' + '.join(parts)} - {(*self.shift, 0.0)[i]!r})"
 
     def point(self, x: Sequence[float]) -> list[float]:
         return [float(v) for v in self.length * self.turned(np.asarray(x, dtype=float) + self.shift[: len(x)])]
-
-    def rectangle(self, size: Sequence[float], origin: Sequence[float], cells: Sequence[int], **more: Any) -> dict:
-        """Mesh of a rectangle or box with its lowest corner at `origin`, before it is turned."""
-        plane = len(size) == 2
-        return {
-            "shape": "rectangle" if plane else "box",
-            "size": [self.number(v, LENGTH) for v in size],
-            "cells": list(cells),
-            "rotate": [{"angle": self.angle} if plane else {"axis": list(self.axis), "angle": self.angle}],
-            "translate": self.point(origin),
-            **more,
-        }
 
     def side(self, name: str) -> str:
         """Name of a face of the box, such as x-."""
@@ -95,6 +125,73 @@ class Frame:
             "cells": [round(float(n)) for n in turned],
         }
 
+    def case(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """A case in this frame: its settings by the units that they have, its meshes, grid and sides of the box turned.
+
+        Raises FrameError for a unit that a frame does not know, and for a mesh that has no place.
+        """
+        return self._section(data, Case)
+
+    def _section(self, data: Mapping[str, Any], section: type[Section]) -> dict[str, Any]:
+        fields = {field.alias or name: field for name, field in section.model_fields.items()}
+        found: dict[str, Any] = {}
+        for name, value in data.items():
+            extra = fields[name].json_schema_extra if name in fields else None
+            unit = str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+            if name == "mesh":
+                found[name] = self._mesh(value, fields[name].annotation)
+            elif name == "grid":
+                found[name] = self._grid(value)
+            elif name == "patches":
+                found[name] = {key: {**patch, "on": self._sides(patch["on"])} for key, patch in value.items()}
+                found[name] = {key: self._nested(patch, fields[name].annotation) for key, patch in found[name].items()}
+            elif name == "held":
+                found[name] = [self.side(f"{axis}+")[0] if axis in ("x", "y", "z") else axis for axis in value]
+            elif unit in SAME:
+                found[name] = self._nested(value, fields[name].annotation) if name in fields else value
+            elif unit not in POWERS:
+                raise FrameError(f"there is no rule for '{name}', whose unit is {unit}, in other frames")
+            elif name in POINTS:
+                found[name] = self.point(value)
+            elif isinstance(value, list):
+                found[name] = self.vector(value, POWERS[unit])
+            else:
+                found[name] = self.number(value, POWERS[unit])
+        return found
+
+    def _nested(self, value: Any, kind: Any) -> Any:
+        """A section, or what has sections in it, of a type."""
+        sections = list(_sections(kind))
+        if isinstance(value, Mapping) and sections:
+            fitting = [one for one in sections if value.keys() <= _names(one)]
+            return self._section(value, fitting[0]) if fitting else {k: self._nested(v, kind) for k, v in value.items()}
+        return [self._nested(one, kind) for one in value] if isinstance(value, list) and sections else value
+
+    def _mesh(self, mesh: Mapping[str, Any], kind: Any) -> dict[str, Any]:
+        """Lengths of a mesh, which is turned and moved as a whole."""
+        if "translate" not in mesh:
+            raise FrameError("a mesh needs 'translate', its place, to be seen in other frames")
+        own = {key: value for key, value in mesh.items() if key not in ("rotate", "translate")}
+        turn = {"angle": self.angle + sum(one["angle"] for one in mesh.get("rotate", []))}
+        place = mesh["translate"]
+        return {
+            **replace(self, angle=0.0, shift=(0.0, 0.0, 0.0))._nested(own, kind),
+            "rotate": [turn if len(place) == 2 else {"axis": list(self.axis), **turn}],
+            "translate": self.point(place),
+        }
+
+    def _grid(self, grid: Mapping[str, Any]) -> dict[str, Any]:
+        refine = []
+        for one in grid.get("refine", []):
+            if "box" in one:
+                turned = self.grid(one["box"][0], one["box"][1], [1] * len(grid["cells"]))
+                one = {**one, "box": [turned["from"], turned["to"]]}
+            refine.append(one)
+        return {**self.grid(grid["from"], grid["to"], grid["cells"]), **({"refine": refine} if refine else {})}
+
+    def _sides(self, on: str | Sequence[str]) -> Any:
+        return self.side(on) if isinstance(on, str) else [self.side(name) for name in on]
+
     def back(self, history: History, quantities: Mapping[str, str], dim: int = 2) -> History:
         """Time and probes (name -> quantity) of a history as they are in the scene's own frame."""
         found = {"time": history["time"] / self.time}
@@ -110,3 +207,15 @@ class Frame:
                     values = values - np.asarray(self.shift[:dim])[:, None]
             found |= dict(zip(columns, values, strict=True))
         return found
+
+
+def _sections(kind: Any) -> Iterator[type[Section]]:
+    """The sections that a type of a setting may be, or may have in it."""
+    if isinstance(kind, type) and get_origin(kind) is None and issubclass(kind, Section):
+        yield kind
+    for inner in get_args(kind):
+        yield from _sections(inner)
+
+
+def _names(section: type[Section]) -> set[str]:
+    return {field.alias or name for name, field in section.model_fields.items()}

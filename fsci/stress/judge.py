@@ -107,7 +107,7 @@ def distance(draw: Draw, run: Ended, twin: Ended, frame: Frame) -> tuple[float, 
 
     Values below AT_REST / AGREEMENT count as this: their differences may be rounding errors.
     """
-    quantities = {name: probe["quantity"] for name, probe in draw.scene.probes.items()}
+    quantities = {name: str(probe["quantity"]) for name, probe in draw.scene.probes.items()}
     dim = draw.scene.dim
     ours, theirs = Frame().back(run.history, quantities, dim), frame.back(twin.history, quantities, dim)
     rows, others = _common(ours["time"], theirs["time"])

@@ -8,48 +8,14 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
 from fsci.run.child import ENVIRONMENT, command
 from fsci.run.history import History, read_history
+from fsci.stress.mutants import cases
 from fsci.stress.program import steps_done, write
 
-#: A disc in a basin whose weight changes its sign every half second: it is pressed onto the floor, and lifted off.
-CASE: dict[str, Any] = {
-    "title": "A disc that lands again and again",
-    "fluid": {
-        "density": 1,
-        "viscosity": 0.05,
-        "scheme": "backward_euler",
-        "grid": {"from": [0, 0], "to": [1, 1], "cells": [8, 8]},
-        "patches": {"walls": {"on": ["x-", "x+", "y-"], "slip": True}, "top": {"on": "y+", "outflow": True}},
-    },
-    "structure": {
-        "dynamics": {"rho_inf": 0.5},
-        "bodies": {
-            "disc": {
-                "mesh": {"shape": "disc", "radius": 0.3, "cells": [12, 2], "translate": [0.5, 0.31]},
-                "material": {"law": "neo_hooke", "E": 1000, "nu": 0.3, "density": 2},
-                "gravity": [0, "-2 - 6*tanh(5*sin(2*pi*t))"],
-            }
-        },
-    },
-    "contact": {
-        "obstacles": {
-            "floor": {
-                "mesh": {"shape": "rectangle", "size": [3, 0.2], "cells": [3, 1], "origin": [-1, -0.2]},
-                "on": "top",
-            }
-        },
-        "pairs": {"floor": {"slave": {"body": "disc", "on": "outer"}, "master": {"obstacle": "floor"}}},
-    },
-    "coupling": {"scheme": "monolithic"},
-    "probes": {"centre": {"quantity": "centre"}, "force": {"quantity": "force"}, "energy": {"quantity": "energy"}},
-    "output": {"fields_every": 0, "checkpoint_every": 0},
-    "solver": {"newton": {"residual": 1e-8}},
-}
 STEP = 0.01
 
 Row = dict[str, float]
@@ -59,7 +25,7 @@ def long_run(steps: int, parts: int = 10) -> list[Row]:
     """A row for each of some equal parts of the run. Raises RuntimeError if it does not come to its end."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        write(folder, {**CASE, "time": {"step": STEP, "end": steps * STEP}})
+        write(folder, {**cases()["long"], "time": {"step": STEP, "end": steps * STEP}})
         with (folder / "words.txt").open("w") as words:
             arguments = command("run", str(folder), "-o", str(folder / "out"))
             process = subprocess.Popen(arguments, stdout=words, stderr=words, env=ENVIRONMENT)

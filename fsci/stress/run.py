@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from fsci.stress.draw import SERIES, Draw, draw
+from fsci.stress.draw import Draw, draw
 from fsci.stress.frame import Frame
 from fsci.stress.judge import (
     AGAINST_GRID,
@@ -28,6 +28,7 @@ from fsci.stress.judge import (
 )
 from fsci.stress.mutants import run_mutant
 from fsci.stress.program import Ended, run, run_killed
+from fsci.stress.scene import SCENES
 
 VERDICTS: tuple[Verdict, ...] = ("right", "edge", "refused", "wrong")
 MUTANT = 5  #: every so many draws is a mutated case file
@@ -47,11 +48,16 @@ class Outcome:
     warnings: tuple[str, ...] = ()  #: of sentinels, in the scene's own frame
 
 
-def stress(seeds: Sequence[int], say: Callable[[str], None], keep: Path | None = None) -> list[Outcome]:
-    """Run all draws. Wrong ones are reported at once, and their cases are written to the folder `keep`."""
+def stress(
+    seeds: Sequence[int], say: Callable[[str], None], keep: Path | None = None, scenes: Path = SCENES
+) -> list[Outcome]:
+    """Run all draws. Wrong ones are reported at once, and their cases are written to the folder `keep`.
+
+    Draws of a file of scenes of somebody else have no mutants among them. Raises SceneError, ExpressionError.
+    """
     outcomes = []
     for seed in seeds:
-        outcome = judge(seed, keep)
+        outcome = judge(seed, keep, scenes)
         if outcome.verdict == "wrong":
             say(f"{seed} {outcome.scene}, {outcome.twin}: {outcome.reason}")
         for warning in outcome.warnings:
@@ -60,19 +66,19 @@ def stress(seeds: Sequence[int], say: Callable[[str], None], keep: Path | None =
     return outcomes
 
 
-def judge(seed: int, keep: Path | None = None) -> Outcome:
+def judge(seed: int, keep: Path | None = None, scenes: Path = SCENES) -> Outcome:
     """Run one draw and its twin, and judge them."""
     begin = time.perf_counter()
     with TemporaryDirectory() as folder:
-        if seed % MUTANT == MUTANT - 1:
+        if scenes == SCENES and seed % MUTANT == MUTANT - 1:
             ended = run_mutant(seed, Path(folder))
             words = failure_of(ended)
             verdict: Verdict = "wrong" if words else "refused" if ended.code else "right"
             found = Outcome(seed, "mutant", "none", {}, verdict, words or (ended.message if ended.code else ""), 0.0)
         else:
-            one = draw(seed)
+            one = draw(seed, path=scenes)
             first, judged = _judge(one, Path(folder))
-            found = Outcome(seed, one.scene.name, one.how, one.scene.parameters, *judged, 0.0, warnings_of(first))
+            found = Outcome(seed, one.scene.name, one.how, dict(one.scene.parameters), *judged, 0.0, warnings_of(first))
         if keep is not None and found.verdict == "wrong":
             _keep(Path(folder), keep / str(seed))
     return Outcome(**{**asdict(found), "seconds": round(time.perf_counter() - begin, 2)})
@@ -108,7 +114,7 @@ def _verdict(one: Draw, first: Ended, folder: Path) -> tuple[Verdict, str]:
 def _rounding_decides(one: Draw, first: Ended, folder: Path) -> bool:
     """Whether the results jump when only rounding is different."""
     frames = [Frame(shift=(*shift, shift[0] - shift[1])) for shift in ROUNDING]
-    others = [(one, frame) for frame in frames] + [(draw(one.seed, by), Frame()) for by in AGAINST_GRID]
+    others = [(one, frame) for frame in frames] + [(one.moved(by), Frame()) for by in AGAINST_GRID]
     for number, (same, frame) in enumerate(others):
         other = run(folder / f"rounding{number}", same.case(frame))
         if other.code == 0 and AGREEMENT < distance(one, first, other, frame)[0] <= NEAR:
@@ -133,8 +139,8 @@ def _keep(folder: Path, to: Path) -> None:
 
 def table(outcomes: Sequence[Outcome]) -> str:
     """Counts of verdicts by scene, and messages of rejections."""
-    kinds = (*(name for _, scenes in reversed(SERIES) for name in scenes), "mutant")
-    names = [name for name in kinds if any(o.scene == name for o in outcomes)]
+    names = [name for name in dict.fromkeys(o.scene for o in outcomes) if name != "mutant"]
+    names += ["mutant"] * any(o.scene == "mutant" for o in outcomes)
     counts = Counter((o.scene, o.verdict) for o in outcomes)
     lines = [f"{'scene':10}{'draws':>8}" + "".join(f"{verdict:>10}" for verdict in VERDICTS)]
     for name in (*names, "all"):

@@ -10,16 +10,17 @@ from typing import Any, Literal
 from fsci.case import Case
 from fsci.case.contact import PairSection
 from fsci.case.mesh import FileMesh
-from fsci.case.shapes.plane import Rectangle
-from fsci.case.shapes.solid import Beam, Box
+from fsci.meshes.of_case import read_body
+from fsci.twin.frames import MIRRORED, TURNED, Coordinates
 from fsci.twin.grids import Settings, coarser, low_discrepancy, shifted
 
 #: What a difference means: the error of cells or steps, the scatter by where cells lie, contact that depends on the
 #: roles of its surfaces, or a defect of the program.
 Meaning = Literal["space", "time", "scatter", "roles", "defect"]
-SHIFTS = 8
-#: Shapes whose facets are exact.
-FLAT = Rectangle | Box | Beam
+SHIFTED_TWINS = 8
+#: Twins, those first that find most, and what they cost in 2D over the case; `element` is that of a case with q2q1.
+COSTS = {"coarse": 1.0, "scheme": 1.0, "exchange": 1.0, "facets": 1.0, "order": 1.5, "step": 2.0, "element": 0.5}
+QUICK_COST = 2.5
 
 
 @dataclass(frozen=True)
@@ -32,18 +33,27 @@ class Twin:
     settings: Settings = ()
     processes: int = 1
     opposite: tuple[str, ...] = ()  #: columns whose values change their sign
+    frame: Coordinates | None = None  #: other coordinates
 
 
 def twins(case: Case) -> list[Twin]:
     """All twins that a case has."""
-    found = (_elements, _schemes, _steps, _shifts, _facets, _orders_of_cells, _roles, _orders_of_bodies, _c_n)
+    found = (_elements, _schemes, _steps, _shifts, _facets, _orders_of_cells, _roles, _orders_of_bodies, _c_n, _frames)
     return [twin for make in found for twin in make(case)] + [Twin("processes", "two processes", "defect", processes=2)]
 
 
 def quick(all_twins: list[Twin]) -> list[Twin]:
-    """The two that find most for their cost: one for the error in space or of roles, one for that in time."""
-    ranks = ("coarse", "scheme", "exchange", "facets", "step", "order", "element")
-    return sorted((twin for twin in all_twins if twin.name in ranks), key=lambda twin: ranks.index(twin.name))[:2]
+    """One or two that find most and together cost at most QUICK_COST times the case."""
+    found = {twin.name: twin for twin in all_twins}
+    if "coarse" in found:
+        found.pop("element")  # which says the same, for four times the cost
+    chosen: list[Twin] = []
+    left = QUICK_COST
+    for name, cost in COSTS.items():
+        if name in found and cost <= left and len(chosen) < 2:
+            chosen.append(found[name])
+            left -= cost
+    return chosen
 
 
 def _elements(case: Case) -> Iterator[Twin]:
@@ -85,21 +95,20 @@ def _steps(case: Case) -> Iterator[Twin]:
 def _shifts(case: Case) -> Iterator[Twin]:
     if case.fluid is None or not (case.fluid.bodies or case.elastic_bodies):
         return
-    for number, shares in enumerate(low_discrepancy(case.fluid.grid.dimension, SHIFTS), 1):
+    for number, shares in enumerate(low_discrepancy(case.fluid.grid.dimension, SHIFTED_TWINS), 1):
         words = f"planes moved by {', '.join(f'{share:+.2f}' for share in shares)} cells"
         yield Twin(f"shift_{number}", words, "scatter", shifted(case.fluid.grid, shares.tolist()))
 
 
 def _facets(case: Case) -> Iterator[Twin]:
     """Rigid bodies and obstacles of built-in shapes: only their surfaces count."""
-    rigid = {} if case.fluid is None else {f"fluid.bodies.{name}": body for name, body in case.fluid.bodies.items()}
     obstacles = {} if case.contact is None else case.contact.obstacles
-    meshes = {name: body.mesh for name, body in rigid.items()}
+    meshes = {".".join(surface.keys): surface.mesh for surface in case.rigid_surfaces.values()}
     meshes |= {f"contact.obstacles.{name}": obstacle.mesh for name, obstacle in obstacles.items()}
     settings = tuple(
         (f"{name}.mesh.cells", json.dumps([2 * count for count in mesh.cells]))
         for name, mesh in meshes.items()
-        if not isinstance(mesh, FileMesh | FLAT)
+        if not isinstance(mesh, FileMesh) and not mesh.plan.flat
     )
     if settings:
         yield Twin("facets", "twice as many facets along rigid surfaces", "space", settings)
@@ -147,6 +156,13 @@ def _orders_of_bodies(case: Case) -> Iterator[Twin]:
 def _c_n(case: Case) -> Iterator[Twin]:
     if case.contact is not None:
         yield Twin("c_n", "ten times c_n", "defect", (("contact.c_n", repr(10.0 * case.contact.c_n)),))
+
+
+def _frames(case: Case) -> Iterator[Twin]:
+    """Raises CaseError where only a mesh file says how many dimensions there are, and cannot be read."""
+    dimension = case.dimension or read_body(case, next(iter(case.elastic_bodies))).points.shape[1]
+    for frame in (MIRRORED, TURNED):
+        yield Twin(frame.name, frame.words, "defect", frame.settings(case, dimension), frame=frame)
 
 
 def _section(case: Case, *keys: str) -> dict[str, Any]:

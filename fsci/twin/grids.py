@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,24 +14,38 @@ from fsci.case.grid import GridSection
 
 Settings = tuple[tuple[str, str], ...]  #: dotted names of settings and their values as YAML text
 
+#: Of twins only numbers are compared.
+NO_FIELDS: Settings = (("output.fields_every", "0"),)
+
+#: Layers of nested cells that stay, however large these are: fewer than three on a side of a body are refused.
+LAYERS = 4
+
 
 def coarser(grid: GridSection) -> Settings:
-    """Cells twice as large: half as many in each direction and stretch, and in the layers of refinements."""
+    """Cells twice as large."""
+    return resized(grid, 2.0)
+
+
+def resized(grid: GridSection, factor: float) -> Settings:
+    """Cells `factor` times as large: so many fewer in each direction and stretch, and in the
+    layers of refinements, of which LAYERS stay."""
     changes: dict[str, Any] = {}
     if grid.cells is not None:
-        changes["cells"] = [None if count is None else half(count) for count in grid.cells]
+        changes["cells"] = [None if count is None else resized_count(count, factor) for count in grid.cells]
     for name, stretches in zip("xyz", grid.graded, strict=False):
         for number, stretch in enumerate(stretches or ()):
-            changes[f"{name}.{number}.cells"] = half(stretch.cells)
+            changes[f"{name}.{number}.cells"] = resized_count(stretch.cells, factor)
     for number, refinement in enumerate(grid.refine):
         if refinement.around is not None:
-            changes[f"refine.{number}.layers"] = half(refinement.layers)
+            layers = max(resized_count(refinement.layers, factor), min(refinement.layers, LAYERS))
+            changes[f"refine.{number}.layers"] = layers
     return _settings(changes)
 
 
-def half(count: int) -> int:
-    """Half of a number of cells, rounded up."""
-    return (count + 1) // 2
+def resized_count(count: int, factor: float) -> int:
+    """How many cells fill what `count` cells fill, if they are `factor` times as large: that with the nearest ratio."""
+    fewer = max(1, int(count / factor))
+    return fewer + (count / factor >= (1.0 - 1e-9) * math.sqrt(fewer * (fewer + 1)))
 
 
 def shifted(grid: GridSection, shares: Sequence[float]) -> Settings:

@@ -37,6 +37,23 @@ class TwinEnded:
         return None if wall is None else float(wall)
 
 
+def known_runs(results: Path) -> dict[str, str]:
+    """Checksums of all runs that are in the folder, by the file of results of a former command."""
+    try:
+        return dict(json.loads(results.read_text())["checksums"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}
+
+
+def has_run(case: Case, overrides: Settings, twin: Twin, out: Path, known: Mapping[str, str]) -> bool:
+    """Whether the run of a twin is in the folder, of the case as it is now."""
+    try:
+        checksum = _checksum(load_case(case.path, (*overrides, *twin.settings)), twin.processes)
+    except CaseError:
+        return False
+    return _is_there(checksum, twin, out, known)
+
+
 def run_all(
     case: Case, overrides: Settings, twins: Sequence[Twin], out: Path, known: Mapping[str, str]
 ) -> Iterator[TwinEnded]:
@@ -55,7 +72,7 @@ def run_all(
             except CaseError as error:
                 yield TwinEnded(twin, message=str(error))
                 continue
-            done = checksum == known.get(twin.name) and (out / twin.name / "summary.json").exists()
+            done = _is_there(checksum, twin, out, known)
             runs.append(pool.submit(_read if done else _run, case.path, settings, twin, out / twin.name, checksum))
         try:
             for run in as_completed(runs):
@@ -83,6 +100,10 @@ def _read(case: Path, settings: Settings, twin: Twin, folder: Path, checksum: st
     if summary["status"] != "finished":
         return TwinEnded(twin, message=str(summary["message"] or summary["status"]), summary=summary)
     return TwinEnded(twin, checksum, "", read_history(folder / "history.csv"), summary)
+
+
+def _is_there(checksum: str, twin: Twin, out: Path, known: Mapping[str, str]) -> bool:
+    return checksum == known.get(twin.name) and (out / twin.name / "summary.json").exists()
 
 
 def _checksum(case: Case, processes: int) -> str:

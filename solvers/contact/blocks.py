@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.connected import connected_parts
+from solvers.algebra.sparse import Sparse, nothing, sparse_from_entries
 from solvers.api import Array
-from solvers.connected import connected_parts
-from solvers.sparse import Sparse, nothing, sparse_from_entries
 
 #: A sparse matrix and the numbers of its rows and columns in a larger one.
 Part = tuple[Sparse, NDArray[np.int64], NDArray[np.int64]]

@@ -5,21 +5,14 @@ Let J be the tangent and R the balance without multipliers, both at the interfac
     J du + R - w F z = 0                     z = P zeta + Z du: multipliers in their admissible directions
     G zeta + H du + r = 0                    the law, one row for each zeta
 
-where w is the weight in the balance of the contact force at the end of the step, and F z the force of multipliers on
-all nodes. The columns of Q are the directions, orthonormal at each node, in which multipliers act on their nodes. Then
-B = Q^T F P is invertible, block by block,
+with the weight w of the contact force and the force F z of multipliers on all nodes. Q: the directions, orthonormal at
+each node, in which multipliers act on their nodes. B = Q^T F P is invertible, block by block, and
 
     zeta = B^-1 Q^T ((J - w F Z) du + R) / w,
+    [L (J - w F Z) + Q H] du = -L R - Q r,   L = I - (F P - Q G / w) B^-1 Q^T
 
-and the elimination of zeta is one linear transformation of the rows:
-
-    [L (J - w F Z) + Q H] du = -L R - Q r,   L = I - (F P - Q G / w) B^-1 Q^T.
-
-Since Q^T L = G B^-1 Q^T / w, the rows in the directions Q are those of the law, and all others those of the balance. J
-contains the derivative of the contact force at fixed multipliers. Without friction P = Q = n at an ordinary node,
-B = -D, and the law is a zero gap.
-Source: Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010), section 4.4, generalised to several
-multipliers at a node and to supports that hold some of its components.
+(docs/theory_contact.md, General form). Source: Popp, Gitterle, Gee & Wall, Int. J. Numer. Meth. Engng 83 (2010),
+section 4.4.
 """
 
 from __future__ import annotations
@@ -28,12 +21,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from solvers.algebra.sparse import Sparse, diagonal
 from solvers.api import Array
 from solvers.contact.blocks import inverse
-from solvers.sparse import Sparse, diagonal
 
 #: Entries of L below this are rounding errors of 1 - 1.
-ROUNDING = 1e-13
+ZERO_ENTRY = 1e-13
 
 
 @dataclass(frozen=True)
@@ -70,7 +63,7 @@ def condense(terms: Linearised) -> Condensed:
         FP = to_basis.T @ FP
     inverted = inverse(back @ FP) @ back
     law = Q @ (terms.by_multiplier * (1.0 / terms.weight))
-    rows = (diagonal(np.ones(Q.shape[0])) - (FP - law) @ inverted).without_small(ROUNDING)
+    rows = (diagonal(np.ones(Q.shape[0])) - (FP - law) @ inverted).without_small(ZERO_ENTRY)
     return Condensed(
         rows=rows if to_basis is None else rows @ to_basis.T,
         stiffness=-terms.weight * (terms.dforce + terms.force @ terms.turning),

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.sparse import Sparse
 from solvers.api import Array
-from solvers.contact.blocked import find_blocked
 from solvers.contact.coverage import Coverage
+from solvers.contact.directions import free_normals
 from solvers.contact.interface import ContactInterface
 from solvers.contact.merge import Merging, with_mean_normals
 from solvers.contact.redistribute import Redistribution
-from solvers.contact.terms import Terms
-from solvers.sparse import Sparse
+from solvers.contact.terms import Terms, find_normals
 
 
 @dataclass(frozen=True)
@@ -58,3 +58,22 @@ class Constraints:
         covers = able & ~merged
         shared = self._redistribution.shares((terms.D != 0.0) & ~able, covers, into)
         return Constrained(terms, covers, merged, self._interface.spans_among(covers), shared)
+
+
+def find_blocked(interface: ContactInterface, x: Array) -> NDArray[np.bool_]:
+    """Mask of the blocked multipliers for nodes at x [m], shape (C,). It is found once, at the start of a run.
+
+    Supports or other multipliers leave them no free direction, or their node is on both sides of a pair.
+    """
+    multipliers, held = interface.multipliers, interface.nodes.held
+    node, slaves = multipliers.node, multipliers.areas > 0.0
+    if not held[node[slaves]].any() and multipliers.only_one.all():
+        return interface.shared
+    normals = find_normals(multipliers, x).values
+    own = np.arange(len(node))  # treat every multiplier as the only one of its node
+    is_free = np.abs(free_normals(normals, own, held[node])).max(axis=1) > 0.0
+    whole = slaves & (interface.spans == "space")
+    first = np.zeros(len(node), dtype=bool)
+    first[np.flatnonzero(whole)[np.unique(node[whole], return_index=True)[1]]] = True
+    blocked = slaves & (interface.nodes.fixed[node] | interface.shared | (~whole & ~is_free))
+    return blocked | (slaves & np.isin(node, node[whole]) & ~first)

@@ -9,20 +9,19 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from solvers.algebra.rows import RowTransformation
+from solvers.algebra.sparse import Sparse, nothing
 from solvers.api import Array, State
 from solvers.contact.active_set import ActiveSet
 from solvers.contact.condense import Condensed, Linearised, condense, recover
 from solvers.contact.constraints import Constraints
 from solvers.contact.directions import free_normals
 from solvers.contact.force import force_matrix, nodal_force
-from solvers.contact.friction_work import FrictionWork
 from solvers.contact.integration import Integration
 from solvers.contact.interface import ContactInterface, describe_interface
-from solvers.contact.interference_work import InterferenceWork
 from solvers.contact.law.law import OPEN, STICK, Point, Slopes, Statuses, along
 from solvers.contact.law.tied import Tied
 from solvers.contact.linearise import ActiveMultipliers, linearise
-from solvers.contact.obstacle_work import ObstacleWork
 from solvers.contact.pair import Pair
 from solvers.contact.reach import Reach
 from solvers.contact.redistribute import redistributed
@@ -30,15 +29,14 @@ from solvers.contact.slip import Slip
 from solvers.contact.stiffness import ContactStiffness
 from solvers.contact.terms import Terms
 from solvers.contact.violation import rounding, violation
-from solvers.rows import RowTransformation
-from solvers.sparse import Sparse, nothing
+from solvers.contact.work import FrictionWork, GivenWork
 
 #: Gap that is the rounding of positions, relative to the extent of all surfaces, and to their distance from the origin.
-TOUCHING, FAR = 1e-12, 1e-15
+GAP_OF_EXTENT, GAP_OF_DISTANCE = 1e-12, 1e-15
 
 #: The same of nodes that no iterate of this solve has pressed yet: rounding of meshes and their translations. They are
 #: tried. As those that would pull are open in the next iterate, the result does not depend on it.
-TRIED = 1e-10
+GAP_OF_TRIED = 1e-10
 
 
 class Contact:
@@ -83,15 +81,19 @@ class Contact:
         self._stiffness = np.zeros(count)  # per area [Pa/m], at the latest evaluation
         self._stiffnesses = ContactStiffness(self.interface, np.zeros_like(self.x))
         extent, far = float(np.ptp(self.nodes.points, axis=0).max()), float(np.abs(self.nodes.points).max())
-        self._touching, self._nearly = max(TOUCHING * extent, FAR * far), TRIED * max(extent, far)  # gaps [m]
+        self._touching = max(GAP_OF_EXTENT * extent, GAP_OF_DISTANCE * far)  # gaps [m]
+        self._nearly = GAP_OF_TRIED * max(extent, far)
         self._shared: Sparse | None = None  # redistribution at the latest evaluation
         self._tied = np.isin(np.arange(count), [m for law, own in self.interface.laws if law == Tied() for m in own])
         self._integration = Integration(self.interface, comm)
         self.slip: Slip | None = None  # at the latest evaluation
         self._weight = 1.0  # of the new contact force in the balance
         self.work = FrictionWork((count, self.dim))
-        self._of_obstacles = ObstacleWork(np.flatnonzero(self.nodes.dofs[:, 0] < 0), self.dim)
-        self._interfered = InterferenceWork(len(self.pairs))
+        #: nodes of obstacles, which may begin to move when a run is resumed
+        self._obstacles = np.flatnonzero(self.nodes.dofs[:, 0] < 0)
+        self._of_obstacles = GivenWork((len(self._obstacles), self.dim))
+        self._of_interference = GivenWork((len(self.pairs),))
+        self._interference = np.zeros(len(self.pairs))  # of each pair at the end of the last step [m]
         self.time = np.nan  #: of the latest evaluation [s]
         self.touched_at = np.full(len(self.pairs), np.inf)  #: time of the first contact of each pair [s], set by probes
         self.terms: Terms | None = None
@@ -108,7 +110,7 @@ class Contact:
         self.x_old = self.x.copy()
         self._integration.start(self.x)
         self._integration.interfere(t)
-        self._interfered.start(self._integration.interference)
+        self._interference = self._integration.interference  # what it takes to make it is energy of the start
         self._constraints.start(self.x)
 
     def positions(self, u: Array, t: float) -> Array:
@@ -140,8 +142,9 @@ class Contact:
         """Accept the step; weight: that of the contact force at its end in the balance."""
         if self._integration.has_slip:
             self.work.end_step(weight, *self._force_and_slip())
-        self._of_obstacles.end_step(self.force(), self.x - self.x_old)
-        self._interfered.end_step(self._normal_forces(), self._integration.interference)
+        self._of_obstacles.end_step(-self.force()[self._obstacles], (self.x - self.x_old)[self._obstacles])
+        before, self._interference = self._interference, self._integration.interference
+        self._of_interference.end_step(self._normal_forces(), self._interference - before)
         self._set_multipliers(np.where(self.active_set.active[:, None], self.z, 0.0))
         self.slip = None
 
@@ -153,7 +156,7 @@ class Contact:
     @property
     def obstacle_work(self) -> Array:
         """(work of moved obstacles and of growing interference since the start, by how much it may be wrong) [J]."""
-        parts = self._of_obstacles, self._interfered
+        parts = self._of_obstacles, self._of_interference
         return np.array([sum(part.total for part in parts), sum(part.doubt for part in parts)])
 
     def _normal_forces(self) -> Array:
@@ -226,6 +229,7 @@ class Contact:
             stiffness=stiffness,
             slip=np.zeros((len(which), self.dim)) if slip is None else slip.values[which],
             slip_defined=np.zeros(len(which), dtype=bool) if slip is None else slip.defined[which],
+            shares=np.zeros((len(which), len(self.pairs))) if slip is None else slip.shares[which],
             stuck=self.active_set.stuck[which],
             c_n=self.c_n * stiffness,
             c_t=self.c_n * stiffness,
@@ -442,7 +446,8 @@ class Contact:
             "touched_at": self.touched_at.copy(),
             "work": self.work.save(),
             "obstacle_work": self._of_obstacles.save(),
-            "interference_work": self._interfered.save(),
+            "interference_work": self._of_interference.save(),
+            "interference": self._interference.copy(),
         }
 
     def restore(self, state: State) -> None:
@@ -455,4 +460,5 @@ class Contact:
         self.touched_at[:] = state["touched_at"]
         self.work.restore(state["work"])
         self._of_obstacles.restore(state["obstacle_work"])
-        self._interfered.restore(state["interference_work"])
+        self._of_interference.restore(state["interference_work"])
+        self._interference = state["interference"].copy()

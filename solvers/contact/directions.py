@@ -1,9 +1,7 @@
 """Directions of multipliers, and directions in which they act on their nodes.
 
-Along a direction that a support prescribes, a multiplier acts on the support and not on the node. Hence the normal
-traction acts on a node with prescribed components along the free ones only. At a node with several multipliers, such as
-an edge in a corner, each acts along a direction of its own. A multiplier without such a direction is excluded, because
-its constraint would contradict the support or depend on another multiplier.
+Along a direction that a support prescribes, a multiplier acts on the support and not on the node. A multiplier without
+a direction of its own is excluded: its constraint would contradict the support or depend on another multiplier.
 """
 
 from __future__ import annotations
@@ -13,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.sparse import Sparse, sparse_from_entries
 from solvers.api import Array
 from solvers.contact.blocks import block_diagonal
-from solvers.sparse import Sparse, sparse_from_entries
 
 #: Smallest sine of the angle between a normal and the span of held directions and earlier normals. Below it, a node
 #: would have to move a hundred times its gap to close it.

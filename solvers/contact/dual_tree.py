@@ -1,8 +1,6 @@
 """The search tree of self contact: a binary tree on the facets of one surface, built bottom-up from neighbours.
 
-Every subtree is a connected piece of the surface. If all normals of a piece lie in a cone so narrow that no two of them
-are opposed, the piece cannot touch itself and is not searched. Without this criterion every search would return all
-neighbours of all facets.
+A piece of surface is not searched in itself if its normals lie in so narrow a cone that no two of them are opposed.
 Source: Yang & Laursen, Comput. Mech. 41 (2008), section 3: dual graph, curvature criterion.
 """
 
@@ -14,18 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
-from solvers.search import OPPOSED
-from solvers.tessellation import unit_normals
+from solvers.api import Array, Indices
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.search import OPPOSED
+from solvers.mesh.tessellation import unit_normals
 
 #: Two normals whose product with a common unit vector exceeds this are not opposed: cos(2 a) = OPPOSED.
 CONE = np.sqrt(0.5 * (1.0 + OPPOSED))
 
 #: Count of unit vectors that normals are compared with, by dimension; at most 64, the bits of an integer.
-SAMPLES = {2: 32, 3: 64}
-
-Indices = NDArray[np.int64]
+SAMPLED_NORMALS = {2: 32, 3: 64}
 
 
 @dataclass(frozen=True)
@@ -112,7 +108,7 @@ class DualTree:
 
 def _sample_vectors(dim: int) -> Array:
     """Uniformly distributed unit vectors, shape (n, dim)."""
-    n = SAMPLES[dim]
+    n = SAMPLED_NORMALS[dim]
     if dim == 2:
         angles = 2.0 * np.pi * np.arange(n) / n
         return np.stack([np.cos(angles), np.sin(angles)], axis=1)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from solvers.algebra.sparse import Sparse, sparse_from_entries
 from solvers.api import Array
 from solvers.contact.interface import ContactInterface
 from solvers.contact.terms import Terms
-from solvers.sparse import Sparse, sparse_from_entries
 
 
 def force_matrix(interface: ContactInterface, terms: Terms) -> Sparse:

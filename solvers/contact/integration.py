@@ -10,8 +10,10 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from solvers.algebra.sparse import Sparse
 from solvers.api import Array
 from solvers.contact.interface import ContactInterface
+from solvers.contact.law.by_pair import ByPair
 from solvers.contact.law.tied import Tied
 from solvers.contact.mortar import Mortar
 from solvers.contact.redistribute import redistributed
@@ -19,7 +21,6 @@ from solvers.contact.share import Shares
 from solvers.contact.slip import Sliding, Slip
 from solvers.contact.terms import Normals, Terms, find_normals, total_terms
 from solvers.contact.ties import Ties
-from solvers.sparse import Sparse
 
 
 @dataclass(frozen=True)
@@ -41,12 +42,14 @@ class Integration:
         self._interface, self._multipliers = interface, interface.multipliers
         self.shares = Shares(comm)
         laws = [(mortar, interface.law_of(mortar.patch)) for mortar in interface.mortars]
+        by_pair = [mortar for mortar, law in laws if isinstance(law, ByPair)]
+        pairs = len(interface.pairs) if by_pair else 0  # whose shares a law depends on
         self._mortars = [mortar for mortar, law in laws if not isinstance(law, Tied)]
         tied = [mortar for mortar, law in laws if isinstance(law, Tied)]
-        self._ties = Ties(tied, self._multipliers, interface.nodes.points, interface.unmoved())
+        self._ties = Ties(tied, self._multipliers, interface.nodes.points, interface.unmoved(), pairs)
         sliding = [mortar for mortar, law in laws if law.slips]
         N, dim = interface.nodes.points.shape
-        self._sliding = Sliding(sliding, self._multipliers, self.shares, (N, dim))
+        self._sliding = Sliding(sliding, by_pair, self._multipliers, self.shares, (N, dim, pairs))
         self._travel = 0.0  # sum over iterates of the largest motion of a node [m]
         self._nothing_near = False  # the latest integration found no facet pairs
         self.interference = np.zeros(len(interface.pairs))  #: of each pair at present [m]

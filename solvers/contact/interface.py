@@ -9,7 +9,11 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from solvers.algebra.sparse import Sparse, sparse
 from solvers.api import Array
+from solvers.contact.law.by_pair import ByPair
+from solvers.contact.law.friction import FrictionBound
+from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import Law
 from solvers.contact.mortar import FacetSearch, Masters, Mortar, join_masters
 from solvers.contact.pair import Pair
@@ -17,8 +21,7 @@ from solvers.contact.patch import Multipliers, SlavePatch, number_multipliers
 from solvers.contact.self_search import SelfSearch
 from solvers.contact.shared_nodes import SearchApart, shared_nodes
 from solvers.contact.surface import ContactNodes, Surface, longest_edge, number_nodes
-from solvers.search import Search
-from solvers.sparse import Sparse, sparse
+from solvers.mesh.search import Search
 
 #: T with N~ = N T over all nodes, and its inverse.
 Basis = tuple[Sparse, Sparse]
@@ -90,7 +93,7 @@ def describe_interface(pairs: Sequence[Pair]) -> ContactInterface:
     slaves = _distinct([pair.slave for pair in pairs])
     nodes = number_nodes(surfaces)
     numbers = {id(surface): found for surface, found in zip(surfaces, nodes.of_surface, strict=True)}
-    law_of_slave = [next(pair.law for pair in pairs if pair.slave is slave) for slave in slaves]
+    law_of_slave = [_law_of_slave(slave, pairs) for slave in slaves]
     multipliers = number_multipliers(slaves, [numbers[id(slave)] for slave in slaves], nodes, law_of_slave)
     laws = _multipliers_by_law(multipliers, law_of_slave)
     mortars: list[Mortar] = []
@@ -109,6 +112,17 @@ def describe_interface(pairs: Sequence[Pair]) -> ContactInterface:
         basis=_nodal_basis(multipliers, len(nodes.points)),
         shared=_shared(slaves, pairs, numbers, multipliers),
     )
+
+
+def _law_of_slave(slave: Surface, pairs: Sequence[Pair]) -> Law:
+    """The law of all pairs of a slave, or the mean of their frictions. Raises ValueError if there is no such mean."""
+    own = [pair.law for pair in pairs if pair.slave is slave]
+    if all(law == own[0] for law in own):
+        return own[0]
+    if not all(law == Frictionless() or isinstance(law, FrictionBound) for law in own):
+        raise ValueError(f"pairs of the slave '{slave.name}' have laws of which there is no mean: {own}")
+    # of all pairs, so that slaves that share nodes have the same law
+    return ByPair(tuple(pair.law if isinstance(pair.law, FrictionBound) else None for pair in pairs))
 
 
 def _multipliers_by_law(multipliers: Multipliers, law_of_slave: Sequence[Law]) -> list[tuple[Law, NDArray[np.int64]]]:

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.sparse import Sparse, nothing, stack
 from solvers.api import Array
 from solvers.contact.blocks import block_diagonal, components, expand
 from solvers.contact.condense import Linearised
 from solvers.contact.directions import find_directions
 from solvers.contact.interface import ContactInterface
 from solvers.contact.law.law import Law, Point, Slopes, Statuses
-from solvers.sparse import Sparse, nothing, stack
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,7 @@
 """Merging: multipliers of one node whose masters are the same surface become one.
 
-A node on a sharp edge has a multiplier for each side of the edge. In a corner between two walls, each side has its own
-wall as master. Where the edge points at one surface, both sides have this master and their gaps are equivalent. Two
-constraints would leave no tangential balance. The sides are then merged into one multiplier, whose function is the sum
-of theirs and whose normal is the mean of theirs.
+Where a sharp edge points at one surface, both of its sides have this master and their gaps are equivalent. Two
+constraints would leave no tangential balance. The function of the merged one is the sum, its normal the mean of theirs.
 """
 
 from __future__ import annotations
@@ -13,18 +11,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.connected import connected_parts
+from solvers.algebra.sparse import sparse_from_entries
 from solvers.api import Array
-from solvers.connected import connected_parts
 from solvers.contact.blocks import block_diagonal, expand
 from solvers.contact.law.law import along
 from solvers.contact.mortar import KEEP_AFTER
 from solvers.contact.patch import Multipliers
 from solvers.contact.terms import Terms
-from solvers.sparse import sparse_from_entries
 
 #: Product of the directions of two gaps at a node above which they are equivalent: 45 degrees, half of the angle
 #: between two perpendicular surfaces.
-SAME = np.sqrt(0.5)
+SAME_DIRECTION = np.sqrt(0.5)
 
 
 class Merging:
@@ -66,7 +64,7 @@ class Merging:
             at_one = self._node[which[shift:]] == self._node[which[:-shift]]
             if not at_one.any():
                 break
-            same = at_one & (np.einsum("nd,nd->n", directions[shift:], directions[:-shift]) > SAME)
+            same = at_one & (np.einsum("nd,nd->n", directions[shift:], directions[:-shift]) > SAME_DIRECTION)
             found.append(np.stack([which[:-shift][same], which[shift:][same]], axis=1))
         return np.concatenate(found)
 

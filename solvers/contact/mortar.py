@@ -9,17 +9,17 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.sparse import Sparse, nothing, sparse, stack
 from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
 from solvers.contact.blocks import expand
 from solvers.contact.patch import SlavePatch
 from solvers.contact.surface import Surface
 from solvers.kernels import MortarResult, mortar
-from solvers.search import OPPOSED
-from solvers.sparse import Sparse, nothing, sparse, stack
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.search import OPPOSED
 
 #: Largest distance to a master at which slave facets take part, relative to the longest edge; the motion is added.
-NEAR = 0.3
+REACH_OF_SLAVES = 0.3
 
 #: Evaluations of a step after which facet pairs stay in use. With 12 instead of 3, the two tori need up to 14 Newton
 #: iterations instead of 6.
@@ -224,7 +224,7 @@ class Mortar:
         return MortarTerms(result.D, M, np.zeros(ns), *none, result.area, used), W, M
 
     def _reach(self, motion: float) -> dict[str, float]:
-        return {"reach": self.edge + motion, "near": NEAR * self.edge + motion, "facing": OPPOSED}
+        return {"reach": self.edge + motion, "near": REACH_OF_SLAVES * self.edge + motion, "facing": OPPOSED}
 
     @staticmethod
     def _total(direct, by_normals, dnormals: Sparse, rows: int, columns: int) -> Sparse:
@@ -239,6 +239,15 @@ class Mortar:
         result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(self.edge))
         W = sparse(result.W, (len(slave), len(slave))) @ self.patch.basis()[1]
         return result.D, W, sparse(result.M, (len(slave), len(master)))
+
+    def covered(self, x: Array, normals: Array, facet_pairs: NDArray[np.int32]) -> Array:
+        """int N~_k where masters cover the slave at the beginning of a step [m^(dim-1)]; none is negative.
+
+        The dual functions have the sum 1, so that these are sums of int Phi_j N~_k.
+        """
+        slave = self.patch.nodes
+        result = self._kernel(x, normals, facet_pairs, derivatives=False, own=True, **self._reach(self.edge))
+        return sparse(result.W, (len(slave), len(slave))).T @ np.ones(len(slave))
 
     def gap_vectors(
         self, x: Array, normals: Array, dnormals: Sparse, used: NDArray[np.int32]

@@ -11,14 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
+from solvers.api import Array, Indices
 from solvers.contact.surface import longest_edge
-from solvers.penetration import depths, inside
-from solvers.search import OPPOSED, Search
-from solvers.tessellation import unit_normals
-
-Indices = NDArray[np.int64]
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.penetration import depths, inside
+from solvers.mesh.search import OPPOSED, Search
+from solvers.mesh.tessellation import unit_normals
 
 #: Depth, relative to the longest edge of the slave, up to which facets are left to the search.
 LEFT = 0.5

@@ -16,7 +16,7 @@ from solvers.contact.surface import Surface
 
 @dataclass(frozen=True)
 class Pair:
-    """The slave carries the multipliers; pairs with the same slave have the same law.
+    """The slave carries the multipliers; laws of pairs with the same slave: the same, or friction and none.
 
     Self contact: the master is the same object as the slave.
     """
@@ -28,3 +28,4 @@ class Pair:
     #: facets (slave, master) in numbers of the surfaces that lie deep in each other's body at the start, shape (p, 2)
     deep: NDArray[np.int32] | None = None
     interference: Callable[[float], float] | None = None  #: time [s] -> overlap [m] of the bodies as meshed; None: zero
+    always: bool = False  #: present in all steps, so that its surfaces never have mass

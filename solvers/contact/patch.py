@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.sparse import Sparse, sparse
 from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
 from solvers.contact.law.law import Law
 from solvers.contact.sharp_edges import split_nodes
 from solvers.contact.surface import ContactNodes, Surface, facet_areas
 from solvers.kernels import basis_transformation, nodal_normals
-from solvers.sparse import Sparse, sparse
+from solvers.mesh.cell_types import CELL_TYPES
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,8 @@ class SlavePatch:
         """T of the basis N~ = N T that multipliers are dual to, and its inverse; the identity except for tri6."""
         n = len(self.nodes)
         return tuple(  # type: ignore[return-value]
-            sparse(csr, (n, n)) for csr in basis_transformation(self.facets, self._kernel_type, n)
+            sparse(csr, (n, n)) for csr in basis_transformation(self.facets, CELL_TYPES[self.facet_type].kernel, n)
         )
-
-    @property
-    def _kernel_type(self) -> str:
-        return CELL_TYPES[self.facet_type].kernel
 
 
 @dataclass(frozen=True)

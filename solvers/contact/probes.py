@@ -11,11 +11,11 @@ from typing import Literal
 import numpy as np
 
 from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
 from solvers.contact.contact import Contact
 from solvers.contact.surface import Surface
-from solvers.distance import signed_distances
 from solvers.kernels import nodal_normals
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.distance import signed_distances
 
 Probe = Callable[[], dict[str, float]]
 

@@ -8,8 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from solvers.algebra.sparse import Sparse, sparse
 from solvers.contact.blocks import expand
-from solvers.sparse import Sparse, sparse
 
 
 def redistributed(rows, shares: Sparse | None):

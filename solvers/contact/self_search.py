@@ -5,15 +5,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array, StepFailed
+from solvers.algebra.connected import connected_parts
+from solvers.api import Array, FailureKind, Indices, StepFailed
 from solvers.contact.dual_tree import DualTree
-from solvers.contact.roles import MASTER, SLAVE, choose_roles
-from solvers.search import Search
-from solvers.wall_thickness import wall_thickness
+from solvers.mesh.search import Search
+from solvers.mesh.wall_thickness import wall_thickness
 
-Indices = NDArray[np.int64]
+Roles = NDArray[np.int8]
 
-#: Overlap relative to the thickness of the wall above which a pair is the two sides of the wall.
+SLAVE, MASTER = 1, 2  #: roles of facets; 0 is none
+
+
+#: Overlap relative to the thickness of the wall above which a pair is the two sides of the wall. From 0.001 to 0.8
+#: results are the same.
 THROUGH = 0.5
 
 
@@ -58,7 +62,8 @@ class SelfSearch:
 
     def _own_pairs(self, xs: Array, inflation: float, xs_previous: Array | None) -> NDArray[np.int32]:
         if not np.isfinite(xs).all():
-            raise StepFailed("contact", "positions of contact surfaces are not finite: take a smaller time step")
+            reason = "positions of contact surfaces are not finite: take a smaller time step"
+            raise StepFailed("contact", FailureKind.NOT_FINITE, reason)
         found = self.tree.pairs(xs, inflation, xs_previous)
         found = found[~self._through_the_wall(found, xs)]
         k = self._count
@@ -82,3 +87,27 @@ class SelfSearch:
         i, j = pairs.T
         overlap = -0.5 * np.einsum("pd,pd->p", middles[j] - middles[i], normals[i] - normals[j])
         return overlap > THROUGH * np.minimum(self._thickness[i], self._thickness[j])
+
+
+def choose_roles(roles: Roles, pressed: NDArray[np.int64], pairs: NDArray[np.int64]) -> Roles:
+    """Roles (SLAVE, MASTER or 0) of facets with undirected pairs (p, 2); roles that are not 0 are kept.
+
+    Neighbours in the graph of pairs get different roles: a two-colouring of each connected part. Take a graph with two
+    copies of every facet, in which a pair joins different copies. There a part that can be coloured has two connected
+    components, which are its two colourings. The colouring with more pressed facets among the slaves is chosen, else
+    the one in which the first facet is a slave. In a part with an odd cycle all facets are slaves.
+    Source: Yang & Laursen, Comput. Mech. 41 (2008), section 4, for the alternation.
+    """
+    k = len(roles)
+    i, j = pairs.T
+    part = connected_parts(np.concatenate([i, i + k]), np.concatenate([j + k, j]), 2 * k)
+    first, second = part[:k], part[k:]
+    low = np.minimum(first, second)
+    # pressed facets vote for themselves as slaves; a fixed role outweighs all votes
+    vote = pressed + (1.0 + pressed.sum()) * ((roles == SLAVE).astype(float) - (roles == MASTER))
+    balance = np.bincount(low, np.where(first == low, vote, -vote), minlength=2 * k)
+    slave = (first == second) | ((first == low) == (balance[low] >= 0.0))
+    found = np.where(slave, SLAVE, MASTER).astype(np.int8)
+    among = np.zeros(k, dtype=bool)
+    among[pairs.ravel()] = True
+    return np.where((roles == 0) & among, found, roles).astype(np.int8)

@@ -11,10 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array
-from solvers.search import Search
-
-Indices = NDArray[np.int64]
+from solvers.api import Array, Indices
+from solvers.mesh.search import Search
 
 
 class SearchApart:

@@ -9,17 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
-from solvers.connected import connected_parts
+from solvers.algebra.connected import connected_parts
+from solvers.api import Array, Indices
 from solvers.kernels import nodal_normals
-
-#: Angle between the normals of neighbouring facets above which their edge is sharp [degrees].
-SHARP = 60.0
-
-Indices = NDArray[np.int64]
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.tessellation import SHARP
 
 
 @dataclass(frozen=True)
@@ -38,7 +33,7 @@ def split_nodes(points: Array, facets: Indices, facet_type: str, among: Indices 
     k, n = facets.shape
     of_facet, ends, normals = np.arange(k).repeat(n), facets.ravel(), _corner_normals(points, facets, facet_type)
     i, j = _across_edges(facets, facet_type)
-    smooth = np.einsum("ed,ed->e", normals[i], normals[j]) > np.cos(np.radians(SHARP))
+    smooth = np.einsum("ed,ed->e", normals[i], normals[j]) > np.cos(SHARP)
     if among is not None:
         smooth |= among[of_facet[i]] == among[of_facet[j]]
     part = connected_parts(i[smooth], j[smooth], k * n)

@@ -1,12 +1,9 @@
-"""The slip of multipliers in a step, from the mortar integrals at its beginning and at the iterate.
+"""The slip of multipliers in a step, from the mortar integrals at its beginning (superscript n) and at the iterate.
 
-With the integrals at the beginning (superscript n) and at the iterate, and positions x of the iterate, the slip s_j of
-multiplier j follows from
+    D_j^n s_j = -[(W - W^n) x_slave - (M - M^n) x_master]_j
 
-    D_j^n s_j = W_j^n x_slave - M_j^n x_master + int Phi_j (x_m - x_s) = -[(W - W^n) x_slave - (M - M^n) x_master]_j .
-
-W_jk = int Phi_j N_k equals D where the area is fully covered. The formula is objective: a common rigid motion does not
-change the integrals and has no slip. Laws use the tangential part of the slip only.
+with positions x of the iterate (docs/theory_contact.md, Friction). W_jk = int Phi_j N_k equals D where the area is
+fully covered. Laws use the tangential part of the slip only.
 Source: Gitterle, Popp, Gee & Wall, Int. J. Numer. Meth. Engng 84 (2010), section 3.
 """
 
@@ -19,13 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.sparse import Sparse, nothing
 from solvers.api import Array
 from solvers.contact.blocks import add_up, components, expand
 from solvers.contact.mortar import Mortar
 from solvers.contact.patch import Multipliers
 from solvers.contact.share import Shares
 from solvers.contact.terms import Normals, find_normals
-from solvers.sparse import Sparse, nothing
 
 
 @dataclass(frozen=True)
@@ -35,6 +32,7 @@ class Beginning:
     difference: Sparse  #: (W^n, -M^n) over all nodes, shape (C, N)
     slopes: Sparse  #: `difference` for all components, shape (dim * C, dim * N)
     D: Array  #: shape (C,)
+    covered: Array  #: int N_j where the masters of each pair cover the slave, for laws by pair, shape (C, pairs)
 
 
 @dataclass(frozen=True)
@@ -44,41 +42,56 @@ class Slip:
     values: Array  #: [m], shape (C, dim), zero where it is not defined
     slopes: Sparse  #: derivatives, shape (dim * C, dim * N)
     defined: NDArray[np.bool_]  #: mask of the multipliers that a master covered at the beginning, shape (C,)
+    shares: Array  #: of each pair in the area covered at the beginning, for laws by pair, shape (C, pairs)
 
     def plus(self, other: Slip) -> Slip:
         """The slip of these and of other multipliers."""
-        return Slip(self.values + other.values, self.slopes + other.slopes, self.defined | other.defined)
+        defined = self.defined | other.defined
+        return Slip(self.values + other.values, self.slopes + other.slopes, defined, self.shares + other.shares)
 
 
 class Sliding:
     """Slip of the present step for the multipliers of some mortars; collective calls."""
 
-    def __init__(self, mortars: Sequence[Mortar], multipliers: Multipliers, shares: Shares, shape: tuple[int, int]):
-        """shape: (N, dim)."""
+    def __init__(
+        self,
+        mortars: Sequence[Mortar],
+        by_pair: Sequence[Mortar],
+        multipliers: Multipliers,
+        shares: Shares,
+        shape: tuple[int, int, int],
+    ):
+        """by_pair: those of laws that depend on the share of each pair; shape: (N, dim, pairs)."""
+        self._by_pair = list(by_pair)
         self.mortars, self._multipliers, self._shares = list(mortars), multipliers, shares
         self._count, self._shape = len(multipliers.node), shape
         self._beginning: Beginning | None = None
 
     def begin_step(self, x: Array, travel: float) -> None:
         """Integrals at the positions x [m] at the beginning of a step, (N, dim); travel: see `Mortar.near`."""
-        (N, dim), C = self._shape, self._count
+        (N, dim, pairs), C = self._shape, self._count
         if all(travel < mortar.clear_until for mortar in self.mortars):
             # all integrals are zero; other pairs, or these by a long step, may still meet
-            self._beginning = Beginning(nothing((C, N)), nothing((dim * C, dim * N)), np.zeros(C))
+            self._beginning = Beginning(nothing((C, N)), nothing((dim * C, dim * N)), np.zeros(C), np.zeros((C, pairs)))
             return
-        D, parts = np.zeros(C), []
+        D, covered, parts = np.zeros(C), np.zeros((C, pairs)), []
         normals = find_normals(self._multipliers, x) if self.mortars else None
         for index, mortar in enumerate(self.mortars):
             facet_pairs, _ = mortar.near(x, x, travel)
             facet_pairs = self._shares.mine(index, facet_pairs, len(mortar.facets))
             if normals is None or len(facet_pairs) == 0:
                 continue
-            found, W, M = mortar.begin(x, normals.at(self._multipliers, mortar.patch)[0], facet_pairs)
+            at_nodes = normals.at(self._multipliers, mortar.patch)[0]
+            found, W, M = mortar.begin(x, at_nodes, facet_pairs)
             rows = mortar.patch.multipliers
             D[rows] += found
+            if any(mortar is one for one in self._by_pair):
+                pair_of = mortar.masters.pair_of_facet[facet_pairs[:, 1]]
+                for pair in np.unique(pair_of):
+                    covered[rows, pair] += mortar.covered(x, at_nodes, facet_pairs[pair_of == pair])
             parts += [(W, rows, mortar.patch.nodes), (-M, rows, mortar.masters.nodes)]
-        D, difference = self._shares.total_of(D, add_up(parts, (C, N)))
-        self._beginning = Beginning(difference, expand(difference, dim), D)
+        D, covered, difference = self._shares.total_of(D, covered, add_up(parts, (C, N)))
+        self._beginning = Beginning(difference, expand(difference, dim), D, covered)
 
     def evaluate(
         self,
@@ -89,7 +102,7 @@ class Sliding:
     ) -> Slip:
         """Slip at the positions x [m]; used: the facet pairs of each mortar that contributed to the integrals there."""
         assert self._beginning is not None
-        (N, dim), C = self._shape, self._count
+        (N, dim, _), C = self._shape, self._count
         gap, parts = np.zeros((C, dim)), []
         for mortar, facet_pairs in used:
             if not any(mortar is mine for mine in self.mortars):
@@ -105,4 +118,7 @@ class Sliding:
         share = np.divide(1.0, D, out=np.zeros_like(D), where=defined)
         values = share[:, None] * redistributed(self._beginning.difference @ x + gap)
         slopes = redistributed(self._beginning.slopes + dgap).scaled_rows(share.repeat(dim))
-        return Slip(values, slopes, defined)
+        covered = redistributed(self._beginning.covered)
+        total = covered.sum(axis=1, keepdims=True)
+        shares = np.divide(covered, total, out=np.zeros_like(covered), where=total > 0.0)
+        return Slip(values, slopes, defined, shares)

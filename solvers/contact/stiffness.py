@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from solvers.algebra.sparse import Sparse
 from solvers.api import Array
 from solvers.contact.interface import ContactInterface
 from solvers.contact.surface import nodal_areas
-from solvers.sparse import Sparse
 
 
 class ContactStiffness:
@@ -30,11 +30,11 @@ class ContactStiffness:
             interface.multipliers.areas, at_slaves, out=np.zeros_like(at_slaves), where=at_slaves > 0.0
         )
         self._values = np.zeros(len(at_slaves))
-        self.begin_step()
+        self._found = np.zeros(len(at_slaves), dtype=bool)  #: multipliers that have had masters in this step
 
     def begin_step(self) -> None:
         """Find the masters of each multiplier anew."""
-        self._found = np.zeros(len(self._of_slaves), dtype=bool)
+        self._found[:] = False
 
     def per_area(self, M: Sparse) -> Array:
         """Stiffness [Pa/m] of each multiplier and its masters, (C,); M: mortar integrals with all nodes, (C, N).

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
+from solvers.mesh.cell_types import CELL_TYPES
 
 
 @dataclass(frozen=True)

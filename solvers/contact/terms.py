@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.sparse import Sparse, nothing
 from solvers.api import Array
 from solvers.contact.blocks import add_up, components
 from solvers.contact.mortar import Mortar, MortarTerms
 from solvers.contact.patch import Multipliers, SlavePatch
 from solvers.contact.share import Shares
-from solvers.sparse import Sparse, nothing
 
 
 @dataclass(frozen=True)

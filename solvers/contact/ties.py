@@ -1,15 +1,8 @@
-"""Tied surfaces: mortar integrals in the reference configuration, which are computed once.
+"""Tied surfaces: sum_k W_jk u_k - sum_l M_jl u_l = 0, with mortar integrals in the reference configuration.
 
-With W_jk = int Phi_j N_k over the slave and M_jl = int Phi_j N_l, both for the meshes as they are read, the constraint
-of multiplier j is
-
-    sum_k W_jk u_k - sum_l M_jl u_l = 0 .
-
-It is linear, and a common translation fulfils it. A common rotation fulfils it too if sum W X = sum M X, which holds
-for flat surfaces. On curved surfaces the slave nodes are moved before the run so that it holds (`relocated`), by a
-distance that decreases with the square of the facet size. The integrals are those before this.
-Source: Puso & Laursen, Comput. Methods Appl. Mech. Engng 193 (2004); Puso, Int. J. Numer. Meth. Engng 59 (2004), for
-the initial positions.
+On curved surfaces the slave nodes are moved before the run so that rotations fulfil it (`relocated`). The integrals are
+those before this (docs/theory_contact.md, Tied surfaces).
+Source: Puso & Laursen, Comput. Methods Appl. Mech. Engng 193 (2004); Puso, Int. J. Numer. Meth. Engng 59 (2004).
 """
 
 from __future__ import annotations
@@ -19,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.sparse import Sparse, nothing
 from solvers.api import Array
 from solvers.contact.blocks import expand
 from solvers.contact.coverage import Coverage
@@ -29,17 +23,20 @@ from solvers.contact.patch import Multipliers
 from solvers.contact.redistribute import redistributed
 from solvers.contact.slip import Slip
 from solvers.contact.terms import find_normals, renumber
-from solvers.sparse import Sparse, nothing
 
 
 class Ties:
     """The ties of some mortars."""
 
-    def __init__(self, mortars: Sequence[Mortar], multipliers: Multipliers, reference: Array, x: Array):
-        """reference: positions [m] of all nodes; x: the same before nodes were relocated; both (N, dim)."""
+    def __init__(self, mortars: Sequence[Mortar], multipliers: Multipliers, reference: Array, x: Array, pairs: int):
+        """reference: positions [m] of all nodes; x: the same before nodes were relocated; both (N, dim).
+
+        pairs: count of those whose shares a law depends on.
+        """
         self.pieces: list[tuple[Mortar, MortarTerms]] = []
         N, C = len(x), len(multipliers.node)
         self._reference = reference
+        self._no_shares = np.zeros((C, pairs))  # no bound depends on ties
         self.D = np.zeros(C)  #: covered area [m^(dim-1)]
         self.difference = nothing((C, N))  #: (W, -M) over all nodes
         self._shares: Sparse | None = None  # redistribution that the slopes were computed with
@@ -62,14 +59,14 @@ class Ties:
             mean = redistributed(self.difference, shares).scaled_rows(share)
             self._shares, self._slopes = shares, (mean, expand(mean, x.shape[1]), D > 0.0)
         mean, slopes, defined = self._slopes
-        return Slip(mean @ (x - self._reference), slopes, defined)
+        return Slip(mean @ (x - self._reference), slopes, defined, self._no_shares)
 
 
 def relocated(pair: Pair) -> Array | None:
     """Positions [m] of the slave's nodes with sum W X = sum M X, shape (n, dim); None if the surfaces do not meet."""
     interface = describe_interface([pair])
     patch, x = interface.multipliers.patches[0], interface.nodes.points.copy()
-    ties = Ties(interface.mortars, interface.multipliers, x, x)
+    ties = Ties(interface.mortars, interface.multipliers, x, x, len(interface.pairs))
     tied = Coverage(interface.multipliers.areas).enough(ties.D)
     if not tied.any():
         return None

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.rounding import EPS, rounding_error_of_rows
 from solvers.api import Array
 from solvers.contact.condense import Condensed
 from solvers.contact.directions import admissible
 from solvers.contact.interface import ContactInterface
 from solvers.contact.linearise import ActiveMultipliers
 from solvers.contact.surface import longest_edge
-from solvers.rounding import EPS, rounding_error_of_rows
 
 
 def violation(

@@ -12,9 +12,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
 from solvers.fem.calls import calls
-from solvers.mesh import Mesh
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.mesh import Mesh
 
 #: (processes, offsets of the first one of each cell); on rank 0, empty on others.
 Destinations: TypeAlias = tuple[NDArray[np.int32], NDArray[np.int32]]

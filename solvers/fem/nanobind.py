@@ -19,9 +19,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from solvers.api import Array
-
-Indices = NDArray[np.int32]
+from solvers.api import Array, Indices32
 
 # UFL sorts the constants of a form by their numbers as text, 10 before 9: where a digit is added the same form would be
 # another one, and would be compiled once more. From here on all numbers have seven digits.
@@ -61,7 +59,7 @@ def create_mesh(
     points: Array,
     cell: str,
     degree: int,
-    destinations: tuple[Indices, Indices] | None = None,
+    destinations: tuple[Indices32, Indices32] | None = None,
 ) -> dolfinx_mesh.Mesh:
     """A distributed mesh; processes know the cells behind the facets between them.
 
@@ -82,19 +80,19 @@ def _by_graph() -> Any:
         return cpp.mesh.create_cell_partitioner(dolfinx_mesh.GhostMode.shared_facet)
 
 
-def _given(destinations: tuple[Indices, Indices]) -> Any:
+def _given(destinations: tuple[Indices32, Indices32]) -> Any:
     """A partitioner that returns these; its arguments differ between versions."""
     return lambda *arguments: cpp.graph.AdjacencyList_int32(*destinations)
 
 
-def geometry_nodes(mesh: dolfinx_mesh.Mesh) -> Indices:
+def geometry_nodes(mesh: dolfinx_mesh.Mesh) -> Indices32:
     """Local geometry nodes of all local cells, one cell after the other."""
     geometry = mesh.geometry
     several = getattr(geometry, "dofmaps", None)  # since meshes may have cells of several types
     return np.asarray(several[0] if isinstance(several, list) else geometry.dofmap).ravel()
 
 
-def facet_nodes(mesh: dolfinx_mesh.Mesh, facets: Indices) -> Indices:
+def facet_nodes(mesh: dolfinx_mesh.Mesh, facets: Indices32) -> Indices32:
     """Local geometry nodes at the corners of facets, shape (facets, corners)."""
     dim = mesh.topology.dim
     mesh.topology.create_connectivity(dim - 1, dim)
@@ -105,7 +103,7 @@ def facet_nodes(mesh: dolfinx_mesh.Mesh, facets: Indices) -> Indices:
     return np.asarray(dolfinx_mesh.entities_to_geometry(mesh, dim - 1, facets))[:, :corners]
 
 
-def exterior_facets(mesh: dolfinx_mesh.Mesh) -> Indices:
+def exterior_facets(mesh: dolfinx_mesh.Mesh) -> Indices32:
     """Facets of this process on the boundary of the mesh."""
     return np.asarray(dolfinx_mesh.exterior_facet_indices(mesh.topology), dtype=np.int32)
 
@@ -118,12 +116,12 @@ def function_space(mesh: dolfinx_mesh.Mesh, element: Any) -> Any:
     return fem.functionspace(mesh, element)
 
 
-def cell_blocks(space: Any) -> Indices:
+def cell_blocks(space: Any) -> Indices32:
     """Local dof blocks of all local cells, shape (cells, blocks per cell)."""
     return np.asarray(space.dofmap.list)
 
 
-def replace_dofs(space: Any, cells: Indices, ghosts: NDArray[np.int64], owners: Indices) -> Any:
+def replace_dofs(space: Any, cells: Indices32, ghosts: NDArray[np.int64], owners: Indices32) -> Any:
     """The space with other dof blocks in its cells: owned blocks keep their numbers, ghosts come with their owners."""
     dofmap, own = space.dofmap, int(space.dofmap.index_map.size_local)
     try:
@@ -168,7 +166,7 @@ class Compiled:
         topology.create_connectivity(topology.dim - 1, topology.dim)
         topology.create_connectivity(topology.dim, topology.dim - 1)
 
-    def on(self, entities: dict[str, Indices]) -> Any:
+    def on(self, entities: dict[str, Indices32]) -> Any:
         """The form over local cells or facets, by the name of the integral type."""
         domains = {}
         for name, local in entities.items():
@@ -184,7 +182,7 @@ class Compiled:
             return fem.create_form(*arguments, self._coefficients, self._constants)
 
 
-def _integration_entities(mesh: dolfinx_mesh.Mesh, kind: Any, local: Indices) -> Indices:
+def _integration_entities(mesh: dolfinx_mesh.Mesh, kind: Any, local: Indices32) -> Indices32:
     """Cells as they are, facets as (cell, number of the facet in it) of each of their cells."""
     topology = mesh.topology._cpp_object if hasattr(mesh.topology, "_cpp_object") else mesh.topology
     try:
@@ -216,7 +214,7 @@ def compile_expression(expression: Any, points: Array, options: dict[str, Any]) 
     return fem.Expression(expression, points, jit_options=options)
 
 
-def evaluate(expression: Any, mesh: dolfinx_mesh.Mesh, cells: Indices) -> Array:
+def evaluate(expression: Any, mesh: dolfinx_mesh.Mesh, cells: Indices32) -> Array:
     """Values in cells, shape (cells, points * components)."""
     if not len(cells):  # what 0.9 returns has no shape then
         return np.empty((0, len(expression.X()) * expression.value_size))

@@ -10,12 +10,12 @@ from dolfinx import fem
 from dolfinx import mesh as dolfinx_mesh
 
 from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
 from solvers.fem.calls import calls
 from solvers.fem.domain import Domain, input_cells, owned_cells
 from solvers.fem.ghosts import accumulate
 from solvers.fem.spaces import cell_blocks, function
-from solvers.locate import locate
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.locate import locate
 
 
 def locate_point(domain: Domain, point: Array) -> tuple[int, Array] | None:

@@ -12,9 +12,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from solvers.api import Array
-
-Indices = NDArray[np.int32]
+from solvers.api import Array, Indices32
 
 # UFL sorts the constants of a form by their numbers as text, 10 before 9: where a digit is added the same form would be
 # another one, and would be compiled once more. From here on all numbers have seven digits.
@@ -60,7 +58,7 @@ def create_mesh(
     points: Array,
     cell: str,
     degree: int,
-    destinations: tuple[Indices, Indices] | None = None,
+    destinations: tuple[Indices32, Indices32] | None = None,
 ) -> dolfinx_mesh.Mesh:
     """A distributed mesh; processes know the cells behind the facets between them.
 
@@ -77,17 +75,17 @@ def create_mesh(
     )
 
 
-def geometry_nodes(mesh: dolfinx_mesh.Mesh) -> Indices:
+def geometry_nodes(mesh: dolfinx_mesh.Mesh) -> Indices32:
     """Local geometry nodes of all local cells, one cell after the other."""
     return np.asarray(mesh.geometry.dofmap.array)
 
 
-def facet_nodes(mesh: dolfinx_mesh.Mesh, facets: Indices) -> Indices:
+def facet_nodes(mesh: dolfinx_mesh.Mesh, facets: Indices32) -> Indices32:
     """Local geometry nodes at the corners of facets, shape (facets, corners)."""
     return np.asarray(cpp.mesh.entities_to_geometry(mesh._mesh, mesh.topology.dim - 1, facets, False))
 
 
-def exterior_facets(mesh: dolfinx_mesh.Mesh) -> Indices:
+def exterior_facets(mesh: dolfinx_mesh.Mesh) -> Indices32:
     """Facets of this process on the boundary of the mesh."""
     return np.asarray(cpp.mesh.exterior_facet_indices(mesh.topology), dtype=np.int32)
 
@@ -100,12 +98,12 @@ def function_space(mesh: dolfinx_mesh.Mesh, element: Any) -> Any:
     return fem.FunctionSpace(mesh, element)
 
 
-def cell_blocks(space: Any) -> Indices:
+def cell_blocks(space: Any) -> Indices32:
     """Local dof blocks of all local cells, shape (cells, blocks per cell)."""
     return np.asarray(space.dofmap.list.array).reshape(-1, space.dofmap.dof_layout.num_dofs)
 
 
-def replace_dofs(space: Any, cells: Indices, ghosts: NDArray[np.int64], owners: Indices) -> Any:
+def replace_dofs(space: Any, cells: Indices32, ghosts: NDArray[np.int64], owners: Indices32) -> Any:
     """The space with other dof blocks in its cells: owned blocks keep their numbers, ghosts come with their owners."""
     dofmap, own = space.dofmap, int(space.dofmap.index_map.size_local)
     index_map = cpp.common.IndexMap(space.mesh.comm, own, ghosts, owners)
@@ -140,7 +138,7 @@ class Compiled:
         self._constants = [constant._cpp_object for constant in form.constants()]
         self._spaces = [argument.ufl_function_space()._cpp_object for argument in form.arguments()]
 
-    def on(self, entities: dict[str, Indices]) -> Any:
+    def on(self, entities: dict[str, Indices32]) -> Any:
         """The form over local cells or facets, by the name of the integral type."""
         mesh = self._mesh
         types = {name: mesh.topology.dim - ("facet" in name) for name in entities}
@@ -178,6 +176,6 @@ def compile_expression(expression: Any, points: Array, options: dict[str, Any]) 
     return fem.Expression(expression, points, jit_params=options)
 
 
-def evaluate(expression: Any, mesh: dolfinx_mesh.Mesh, cells: Indices) -> Array:
+def evaluate(expression: Any, mesh: dolfinx_mesh.Mesh, cells: Indices32) -> Array:
     """Values in cells, shape (cells, points * components)."""
     return expression.eval(cells)

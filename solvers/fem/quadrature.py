@@ -10,9 +10,9 @@ from dolfinx import fem
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
 from solvers.fem.domain import Domain
 from solvers.fem.spaces import block_points, cell_blocks, quadrature_points, tabulate_lagrange
+from solvers.mesh.cell_types import CELL_TYPES
 
 #: Number of corners -> type of a facet.
 FACETS = {2: basix.CellType.interval, 3: basix.CellType.triangle, 4: basix.CellType.quadrilateral}

@@ -11,10 +11,10 @@ from dolfinx import fem
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
 from solvers.fem.calls import calls
 from solvers.fem.compiling import compiling
 from solvers.fem.domain import Domain, input_nodes
+from solvers.mesh.cell_types import CELL_TYPES
 
 
 def cell_of(domain: Domain) -> str:

@@ -5,10 +5,10 @@ from solvers.lazy import lazy_names
 __getattr__, __all__ = lazy_names(
     __name__,
     {
-        "field": ["Fluid"],
-        "background.grid": ["Grid", "uniform"],
-        "bodies.immersed": ["ImmersedBody", "rigid_body"],
-        "boundary.patches": ["Patch"],
-        "flow_settings": ["FlowSettings"],
+        "flow.field": ["Fluid"],
+        "grid.box": ["Grid", "uniform"],
+        "surfaces.immersed": ["ImmersedBody", "rigid_body"],
+        "terms.boundary.patches": ["Patch"],
+        "settings.flow_settings": ["FlowSettings"],
     },
 )

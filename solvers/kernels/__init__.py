@@ -15,7 +15,6 @@ from ._kernels import (
     moments,
     mortar,
     nodal_normals,
-    nodal_tangents,
     node_blocks,
     row_squares,
     spread_blocks,

@@ -1,29 +1,15 @@
 // Python names of coarse_blocks.hpp: coarse_pattern, coarse_product.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-
 #include <algorithm>
-#include <cstdint>
-#include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
 
+#include "bindings.hpp"
 #include "coarse_blocks.hpp"
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 namespace {
 
-using Numbers = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Reals = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Blocks = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
-using Result = nb::ndarray<double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
-
-void require(bool condition, const std::string& message) {
-    if (!condition) throw std::invalid_argument(message);
-}
+using Numbers = Values<const std::int32_t, 1>;
+using Reals = Values<const double, 1>;
+using Blocks = Values<const double, 3>;
+using Result = Values<double, 3>;
 
 // Rows whose starts increase from 0 and whose columns are below a limit.
 coarse::Rows checked(const std::string& name, const Numbers& start, const Numbers& columns, std::size_t limit) {
@@ -37,12 +23,6 @@ coarse::Rows checked(const std::string& name, const Numbers& start, const Number
     return {start.data(), columns.data()};
 }
 
-nb::object to_numpy(std::vector<std::int32_t> values) {
-    auto* owned = new std::vector<std::int32_t>(std::move(values));
-    nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<std::int32_t>*>(p); });
-    return nb::cast(nb::ndarray<nb::numpy, std::int32_t, nb::ndim<1>>(owned->data(), {owned->size()}, owner));
-}
-
 nb::object py_pattern(const Numbers& start, const Numbers& columns, const Numbers& p_start, const Numbers& p_columns,
                       std::size_t coarse) {
     const std::size_t rows = start.size() - 1, nodes = p_start.size() - 1;
@@ -53,7 +33,8 @@ nb::object py_pattern(const Numbers& start, const Numbers& columns, const Number
         nb::gil_scoped_release release;
         found = coarse::pattern(rows, A, P, coarse);
     }
-    return nb::make_tuple(to_numpy(std::move(found.start)), to_numpy(std::move(found.columns)));
+    const std::size_t count = found.start.size(), blocks = found.columns.size();
+    return nb::make_tuple(to_numpy(std::move(found.start), {count}), to_numpy(std::move(found.columns), {blocks}));
 }
 
 void py_product(const Numbers& start, const Numbers& columns, const Blocks& values, const Numbers& p_start,

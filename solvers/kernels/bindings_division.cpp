@@ -1,37 +1,20 @@
 // Python names of the division of cells: divide_cells.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/tuple.h>
 
 #include <algorithm>
-#include <cstdint>
-#include <initializer_list>
 #include <map>
-#include <stdexcept>
 #include <tuple>
-#include <vector>
 
+#include "bindings.hpp"
 #include "open_regions.hpp"
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 namespace {
 
-using Integers = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Numbers = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Planes = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Corners = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
+using Integers = Values<const std::int64_t, 1>;
 
-template <typename T>
-nb::object to_numpy(std::vector<T> values, std::initializer_list<std::size_t> shape) {
-  auto* owned = new std::vector<T>(std::move(values));
-  nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-  return nb::cast(nb::ndarray<nb::numpy, T>(owned->data(), shape.size(), shape.begin(), owner));
-}
-
-auto divide_cells(const Integers& first, const Numbers& fraction, const Integers& count, const Corners& corners,
-                  const Planes& planes, const Integers& body, double gap) {
+auto divide_cells(const Integers& first, const Values<const double, 1>& fraction, const Integers& count,
+                  const Values<const double, 3>& corners, const Values<const double, 2>& planes, const Integers& body,
+                  double gap) {
   const std::size_t cells = fraction.size(), polygons = count.size();
   if (first.size() != cells + 1 || corners.shape(0) != polygons ||
       planes.shape(0) != polygons || planes.shape(1) != 4 || body.size() != polygons || corners.shape(2) != 3 ||

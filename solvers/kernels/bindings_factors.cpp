@@ -1,38 +1,25 @@
 // Python names of block_factors.hpp, block_product.hpp, changed_rows.hpp, node_blocks.hpp and row_squares.hpp:
 // BlockFactors, BlockProduct, changed_rows, node_blocks, row_squares, spread_blocks.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 
 #include <algorithm>
-#include <cstdint>
 #include <memory>
 #include <numeric>
 #include <optional>
-#include <stdexcept>
-#include <utility>
-#include <vector>
 
-#include <nanobind/stl/optional.h>
-
+#include "bindings.hpp"
 #include "block_factors.hpp"
 #include "block_product.hpp"
 #include "changed_rows.hpp"
 #include "node_blocks.hpp"
 #include "row_squares.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-
 namespace {
 
-using Numbers = nb::ndarray<const std::int32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Result = nb::ndarray<double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Blocks = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
-
-void require(bool condition, const char* message) {
-    if (!condition) throw std::invalid_argument(message);
-}
+using Numbers = Values<const std::int32_t, 1>;
+using Vector = Values<const double, 1>;
+using Result = Values<double, 1>;
+using Blocks = Values<const double, 3>;
 
 // Throws unless these are compressed rows of a matrix with so many columns.
 void require_rows(const Numbers& start, const Numbers& columns, std::size_t width, const char* otherwise) {
@@ -80,21 +67,15 @@ void create(factors::Factors* self, const Numbers& start, const Numbers& columns
     new (self) factors::Factors(rows, start.data(), columns.data(), size, nodes.data());
 }
 
-template <class... Shape>
-nb::object to_numpy(std::unique_ptr<double[]> values, Shape... shape) {
+using ::to_numpy;
+
+nb::object to_numpy(std::unique_ptr<double[]> values, std::initializer_list<std::size_t> shape) {
     double* owned = values.release();
     nb::capsule owner(owned, [](void* p) noexcept { delete[] static_cast<double*>(p); });
-    return nb::cast(nb::ndarray<nb::numpy, double>(owned, {static_cast<std::size_t>(shape)...}, owner));
+    return nb::cast(nb::ndarray<nb::numpy, double>(owned, shape.size(), shape.begin(), owner));
 }
 
-template <class T, class... Shape>
-nb::object to_numpy(std::vector<T> values, Shape... shape) {
-    auto* owned = new std::vector<T>(std::move(values));
-    nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
-    return nb::cast(nb::ndarray<nb::numpy, T>(owned->data(), {static_cast<std::size_t>(shape)...}, owner));
-}
-
-nb::object collect(const Numbers& start, const Numbers& columns, const Vector& values, int size) {
+nb::object collect(const Numbers& start, const Numbers& columns, const Vector& values, std::size_t size) {
     require_square(start, columns);
     require(values.size() == columns.size(), "each column needs a value");
     require(size == 3 || size == 4, "blocks must have 3 or 4 rows");
@@ -107,8 +88,8 @@ nb::object collect(const Numbers& start, const Numbers& columns, const Vector& v
         found = size == 3 ? node_blocks::collect<3>(nodes, A) : node_blocks::collect<4>(nodes, A);
     }
     const std::size_t rows = found.start.size(), blocks = found.columns.size();
-    return nb::make_tuple(to_numpy(std::move(found.start), rows), to_numpy(std::move(found.columns), blocks),
-                          to_numpy(std::move(found.values), blocks, size, size));
+    return nb::make_tuple(to_numpy(std::move(found.start), {rows}), to_numpy(std::move(found.columns), {blocks}),
+                          to_numpy(std::move(found.values), {blocks, size, size}));
 }
 
 void spread(const Numbers& start, const Blocks& blocks, const Result& entries, double factor) {
@@ -143,8 +124,8 @@ nb::object change(const Numbers& start, const Numbers& columns, const Vector& va
         found = changed_rows::change(count, before, rows.data(), rows.size(), replaced, after);
     }
     const std::size_t entries = found.columns.size();
-    return nb::make_tuple(to_numpy(std::move(found.values), entries), to_numpy(std::move(found.columns), entries),
-                          to_numpy(std::move(found.start), count + 1));
+    return nb::make_tuple(to_numpy(std::move(found.values), {entries}), to_numpy(std::move(found.columns), {entries}),
+                          to_numpy(std::move(found.start), {count + 1}));
 }
 
 void add_squares(const Numbers& start, const Numbers& columns, const Blocks& blocks, const Vector& x, const Result& y) {

@@ -1,30 +1,21 @@
 // Python names of the contact search: KdopTree2 and KdopTree3, the same class in 2D and 3D.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <optional>
-#include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
 
+#include "bindings.hpp"
 #include "kdop.hpp"
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 namespace {
 
-using FacetArray = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Positions = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Radii = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using FacetArray = Values<const std::int64_t, 2>;
+using Positions = Values<const double, 2>;
+using Radii = Values<const double, 1>;
 
 // Gives a container of rows to Python without copying it.
 template <typename Rows>

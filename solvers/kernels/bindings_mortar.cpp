@@ -1,43 +1,24 @@
-// Python names of the mortar kernel: nodal_normals, nodal_tangents, basis_transformation, mortar.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
+// Python names of the mortar kernel: nodal_normals, basis_transformation, mortar.
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
-#include <cstdint>
 #include <limits>
 #include <optional>
-#include <stdexcept>
-#include <string>
-#include <string_view>
-#include <utility>
-#include <vector>
 
+#include "bindings.hpp"
 #include "mortar.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
 using namespace mortar;
 
 namespace {
 
-using Reals = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Facets = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Flags = nb::ndarray<const std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Direction = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Pairs = nb::ndarray<const std::int32_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Reals = Values<const double, 2>;
+using Facets = Values<const std::int64_t, 2>;
+using Flags = Values<const std::uint8_t, 1>;
+using Direction = Values<const double, 1>;
+using Pairs = Values<const std::int32_t, 2>;
 
-void require(bool condition, const std::string& message) {
-    if (!condition) throw std::invalid_argument(message);
-}
-
-// Gives a vector to Python without copying it.
-template <typename Scalar>
-nb::object to_numpy(std::vector<Scalar> values, std::initializer_list<std::size_t> shape) {
-    auto* owned = new std::vector<Scalar>(std::move(values));
-    nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<std::vector<Scalar>*>(p); });
-    return nb::cast(nb::ndarray<nb::numpy, Scalar>(owned->data(), shape.size(), shape.begin(), owner));
-}
+using ::to_numpy;
 
 // (data, indices, indptr), as scipy.sparse.csr_matrix takes it.
 nb::object to_numpy(Csr csr) {
@@ -93,20 +74,6 @@ nb::object py_nodal_normals(const Reals& x, const Facets& facets, const std::str
                                 derivatives ? to_numpy(std::move(slopes)) : nb::none());
     });
     return result;
-}
-
-nb::object py_nodal_tangents(const Reals& normals) {
-    const std::size_t n = normals.shape(0), dim = normals.shape(1);
-    require(dim == 2 || dim == 3, "normals must have 2 or 3 components");
-    std::vector<double> t(n * (dim - 1) * dim), dt(n * (dim - 1) * dim * dim);
-    for (std::size_t j = 0; j < n; ++j) {
-        const double* normal = normals.data() + j * dim;
-        if (dim == 2)
-            nodal_tangents<2>(normal, t.data() + 2 * j, dt.data() + 4 * j);
-        else
-            nodal_tangents<3>(normal, t.data() + 6 * j, dt.data() + 18 * j);
-    }
-    return nb::make_tuple(to_numpy(std::move(t), {n, dim - 1, dim}), to_numpy(std::move(dt), {n, dim - 1, dim, dim}));
 }
 
 struct MortarResult {
@@ -245,8 +212,6 @@ void bind_mortar(nb::module_& module) {
                "Averaged unit nodal normals (ns, dim) and dn/dx as (data, indices, indptr) or None.\n\n"
                "x: positions (ns, dim); facets: (k, nodes), oriented outward; mask: (ns, dim) of 0 and 1, components "
                "to drop before normalising; chosen: (ns,) of 0 and 1, nodes whose derivatives are wanted.");
-    module.def("nodal_tangents", &py_nodal_tangents, "normals"_a,
-               "Unit tangents (ns, dim - 1, dim) at unit normals (ns, dim), and dt/dn (ns, dim - 1, dim, dim).");
     module.def("basis_transformation", &py_basis_transformation, "facets"_a, "facet_type"_a, "n_nodes"_a,
                "T and its inverse, (ns, ns), each as (data, indices, indptr); the identity but for tri6.\n\n"
                "D, M and gap belong to the slave basis N~ = N T: positions x = T x~, so a slave force on the nodes is "

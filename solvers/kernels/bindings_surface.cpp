@@ -1,27 +1,14 @@
 // Python name of surface_rows.hpp: surface_rows.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-
-#include <cstddef>
-#include <cstdint>
-#include <stdexcept>
-#include <string>
-
+#include "bindings.hpp"
 #include "surface_rows.hpp"
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 namespace {
 
-template <class T, int dims>
-using Values = nb::ndarray<T, nb::ndim<dims>, nb::c_contig, nb::device::cpu>;
-
 template <class Array, class... Sizes>
-void require(const char* name, const Array& values, Sizes... sizes) {
+void require_shape(const char* name, const Array& values, Sizes... sizes) {
     const std::size_t wanted[] = {static_cast<std::size_t>(sizes)...};
     for (std::size_t k = 0; k < sizeof...(sizes); ++k)
-        if (values.shape(k) != wanted[k]) throw std::invalid_argument(std::string(name) + " has another shape");
+        require(values.shape(k) == wanted[k], std::string(name) + " has another shape");
 }
 
 void py_surface_rows(const Values<const double, 3>& moments, const Values<const double, 4>& density,
@@ -29,18 +16,18 @@ void py_surface_rows(const Values<const double, 3>& moments, const Values<const 
                      const Values<const double, 4>& fields, const Values<const double, 4>& by_motion,
                      const Values<const double, 1>& leak, const Values<double, 5>& rows) {
     const std::size_t pieces = normal.shape(0), dim = normal.shape(1), points = density.shape(1);
-    if (dim != 2 && dim != 3) throw std::invalid_argument("normals have two or three components");
+    require(dim == 2 || dim == 3, "normals have two or three components");
     const std::size_t functions = std::size_t{1} << dim;
-    require("moments", moments, pieces, points, dim);
-    require("density", density, density.shape(0), points, functions, dim + 1);
-    require("cell", cell, pieces);
-    require("fields", fields, pieces, functions, dim, dim + 1);
-    require("by_motion", by_motion, pieces, dim, dim, dim + 1);
-    require("leak", leak, pieces);
-    require("rows", rows, pieces, functions, dim, dim, dim + 1);
+    require_shape("moments", moments, pieces, points, dim);
+    require_shape("density", density, density.shape(0), points, functions, dim + 1);
+    require_shape("cell", cell, pieces);
+    require_shape("fields", fields, pieces, functions, dim, dim + 1);
+    require_shape("by_motion", by_motion, pieces, dim, dim, dim + 1);
+    require_shape("leak", leak, pieces);
+    require_shape("rows", rows, pieces, functions, dim, dim, dim + 1);
     for (std::size_t p = 0; p < pieces; ++p)
-        if (cell.data()[p] < 0 || static_cast<std::size_t>(cell.data()[p]) >= density.shape(0))
-            throw std::invalid_argument("a piece is in no cell of the density");
+        require(cell.data()[p] >= 0 && static_cast<std::size_t>(cell.data()[p]) < density.shape(0),
+                "a piece is in no cell of the density");
     const SurfaceRows at{points,        moments.data(), density.data(),   cell.data(),
                          normal.data(), fields.data(),  by_motion.data(), leak.data()};
     nb::gil_scoped_release release;

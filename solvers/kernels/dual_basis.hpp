@@ -15,10 +15,12 @@
 
 namespace mortar {
 
-// Below these fractions of coverage; second-order facets degrade with a higher power of the size of the covered part.
+// Second-order facets degrade with a higher power of the size of the covered part.
 template <typename Facet>
 struct Coverage {
+    // Share of a facet that a master covers from which on dual functions are those of the covered part.
     static constexpr double whole = Facet::order == 1 ? 1e-2 : 0.25;
+    // Share up to which they are the shape functions. Between both they change smoothly.
     static constexpr double none = Facet::order == 1 ? 1e-3 : 0.05;
 };
 

@@ -1,4 +1,4 @@
-// Averaged unit nodal normals of a surface and their derivatives; tangents at the nodes.
+// Averaged unit nodal normals of a surface and their derivatives.
 //
 //     n_j = m_j s_j / |m_j s_j|,  s_j = sum over the facets at node j of their unit normal at that node
 //
@@ -109,46 +109,6 @@ std::vector<double> nodal_normals(const double* x, int n_nodes, const std::int64
         }
     }
     return normals;
-}
-
-// Tangents t[k][c] at a node with normal n and dt[k][c][b] = dt_kc/dn_b. 2D: t = (-n_y, n_x). 3D: t_1 is
-// (-n_y, n_x, 0) made unit, or (0, -n_z, n_y) where n is nearly along z; t_2 = n x t_1.
-template <int dim>
-void nodal_tangents(const double* n, double* t, double* dt) {
-    std::fill(dt, dt + (dim - 1) * dim * dim, 0.0);
-    if constexpr (dim == 2) {
-        t[0] = -n[1];
-        t[1] = n[0];
-        dt[0 * 2 + 1] = -1.0;
-        dt[1 * 2 + 0] = 1.0;
-    } else {
-        const bool along_z = std::abs(n[0]) < 1e-4 && std::abs(n[1]) < 1e-4;
-        const int first = along_z ? 1 : 0, second = first + 1;
-        const double length = std::hypot(n[first], n[second]);
-        double *t1 = t, *t2 = t + 3, *dt1 = dt, *dt2 = dt + 9;
-        std::fill(t1, t1 + 3, 0.0);
-        if (length == 0.0) {  // no normal, no tangents
-            std::fill(t2, t2 + 3, 0.0);
-            return;
-        }
-        t1[first] = -n[second] / length;
-        t1[second] = n[first] / length;
-        cross(n, t1, t2);
-        for (int b : {first, second}) {
-            double raw[3] = {}, along;
-            (b == first ? raw[second] : raw[first]) = b == first ? 1.0 / length : -1.0 / length;
-            along = dot(raw, t1);
-            for (int c = 0; c < 3; ++c) dt1[3 * c + b] = raw[c] - along * t1[c];
-        }
-        for (int b = 0; b < 3; ++b) {  // e_b x t_1 + n x dt_1/dn_b
-            double unit[3] = {}, turned[3], rest[3];
-            unit[b] = 1.0;
-            const double change[3] = {dt1[b], dt1[3 + b], dt1[6 + b]};
-            cross(unit, t1, turned);
-            cross(n, change, rest);
-            for (int c = 0; c < 3; ++c) dt2[3 * c + b] = turned[c] + rest[c];
-        }
-    }
 }
 
 }  // namespace mortar

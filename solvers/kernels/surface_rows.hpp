@@ -1,4 +1,4 @@
-// Rows of the flow by the motion of the surface: the sums over pieces of `solvers/fluid/cut_shape.py`.
+// Rows of the flow by the motion of the surface: the sums over pieces of `solvers/fluid/terms/shape_derivatives/cut_shape.py`.
 #pragma once
 
 #include <cstddef>

@@ -5,8 +5,9 @@ from solvers.lazy import lazy_names
 __getattr__, __all__ = lazy_names(
     __name__,
     {
-        "body": ["PointSpring", "RigidBody"],
+        "body": ["PointLoad", "PointSpring", "RigidBody", "hinged"],
         "field": ["RigidBodies"],
         "inertia": ["Inertia", "inertia_of_surface"],
+        "line_springs": ["LineSpring"],
     },
 )

@@ -1,203 +1,181 @@
-"""Frictionless contact of rigid bodies with rigid obstacles, vertex against facet.
+"""Contact of rigid bodies with each other, with obstacles and walls: vertex against facet, with Coulomb's friction.
 
-For the gaps g_j of vertices, their derivatives G by the unknowns, and contact forces z_j [N] averaged over the step,
+For the gaps g_j of vertices, their ways s_j along the other surface in the step, and contact forces (z_j, t_j) [N]
+averaged over the step, B being the derivative of (g, s) by the unknowns,
 
-    g_j >= 0,   z_j >= 0,   z_j g_j = 0,        balance - G^T z = 0.
+    g_j >= 0,   z_j >= 0,   z_j g_j = 0,   |t_j| <= mu z_j, against the way that the vertex slides,
+    balance - B^T (z, t) = 0.
 
-Each Newton iteration finds the active set by a small quadratic program: the increment nearest to that without contact,
-in the metric of the tangent, for which no gap is negative. Where several z give the same force, few are not zero. After
-an impact, the velocity away from the obstacle is the restitution times that towards it before.
-Sources: Lawson, Hanson, Solving Least Squares Problems (1974), chapter 23 (least distance); Moreau in Moreau,
-Panagiotopoulos, Nonsmooth Mechanics and Applications (1988) (impact).
+The vertices of both surfaces have gaps to the other one. So there are more forces than the bodies have freedoms. Each
+Newton iteration solves the cone problem of its linear system (`solvers.rigid.coulomb`). After an impact, the velocity
+away from the other side is the restitution times that towards it before; the impulse has friction, too.
+Source: Moreau in Moreau, Panagiotopoulos, Nonsmooth Mechanics and Applications (1988).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.rows import RowTransformation
+from solvers.algebra.sparse import Sparse, nothing, sparse_from_entries
 from solvers.api import Array
-from solvers.rows import RowTransformation
-from solvers.sparse import nothing, sparse_from_array
+from solvers.rigid.body import RigidBody
+from solvers.rigid.coulomb import Touch, contact_forces
+from solvers.rigid.impact import AT_BOUND, Closed
+from solvers.rigid.near import Moment, Near, Obstacle, RigidPair, search, vertices
+from solvers.rigid.turning import turning
 
+__all__ = ["Obstacle", "RigidContact", "RigidPair"]
 
-@dataclass(frozen=True)
-class Obstacle:
-    """A rigid obstacle of segments or triangles, whose right-hand normals point towards the bodies."""
+#: Singular value relative to the largest, below which forces of contact are redundant.
+REDUNDANT = 1e-10
 
-    name: str
-    points: Array  #: vertices [m], shape (n, dim)
-    facets: NDArray[np.int64]  #: shape (m, dim)
-    motion: Callable[[float], Array] | None = None  #: time [s] -> positions of the vertices [m]; None: it rests
-
-    def at(self, t: float) -> Array:
-        """Positions [m] of the vertices at the time t [s]."""
-        return self.points if self.motion is None else self.motion(t)
-
-
-@dataclass(frozen=True)
-class Gaps:
-    """Gaps of vertices to an obstacle."""
-
-    gap: Array  #: [m], negative behind the obstacle, shape (n,)
-    normal: Array  #: unit normals of the obstacle, shape (n, dim)
-
-
-def gaps(x: Array, corners: Array) -> Gaps:
-    """Gaps of points (n, dim) to the nearest of flat facets with corners (m, dim, dim), positions in [m]."""
-    closest, gap, normal = np.full(len(x), np.inf), np.full(len(x), np.inf), np.zeros_like(x)
-    for facet in corners:
-        n = _normal(facet)
-        foot = _nearest(x, facet)
-        away = x - foot
-        distance = np.linalg.norm(away, axis=1)
-        height = away @ n
-        nearer = distance < closest
-        closest[nearer], gap[nearer], normal[nearer] = distance[nearer], height[nearer], n
-    return Gaps(gap, normal)
-
-
-def _normal(facet: Array) -> Array:
-    edges = facet[1:] - facet[0]
-    n = np.array([edges[0, 1], -edges[0, 0]]) if len(facet) == 2 else np.cross(edges[0], edges[1])
-    return n / np.linalg.norm(n)
-
-
-def _nearest(x: Array, facet: Array) -> Array:
-    """The point of a segment or triangle nearest to each point, shape (n, dim)."""
-    edges = [(facet[a], facet[b]) for b in range(len(facet)) for a in range(b)]
-    feet = []
-    for a, b in edges:
-        share = np.clip((x - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
-        feet.append(a + share[:, None] * (b - a))
-    best = np.argmin([np.linalg.norm(x - foot, axis=1) for foot in feet], axis=0)
-    foot = np.stack(feet)[best, np.arange(len(x))]
-    if len(facet) == 3:
-        n = _normal(facet)
-        flat = x - ((x - facet[0]) @ n)[:, None] * n
-        turns = [np.cross(facet[(i + 1) % 3] - facet[i], flat - facet[i]) @ n for i in range(3)]
-        inside = np.min(turns, axis=0) >= 0.0
-        foot[inside] = flat[inside]
-    return foot
-
-
-@dataclass(frozen=True)
-class RigidPair:
-    """A body that may touch an obstacle."""
-
-    body: int  #: index of the body
-    vertices: int  #: count of vertices of its surface
-    obstacle: Obstacle
+#: Iterates of a step from which on vertices keep their facets. Where corners meet, they go from facet to facet, whose
+#: normals differ, without end. Most steps end before.
+KEPT = 4
 
 
 class RigidContact:
-    """All pairs. Arrays have the shape (m,): the vertices of all bodies, pair by pair."""
+    """All pairs. Arrays have the shape (m, ...): the vertices that are near the other side at the latest `measure`."""
 
-    def __init__(self, pairs: Sequence[RigidPair], unknowns: int, *, restitution: float = 0.0):
-        self.pairs, self.restitution = list(pairs), restitution
-        count = sum(pair.vertices for pair in pairs)
-        self.z = np.zeros(count)  #: contact forces [N]
-        self.gap = np.full(count, np.inf)  #: [m]
-        self.G = np.zeros((count, unknowns))  #: derivatives of the gaps by the unknowns
+    def __init__(
+        self,
+        bodies: Sequence[RigidBody],
+        pairs: Sequence[RigidPair],
+        *,
+        restitution: float = 0.0,
+        standoff: float = 0.0,
+    ):
+        """standoff: gap [m] that contact leaves open, so that a flow between the bodies stays connected."""
+        self.bodies, self.pairs, self.restitution, self.standoff = list(bodies), list(pairs), restitution, standoff
+        self._starts = np.cumsum([0] + [vertices(bodies, pair) for pair in pairs]).tolist()
+        self._unknowns = len(bodies) * (3 if bodies[0].dim == 2 else 6)
+        self._moment: Moment | None = None
+        self._components = np.empty(0, dtype=np.int64)
+        self.near = Near.joined([], bodies[0].dim)
+        self.touch = Touch(np.empty((0, 2, bodies[0].dim, 1)), self.near.body, self.near.friction)
+        self.z = np.zeros_like(self.near.x)  #: forces [N] in the frames, the pressing one first
+        self.stiffness = nothing((self._unknowns, self._unknowns))  #: minus the derivative of `force`, forces turning
+        self._start: Array | None = None  # forces in the frames at the last press of this step
+        self._measured = 0  # in this step
+        self._pressing = np.empty(0, dtype=np.int64), self.near.x  # vertices and forces [N] in space at the last press
+
+    def begin_step(self) -> None:
+        """Nothing is known of the contact forces."""
+        self._pressing, self._measured = (np.empty(0, dtype=np.int64), self.near.x[:0]), 0
+
+    def forget(self) -> None:
+        """No contact forces, until `press`."""
+        self.z = np.zeros_like(self.z)
 
     @property
     def force(self) -> Array:
         """Generalised contact force: force [N] and moment [N m] by unknown."""
-        return self.G.T @ self.z
+        return self.touch.force(self.z, self._unknowns) if len(self.z) else np.zeros(self._unknowns)
 
     @property
     def active(self) -> NDArray[np.bool_]:
-        """Mask of the vertices in contact, shape (m,)."""
-        return self.z > 0.0
+        """Mask of the near vertices in contact, shape (m,)."""
+        return self.z[:, 0] > 0.0
 
-    def measure(
-        self, positions: Sequence[Array], arms: Sequence[Array], components: NDArray[np.int64], t: float
-    ) -> None:
-        """Set gaps and their derivatives at the time t [s].
+    def touching(self) -> NDArray[np.bool_]:
+        """Mask of the vertices in contact, of all pairs: those of the body, then those of the other side."""
+        found = np.zeros(self._starts[-1], dtype=bool)
+        found[self.near.vertex[self.active]] = True
+        return found
 
-        positions, arms: of the vertices [m] and from the centres to them [m], by body, (n, dim) and (n, 3);
-        components: the unknowns of a body among `COMPONENTS`.
+    def measure(self, moment: Moment, components: NDArray[np.int64], free: NDArray[np.bool_]) -> None:
+        """Set gaps and their derivatives at the end of a step.
+
+        components: the unknowns of a body among `COMPONENTS`; free: mask of the unknowns that are not held.
         """
-        self.G[:] = 0.0
-        start = 0
-        for pair in self.pairs:
-            rows = slice(start, start + pair.vertices)
-            found = gaps(positions[pair.body], pair.obstacle.at(t)[pair.obstacle.facets])
-            n = np.pad(found.normal, ((0, 0), (0, 3 - found.normal.shape[1])))
-            by_component = np.hstack([n, np.cross(arms[pair.body], n)])[:, components]
-            self.gap[rows] = found.gap
-            self.G[rows, pair.body * len(components) : (pair.body + 1) * len(components)] = by_component
-            start = rows.stop
+        self._moment, self._components = moment, components
+        self.near = search(self.pairs, self._starts, moment, self.near if self._measured >= KEPT else None)
+        self._measured += 1
+        self.touch = self.near.touch(moment, components, free)
+        self.z = np.zeros_like(self.near.x)
+        known, forces = self._pressing
+        _, at, of = np.intersect1d(self.near.vertex, known, return_indices=True)
+        if len(at):
+            self.stiffness = -turning(self.near[at], forces[of], moment, components, free)
+            self._start = np.zeros_like(self.z)
+            self._start[at] = np.einsum("mde,me->md", self.near.frame[at], forces[of])
+        else:
+            self._start = None
+            self.stiffness = nothing((self._unknowns, self._unknowns))
 
-    def press(self, tangent: Array, right: Array) -> None:
+    def _ways(self) -> Array:
+        """Gaps beyond the standoff, and ways along the surface in the step [m], shape (m, dim)."""
+        ways = self.near.in_frame(self.near.carried)
+        moves = (self.touch.B[:, :, 0] != 0.0).any(axis=(1, 2))  # else nothing can open it
+        ways[:, 0] = self.near.gap - np.where(moves, self.standoff, 0.0)
+        return ways
+
+    def press(self, tangent: Sparse, right: Array) -> None:
         """Set the contact forces for a Newton iteration; right: minus the balance without contact.
 
-        When the balance with these forces vanishes, gaps and forces fulfil the complementarity conditions.
+        When the balance with these forces vanishes, gaps and forces fulfil the conditions of contact.
         """
-        without = np.linalg.solve(tangent, right)
-        too_far = 0.0 - self.gap - self.G @ without
-        self.z = pressures(0.5 * (tangent + tangent.T), self.G, too_far)
+        if len(self.z) == 0:
+            return
+        self.z = contact_forces(tangent, right, self.touch, self._ways(), self._start)[1]
+        active = self.active
+        in_space = np.einsum("mde,md->me", self.near.frame[active], self.z[active])
+        self._pressing = self.near.vertex[active], in_space
 
-    def transformation(self, tangent: Array) -> RowTransformation | None:
-        """Transformation that eliminates z from J du = b + G^T z with G du = -g; None without contact.
+    def transformation(self, tangent: Sparse) -> RowTransformation | None:
+        """Transformation that eliminates the forces from J du = b + F z with C du = -c; None without contact.
 
-        With S = G K^-1 G^T: rows L = 1 - G^T S^-1 G K^-1, added A = G^T S^-1 G, right c = -G^T S^-1 g.
+        C has the normals, and the tangents of contacts that stick; F has the forces, with friction of those that slide.
+        With S = C K^-1 F: rows L = 1 - F S^-1 C K^-1, added A = F S^-1 C, right -F S^-1 c.
         """
-        G, g, n = self.G[self.active], self.gap[self.active], len(tangent)
-        if not len(G):
+        active = self.active
+        if not active.any():
             return None
-        inverse = np.linalg.inv(tangent)
-        back = np.linalg.solve(G @ inverse @ G.T, G).T
+        touch, z = self.touch[active], self.z[active]
+        unknowns, dim = len(tangent.indptr) - 1, z.shape[1]
+        stuck = np.linalg.norm(z[:, 1:], axis=1) < AT_BOUND * touch.friction * z[:, 0]
+        slide = np.where(stuck[:, None], 0.0, z[:, 1:] / z[:, :1])
+        kept = np.flatnonzero(np.concatenate([np.ones((len(z), 1), bool), np.tile(stuck[:, None], dim - 1)], 1).ravel())
+        C = touch.rows(unknowns)[kept].toarray()
+        F = touch.sliding(slide).rows_of_force(unknowns)[kept].toarray().T
+        c = self._ways()[active].ravel()[kept]
+        dofs = np.unique(touch.dofs()[touch.body >= 0])
+        C, F = C[:, dofs], F[dofs]
+        number = np.full(unknowns, -1)
+        number[dofs] = np.arange(len(dofs))
+        K = tangent[dofs].columns(dofs).toarray()
+        through = np.linalg.solve(K.T, C.T).T
+        back = F @ np.linalg.pinv(through @ F, rcond=REDUNDANT)
+        n = len(dofs)
         return RowTransformation(
-            dofs=np.arange(n),
-            rows=sparse_from_array(np.eye(n) - back @ G @ inverse),
+            dofs=dofs,
+            rows=_entries(np.eye(n) - back @ through),
             stiffness=nothing((n, n)),
-            added=sparse_from_array(back @ G),
-            right=-back @ g,
+            added=_entries(back @ C),
+            right=-back @ c,
             replaced=np.ones(n, dtype=bool),
         )
 
-    def after_impact(self, mass: Array, before: Array, without: Array, force: Array) -> tuple[Array, Array]:
-        """(velocities, rates of momentum) by unknown at the end of a step with contact.
+    def closed(self, mass: Sparse, without: Array, force: Array, gyroscopic: Array) -> Closed:
+        """The contacts that are closed; all by unknown, see `Closed`; without: velocities, also of held unknowns."""
+        assert self._moment is not None
+        near, touch = self.near[self.active], self.touch[self.active]
+        held = near.touch(self._moment, self._components, np.ones(self._unknowns, dtype=bool))
+        given = near.in_frame(near.given) / self._moment.dt + held.motion(without) - touch.motion(without)
+        return Closed(near, touch, self._moment, mass, given, force, gyroscopic)
 
-        mass: mass matrix; before: velocities at the start of the step, to which restitution applies; without: those at
-        its end without contact; force: that at its end. Vertices that stay in contact do not accelerate towards the
-        obstacle.
-        """
-        G: Array = self.G[self.active]
-        rebound = -self.restitution * np.minimum(G @ before, 0.0)
-        missing: Array = rebound - G @ without
-        velocity = without + np.linalg.solve(mass, G.T @ pressures(mass, G, missing))
-        staying: Array = G[rebound == 0.0]
-        inwards: Array = -(staying @ np.linalg.solve(mass, force))
-        return velocity, force + staying.T @ pressures(mass, staying, inwards)
-
-    def numbers(self) -> dict[str, float]:
-        """Columns of the history."""
-        return {"contact.active": float(self.active.sum())}
+    def numbers(self, forces: Array) -> dict[str, float]:
+        """Columns of the history; forces: on each body [N], shape (bodies, dim)."""
+        found = {"contact.active": float(self.active.sum())}
+        for body, force in zip(self.bodies, forces, strict=True):
+            found |= {f"contact.on_{body.name}.{axis}": float(f) for axis, f in zip("xyz", force, strict=False)}
+        return found
 
 
-def pressures(K: Array, G: Array, f: Array) -> Array:
-    """z >= 0 of the smallest d = K^-1 G^T z, in the metric of K, with G d >= f; K (n, n), G (m, n), f (m,)."""
-    if not (f > 0.0).any():
-        return np.zeros(len(f))
-    half = np.linalg.cholesky(K)
-    E = np.linalg.solve(half, G.T).T
-    sizes = np.abs(E).max(), f.max()
-    z = least_distance(E / sizes[0], f / sizes[1])
-    return z * sizes[1] / sizes[0] ** 2
-
-
-def least_distance(E: Array, f: Array) -> Array:
-    """z >= 0 of the shortest y = E^T z with E y >= f, E (m, n), f (m,); few components of z are not zero."""
-    from scipy.optimize import nnls  # the import takes a fifth of a second: only runs with contact need it
-
-    system = np.vstack([E.T, f])
-    target = np.zeros(len(system))
-    target[-1] = 1.0
-    found, _ = nnls(system, target)
-    rest = system @ found - target
-    return -found / rest[-1]
+def _entries(values: Array) -> Sparse:
+    rows, columns = np.nonzero(values)
+    return sparse_from_entries(rows, columns, values[rows, columns], (len(values), values.shape[1]))

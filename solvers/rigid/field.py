@@ -10,19 +10,23 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from solvers.api import Array, State, StepFailed, StepInfo
+from solvers.algebra.rounding import rounding_error
+from solvers.algebra.rows import RowTransformation, TakenRows
+from solvers.algebra.sparse import Sparse, block_diagonal
+from solvers.algebra.vertices import VertexJacobian
+from solvers.api import Array, FailureKind, State, Step, StepFailed, StepInfo
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance, converge
-from solvers.rigid import motion, surface
+from solvers.rigid import line_springs, motion, surface
 from solvers.rigid.body import RigidBody, in_space
 from solvers.rigid.contact import RigidContact
+from solvers.rigid.coulomb import solver
+from solvers.rigid.line_springs import LineSpring
 from solvers.rigid.motion import RigidInstant
+from solvers.rigid.near import Moment
 from solvers.rigid.rotation import vector_rate
-from solvers.rounding import rounding_error
-from solvers.rows import RowTransformation, TakenRows
-from solvers.step import Step
+from solvers.rigid.supported import supported
 from solvers.timing import Timer
-from solvers.vertices import VertexJacobian
 
 #: Unknowns of a body among `COMPONENTS`, by dimension of space.
 UNKNOWNS = {2: np.array([0, 1, 5]), 3: np.arange(6)}
@@ -32,7 +36,7 @@ HALF_TURN = np.pi
 
 
 class RigidBodies:
-    """Implements `Solid`. Every process has all bodies; the first one owns the unknowns.
+    """Implements `Solid`. Every process has all bodies; one owns the unknowns, the first unless they are `behind`.
 
     The unknowns of a body are its increments in a step: displacement of the centre [m] and rotation vector in space
     [rad]. `held` components are prescribed, the others follow from the balance of forces and moments.
@@ -46,22 +50,29 @@ class RigidBodies:
         scheme: GeneralisedAlpha = GeneralisedAlpha.from_rho_inf(1.0),
         tolerance: Tolerance = Tolerance(),
         *,
+        springs: Sequence[LineSpring] = (),
         contact: RigidContact | None = None,
         timer: Timer | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ):
-        self.bodies, self.scheme, self.tolerance = list(bodies), scheme, tolerance
+        self.bodies, self.scheme, self.tolerance, self.springs = list(bodies), scheme, tolerance, springs
         self.comm, self.timer, self.contact = comm, timer or Timer(), contact
         self.dim, self.extents = bodies[0].dim, np.array([body.extent for body in bodies])
         self.components = UNKNOWNS[self.dim]
         self.unknowns = len(bodies) * len(self.components)  #: count on all processes
+        self._owner = 0  #: process that owns the unknowns
         self.size = self.unknowns if comm.rank == 0 else 0
+        self.first = 0  #: number of the first unknown in the system of the solid
         self.surfaces = {body.name: body.points for body in bodies}
         self.now = [RigidInstant.at_rest() for _ in bodies]
         self.old = list(self.now)
         self.on_surface = np.zeros((len(bodies), 6))  #: force and moment by the flow [N, N m], at present
         self.on_surface_old = np.zeros((len(bodies), 6))
         self._forces = [np.zeros((len(body.points), self.dim)) for body in bodies]  #: on the vertices [N]
+        self._pressing: list[tuple[int, Array, Array]] = []  #: see `press`
+        self._pressed_weight = 1.0
+        self.pressed = np.zeros(self.unknowns)  #: by contact with others, at present [N, N m]
+        self.pressed_old = np.zeros(self.unknowns)
         self._u, self._last = np.zeros((len(bodies), 6)), np.zeros((len(bodies), 6))
         self._held_u = np.zeros((len(bodies), 6))  #: increments of the held components in this step
         self.current = Step(0.0, 0.0)  #: the present step, or the last one
@@ -73,26 +84,29 @@ class RigidBodies:
         self._exchanged = 0.0  # [J]
         self._noise: Array | None = None  #: rounding errors of the balance; None before this step linearises
 
+    def behind(self, others: int) -> None:
+        """Let other unknowns, `others` on all processes, come first; the last process owns those of this field."""
+        self._owner, self.first = self.comm.size - 1, others
+        self.size = self.unknowns if self.comm.rank == self._owner else 0
+
     # ------------------------------------------------------------------------------------------------- steps
 
     @property
     def force_weight(self) -> float:
         return 1.0 - self.scheme.alpha_f
 
+    def mean_load(self, before: Array, after: Array) -> Array:
+        return self.force_weight * after + (1.0 - self.force_weight) * before
+
+    def weighted(self, rows: Sparse) -> Sparse:
+        return self.force_weight * rows
+
     def initialise(self, t: float, dt: float) -> None:
         """Set initial velocities, and accelerations by the loads at the time t [s]; dt [s]: the first step."""
-        for index, body in enumerate(self.bodies):
-            v = np.zeros(6)
-            v[: len(body.initial_velocity)] = body.initial_velocity
-            v[3 : 3 + len(body.initial_spin)] = body.initial_spin
-            start = RigidInstant.at_rest()
-            load = body.own_load(t, start.shift, start.R, v[:3], v[3:])
-            rate, held, h = load.copy(), body.held_components, 1e-3 * dt
-            x = [body.held_at(t + k * h) for k in range(4)]
-            v[held] = (-3.0 * x[0] + 4.0 * x[1] - x[2]) / (2.0 * h)
-            acceleration = (2.0 * x[0] - 5.0 * x[1] + 4.0 * x[2] - x[3]) / h**2
-            rate[held] = np.diag(motion.mass(body, start.R))[held] * acceleration
-            self.now[index] = RigidInstant(start.shift, start.R, v, rate, load)
+        self.current = Step(t, 0.0)
+        begun = [motion.at_start(body, t, dt) for body in self.bodies]
+        begun = line_springs.with_springs(self.springs, self.bodies, begun)
+        self.now = [motion.with_rates(body, now, t, dt) for body, now in zip(self.bodies, begun, strict=True)]
         self.old = list(self.now)
 
     def step(self, t: float, dt: float) -> StepInfo:
@@ -106,7 +120,10 @@ class RigidBodies:
     def begin_step(self, t: float, dt: float, held: Array | None = None) -> None:
         """Store the state at t; held: increments of held components, shape (bodies, 6), None: by their functions."""
         self.old, self.on_surface_old = list(self.now), self.on_surface.copy()
+        self.pressed_old = self.pressed.copy()
         self.current, self._noise = Step(t + dt, dt), None
+        if self.contact is not None:
+            self.contact.begin_step()
         self._u[:] = self._held_u[:] = 0.0
         for index, (u, body) in enumerate(zip(self._held_u, self.bodies, strict=True)):
             prescribed = body.held_at(t + dt) - body.held_at(t) if held is None else held[index, body.held_components]
@@ -127,23 +144,26 @@ class RigidBodies:
     def set_increments(self, u: Array) -> None:
         """Set the increments u since the start of the step, shape (bodies, 6)."""
         self._u = u
-        self.now = [
+        now = [
             motion.moved(body, self.scheme, old, part, self.current.t, self.current.dt)
             for body, old, part in zip(self.bodies, self.old, u, strict=True)
         ]
+        self.now = line_springs.with_springs(self.springs, self.bodies, now)
 
     def solve(self) -> StepInfo:
         """Newton's method to the tolerance, under the present load. Raises StepFailed."""
         info = converge(self, self.tolerance)
         self.check(info)
-        return info
+        return replace(info, numbers=self.numbers())
 
     def check(self, info: StepInfo) -> None:
         """Raise StepFailed for a body that rotates by half a turn or more in a step."""
         for body, u in zip(self.bodies, self._u, strict=True):
             if not np.linalg.norm(u[3:]) < HALF_TURN:
                 reason = f"body '{body.name}' turned by more than half a turn: take a smaller time step"
-                raise StepFailed(self.name, reason, iteration=info.iterations, history=info.residuals)
+                raise StepFailed(
+                    self.name, FailureKind.MOTION, reason, iteration=info.iterations, history=info.residuals
+                )
 
     def end_step(self) -> None:
         """Accept the step; with contact, velocities and rates of momentum are those after the impact."""
@@ -157,28 +177,29 @@ class RigidBodies:
 
     def _end_contact(self) -> None:
         self.balance = self._own_balance()
-        if self.contact is None or not self.contact.active.any():
+        statics = not any(body.inertia.mass for body in self.bodies)
+        if self.contact is None or statics or not self.contact.active.any():
             return
-        mass = np.zeros((self.unknowns, self.unknowns))
-        n = len(self.components)
-        for index, (body, now) in enumerate(zip(self.bodies, self.now, strict=True)):
-            rows = slice(index * n, (index + 1) * n)
-            mass[rows, rows] = motion.mass(body, now.R)[np.ix_(self.components, self.components)]
+        inertia = np.array([motion.mass(body, now.R) for body, now in zip(self.bodies, self.now, strict=True)])
+        mass = block_diagonal(self._without_held(inertia[:, self.components][:, :, self.components]))
         before, weight = self._velocity(self.old), self.force_weight
         force, force_before = (
             self._by_component(np.array([one.load for one in some]) + by_flow)
             for some, by_flow in ((self.now, self.on_surface), (self.old, self.on_surface_old))
         )
-        pushed = np.linalg.solve(mass, weight * force + (1.0 - weight) * force_before)
+        w = self._pressed_weight
+        mean = weight * force + (1.0 - weight) * force_before
+        gyroscopic = self._by_component(
+            np.array([motion.gyroscopic(b, i) for b, i in zip(self.bodies, self.now, strict=True)])
+        )
+        pushed = solver(mass)(mean + w * self.pressed + (1.0 - w) * self.pressed_old)
+        force = force + self.pressed
         without = np.where(self._free, before + self.current.dt * pushed, self._velocity(self.now))
-        velocity, rate = self.contact.after_impact(mass, before, without, force)
+        closed = self.contact.closed(mass, without, np.where(self._free, force, 0.0), gyroscopic)
+        velocity, rate = closed.after(before, without, self.contact.restitution)
         rate = np.where(self._free, rate, self._by_component(np.array([now.p for now in self.now])))
-        for index, now in enumerate(self.now):
-            rows = slice(index * n, (index + 1) * n)
-            v, p = np.zeros(6), now.p.copy()
-            v[self.components], p[self.components] = velocity[rows], rate[rows]
-            v[3:] = now.R.T @ v[3:]
-            self.now[index] = replace(now, v=v, p=p)
+        ends = zip(self.now, *(np.split(part, len(self.bodies)) for part in (velocity, rate)), strict=True)
+        self.now = [motion.with_motion(now, self.components, v, p) for now, v, p in ends]
 
     def _velocity(self, instants: Sequence[RigidInstant]) -> Array:
         """Velocities of the centres [m/s] and angular velocities in space [rad/s], by unknown."""
@@ -191,7 +212,8 @@ class RigidBodies:
         return surface.displacements(self.bodies, self.now)
 
     def jacobian(self) -> VertexJacobian:
-        return surface.jacobian(self.bodies, self.now, self.components)
+        found = surface.jacobian(self.bodies, self.now, self.components)
+        return VertexJacobian(self.first + found.columns, found.values) if self.first else found
 
     def _by_body(self, force: Array) -> list[Array]:
         return np.split(force, np.cumsum([len(body.points) for body in self.bodies])[:-1])
@@ -200,6 +222,28 @@ class RigidBodies:
         """Set the force [N] of the flow on all vertices, shape (n, dim)."""
         self._forces = self._by_body(force)
         self.on_surface = surface.resultants(self.bodies, self.now, self._forces)
+
+    def press(self, forces: Sequence[tuple[int, Array, Array]], weight: float) -> None:
+        """Set the forces of contact with bodies of another field.
+
+        forces: (body, points at the start [m], force on them [N], both of shape (n, dim)); weight: of those at the end
+        of the step in the balance, the same as in that of the others, so that momentum is kept.
+        """
+        self._pressing, self._pressed_weight = list(forces), weight
+        total = np.zeros((len(self.bodies), 6))
+        for index, points, given in forces:
+            f, arms = in_space(given), self.bodies[index].arms(self.now[index].R, points)
+            total[index] += np.concatenate([f.sum(axis=0), np.cross(arms, f).sum(axis=0)])
+        self.pressed = self._by_component(total)
+
+    def points_of(self, index: int, points: Array, t: float) -> Array:
+        """Positions [m] of points of a body, given at the start, (n, dim); at other times than now by its velocity."""
+        body, now = self.bodies[index], self.now[index]
+        arms = body.arms(now.R, points)
+        found = body.inertia.centre + (now.shift + arms)[:, : self.dim]
+        if t != self.current.t:
+            found = found + (t - self.current.t) * (now.v[:3] + np.cross(motion.spin(now), arms))[:, : self.dim]
+        return found
 
     def reduced(self, force: Array) -> Array:
         """Forces [N] and moments [N m], by unknown, of forces on the vertices, (n, dim)."""
@@ -229,21 +273,26 @@ class RigidBodies:
         parts = zip(self.now, self.old, strict=True)
         rows = [(1 - m) * now.p + m * old.p - (1 - f) * now.load - f * old.load for now, old in parts]
         balance = self._by_component(np.array(rows))
+        if self.pressed.any() or self.pressed_old.any():
+            w = self._pressed_weight
+            balance = balance - (w * self.pressed + (1.0 - w) * self.pressed_old)
         return balance if self.contact is None else balance - self.contact.force
+
+    def follow(self) -> None:
+        """Nothing depends on the iterate before its residual."""
 
     def residual(self) -> Array:
         """Norm [N] of the balance of each body; moments are divided by its size."""
-        weight = self.force_weight
-        mean = self._by_component(weight * self.on_surface + (1.0 - weight) * self.on_surface_old)
+        mean = self._by_component(self.mean_load(self.on_surface_old, self.on_surface))
         if self.contact is not None:
-            self.contact.z[:] = 0.0
+            self.contact.forget()
         self.balance = np.where(self._free, self._own_balance() - mean, 0.0)
         if self.contact is None:
             return self._norms(self.balance)
-        arms = [body.arms(now.R, body.points) for body, now in zip(self.bodies, self.now, strict=True)]
-        self.contact.measure(surface.positions(self.bodies, self.now), arms, self.components, self.current.t)
-        self.contact.G[:, ~self._free] = 0.0
-        self.contact.press(self._system(), -self.balance)
+        moment = Moment(self.bodies, self.now, self.old, self.current.t, self.current.dt)
+        self.contact.measure(moment, self.components, self._free)
+        with supported():
+            self.contact.press(self._system(), -self.balance)
         return self._norms(self.balance - self.contact.force)
 
     def _norms(self, rows: Array) -> Array:
@@ -260,33 +309,45 @@ class RigidBodies:
         before = [motion.momentum(body, old.R, old.v) for body, old in zip(self.bodies, self.old, strict=True)]
         momentum = np.array(before) / self.current.dt
         all_forces = [self._by_component(some) for some in (rates, loads, momentum, self.on_surface)]
+        all_forces.append(self.pressed)
         if self.contact is not None:
             all_forces.append(self.contact.force)
         return np.max([self._norms(rows) for rows in all_forces], axis=0)
 
-    def tangent(self) -> Array:
-        """d(balance)/d(unknowns), dense, including the change of moments of forces on the vertices by rotation."""
-        found, n, weight = np.zeros((self.unknowns, self.unknowns)), len(self.components), self.force_weight
+    def tangent(self) -> Sparse:
+        """d(balance)/d(unknowns), including the change of moments of forces on the vertices by rotation.
+
+        Contact forces turn, too, as they were at the last evaluation of the residual.
+        """
+        return self._with_others(block_diagonal(self._blocks()), np.ones(self.unknowns, dtype=bool))
+
+    def _with_others(self, own: Sparse, free: NDArray[np.bool_]) -> Sparse:
+        """The tangent of single bodies, and what springs and contact between them add; free: mask of the unknowns."""
+        if self.springs:
+            parts = zip(self.old, self.now, self._u, strict=True)
+            rates = [motion.velocity_rate(self.scheme, old, now, u[3:], self.current.dt) for old, now, u in parts]
+            loads = line_springs.tangent(self.springs, self.bodies, self.now, rates, self.components, free)
+            own = own + -self.force_weight * loads
+        return own if self.contact is None else own + self.contact.stiffness
+
+    def _blocks(self) -> Array:
+        """The tangent of each body alone, shape (bodies, unknowns of a body, unknowns of a body)."""
+        found, weight, t, dt = [], self.force_weight, self.current.t, self.current.dt
         parts = zip(self.bodies, self.old, self.now, self._u, self._forces, strict=True)
         for index, (body, old, now, u, force) in enumerate(parts):
-            own = motion.inertia_tangent(body, self.scheme, old, now, u[3:], self.current.dt)
-            rate = motion.velocity_rate(self.scheme, old, now, u[3:], self.current.dt)
-            own -= weight * body.own_load_tangent(now.shift, now.R, now.v[:3], motion.spin(now), rate)
-            arms = body.arms(now.R, body.points)
-            turned = arms.T @ in_space(force)  # sum of [f] [r] = r f^T - (f . r) 1
-            own[3:, 3:] -= weight * (turned - np.trace(turned) * np.eye(3))
-            rows = slice(index * n, (index + 1) * n)
-            found[rows, rows] = own[np.ix_(self.components, self.components)]
-        return found
+            own = motion.own_tangent(body, self.scheme, old, now, u[3:], t, dt)
+            own[3:, 3:] -= weight * surface.turned(body, now, body.points, force)
+            for at, points, pressing in self._pressing:
+                if at == index:
+                    own[3:, 3:] -= self._pressed_weight * surface.turned(body, now, points, pressing)
+            found.append(own[np.ix_(self.components, self.components)])
+        return np.array(found)
 
     def linearise(self) -> PETSc.Mat:
         """The tangent as a distributed matrix."""
-        own = (self.size, None)
-        matrix, values = PETSc.Mat().createAIJ((own, own), nnz=(self.unknowns, 0), comm=self.comm), self.tangent()
-        if self.size:
-            rows = np.arange(self.unknowns, dtype=PETSc.IntType)
-            matrix.setValues(rows, rows, values)
-        matrix.assemble()
+        own, tangent = (self.size, None), self.tangent().ordered()[np.arange(self.size)]
+        entries = tangent.indptr.astype(PETSc.IntType), tangent.indices.astype(PETSc.IntType), tangent.data
+        matrix = PETSc.Mat().createAIJ((own, own), csr=entries, comm=self.comm)
         self._noise = rounding_error(matrix, self.rounded())
         return matrix
 
@@ -295,22 +356,36 @@ class RigidBodies:
         right = -self.balance
         if self.contact is not None:
             right += self.contact.force
-        return self._add(np.linalg.solve(self._system(), right))
+        with supported():
+            if self.contact is None and not self.springs:
+                blocks = self._without_held(self._blocks())
+                return self._add(np.linalg.solve(blocks, right.reshape(*blocks.shape[:2], 1)).ravel())
+            return self._add(solver(self._system())(right))
 
-    def _system(self) -> Array:
+    def _system(self) -> Sparse:
         """The tangent with rows and columns of the identity for held components."""
-        matrix, held = self.tangent(), ~self._free
-        matrix[held], matrix[:, held] = 0.0, 0.0
-        matrix[held, held] = 1.0
-        return matrix
+        return self._with_others(block_diagonal(self._without_held(self._blocks())), self._free)
+
+    def _without_held(self, blocks: Array) -> Array:
+        """Blocks of bodies with rows and columns of the identity for held components."""
+        free = self._free.reshape(blocks.shape[:2])
+        kept = np.where(free[:, :, None] & free[:, None, :], blocks, 0.0)
+        return kept + np.where(free, 0.0, 1.0)[:, :, None] * np.eye(free.shape[1])
 
     def right_side(self) -> Array:
-        """Minus the balance, without the contact force."""
-        return -self.balance[: self.size]
+        """Minus the balance, without the contact forces at the end of the step."""
+        right = -self.balance
+        if self._pressing:
+            right = right - np.where(self._free, self._pressed_weight * self.pressed, 0.0)
+        return right[: self.size]
 
     def update(self, increment: Array) -> Array:
         """Add increments of the owned unknowns; returns their norm relative to that of the step, by body."""
-        return self._add(self.comm.bcast(increment.copy() if self.comm.rank == 0 else None, root=0))
+        return self._add(self._from_owner(increment.copy()))
+
+    def _from_owner(self, owned: Array) -> Array:
+        """Values of all unknowns from those of the process that owns them (collective)."""
+        return self.comm.bcast(owned if self.comm.rank == self._owner else None, root=self._owner)
 
     def _add(self, increment: Array) -> Array:
         added = np.zeros_like(self._u)
@@ -353,7 +428,8 @@ class RigidBodies:
         """Whether the balance of each body is rounding errors, where this step linearised last (collective)."""
         if self._noise is None:
             self.linearise()
-        noise = self.comm.bcast(self._noise if self.comm.rank == 0 else None, root=0)
+        assert self._noise is not None
+        noise = self._from_owner(self._noise)
         missed = self.balance if self.contact is None else self.balance - self.contact.force
         return (np.abs(missed) <= noise).reshape(len(self.bodies), -1).all(axis=1)
 
@@ -365,10 +441,12 @@ class RigidBodies:
 
     # ------------------------------------------------------------------------------------- rows of a larger system
 
-    def row_transformation(self) -> RowTransformation | None:
-        return None if self.contact is None else self.contact.transformation(self._system())
+    def row_transformations(self) -> list[RowTransformation]:
+        with supported():
+            change = None if self.contact is None else self.contact.transformation(self._system())
+        return [] if change is None else [replace(change, dofs=self.first + change.dofs)]
 
-    def recover(self, taken: TakenRows, du: Array) -> None:
+    def recover(self, taken: Sequence[TakenRows], du: Array) -> None:
         """Nothing to do: the next evaluation of the balance computes the contact forces."""
 
     def added_product(self) -> None:
@@ -383,7 +461,7 @@ class RigidBodies:
         changed = list(blocks)
         rows = np.flatnonzero(~self._free[: self.size]).astype(PETSc.IntType)
         for index, block in enumerate(changed):
-            block.zeroRows(rows, 1.0 if index == 0 else 0.0)
+            block.zeroRows(rows + PETSc.IntType(self.first), 1.0 if index == 0 else 0.0)
         b[rows] = x[rows]
         return changed
 
@@ -398,17 +476,24 @@ class RigidBodies:
         return self.contact is not None and bool(self.contact.active.any())
 
     def touching(self) -> NDArray[np.bool_] | None:
-        return None if self.contact is None else self.contact.active
+        return None if self.contact is None else self.contact.touching()
 
     def numbers(self) -> dict[str, float]:
-        return {} if self.contact is None else self.contact.numbers()
+        """With contact: vertices that touch, and the contact force on each body [N], averaged over the step."""
+        if self.contact is None:
+            return {}
+        w = self._pressed_weight
+        total = self.contact.force + w * self.pressed + (1.0 - w) * self.pressed_old
+        return self.contact.numbers(total.reshape(len(self.bodies), -1)[:, : self.dim])
 
     def save(self) -> State:
         parts = {body.name: now.arrays() for body, now in zip(self.bodies, self.now, strict=True)}
-        return {"bodies": parts, "on_surface": self.on_surface.copy(), "exchanged": self._exchanged}
+        loads = {"on_surface": self.on_surface.copy(), "pressed": self.pressed.copy()}
+        return {"bodies": parts, **loads, "exchanged": self._exchanged}
 
     def restore(self, state: State) -> None:
         self.now = [
             RigidInstant(**{k: a.copy() for k, a in state["bodies"][body.name].items()}) for body in self.bodies
         ]
         self.on_surface, self._exchanged = state["on_surface"].copy(), state["exchanged"]
+        self.pressed = state["pressed"].copy()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,29 @@ from solvers.api import Array
 
 @dataclass(frozen=True)
 class Inertia:
-    """Mass properties of a body at the start."""
+    """Mass properties of a body at the start, about its centre of mass or another point that does not move."""
 
     mass: float  #: [kg]
-    centre: Array  #: centre of mass [m], shape (dim,)
-    tensor: Array  #: moments of inertia about the centre [kg m^2], shape (3, 3); in 2D only the last entry is used
+    centre: Array  #: the centre of mass or the other point [m], shape (dim,)
+    tensor: Array  #: moments of inertia about it [kg m^2], shape (3, 3); in 2D only the last entry is used
+    offset: Array = field(default_factory=lambda: np.zeros(3))  #: from it to the centre of mass [m], shape (3,)
+    heavy: float | None = None  #: mass that gravity acts on [kg]; None: the same
+
+    @property
+    def gravitational_mass(self) -> float:
+        return self.mass if self.heavy is None else self.heavy
+
+
+def about(inertia: Inertia, point: Array) -> Inertia:
+    """Inertia about a point [m], shape (dim,), from that about the centre of mass: J + m (r . r 1 - r r^T)."""
+    r = np.pad(inertia.centre - point, (0, 3 - len(point)))
+    tensor = inertia.tensor + inertia.mass * (r @ r * np.eye(3) - np.outer(r, r))
+    return replace(inertia, centre=point, tensor=tensor, offset=r)
+
+
+def without_inertia(inertia: Inertia) -> Inertia:
+    """Of a body in statics: it has weight, but nothing resists its acceleration."""
+    return replace(inertia, mass=0.0, tensor=np.zeros((3, 3)), heavy=inertia.gravitational_mass)
 
 
 def inertia_of_surface(points: Array, facets: NDArray[np.int64], density: float) -> Inertia:

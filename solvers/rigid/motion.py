@@ -11,14 +11,16 @@ W: spin, both in the body), and its rate p, a step of length dt by u = (dc, thet
 For the centre this is Chung and Hulbert's method. Without moments, p = 0 and the angular momentum R J W is conserved
 exactly. With rho_inf = 1 the energy W . J W is conserved too, because W - W_n = J^-1 (R^T - R_n^T) R J W and theta is
 the axis of R R_n^T.
+A body with a pivot has the same equations about the pivot, at rest, with the inertia about it (`inertia.about`).
 Source: for rho_inf = 1 Simo, Wong, Int. J. Numer. Meth. Engng 31 (1991) 19-52.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solvers.api import Array
 from solvers.generalised_alpha import GeneralisedAlpha
@@ -62,15 +64,58 @@ def mass(body: RigidBody, R: Array) -> Array:
     return found
 
 
+def gyroscopic(body: RigidBody, now: RigidInstant) -> Array:
+    """Part of the rate of momentum at constant velocity and spin, w x J w in space [N, N m], shape (6,)."""
+    W = now.v[3:]
+    return np.concatenate([np.zeros(3), now.R @ np.cross(W, body.inertia.tensor @ W)])
+
+
 def kinetic_energy(body: RigidBody, now: RigidInstant) -> float:
     """Kinetic energy [J]."""
     return 0.5 * float(body.inertia.mass * now.v[:3] @ now.v[:3] + now.v[3:] @ body.inertia.tensor @ now.v[3:])
 
 
 def acceleration(body: RigidBody, now: RigidInstant) -> Array:
-    """Accelerations: a of the centre [m/s^2], A of the rotation in the body [rad/s^2], shape (6,)."""
+    """Accelerations: a of the centre [m/s^2], A of the rotation in the body [rad/s^2], shape (6,); zero in statics."""
+    if body.inertia.mass == 0.0:
+        return np.zeros(6)
     J, W = body.inertia.tensor, now.v[3:]
     return np.concatenate([now.p[:3] / body.inertia.mass, np.linalg.solve(J, now.R.T @ now.p[3:] - np.cross(W, J @ W))])
+
+
+def at_start(body: RigidBody, t: float, dt: float) -> RigidInstant:
+    """Velocities and load of a body at the first time t [s], still without rates of momentum; dt [s]: the first step.
+
+    The velocities of held components are those of their functions.
+    """
+    v, held, h = np.zeros(6), body.held_components, 1e-3 * dt
+    v[: len(body.initial_velocity)] = body.initial_velocity
+    v[3 : 3 + len(body.initial_spin)] = body.initial_spin
+    x = [body.held_at(t + k * h) for k in range(3)]
+    rest = RigidInstant.at_rest()
+    load = body.own_load(t, rest.shift, rest.R, v[:3], v[3:])
+    v[held] = (-3.0 * x[0] + 4.0 * x[1] - x[2]) / (2.0 * h)
+    return replace(rest, v=v, load=load)
+
+
+def with_rates(body: RigidBody, now: RigidInstant, t: float, dt: float) -> RigidInstant:
+    """The state at the first time t [s] with the rates of momentum by its load.
+
+    Those of held components belong to their accelerations and, by products of inertia, to the motion of the others.
+    """
+    held, h, p = body.held_components, 1e-3 * dt, now.load.copy()
+    if body.inertia.mass == 0.0:
+        return now
+    if len(held) == 0:
+        return replace(now, p=p)
+    M, spinning, a = mass(body, now.R), spin(now), np.zeros(6)
+    gyroscopic = np.concatenate([np.zeros(3), np.cross(spinning, M[3:, 3:] @ spinning)])
+    x = [body.held_at(t + k * h) for k in range(4)]
+    a[held] = (2.0 * x[0] - 5.0 * x[1] + 4.0 * x[2] - x[3]) / h**2
+    free = np.setdiff1d(np.arange(6), held)
+    a[free] = np.linalg.solve(M[np.ix_(free, free)], (now.load - gyroscopic - M @ a)[free])
+    p[held] = (M @ a + gyroscopic)[held]
+    return replace(now, p=p)
 
 
 def moved(body: RigidBody, scheme: GeneralisedAlpha, old: RigidInstant, u: Array, t: float, dt: float) -> RigidInstant:
@@ -89,6 +134,23 @@ def velocity_rate(scheme: GeneralisedAlpha, old: RigidInstant, now: RigidInstant
     rate = scheme.gamma / (scheme.beta * dt)
     by_w = rate * now.R @ old.R.T @ vector_rate(theta) - skew(spin(now))
     return np.block([[rate * np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), by_w]])
+
+
+def with_motion(now: RigidInstant, components: NDArray[np.int64], velocity: Array, rate: Array) -> RigidInstant:
+    """The instant with another velocity [m/s, rad/s] in space, and rate of momentum [N, N m], in these components."""
+    v, p = np.zeros(6), now.p.copy()
+    v[components], p[components] = velocity, rate
+    v[3:] = now.R.T @ v[3:]
+    return replace(now, v=v, p=p)
+
+
+def own_tangent(
+    body: RigidBody, scheme: GeneralisedAlpha, old: RigidInstant, now: RigidInstant, theta: Array, t: float, dt: float
+) -> Array:
+    """Derivative of (1 - alpha_m) p - (1 - alpha_f) f, f: own loads, by dc and a further rotation, shape (6, 6)."""
+    rate = velocity_rate(scheme, old, now, theta, dt)
+    loads = body.own_load_tangent(t, now.shift, now.R, now.v[:3], spin(now), rate)
+    return inertia_tangent(body, scheme, old, now, theta, dt) - (1.0 - scheme.alpha_f) * loads
 
 
 def inertia_tangent(

@@ -34,11 +34,12 @@ def of_body(bodies: RigidBodies, index: int, quantity: str) -> Probe:
     def probe() -> dict[str, float]:
         now = bodies.now[index]
         if quantity == "mass":
-            return {"": body.inertia.mass}
-        centre = np.pad(body.inertia.centre, (0, 3 - bodies.dim)) + now.shift
-        momentum = motion.momentum(body, now.R, now.v)
+            return {"": body.inertia.gravitational_mass}
+        to_mass, about = now.R @ body.inertia.offset, np.pad(body.inertia.centre, (0, 3 - bodies.dim)) + now.shift
+        centre, momentum = about + to_mass, motion.momentum(body, now.R, now.v)
+        momentum[:3] += body.inertia.mass * np.cross(motion.spin(now), to_mass)
         if quantity == "angular_momentum":
-            total = momentum[3:] + np.cross(centre, momentum[:3])
+            total = momentum[3:] + np.cross(about, momentum[:3])
             return _components(total) if bodies.dim == 3 else {"": float(total[2])}
         return _components((centre if quantity == "centre" else momentum)[: bodies.dim])
 

@@ -7,7 +7,7 @@ import numpy as np
 from solvers.api import Array
 
 #: Angle below which series replace quotients of small numbers; the neglected terms are about angle^4 / 1e4.
-SMALL = 1e-3
+SMALL_ANGLE = 1e-3
 
 
 def skew(a: Array) -> Array:
@@ -18,7 +18,7 @@ def skew(a: Array) -> Array:
 def rotation(theta: Array) -> Array:
     """exp [theta], the rotation by |theta| about theta, by Rodrigues' formula."""
     angle, K = float(np.linalg.norm(theta)), skew(theta)
-    if angle < SMALL:
+    if angle < SMALL_ANGLE:
         first, second = 1.0 - angle**2 / 6.0, 0.5 - angle**2 / 24.0
     else:
         first, second = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
@@ -32,7 +32,7 @@ def vector_rate(theta: Array) -> Array:
     Source: Cardona, Geradin, Int. J. Numer. Meth. Engng 26 (1988) 2403-2438.
     """
     angle, K = float(np.linalg.norm(theta)), skew(theta)
-    if angle < SMALL:
+    if angle < SMALL_ANGLE:
         factor = 1.0 / 12.0 + angle**2 / 720.0
     else:
         factor = (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2

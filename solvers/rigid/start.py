@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 
 from solvers.api import Array
-from solvers.generalised_alpha import GeneralisedAlpha
+from solvers.generalised_alpha import BACKWARD_EULER
 from solvers.rigid import motion
 from solvers.rigid.field import RigidBodies
-
-#: Backward Euler, written as generalised-alpha.
-BACKWARD_EULER = GeneralisedAlpha(alpha_m=0.0, alpha_f=0.0, beta=1.0, gamma=1.0)
 
 
 class RigidStart:
     """Implements `StartOfSolid`. One step is enough, because rigid bodies do not oscillate."""
 
     steps = 1
-    impulsive = True
+    took_impulse = False
 
     def __init__(self, field: RigidBodies):
         self.field, self._initial = field, list(field.now)
         self._apart: Collection[str] = ()
+
+    def begin(self) -> None:
+        """Nothing: no step took an impulse."""
 
     def leave_out(self, names: Collection[str]) -> None:
         self._apart = names
@@ -48,6 +48,9 @@ class RigidStart:
             largest = max(largest, float(np.linalg.norm(a) + np.linalg.norm(turning) * arm))
         return largest
 
+    def gained(self, t: float, dt: float) -> float:
+        return self.acceleration() * dt
+
     @contextmanager
     def step(self, t: float, dt: float) -> Iterator[None]:
         """Begin a start step from rest, so that a = (u - u_n) / dt^2; held components have their accelerations."""
@@ -65,6 +68,9 @@ class RigidStart:
         finally:
             field.scheme = own
 
+    def repeat(self) -> None:
+        """Not called: there is one step."""
+
     def end(self) -> None:
         """Restore positions and velocities; rates of momentum are those of the start step."""
         field = self.field
@@ -72,9 +78,9 @@ class RigidStart:
         field.now = [start if body.name in self._apart else replace(start, p=now.p) for body, start, now in parts]
         field.old = list(field.now)
 
-    def end_impulse(self, dt: float) -> None:
-        """Restore positions, and add the velocities that bodies have gained in a start step of length dt [s]."""
-        field = self.field
+    def take_impulse(self, step: Callable[[], float], jump: float) -> bool:
+        """True: the whole body has another velocity at once. Positions are restored."""
+        dt, field = step(), self.field
         parts = zip(field.bodies, self._initial, field.now, field.old, field.increments(), strict=True)
         changed = []
         for body, initial, now, old, u in parts:
@@ -85,3 +91,4 @@ class RigidStart:
             changed.append(replace(initial, v=v))
         field.now = changed
         field.old = list(field.now)
+        return True

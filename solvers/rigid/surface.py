@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.vertices import VertexJacobian
 from solvers.api import Array
 from solvers.rigid.body import RigidBody, in_space
 from solvers.rigid.motion import RigidInstant
-from solvers.vertices import VertexJacobian
 
 
 def positions(bodies: Sequence[RigidBody], instants: Sequence[RigidInstant]) -> list[Array]:
@@ -60,3 +60,9 @@ def resultants(bodies: Sequence[RigidBody], instants: Sequence[RigidInstant], fo
         f = in_space(given)
         found.append(np.concatenate([f.sum(axis=0), np.cross(body.arms(now.R, body.points), f).sum(axis=0)]))
     return np.array(found)
+
+
+def turned(body: RigidBody, now: RigidInstant, points: Array, force: Array) -> Array:
+    """Derivative of the moment of forces on points by a rotation, sum of r f^T - (f . r) 1, shape (3, 3)."""
+    found = body.arms(now.R, points).T @ in_space(force)
+    return np.asarray(found - np.trace(found) * np.eye(3))

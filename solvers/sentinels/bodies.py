@@ -7,22 +7,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from solvers.api import Array
-from solvers.tessellation import area_vectors, unit_normals
-from solvers.wall_thickness import wall_thickness
-
-Indices = NDArray[np.int64]
-
-#: Angle between facets from which their edge is one of the body, not of its approximation [rad].
-SHARP = np.pi / 3
+from solvers.api import Array, Indices
+from solvers.mesh.tessellation import SHARP, area_vectors, unit_normals
+from solvers.mesh.wall_thickness import wall_thickness
 
 #: Facets whose walls are measured for a median.
 SAMPLE = 50
 
 #: Distance, relative to the thickness, that Newton's tolerance and rounding leave between surfaces that touch.
-ROUNDING = 1e-6
+LEFT_BETWEEN = 1e-6
 
 
 @dataclass(frozen=True)

@@ -9,20 +9,21 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array, Finding, Helps, State
-from solvers.penetration import depths, inside
-from solvers.search import Search
-from solvers.sentinels.bodies import ROUNDING, Measures, MovingBody, arc_height
+from solvers.api import Array, FailureKind, Finding, State
+from solvers.mesh.penetration import depths, inside
+from solvers.mesh.search import Search
+from solvers.sentinels.bodies import LEFT_BETWEEN, Measures, MovingBody, arc_height
 
 #: Samples per edge of a facet at most: of a facet larger than so many thicknesses of the other body.
-MOST = 64
+MOST_SAMPLES = 64
 
 #: Share of the thickness of the thinner body, or the edge of a facet if that is less, from which depth on an overlap
 #: means nothing. A body that passes through a plate has points in its middle, one half of the thickness deep; states
 #: within a step are half a thickness apart, so that one of them has a point deeper than a quarter.
-SHARE = 0.25
+TOO_DEEP = 0.25
 
 Depth = tuple[float, tuple[float, ...], float]  #: depth [m], the point [m], depth from which on it means nothing [m]
+#: Nothing overlaps.
 NOT_AT_ALL: Depth = (0.0, (), 0.0)
 
 
@@ -128,8 +129,8 @@ class Overlaps:
         else:
             message += f"contact ({', '.join(meeting.pairs)}) does not hold them apart; take a smaller 'step' or a "
             message += "finer slave surface, and begin without overlap"
-        helps: Helps = "" if not worthless else "end" if meeting is None else "repeat"
-        return Finding("overlap", names, depth, message, helps, where)
+        kind = FailureKind.NOT_HELD if meeting is None else FailureKind.PASSAGE
+        return Finding("overlap", names, depth, message, kind if worthless else None, where)
 
     def _deepest(self, i: int, j: int, x: Sequence[Array]) -> Depth:
         """The deepest point of one body in the other, where their surfaces cross."""
@@ -193,7 +194,7 @@ class Overlaps:
             depth[deep[began & ~samples.paired[chosen[deep]]]] = 0.0
         k = int(depth.argmax())
         edge = min(self._measures[a].edge[facet[k]], self._measures[b].edge[near].min())
-        limit = min(float(edge), SHARE * min(self._measures[k].thickness for k in (a, b)))
+        limit = min(float(edge), TOO_DEEP * min(self._measures[k].thickness for k in (a, b)))
         if self._meeting(a, b) is not None:
             limit += float(tolerance[k])
         return float(depth[k]), tuple(points[k].tolist()), limit
@@ -211,7 +212,7 @@ class Overlaps:
         thickness = min(mine.thickness, other.thickness)
         meeting = self._meeting(a, b)
         if meeting is None:
-            return ROUNDING * thickness + mine.sagitta[facet] + other.sagitta[near[1]].max()
+            return LEFT_BETWEEN * thickness + mine.sagitta[facet] + other.sagitta[near[1]].max()
         slave, there = (a, near[0]) if meeting.slave == self._bodies[a].name else (b, near[1])
         chord = self._bodies[slave].pieces * float(measures[slave].edge[there].max())
         turn = sum(
@@ -219,7 +220,7 @@ class Overlaps:
             for one, some in ((mine, near[0]), (other, near[1]))
         )
         arc = float(arc_height(np.array(chord), np.array(turn)))
-        return np.full(len(facet), ROUNDING * thickness + min(arc, 0.5 * thickness))
+        return np.full(len(facet), LEFT_BETWEEN * thickness + min(arc, 0.5 * thickness))
 
     def _samples_of(self, a: int, b: int) -> Samples:
         """Points on facets of body a, not farther apart than body b is thick."""
@@ -243,7 +244,7 @@ class Overlaps:
         """Bodies that pass through each other between two states without overlap, on straight ways."""
         moved = [float(np.linalg.norm(now[k] - before[k], axis=1).max()) for k in (i, j)]
         thickness = min(self._measures[k].thickness for k in (i, j))
-        count = int(np.ceil(0.5 * sum(moved) / (SHARE * thickness)))
+        count = int(np.ceil(0.5 * sum(moved) / (TOO_DEEP * thickness)))
         if count < 2:
             return None
         if not len(self._searches[i, j].pairs(now[i], now[j], 0.0, before[i], before[j])):
@@ -262,7 +263,7 @@ class Overlaps:
             if depth > limit and self._deepest(i, j, before)[0] == 0.0:
                 names = self._names(i, j)
                 message = f"{names} pass through each other within the step {place_of(where)}; take a smaller 'step'"
-                return Finding("passage", names, sum(moved), message, "repeat", where)
+                return Finding("passage", names, sum(moved), message, FailureKind.PASSAGE, where)
         return None
 
     def _meeting(self, a: int, b: int) -> Meeting | None:
@@ -284,7 +285,7 @@ class Overlaps:
 
 def lattice(sizes: Array, corners: int) -> tuple[NDArray[np.int64], Array]:
     """(facet, weights of its corners) of points on facets with ceil(size) intervals on each edge."""
-    counts = np.clip(np.ceil(sizes), 1, MOST).astype(np.int64)
+    counts = np.clip(np.ceil(sizes), 1, MOST_SAMPLES).astype(np.int64)
     facets, weights = [], []
     for count in np.unique(counts).tolist():
         if corners == 2:

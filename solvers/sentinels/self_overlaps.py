@@ -11,16 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from solvers.api import Array, Finding, Helps, State
-from solvers.penetration import depths, windings
-from solvers.search import OPPOSED, Search
-from solvers.sentinels.bodies import ROUNDING, Measures, MovingBody, arc_height
-from solvers.sentinels.overlaps import SHARE, lattice, place_of
-from solvers.tessellation import unit_normals
-
-Indices = NDArray[np.int64]
+from solvers.api import Array, FailureKind, Finding, Indices, State
+from solvers.mesh.penetration import depths, windings
+from solvers.mesh.search import OPPOSED, Search
+from solvers.mesh.tessellation import unit_normals
+from solvers.sentinels.bodies import LEFT_BETWEEN, Measures, MovingBody, arc_height
+from solvers.sentinels.overlaps import TOO_DEEP, lattice, place_of
 
 #: Distance in thicknesses within which parts of a surface are looked for. If there are none, it is looked for them anew
 #: when a vertex has moved by half of it, but for a rigid motion.
@@ -104,7 +101,7 @@ def _in_states(one: FoldingBody, before: Array, now: Array, middle: Array, facet
     """The finding of the end of a step or of states within it; positions [m] are relative to their middle."""
     thickness = one.measures.thickness_at(facets)
     arcs = min(_tolerance(one, now, facets), 0.5 * thickness)
-    deep = arcs + min(float(one.measures.edge[facets].min()), SHARE * thickness)
+    deep = arcs + min(float(one.measures.edge[facets].min()), TOO_DEEP * thickness)
     name = one.body.name
     if (where := _enclosed_twice(one, now, facets, arcs, thickness)) is not None:
         worthless = _enclosed_twice(one, now, facets, deep, thickness) is not None
@@ -115,10 +112,10 @@ def _in_states(one: FoldingBody, before: Array, now: Array, middle: Array, facet
             message += f"contact ({names}) does not hold it apart; take a smaller 'step' or a finer surface"
         else:
             message += "no pair of contact names its surface, so nothing holds it apart; give it a pair 'self'"
-        helps: Helps = "" if not worthless else "repeat" if one.pairs else "end"
-        return Finding("overlap", name, depth, message, helps, tuple((where + middle).tolist()))
+        kind = FailureKind.PASSAGE if one.pairs else FailureKind.NOT_HELD
+        return Finding("overlap", name, depth, message, kind if worthless else None, tuple((where + middle).tolist()))
     way = float(np.linalg.norm(now - before, axis=1).max())
-    count = int(np.ceil(2.0 * way / (SHARE * thickness)))  # parts move by a quarter of the thickness to each other
+    count = int(np.ceil(2.0 * way / (TOO_DEEP * thickness)))  # parts move by a quarter of the thickness to each other
     for share in np.arange(1, count) / count:
         x = (1.0 - share) * before + share * now
         if (where := _enclosed_twice(one, x, facets, deep, thickness)) is None:
@@ -128,7 +125,7 @@ def _in_states(one: FoldingBody, before: Array, now: Array, middle: Array, facet
         message = (
             f"{name} passes through itself within the step {place_of((where + middle).tolist())}; take a smaller 'step'"
         )
-        return Finding("passage", name, way, message, "repeat", tuple((where + middle).tolist()))
+        return Finding("passage", name, way, message, FailureKind.PASSAGE, tuple((where + middle).tolist()))
     return None
 
 
@@ -158,7 +155,7 @@ def _tolerance(one: FoldingBody, x: Array, facets: Indices) -> float:
         if one.pairs:
             turn += 2.0 * float(measures.bends[1][facets].max())
         found = max(found, float(arc_height(np.array(chord), np.array(turn))))
-    return ROUNDING * one.measures.thickness + found
+    return LEFT_BETWEEN * one.measures.thickness + found
 
 
 def _enclosed_twice(one: FoldingBody, x: Array, facets: Indices, depth: float, apart: float) -> Array | None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.api import Array, Finding, State
-from solvers.sentinels.bodies import ROUNDING, Measures, MovingBody, arc_height
+from solvers.api import Array, FailureKind, Finding, State
+from solvers.sentinels.bodies import LEFT_BETWEEN, Measures, MovingBody, arc_height
 from solvers.sentinels.overlaps import place_of
 
 
@@ -40,8 +40,15 @@ class BoxWalls:
     vertices pass by the height of the arcs that facets replace, edges included.
     """
 
-    def __init__(self, bodies: Sequence[MovingBody], walls: Sequence[Wall], box: tuple[Array, Array]):
-        """box: lowest and highest corner [m]."""
+    def __init__(
+        self,
+        bodies: Sequence[MovingBody],
+        walls: Sequence[Wall],
+        box: tuple[Array, Array],
+        ending: Collection[str] = (),
+    ):
+        """box: lowest and highest corner [m]; ending: names of the bodies that end the run when they have left it."""
+        self._ending = frozenset(ending)
         self._bodies, self._walls, self._box = [body for body in bodies if body.free], list(walls), box
         self._allowed: list[list[bool]] = []  # by body and wall
         self._tolerance: list[Array] = []  # at the vertices of each body [m]
@@ -55,7 +62,7 @@ class BoxWalls:
         for body in self._bodies:
             x = body.positions(t)
             measures = Measures(body.facets, x[body.facets])
-            rounding = ROUNDING * measures.thickness
+            rounding = LEFT_BETWEEN * measures.thickness
             heights = arc_height(measures.edge, measures.bends[0] + measures.bends[1])
             self._tolerance.append(rounding + _at_vertices(heights, body.facets, len(x)))
             self._edge.append(_at_vertices(measures.edge, body.facets, len(x)))
@@ -74,8 +81,10 @@ class BoxWalls:
             through = [self._through(k, number, x) for number in range(len(self._walls))]
             found += [finding for finding in through if finding]
             if self._within[k] and not self._meets_box(x):
-                message = f"{body.name} has left the box of the fluid; what follows has no meaning for it"
-                found.append(Finding("outside", body.name, 1.0, message))
+                ends = body.name in self._ending
+                follows = "the run ends, by 'leaves: stop'" if ends else "what follows has no meaning for it"
+                message = f"{body.name} has left the box of the fluid; {follows}"
+                found.append(Finding("outside", body.name, 1.0, message, ends_run=ends))
         return found
 
     def _through(self, k: int, number: int, x: Array) -> Finding | None:
@@ -91,7 +100,7 @@ class BoxWalls:
             f"{place_of(where)}: nothing holds it there; put an obstacle along the face and give both a pair of contact"
         )
         worthless = depth[deepest] > self._edge[k][deepest]
-        return Finding("wall", name, float(depth[deepest]), message, "end" if worthless else "", where)
+        return Finding("wall", name, float(depth[deepest]), message, FailureKind.NOT_HELD if worthless else None, where)
 
     def save(self) -> State:
         return {}

@@ -8,7 +8,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from solvers import fem
-from solvers.petsc_blocks import BlockRows, block_rows, has_entries_of, write_entries
+from solvers.algebra.petsc_blocks import BlockRows, block_rows, has_entries_of, write_entries
 
 
 class BlockAssembly:

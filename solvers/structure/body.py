@@ -12,10 +12,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from solvers import fem
+from solvers.algebra.petsc_blocks import BlockRows, quick_to_multiply
 from solvers.api import Array
-from solvers.cell_types import CELL_TYPES
-from solvers.mesh import Mesh
-from solvers.petsc_blocks import BlockRows, quick_to_multiply
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.mesh import Mesh
 from solvers.structure import forms
 from solvers.structure.block_assembly import BlockAssembly
 from solvers.structure.element import Element
@@ -86,16 +86,7 @@ class Body:
         self._loads_at: float | None = None  #: time [s] of the loads
         self.pressures = [FollowerPressure(domain, self.space, pressure) for pressure in pressures]
         self._spring_matrix = Springs(self) if springs else None
-
-    @cached_property
-    def _stress(self):
-        """Compiled when it is first used, by a picture or file."""
-        return fem.compile_expression(forms.cauchy_stress(self.u, self.element), fem.reference_nodes(self.domain))
-
-    @cached_property
-    def _scalars(self):
-        """Space of nodal averages, created when it is first used: that takes longer than a step of a small body."""
-        return fem.scalar_space(self.domain)
+        self._averages: tuple[Any, Any] | None = None  #: space of nodal averages and expression of the stress
 
     @cached_property
     def heights(self) -> Array:
@@ -253,7 +244,11 @@ class Body:
 
     def stress(self) -> Array:
         """Nodal averages of the Cauchy stress [Pa] at owned nodes, 3x3 by rows, shape (owned, 9)."""
-        return fem.average_at_nodes(self.domain, self._scalars, self._stress, components=9)[: self.owned]
+        if self._averages is None:  # compiled for the first picture or file: a step of a small body takes less time
+            at = fem.reference_nodes(self.domain)
+            expression = fem.compile_expression(forms.cauchy_stress(self.u, self.element), at)
+            self._averages = fem.scalar_space(self.domain), expression
+        return fem.average_at_nodes(self.domain, *self._averages, components=9)[: self.owned]
 
     def internal_energy(self) -> float:
         """int W dX plus the energy of springs [J] (collective)."""

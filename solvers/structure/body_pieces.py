@@ -12,9 +12,9 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from solvers.algebra.connected import connected_parts
 from solvers.api import Array
-from solvers.connected import connected_parts
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 from solvers.structure.body import Body
 
 

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from solvers.algebra.blocks import Layout
+from solvers.algebra.rows import TakenRows, gather_at
 from solvers.api import Array
-from solvers.blocks import Layout
 from solvers.constraint import Constraint
-from solvers.rows import TakenRows, gather_at
+from solvers.structure.body_pieces import BodyPieces
 
 
 class ConstrainedDofs:
     """Moves values between the owned dofs of a structure and the nodes of its constraint, (N, dim) on all processes."""
 
-    def __init__(self, layout: Layout, constraint: Constraint):
+    def __init__(self, layout: Layout, constraint: Constraint, pieces: BodyPieces):
         self._layout, self._constraint = layout, constraint
+        #: piece of each node, 0 for rigid ones, shape (N,)
+        self.pieces = self.at_nodes(pieces.of_dofs.astype(float))[:, 0].astype(np.int64)
 
     def at_nodes(self, owned: Array) -> Array:
         """Values at the nodes, shape (N, dim), from those at owned dofs (collective)."""
@@ -25,7 +28,7 @@ class ConstrainedDofs:
         return self.at_owned(self._constraint.force()) if self._constraint.near else np.zeros(self._layout.size)
 
     def at_owned(self, at_nodes: Array) -> Array:
-        """Values at owned dofs from those at the nodes, shape (N, dim); zero elsewhere (collective)."""
+        """Values at owned dofs from those at the nodes, shape (N, dim); zero elsewhere."""
         found = np.zeros(self._layout.size)
         mine, numbers = self._layout.among_owned(self._constraint.dofs())
         found[numbers] = at_nodes[mine]

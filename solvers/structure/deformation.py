@@ -1,8 +1,10 @@
-"""Checks of deformations: unbounded displacements and inverted elements."""
+"""Checks of deformations: unbounded displacements, inverted elements, limit points of statics."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from statistics import median
 
 import numpy as np
 from mpi4py import MPI
@@ -12,6 +14,12 @@ from solvers.structure.body import Body
 
 #: Displacement, relative to the size of the largest body, above which the system was singular.
 FLOWN_OFF = 1e6
+
+#: Speed of the last step relative to the usual one from which displacements run away.
+RUNAWAY = 2.0
+
+#: Count of speeds that show what is usual.
+USUAL = 4
 
 
 def largest_extent(comm: MPI.Comm, bodies: Sequence[Body]) -> float:
@@ -34,3 +42,30 @@ def inverted(bodies: Sequence[Body]) -> tuple[str, tuple[float, ...]] | None:
     if volume_ratio > 0.0:
         return None
     return f"element of body '{name}' inverted (volume ratio {volume_ratio:.3g})", place
+
+
+class LimitPoint:
+    """Notes how fast a static structure moves with its load.
+
+    Towards a limit point of the load at t* displacements grow as sqrt(t* - t), so that their speed has no bound. A
+    static step that fails after such growth has most likely no equilibrium: a thin structure buckles or snaps.
+    """
+
+    def __init__(self) -> None:
+        self._speeds: list[float] = []
+        self._reached = math.nan
+
+    def accept(self, t: float, speed: float) -> None:
+        """Note an accepted step: its end t [s], and the norm of its displacement over its length."""
+        if speed > 0.0:
+            self._speeds.append(speed)
+        self._reached = t
+
+    def explain(self) -> str:
+        """What a step that fails now most likely means, to be added to the reason; empty if nothing points to it."""
+        if len(self._speeds) <= USUAL or self._speeds[-1] < RUNAWAY * median(self._speeds[:-1]):
+            return ""
+        return (
+            f"; most likely there is no equilibrium beyond t = {self._reached:.4g}: displacements grew ever faster "
+            "up to there, as of a structure that snaps or buckles; use dynamics"
+        )

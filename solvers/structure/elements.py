@@ -1,8 +1,7 @@
 """Elements: `Displacement` and `Mixed`, by which the energy of a body is integrated over cells.
 
-The displacement element integrates W(F). It locks for nearly incompressible materials: each quadrature point then
-requires det F = 1, which are more conditions than the nodes of a cell can fulfil. The mixed element has fewer
-conditions. In both, the nodal displacements are the only unknowns.
+The displacement element locks for nearly incompressible materials: each quadrature point then requires det F = 1. The
+mixed element has fewer conditions. In both, the nodal displacements are the only unknowns.
 """
 
 from __future__ import annotations
@@ -48,27 +47,16 @@ class Displacement:
 class Mixed:
     """Mixed element with discontinuous volume ratio theta and pressure p, eliminated cell by cell (Hu-Washizu).
 
-    The functional, stationary in u, theta and p, is
-
-        int D(F) + U(theta) + p (J - theta) dX,   D(F) = W(F) - U(J).
-
-    U(J) is the energy of a pure change of volume. J is det F, or 1 + the trace of the strain in laws of small strain,
-    such that D does not depend on the bulk modulus.
-
-    theta, p and their test functions q are constant in first-order cells (mean dilatation, B-bar for small strain) and
-    linear in second-order cells (Q2/P1). theta and p follow from u,
+    theta, p and their test functions q are constant in first-order cells and linear in second-order ones. With J and
+    W(F) = D(F) + U(J) as in docs/theory_structure.md, Elements,
 
         int theta q dX = int J q dX,   int p q dX = int U'(theta) q dX,
 
-    and the tangent is the second derivative of int D(F) + p J dX at fixed p and, from the derivative of p, one product
-    per cell:
+    and the tangent is the second derivative of int D(F) + p J dX at fixed p and one product per cell:
 
         B^T M^-1 C M^-1 B,   q^T B du = int q dJ/du . du dX,   M = int q r dX,   C = int U''(theta) q r dX.
 
-    Newton's method linearises the three fields: p in the tangent is that of the last iterate plus its linear change.
-    With p = U'(theta) instead, an iterate could rotate a cell by no more than about sqrt(mu/lambda): straight paths of
-    the nodes change the volume by a term of second order, but its pressure is not small.
-
+    p in the tangent is that of the last iterate plus its linear change.
     Source: Simo, Taylor & Pister, Computer Methods in Applied Mechanics and Engineering 51 (1985) 177-208; Bonet &
     Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (2008), section 8.6.5 (mean dilatation).
     """

@@ -78,6 +78,10 @@ class EnergySentinel:
     def start(self, t: float) -> None:
         """The balance keeps what it needs."""
 
+    def allow_loss(self) -> None:
+        """Contact that has come in loses energy where steps are long."""
+        self._dissipates = True
+
     def look(self, t: float, dt: float) -> Sequence[Finding]:
         """A finding if the balance does not hold."""
         energy = self._energy

@@ -12,26 +12,23 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from solvers import linear
-from solvers.api import Array, State, StepFailed, StepInfo
-from solvers.blocks import Layout
+from solvers.algebra import linear
+from solvers.algebra.blocks import Layout
+from solvers.algebra.largest import position_of_largest
+from solvers.algebra.rounding import rounding_error
+from solvers.algebra.rows import RowTransformation, TakenRows, gather, transform_rows
+from solvers.api import Array, FailureKind, State, Step, StepFailed, StepInfo
 from solvers.constraint import Constraint
-from solvers.largest import position_of_largest
 from solvers.newton import converge
-from solvers.rounding import rounding_error
-from solvers.rows import RowTransformation, TakenRows, gather, transform_rows
 from solvers.solver_settings import SolverSettings
-from solvers.step import Step
 from solvers.structure.body import Body
 from solvers.structure.body_pieces import BodyPieces
 from solvers.structure.constrained_dofs import ConstrainedDofs
-from solvers.structure.deformation import flown_off, inverted, largest_extent
+from solvers.structure.deformation import LimitPoint, flown_off, inverted, largest_extent
 from solvers.structure.energy import EnergyBalance, EnergySentinel
 from solvers.structure.held import Held
 from solvers.structure.inertia import ElasticInertia
 from solvers.structure.instant import Instant
-from solvers.structure.limit_point import LimitPoint
-from solvers.structure.rayleigh import RayleighDamping
 from solvers.structure.rigid_modes import attach_rigid_modes
 from solvers.structure.saved import restore_state, saved_state
 from solvers.structure.solid_solver import SolidSolver
@@ -64,7 +61,7 @@ class Structure:
         self.dim = bodies[0].dim
         self.layout = Layout(comm, [body.size for body in bodies])
         self.pieces = BodyPieces(comm, bodies)
-        self._constrained = None if contact is None else ConstrainedDofs(self.layout, contact)
+        self._constrained = None if contact is None else ConstrainedDofs(self.layout, contact, self.pieces)
         self.held = Held(self.layout, [prescribe(body) for body in bodies], self.dim)
         self.now, self.old = (Instant.zeros(self.layout.size) for _ in range(2))
         self.inertia = ElasticInertia(comm, bodies, self.pieces, lambda: self.time.massless(self))
@@ -86,69 +83,79 @@ class Structure:
         self._imposed: PETSc.Mat | None = None  #: tangent of the last iterate with its supports; None in contact
         self._assembled_tangent = Tangent(bodies)
         self._b, self._x = self.layout.vector(), self.layout.vector()
+        self._extent = largest_extent(comm, bodies)  #: [m]
+        self._first = self.now.u, 0.0  #: displacement [m] and time [s] at the start of the run
+        self.damping = time.create_damping(self)  #: of all bodies; None without damping
         self.solver = SolidSolver(self.comm, self.dim, self.dofs(), settings, contact=contact is not None)
 
-    @cached_property
-    def _symmetric(self) -> bool:
-        """Whether tangents away from contact are symmetric."""
+    def has_symmetric_tangent(self) -> bool:
+        """Whether tangents away from contact are symmetric (collective)."""
         # follower pressures have an unsymmetric boundary term, and the velocity of massless nodes has a rule of its own
-        damped = self.damping is not None and (self.inertia.moves_mass or not self.damping.symmetric)
+        damped = self.damping is not None and (self.inertia.moves_mass() or not self.damping.symmetric)
         return not (damped or any(body.pressures for body in self.bodies))
 
-    @property
-    def linear_solver(self) -> PETSc.KSP:
-        """The present linear solver away from contact."""
-        return self.solver.current(symmetric=self._symmetric)
-
-    @property
-    def constrained_solver(self) -> PETSc.KSP:
-        """The present linear solver in contact."""
-        return self.solver.current(symmetric=False)
+    def create_solver(self, *, contact: bool = False) -> PETSc.KSP:
+        """The present linear solver, away from contact or in contact; created once (collective)."""
+        return self.solver.current(symmetric=not contact and self.has_symmetric_tangent())
 
     def dofs(self) -> int:
         """Unknowns of all bodies on all processes, prescribed ones included."""
         return self.comm.allreduce(self.layout.size)
 
-    @cached_property
-    def _extent(self) -> float:
-        return largest_extent(self.comm, self.bodies)
-
     def forget_mass(self) -> None:
         """Find the massless nodes anew, and all that follows from them."""
         self.inertia.forget()
-        vars(self).pop("_symmetric", None)
         self._assembled_tangent.forget()
+
+    def constrain(self, constraint: Constraint | None, *, exchanges_mass: bool) -> None:
+        """Replace the constraint between steps; its state is the caller's (collective)."""
+        self.constraint, self.exchanges_mass = constraint, exchanges_mass
+        self._constrained = None if constraint is None else ConstrainedDofs(self.layout, constraint, self.pieces)
+        self.forget_mass()
+        if constraint is not None:
+            self.energy_sentinel.allow_loss()
+
+    def start_constraint(self) -> None:
+        """Start the constraint from the first state of the run, whatever the present one is (collective)."""
+        assert self.constraint is not None
+        u, t = self._first
+        self._place_bodies(u)
+        stiffness = self.at_constraint(self._assembled_tangent.diagonal(t))
+        self._place_bodies(self.now.u)
+        self.constraint.start(self.at_constraint(u), stiffness, t)
+
+    def _place_bodies(self, displacement: Array) -> None:
+        for body, u in zip(self.bodies, self.split(displacement), strict=True):
+            body.set_displacement(u)
 
     def at_constraint(self, owned: Array) -> Array:
         """Values at the nodes of the constraint, shape (N, dim) (collective)."""
         assert self._constrained is not None
         return self._constrained.at_nodes(owned)
 
-    @cached_property
-    def damping(self) -> RayleighDamping | None:
-        """Damping of all bodies, None without damping."""
-        return self.time.create_damping(self)
-
     # ------------------------------------------------------------------------------------------------- steps
 
     def initialise(self, t: float, dt: float) -> None:
         """Set initial displacement and velocity, and the acceleration by the loads at t [s]; dt [s]: the first step."""
-        for body, u, v in zip(self.bodies, self.split(self.now.u), self.split(self.now.v), strict=True):
-            for target, value in ((u, body.initial_displacement), (v, body.initial_velocity)):
-                if value is not None:
-                    target[:] = body.nodal(value, t)[: body.owned].ravel()
-        self.current = Step(t, dt)
+        self.set_first_motion(t)
+        self._first, self.current = (self.now.u.copy(), t), Step(t, dt)
         if self.constraint is not None and self.exchanges_mass:
             self.constraint.present[:] = False
             u, v = self.at_constraint(self.now.u), self.at_constraint(self.now.v)
             self.constraint.present = self.constraint.find_present(u, v, t, dt)
             self.forget_mass()
         self._assemble_bodies()
-        if self.constraint is not None and self._constrained is not None:
-            at_nodes, stiffness = self._constrained.at_nodes, self._assembled_tangent.diagonal(t)
-            self.constraint.start(at_nodes(self.now.u), at_nodes(stiffness), t)
+        if self.constraint is not None:
+            self.start_constraint()
         self.time.start(self, t, dt)
         self.energy.start(*self._energies())
+
+    def set_first_motion(self, t: float) -> None:
+        """Set initial displacement [m] and velocity [m/s] at the first time t [s]."""
+        for body, u, v in zip(self.bodies, self.split(self.now.u), self.split(self.now.v), strict=True):
+            for target, value in ((u, body.initial_displacement), (v, body.initial_velocity)):
+                if value is not None:
+                    target[:] = body.nodal(value, t)[: body.owned].ravel()
 
     def _energies(self) -> tuple[float, float, float]:
         """Kinetic energy, internal energy, and energy that friction has dissipated [J]."""
@@ -220,19 +227,23 @@ class Structure:
             info = converge(self, self.settings.newton)
         except StepFailed as failure:
             self.check_deformation(failure.iteration, failure.history)
-            raise failure.with_reason(failure.reason + self._limit_point.explain()) from None
+            if not (beyond := self._limit_point.explain()):
+                raise
+            kind = None if failure.kind is FailureKind.NOT_FINITE else FailureKind.LIMIT_POINT
+            raise failure.with_reason(failure.reason + beyond, kind) from None
         self.check_deformation(info.iterations, info.residuals)
         return info if self.constraint is None else replace(info, numbers=self.constraint.numbers())
 
     def check_deformation(self, iteration: int, history: tuple[float, ...]) -> None:
         """Raise StepFailed if displacements are unbounded, as of bodies without supports, or an element is inverted."""
-        reason, where = flown_off(self.comm, self.now.u, self._extent), None
+        kind, where = FailureKind.UNSUPPORTED, None
+        reason = flown_off(self.comm, self.now.u, self._extent)
         if reason is not None:
             where = self.worst()
         elif found := inverted(self.bodies):
-            reason, where = found
+            kind, (reason, where) = FailureKind.INVERTED, found
         if reason is not None:
-            raise StepFailed(self.name, reason, iteration=iteration, where=where, history=history)
+            raise StepFailed(self.name, kind, reason, iteration=iteration, where=where, history=history)
 
     def end_step(self) -> None:
         """Accept the step."""
@@ -286,6 +297,9 @@ class Structure:
             self.constraint.evaluate(self._constrained.at_nodes(self.now.u), self.current.t)
             self.now.constraint[:] = self._constrained.force()
 
+    def follow(self) -> None:
+        """Nothing depends on the iterate before its residual."""
+
     def residual(self) -> Array:
         """Norm [N] of the balance at the free dofs and of the residual of the constraint, by piece."""
         with self.timer("assembly"):
@@ -298,16 +312,10 @@ class Structure:
             self.now.damping = self.damping.force(self.now.v)
         self.residual_force = self.time.balance(self)
         self._unbalanced, missed = self.held.free_part(self.residual_force), None
-        if self.constraint is not None and self.constraint.near:
+        if self.constraint is not None and self._constrained is not None and self.constraint.near:
             at_nodes = self.constraint.violation(self.time.force_weight)
-            missed = np.bincount(self._piece_at_constraint, at_nodes**2, self.pieces.count).astype(float)
+            missed = np.bincount(self._constrained.pieces, at_nodes**2, self.pieces.count).astype(float)
         return self.pieces.norms([self._unbalanced], missed)[0]
-
-    @cached_property
-    def _piece_at_constraint(self) -> NDArray[np.int64]:
-        """Piece of each node of the constraint, 0 for rigid ones (collective)."""
-        assert self._constrained is not None
-        return self._constrained.at_nodes(self.pieces.of_dofs.astype(float))[:, 0].astype(np.int64)
 
     def forces(self) -> Array:
         """Norm [N] of the largest force on each piece: internal, external, of the constraint.
@@ -350,21 +358,21 @@ class Structure:
                     matrix, taken = transform_rows(matrix, self._b, change)
             matrix = self.held.impose(matrix, self._x, self._b)
         self._imposed = matrix if change is None else None
-        symmetric, enough = (self._symmetric, 0.0) if change is None else (False, reduction)
+        symmetric, enough = (self.has_symmetric_tangent(), 0.0) if change is None else (False, reduction)
         try:
             with self.timer("solve"):
                 self.solver.solve(
                     matrix, self._b, self._x, self._attach_modes, symmetric=symmetric, reduction=enough, added=free
                 )
         except linear.LinearSolveFailed as failure:
-            raise StepFailed(self.name, str(failure), where=self.worst()) from failure
+            raise StepFailed(self.name, failure.kind, str(failure), where=self.worst()) from failure
         if taken is not None:
             self.recover(taken, gather(self.comm, self._x.array))
         return self.update(self._x.array)
 
     def added_product(self) -> Callable[[Array], Array] | None:
         """The part of the tangent that `linearise` lacks, as a product with owned dofs: of the inertia `rigid`."""
-        rigid, frame, factor = self.inertia.rigid, self.inertia.frame, self.time.rigid_factor(self.current.dt)
+        rigid, frame, factor = self.inertia.find_rigid(), self.inertia.frame, self.time.rigid_factor(self.current.dt)
         if rigid is None or frame is None or not factor:
             return None
         product = rigid.product(frame)
@@ -462,7 +470,7 @@ class Structure:
         of_force, of_conditions = self.constraint.rounding(weight)
         found = self.pieces.below(self._unbalanced, self.rounding + several * self._constrained.at_owned(of_force))
         missed = self.constraint.violation(weight) > several * of_conditions
-        return found & (np.bincount(self._piece_at_constraint[missed], minlength=self.pieces.count) == 0)
+        return found & (np.bincount(self._constrained.pieces[missed], minlength=self.pieces.count) == 0)
 
     def worst(self) -> tuple[float, ...] | None:
         """Reference position [m] of the largest residual relative to the forces on its piece (collective)."""

@@ -6,33 +6,33 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from solvers.algebra.blocks import times
 from solvers.api import Array
-from solvers.blocks import times
-from solvers.structure.instant import Moving
+from solvers.structure.instant import MovingStructure
 from solvers.structure.time_scheme import Statics
 
 
 class SmoothAcceleration(Statics):
     """M (u - u_n) / dt^2 + C v + f_int(u) = f_ext(t), with the velocity v before the step."""
 
-    def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
+    def motion(self, structure: MovingStructure, dt: float) -> tuple[Array, Array]:
         a = (structure.now.u - structure.old.u) / dt**2
-        a[structure.inertia.massless] = 0.0
+        a[structure.inertia.find_massless()] = 0.0
         return structure.now.v, a
 
-    def rigid_force(self, structure: Moving, dt: float) -> Array:
-        now, rigid, frame = structure.now, structure.inertia.rigid, structure.inertia.frame
+    def rigid_force(self, structure: MovingStructure, dt: float) -> Array:
+        now, rigid, frame = structure.now, structure.inertia.find_rigid(), structure.inertia.frame
         return now.rigid if rigid is None or frame is None else rigid.force_by_acceleration(frame, now.v, now.a)
 
     def rigid_factor(self, dt: float) -> float:
         return 1.0 / dt**2
 
-    def balance(self, structure: Moving) -> Array:
+    def balance(self, structure: MovingStructure) -> Array:
         now = structure.now
-        return self.reaction(structure) + times(structure.inertia.mass, now.a) + now.rigid + now.damping
+        return self.reaction(structure) + times(structure.inertia.assemble_mass(), now.a) + now.rigid + now.damping
 
-    def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat:
-        matrix = structure.inertia.mass.copy()
+    def dynamic_stiffness(self, structure: MovingStructure, dt: float) -> PETSc.Mat:
+        matrix = structure.inertia.assemble_mass().copy()
         matrix.scale(1.0 / dt**2)
         return matrix
 
@@ -48,14 +48,14 @@ class FirstState(Statics):
         """moving: owned dofs without mass; damped: whether the structure has damping."""
         self._moving, self._damped = moving, damped
 
-    def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
+    def motion(self, structure: MovingStructure, dt: float) -> tuple[Array, Array]:
         v = structure.now.v.copy()
         if self._damped:
             v[self._moving] = (structure.now.u - structure.old.u)[self._moving] / dt
         return v, structure.now.a
 
-    def balance(self, structure: Moving) -> Array:
+    def balance(self, structure: MovingStructure) -> Array:
         return self.reaction(structure) + structure.now.damping
 
-    def damping_slope(self, structure: Moving, dt: float) -> Array | None:
+    def damping_slope(self, structure: MovingStructure, dt: float) -> Array | None:
         return np.full(structure.layout.size, 1.0 / dt)

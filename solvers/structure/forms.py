@@ -1,13 +1,4 @@
-"""Weak forms of a body in its reference configuration.
-
-Find u(t) such that for all v, with W the stored energy, F = I + grad u, J = det F and N the outward normal,
-
-    int rho u_tt.v dX + int dW/dF : grad v dX = int (b + rho g).v dX + int_G t.v dA - int_G p J F^-T N . v dA
-
-The right-hand side is in solvers.structure.loads.
-
-Source: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (2008), sections 4.2 and 8.5.
-"""
+"""Weak forms of a body in its reference configuration (docs/theory_structure.md); its loads are in `loads`."""
 
 from __future__ import annotations
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from solvers.algebra.blocks import Layout
 from solvers.api import Array
-from solvers.blocks import Layout
 from solvers.structure.supports import Prescribed
 
 
@@ -33,6 +32,7 @@ class Held:
         self._projections = np.concatenate([s.oblique.projections for s in supports])
         self.oblique = layout.comm.allreduce(len(self._nodes)) > 0  #: on any process
         self._stopped_at: Array | None = None
+        self._free: PETSc.Mat | None = None  #: see `_assemble_free`
 
     def stopped(self, dofs: NDArray[np.int64], u: Array) -> Held:
         """A copy that prescribes these owned dofs too, with the displacement u [m] at all prescribed dofs."""
@@ -79,7 +79,7 @@ class Held:
     def impose(self, matrix: PETSc.Mat, x: PETSc.Vec, b: PETSc.Vec) -> PETSc.Mat:
         """Impose the held part of x on a symmetric system; b changes in place, and the matrix is overwritten."""
         if self.oblique:
-            free, scale = self._free, _mean_diagonal(matrix)
+            free, scale = self._assemble_free(), _mean_diagonal(matrix)
             missing = x.duplicate()
             missing.array[:] = self._along(x.array)
             b.axpy(-1.0, matrix * missing)
@@ -90,13 +90,19 @@ class Held:
         return matrix
 
     def impose_rows(self, blocks: Sequence[PETSc.Mat], x: Array, b: Array) -> list[PETSc.Mat]:
-        """Impose the held part of x on rows only. blocks: a row of blocks, its own first; x, b: at owned dofs."""
+        """Impose the held part of x on rows only. blocks: a row of blocks, its own first; x, b: at owned dofs.
+
+        On each process, further rows may come behind the owned dofs.
+        """
         changed = list(blocks)
         if self.oblique:
             scale = _mean_diagonal(blocks[0])
             b[:] = b - self._along(b) + scale * self._along(x)
-            changed = [self._free.matMult(block) for block in blocks]
-            held = self._identity_minus(self._free)
+            free = self._assemble_free()
+            if blocks[0].getSize()[0] > free.getSize()[0]:
+                free = self._assemble_free_before(blocks[0].getLocalSize()[0] - self._layout.size)
+            changed = [free.matMult(block) for block in blocks]
+            held = self._identity_minus(free)
             changed[0].axpy(scale, held, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         for index, block in enumerate(changed):
             block.zeroRows(self._rows, 1.0 if index == 0 else 0.0)
@@ -114,11 +120,17 @@ class Held:
             part[self._nodes] = np.einsum("kij,kj->ki", self._projections, array[self._nodes])
         return part
 
-    @cached_property
-    def _free(self) -> PETSc.Mat:
-        """1 - P of the oblique directions, with explicit ones on the diagonal elsewhere."""
-        matrix = PETSc.Mat().createAIJ([(self._layout.size, None)] * 2, nnz=(self._dim, 0), comm=self._layout.comm)
-        others = np.ones(self._layout.size, dtype=bool)
+    def _assemble_free(self) -> PETSc.Mat:
+        """1 - P of the oblique directions, with explicit ones on the diagonal elsewhere; once (collective)."""
+        if self._free is None:
+            self._free = self._assemble_free_before(0)
+        return self._free
+
+    def _assemble_free_before(self, more: int) -> PETSc.Mat:
+        """The same, with `more` further rows of this process behind its dofs, on the last one alone (collective)."""
+        size = self._layout.size + more
+        matrix = PETSc.Mat().createAIJ([(size, None)] * 2, nnz=(self._dim, 0), comm=self._layout.comm)
+        others = np.ones(size, dtype=bool)
         others[self._nodes] = False
         for dof in (self._layout.start + np.flatnonzero(others)).tolist():
             matrix.setValue(dof, dof, 1.0)

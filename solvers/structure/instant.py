@@ -9,10 +9,9 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from solvers.api import Array
-from solvers.blocks import Layout
+from solvers.algebra.blocks import Layout
+from solvers.api import Array, Step
 from solvers.constraint import Constraint
-from solvers.step import Step
 from solvers.structure.body import Body
 from solvers.structure.body_pieces import BodyPieces
 from solvers.structure.held import Held
@@ -64,7 +63,7 @@ class DampingForce(Protocol):
         ...
 
 
-class Moving(Protocol):
+class MovingStructure(Protocol):
     """A structure with its state at both ends of a step."""
 
     comm: MPI.Comm

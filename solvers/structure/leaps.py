@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solvers.api import Array, Finding, State
-from solvers.blocks import times
+from solvers.algebra.blocks import times
+from solvers.api import Array, FailureKind, Finding, State
 from solvers.structure.field import Structure
 from solvers.structure.time_scheme import Statics
 
@@ -37,7 +37,7 @@ class Leaps:
         ones = np.ones(structure.layout.size)
         self._counts = self._sums(ones)[:, 0]
         if not isinstance(structure.time, Statics):
-            self._masses = self._sums(times(structure.inertia.mass, ones))[:, 0]
+            self._masses = self._sums(times(structure.inertia.assemble_mass(), ones))[:, 0]
 
     def _sums(self, values: Array) -> Array:
         """Sums of values at owned dofs over the nodes of each body, shape (bodies, dim) (collective)."""
@@ -68,7 +68,7 @@ class Leaps:
                 float(way),
                 f"{body.name} moved by {way:.3g} in one step, {way / size:.3g} times its size: it may have passed "
                 "through what should hold it, or nothing holds it; take a smaller 'step', or support it",
-                "repeat",
+                FailureKind.PASSAGE,
             )
             for body, way, size, allowed in zip(structure.bodies, ways, self._sizes, asked, strict=True)
             if way > size + allowed

@@ -2,9 +2,8 @@
 
     f_ext . v = int (b + rho g).v dX + int_G t.v dA - int_G p n.v da
 
-Gravity g, body force b and traction t are dead loads, which refer to the reference configuration. The pressure p is a
-follower load: n da = J F^-T N dA is the cross product of the tangents of the deformed facet, in 2D the tangent rotated
-by 90 degrees. Source: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis (2008), section 8.5.
+The pressure p is a follower load: n da = J F^-T N dA is the cross product of the tangents of the deformed facet, in 2D
+the tangent rotated by 90 degrees.
 """
 
 from __future__ import annotations

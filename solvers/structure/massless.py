@@ -1,12 +1,8 @@
-"""Massless contact surfaces: their mass is given to the rest of the body.
+"""Massless contact surfaces: their mass is given to the rest of the body, scaled uniformly.
 
-A node with mass stops abruptly when it hits an obstacle. It loses its kinetic energy, and the contact force oscillates
-from step to step, with an amplitude that increases as the step decreases. A surface without mass is in static
-equilibrium with the body behind it: contact pressures are continuous in time, and impacts conserve energy.
+A node with mass that hits an obstacle loses its kinetic energy, and the contact force oscillates from step to step
+(docs/theory_contact.md, Massless contact surfaces). `rigid_inertia.py` adds what the inertia of rigid motions lacks.
 Source: Khenous, Laborde & Renard, Eur. J. Mech. A/Solids 27 (2008).
-
-The density of the rest is scaled uniformly. A density that varied in space would reflect the waves of an impact; what
-is missing in the inertia of rigid motions is added by `rigid_inertia.py`.
 """
 
 from __future__ import annotations
@@ -18,14 +14,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.structure.instant import Moving
+from solvers.structure.instant import MovingStructure
 
 #: Extent of nodes over that of their piece below which it is a rounding error (1e-30): they are one point or, in 3D, on
 #: a line. That of the nodes inside of a piece is above 1e-4 with a hundred cells across.
 NO_EXTENT = 1e-12
 
 
-def massless_dofs(structure: Moving) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def massless_dofs(structure: MovingStructure) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Masks of owned dofs: massless ones, and those of pieces that touch with nodes that have mass (collective).
 
     Nodes of all contact surfaces are massless. The other nodes of a piece must determine its rotation: in 2D there are

@@ -12,7 +12,7 @@ from solvers import fem
 from solvers.api import Array
 
 
-class Meshed(Protocol):
+class MeshedBody(Protocol):
     """A body with nodes and named surfaces."""
 
     name: str

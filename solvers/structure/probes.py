@@ -5,22 +5,21 @@ A probe is a function without arguments that every process calls. It returns val
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import ufl
 from mpi4py import MPI
 
 from solvers import fem
+from solvers.algebra.blocks import times
 from solvers.api import Array
-from solvers.blocks import times
 from solvers.structure import forms
 from solvers.structure.body import Body
 from solvers.structure.field import Structure
 
 Probe = Callable[[], dict[str, float]]
-
-AXES = ("x", "y", "z")
 
 
 class PointOutside(ValueError):
@@ -96,17 +95,12 @@ def of_bodies(structure: Structure, bodies: Sequence[Body], quantity: str) -> Pr
     energy [J] of the whole structure: kinetic, internal, work (of loads and supports), total; mass [kg]; volume [m^3]
     of the deformed bodies; centre of mass [m]; momentum [kg m/s]; angular_momentum [kg m^2/s] about the origin.
     """
-    return {
-        "energy": lambda: _energy(structure),
-        "mass": lambda: {"": _mass(structure, bodies)},
-        "centre": lambda: _centre(structure, bodies),
-        "momentum": lambda: _components(_sums(structure, bodies, _momenta(structure))),
-        "angular_momentum": lambda: _angular_momentum(structure, bodies),
-        "volume": _volume(structure, bodies) if quantity == "volume" else dict,
-    }[quantity]
+    if quantity == "volume":
+        return _volume(structure, bodies)
+    return partial(OF_BODIES[quantity], structure, bodies)
 
 
-def _energy(structure: Structure) -> dict[str, float]:
+def _energy(structure: Structure, bodies: Sequence[Body]) -> dict[str, float]:
     energy = structure.energy
     return {
         "kinetic": energy.kinetic,
@@ -124,7 +118,7 @@ def _sums(structure: Structure, bodies: Sequence[Body], array: Array) -> Array:
 
 
 def _mass(structure: Structure, bodies: Sequence[Body]) -> float:
-    return float(_sums(structure, bodies, times(structure.inertia.mass, np.ones_like(structure.now.u)))[0])
+    return float(_sums(structure, bodies, times(structure.inertia.assemble_mass(), np.ones_like(structure.now.u)))[0])
 
 
 def _momenta(structure: Structure) -> Array:
@@ -139,7 +133,7 @@ def _positions(structure: Structure) -> Array:
 
 def _centre(structure: Structure, bodies: Sequence[Body]) -> dict[str, float]:
     inertia = structure.inertia
-    moments, rigid, frame = times(inertia.mass, _positions(structure)), inertia.rigid, inertia.frame
+    moments, rigid, frame = times(inertia.assemble_mass(), _positions(structure)), inertia.find_rigid(), inertia.frame
     if rigid is not None and frame is not None:
         moments = moments + rigid.on_nodes(frame, frame.first, np.zeros_like(frame.first))
     return _components(_sums(structure, bodies, moments) / _mass(structure, bodies))
@@ -167,4 +161,14 @@ def _volume(structure: Structure, bodies: Sequence[Body]) -> Probe:
 
 
 def _components(values: Sequence[float] | Array) -> dict[str, float]:
-    return {axis: float(value) for axis, value in zip(AXES, values, strict=False)}
+    return {axis: float(value) for axis, value in zip("xyz", values, strict=False)}
+
+
+#: Quantity of bodies -> its values by component at the end of a step (collective).
+OF_BODIES: Mapping[str, Callable[[Structure, Sequence[Body]], dict[str, float]]] = {
+    "energy": _energy,
+    "mass": lambda structure, bodies: {"": _mass(structure, bodies)},
+    "centre": _centre,
+    "momentum": lambda structure, bodies: _components(_sums(structure, bodies, _momenta(structure))),
+    "angular_momentum": _angular_momentum,
+}

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from petsc4py import PETSc
 
+from solvers.algebra.blocks import block_diagonal
 from solvers.api import Array
-from solvers.blocks import block_diagonal
-from solvers.structure.instant import Moving
+from solvers.structure.instant import MovingStructure
 from solvers.structure.viscosity import Viscosity
 
 
@@ -25,12 +24,10 @@ class Damping:
 class RayleighDamping:
     """The force c_M M v + c_K f(u, v), f of `Viscosity`, and its derivatives at the present displacement."""
 
-    def __init__(self, damping: Damping, structure: Moving):
+    def __init__(self, damping: Damping, structure: MovingStructure):
+        """(collective)"""
         self._damping, self._structure = damping, structure
-
-    @cached_property
-    def _viscosities(self) -> list[Viscosity]:
-        return [Viscosity(body) for body in self._structure.bodies] if self._damping.stiffness else []
+        self._viscosities = [Viscosity(body) for body in structure.bodies] if damping.stiffness else []
 
     @property
     def symmetric(self) -> bool:
@@ -58,7 +55,7 @@ class RayleighDamping:
         columns.array[:] = slope
         parts: list[tuple[float, PETSc.Mat]] = []
         if self._damping.mass:
-            parts.append((self._damping.mass, self._structure.inertia.mass.copy()))
+            parts.append((self._damping.mass, self._structure.inertia.assemble_mass().copy()))
         if self._damping.stiffness:
             viscous = block_diagonal([viscosity.matrix() for viscosity in self._viscosities])
             parts.append((self._damping.stiffness, viscous))

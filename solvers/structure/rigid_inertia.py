@@ -1,26 +1,17 @@
 """Inertia of rigid motion of bodies whose mass is not where their material is.
 
-Massless contact surfaces (`massless.py`) change the centre of mass and the moments of inertia of a body. Here each
-connected piece gets the difference back, as that of a rigid body without mass that it carries along. Let M' be the
-matrix of the moved mass, c' its centre, r = x - c', and I' = int (|r|^2 1 - r r^T) dm' its inertia. As a rigid body the
-piece has the velocity
-
-    V = sum M' v / m,    omega = I'^-1 sum M' r x v.
-
-The difference has the first moment m d, where c' + d is the true centre, and the inertia K about c'. Both are turned
-from the reference by the rotation R that fits the nodes with mass best:
+Each connected piece gets what the matrix M' of the moved mass lacks, as that of a rigid body without mass that it
+carries along (docs/theory_contact.md, Massless contact surfaces). With the centre c' of M', r = x - c', and the inertia
+I' = int (|r|^2 1 - r r^T) dm', the piece has the velocity V = sum M' v / m, omega = I'^-1 sum M' r x v. The difference
+has the first moment m d, where c' + d is the true centre, and the inertia K about c':
 
     momenta  H = omega x m d,    h = K omega          energy  V . H + omega . K omega / 2
     force    A = dH/dt,          couple about c'  B = dh/dt + m d x dV/dt
     forces on nodes  f = M' (A / m + (I'^-1 B) x r)
 
-f has the resultants A and B, and its power is A . V + B . omega. Together with M' a the inertia of all rigid motions is
-that of the true mass; other motions have that of M' alone. The energy of both together is never negative:
+The energy of M' and the difference together is never negative, with the inertia K_d of a mass m at d:
 
-    v.M'v / 2 >= m |V|^2 / 2 + omega . I' omega / 2,    m |V + omega x d|^2 / 2 + omega . (I' + K - K_d) omega / 2,
-
-K_d the inertia of a mass m at d. The rates of H and h follow the rule of the time scheme for velocities, v_{n+1} =
-v_n + dt ((1 - gamma) a_n + gamma a_{n+1}), so that the momenta of the whole are conserved.
+    v.M'v / 2 >= m |V|^2 / 2 + omega . I' omega / 2,    m |V + omega x d|^2 / 2 + omega . (I' + K - K_d) omega / 2
 """
 
 from __future__ import annotations
@@ -33,9 +24,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from solvers.algebra.blocks import times
+from solvers.algebra.sparse import Sparse, sparse_from_entries
 from solvers.api import Array
-from solvers.blocks import times
-from solvers.sparse import Sparse, sparse_from_entries
 
 #: Moments below this share of those of the whole piece are rounding errors.
 NO_DIFFERENCE = 1e-12
@@ -92,7 +83,7 @@ class RigidInertia:
         (n, dim); pieces, the number of each, shape (n,), and their count; turns, whether they have large displacements,
         shape (n,) (collective).
         """
-        self._comm, self._true, self._moved = comm, true, moved
+        self._comm, self._moved = comm, moved
         self._piece, self._count = piece, count = pieces
         n, self._dim = points.shape
         self._turns, self._points = turns, self._in_space(points.ravel())
@@ -107,7 +98,10 @@ class RigidInertia:
         self._first = np.where(np.abs(first) > NO_DIFFERENCE * np.sqrt(self.mass * size), first, 0.0)
         changed = np.abs(total - own) > NO_DIFFERENCE * size[:, None]
         self._second = np.where(changed, total - own, 0.0)  # int r r^T of the difference
-        self._number_modes()
+        self._pattern = indices, indptr = _pattern_of_modes(piece, self._dim)
+        self._shape = len(indptr) - 1, 6 * count
+        numbered = Sparse(np.arange(indices.size, dtype=float), *self._pattern, self._shape).T
+        self._transposed, self._order = (numbered.indices, numbered.indptr), numbered.data.astype(np.int64)
 
     # ------------------------------------------------------------------------------------------------ geometry
 
@@ -129,18 +123,6 @@ class RigidInertia:
         else:
             compliance = np.linalg.inv(inertia)
         return Frames(arms, *self._modes(moments), inertia, compliance, _apply(R, self._first), second)
-
-    def _number_modes(self) -> None:
-        """The pattern of the modes: at component k of a node e_k, and those e_j x r that have this component."""
-        turning = [(1, 2), (0, 2), (0, 1)] if self._dim == 3 else [(2,), (2,)]
-        columns = np.array([[k, *(3 + j for j in axes)] for k, axes in enumerate(turning)])
-        indices = (6 * self._piece[:, None, None] + columns).astype(np.int32)
-        rows, width = indices.shape[0] * indices.shape[1], indices.shape[2]
-        indptr = np.arange(rows + 1, dtype=np.int32) * np.int32(width)
-        self._pattern = indices.ravel(), indptr
-        self._shape = rows, 6 * self._count
-        numbered = Sparse(np.arange(indices.size, dtype=float), *self._pattern, self._shape).T
-        self._transposed, self._order = (numbered.indices, numbered.indptr), numbered.data.astype(np.int64)
 
     def _modes(self, moments: Array) -> tuple[Sparse, Sparse]:
         """The modes and their transpose."""
@@ -262,6 +244,15 @@ class RigidInertia:
 
     def _summed(self, local: Array) -> Array:
         return local if self._comm.size == 1 else self._comm.allreduce(local)
+
+
+def _pattern_of_modes(piece: NDArray[np.int64], dim: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """(indices, indptr) of the modes: at component k of a node e_k, and those e_j x r that have this component."""
+    turning = [(1, 2), (0, 2), (0, 1)] if dim == 3 else [(2,), (2,)]
+    columns = np.array([[k, *(3 + j for j in axes)] for k, axes in enumerate(turning)])
+    indices = (6 * piece[:, None, None] + columns).astype(np.int32)
+    rows, width = indices.shape[0] * indices.shape[1], indices.shape[2]
+    return indices.ravel(), np.arange(rows + 1, dtype=np.int32) * np.int32(width)
 
 
 def _momenta(frame: Frames, omega: Array) -> tuple[Array, Array]:

@@ -7,13 +7,13 @@ from typing import Protocol
 import numpy as np
 
 from solvers.api import Array, State
-from solvers.distributed import Nodal
+from solvers.mesh.distributed import Nodal
 from solvers.structure.energy import EnergyBalance
-from solvers.structure.instant import Moving
+from solvers.structure.instant import MovingStructure
 from solvers.structure.solid_solver import SolidSolver
 
 
-class Saved(Moving, Protocol):
+class SavedStructure(MovingStructure, Protocol):
     """A structure with all that its state consists of; `Structure` is one."""
 
     energy: EnergyBalance
@@ -24,7 +24,7 @@ class Saved(Moving, Protocol):
         ...
 
 
-def saved_state(structure: Saved) -> State:
+def saved_state(structure: SavedStructure) -> State:
     """The state, by body."""
     state: State = {name: per_body(structure, array) for name, array in vars(structure.now).items()}
     state["last_length"] = structure.last_length
@@ -35,7 +35,7 @@ def saved_state(structure: Saved) -> State:
     return state
 
 
-def restore_state(structure: Saved, state: State) -> None:
+def restore_state(structure: SavedStructure, state: State) -> None:
     """Set what `saved_state` returned."""
     for name, array in vars(structure.now).items():
         array[:] = from_bodies(structure, state[name])
@@ -49,7 +49,7 @@ def restore_state(structure: Saved, state: State) -> None:
     structure.solver.position, structure.last_length = state["linear_solver"], state["last_length"]
 
 
-def per_body(structure: Moving, array: Array) -> State:
+def per_body(structure: MovingStructure, array: Array) -> State:
     """Nodal values by body, from an array of owned dofs."""
     return {
         body.name: Nodal(part.reshape(-1, body.dim).copy(), body.nodes[: body.owned])
@@ -57,6 +57,6 @@ def per_body(structure: Moving, array: Array) -> State:
     }
 
 
-def from_bodies(structure: Moving, state: State) -> Array:
+def from_bodies(structure: MovingStructure, state: State) -> Array:
     """An array of owned dofs, from nodal values by body."""
     return np.concatenate([state[body.name].values.ravel() for body in structure.bodies])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array, Snapshot
-from solvers.distributed import Nodal, gather_nodal
+from solvers.mesh.distributed import Nodal, gather_nodal
 from solvers.structure.body import Body
 from solvers.structure.field import Structure
 

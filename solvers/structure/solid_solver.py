@@ -6,20 +6,21 @@ from collections.abc import Callable
 
 from petsc4py import PETSc
 
-from solvers import linear
-from solvers.added_product import with_product
+from solvers.algebra import linear
+from solvers.algebra.added_product import with_product
 from solvers.api import Array
 from solvers.solver_settings import SolverSettings
 
 #: Iterations after which incomplete factors are given up if another solver follows: FIRST, and one more for each
-#: PER_ITERATION unknowns, up to MOST. That is about half the time of the direct solver. Measured with Hertz contact on
-#: one core, 450, 2,187 and 10,125 unknowns: a direct solution takes the time of 30, 110 and 330 iterations. The first
-#: system takes 17, 29 and 75 of them to 1e-6; that of a bent plate in contact, 2,034 and 3,258 unknowns, 72 and 130.
-FIRST, PER_ITERATION, MOST = 20, 60, 300
+#: PER_ITERATION unknowns, up to MOST_ITERATIONS. That is about half the time of the direct solver. Measured with Hertz
+#: contact on one core, 450, 2,187 and 10,125 unknowns: a direct solution takes the time of 30, 110 and 330 iterations.
+#: The first system takes 17, 29 and 75 of them to 1e-6; that of a bent plate in contact, 2,034 and 3,258 unknowns, 72
+#: and 130.
+FIRST, PER_ITERATION, MOST_ITERATIONS = 20, 60, 300
 
 #: Tolerance of the linear systems relative to Newton's where `auto` replaces a direct solver: away from contact one
-#: solution may be all that is needed. Below LEAST there are rounding errors.
-OF_NEWTON, LEAST = 0.01, 1e-12
+#: solution may be all that is needed. Below LEAST_TOLERANCE there are rounding errors.
+OF_NEWTON, LEAST_TOLERANCE = 0.01, 1e-12
 
 
 def choose(method: linear.Method, dim: int, dofs: int, *, contact: bool) -> tuple[str, ...]:
@@ -30,7 +31,7 @@ def choose(method: linear.Method, dim: int, dofs: int, *, contact: bool) -> tupl
 
 def iterations_allowed(dofs: int) -> int:
     """Iterations after which incomplete factors of a system of this size are given up if another solver follows."""
-    return min(FIRST + dofs // PER_ITERATION, MOST)
+    return min(FIRST + dofs // PER_ITERATION, MOST_ITERATIONS)
 
 
 class SolidSolver:
@@ -73,7 +74,7 @@ class SolidSolver:
     def _create(self, *, symmetric: bool) -> PETSc.KSP:
         method, tolerance = self.sequence[self.position], self._settings.linear_tolerance
         if len(self.sequence) > 1:
-            tolerance = min(tolerance, max(LEAST, OF_NEWTON * self._settings.newton.residual))
+            tolerance = min(tolerance, max(LEAST_TOLERANCE, OF_NEWTON * self._settings.newton.residual))
         make = linear.SOLVERS[method] if isinstance(method, str) else method
         ksp = make(self._comm, linear.Task(self._dim, self._dofs, symmetric, tolerance))
         if not self._last:

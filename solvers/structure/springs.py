@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from solvers import fem
 from solvers.api import Array
-from solvers.structure.meshed import Meshed
+from solvers.structure.meshed import MeshedBody
 from solvers.structure.supports import Where, owned_blocks
 from solvers.values import Value, evaluate
 
@@ -32,7 +32,7 @@ class Spring:
 class Springs:
     """All springs of a body as one matrix."""
 
-    def __init__(self, body: Meshed):
+    def __init__(self, body: MeshedBody):
         self.matrix = body.create_tangent()
         for spring in body.springs:
             if isinstance(spring.where, str):
@@ -52,7 +52,7 @@ class Springs:
         """u.K u / 2 [J] (collective)."""
         return 0.5 * comm.allreduce(float(u @ self.force(u)))
 
-    def _add_surface(self, body: Meshed, spring: Spring, surface: str) -> None:
+    def _add_surface(self, body: MeshedBody, spring: Spring, surface: str) -> None:
         x = np.ascontiguousarray(body.points[: body.dim].T)
         degree = 2 * body.domain.degree + 1
         for facets in fem.facet_quadrature(body.domain, body.space, surface, degree):
@@ -63,13 +63,13 @@ class Springs:
             block = np.einsum("ep,pa,pb,epij->eaibj", weights, facets.shape, facets.shape, tensor, optimize=True)
             self._add(body, facets.blocks, block)
 
-    def _add_nodes(self, body: Meshed, spring: Spring) -> None:
+    def _add_nodes(self, body: MeshedBody, spring: Spring) -> None:
         blocks = owned_blocks(body, spring.where)
         stiffness = evaluate(spring.stiffness, body.points[:, blocks], 0.0)
         tensor = _tensor(spring, np.zeros((len(blocks), body.dim)))
         self._add(body, blocks[:, None], (stiffness[:, None, None] * tensor)[:, None, :, None, :])
 
-    def _add(self, body: Meshed, blocks, values: Array) -> None:
+    def _add(self, body: MeshedBody, blocks, values: Array) -> None:
         """Add matrices (entities, nodes, dim, nodes, dim) at the dofs of (entities, nodes)."""
         size = body.dim * blocks.shape[1]
         dofs = body.dim * blocks[:, :, None] + np.arange(body.dim, dtype=np.int32)

@@ -1,8 +1,8 @@
-"""Supports of a body: prescribed displacement components.
+"""Supports of a body: prescribed displacement components, along axes (dofs) or along an oblique direction.
 
-A support prescribes components along axes (dofs), or along an oblique direction. At a node with an oblique direction
-all conditions n_j.u = g_j are made orthonormal from the last support to the first (Gram-Schmidt): they prescribe P u
-with the projection P on the span of the n_j. Where supports contradict each other, the last one applies.
+At a node with an oblique direction all conditions n_j.u = g_j are made orthonormal from the last support to the first
+(Gram-Schmidt): they prescribe P u with the projection P on the span of the n_j. Where supports contradict each other,
+the last one applies.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from solvers import fem
 from solvers.api import Array
-from solvers.structure.meshed import Meshed
+from solvers.structure.meshed import MeshedBody
 from solvers.values import Value, evaluate
 
 #: A named surface, or nodes by their numbers in the mesh.
@@ -122,7 +122,7 @@ class _Condition:
     value: Value
 
 
-def prescribe(body: Meshed) -> Prescribed:
+def prescribe(body: MeshedBody) -> Prescribed:
     """Collect the supports of a body (collective). Raises SupportError."""
     conditions = [condition for support in body.supports for condition in _conditions(body, support)]
     turned = [c.blocks for c in conditions if c.axis is None]
@@ -136,7 +136,7 @@ def prescribe(body: Meshed) -> Prescribed:
     return Prescribed(dofs.astype(np.int32), tuple(entries), _orthonormal(body, conditions, oblique))
 
 
-def symmetric_dofs(body: Meshed) -> NDArray[np.int32]:
+def symmetric_dofs(body: MeshedBody) -> NDArray[np.int32]:
     """Owned local dofs that are held by planes of symmetry normal to an axis (collective). Raises SupportError."""
     found = [np.empty(0, dtype=np.int32)]
     for support in body.supports:
@@ -148,7 +148,7 @@ def symmetric_dofs(body: Meshed) -> NDArray[np.int32]:
     return np.unique(np.concatenate(found)).astype(np.int32)
 
 
-def owned_blocks(body: Meshed, where: Where) -> NDArray[np.int32]:
+def owned_blocks(body: MeshedBody, where: Where) -> NDArray[np.int32]:
     """Owned dof blocks of a body on a named surface, or at given nodes (collective)."""
     if isinstance(where, str):
         blocks = fem.surface_blocks(body.domain, body.space, where)
@@ -156,7 +156,7 @@ def owned_blocks(body: Meshed, where: Where) -> NDArray[np.int32]:
     return np.flatnonzero(np.isin(body.nodes[: body.owned], where)).astype(np.int32)
 
 
-def _conditions(body: Meshed, support: Support | Symmetry | Roller) -> list[_Condition]:
+def _conditions(body: MeshedBody, support: Support | Symmetry | Roller) -> list[_Condition]:
     blocks = owned_blocks(body, support.where)
     axes = np.eye(body.dim)
 
@@ -184,7 +184,7 @@ def _conditions(body: Meshed, support: Support | Symmetry | Roller) -> list[_Con
     return [_Condition(blocks, None, normals, support.displacement)]
 
 
-def _orthonormal(body: Meshed, conditions: list[_Condition], oblique: NDArray[np.int32]) -> Oblique:
+def _orthonormal(body: MeshedBody, conditions: list[_Condition], oblique: NDArray[np.int32]) -> Oblique:
     """The conditions at nodes with an oblique direction, made orthonormal."""
     basis = np.zeros((len(oblique), body.dim, body.dim))
     found = np.zeros(len(oblique), dtype=np.int64)
@@ -204,7 +204,7 @@ def _orthonormal(body: Meshed, conditions: list[_Condition], oblique: NDArray[np
     return Oblique(oblique, basis, tuple(shares) if len(oblique) else ())
 
 
-def symmetry_normal(body: Meshed, support: Symmetry, blocks: NDArray[np.int32]) -> Array:
+def symmetry_normal(body: MeshedBody, support: Symmetry, blocks: NDArray[np.int32]) -> Array:
     """Unit normal of a plane of symmetry, exact if it is an axis (collective). Raises SupportError for curved ones."""
     points = body.points[: body.dim, blocks]
     extent = _extent(body, points)
@@ -221,14 +221,14 @@ def symmetry_normal(body: Meshed, support: Symmetry, blocks: NDArray[np.int32]) 
     )
 
 
-def _extent(body: Meshed, values: Array) -> Array:
+def _extent(body: MeshedBody, values: Array) -> Array:
     """Largest minus smallest value of each row over all processes."""
     low, high = values.min(axis=1, initial=np.inf), values.max(axis=1, initial=-np.inf)
     gathered = body.domain.comm.allgather((low, high))
     return np.asarray(np.max([h for _, h in gathered], axis=0) - np.min([low for low, _ in gathered], axis=0))
 
 
-def _normals_by_node(body: Meshed, surface: str) -> list[tuple[NDArray[np.int32], Array]]:
+def _normals_by_node(body: MeshedBody, surface: str) -> list[tuple[NDArray[np.int32], Array]]:
     """Pairs (blocks, int N^2 n dA) by type of facet. N^2, because the mean of N may be zero or negative."""
     x = np.ascontiguousarray(body.points[: body.dim].T)
     found = []
@@ -238,7 +238,7 @@ def _normals_by_node(body: Meshed, surface: str) -> list[tuple[NDArray[np.int32]
     return found
 
 
-def _nodal_normals(body: Meshed, surface: str) -> Array:
+def _nodal_normals(body: MeshedBody, surface: str) -> Array:
     """Outward unit normals in the reference configuration at owned nodes, zero off the surface, shape (owned, dim)."""
     total = fem.function(body.space)
     normals = total.x.array.reshape(-1, body.dim)

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from petsc4py import PETSc
 
+from solvers.algebra.blocks import block_diagonal
+from solvers.algebra.petsc_blocks import BlockRows, has_entries_of, write_entries
 from solvers.api import Array
-from solvers.blocks import block_diagonal
-from solvers.petsc_blocks import BlockRows, has_entries_of, write_entries
 from solvers.structure.body import Body
-from solvers.structure.instant import Moving
+from solvers.structure.instant import MovingStructure
 from solvers.structure.time_scheme import TimeScheme
 
 
@@ -29,7 +29,7 @@ class Tangent:
         self._assemble_bodies(t)
         return np.concatenate([matrix.getDiagonal().array for matrix in self._matrices])
 
-    def assemble(self, structure: Moving, time: TimeScheme) -> PETSc.Mat:
+    def assemble(self, structure: MovingStructure, time: TimeScheme) -> PETSc.Mat:
         """The tangent without supports; the next call overwrites the matrix (collective)."""
         weight, added = time.force_weight, self._added(structure, time)
         if self._combined is None or not self._write(self._combined, structure.current.t, weight):
@@ -65,7 +65,7 @@ class Tangent:
         for body, matrix in zip(self._bodies, self._matrices, strict=True):
             body.assemble_tangent(matrix, t)
 
-    def _added(self, structure: Moving, time: TimeScheme) -> PETSc.Mat | None:
+    def _added(self, structure: MovingStructure, time: TimeScheme) -> PETSc.Mat | None:
         """D, computed again when the scheme or the length of the step changes."""
         scheme, dt, _ = self._dynamic or (None, 0.0, None)
         if scheme is not time or dt != structure.current.dt:

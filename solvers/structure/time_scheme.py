@@ -11,11 +11,11 @@ from petsc4py import PETSc
 
 from solvers.api import Array, StepInfo
 from solvers.structure.held import Held
-from solvers.structure.instant import Moving
+from solvers.structure.instant import MovingStructure
 from solvers.structure.rayleigh import RayleighDamping
 
 
-class Settling(Moving, Protocol):
+class SettlingStructure(MovingStructure, Protocol):
     """A structure that can solve for its initial state."""
 
     def by(self, time: TimeScheme, held: Held, t: float, dt: float) -> AbstractContextManager[None]:
@@ -27,7 +27,7 @@ class Settling(Moving, Protocol):
         ...
 
 
-class Exchanging(Settling, Protocol):
+class ExchangingStructure(SettlingStructure, Protocol):
     """A structure whose massless nodes may change between steps."""
 
     exchanges_mass: bool
@@ -53,39 +53,39 @@ class TimeScheme(Protocol):
         """Weight w of the forces at the end of the step in the balance; those at its start have 1 - w."""
         ...
 
-    def massless(self, structure: Moving) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def massless(self, structure: MovingStructure) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Owned dofs without mass, and those of pieces that touch with nodes that have mass."""
         ...
 
-    def create_damping(self, structure: Moving) -> RayleighDamping | None:
+    def create_damping(self, structure: MovingStructure) -> RayleighDamping | None:
         """The damping of a structure; None without damping."""
         ...
 
-    def damping_slope(self, structure: Moving, dt: float) -> Array | None:
+    def damping_slope(self, structure: MovingStructure, dt: float) -> Array | None:
         """Derivative of the weighted velocity of damping by the displacement [1/s]; None: there is no damping."""
         ...
 
-    def start(self, structure: Settling, t: float, dt: float) -> None:
+    def start(self, structure: SettlingStructure, t: float, dt: float) -> None:
         """Set velocity and acceleration at the start."""
         ...
 
-    def prepare(self, structure: Exchanging, t: float, dt: float) -> None:
+    def prepare(self, structure: ExchangingStructure, t: float, dt: float) -> None:
         """Prepare a step from t to t + dt [s], before its start is stored. Raises StepFailed."""
         ...
 
-    def extrapolation(self, structure: Exchanging, t: float, dt: float) -> Array:
+    def extrapolation(self, structure: ExchangingStructure, t: float, dt: float) -> Array:
         """Factor of the change of velocity of massless dofs in a step from t to t + dt [s], at owned dofs."""
         ...
 
-    def guess(self, structure: Moving, dt: float) -> Array:
+    def guess(self, structure: MovingStructure, dt: float) -> Array:
         """Predictor: increment [m] of the displacement in a step of length dt, at owned dofs."""
         ...
 
-    def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
+    def motion(self, structure: MovingStructure, dt: float) -> tuple[Array, Array]:
         """(velocity [m/s], acceleration [m/s^2]) for the present displacement in a step of length dt."""
         ...
 
-    def rigid_force(self, structure: Moving, dt: float) -> Array:
+    def rigid_force(self, structure: MovingStructure, dt: float) -> Array:
         """The inertia force [N] that the moved mass lacks, for the present motion in a step of length dt."""
         ...
 
@@ -93,19 +93,19 @@ class TimeScheme(Protocol):
         """Derivative of this force in the balance by the mass that is lacking times the displacement [1/s^2]."""
         ...
 
-    def balance(self, structure: Moving) -> Array:
+    def balance(self, structure: MovingStructure) -> Array:
         """The residual [N] at the present iterate."""
         ...
 
-    def averaged_load(self, structure: Moving) -> Array:
+    def averaged_load(self, structure: MovingStructure) -> Array:
         """The balance [N] without loads of another field, with all forces averaged over the step."""
         ...
 
-    def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat | None:
+    def dynamic_stiffness(self, structure: MovingStructure, dt: float) -> PETSc.Mat | None:
         """D in d(balance)/du = force_weight K + D, K the static stiffness; None if it is zero."""
         ...
 
-    def reaction(self, structure: Moving) -> Array:
+    def reaction(self, structure: MovingStructure) -> Array:
         """The out-of-balance force [N] at the present time, which supports carry."""
         ...
 
@@ -113,19 +113,19 @@ class TimeScheme(Protocol):
         """The mean of loads [N] at both ends of the step that does work in it."""
         ...
 
-    def damping_force(self, structure: Moving) -> Array:
+    def damping_force(self, structure: MovingStructure) -> Array:
         """The force of damping [N] in the balance of the step."""
         ...
 
-    def support_forces(self, structure: Moving) -> tuple[Array, Array]:
+    def support_forces(self, structure: MovingStructure) -> tuple[Array, Array]:
         """Forces [N] of supports at both ends of the step, whose mean does work on its displacement."""
         ...
 
-    def stopping_force(self, structure: Moving) -> Array:
+    def stopping_force(self, structure: MovingStructure) -> Array:
         """Force of inertia [N] in the balance if nothing moved in the step, at owned dofs; zero without inertia."""
         ...
 
-    def kinetic_energy(self, structure: Moving) -> float:
+    def kinetic_energy(self, structure: MovingStructure) -> float:
         """Kinetic energy [J]."""
         ...
 
@@ -141,58 +141,58 @@ class Statics:
     force_weight = 1.0
     dissipates = True  #: a state without equilibrium nearby jumps to another one
 
-    def massless(self, structure: Moving) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def massless(self, structure: MovingStructure) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
 
-    def create_damping(self, structure: Moving) -> RayleighDamping | None:
+    def create_damping(self, structure: MovingStructure) -> RayleighDamping | None:
         return None
 
-    def damping_slope(self, structure: Moving, dt: float) -> Array | None:
+    def damping_slope(self, structure: MovingStructure, dt: float) -> Array | None:
         return None
 
-    def start(self, structure: Settling, t: float, dt: float) -> None: ...
+    def start(self, structure: SettlingStructure, t: float, dt: float) -> None: ...
 
-    def prepare(self, structure: Exchanging, t: float, dt: float) -> None: ...
+    def prepare(self, structure: ExchangingStructure, t: float, dt: float) -> None: ...
 
-    def extrapolation(self, structure: Exchanging, t: float, dt: float) -> Array:
+    def extrapolation(self, structure: ExchangingStructure, t: float, dt: float) -> Array:
         return np.zeros(structure.layout.size)
 
-    def guess(self, structure: Moving, dt: float) -> Array:
+    def guess(self, structure: MovingStructure, dt: float) -> Array:
         return np.zeros(structure.layout.size)
 
-    def motion(self, structure: Moving, dt: float) -> tuple[Array, Array]:
+    def motion(self, structure: MovingStructure, dt: float) -> tuple[Array, Array]:
         return structure.now.v, structure.now.a
 
-    def rigid_force(self, structure: Moving, dt: float) -> Array:
+    def rigid_force(self, structure: MovingStructure, dt: float) -> Array:
         return structure.now.rigid
 
     def rigid_factor(self, dt: float) -> float:
         return 0.0
 
-    def balance(self, structure: Moving) -> Array:
+    def balance(self, structure: MovingStructure) -> Array:
         return self.reaction(structure)
 
-    def averaged_load(self, structure: Moving) -> Array:
+    def averaged_load(self, structure: MovingStructure) -> Array:
         return structure.now.internal - structure.now.loads - structure.now.constraint
 
-    def dynamic_stiffness(self, structure: Moving, dt: float) -> PETSc.Mat | None:
+    def dynamic_stiffness(self, structure: MovingStructure, dt: float) -> PETSc.Mat | None:
         return None
 
-    def reaction(self, structure: Moving) -> Array:
+    def reaction(self, structure: MovingStructure) -> Array:
         return structure.now.internal - structure.now.external - structure.now.constraint
 
-    def support_forces(self, structure: Moving) -> tuple[Array, Array]:
+    def support_forces(self, structure: MovingStructure) -> tuple[Array, Array]:
         old = structure.old
         return old.internal - old.external - old.constraint, self.reaction(structure)
 
     def averaged(self, before: Array, after: Array) -> Array:
         return 0.5 * (before + after)
 
-    def damping_force(self, structure: Moving) -> Array:
+    def damping_force(self, structure: MovingStructure) -> Array:
         return np.zeros(structure.layout.size)
 
-    def stopping_force(self, structure: Moving) -> Array:
+    def stopping_force(self, structure: MovingStructure) -> Array:
         return np.zeros(structure.layout.size)
 
-    def kinetic_energy(self, structure: Moving) -> float:
+    def kinetic_energy(self, structure: MovingStructure) -> float:
         return 0.0

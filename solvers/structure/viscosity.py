@@ -2,12 +2,9 @@
 
     f = int C_0 : e(v) : e(w) dX,    e(v) = sym(R^T grad v)
 
-times the coefficient [s]. C_0 is the elasticity of the undeformed material and R the rotation of the cell, that of the
-polar decomposition F = R U in its middle. e(v) is the strain rate in the frame of the cell: zero in a rigid motion,
-however the body has turned. Without rotations f = K(0) v.
-
-The mixed element has the volume changes of whole cells. Here their part is integrated by fewer points (selectively
-reduced integration), which does not lock either.
+times the coefficient [s], with the elasticity C_0 of the undeformed material and the rotation R in the middle of the
+cell (docs/theory_structure.md, Time). The mixed element has the volume changes of whole cells. Here their part is
+integrated by fewer points (selectively reduced integration), which does not lock either.
 """
 
 from __future__ import annotations

@@ -1,17 +1,15 @@
-"""Every case in cases/: the first steps on 1 and 2 processes, and whole runs of those with published numbers."""
+"""Every case in cases/: the first steps, on 1 and 2 processes, and whole runs of those with published numbers."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
-from programs import on_processes, run_whole, warnings_of
+from programs import fsci, run_whole, warnings_of
 
 from fsci.case import load_case
 from fsci.case.verify import FIELD_COLUMNS
 from fsci.run.history import read_history
 
-RUN_CASES = Path(__file__).parents[1] / "setups" / "run_cases.py"
 CASES = sorted(path.parent for path in Path("cases").glob("*/case.yaml"))
 LONG = ("torus_wall_fine", "valve_3d")
 #: what makes the first steps quick without changing what they are about
@@ -40,6 +38,8 @@ SMALLER = {
     "torus_wall": ["fluid.grid.cells=[8, 8, 13]", "structure.bodies.torus.mesh.cells=[16, 8]"],
     "torus_rough": ["fluid.grid.cells=[12, 6, 20]", "structure.bodies.torus.mesh.cells=[12, 12]"],
     "sphere_tube": ["structure.bodies.tube.mesh.cells=[24, 1, 30]", "structure.bodies.sphere.mesh.cells=[5, 1]"],
+    "thin_flag": ["fluid.grid.cells=[42, 14]"],
+    "elastic_tube": ["fluid.grid.cells=[4, 4, 16]", "structure.bodies.wall.mesh.cells=[8, 1, 20]"],
     "falling_sphere": [
         f"fluid.grid.{axis}=[{{to: {near}, cells: {cells}}}, {{to: {far}, cells: 3, ratio: 4}}]"
         for axis, near, cells, far in (("x", 0.012, 3, 0.05), ("y", 0.012, 3, 0.05), ("z", 0.14, 12, 0.16))
@@ -50,29 +50,59 @@ SMALLER = {
 SMALLER["falling_rigid_sphere"] = SMALLER["falling_sphere"]
 
 
-#: cases that share the processes they run on, whose start takes longer than three steps of most cases
-BATCH = 4
-QUICK = [f for f in CASES if f.name not in LONG]
-BATCHES = [[f] for f in CASES if f.name in LONG]
-BATCHES += [QUICK[i : i + BATCH] for i in range(0, len(QUICK), BATCH)]
-
-
-@pytest.mark.parametrize(
-    "folders",
-    [
-        pytest.param(some, id="-".join(f.name for f in some), marks=[pytest.mark.slow] * (some[0].name in LONG))
-        for some in BATCHES
-    ],
+#: cases that run on two processes in quick tests: each field, element, kind of body, of contact and of linear solver
+#: once. The others do so in slow ones.
+PARALLEL = (
+    "cylinder_nested",  # nested cells, q2q1, steady
+    "fsi3",  # q2q1, an elastic body on a given one, BDF2
+    "elastic_tube",  # 3D, iterative, slip, planes of symmetry
+    "falling_rigid_sphere",  # free body, graded cells
+    "thin_flag",  # bodies without thickness
+    "valve",  # contact of two bodies in a flow
+    "torus_wall",  # contact with an obstacle in a flow in 3D
+    "two_tori_friction",  # friction between bodies of solid shells
+    "tied_cube",  # tied
+    "self_contact_fold",  # a surface on itself
 )
-def test_first_steps(folders, tmp_path):
-    """Three steps; probes, forces and balances of 1 and 2 processes agree, and no sentinel finds anything."""
-    for processes in (1, 2):
-        commands = tmp_path / f"{processes}.json"
-        commands.write_text(json.dumps([first_steps(folder, tmp_path / str(processes)) for folder in folders]))
-        on_processes(processes, RUN_CASES, commands, timeout=600)
-    for folder in folders:
-        assert [warnings_of(tmp_path / str(n) / folder.name) for n in (1, 2)] == [[], []], folder.name
-        assert_same(folder, *(read_history(tmp_path / str(n) / folder.name / "history.csv") for n in (1, 2)))
+
+
+#: what the whole runs of cases take, where it is long [s]
+SECONDS = {
+    "cavity_flexible_bottom": 55, "cylinder_2d2": 200, "elastic_tube": 90, "flap": 90, "torus_rough": 150,
+    "torus_wall": 65, "two_tori_friction": 80,
+}  # fmt: skip
+
+
+def with_slow(names, slow, seconds=SECONDS):
+    mark = pytest.mark.slow
+    return [pytest.param(n, marks=[mark(seconds=seconds.get(n, 0))] if slow(n) else ()) for n in names]
+
+
+NAMES = [folder.name for folder in CASES]
+#: cases whose whole run takes seconds; FSI3 takes half an hour
+SHORT = ("csm1", "csm2", "cavity", "cook_membrane", "sealed_plate", "cylinder_nested")
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in (*PARALLEL, *LONG, *SHORT)])
+def test_first_steps(name, tmp_path):
+    three_steps(name, tmp_path)
+
+
+@pytest.mark.parametrize("name", with_slow(NAMES, lambda name: name not in PARALLEL, {"valve_3d": 170}))
+def test_first_steps_on_two_processes(name, tmp_path):
+    """Probes, forces and balances are those of one process."""
+    assert_same(*(three_steps(name, tmp_path / str(processes), processes) for processes in (1, 2)))
+
+
+def three_steps(name, out, processes=1):
+    """History of the first three steps, in which no sentinel finds anything."""
+    folder = Path("cases") / name
+    done = fsci(*first_steps(folder, out), processes=processes)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert warnings_of(out) == []
+    history, time = read_history(out / "history.csv"), load_case(folder / "case.yaml").time
+    assert len(history["step"]) == min(3, round((time.end - time.start) / time.step))
+    return history
 
 
 def first_steps(folder, out):
@@ -81,26 +111,23 @@ def first_steps(folder, out):
     end = min(time.end, time.start + 3 * time.step)
     # iterative solvers are as exact as they can be, so that what they leave over does not tell processes apart
     settings = [f"time.end={end!r}", "verify=[]", "solver.linear.tolerance=1e-12", *SMALLER.get(folder.name, [])]
-    return ["run", str(folder), "-o", str(out / folder.name), *(w for setting in settings for w in ("--set", setting))]
+    return ["run", str(folder), "-o", str(out), *(w for setting in settings for w in ("--set", setting))]
 
 
-def assert_same(folder, first, second):
+def assert_same(first, second):
     """Histories of 1 and 2 processes agree."""
+    assert first.keys() == second.keys()
     one, two = ({name: np.nan_to_num(values) for name, values in history.items()} for history in (first, second))
-    assert all(np.array_equal(np.isnan(first[name]), np.isnan(second[name])) for name in one), folder.name
-    time = load_case(folder / "case.yaml").time
-    assert len(one["step"]) == min(3, round((time.end - time.start) / time.step)), folder.name
+    assert all(np.array_equal(np.isnan(first[name]), np.isnan(second[name])) for name in one)
     sizes = {name: np.abs(values).max() for name, values in one.items()}
     counts = {"iterations", "coupling.linear", "fluid.linear", "coupling.newton"}
     errors = {"residual", "interface.force", "interface.momentum", "fluid.loss", *FIELD_COLUMNS.values()}
     for name in one.keys() - {"wall", *counts, *errors}:
         # components of one vector are measured against the largest of them
         size = max(s for other, s in sizes.items() if other.partition(".")[0] == name.partition(".")[0])
-        assert np.abs(one[name] - two[name]).max() <= 1e-8 * size + 1e-12, (folder.name, name)
+        assert np.abs(one[name] - two[name]).max() <= 1e-8 * size + 1e-12, name
 
 
-#: cases whose whole run takes seconds; FSI3 takes half an hour
-SHORT = ("csm1", "csm2", "cavity", "cook_membrane", "sealed_plate", "cylinder_nested")
 #: tests of their own run them to their end
 WHOLE = ("double_arch", "falling_sphere", "ironing", "piston_impact", "rebound_stokes", "sphere_tube", "two_tori")
 WHOLE += ("valve", "valve_thin", "valve_3d")
@@ -109,9 +136,7 @@ EARLIER = {"flap": 2.6, "cavity_flexible_bottom": 56.0, "torus_rough": 0.42}
 VERIFIED = [folder.name for folder in CASES if folder.name not in (*LONG, *WHOLE, "fsi3")]
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in SHORT)) for name in VERIFIED]
-)
+@pytest.mark.parametrize("name", with_slow(VERIFIED, lambda name: name not in SHORT))
 def test_published_numbers(name, tmp_path):
     """The published numbers, as the case itself verifies them."""
     run_whole(name, tmp_path, *([f"time.end={EARLIER[name]}"] if name in EARLIER else []), timeout=1800)

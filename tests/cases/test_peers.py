@@ -1,15 +1,21 @@
 """Other programs beside ours: what they are given, what is read from them, what is said if they are missing."""
 
+import fsi1_files
+import hertz_files
+import install
 import numpy as np
+import others
+import ours
 import pytest
+from pressure import pressure_errors
+from run_peers import PEERS, main
 
 from fsci.bench import hertz
-from fsci.bench.peers import fsi1, fsi1_files, hertz_files, install, rows, stokes
-from fsci.bench.peers.__main__ import main
+from fsci.bench.family import function, read_families
 
 
 def test_our_stokes_flow_has_the_exact_solution():
-    coarse, fine = (stokes.solve("q1q1", cells) for cells in (10, 20))
+    coarse, fine = (ours.stokes("q1q1", cells) for cells in (10, 20))
     assert fine["velocity [%]"] < 0.3 * coarse["velocity [%]"] < 0.3
     assert fine["pressure [%]"] < 0.5 * coarse["pressure [%]"]
 
@@ -19,9 +25,9 @@ def test_the_pressure_of_hertz_has_no_error():
     distance = np.linspace(0.0, 3.0, 50)
     pressure = 1.5 * force / np.pi * np.sqrt(np.maximum(0.0, 1.0 - (distance / radius) ** 2))
     found = {"dofs": 1, "newton": 1, "time [s]": 1.0, "force": force, "distance": distance, "pressure": pressure}
-    assert rows.pressure_errors(found)["peak [%]"] == pytest.approx(0.0, abs=1e-10)
-    assert rows.pressure_errors(found)["pressure [%]"] == pytest.approx(0.0, abs=1e-10)
-    assert rows.pressure_errors({**found, "pressure": 1.1 * pressure})["pressure [%]"] == pytest.approx(10.0)
+    assert pressure_errors(found)["peak [%]"] == pytest.approx(0.0, abs=1e-10)
+    assert pressure_errors(found)["pressure [%]"] == pytest.approx(0.0, abs=1e-10)
+    assert pressure_errors({**found, "pressure": 1.1 * pressure})["pressure [%]"] == pytest.approx(10.0)
 
 
 def test_files_of_the_ball(tmp_path):
@@ -68,8 +74,9 @@ def test_files_of_the_flag(tmp_path):
 
 
 @pytest.mark.slow
-def test_our_flag_has_the_published_displacement():
-    found = fsi1.solve(0.7)
+def test_our_flag_has_the_published_displacement(tmp_path):
+    (_, member, _) = [one for one in read_families(PEERS)["fsi1"].members() if one.measure == "ours:flag"]
+    found = ours.flag(member.scene(tmp_path))
     assert abs(found["u_x error [%]"]) < 1.5
     assert abs(found["drag error [%]"]) < 0.5
 
@@ -81,23 +88,27 @@ def test_pressure_in_a_result_of_calculix(tmp_path):
         " -1         7 0.00000E+00 0.00000E+00 0.00000E+00 6.50000E+00 0.00000E+00 0.00000E+00\n -3\n"
         " -4  OTHER       6    1\n -1         7 1.00000E+00 1.00000E+00 1.00000E+00 1.00000E+00\n -3\n"
     )
-    assert rows.contact_pressure(tmp_path / "a.frd") == {7: 6.5}
+    assert others.contact_pressure(tmp_path / "a.frd") == {7: 6.5}
 
 
 def test_what_is_missing(tmp_path, monkeypatch, capsys):
     assert main([]) == main([str(tmp_path), "sotkes"]) == 2
-    assert capsys.readouterr().err.startswith(
-        "usage: python -m fsci.bench.peers FOLDER [stokes|cylinder|hertz|fsi1 ..]"
-    )
+    assert capsys.readouterr().err.startswith("usage: python tests/peers FOLDER [stokes|cylinder|hertz|fsi1 ..]")
     monkeypatch.setattr(install.shutil, "which", lambda name: None)
-    monkeypatch.setattr(rows, "python_of", lambda name, folder: folder)
     assert main([str(tmp_path), "hertz"]) == 1
     assert capsys.readouterr().out.splitlines()[-1] == "there is no ccx: apt-get install calculix-ccx"
 
 
 def test_a_program_that_fails_is_shown(tmp_path, monkeypatch):
-    with pytest.raises(rows.PeerFailed, match="No such file"):
-        rows.run_program(tmp_path, "ls", "nothing")
-    monkeypatch.setattr(rows, "PATIENCE", 0.1)
-    with pytest.raises(rows.PeerFailed, match=r"sleep took more than 0\.1 s"):
-        rows.run_program(tmp_path, "sleep", "5")
+    with pytest.raises(others.PeerFailed, match="No such file"):
+        others.run_program(tmp_path, "ls", "nothing")
+    monkeypatch.setattr(others, "PATIENCE", 0.1)
+    with pytest.raises(others.PeerFailed, match=r"sleep took more than 0\.1 s"):
+        others.run_program(tmp_path, "sleep", "5")
+
+
+def test_each_peer_has_a_function():
+    families = read_families(PEERS)
+    assert [*families] == ["stokes", "cylinder", "hertz", "fsi1"]
+    for family in families.values():
+        assert {callable(function(member.measure)) for member in family.members()} == {True}

@@ -17,7 +17,7 @@ from programs import ENVIRONMENT, PARALLEL, fsci
 from small_cases import PLATE
 
 from fsci.run.history import read_history
-from solvers import unlocked
+from solvers.algebra import unlocked
 
 PROGRAM = Path(__file__).parents[1] / "setups" / "disturbed_run.py"
 

@@ -105,6 +105,7 @@ CHANGES = [
     ("flow", "fluid.bodies.moving.motion.velocity.0=where(t > 0.3, 1, 0.1)", "velocity: [0.1, 0] -> [where(t > 0.3, "),
     ("flow", "fluid.bodies.still.motion={displacement: [0, t - 0.3]}", "still.motion: not set -> {displacement: [0, t"),
     ("contact", "contact.pairs.p.friction={bound: 1}", "contact.pairs.p.friction.bound: not set -> 1"),
+    ("contact", "contact.friction={coefficient: 0.2}", "contact.friction: not set -> {coefficient: 0.2}"),
     ("contact", "contact.obstacles.w.motion=[0, t - 0.3]", "contact.obstacles.w.motion: not set -> [0, t - 0.3]"),
 ]
 

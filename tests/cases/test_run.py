@@ -17,7 +17,7 @@ from programs import fsci, start_fsci
 from fsci.case import CaseError, load_case
 from fsci.run.history import read_history
 from fsci.run.run import FAILED, FINISHED, STOPPED, resume_run, run_case
-from solvers.api import StepFailed
+from solvers.api import FailureKind, StepFailed
 
 CASE = """\
 title: a swinging beam
@@ -105,7 +105,9 @@ class FailsAt:
         self.count += 1
         info = self.scheme.step(t, dt)
         if self.count in self.calls:
-            raise StepFailed("structure", "injected", iteration=3, where=(1.0, 2.0), history=self.history)
+            raise StepFailed(
+                "structure", FailureKind.NEWTON, "injected", iteration=3, where=(1.0, 2.0), history=self.history
+            )
         return info
 
     def __getattr__(self, name):

@@ -10,7 +10,7 @@ from fsci.case import load_case
 from fsci.run.finite import not_numbers
 from fsci.run.history import read_history
 from fsci.run.run import FINISHED, run_case
-from solvers.fluid.bodies.sweep import Sweep
+from solvers.fluid.surfaces.sweep import Sweep
 
 RING = """\
 title: a spinning ring full of water

@@ -7,22 +7,19 @@ import numpy as np
 import pytest
 from programs import fsci
 
+from fsci.case import load_case
+from fsci.expression import Expression
 from fsci.stress import long_run, program, run
-from fsci.stress.draw import (
-    COMPOSED,
-    COMPOSED_SCENES,
-    FURTHER,
-    FURTHER_SCENES,
-    SCENES,
-    SPACE,
-    SPACE_SCENES,
-    Draw,
-    draw,
-)
+from fsci.stress.draw import Draw, draw
 from fsci.stress.frame import Frame
 from fsci.stress.judge import distance, failure_of, missing_warning, other_bits, out_of_balance
+from fsci.stress.mutants import cases
 from fsci.stress.program import NEVER_ENDED, Ended
-from fsci.stress.scenes import StressScene
+from fsci.stress.scene import StressScene, read_scenes, series
+
+pytestmark = pytest.mark.usefixtures("runs_in_copies")
+
+SPACE, FURTHER, COMPOSED = 100_000, 200_000, 300_000
 
 FRAME = Frame(angle=30, shift=(3, -2), length=1e-3, mass=100.0, time=10.0)
 QUANTITIES = {"c": "centre", "f": "force", "u": "displacement", "e": "energy"}
@@ -54,7 +51,19 @@ def test_quarter_turns_are_exact():
     assert [frame.side(name) for name in ("x-", "x+", "y-", "y+")] == ["y-", "y+", "x+", "x-"]
     assert frame.grid((0, 0), (2, 1), (20, 10)) == {"from": [-1.0, 0.0], "to": [0.0, 2.0], "cells": [10, 20]}
     assert frame.vector((1, 0), (0, 0, 0)) == [0.0, 1.0]
-    assert frame.vector((1, 0), (0, 0, 0), "min(s_, 1)") == ["0.0*(min((t/1.0), 1))", "1.0*(min((t/1.0), 1))"]
+    assert frame.vector(("min(t, 1)", 0), (0, 0, 0)) == [0.0, "1.0*(min((t/1.0), 1))"]
+    assert FRAME.vector((0, "2*t"), (1, 0, 0)) == [f"{v!r}*(2*(t/10.0))" for v in FRAME.vector((0, 1), (1, 0, 0))]
+
+
+def test_functions_of_place():
+    """An inflow has the same value at the same place of the scene."""
+    profile = "4*y*(1 - y)*t + x"
+    x, t = np.array([0.2, 0.7]), 0.3
+    there = FRAME.point(x)
+    own, turned = Expression.parse(profile), FRAME.vector((profile, 0), (1, 0, -1))
+    found = [Expression.parse(text)(np.array([there]).T, t * FRAME.time)[0] for text in turned]
+    value = own(x[:, None], t)[0]
+    assert found == pytest.approx(FRAME.vector((value, 0), (1, 0, -1)))
 
 
 def test_turns_in_space():
@@ -70,7 +79,8 @@ def test_turns_in_space():
     oblique = Frame(angle=33.0, axis=(1.0, -2.0, 0.5))
     assert np.linalg.norm(oblique.turned((3, 4, 12))) == pytest.approx(13.0)
     assert oblique.turned(oblique.axis) == pytest.approx(oblique.axis)
-    mesh = oblique.rectangle((1, 1, 1), (0, 0, 0), (1, 1, 1))
+    box = {"mesh": {"shape": "box", "size": [1, 1, 1], "translate": [0, 0, 0], "cells": [1, 1, 1]}}
+    mesh = oblique.case({"structure": {"bodies": {"body": box}}})["structure"]["bodies"]["body"]["mesh"]
     assert (mesh["shape"], mesh["rotate"]) == ("box", [{"axis": [1.0, -2.0, 0.5], "angle": 33.0}])
     history = {"time": np.ones(1), **{f"f.{axis}": v for axis, v in zip("xyz", oblique.turned((1, 2, 3)), strict=True)}}
     found = oblique.back(history, {"f": "force"}, 3)
@@ -79,13 +89,13 @@ def test_turns_in_space():
 
 def test_draws_in_space():
     draws = [draw(SPACE + seed) for seed in range(100)]
-    assert {one.scene.name for one in draws} == SPACE_SCENES.keys()
+    assert {one.scene.name for one in draws} == series(SPACE).keys()
     assert all(one.scene.dim == 3 for one in draws)
     turned = [one.frame for one in draws if one.twin == "rotated" and one.scene.any_angle]
     assert any(np.abs(frame.rotation - np.rint(frame.rotation)).max() > 0.1 for frame in turned)
 
 
-@pytest.mark.parametrize("scene", sorted(SPACE_SCENES))
+@pytest.mark.parametrize("scene", sorted(series(SPACE)))
 @pytest.mark.slow
 def test_a_draw_of_each_scene_in_space(scene):
     seed = next(s for s in range(SPACE, SPACE + 1000) if s % 5 != 4 and draw(s).scene.name == scene)
@@ -95,13 +105,13 @@ def test_a_draw_of_each_scene_in_space(scene):
 def test_further_draws():
     """Each scene comes up; what is held is turned with it."""
     draws = [draw(FURTHER + seed) for seed in range(40)]
-    assert {one.scene.name for one in draws} == FURTHER_SCENES.keys()
+    assert {one.scene.name for one in draws} == series(FURTHER).keys()
     held = next(one for one in draws if one.scene.parameters.get("held") == ["x"])
     turned = held.case(Frame(angle=90.0))["fluid"]["bodies"]["body"]["free"]
     assert (turned["held"], turned["gravity"]) == (["y"], [1.0, 0.0])
 
 
-@pytest.mark.parametrize("scene", sorted(FURTHER_SCENES))
+@pytest.mark.parametrize("scene", sorted(series(FURTHER)))
 @pytest.mark.slow
 def test_a_further_draw_of_each_scene(scene):
     """Some are refused with a message: bodies that leave fine cells, impacts that a step does not resolve."""
@@ -114,14 +124,14 @@ def test_a_further_draw_of_each_scene(scene):
 def test_composed_draws():
     """Each scene and twin comes up; the body beside a scene is in the twin alone."""
     draws = [draw(COMPOSED + seed) for seed in range(100)]
-    assert {one.scene.name for one in draws} == COMPOSED_SCENES.keys()
+    assert {one.scene.name for one in draws} == series(COMPOSED).keys()
     assert len({one.twin for one in draws}) == 6
     one = next(one for one in draws if one.twin == "beside")
     bodies = [set(one.case(Frame(), twin)["structure"]["bodies"]) for twin in (False, True)]
     assert bodies[1] - bodies[0] == {"beside"}
 
 
-@pytest.mark.parametrize("scene", sorted(COMPOSED_SCENES))
+@pytest.mark.parametrize("scene", sorted(series(COMPOSED)))
 @pytest.mark.slow
 def test_a_composed_draw_of_each_scene(scene):
     seeds = [s for s in range(COMPOSED, COMPOSED + 60) if draw(s).scene.name == scene and draw(s).twin == "beside"]
@@ -152,7 +162,7 @@ def test_a_free_body_that_has_left_the_box_has_no_force():
 
 def test_draws_are_the_same_every_time():
     draws = [draw(seed) for seed in range(200)]
-    assert {one.scene.name for one in draws} == SCENES.keys()
+    assert {one.scene.name for one in draws} == series(0).keys()
     assert len({one.twin for one in draws}) == 5
     for seed, one in enumerate(draws):
         again = draw(seed)
@@ -161,7 +171,7 @@ def test_draws_are_the_same_every_time():
 
 
 def test_a_body_is_moved_against_the_grid():
-    one, other = draw(310), draw(310, 1e-12)
+    one, other = draw(310), draw(310).moved(1e-12)
     starts = [d.case(Frame())["fluid"]["bodies"]["body"]["mesh"]["translate"] for d in (one, other)]
     assert np.subtract(*starts) == pytest.approx([-1e-12, -1e-12], rel=1e-3)
     assert one.case(Frame())["fluid"]["grid"] == other.case(Frame())["fluid"]["grid"]
@@ -174,7 +184,7 @@ def test_a_side_that_comes_to_lie_in_a_plane_of_the_grid_is_an_edge():
     assert run.judge(310).verdict in ("edge", "right")
 
 
-SCENE = StressScene("beam", {}, lambda frame: {}, {"tip": {"quantity": "displacement"}}, must_warn=("lock",))
+SCENE = StressScene("beam", {}, {"probes": {"tip": {"quantity": "displacement"}}}, must_warn=("lock",))
 DRAW = Draw(0, SCENE, "shifted", Frame())
 HISTORY = {"time": np.array([1.0, 2.0]), "wall": np.ones(2), "tip.x": np.array([1.0, 2.0]), "tip.y": np.zeros(2)}
 GOOD = Ended(0, "warning: cells lock", HISTORY, {})
@@ -273,7 +283,7 @@ def test_many_steps():
 
 def pull_a_flat_block_off_the_floor(transmissivity, folder):
     """A run: the block lies on the floor from 0.6 s on and is pulled up from 1.17 s on."""
-    case = json.loads(json.dumps(long_run.CASE))
+    case = json.loads(json.dumps(cases()["long"]))
     block = {**case["structure"]["bodies"].pop("disc"), "gravity": [0, "-2 - 4*sin(pi*t)"]}
     block["mesh"] = {"shape": "rectangle", "size": [0.62, 0.7], "cells": [2, 2], "origin": [0.21, 0.01]}
     case["structure"]["bodies"]["block"] = block
@@ -304,7 +314,100 @@ def test_a_flat_block_is_pulled_off_the_floor(transmissivity, tmp_path):
     assert (active[time > 1.25] == 0).all()
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=65)
 def test_many_draws():
     outcomes = run.stress(range(1000, 1015), print)
     assert not [one for one in outcomes if one.verdict == "wrong"]
+
+
+OWN = """\
+hanging:
+  words: a block that hangs by its top
+  any_angle: true
+  parameters:
+    E: {spread: [10, 1000]}
+    cells: [1, 2]
+    load: "{0.01*E}"
+    soft: {choice: [true, false], when: E > 1.0e9, else: false}
+  case:
+    time: {step: 1, end: 2}
+    structure:
+      bodies:
+        block:
+          mesh: {shape: rectangle, size: [1, 1], translate: [0, 0], cells: ["{cells}", "{2*cells}"]}
+          material: {law: neo_hooke, E: "{E}", nu: 0.3, density: 1}
+          supports: [{on: top, displacement: [0, 0]}]
+          tractions: [{on: bottom, value: [0, "-{load}*t"]}]
+          gravity: [0, -1]
+          pressures: [{when: soft, on: left, value: "{load}"}]
+    probes: {low: {quantity: displacement, on: bottom}, force: {quantity: reaction, on: top}}
+"""
+
+
+def test_a_scene_from_outside(tmp_path):
+    """One entry of a file: what is drawn, a case with formulas of it; twins are made of it as of ours."""
+    (tmp_path / "own.yaml").write_text(OWN)
+    done = fsci("stress", "2", "--scenes", tmp_path / "own.yaml", "-o", tmp_path / "out.json")
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = json.loads((tmp_path / "out.json").read_text())["outcomes"]
+    assert {(one["scene"], one["verdict"]) for one in found} == {("hanging", "right")}
+    assert [one["twin"].split()[0] for one in found] == ["rotated", "units"]
+    assert all(one["parameters"]["load"] == pytest.approx(0.01 * one["parameters"]["E"]) for one in found)
+
+
+def test_a_case_in_another_frame(tmp_path):
+    """Settings change by their units, vectors and points are turned, what is a number of cells stays."""
+    (tmp_path / "own.yaml").write_text(OWN)
+    one = draw(0, tmp_path / "own.yaml")
+    E, load = one.scene.parameters["E"], one.scene.parameters["load"]
+    found = one.case(Frame(angle=90.0, shift=(1.0, 2.0), length=10.0, mass=3.0, time=2.0))
+    body = found["structure"]["bodies"]["block"]
+    stress = 3.0 / 10.0 / 2.0**2
+    assert (found["time"]["step"], found["time"]["end"]) == (2.0, 4.0)
+    assert body["mesh"]["size"] == [10.0, 10.0]
+    assert (body["mesh"]["rotate"], body["mesh"]["translate"]) == ([{"angle": 90.0}], [-20.0, 10.0])
+    assert (body["material"]["law"], body["material"]["nu"]) == ("neo_hooke", 0.3)
+    assert body["material"]["E"] == pytest.approx(E * stress)
+    assert body["material"]["density"] == pytest.approx(3.0 / 10.0**3)
+    assert body["gravity"] == pytest.approx([10.0 / 2.0**2, 0.0])
+    value, zero = body["tractions"][0]["value"]
+    assert zero == 0.0
+    assert value.endswith(f"*(-{load!r}*(t/2.0))")
+    assert float(value.split("*")[0]) == pytest.approx(-stress)
+    assert "pressures" not in body or body["pressures"] == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("any_angle", "any_angel", "scene 'hanging' has an unknown entry 'any_angel'"),
+        ("  words:", "  title:", "scene 'hanging' needs 'words', 'parameters' and 'case'"),
+        ("{load}*t", "{laod}*t", "unknown name 'laod'"),
+        (
+            "gravity: [0, -1]",
+            "point_forces: [{at: [0, 0], value: [0, 1]}]",
+            "there is no rule for 'value'",
+        ),
+        ("translate: [0, 0], ", "", "a mesh needs 'translate'"),
+        ("hanging:", "hanging: [", "own.yaml: while parsing"),
+        ("  words:", "  from: 400\n  words:", "no scene is drawn from number 0; the first one has 400: --seed 400"),
+    ],
+)
+def test_mistakes_of_scenes(old, new, message, tmp_path):
+    assert old in OWN
+    (tmp_path / "own.yaml").write_text(OWN.replace(old, new, 1))
+    done = fsci("stress", "1", "--scenes", tmp_path / "own.yaml")
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("name", read_scenes())
+def test_each_scene_is_a_case_with_probes(name, tmp_path):
+    """In the frame of its twin, too."""
+    scene = read_scenes()[name]
+    seeds = range(scene["from"], scene["from"] + 1000)
+    one = next(one for one in map(draw, seeds) if one.scene.name == name and one.twin == "rotated")
+    for frame in (Frame(), one.frame):
+        (tmp_path / "case.yaml").write_text(json.dumps(one.case(frame)))
+        assert load_case(tmp_path).probes

@@ -5,6 +5,8 @@ import json
 import pytest
 from programs import fsci
 
+pytestmark = pytest.mark.usefixtures("runs_in_copies")
+
 FLOW = """
 time: {step: 1, end: 1}
 fluid:
@@ -81,11 +83,13 @@ def test_a_flow(tmp_path):
 def test_blocks(tmp_path):
     """Uniform strain: neither roles, orders nor c_n change anything, and the force on the slave turns round."""
     ended, found = twin(tmp_path, BLOCKS)
-    assert set(found["runs"]) == {"case", "step", "order", "exchange", "reversed", "c_n", "processes"}
+    assert set(found["runs"]) == {
+        "case", "step", "order", "exchange", "reversed", "c_n", "mirrored", "turned", "processes",
+    }  # fmt: skip
     for name in ("top.y", "contact.blocks.y final"):
         for change in found["values"][name]["changes"].values():
             assert change["curve"] < 1e-7
-    assert ended.stdout.count("nothing changes") == 6
+    assert ended.stdout.count("nothing changes") == 8
 
 
 def test_a_twin_that_fails_is_a_finding(tmp_path):
@@ -109,6 +113,6 @@ def test_names(tmp_path):
     ended = fsci("twin", tmp_path, "-o", tmp_path / "out", "--only", "exchang")
     assert ended.returncode == 2
     assert (
-        "this case has step, order, exchange, reversed, c_n, processes, but no twin 'exchang'; did you mean 'exchange'?"
-        in ended.stderr
+        "this case has step, order, exchange, reversed, c_n, mirrored, turned, processes, but no twin 'exchang'; "
+        "did you mean 'exchange'?" in ended.stderr
     )

@@ -12,7 +12,7 @@ from test_coupled_run import run
 from coupling.coupled import Coupled
 from fsci.case import CaseError, load_case
 from fsci.run.run import FAILED, run_case
-from solvers.api import StepFailed
+from solvers.api import FailureKind, StepFailed
 
 #: fluid inside of a ring, and outside of it in an open channel
 RING = """\
@@ -62,7 +62,7 @@ def test_a_steady_flow_is_not_repeated_with_half_its_step(scheme, tmp_path, monk
     """The size of the step means nothing to it, nor to a body at rest in it."""
 
     def fail(self, t, dt):
-        raise StepFailed("test", "on purpose")
+        raise StepFailed("test", FailureKind.NEWTON, "on purpose")
 
     monkeypatch.setattr(Coupled, "begin_step", fail)
     (tmp_path / "case.yaml").write_text(COLUMN.replace("coupling:", f"coupling:\n  scheme: {scheme}"))

@@ -184,6 +184,12 @@ def balloon(parts: dict[str, str]) -> str:
     return text
 
 
+def test_thrown_wall(tmp_path):
+    """The start after the impulse of the first step keeps the volume, too, up to second order in a fast motion."""
+    history = run(balloon(FLAT | {"VELOCITY": "[0.1*x, -0.1*y]"}), tmp_path)
+    assert history["volume"] == pytest.approx(history["volume"][0], rel=1e-6)
+
+
 @pytest.mark.parametrize(("parts", "ball"), [(FLAT, np.pi * 0.37**2), (SOLID, 4 / 3 * np.pi * 0.37**3)])
 def test_closed_wall(parts, ball, tmp_path):
     """The fluid is what is inside, and it keeps its volume up to second order in the motion."""

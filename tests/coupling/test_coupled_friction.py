@@ -16,6 +16,7 @@ OBLIQUE = {
     "time": "{step: 0.005, end: 0.06}",
     "probes.mean": "{pair: wall, quantity: mean_gap}",
     "output.fields_every": "0",
+    "solver.newton.residual": "1e-8",
     "verify": "[]",
 }
 

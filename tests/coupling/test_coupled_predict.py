@@ -32,8 +32,10 @@ def test_predictors_that_increase_the_residual_in_a_film_in_contact(contact, fil
     coupled = Coupled.__new__(Coupled)
     coupled.flow, coupled.solid = flow, solid
     scheme = Monolithic.__new__(Monolithic)
-    scheme.coupled, scheme.residual, scheme._secant = coupled, lambda: np.array([residual, 0.5]), Secant()
-    scheme._predict(0.5, np.array([1.0, 1.0]))
+    residuals = iter([np.array([1.0, 1.0]), np.array([residual, 0.5])])
+    scheme.coupled, scheme.residual, scheme._secant = coupled, lambda: next(residuals), Secant()
+    scheme.follow = lambda: None
+    scheme._predict(0.5)
     back = contact and films and not residual < 1.0
     assert flow.calls == solid.calls == (["predict", 1.0] if back else ["predict"])
 
@@ -47,11 +49,13 @@ def test_predictors_are_taken_back_to_the_start_of_the_step():
         scheme.step(step * DT, DT)
     coupled = scheme.coupled
     coupled.begin_step(3 * DT, DT)
+    scheme.follow()
     scheme.residual()
     before = SimpleNamespace(u=coupled.solid.structure.now.u.copy(), flow=coupled.flow.flow.copy())
     coupled.predict(4 * DT)
     assert abs(coupled.solid.structure.now.u - before.u).max() > 1e-3
     assert abs(coupled.flow.flow - before.flow).max() > 1e-3
+    scheme.follow()
     scheme.residual()
     scheme.retreat(1.0)
     assert coupled.solid.structure.now.u == pytest.approx(before.u, abs=1e-14)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from coupled_case import POST
-from programs import ENVIRONMENT, fsci
+from programs import ENVIRONMENT, fsci, new_process
 
 from coupling.coupled import Coupled
 from fsci.case import load_case
@@ -11,7 +11,7 @@ from fsci.plot.picture import plot_run
 from fsci.run.history import read_history
 from fsci.run.output import read_collection
 from fsci.run.run import FINISHED, run_case
-from solvers.api import StepFailed
+from solvers.api import FailureKind, StepFailed
 
 SCHEMES = {
     "monolithic": "coupling: {scheme: monolithic}",
@@ -161,12 +161,12 @@ def test_a_failed_step_does_not_change_the_state(at, whole, tmp_path, monkeypatc
         def fail_once(self, *arguments, calls=calls, method=method):
             calls.append(1)
             if len(calls) == at:
-                raise StepFailed("test", "on purpose")
+                raise StepFailed("test", FailureKind.NEWTON, "on purpose")
             method(self, *arguments)
 
         with monkeypatch.context() as patched:
             patched.setattr(Coupled, name, fail_once)
-            overrides = ("time.end", "0.08"), ("verify", "[]")
+            overrides = ("time.end", "0.06"), ("verify", "[]")
             histories.append(run(with_scheme(scheme), tmp_path, *overrides))
     one, two = histories
     assert np.allclose(one["dt"][: at + 1], [0.02] * (at - 1) + [0.01] * 2, rtol=1e-12)
@@ -240,7 +240,7 @@ def test_no_matrix_is_kept_from_step_to_step(tmp_path, monkeypatch):
     monkeypatch.setitem(ENVIRONMENT, "PETSC_OPTIONS", f"-log_view :{log}")
     kept = []
     for steps in (1, 3):
-        run = fsci("run", case, "-o", tmp_path / f"{steps}", "--set", f"time.end={0.02 * steps}")
+        run = new_process("run", case, "-o", tmp_path / f"{steps}", "--set", f"time.end={0.02 * steps}")
         assert run.returncode == 0, run.stdout
         line = next(line for line in log.read_text().splitlines() if line.split()[:1] == ["Matrix"])
         created, destroyed = (int(number) for number in line.split()[1:3])

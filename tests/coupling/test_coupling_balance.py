@@ -9,7 +9,7 @@ from coupling_setup import TIGHT, post_in_flow
 from coupling import accelerate
 from coupling.monolithic import Monolithic
 from coupling.partitioned import FixedPointTolerance, Partitioned
-from solvers.fluid.interface import InterfaceTerms
+from solvers.fluid.terms.interface import InterfaceTerms
 from solvers.structure.field import Structure
 
 SCHEMES = {

@@ -7,8 +7,8 @@ import pytest
 from coupling_setup import post_in_flow
 
 from coupling.monolithic import Monolithic
-from solvers.fluid import coupling_entries
-from solvers.fluid.system import FlowSystem
+from solvers.fluid.solve.system import FlowSystem
+from solvers.fluid.terms import coupling_entries
 from solvers.newton import Tolerance
 
 
@@ -24,8 +24,9 @@ def disturbed():
     structure, fluid = coupled.solid.structure, coupled.flow
     structure.now.u += structure.held.free_part(1e-3 * rng.standard_normal(structure.layout.size))
     fluid.move(coupled.interface.move(coupled.interface.displacement()))
-    free = np.flatnonzero(~fluid.held)
+    free = np.flatnonzero(~fluid.iterate.held)
     fluid.flow[free] += 0.1 * rng.standard_normal(len(free))
+    scheme.follow()
     scheme.residual()
     return scheme
 
@@ -39,13 +40,13 @@ def rows(scheme) -> np.ndarray:
     fluid, structure, interface = coupled.flow, coupled.solid.structure, coupled.interface
     d, cut = interface.displacement(), fluid.cut
     cut.motion.v[:] = interface.velocity(d)
-    fluid.system.sweep_velocity = fluid.sweep.velocity(
+    fluid.system.sweep_velocity = fluid.moving.sweep.velocity(
         cut.facets, interface.points + d, cut.motion.v, fluid.current.difference
     )
     fluid.residual()
     coupled.solid.load(coupled.force())
     structure.residual()
-    return np.concatenate([structure.held.free_part(structure.residual_force), fluid.residual_rows])
+    return np.concatenate([structure.held.free_part(structure.residual_force), fluid.iterate.rows])
 
 
 @pytest.fixture
@@ -65,7 +66,7 @@ def split(scheme, rows_of_both) -> tuple[np.ndarray, np.ndarray]:
     """Free rows of the structure and of the fluid."""
     fluid, structure = scheme.coupled.flow, scheme.coupled.solid.structure
     own = structure.layout.size
-    return structure.held.free_part(rows_of_both[:own]), np.where(fluid.held, 0.0, rows_of_both[own:])
+    return structure.held.free_part(rows_of_both[:own]), np.where(fluid.iterate.held, 0.0, rows_of_both[own:])
 
 
 def direction(scheme, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -73,7 +74,7 @@ def direction(scheme, seed: int) -> tuple[np.ndarray, np.ndarray]:
     fluid, structure = scheme.coupled.flow, scheme.coupled.solid.structure
     rng = np.random.default_rng(seed)
     du = structure.held.free_part(rng.standard_normal(structure.layout.size))
-    return du, np.where(fluid.held, 0.0, rng.standard_normal(fluid.unknowns.owned))
+    return du, np.where(fluid.iterate.held, 0.0, rng.standard_normal(fluid.unknowns.owned))
 
 
 def by_matrix(scheme, matrix, du, dw) -> tuple[np.ndarray, np.ndarray]:
@@ -154,7 +155,7 @@ def test_the_force_on_the_structure_is_the_reaction_of_the_fluid():
     coupled.initialise(0.0, 0.02)
     Monolithic(coupled).step(0.0, 0.02)
     fluid = coupled.flow
-    interface, velocity = fluid.system.interface, fluid.unknowns.velocity.dofs.ravel()
+    interface, velocity = fluid.system.assemble_interface(), fluid.unknowns.velocity.dofs.ravel()
     rng = np.random.default_rng(3)
     w, g = rng.standard_normal(fluid.unknowns.local), rng.standard_normal(fluid.cut.motion.v.shape)
     signed = w.copy()

@@ -1,12 +1,14 @@
-"""Impulsive starts of rigid bodies: a body that is thrown into fluid at rest shares its momentum with it at once."""
+"""Impulsive starts: a body that is thrown into fluid at rest shares its momentum with it, and coasts."""
 
 from __future__ import annotations
+
+import math
 
 import pytest
 
 from fsci.case import load_case
 from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.run.run import FINISHED, resume_run, run_case
 
 #: A cylinder of the fluid's density in the middle of a round tank of three times its radius; nothing rubs. The added
 #: mass of the cylinder is (9 + 1) / (9 - 1) of its own (Lamb, Hydrodynamics (1932), section 69), hence 1 / 2.25 of
@@ -33,6 +35,23 @@ output: {{fields_every: 0}}
 """
 
 
+ELASTIC = """\
+structure:
+  dynamics: {{{{rho_inf: {rho_inf}}}}}
+  bodies:
+    cylinder:
+      mesh: {{{{shape: disc, radius: 0.5, cells: [32, 4]}}}}
+      material: {{{{law: neo_hooke, E: {young}, nu: 0.3, density: 1}}}}
+      initial_velocity: [0.1, 0]
+      slip_length: 1e6
+coupling: {{{{scheme: monolithic}}}}
+probes:
+  p: {{{{body: cylinder, quantity: momentum}}}}
+  m: {{{{body: cylinder, quantity: mass}}}}
+output: {{{{fields_every: 0}}}}
+"""
+
+
 def speeds(folder, text, name="v.x"):
     (folder / "case.yaml").write_text(text)
     assert run_case(load_case(folder / "case.yaml"), folder / "run") == FINISHED
@@ -40,19 +59,124 @@ def speeds(folder, text, name="v.x"):
 
 
 @pytest.mark.parametrize(
-    ("scheme", "coupling", "step"),
+    ("scheme", "coupling", "step", "steps"),
     [
-        ("bdf2", "monolithic", 0.02),
-        ("bdf2", "monolithic", 0.005),
-        ("bdf2", "partitioned", 0.02),
-        ("bdf2_optimized", "monolithic", 0.02),
-        ("backward_euler", "monolithic", 0.02),
+        ("bdf2", "monolithic", 0.02, 12),
+        ("bdf2", "monolithic", 0.002, 16),
+        ("bdf2", "partitioned", 0.02, 4),
+        ("bdf2_optimized", "monolithic", 0.02, 8),
+        ("backward_euler", "monolithic", 0.02, 8),
     ],
 )
-def test_cylinder_in_a_round_tank(tmp_path, scheme, coupling, step):
-    """Without the impulse, its velocity swings by 30 % and ends 23 % too low with BDF2."""
-    text = CYLINDER.format(step=step, end=4 * step, scheme=scheme, coupling=coupling, x=0.0)
-    assert speeds(tmp_path, text) == pytest.approx([0.1 / 2.25] * 4, rel=0.005)
+def test_cylinder_in_a_round_tank(tmp_path, scheme, coupling, step, steps):
+    """Without the impulse, its velocity swings by 30 % and ends 23 % too low with BDF2.
+
+    Penalties that grow with 1 / dt took 0.06 % of it in each step, whatever the step.
+    """
+    text = CYLINDER.format(step=step, end=steps * step, scheme=scheme, coupling=coupling, x=0.0)
+    found = speeds(tmp_path, text)
+    assert len(found) == steps
+    assert found == pytest.approx(0.1 / 2.25, rel=0.002)
+
+
+@pytest.mark.parametrize(("young", "rho_inf"), [(1e4, 0.0), (1e6, 0.8)])
+def test_elastic_cylinder(tmp_path, young, rho_inf):
+    """Steps do not resolve its waves. Its mean velocity ended 19 % too low."""
+    head, _ = CYLINDER.split("    cylinder:\n")
+    text = head + ELASTIC.format(young=young, rho_inf=rho_inf)
+    text = text.format(step=0.02, end=0.24, scheme="bdf2")
+    momentum = speeds(tmp_path, text, "p.x")
+    mass = read_history(tmp_path / "run" / "history.csv")["m"][0]
+    assert momentum / mass == pytest.approx(0.1 / 2.25, rel=0.02)
+    assert momentum[4:].mean() / mass == pytest.approx(0.1 / 2.25, rel=0.004)
+
+
+def test_elastic_cylinder_is_resumed(tmp_path):
+    """Behind the step that takes the impulse."""
+    head, _ = CYLINDER.split("    cylinder:\n")
+    text = (head + ELASTIC.format(young=1e4, rho_inf=0.5)).replace("cells: [40, 40]", "cells: [20, 20]")
+    whole = speeds(tmp_path, text.format(step=0.02, end=0.06, scheme="bdf2"), "p.x")
+    (tmp_path / "parts").mkdir()
+    speeds(tmp_path / "parts", text.format(step=0.02, end=0.02, scheme="bdf2"), "p.x")
+    assert resume_run(tmp_path / "parts" / "run", [("time.end", "0.06")]) == FINISHED
+    assert (read_history(tmp_path / "parts" / "run" / "history.csv")["p.x"] == whole).all()
+
+
+@pytest.mark.parametrize("scheme", ["bdf2", "bdf2_optimized", "backward_euler"])
+def test_steps_that_change_while_it_coasts(tmp_path, scheme):
+    """By a factor of 1/50, as after many retries."""
+    text = CYLINDER.format(step=0.02, end=0.1, scheme=scheme, coupling="monolithic", x=0.0)
+    speeds(tmp_path, text)
+    assert resume_run(tmp_path / "run", [("time.end", "0.104"), ("time.step", "0.0004")]) == FINISHED
+    found = read_history(tmp_path / "run" / "history.csv")["v.x"]
+    assert len(found) == 15
+    assert found == pytest.approx(0.1 / 2.25, rel=0.002)
+    assert found[5:] == pytest.approx(found[4], rel=2e-4)
+
+
+@pytest.mark.parametrize("scheme", ["bdf2", "bdf2_optimized", "backward_euler"])
+def test_load_in_the_middle_of_a_run(tmp_path, scheme):
+    """A push of two steps gives the momentum of 0.1 m/s to a cylinder that coasts. The step hardly resolves it."""
+    gravity = 'gravity: ["where(abs(t - 0.12) < 0.02, 5 * (1 - abs(t - 0.12) / 0.02), 0)", 0]'
+    text = CYLINDER.replace("density: 1, initial", gravity.replace("{", "{{") + ", density: 1, initial")
+    found = speeds(tmp_path, text.format(step=0.02, end=0.48, scheme=scheme, coupling="monolithic", x=0.0))
+    assert found[:5] == pytest.approx(0.1 / 2.25, rel=0.002)
+    assert found[-4:] == pytest.approx(0.2 / 2.25, rel=0.004)
+
+
+@pytest.mark.parametrize(("scheme", "swing"), [("bdf2", 4), ("bdf2_optimized", 6), ("backward_euler", 2)])
+def test_motion_that_jumps_in_the_middle_of_a_run(tmp_path, scheme, swing):
+    """The impulses of some steps swing; they add up to that of the added mass, and then there is no force."""
+    head, _ = CYLINDER.split("coupling:")
+    moved = """motion: {{displacement: ["where(t < 0.11, 0, 0.1 * (t - 0.11))", 0]}}"""
+    text = head.replace("free: {{density: 1, initial_velocity: [0.1, 0]}}", moved)
+    text = text.format(step=0.02, end=0.3, scheme=scheme, x=0.0)
+    text += "probes: {f: {body: cylinder, quantity: force}}\noutput: {fields_every: 0}\n"
+    impulses = -0.02 * speeds(tmp_path, text, "f.x") / (math.pi * 0.5**2 * 1.25 * 0.1)
+    assert impulses.sum() == pytest.approx(1.0, rel=0.005)
+    assert abs(impulses[:5]).max() < 1e-6
+    assert abs(impulses[5 + swing :]).max() < 0.02
+
+
+@pytest.mark.parametrize("step", [0.02, 0.005])
+def test_motion_that_starts_with_a_jump(tmp_path, step):
+    """The impulse of the fluid on it is that of its added mass, and then there is no force."""
+    head, _ = CYLINDER.split("coupling:")
+    text = head.replace("free: {{density: 1, initial_velocity: [0.1, 0]}}", 'motion: {{displacement: ["0.1*t", 0]}}')
+    text = text.format(step=step, end=8 * step, scheme="bdf2", x=0.0)
+    text += "probes: {f: {body: cylinder, quantity: force}}\noutput: {fields_every: 0}\n"
+    impulses = -step * speeds(tmp_path, text, "f.x") / (math.pi * 0.5**2 * 1.25 * 0.1)
+    assert impulses[0] == pytest.approx(1.0, rel=0.01)
+    assert impulses.sum() == pytest.approx(1.0, rel=0.005)
+    assert abs(impulses[4:]).max() < 3e-4
+
+
+#: A quarter of a ball in the middle of a hollow one of twice its radius, hence with a quarter of its density. Its added
+#: mass is (b^3 + 2 a^3) / (b^3 - a^3) / 2 = 5 / 7 of the fluid's that it displaces (Lamb, Hydrodynamics, section 93).
+BALL_IN_BALL = """\
+title: Ball thrown into fluid at rest
+time: {step: 0.02, end: 0.08}
+fluid:
+  density: 1
+  viscosity: 1e-6
+  scheme: bdf2
+  grid: {from: [-1.07, 0, 0], to: [1.07, 1.07, 1.07], cells: [18, 9, 9]}
+  patches: {box: {on: [x-, x+, y-, y+, z-, z+], slip: true}}
+  bodies:
+    tank: {mesh: {shape: hollow_sphere, inner_radius: 1, outer_radius: 2, cells: [12, 1]}, slip_length: 1e6}
+    ball:
+      mesh: {shape: sphere, radius: 0.5, cells: [10, 1]}
+      slip_length: 1e6
+      free: {density: 0.25, initial_velocity: [0.1, 0, 0], held: [y, z, rotation_x, rotation_y, rotation_z]}
+coupling: {scheme: monolithic}
+probes:
+  v: {body: ball, quantity: velocity, at: [0, 0, 0]}
+output: {fields_every: 0}
+"""
+
+
+def test_ball_in_a_ball(tmp_path):
+    assert speeds(tmp_path, BALL_IN_BALL) == pytest.approx(0.1 / (1.0 + 5.0 / 7.0), rel=0.005)
 
 
 BALL = """\

@@ -11,7 +11,7 @@ from coupling.start import NO_BALANCE, start_together
 from fsci.case import load_case
 from fsci.run.history import read_history
 from fsci.run.run import FINISHED, run_case
-from solvers.api import StepFailed
+from solvers.api import FailureKind, StepFailed
 
 #: A disc of the density of the fluid is let go. Waves cross it in 0.01 s, less than most steps.
 DISC = """\
@@ -102,16 +102,17 @@ def test_a_rigid_disc_starts_smoothly(tmp_path):
 
 
 def test_flows_that_start_at_once_have_no_acceleration():
-    """A body that moves in fluid at rest; a body at rest in such a fluid may be given one."""
+    """A body that moves in fluid at rest; a body at rest in such a fluid may be given one. Rounding is no jump."""
     coupled = bar_and_column(1.0)
     coupled.initialise(0.0, 0.1)
     assert coupled.start is not None
     at_rest = coupled.start.solid.velocity()
-    assert not coupled.start.flow.at_once(coupled.interface.at_start(at_rest))
+    assert coupled.start.flow.jump(coupled.interface.at_start(at_rest), 0.0) == 0.0
     coupled.solid.structure.now.v[:] = 1e-3
     moving = coupled.start.solid.velocity()
     assert np.array_equal(moving, at_rest + 1e-3)
-    assert coupled.start.flow.at_once(coupled.interface.at_start(moving))
+    assert coupled.start.flow.jump(coupled.interface.at_start(moving), 0.0) == pytest.approx(1e-3)
+    assert coupled.start.flow.jump(coupled.interface.at_start(moving), 2e3) == 0.0
 
 
 @pytest.mark.parametrize(("growth", "at_once"), [(lambda t: 1.0, True), (lambda t: t / 0.1, False)])
@@ -127,7 +128,7 @@ def test_a_start_without_balance_is_told():
     """The state is the initial one, and the first step says so once."""
 
     def fail():
-        raise StepFailed("fluid", "no balance")
+        raise StepFailed("fluid", FailureKind.NEWTON, "no balance")
 
     scheme = Monolithic(post_in_flow(growth=lambda t: t / 0.1), TIGHT)
     scheme.coupled.initialise(0.0, 0.01)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from advised import require_explained
 
 from fsci.case import load_case
 from fsci.run.history import read_history
 from fsci.run.run import FAILED, FINISHED, run_case
+from solvers.api import FailureKind
 
 #: A block pressed on the floor by 5 Pa, in water at rest whose pressure falls to -10 Pa.
 BLOCK = """\
@@ -51,6 +53,7 @@ def test_without_a_state_the_failure_says_why(tmp_path, capsys, scheme):
     words = said.out + said.err
     assert "below zero pulls at bodies that are dry where they touch" in words
     assert "'contact.film.zone: wetted' gives closed contact the pressure around it" in words
+    require_explained(tmp_path / "run", FailureKind.SUCTION)
 
 
 @pytest.mark.parametrize(("zone", "pull"), [("wetted", 10), ("dry", 3)])

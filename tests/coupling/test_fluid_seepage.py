@@ -10,9 +10,9 @@ from test_fsci_lubrication import SETTLING
 
 from fsci.case import CaseError, load_case
 from fsci.run.history import read_history
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.closed_contact import seepage
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms import seepage
+from solvers.fluid.terms.boundary.patches import Patch
 
 KAPPA, MU = 1e-3, 0.7
 
@@ -30,7 +30,7 @@ def test_volume_rows_of_a_linear_pressure(element):
     along = np.array([np.cos(0.4), np.sin(0.4)])
     length = fluid.cut.pieces.mass.sum()
     expected = KAPPA / MU * (along @ [2, 1]) * (along @ [-1, 3]) * length
-    assert q @ fluid.system.interface.cell_blocks[0].rows(p) == pytest.approx(expected, rel=1e-10)
+    assert q @ fluid.system.assemble_interface().cell_blocks[0].rows(p) == pytest.approx(expected, rel=1e-10)
 
 
 def test_films_of_the_references():

@@ -12,13 +12,13 @@ from mpi4py import MPI
 from fsci import shapes
 from fsci.builder.build import build
 from fsci.case import load_case
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.bodies.immersed import ImmersedBody
-from solvers.fluid.bodies.surface import ImmersedSurface, Motion
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.closed_contact import zone
-from solvers.fluid.closed_contact.zone import stiffness, stiffness_by_motion
-from solvers.tessellation import area_vectors, tessellate
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.surfaces.immersed import ImmersedBody
+from solvers.fluid.surfaces.surface import ImmersedSurface, Motion
+from solvers.fluid.terms.boundary.patches import Patch
+from solvers.fluid.terms.closed_contact import zone
+from solvers.fluid.terms.closed_contact.zone import stiffness, stiffness_by_motion
+from solvers.mesh.tessellation import area_vectors, tessellate
 from solvers.timing import Timer
 
 PRESSURE = 7.0
@@ -82,7 +82,7 @@ def test_pressure_of_the_zone(dim):
     fluid, points, facets, floor = block_on_floor(dim)
     slope = np.array([2.0, -1.0, 0.0])[: dim - 1]
     set_pressure(fluid, lambda x: 3.0 + x[:, :-1] @ slope)
-    found = fluid.system.zone
+    found = fluid.system.assemble_zone()
     at = found.facets.vertices
     on_floor = np.isin(at, facets[floor])
     assert found.pressure(fluid.flow)[on_floor] == pytest.approx(3.0 + points[at[on_floor], :-1] @ slope, rel=1e-4)
@@ -126,7 +126,7 @@ def test_derivatives_of_the_force(dim):
         return moved.system.zone_force()
 
     set_pressure(fluid, lambda x: 3.0 + x @ slope)
-    closed, h = fluid.system.zone, 1e-5
+    closed, h = fluid.system.assemble_zone(), 1e-5
     at, number = closed.facets.vertices, np.full(len(points), -1)
     number[at] = np.arange(len(at))
 
@@ -155,7 +155,7 @@ def test_force_is_continuous_when_contact_closes(gap):
     grid = uniform([0, 0], [1, 1], [10, 10])
     fluid = make_fluid(grid, [*sides, Patch("bottom", ("y-",), "no_slip")], [rigid], scheme="steady")
     solve_steady(fluid)
-    assert (fluid.system.zone is None) == (gap > 1e-6 * h)
+    assert (fluid.system.assemble_zone() is None) == (gap > 1e-6 * h)
     assert fluid.force()["block"].sum(axis=0) == pytest.approx([0.0, 0.0], abs=1e-7 if gap > 0 else 1e-10)
 
 

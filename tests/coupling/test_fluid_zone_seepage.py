@@ -11,12 +11,12 @@ from test_coupled_run import MEETING, run
 
 from fsci.case import CaseError, load_case
 from fsci.run.history import read_history
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.balances import seepage
-from solvers.fluid.bodies.immersed import ImmersedBody
-from solvers.fluid.bodies.surface import ImmersedSurface, Motion
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.probes import flow_rate
+from solvers.fluid.flow.balances import seepage
+from solvers.fluid.flow.probes import flow_rate
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.surfaces.immersed import ImmersedBody
+from solvers.fluid.surfaces.surface import ImmersedSurface, Motion
+from solvers.fluid.terms.boundary.patches import Patch
 
 KAPPA, MU, INSIDE, OUTSIDE = 1e-7, 0.5, 3.0, 1.0
 
@@ -71,7 +71,7 @@ def test_seal_in_a_channel():
     assert seepage(fluid.system) == pytest.approx(expected, rel=5e-3)
     assert flow_rate(fluid)(["right"]) == pytest.approx(expected, rel=5e-3)
     assert flow_rate(fluid)(["left"]) == pytest.approx(-expected, rel=5e-3)
-    zone = fluid.system.zone
+    zone = fluid.system.assemble_zone()
     x = fluid.cut.motion.x[zone.facets.vertices]
     below = x[:, 1] == 0.0
     linear = INSIDE + (OUTSIDE - INSIDE) * (x[below, 0] - 0.33) / 0.43
@@ -96,7 +96,7 @@ def test_annular_seal():
     expected = 2.0 * np.pi * KAPPA * (INSIDE - OUTSIDE) / (MU * np.log(b / a))
     assert seepage(fluid.system) == pytest.approx(expected, rel=0.01)
     assert flow_rate(fluid)(["outside"]) == pytest.approx(expected, rel=0.01)
-    zone = fluid.system.zone
+    zone = fluid.system.assemble_zone()
     x = fluid.cut.motion.x[zone.facets.vertices]
     below = x[:, 2] == 0.0
     r = np.hypot(*x[below, :2].T)
@@ -107,7 +107,7 @@ def test_annular_seal():
 def test_tangent():
     """The rows are linear in the pressure: their matrix times a pressure, and no sum over all rows."""
     fluid = channel()
-    terms, unknowns = fluid.system.seepage, fluid.unknowns
+    terms, unknowns = fluid.system.assemble_seepage(), fluid.unknowns
     p, rows = np.zeros(len(fluid.flow)), np.zeros(len(fluid.flow))
     dofs = unknowns.pressure.dofs[:, 0]
     p[dofs] = np.random.default_rng(0).standard_normal(len(dofs))

@@ -10,8 +10,8 @@ from fluid_setup import block, body, field, make_fluid, solve_steady
 from programs import fsci
 
 from fsci.run.history import read_history
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
 
 PRESSURE = 7.0
 

@@ -36,6 +36,6 @@ def test_piston_with_impact(tmp_path):
     assert len(t) == 720
     stop = (contact[last + 1 :] * history["dt"][last + 1 :]).sum() - (t[-1] - t[last])
     assert stop == pytest.approx(IMPULSE, rel=5e-4)
-    assert contact[-1] == pytest.approx(1.0, rel=1e-8)
-    assert pressure[-1] == pytest.approx(1.0, rel=1e-8)
-    assert np.abs(v[-1]) < 1e-12
+    assert contact[-1] == pytest.approx(1.0, rel=1e-6)
+    assert pressure[-1] == pytest.approx(1.0, rel=1e-6)
+    assert np.abs(v[-1]) < 1e-11

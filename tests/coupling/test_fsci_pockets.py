@@ -12,9 +12,9 @@ from coupling.accelerate import Aitken
 from coupling.monolithic import Monolithic
 from coupling.partitioned import FixedPointTolerance, Partitioned
 from fsci import shapes
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.flow_settings import FlowSettings
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.settings.flow_settings import FlowSettings
+from solvers.fluid.terms.boundary.patches import Patch
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Body, Symmetry
 from solvers.structure.dynamics import Dynamics
@@ -151,6 +151,6 @@ def test_relaxation_alone_keeps_the_level():
     scheme = Partitioned(coupled, Aitken(0.5), FixedPointTolerance(1e-6))
     scheme.initialise(0.0, 0.01)
     assert scheme.step(0.0, 0.01).iterations <= 20
-    hold = coupled.flow.levels._holds[0]
+    hold = coupled.flow.parts.levels._holds[0]
     mean = hold.shares @ coupled.flow.flow[: len(hold.shares)]
     assert abs(mean) < 1e-3 * np.abs(behind(coupled)).max()  # the shares of the nodes change as the plug moves

@@ -86,7 +86,7 @@ def velocities(folder) -> tuple[float, float]:
     return float(down), float(up)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=180)
 def test_rebound_at_high_stokes_number(tmp_path):
     """St 131: the ball comes back. Known and documented: slower than by theory (0.82) and experiments (0.77)."""
     run_whole("rebound_stokes", tmp_path, timeout=2400)

@@ -75,7 +75,7 @@ def impact(folder: Path, **changes: str) -> tuple[float, float, float]:
     return float(contact), force.max(), step * force.sum()
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=130)
 def test_time_force_and_impulse_by_the_grid(tmp_path):
     """Cells, facets and step at two thirds: 1.3, 3.2, 1.5 %. Two grids finer than both are in verification_fsci.md."""
     coarse, fine = impact(tmp_path / "coarse", **COARSER), impact(tmp_path / "fine")

@@ -80,7 +80,7 @@ def test_dry_contact_depends_on_the_facets(rough, tmp_path):
     assert force > 1.25 * rough[1]
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=65)
 def test_time_force_and_impulse_converge(rough, tmp_path):
     """Cells, facets and step at two thirds: time and force within 3 %, the whole impulse within 5 % (the next one 1 %).
 

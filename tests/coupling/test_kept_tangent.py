@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from coupled_case import post
 from mpi4py import MPI
+from small_scenes import BEAM, BLOCK, FLOW
 
 from coupling.monolithic import Monolithic
-from fsci.bench.small import BEAM, BLOCK, FLOW
 from fsci.builder.build import build
 from fsci.case import load_case
-from solvers.fluid.field import Fluid
-from solvers.fluid.system import FlowSystem
+from solvers.fluid.flow.field import Fluid
+from solvers.fluid.solve.system import FlowSystem
 from solvers.structure.field import Structure
 from solvers.structure.tangent import Tangent
 from solvers.timing import Timer

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from fsi1_cells import grid_fsi1
 from mpi4py import MPI
 
-from fsci.bench.families import grid_fsi1
 from fsci.builder.build import build
 from fsci.case import load_case
 from solvers.timing import Timer

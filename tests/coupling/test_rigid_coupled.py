@@ -10,10 +10,10 @@ from coupling import couple_rigid
 from coupling.accelerate import QuasiNewton
 from coupling.monolithic import Monolithic
 from coupling.partitioned import FixedPointTolerance, Partitioned
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.bodies.immersed import rigid_body
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.flow_settings import FlowSettings
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.settings.flow_settings import FlowSettings
+from solvers.fluid.surfaces.immersed import rigid_body
+from solvers.fluid.terms.boundary.patches import Patch
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.march import march
 from solvers.newton import Tolerance
@@ -63,8 +63,8 @@ def test_both_schemes_agree():
 
 def test_blocks_against_finite_differences(monkeypatch):
     """With the cut held: velocity and force of the surface follow the unknowns, its place does not."""
-    from solvers.fluid import coupling_entries
-    from solvers.fluid.system import FlowSystem
+    from solvers.fluid.solve.system import FlowSystem
+    from solvers.fluid.terms import coupling_entries
 
     coupled = swimming(gravity=(0.3, -1.0), springs=[PointSpring((0.6, 0.55), 3.0)], initial_spin=(0.0, 0.0, 1.0))
     scheme = Monolithic(coupled)
@@ -77,8 +77,9 @@ def test_blocks_against_finite_differences(monkeypatch):
     start[:, bodies.components] = 1e-3 * rng.standard_normal(3)
     bodies.set_increments(start)
     fluid.move(interface.move(interface.displacement()))
-    free = np.flatnonzero(~fluid.held)
+    free = np.flatnonzero(~fluid.iterate.held)
     fluid.flow[free] += 0.1 * rng.standard_normal(len(free))
+    scheme.follow()
     scheme.residual()
 
     def rows(increment):
@@ -86,13 +87,13 @@ def test_blocks_against_finite_differences(monkeypatch):
         bodies.update(increment)
         d, cut = interface.displacement(), fluid.cut
         cut.motion.v[:] = interface.velocity(d)
-        fluid.system.sweep_velocity = fluid.sweep.velocity(
+        fluid.system.sweep_velocity = fluid.moving.sweep.velocity(
             cut.facets, interface.points + d, cut.motion.v, fluid.current.difference
         )
         fluid.residual()
         bodies.load(coupled.force())
         bodies.residual()
-        return np.concatenate([bodies.balance, fluid.residual_rows])
+        return np.concatenate([bodies.balance, fluid.iterate.rows])
 
     rows(np.zeros(3))
     with_shape = coupling_entries.shape_derivatives
@@ -105,7 +106,7 @@ def test_blocks_against_finite_differences(monkeypatch):
     monkeypatch.setattr(FlowSystem, "shape_derivatives", lambda *_, **__: None)
     matrix = scheme.blocks().assembled()
     flow, h = fluid.flow.copy(), 1e-6
-    du, dw = rng.standard_normal(3), np.where(fluid.held, 0.0, rng.standard_normal(fluid.size))
+    du, dw = rng.standard_normal(3), np.where(fluid.iterate.held, 0.0, rng.standard_normal(fluid.size))
     x, y = matrix.createVecs()
     x.array[:] = np.concatenate([du, dw])
     matrix.mult(x, y)
@@ -114,7 +115,7 @@ def test_blocks_against_finite_differences(monkeypatch):
         fluid.flow[:] = flow + sign * h * dw
         values.append(rows(sign * h * du))
     difference = (values[0] - values[1]) / (2.0 * h)
-    derivative = np.concatenate([y.array[:3], np.where(fluid.held, 0.0, y.array[3:])])
+    derivative = np.concatenate([y.array[:3], np.where(fluid.iterate.held, 0.0, y.array[3:])])
     for part in (slice(0, 3), slice(3, None)):
         error = np.linalg.norm((difference - derivative)[part]) / np.linalg.norm(derivative[part])
         assert error < 1e-6
@@ -161,7 +162,7 @@ def test_a_rigid_disc_lands_in_a_flow():
     lowest = {}
     for name, make in SCHEMES.items():
         floor = Obstacle("floor", np.array([[1.0, 0.25], [0.0, 0.25]]), np.array([[0, 1]]))
-        contact = RigidContact([RigidPair(0, 24, floor)], 3)
+        contact = RigidContact([disc(gravity=(0.0, -10.0))], [RigidPair(0, floor)])
         coupled = swimming("backward_euler", 0.0, patches=OPEN, mu=0.05, contact=contact, gravity=(0.0, -10.0))
         for _ in march(make(coupled), 0.3, 15):
             height = coupled.solid.displacement()[:, 1] + coupled.solid.bodies[0].points[:, 1]

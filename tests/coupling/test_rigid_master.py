@@ -77,13 +77,13 @@ def test_it_turns(tmp_path):
 
 
 def test_the_program_finds_it(tmp_path):
-    """`bodies: all` asks for pairs with rigid bodies of the flow, too, and `check` lists them."""
+    """`bodies: all` asks for pairs with rigid bodies and walls of the flow, too, and `check` lists them."""
     path = tmp_path / "case.yaml"
     path.write_text(with_section(RAM, "contact: {bodies: all}\n", "contact"))
-    (found,) = with_pairs(load_case(path)).contact.pairs.values()
+    found = with_pairs(load_case(path)).contact.pairs.values()
     path.write_text(RAM)
     (named,) = load_case(path).contact.pairs.values()
-    assert (found.slave, found.master) == (named.slave, named.master)
+    assert (named.slave, named.master) in [(pair.slave, pair.master) for pair in found]
     path.write_text(
         RAM.replace("pairs:\n    press: {slave: {body: block, on: top}, master: {obstacle: ram}}", "bodies: all")
     )

@@ -57,7 +57,12 @@ def test_the_slit_alone_leaks(tmp_path):
 
 @pytest.mark.parametrize(
     ("scheme", "seal"),
-    [("monolithic", 0.51 * SLIT), ("monolithic", 5 * SLIT), ("monolithic", 50 * SLIT), ("partitioned", SLIT)],
+    [
+        ("monolithic", 0.51 * SLIT),
+        pytest.param("monolithic", 5 * SLIT, marks=pytest.mark.slow),
+        ("monolithic", 50 * SLIT),
+        ("partitioned", SLIT),
+    ],
 )
 def test_a_layer_on_both_ends_closes_it(tmp_path, scheme, seal):
     """Nothing passes, and the plates carry the pressure of 1 Pa over the height of 1 m, whatever the thickness."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from fsi1_cells import grid_fsi1
 from mpi4py import MPI
 
 from coupling.secant import Secant
-from fsci.bench.families import grid_fsi1
 from fsci.builder.build import build
 from fsci.case import load_case
 from solvers.timing import Timer

@@ -56,7 +56,7 @@ def test_flap_that_closes_a_duct(tmp_path):
     assert np.abs(history["interface.momentum"]).max() < 1e-8
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=120)
 def test_resumed_in_contact_and_on_two_processes(tmp_path):
     """A run that goes on two steps after the first contact is the same bit for bit; on two processes to 1e-8."""
     (tmp_path / "case.yaml").write_text(CASE)

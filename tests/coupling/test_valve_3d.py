@@ -10,7 +10,7 @@ from programs import run_whole
 from fsci.run.history import read_history
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=900)
 def test_valve_3d(tmp_path):
     """Closed, each cusp carries the pressure on a third of the tube, whose cross-section is a polygon of 48 sides."""
     run_whole("valve_3d", tmp_path, timeout=2400)

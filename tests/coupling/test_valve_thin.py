@@ -16,7 +16,8 @@ def test_valve_thin(tmp_path):
     history = read_history(tmp_path / "history.csv")
     time, flow = history["time"], history["flow"]
     touching = time[history["contact.active"] > 0]
-    assert 2.2 < touching[0] < touching[-1] < 3.8
+    assert touching[0] == pytest.approx(2.2, abs=0.1)
+    assert touching[-1] == pytest.approx(3.8, abs=0.1)
     closed = (time > 3.0) & (time < 3.5)
     assert np.abs(flow[closed]).max() < 1e-3 * flow[time < 2.0].max()
     # the pressure from the right is carried by the leaflets

@@ -37,6 +37,7 @@ def update(active_set, pressure, gap, covered=ALL, c=ONE):
         touching=0.0 * one,
         slip=0.0 * z,
         slip_defined=covered,
+        shares=np.zeros((1, 1)),
     )
     active_set.choose(Frictionless().status(point))
     return active_set.active.tolist()

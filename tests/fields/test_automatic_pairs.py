@@ -8,7 +8,7 @@ from fsci.builder.automatic_pairs import with_pairs
 from fsci.case import CaseError, load_case
 from fsci.run.history import read_history
 from fsci.run.run import FINISHED, run_case
-from solvers.search import Search
+from solvers.mesh.search import Search
 
 #: A soft block between two stiff ones, and a rigid floor below.
 STACK = """\
@@ -51,6 +51,21 @@ def write(folder, contact):
 def run(folder, contact):
     assert run_case(load_case(write(folder, contact)), folder / "out") == FINISHED
     return read_history(folder / "out" / "history.csv")
+
+
+def test_an_obstacle_that_moves_by_a_formula(tmp_path):
+    """The same as with named pairs: formulas are not sent between processes."""
+    text = STACK.replace("on: top}\nprobes", 'on: top, motion: [0, "0.05*t"]}\nprobes')
+    assert text != STACK
+    histories = []
+    for name, contact in (("all", "bodies: all\n  reach: 0.5"), ("named", NAMED)):
+        path = write(tmp_path / name, contact)
+        path.write_text(text.replace("CONTACT", contact))
+        assert run_case(load_case(path), tmp_path / name / "out") == FINISHED
+        histories.append(read_history(tmp_path / name / "out" / "history.csv"))
+    assert histories[0]["soft.y"][-1] != histories[0]["soft.y"][0]
+    for axis in "xy":
+        assert histories[0][f"soft.{axis}"] == pytest.approx(histories[1][f"soft.{axis}"], rel=1e-9)
 
 
 def test_three_bodies_and_a_floor(tmp_path):
@@ -187,3 +202,80 @@ def test_mistakes_are_named(name, tmp_path):
     with pytest.raises(CaseError) as caught:
         with_pairs(load_case(path))
     assert message in str(caught.value)
+
+
+#: Contact of the stack -> frictions of the pairs floor, bottom and top: a coefficient, the text of a bound, or None.
+OTHER = "soft_top: {slave: {body: soft, on: top}, master: {body: high, on: bottom}"
+FRICTIONS = {
+    "none": (NAMED, (None, None, None)),
+    "default": (f"friction: {{coefficient: 0.3}}\n  {NAMED}", (0.3, 0.3, 0.3)),
+    "one has none": (f"friction: {{coefficient: 0.3}}\n  {NAMED[:-1]}, friction: none}}", (0.3, 0.3, None)),
+    "one is empty": (f"friction: {{coefficient: 0.3}}\n  {NAMED[:-1]}, friction: {{}}}}", (0.3, 0.3, None)),
+    "one has its own": (f"friction: {{coefficient: 0.3}}\n  {NAMED[:-1]}, friction: {{bound: 2}}}}", (0.3, 0.3, "2")),
+    "one alone": (f"{NAMED[:-1]}, friction: {{coefficient: 0.2}}}}", (None, None, 0.2)),
+    "one is tied": (f"friction: {{coefficient: 0.3}}\n  {NAMED[:-1]}, tied: true}}", (0.3, 0.3, None)),
+    "the default is none": (f"friction: none\n  {NAMED[:-1]}, friction: {{coefficient: 0.2}}}}", (None, None, 0.2)),
+    "found": ("friction: {bound: 2}\n  bodies: all\n  reach: 0.5", ("2", "2", "2")),
+    "found and named": (
+        f"bodies: all\n  reach: 0.5\n  friction: {{bound: 2}}\n  pairs: {{{OTHER}, friction: none}}}}",
+        ("2", "2", None),
+    ),
+    "found and named by the default": (
+        f"bodies: all\n  reach: 0.5\n  friction: {{bound: 2}}\n  pairs: {{{OTHER}}}}}",
+        ("2", "2", "2"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FRICTIONS)
+def test_friction_by_pair_with_a_default(name, tmp_path):
+    """A pair has its own friction, `none` is no friction, without one it has that of `contact`."""
+    contact, wanted = FRICTIONS[name]
+    pairs = with_pairs(load_case(write(tmp_path, contact))).contact.pairs
+    found = {}
+    for pair in pairs.values():
+        sides = pair.slave.body, pair.master.body or pair.master.obstacle
+        law = None if pair.law in ("frictionless", "tied") else pair.law_parameters[0]
+        found[sides] = f"{law:g}" if pair.law == "tresca" else law
+    assert tuple(found[key] for key in (("low", "floor"), ("soft", "low"), ("soft", "high"))) == wanted
+
+
+def test_a_default_is_the_friction_that_each_pair_would_have(tmp_path):
+    """Bit for bit, and other than without friction."""
+    every = NAMED.replace("}}", "}, friction: {coefficient: 0.4}}")
+    one, other = run(tmp_path / "one", f"friction: {{coefficient: 0.4}}\n  {NAMED}"), run(tmp_path / "other", every)
+    without = run(tmp_path / "without", f"friction: none\n  {NAMED}")
+    for column in ("soft.x", "soft.y", "contact.soft_top.y", "contact.friction"):
+        assert np.array_equal(one[column], other[column])
+    assert abs(one["soft.x"][-1]) < 0.99 * abs(without["soft.x"][-1])
+    assert "contact.friction" not in without
+
+
+def test_frictions_of_one_slave(tmp_path):
+    """A pair of the case and one that is found have the same slave: each has its own friction."""
+    named = "{p: {slave: {body: soft, on: bottom}, master: {obstacle: floor}, friction: none}}"
+    path = write(tmp_path, f"bodies: all\n  friction: {{bound: 2}}\n  pairs: {named}")
+    pairs = with_pairs(load_case(path)).contact.pairs
+    assert pairs["p"].law == "frictionless"
+    assert pairs["soft_bottom_low_top"].law == "tresca"
+
+
+def test_the_slave_of_a_tie_is_no_slave_of_contact(tmp_path):
+    """The pair that is found has the other surface as slave, as multipliers of ties have no gap."""
+    named = "{p: {slave: {body: soft, on: bottom}, master: {obstacle: floor}, tied: true}}"
+    pairs = with_pairs(load_case(write(tmp_path, f"bodies: all\n  pairs: {named}"))).contact.pairs
+    slaves = [(pair.slave.body, pair.slave.on) for name, pair in pairs.items() if name != "p"]
+    assert ("soft", ("bottom",)) not in slaves
+    assert pairs["low_top_soft_bottom"].law == "frictionless"
+
+
+def test_verify_knows_the_columns_of_friction_by_default(tmp_path):
+    check = "verify: [{value: contact.friction, reference: 0, absolute: 1}]\n"
+    for friction, known in (("{coefficient: 0.3}", True), ("none", False)):
+        path = write(tmp_path, f"friction: {friction}\n  {NAMED}")
+        path.write_text(path.read_text() + check)
+        if known:
+            load_case(path)
+        else:
+            with pytest.raises(CaseError, match=r"contact\.friction"):
+                load_case(path)

@@ -6,8 +6,8 @@ import ufl
 from structure_setup import CELL_TYPES, block, constant, distort, make_structure
 
 from solvers import fem
-from solvers.blocks import block_diagonal
-from solvers.petsc_blocks import block_rows, join_entries
+from solvers.algebra.blocks import block_diagonal
+from solvers.algebra.petsc_blocks import block_rows, join_entries
 from solvers.structure import forms
 from solvers.structure.block_assembly import BlockAssembly
 from solvers.structure.body import Pressure

@@ -6,9 +6,9 @@ from fluid_setup import block, sphere
 from thin_space import turn
 
 from solvers import kernels
-from solvers.fluid.background.grid import Grid, uniform
-from solvers.fluid.thin.cell_regions import SpaceRegion, cell_regions
-from solvers.gauss import gauss
+from solvers.fluid.geometry.regions.cell_regions import SpaceRegion, cell_regions
+from solvers.fluid.grid.box import Grid, uniform
+from solvers.mesh.gauss import gauss
 
 POINTS, WEIGHTS = gauss(3)
 GRID = uniform([0, 0, 0], [1, 1, 1], [8, 8, 8])

@@ -4,26 +4,30 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, loop, solve_steady
 from lubrication import drag_ratio
+from test_contact_roles import press_fit, strip_on_a_corner
 from test_contact_start import end_of_a_pushed_bar
 from test_fluid_film import scene
 from test_self_contact import CLAPPING, closing_c, fold, run
 
-from coupling import wetted
+from coupling import immersed
 from fsci import shapes
 from fsci.bench import fluid as flows
 from fsci.builder import facing
 from fsci.case import load_case
-from solvers import wall_thickness
-from solvers.cell_types import CELL_TYPES
+from fsci.run import cause
+from solvers.api import StepFailed
 from solvers.contact import dual_tree, mortar, overlap_at_start, self_search, share, sharp_edges
 from solvers.contact.sharp_edges import split_nodes
-from solvers.fluid.bodies import hidden
-from solvers.fluid.bodies.surface import ImmersedSurface
-from solvers.fluid.films import film, gaps
-from solvers.fluid.poorly_cut import extension
-from solvers.mesh_topology import cut_out
+from solvers.fluid.cut import extension, film, gaps
+from solvers.fluid.surfaces import hidden
+from solvers.fluid.surfaces.surface import ImmersedSurface
+from solvers.mesh import wall_thickness
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.tessellation import tessellate
+from solvers.mesh.topology import cut_out
+from solvers.newton import Tolerance
+from solvers.solver_settings import SolverSettings
 from solvers.structure import dynamics
-from solvers.tessellation import tessellate
 
 
 def set_opposed(monkeypatch, value):
@@ -36,7 +40,7 @@ def set_opposed(monkeypatch, value):
 def test_angle_of_sharp_edges(monkeypatch, angle):
     """Square bodies and fine round ones are the same with any angle; coarse round ones need a large one."""
     found = []
-    for value in (angle, sharp_edges.SHARP):
+    for value in (np.radians(angle), sharp_edges.SHARP):
         monkeypatch.setattr(sharp_edges, "SHARP", value)
         split = []
         for mesh, names in (
@@ -109,9 +113,9 @@ def test_winding_number_of_what_is_inside(monkeypatch, inside):
     ):
         facets, nodes = tessellate(mesh)
         surfaces.append((ImmersedSurface(f"{len(surfaces)}", facets, len(nodes)), mesh.points[nodes]))
-    wanted = [surface.wet for surface in wetted.find_wet(surfaces)]
+    wanted = [surface.wet for surface in immersed.find_wet(surfaces)]
     monkeypatch.setattr(hidden, "HIDDEN", inside)
-    found = [surface.wet for surface in wetted.find_wet(surfaces)]
+    found = [surface.wet for surface in immersed.find_wet(surfaces)]
     assert not all(wet.all() for wet in wanted)
     assert all(np.array_equal(a, b) for a, b in zip(found, wanted, strict=True))
 
@@ -128,9 +132,54 @@ def test_surfaces_that_face_each_other_at_the_start(monkeypatch, opposed):
         meshes = {body: read_body(case, body) for body in case.elastic_bodies}
         wanted = set(find_pairs(case, meshes))
         with monkeypatch.context() as patched:
-            patched.setattr(facing, "OPPOSED", opposed)
+            patched.setattr(facing, "FACING_NORMALS", opposed)
             assert set(find_pairs(case, meshes)) == wanted
         assert wanted
+
+
+@pytest.mark.parametrize("equal", [1e-12, 1e-9, 1e-3])
+def test_stiffnesses_and_sizes_that_are_the_same(monkeypatch, equal):
+    """Pairs and their slaves in cases, and of equal blocks that are moved or turned."""
+    from fsci.builder import automatic_pairs
+    from fsci.meshes.of_case import read_body
+
+    found = []
+    for value in (automatic_pairs.EQUAL_SIZES, equal):
+        monkeypatch.setattr(automatic_pairs, "EQUAL_SIZES", value)
+        for name in ("two_tori", "sphere_tube", "cattaneo_mindlin"):
+            case = load_case(f"cases/{name}/case.yaml")
+            case = case.model_copy(update={"contact": case.contact.model_copy(update={"pairs": {}, "bodies": "all"})})
+            found.append(
+                automatic_pairs.find_pairs(case, {body: read_body(case, body) for body in case.elastic_bodies})
+            )
+    assert found[:3] == found[3:]
+    assert all(found)
+
+
+def failure(structure, t):
+    """That of one step from 0 to t."""
+    structure.initialise(0.0, t)
+    structure.begin_step(0.0, t)
+    with pytest.raises(StepFailed) as failed:
+        structure.solve()
+    return failed.value
+
+
+@pytest.mark.parametrize(("equal", "in_common"), [(1e-5, 4), (0.5, 4), (0.01, 1), (0.01, 5)])
+def test_failures_that_are_the_same(monkeypatch, equal, in_common):
+    """A press fit fails in the same way with any step; a strip that a load bends over a corner does not."""
+    monkeypatch.setattr(cause, "CLOSELY", equal)
+    monkeypatch.setattr(cause, "IN_COMMON", in_common)
+    few = SolverSettings(Tolerance(residual=1e-9, max_iterations=6), linear="direct")
+
+    def fit():
+        return press_fit((12, 17), "outer", few)[0]
+
+    def strip():
+        return strip_on_a_corner(2, -0.5, few)[0]
+
+    assert cause.alike(failure(fit(), 1.0), failure(fit(), 0.5))
+    assert not cause.alike(failure(strip(), 8.0), failure(strip(), 4.0))
 
 
 def drag_in_films():
@@ -164,14 +213,20 @@ def drags_of_films():
     return [drag_ratio(2, gap * 0.1, 0.1, "q2q1") for gap in (0.2, 0.1, 0.05)]
 
 
-@pytest.mark.parametrize(("name", "value"), [("SHARE", 3e-4), ("SHARE", 3e-7), ("LEAST", 1e-2), ("LEAST", 1e-4)])
-def test_how_far_the_penalty_steps_back_in_films(monkeypatch, name, value):
+@pytest.fixture(scope="module")
+def films():
+    return drags_of_films()
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("SHARE_OF_FILM", 3e-4), ("SHARE_OF_FILM", 3e-7), ("LEAST_RATIO", 1e-2), ("LEAST_RATIO", 1e-4)]
+)
+def test_how_far_the_penalty_steps_back_in_films(films, monkeypatch, name, value):
     """Down to a tenth of a cell the same to 0.4 %, to a twentieth to 1.6 %, over three decades of both."""
-    wanted = drags_of_films()
     monkeypatch.setattr(film, name, value)
     found = drags_of_films()
-    assert found[:2] == pytest.approx(wanted[:2], rel=4e-3)
-    assert found[2] == pytest.approx(wanted[2], rel=0.016)
+    assert found[:2] == pytest.approx(films[:2], rel=4e-3)
+    assert found[2] == pytest.approx(films[2], rel=0.016)
 
 
 def drags_in_gaps():
@@ -179,30 +234,34 @@ def drags_in_gaps():
     return [drag_ratio(2, gap * 0.1, 0.1, "q1q1", narrow_gaps=True) for gap in (1.0, 0.5, 0.2)]
 
 
+@pytest.fixture(scope="module")
+def in_gaps():
+    return drags_in_gaps()
+
+
 @pytest.mark.parametrize(
     ("module", "name", "value", "same"),
     [
-        (gaps, "SHARE", 3e-2, 0.01),
-        (gaps, "SHARE", 3e-5, 0.002),
-        (film, "LEAST", 1e-2, 0.002),
+        (gaps, "SHARE_OF_FLOW", 3e-2, 0.01),
+        (gaps, "SHARE_OF_FLOW", 3e-5, 0.002),
+        (film, "LEAST_RATIO", 1e-2, 0.002),
         (gaps, "KINK", 0.3, 0.006),
         (gaps, "KINK", 3e-4, 0.006),
-        (gaps, "FULL", 1.5, 0.03),
+        (gaps, "FULL_HEIGHT", 1.5, 0.03),
     ],
 )
-def test_constants_of_gaps(monkeypatch, module, name, value, same):
+def test_constants_of_gaps(in_gaps, monkeypatch, module, name, value, same):
     """Drags are the same to 1 % over three decades, and to 3 % where the term ends earlier."""
-    wanted = drags_in_gaps()
     for some in (module, gaps):
         monkeypatch.setattr(some, name, value)
-    assert drags_in_gaps() == pytest.approx(wanted, rel=same)
+    assert drags_in_gaps() == pytest.approx(in_gaps, rel=same)
 
 
 def test_largest_amplification_of_an_extension(monkeypatch):
     """2D-1 is the same over three decades; with lines everywhere (1) its pressure difference is worse."""
 
     def found(value):
-        monkeypatch.setattr(extension, "LARGEST", value)
+        monkeypatch.setattr(extension, "LARGEST_FACTOR", value)
         row = flows.steady("q2q1", 10)
         return [row[f"{name} error [%]"] for name in ("c_D", "c_L", "dp")]
 

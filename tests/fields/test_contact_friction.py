@@ -197,7 +197,7 @@ def test_what_slides_goes_on_sliding(edge, monkeypatch):
     Steady sliding takes one Newton step. If all nodes stuck first, and were sheared by the whole step, it would take
     five. The width of the rim does not matter.
     """
-    monkeypatch.setattr(friction, "EDGE", edge)
+    monkeypatch.setattr(friction, "EDGE_OF_DISC", edge)
     structure, contact = sheared("quad", Coulomb(0.25), 0.02, dim=2)
     structure.initialise(0.0, 1.0)
     newton = [solve_step(structure, float(k), first=False).iterations for k in range(5)]

@@ -7,8 +7,9 @@ from programs import fsci
 
 from fsci import shapes
 from fsci.run.history import read_history
-from solvers import linear, newton
-from solvers.solid_factors import SolidFactors
+from solvers import newton
+from solvers.algebra import linear
+from solvers.algebra.solid_factors import SolidFactors
 
 
 def pressed(method):
@@ -20,7 +21,7 @@ def pressed(method):
 def test_static_contact():
     direct, ilu = (pressed(method) for method in ("direct", "ilu"))
     assert_same_results(ilu, direct, displacement=1e-6)
-    used = ilu[0].constrained_solver
+    used = ilu[0].create_solver(contact=True)
     assert isinstance(used.getPC().getPythonContext(), SolidFactors)
     assert 0 < used.getIterationNumber() < 100
 

@@ -10,7 +10,7 @@ from test_contact_patch import check, deformation
 
 import solvers.contact.mortar
 import solvers.contact.patch
-import solvers.search
+import solvers.mesh.search
 from fsci import shapes
 from solvers.contact.surface import Surface
 from solvers.generalised_alpha import GeneralisedAlpha
@@ -134,7 +134,7 @@ def test_a_slight_touch_turns_the_block_away():
     """Slow normal motion under fast sliding: tangential momentum stays, the normal one turns around."""
     structure, contact = flying_block(0.0005, (5.0, 0.0, -0.02))
     newton = steps(structure, 16, 0.01)
-    mass = structure.inertia.mass
+    mass = structure.inertia.assemble_mass()
     x, y = mass.createVecs("right"), mass.createVecs("left")
     x.array[:] = structure.now.v
     mass.mult(x, y)
@@ -157,6 +157,6 @@ def test_a_pair_that_never_meets_costs_nothing(monkeypatch):
     monkeypatch.setattr(solvers.contact.mortar, "mortar", forbidden)
     monkeypatch.setattr(solvers.contact.patch, "nodal_normals", forbidden)
     monkeypatch.setattr(contact, "condense", forbidden)
-    monkeypatch.setattr(solvers.search, "update", forbidden)
+    monkeypatch.setattr(solvers.mesh.search, "update", forbidden)
     assert max(steps(structure, 3, 0.1)) <= 1
     assert not contact.near

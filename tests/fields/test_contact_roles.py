@@ -60,11 +60,11 @@ def test_newton_steps_do_not_depend_on_the_unit_of_length():
     assert dragged(1e4, "block", Coulomb(0.3), 1e-3)[0] == dragged(1e4, "block", Coulomb(0.3))[0]
 
 
-@pytest.mark.parametrize("cells", [(12, 17), (17, 12), (12, 24)])
-@pytest.mark.parametrize("slave", ["inner", "outer"])
-def test_a_press_fit_into_a_stiff_ring(cells, slave):
-    """Radius 2 as in the theory of thick rings, whichever ring has more conditions than the other one has nodes."""
-    stiff, overlap = 1e7, 0.002
+STIFF, OVERLAP = 1e7, 0.002
+
+
+def press_fit(cells, slave, settings=SETTINGS):
+    """Rings of radius 1 to 2 and 2 to 3, the outer one stiff, that overlap: (structure, inner ring)."""
 
     def ring(name, inside, outside, count, stiffness):
         mesh = shapes.ring(inside, outside, [count, 5], angle=90, order=2)
@@ -72,25 +72,30 @@ def test_a_press_fit_into_a_stiff_ring(cells, slave):
         return make_body(name, mesh, material(stiffness), supports=held)
 
     bodies = [
-        ring("inner", 1.0, 2.0 + 0.5 * overlap, cells[0], 1e3),
-        ring("outer", 2.0 - 0.5 * overlap, 3.0, cells[1], stiff),
+        ring("inner", 1.0, 2.0 + 0.5 * OVERLAP, cells[0], 1e3),
+        ring("outer", 2.0 - 0.5 * OVERLAP, 3.0, cells[1], STIFF),
     ]
     sides = [("inner", "outer"), ("outer", "inner")]
-    structure, _ = make_contact(bodies, [tuple(sides if slave == "inner" else sides[::-1])], settings=SETTINGS)
+    return make_contact(bodies, [tuple(sides if slave == "inner" else sides[::-1])], settings=settings)[0], bodies[0]
+
+
+@pytest.mark.parametrize("cells", [(12, 17), (17, 12), (12, 24)])
+@pytest.mark.parametrize("slave", ["inner", "outer"])
+def test_a_press_fit_into_a_stiff_ring(cells, slave):
+    """Radius 2 as in the theory of thick rings, whichever ring has more conditions than the other one has nodes."""
+    structure, inner = press_fit(cells, slave)
     solve_step(structure)
     u = structure.split(structure.now.u)[0].reshape(-1, 2)
-    points = bodies[0].points[:2, : bodies[0].owned].T
+    points = inner.points[:2, : inner.owned].T
     bore = np.abs(np.hypot(*points.T) - 1.0) < 1e-9
     radial = np.einsum("nd,nd->n", u, points)[bore]
-    pressure = overlap / 2.0 / ((0.91 / 1e3) * ((1 + 4) / (4 - 1) - 0.3 / 0.7))  # of a ring against a rigid one
+    pressure = OVERLAP / 2.0 / ((0.91 / 1e3) * ((1 + 4) / (4 - 1) - 0.3 / 0.7))  # of a ring against a rigid one
     exact = -2.0 * pressure * 4.0 / (4 - 1) * 0.91 / 1e3
     assert radial.mean() == pytest.approx(exact, rel=0.01)
 
 
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("edge", [-0.5, -0.483, -0.467])
-def test_a_strip_on_the_corner_of_a_step(order, edge):
-    """A thin strip is far softer in bending than a gap at its surface: whole Newton steps overshoot the corner."""
+def strip_on_a_corner(order, edge, settings=SETTINGS):
+    """A thin strip, held at both ends, above a rigid step whose corner is at `edge`: (structure, contact)."""
     load = Traction("top", (ZERO, lambda x, t: np.full(x.shape[1], -0.025 * t)))
     strip = make_body(
         "strip",
@@ -101,7 +106,14 @@ def test_a_strip_on_the_corner_of_a_step(order, edge):
     )
     points = np.array([[edge, -0.58], [edge, -0.08], [edge - 0.5, -0.08]])
     step = Surface("step", points, np.array([[0, 1], [1, 2]]), "line", None)
-    structure, contact = make_contact([strip], [(("strip", "bottom"), step)], settings=SETTINGS)
+    return make_contact([strip], [(("strip", "bottom"), step)], settings=settings)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("edge", [-0.5, -0.483, -0.467])
+def test_a_strip_on_the_corner_of_a_step(order, edge):
+    """A thin strip is far softer in bending than a gap at its surface: whole Newton steps overshoot the corner."""
+    structure, contact = strip_on_a_corner(order, edge)
     structure.initialise(0.0, 1.0)
     for k in range(10):
         solve_step(structure, float(k), first=False)

@@ -9,7 +9,7 @@ from test_contact_friction_run import SLIDING
 from fsci import shapes
 from fsci.case import CaseError, load_case
 from fsci.run.run import run_case
-from solvers.blocks import times
+from solvers.algebra.blocks import times
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.surface import Surface
@@ -197,7 +197,7 @@ def test_contact_accelerates_what_has_mass():
     structure.initialise(0.0, 1e-3)
     stretch = 1.0 - overlap / h
     force = E * stretch * (1.0 - stretch**2) / 2.0
-    forces = structure.split(times(structure.inertia.mass, structure.now.a))
+    forces = structure.split(times(structure.inertia.assemble_mass(), structure.now.a))
     _, sheet, upper = (part.reshape(-1, 2).sum(axis=0) for part in forces)
     assert contact.resultant(0) == pytest.approx([0.0, force], rel=1e-9, abs=1e-12)
     assert sheet == pytest.approx([0.0, -force], rel=1e-9, abs=1e-12)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solvers.fluid.thin.contact_wedges import beside_contact
+from solvers.fluid.terms.contact_wedges import beside_contact
 
 H = 0.1  #: edge of the cells [m]
 

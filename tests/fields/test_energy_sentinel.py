@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 from programs import fsci, warnings_of
 
-from coupling.sentinel import InterfaceSentinel
+from coupling.balance import InterfaceSentinel
 from fsci.run.history import read_history
 from solvers.structure.energy import EnergyBalance, EnergySentinel
 

@@ -8,9 +8,9 @@ import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, solve_steady, sphere
 
 from solvers import fem
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.probes import on_patch
+from solvers.fluid.flow.probes import on_patch
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 
@@ -48,13 +48,13 @@ def resistance(dim, concentration, cells, element="q1q1"):
     rate = share * -on_patch(fluid, "flow_rate", "in")()[""]
     force = 2 * share * fluid.force()["grain"].sum(axis=0)[0]
     assert force == pytest.approx(1.0, rel=1e-6)
-    iterations = fluid.linear_iterations
+    iterations = fluid.iterate.linear_iterations
     return 1.0 / (rate if dim == 2 else 6 * np.pi * a * rate), fluid.dofs(), (info.iterations, iterations)
 
 
 def hold_tangential(fluid, numbers):
     """The flow crosses these patches at a right angle."""
-    boundary, sides = fluid.boundary, 2
+    boundary, sides = fluid.parts.boundary, 2
     for number in numbers:
         for axis in range(1, fluid.dim):
             dofs = fem.facet_dofs(fluid.unknowns.space, axis, np.sort(boundary.facets[number]))

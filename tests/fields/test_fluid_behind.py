@@ -1,4 +1,4 @@
-"""Velocities of the past behind moving walls (`solvers/fluid/behind.py`)."""
+"""Velocities of the past behind moving walls (`solvers/fluid/flow/behind.py`)."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,9 @@ from fluid_setup import body, field, loop, make_fluid, sphere, wall
 from mpi4py import MPI
 from test_fluid_oscillating import morison, noise, oscillate
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.behind import BehindWalls, mirrored
-from solvers.fluid.bodies.surface import Motion
+from solvers.fluid.flow.behind import BehindWalls, mirrored
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.surfaces.surface import Motion
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 SPEED = np.array([0.5, -0.25])
@@ -95,7 +95,7 @@ def test_impulsive_start_by_a_cell_per_step():
     assert np.abs(force[:, 1]).max() < 0.1
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=70)
 def test_oscillating_cylinder_with_parabolas():
     """Duetsch et al.: c_d 2.09, c_i 1.45. The drag is 8 % off with 10 cells: the bound changes curved profiles."""
     t, force = oscillate("bdf2", 50, 2, 10, element="q2q1")

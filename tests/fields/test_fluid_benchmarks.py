@@ -5,8 +5,8 @@ import pytest
 from fluid_setup import field, make_fluid, solve_steady
 
 from fsci.bench import fluid as bench
-from solvers.fluid.background.grid import Grid
-from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.grid.box import Grid
+from solvers.fluid.terms.boundary.patches import Patch
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 

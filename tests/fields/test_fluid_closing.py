@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fluid_setup import body, field, loop, make_fluid, solve_steady, sphere
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
 
 H = 0.1
 PLACES = [0.0, H / 3.0, 0.47 * H]

@@ -6,15 +6,15 @@ from fluid_setup import block, body, field, make_fluid, nodal_errors, solve_stea
 from programs import fsci
 
 from fsci.run.history import read_history
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.balances import Balances
-from solvers.fluid.boundary.covered_faces import CoveredFaces
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.boundary.wet_faces import wet_face
-from solvers.fluid.conservation.regions import RegionsOfCut
-from solvers.fluid.conservation.volume_balance import VolumeBalance
-from solvers.fluid.probes import flow_rate
-from solvers.gauss import gauss
+from solvers.fluid.flow.balances import Balances
+from solvers.fluid.flow.conservation.regions import RegionsOfCut
+from solvers.fluid.flow.conservation.volume_balance import VolumeBalance
+from solvers.fluid.flow.probes import flow_rate
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.covered_faces import CoveredFaces
+from solvers.fluid.terms.boundary.patches import Patch
+from solvers.fluid.terms.boundary.wet_faces import wet_face
+from solvers.mesh.gauss import gauss
 
 MU = 0.7
 
@@ -42,7 +42,7 @@ def test_shear_under_a_traction(element, turn):
     )  # fmt: skip
     solve_steady(fluid)
     assert nodal_errors(fluid, u, p[0], 0.0) == pytest.approx((0.0, 0.0), abs=1e-11)
-    on_bodies, *_ = Balances(fluid.system)(fluid.held)
+    on_bodies, *_ = Balances(fluid.system)(fluid.iterate.held)
     assert np.abs(on_bodies - fluid.force()["bar"].sum(axis=0)).max() < 1e-11
 
 
@@ -61,7 +61,7 @@ def test_shear_that_leaves(element, back):
     info = solve_steady(fluid)
     assert info.iterations <= 4
     assert nodal_errors(fluid, u, field(0.0, 0.0)[0], 0.0) == pytest.approx((0.0, 0.0), abs=1e-11)
-    on_bodies, *_ = Balances(fluid.system)(fluid.held)
+    on_bodies, *_ = Balances(fluid.system)(fluid.iterate.held)
     assert np.abs(on_bodies - fluid.force()["bar"].sum(axis=0)).max() < 1e-11
 
 
@@ -104,7 +104,7 @@ def test_outflow_of_a_face_without_cover_is_that_of_the_form(side):
     system, unknowns = fluid.system, fluid.unknowns
     system.set_scales(fluid.velocity())
     expected = system.outer_rows()
-    cells = fluid.boundary.cells[1]
+    cells = fluid.parts.boundary.cells[1]
     points, rule = gauss(8)
     reference = np.stack([points, np.full(8, float(side))], axis=1)
     whole = CoveredFaces(fluid.grid, unknowns, cells, 1, side, reference, np.tile(rule / 3.0, (len(cells), 1)))

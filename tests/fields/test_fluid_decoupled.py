@@ -5,7 +5,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from programs import on_processes
 
-from solvers.fluid.linear_systems.decoupled import decoupled, without
+from solvers.fluid.solve.linear_systems.decoupled import decoupled, without
 
 
 def check(comm):

@@ -7,10 +7,10 @@ import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, step, turned, wall
 
 from fsci.bench import fluid as bench
-from solvers.fluid.background.grid import Grid, uniform
-from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.forms import Penalties
-from solvers.fluid.poorly_cut.extension import FREE, Extension
+from solvers.fluid.cut.extension import FREE_SHARE, Extension
+from solvers.fluid.grid.box import Grid, uniform
+from solvers.fluid.settings.flow_settings import FlowSettings
+from solvers.fluid.settings.penalties import Penalties
 
 
 def around_a_disc(scheme="steady", **settings):
@@ -50,7 +50,7 @@ def test_polynomials_have_no_distance_to_their_extension(scheme):
     """On cells of different sizes, too: those of second degree of the velocity, of first degree of the pressure."""
     fluid = around_a_disc(scheme)
     velocity, pressure = fluid.unknowns.velocity.dofs, fluid.unknowns.pressure.dofs
-    assert fluid.system.ghost.dependent.sum() > 20
+    assert fluid.system.cut_penalty.dependent.sum() > 20
     rough = np.abs(penalty(fluid, at_nodes(fluid, lambda x, y: np.sin(40 * x * y))))
     linear = penalty(fluid, at_nodes(fluid, lambda x, y: 1 + 2 * x - 3 * y + x * y))
     quadratic = penalty(fluid, at_nodes(fluid, lambda x, y: x * x - 2 * y * y + x * x * y))
@@ -100,14 +100,14 @@ def test_penalty_loses_no_force_and_no_volume():
 def test_nodes_of_well_cut_cells_are_free():
     """And those of no other cell are; where no fluid is, the velocity is what the extension says."""
     fluid = around_a_disc("bdf2")
-    cut, unknowns, ghost = fluid.cut, fluid.unknowns, fluid.system.ghost
+    cut, unknowns, ghost = fluid.cut, fluid.unknowns, fluid.system.cut_penalty
     share = cut.share[fluid.grid.numbers]
     largest = np.zeros(unknowns.local)
     for cells in (cut.uncut, cut.cut, cut.strip):
         np.maximum.at(largest, unknowns.cell_velocity[cells], share[cells, None, None])
     dofs = unknowns.velocity.dofs
-    asked = fluid.system.active_dofs[dofs] & ~np.isin(dofs, fluid.boundary.dofs)
-    assert np.array_equal((ghost.dependent | ghost.outside)[dofs][asked], (largest[dofs] < FREE)[asked])
+    asked = fluid.system.active_dofs[dofs] & ~np.isin(dofs, fluid.parts.boundary.dofs)
+    assert np.array_equal((ghost.dependent | ghost.outside)[dofs][asked], (largest[dofs] < FREE_SHARE)[asked])
     assert np.array_equal(ghost.outside[dofs][asked], (largest[dofs] == 0.0)[asked])
     assert ghost.outside.sum() > 20
 
@@ -126,7 +126,7 @@ def test_velocity_behind_the_surface_goes_on_as_a_polynomial():
         element="q2q1", dt=0.02, convection=False, initial_velocity=velocity,
     )  # fmt: skip
     step(fluid, 0.0, 0.02)
-    outside, nodes = fluid.system.ghost.outside, fluid.unknowns.velocity
+    outside, nodes = fluid.system.cut_penalty.outside, fluid.unknowns.velocity
     exact = np.stack([c(nodes.points.T, 0.0) for c in velocity], axis=1)
     assert outside[nodes.dofs].sum() > 20
     assert np.abs(fluid.flow[nodes.dofs] - exact)[outside[nodes.dofs]].max() < 1e-10

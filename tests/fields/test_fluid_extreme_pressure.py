@@ -5,9 +5,9 @@ import pytest
 from fluid_setup import block, body, field, loop, make_fluid, turned, wall
 from lubrication import approaching
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.background.nested import RefinedBox, refined
-from solvers.fluid.extreme_pressure import clipped, extreme_pressure
+from solvers.fluid.flow.extreme_pressure import clipped, extreme_pressure
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.grid.nested import RefinedBox, refined
 
 ELEMENTS = pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 NOTCH = np.array([[2.0, -1.0], [2.0, 2.0], [0.3, 1.3], [0.73, 0.41], [0.3, -0.3]])  #: of the solid, its tip in a cell

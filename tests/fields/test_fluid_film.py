@@ -6,14 +6,15 @@ from fluid_setup import block, body, circle, field, loop, make_fluid, solve_stea
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
-from solvers.fluid.background.grid import DistributedGrid, uniform
-from solvers.fluid.bodies.surface import together
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.cutting.cut import Cutter
-from solvers.fluid.films import film
-from solvers.fluid.forms import TRACE, Penalties
-from solvers.fluid.poorly_cut.extension import FREE
-from solvers.fluid.poorly_cut.ghost import Scales
+from solvers.fluid.cut import film
+from solvers.fluid.cut.cut import Cutter
+from solvers.fluid.cut.extension import FREE_SHARE
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.mesh.distributed_grid import DistributedGrid
+from solvers.fluid.settings.penalties import TRACE, Penalties
+from solvers.fluid.surfaces.surface import together
+from solvers.fluid.terms.boundary.patches import Patch, wall_faces
+from solvers.fluid.terms.poorly_cut.ghost import Scales
 
 H = 0.1
 
@@ -34,7 +35,7 @@ def plate(name, low, high, angle=0.0):
 
 
 def expected(gap, h=H):
-    return film.SHARE * min(1.0, max(gap / h, film.LEAST) ** 3 / (12.0 * Penalties().extension))
+    return film.SHARE_OF_FILM * min(1.0, max(gap / h, film.LEAST_RATIO) ** 3 / (12.0 * Penalties().extension))
 
 
 @pytest.mark.parametrize("gap", [0.09, 0.05, 0.02])
@@ -77,9 +78,9 @@ def test_poorly_cut_cells_at_the_end_of_a_film_have_its_flow():
     cut, cells = fluid.cut, fluid.grid.numbers[fluid.system.cells[2]]
     ends = np.flatnonzero(cut.creeping & (cut.film == 1.0) & (cut.share > 0.0))
     assert len(ends) == 2
-    assert (cut.share[ends] < FREE).all()
+    assert (cut.share[ends] < FREE_SHARE).all()
     assert sorted(cells) == sorted(np.flatnonzero((cut.film < 1.0) & (cut.share > 0.0)).tolist() + ends.tolist())
-    poor = np.flatnonzero((cut.film == 1.0) & (cut.share > 0.0) & (cut.share < FREE))
+    poor = np.flatnonzero((cut.film == 1.0) & (cut.share > 0.0) & (cut.share < FREE_SHARE))
     assert len(poor) > 2  # farther away
 
 
@@ -101,7 +102,9 @@ def test_three_dimensions():
     plates = [body(n, *block([0.1, 0.1, a], [0.9, 0.9, b])) for n, a, b in (("l", 0.1, 0.43), ("u", 0.5, 0.7))]
     facets, motion = together([one.surface for one in plates], [one.motion(0.0) for one in plates], 3)
     cutter = Cutter(
-        DistributedGrid(MPI.COMM_SELF, grid), np.linspace(0.0, 1.0, 5)[1:-1], film.films_of(patches, Penalties())
+        DistributedGrid(MPI.COMM_SELF, grid),
+        np.linspace(0.0, 1.0, 5)[1:-1],
+        film.Films(wall_faces(patches), Penalties().extension),
     )
     found = cutter(facets, motion, 1).film
     assert found.reshape(5, 5, 5, order="F")[1:4, 1:4, 2] == pytest.approx(expected(0.07, 0.2), rel=1e-6)
@@ -112,8 +115,8 @@ def test_three_dimensions():
 def test_shares_are_below_the_tolerance(gap):
     """Those of the module's docstring, times the factor."""
     factor, penalties = expected(gap * H), Penalties()
-    assert 12.0 * penalties.extension * factor / gap**3 <= film.SHARE * (1 + 1e-12)
-    assert 3.0 * penalties.extension * factor / gap**3 <= film.SHARE
+    assert 12.0 * penalties.extension * factor / gap**3 <= film.SHARE_OF_FILM * (1 + 1e-12)
+    assert 3.0 * penalties.extension * factor / gap**3 <= film.SHARE_OF_FILM
 
 
 def test_least_factor():
@@ -122,7 +125,7 @@ def test_least_factor():
     In a film u_y is linear, u_y^2 <= 4/g int u_y^2 dy at a wall, hence 4/g < gamma C_T / h.
     """
     assert scene(plate("plate", 1e-5, 0.4)).cut.film.min() == pytest.approx(expected(0.1 * H), rel=1e-6)
-    assert 4.0 / (Penalties().nitsche * TRACE[2, 2]) < film.LEAST
+    assert 4.0 / (Penalties().nitsche * TRACE[2, 2]) < film.LEAST_RATIO
 
 
 def moving(speed=-0.4):
@@ -139,7 +142,7 @@ def test_flow_without_films_is_the_same_bit_for_bit():
     for films in (True, False):
         fluid = moving(speed=0.1)
         if not films:
-            fluid.cutter.films = None
+            fluid.parts.cutter.films = None
         for number in range(3):
             step(fluid, 0.02 * number, 0.02)
         assert fluid.cut.film is None
@@ -150,11 +153,11 @@ def test_flow_without_films_is_the_same_bit_for_bit():
 
 def test_films_are_those_of_the_first_cut_of_a_step():
     fluid = moving()
-    at = [fluid.motions[0]]
+    at = [fluid.moving.motions[0]]
     for number in range(8):
         step(fluid, 0.02 * number, 0.02)
-        at.append(fluid.motions[0])
-    cutter, facets = fluid.cutter, fluid.cut.facets
+        at.append(fluid.moving.motions[0])
+    cutter, facets = fluid.parts.cutter, fluid.cut.facets
     cutter.begin_step()
     assert cutter(facets, at[0], 1).film is None
     assert cutter(facets, at[-1], 1).film is None
@@ -168,7 +171,7 @@ def test_results_do_not_depend_on_the_tolerance(monkeypatch):
     """A disc of a radius of 2.2 cells that falls on the wall, down to 0.2 cells: the force is the same to 3 %."""
     forces = []
     for share in (1e-2, 1e-3, 1e-5):
-        monkeypatch.setattr(film, "SHARE", share)
+        monkeypatch.setattr(film, "SHARE_OF_FILM", share)
         fluid = moving()
         for number in range(14):
             step(fluid, 0.02 * number, 0.02)
@@ -198,13 +201,13 @@ def test_tangent_of_a_film():
     assert solve_steady(fluid).iterations == 1
     before = fluid.system.residual()
     rng = np.random.default_rng(1)
-    change = np.where(fluid.held, 0.0, rng.standard_normal(fluid.unknowns.owned))
+    change = np.where(fluid.iterate.held, 0.0, rng.standard_normal(fluid.unknowns.owned))
     matrix = fluid.linearise()
     u, out = matrix.createVecs()
     u.array[:] = change
     matrix.mult(u, out)
     fluid.flow[: len(change)] += change
-    free = ~fluid.held
+    free = ~fluid.iterate.held
     after = fluid.system.residual()
     np.testing.assert_allclose((after - before)[free], out.array[free], atol=1e-9 * np.abs(out.array).max())
 
@@ -219,11 +222,12 @@ def test_films_are_coercive(gap):
     fluid = scene(
         body("disc", circle([0.517, 0.3 + gap], 0.3, 200), loop(200), velocity=np.array([0.0, -1.0])), walls=("y-",)
     )
+    fluid.follow()
     fluid.residual()
     matrix = fluid.linearise()
     start, columns, values = matrix.getValuesCSR()
     dense = csr_matrix((values, columns, start), matrix.getSize()).toarray()
-    free = ~fluid.held & fluid.unknowns.velocity_mask[: len(fluid.held)]
+    free = ~fluid.iterate.held & fluid.unknowns.velocity_mask[: len(fluid.iterate.held)]
     dense = dense[free][:, free]
     size = np.sqrt(np.abs(np.diag(dense)))
     assert np.abs(dense - dense.T).max() <= 1e-9 * np.abs(dense).max()
@@ -245,7 +249,7 @@ def test_penalty_in_films_has_no_convection():
     gap, alpha = 0.02, 1e3
     penalty = scene(
         plate("plate", gap, 0.4), walls=("y-",), scheme="backward_euler", convection=True, mu=1.0
-    ).system.ghost
+    ).system.cut_penalty
     unknowns = penalty.unknowns
     fast = np.full(len(unknowns.velocity.dofs), 1e4)
     penalty.set_scales(Scales(1.0, 1.0, alpha, np.full(len(unknowns.grid.numbers), 1e4), fast))

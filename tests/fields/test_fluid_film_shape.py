@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, solve_steady
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.coupling_entries import interface_entries
-from solvers.fluid.films import film_shape
-from solvers.fluid.films.film_crossings import crossing_moments
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
+from solvers.fluid.terms.coupling_entries import interface_entries
+from solvers.fluid.terms.shape_derivatives import film_shape
+from solvers.fluid.terms.shape_derivatives.film_crossings import crossing_moments
 
 CENTRE = 0.52
 #: of momentum, continuity (which hardly changes) and force
@@ -35,9 +35,9 @@ def errors(fluid, moved, films, direction):
 
     The wall crosses a plane of the grid there. Farther away it leaves the film.
     """
-    x, state = fluid.motions[0].x.copy(), fluid.flow.copy()
+    x, state = fluid.moving.motions[0].x.copy(), fluid.flow.copy()
     change = np.cos(7.0 * x[:, :1]) * direction
-    at, nothing_held = fluid.system.interface, np.zeros(len(state), dtype=bool)
+    at, nothing_held = fluid.system.assemble_interface(), np.zeros(len(state), dtype=bool)
     found = interface_entries(at, fluid.unknowns, state, 0.0, nothing_held, np.arange(len(x)), films)
     rows, forces = [], []
     for sign in (1.0, -1.0):

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, nodal_errors, step, wall
 
-from solvers.fluid.background.following import Following, RefinedBody, interpolation
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.background.nested import RefinedBox, RefinedSurface, refined
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.linear_systems import krylov
-from solvers.fluid.probes import Forces
-from solvers.linear import LinearSolveFailed
+from solvers.algebra.linear import LinearSolveFailed
+from solvers.fluid.flow.probes import Forces
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.grid.following import Following, RefinedBody, interpolation
+from solvers.fluid.grid.nested import RefinedBox, RefinedSurface, refined
+from solvers.fluid.solve.linear_systems import krylov
+from solvers.fluid.terms.boundary.patches import Patch
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 
@@ -93,7 +93,7 @@ def test_a_correction_that_stalls_leaves_the_solver_of_the_steps(monkeypatch):
     for n in range(5):
         step(fluid, 0.04 * n, 0.04)
     assert len(tried) == 2 * (fluid.renewals - 1) > 0
-    assert fluid.sequence.current == "ilu"
+    assert fluid.iterative.sequence.current == "ilu"
 
 
 def towed(element, following, steps):
@@ -120,7 +120,6 @@ def towed(element, following, steps):
     for n in range(steps):
         before = fluid.renewals
         step(fluid, n * dt, dt)
-        forces.forget()
         force[n], changed[n] = probe()["x"], fluid.renewals > before
     return force, changed
 

@@ -5,8 +5,8 @@ import pytest
 from fluid_setup import block, body, field, fluid_rule, make_fluid, solve_steady, values
 from test_fluid_arrays import hold_tangential
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
 
 MU, FORCE = 0.7, 3.0
 

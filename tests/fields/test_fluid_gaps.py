@@ -21,11 +21,11 @@ from test_fluid_cut_shape import Moving
 from test_fluid_film import plate, scene
 from test_fluid_slip_bodies import along, half_space
 
-from solvers.fluid.background.grid import Grid, uniform
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.films import gaps
-from solvers.fluid.forms import TRACE, Penalties
-from solvers.fluid.probes import flow_rate
+from solvers.fluid.cut import gaps
+from solvers.fluid.flow.probes import flow_rate
+from solvers.fluid.grid.box import Grid, uniform
+from solvers.fluid.settings.penalties import TRACE, Penalties
+from solvers.fluid.terms.boundary.patches import Patch
 
 H = 0.1
 
@@ -86,7 +86,9 @@ def test_shares_are_those_of_the_module():
     assert between.slip[np.argmin(between.height)] == pytest.approx(6.0 / k)
     assert at_face.slip[np.argmin(at_face.height)] == pytest.approx(3.0 / (k - 1.0))
     for found, g in ((between, 0.5), (at_face, 0.3)):
-        assert 12.0 * factors.ghost_pressure * found.pressure.min() / g**3 == pytest.approx(gaps.SHARE, rel=1e-6)
+        assert 12.0 * factors.ghost_pressure * found.pressure.min() / g**3 == pytest.approx(
+            gaps.SHARE_OF_FLOW, rel=1e-6
+        )
 
 
 # -------------------------------------------------------------------------------------------------- flow and drag
@@ -235,7 +237,7 @@ def test_flow_without_gaps_is_the_same_bit_for_bit():
     for finds in (True, False):
         fluid = moving(0.1)
         if not finds:
-            fluid.cutter.gaps = None
+            fluid.parts.cutter.gaps = None
         for number in range(3):
             step(fluid, 0.02 * number, 0.02)
         assert fluid.cut.gaps is None
@@ -248,14 +250,14 @@ def test_flow_without_gaps_is_the_same_bit_for_bit():
 def test_gaps_are_those_of_the_first_cut_of_a_step():
     fluid = moving(-0.4)
     step(fluid, 0.0, 0.02)
-    before = fluid.motions[0]
+    before = fluid.moving.motions[0]
     for number in range(1, 12):
         step(fluid, 0.02 * number, 0.02)
-    cutter, facets = fluid.cutter, fluid.cut.facets
+    cutter, facets = fluid.parts.cutter, fluid.cut.facets
     cutter.begin_step()
     assert cutter(facets, before, 1).gaps is None
     cutter.begin_step()
-    first = cutter(facets, fluid.motions[0], 1).gaps
+    first = cutter(facets, fluid.moving.motions[0], 1).gaps
     assert first.height.min() < 2.5
     assert cutter(facets, before, 1).gaps is first
 
@@ -279,8 +281,8 @@ def test_tangent_of_a_gap():
         assert fluid.cut.gaps is not None
         assert solve_steady(fluid).iterations == 1 or convection
         flow = fluid.flow.copy()
-        change = np.where(fluid.held, 0.0, np.random.default_rng(1).standard_normal(fluid.unknowns.owned))
-        matrix = fluid.system.tangent(fluid.held, picard=False)
+        change = np.where(fluid.iterate.held, 0.0, np.random.default_rng(1).standard_normal(fluid.unknowns.owned))
+        matrix = fluid.system.tangent(fluid.iterate.held, picard=False)
         u, out = matrix.createVecs()
         u.array[:] = change
         matrix.mult(u, out)
@@ -288,8 +290,8 @@ def test_tangent_of_a_gap():
         for sign in (1.0, -1.0):
             fluid.flow[:] = flow + sign * 1e-4 * change
             rows.append(fluid.system.residual())
-        found = np.where(fluid.held, 0.0, (rows[0] - rows[1]) / 2e-4)
-        np.testing.assert_allclose(found, np.where(fluid.held, 0.0, out.array), atol=1e-7 * np.abs(found).max())
+        found = np.where(fluid.iterate.held, 0.0, (rows[0] - rows[1]) / 2e-4)
+        np.testing.assert_allclose(found, np.where(fluid.iterate.held, 0.0, out.array), atol=1e-7 * np.abs(found).max())
 
 
 @pytest.mark.parametrize("height", [0.40, 0.36, 0.27])

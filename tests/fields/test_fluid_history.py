@@ -5,11 +5,11 @@ import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, nodal_errors, step, wall
 
 from solvers.api import StepFailed
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.bodies.immersed import ImmersedBody
-from solvers.fluid.bodies.surface import ImmersedSurface, Motion
-from solvers.fluid.history import History, Past
-from solvers.fluid.time_scheme import SCHEMES, FlowStep
+from solvers.fluid.flow.history import History, Past
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.settings.time_scheme import SCHEMES, FlowStep
+from solvers.fluid.surfaces.immersed import ImmersedBody
+from solvers.fluid.surfaces.surface import ImmersedSurface, Motion
 
 VELOCITY, DT = field(2.0, 0.0), 0.01
 
@@ -113,7 +113,7 @@ def test_first_guess_goes_on_as_in_the_last_step():
     """Where the velocity was known at both times behind, and not on the boundary; with half the step, half as far."""
     fluid = make_fluid(uniform([0, 0], [1, 1], [4, 4]), [wall(VELOCITY)], dt=DT, initial_velocity=VELOCITY)
     x = fluid.unknowns.velocity.dofs[:, 0]
-    inside = ~np.isin(x, fluid.boundary.dofs)
+    inside = ~np.isin(x, fluid.parts.boundary.dofs)
     missing = np.zeros(fluid.unknowns.local, dtype=bool)
     missing[x[inside][0]] = True
     values = [np.where(np.isin(np.arange(fluid.unknowns.local), x), value, 0.0) for value in (3.0, 5.0)]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from fluid_setup import block, body, field, make_fluid, step
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.background.nested import RefinedBox, refined
-from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.grid.nested import RefinedBox, refined
+from solvers.fluid.terms.boundary.patches import Patch
 
 FORCE = (0.4, -3.0, 0.7)  # [N/m^3], also across the outlet
 

@@ -7,10 +7,10 @@ import pytest
 from fluid_setup import field, make_fluid, step
 from programs import on_processes
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.background.nested import RefinedBox, refined
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.probes import flow_rate
+from solvers.fluid.flow.probes import flow_rate
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.grid.nested import RefinedBox, refined
+from solvers.fluid.terms.boundary.patches import Patch
 
 OUT = Patch("out", ("x+",), "outflow")
 

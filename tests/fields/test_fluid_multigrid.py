@@ -13,16 +13,16 @@ from programs import on_processes
 from fsci.bench.fluid import ring_in_channel
 from fsci.case import load_case
 from fsci.run.run import FAILED, run_case
-from solvers import linear
-from solvers.fluid.background.grid import Grid, uniform
-from solvers.fluid.background.nested import RefinedBox, refined
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.linear_systems import krylov
-from solvers.fluid.linear_systems.krylov import SolverSequence
-from solvers.fluid.linear_systems.level_grid import LevelGrid
-from solvers.fluid.linear_systems.multigrid import coarsen, finest, interpolation
-from solvers.fluid.linear_systems.rough_cells import is_rough
-from solvers.linear import LinearSolveFailed
+from solvers.algebra import linear
+from solvers.algebra.linear import LinearSolveFailed
+from solvers.fluid.grid.box import Grid, uniform
+from solvers.fluid.grid.nested import RefinedBox, refined
+from solvers.fluid.solve.linear_systems import krylov
+from solvers.fluid.solve.linear_systems.krylov import SolverSequence
+from solvers.fluid.solve.linear_systems.level_grid import LevelGrid
+from solvers.fluid.solve.linear_systems.multigrid import coarsen, finest, interpolation
+from solvers.fluid.solve.linear_systems.rough_cells import is_rough
+from solvers.fluid.terms.boundary.patches import Patch
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.timing import Timer
@@ -50,7 +50,7 @@ def test_interpolation_of_linear_fields_is_exact(element):
         Grid(edges), [wall(field(1, 0))], solver=SolverSettings(linear="iterative"), scheme="steady",
         convection=False, element=element,
     )  # fmt: skip
-    levels = [finest(fluid.unknowns), *fluid.linear_solver.multigrid.levels[1:]]
+    levels = [finest(fluid.unknowns), *fluid.iterate.solver.create_multigrid().levels[1:]]
     lattices = [levels[-1].components[-1].lattice.coarser()] * 3
     levels.append(coarsen(MPI.COMM_SELF, levels[-1], lattices))
     for fine, coarse in itertools.pairwise(levels):
@@ -80,7 +80,7 @@ def around_a_ball(grid, method, element="q1q1", dt=None, comm=MPI.COMM_SELF):
     fluid.begin_step(0.0, dt or 1.0)
     fluid.residual()
     fluid.advance()
-    return fluid.flow.copy(), fluid.linear_iterations
+    return fluid.flow.copy(), fluid.iterate.linear_iterations
 
 
 def stretched(fine, coarse, ratio):
@@ -248,7 +248,7 @@ def test_stretched_cells_need_stronger_smoothers():
     fluid = make_fluid(grid, patches, [ball], solver=solver, scheme="steady", convection=False)
     fluid.begin_step(0.0, 1.0)
     info = fluid.solve()
-    assert fluid.sequence.methods[0] == "smoothed"
+    assert fluid.iterative.sequence.methods[0] == "smoothed"
     assert info.notes == ()
     assert info.numbers["fluid.linear"] < 20 * info.iterations
 

@@ -7,9 +7,9 @@ import pytest
 import sympy
 from fluid_setup import body, circle, errors, field, loop, make_fluid, nodal_errors, solve_steady, symbolic, wall
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.background.nested import RefinedBox, refined
-from solvers.fluid.probes import at_point
+from solvers.fluid.flow.probes import at_point
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.grid.nested import RefinedBox, refined
 
 EXACT = 1e-11  #: of velocities up to 8 and pressures up to 11: 1e-12 of them
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, sphere, wall
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.coupling_entries import interface_entries
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.coupling_entries import interface_entries
 
 MU, PRESSURE = 0.7, 2.0
 
@@ -41,7 +41,7 @@ def test_shape_derivatives(dim, element):
     fluid, moved = in_linear_flow(dim, element)
     change, state = np.random.default_rng(2).normal(size=moved.shape), fluid.flow.copy()
     nothing_held = np.zeros(len(state), dtype=bool)
-    at = fluid.system.interface
+    at = fluid.system.assemble_interface()
     found = interface_entries(at, fluid.unknowns, state, 0.0, nothing_held, np.arange(len(moved)))
     rows, forces = [], []
     for sign in (1.0, -1.0):

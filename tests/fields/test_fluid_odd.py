@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from advised import require_advice
 from fluid_setup import (
     block,
     body,
@@ -18,9 +19,9 @@ from fluid_setup import (
     wall,
 )
 
-from solvers.api import StepFailed
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
+from solvers.api import FailureKind, StepFailed
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
 
 STILL = field(0, 0)
 
@@ -144,5 +145,6 @@ def test_body_that_outruns_the_flow_behind_it_is_named():
     jump = body("jumper", points, loop(40), motion=lambda x, t: (x + np.array([0.3 * (t > 0.015), 0.0]), 0 * x))
     fluid = make_fluid(uniform([0, 0], [1, 1], [20, 20]), [wall(STILL)], [jump], dt=0.01)
     step(fluid, 0.0, 0.01)
-    with pytest.raises(StepFailed, match="cells in one step"):
+    with pytest.raises(StepFailed, match="cells in one step") as failed:
         step(fluid, 0.01, 0.01)
+    require_advice(failed.value, FailureKind.MOTION)

@@ -5,7 +5,7 @@ import pytest
 import sympy
 from fluid_setup import body, circle, errors, field, loop, make_fluid, solve_steady, sphere, symbolic, wall
 
-from solvers.fluid.background.grid import uniform
+from solvers.fluid.grid.box import uniform
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 
@@ -106,7 +106,7 @@ def beltrami_errors(cells, *, element="q1q1", centre=(0.513, 0.478, 0.502), refi
         solver=SolverSettings(Tolerance(residual=1e-8), linear=linear), body_force=field(*exact[3]),
     )  # fmt: skip
     solve_steady(fluid)
-    return errors(fluid, *exact[:3]), fluid.linear_iterations
+    return errors(fluid, *exact[:3]), fluid.iterate.linear_iterations
 
 
 @pytest.mark.slow

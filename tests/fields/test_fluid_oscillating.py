@@ -6,8 +6,8 @@ from fluid_setup import body, circle, loop, make_fluid, step
 from scipy.signal import butter, sosfiltfilt
 
 from fsci.bench.fluid import graded
-from solvers.fluid.background.grid import Grid
-from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.grid.box import Grid
+from solvers.fluid.terms.boundary.patches import Patch
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 

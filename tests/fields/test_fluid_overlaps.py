@@ -7,13 +7,13 @@ import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, step
 from test_fluid_touching import overlap
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.bodies.surface import Motion
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.cutting.cut import Cutter
-from solvers.fluid.probes import of_fluid
-from solvers.fluid.thin.regions import area_of
-from solvers.fluid.thin.touching_regions import TOUCHING, touching_regions
+from solvers.fluid.cut.cut import Cutter
+from solvers.fluid.flow.probes import of_fluid
+from solvers.fluid.geometry.regions.regions import area_of
+from solvers.fluid.geometry.regions.touching_regions import TOUCHING, touching_regions
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.surfaces.surface import Motion
+from solvers.fluid.terms.boundary.patches import Patch
 
 WEIGHT = 3.0
 

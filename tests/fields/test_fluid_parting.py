@@ -6,9 +6,9 @@ from fluid_setup import block, body, make_fluid, step
 from programs import fsci
 
 from fsci.run.history import read_history
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.probes import flow_rate
+from solvers.fluid.flow.probes import flow_rate
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
 
 
 def brick(low, high):

@@ -18,7 +18,7 @@ from fluid_setup import (
     wall,
 )
 
-from solvers.fluid.background.grid import Grid, uniform
+from solvers.fluid.grid.box import Grid, uniform
 
 ELEMENTS = ("q1q1", "q2q1")
 SCHEMES = ("steady", "backward_euler", "bdf2")
@@ -202,7 +202,7 @@ def test_graded_grid(element):
 
 def test_traction_and_slip_faces():
     """Couette flow between a slip face and nothing: p = 10 x - 1 held by tractions, u = 2 y dragged by the lid."""
-    from solvers.fluid.boundary.patches import Patch
+    from solvers.fluid.terms.boundary.patches import Patch
 
     mu = 0.1
     velocity = field(lambda x, y, t: 2 * y, 0)

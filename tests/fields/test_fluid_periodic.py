@@ -2,15 +2,16 @@
 
 import numpy as np
 import pytest
+from advised import require_advice
 from fluid_setup import block, body, circle, field, loop, make_fluid, nodal_errors, solve_steady, step
 
-from solvers.api import StepFailed
-from solvers.fluid.background.grid import Grid, uniform
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.conservation.regions import RegionsOfCut
-from solvers.fluid.conservation.volume_balance import VolumeBalance
-from solvers.fluid.probes import at_point, on_patch
-from solvers.fluid.snapshot import snapshots
+from solvers.api import FailureKind, StepFailed
+from solvers.fluid.flow.conservation.regions import RegionsOfCut
+from solvers.fluid.flow.conservation.volume_balance import VolumeBalance
+from solvers.fluid.flow.probes import at_point, on_patch
+from solvers.fluid.flow.snapshot import snapshots
+from solvers.fluid.grid.box import Grid, uniform
+from solvers.fluid.terms.boundary.patches import Patch
 
 GRADED = Grid((np.array([0, 0.5, 0.8, 1.5, 2.2, 3.0]), np.array([0, 0.2, 0.6, 0.8, 1.0])))
 ENDS = Patch("ends", ("x-", "x+"), "periodic")
@@ -149,5 +150,6 @@ def test_bodies_stay_within_the_period():
     disc = body("disc", points, loop(16), motion=lambda x, t: (x + np.array([t, 0]), 0 * x + [1, 0]))
     fluid = make_fluid(uniform([0, 0], [2, 1], [16, 8]), [ENDS, WALLS], [disc], dt=0.1)
     step(fluid, 0.0, 0.1)
-    with pytest.raises(StepFailed, match="a body reaches the periodic faces x- and x\\+"):
+    with pytest.raises(StepFailed, match="a body reaches the periodic faces x- and x\\+") as failed:
         step(fluid, 0.1, 0.1)
+    require_advice(failed.value, FailureKind.PERIODIC_FACES)

@@ -5,9 +5,9 @@ import pytest
 from fluid_setup import block
 
 from solvers import kernels
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.cutting.pieces import put_where_fluid_is
-from solvers.tessellation import unit_normals
+from solvers.fluid.geometry.pieces import put_where_fluid_is
+from solvers.fluid.grid.box import uniform
+from solvers.mesh.tessellation import unit_normals
 
 
 def pieces(dim, points, low, high):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fluid_setup import block, body, field, make_fluid, nodal_errors, step
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
 
 RHO, MU, LEFT, START, DT = 1.0, 0.1, -0.5, 0.1, 0.1
 
@@ -70,9 +70,9 @@ def test_piston(dim, element, scheme):
 
 def test_volume_that_the_piston_displaces():
     """The flow through the inlet is the velocity times the area: no fluid is lost where the cut passes."""
-    from solvers.fluid.conservation.regions import RegionsOfCut
-    from solvers.fluid.conservation.volume_balance import VolumeBalance
-    from solvers.fluid.probes import on_patch
+    from solvers.fluid.flow.conservation.regions import RegionsOfCut
+    from solvers.fluid.flow.conservation.volume_balance import VolumeBalance
+    from solvers.fluid.flow.probes import on_patch
 
     fluid = piston(2, "bdf2", "q1q1")
     rate, balance = on_patch(fluid, "flow_rate", "inlet"), VolumeBalance(fluid, RegionsOfCut(fluid)).numbers

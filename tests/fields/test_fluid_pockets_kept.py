@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, sphere, step, turned
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.conservation import pockets as module
-from solvers.fluid.conservation.cavities import enclosed, find_cavities
-from solvers.fluid.conservation.pockets import Pockets
-from solvers.fluid.conservation.regions import Regions, RegionsOfCut
-from solvers.fluid.cutting.pockets import regions
+from solvers.fluid.cut.pockets import regions
+from solvers.fluid.flow.conservation import pockets as module
+from solvers.fluid.flow.conservation.cavities import enclosed, find_cavities
+from solvers.fluid.flow.conservation.pockets import Pockets
+from solvers.fluid.flow.conservation.regions import Regions, RegionsOfCut
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
 
 TIGHT = Patch("walls", ("x-", "x+", "y-", "y+"), "no_slip")
 OPEN = Patch("open", ("x+",), "outflow")
@@ -145,8 +145,8 @@ class Scene:
         )
         comm = SimpleNamespace(allreduce=lambda x: x)
         self.fluid = SimpleNamespace(
-            boundary=SimpleNamespace(patches=[]),
-            surfaces=SimpleNamespace(wet=np.empty(0, dtype=bool)),
+            parts=SimpleNamespace(boundary=SimpleNamespace(patches=[])),
+            moving=SimpleNamespace(surfaces=SimpleNamespace(wet=np.empty(0, dtype=bool))),
             settings=SimpleNamespace(time=SimpleNamespace(times=1)),
             current=SimpleNamespace(difference=SimpleNamespace(alpha=1.0, beta=(1.0,))),
             grid=SimpleNamespace(grid=grid, owned=12, numbers=everything),

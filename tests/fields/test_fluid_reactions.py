@@ -17,7 +17,7 @@ from fluid_setup import (
     wall,
 )
 
-from solvers.fluid.background.grid import uniform
+from solvers.fluid.grid.box import uniform
 
 RHO, MU, DT = 1.3, 0.02, 0.03
 
@@ -81,7 +81,7 @@ def test_moments_balance_without_convection(case):
     nodes = fluid.unknowns.velocity
     rows = fluid.system.residual()[nodes.dofs]
     walls = moment(nodes.points, rows)
-    bodies = sum(moment(m.x, force) for m, force in zip(fluid.motions, fluid.force().values(), strict=True))
+    bodies = sum(moment(m.x, force) for m, force in zip(fluid.moving.motions, fluid.force().values(), strict=True))
     rule, rate = momentum_rate(fluid)
     inertia = moment(rule.x.reshape(-1, fluid.dim), (rule.weights[..., None] * rate).reshape(-1, fluid.dim))
     assert np.abs(walls - bodies - inertia).max() < 1e-12 * np.abs(rows).sum()

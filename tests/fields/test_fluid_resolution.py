@@ -15,18 +15,18 @@ from fsci.bench import resolution as bench
 from fsci.report.report import report
 from fsci.resolution import table as tables
 from fsci.resolution.words import before_the_run, resolved
-from solvers.fluid.background.box import Grid, uniform
-from solvers.fluid.bodies.immersed import rigid_body
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.field import Fluid
-from solvers.fluid.flow_settings import FlowSettings
-from solvers.fluid.resolution.cells import BodyCells, GapCells
-from solvers.fluid.resolution.gaps import WallPlane, gaps, samples_of
-from solvers.fluid.resolution.measure import measure
-from solvers.fluid.resolution.shape import at_start, has_edges
+from solvers.fluid.flow.field import Fluid
+from solvers.fluid.flow.resolution.cells import BodyCells, GapCells
+from solvers.fluid.flow.resolution.gaps import WallPlane, gaps, samples_of
+from solvers.fluid.flow.resolution.measure import measure
+from solvers.fluid.flow.resolution.shape import at_start, has_edges
+from solvers.fluid.grid.box import Grid, uniform
+from solvers.fluid.settings.flow_settings import FlowSettings
+from solvers.fluid.surfaces.immersed import rigid_body
+from solvers.fluid.terms.boundary.patches import Patch
+from solvers.mesh.tessellation import tessellate
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
-from solvers.tessellation import tessellate
 
 
 def corners_of(mesh, shift=(0.0, 0.0)):
@@ -175,7 +175,7 @@ def test_two_processes_measure_the_same(tmp_path):
     program.write_text(
         "from fsci.bench.fluid import ring_in_channel\n"
         "from mpi4py import MPI\n"
-        "from solvers.fluid.resolution.measure import measure\n"
+        "from solvers.fluid.flow.resolution.measure import measure\n"
         "from solvers.timing import Timer\n"
         "fluid = ring_in_channel(10, Timer(), MPI.COMM_WORLD)\n"
         "fluid.initialise(0.0, 0.05)\n"

@@ -18,10 +18,10 @@ from fsci.plot.scene import UPRIGHT
 from fsci.run.history import read_history
 from fsci.run.output import read_collection
 from fsci.run.run import FINISHED, run_case
-from solvers.fluid.bodies.inside import winding
-from solvers.fluid.bodies.surface import Motion
-from solvers.fluid.snapshot import vertex_areas
-from solvers.tessellation import is_closed, tessellate, unit_normals
+from solvers.fluid.flow.snapshot import vertex_areas
+from solvers.fluid.surfaces.inside import winding
+from solvers.fluid.surfaces.surface import Motion
+from solvers.mesh.tessellation import is_closed, tessellate, unit_normals
 
 MOVING = """\
 title: a paddle turns and sways beside a ball
@@ -327,6 +327,6 @@ def test_rigid_motion_by_velocities(dim):
 
 
 def _placed(mesh, rotation):
-    from solvers.mesh import Mesh
+    from solvers.mesh.mesh import Mesh
 
     return place(Mesh(mesh.points, np.zeros((0, 3), dtype=int), "triangle"), rotation).points

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fluid_setup import block, body, field, make_fluid, nodal_errors, solve_steady
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
 
 MU, SLIP = 0.7, 0.3
 

@@ -17,9 +17,9 @@ from fluid_setup import (
 )
 from lubrication import film_force, slip_ratio
 
-from solvers.fluid import coupling_entries
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms import coupling_entries
+from solvers.fluid.terms.boundary.patches import Patch
 
 MU = 0.7
 
@@ -134,7 +134,7 @@ def test_coupling_blocks_are_derivatives(monkeypatch, case):
     with_shape = coupling_entries.shape_derivatives
     monkeypatch.setattr(coupling_entries, "shape_derivatives", lambda *a: tuple(0.0 * part for part in with_shape(*a)))
     fluid, rng = moving(*case), np.random.default_rng(7)
-    at, flow = fluid.system.interface, fluid.flow.copy()
+    at, flow = fluid.system.assemble_interface(), fluid.flow.copy()
     nothing_held = np.zeros(len(flow), dtype=bool)
     found = coupling_entries.interface_entries(at, fluid.unknowns, flow, 1.0, nothing_held, np.arange(at.vertices))
     shape = (at.vertices, fluid.dim)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fsci.bench import fluid as bench
-from solvers.fluid.background.grid import Grid
-from solvers.fluid.probes import at_point, difference
+from solvers.fluid.flow.probes import at_point, difference
+from solvers.fluid.grid.box import Grid
 
 
 def planes(start, *parts):

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, sphere, step, turned
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.conservation.cavities import enclosed
-from solvers.fluid.probes import flow_rate
+from solvers.fluid.flow.conservation.cavities import enclosed
+from solvers.fluid.flow.probes import flow_rate
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
 
 DT = 0.05
 
@@ -60,12 +60,12 @@ def flow(dim, scheme, element="q1q1"):
 def test_outflow_is_the_change_of_volume(dim, scheme, element):
     fluid = flow(dim, scheme, element)
     facets, out = points_of(dim)[1], flow_rate(fluid)
-    volumes, lengths = [enclosed(fluid.motions[0].x, facets)], (0.05, 0.05, 0.05, 0.03)
+    volumes, lengths = [enclosed(fluid.moving.motions[0].x, facets)], (0.05, 0.05, 0.05, 0.03)
     t = 0.0
     for dt in lengths:
         step(fluid, t, dt)
         t += dt
-        volumes.insert(0, enclosed(fluid.motions[0].x, facets))
+        volumes.insert(0, enclosed(fluid.moving.motions[0].x, facets))
         rule = fluid.current.difference
         rate = rule.alpha * volumes[0] - sum(b * v for b, v in zip(rule.beta, volumes[1:], strict=False))
         assert rate > 0.05

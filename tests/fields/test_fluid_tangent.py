@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from fluid_setup import around_moving_body, field, make_fluid, moving_body, step, wall
 
-from solvers.fluid import cell_forms
-from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.terms import cell_forms
+from solvers.fluid.terms.boundary.patches import Patch
 
 
 def channel(dim, element, scheme, convection):

@@ -6,12 +6,12 @@ from fluid_setup import block, body, field, fluid_rule, loop, make_fluid, solve_
 from programs import fsci
 
 from fsci.run.history import read_history
-from solvers.distributed import gather, scatter
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.probes import at_point
-from solvers.fluid.thin.sheet_windows import SheetWindows
-from solvers.fluid.thin.sheets import find_sheets
+from solvers.fluid.flow.probes import at_point
+from solvers.fluid.geometry.thin.sheet_windows import SheetWindows
+from solvers.fluid.geometry.thin.sheets import find_sheets
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
+from solvers.mesh.distributed import gather, scatter
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 

@@ -10,14 +10,14 @@ from programs import fsci
 from fsci.case.plausible_flow import CELLS_ACROSS_IN_CONTACT
 from fsci.run.history import read_history
 from solvers.api import StepFailed
-from solvers.distributed import gather, scatter
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.bodies.surface import Motion
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.cutting.cut import off_boundary
-from solvers.fluid.thin.sheet_transfer import along_surface, sides_of, transfer
-from solvers.fluid.thin.sheets import find_sheets
-from solvers.fluid.thin.thin_bodies import THICK_IN_CONTACT, ThinBodies, may_be_thin
+from solvers.fluid.flow.sheet_transfer import along_surface, sides_of, transfer
+from solvers.fluid.flow.thin_bodies import THICK_IN_CONTACT, ThinBodies, may_be_thin
+from solvers.fluid.geometry.pieces import off_boundary
+from solvers.fluid.geometry.thin.sheets import find_sheets
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.surfaces.surface import Motion
+from solvers.fluid.terms.boundary.patches import Patch
+from solvers.mesh.distributed import gather, scatter
 
 THICKNESS = [1e-3, 0.2, 1.0, 1.5, 3.0]  # in cells
 DRAWS = (range(1), pytest.param(range(1, 10), marks=pytest.mark.slow))

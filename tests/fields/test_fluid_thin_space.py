@@ -7,11 +7,11 @@ from programs import fsci
 from thin_space import duct, sealing, turn
 
 from fsci.run.history import read_history
-from solvers.distributed import gather, scatter
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.probes import at_point
-from solvers.fluid.thin.sheets import find_sheets
+from solvers.fluid.flow.probes import at_point
+from solvers.fluid.geometry.thin.sheets import find_sheets
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
+from solvers.mesh.distributed import gather, scatter
 
 SLOW = pytest.mark.slow
 THICKNESS = [pytest.param(1e-3, marks=SLOW), 0.2, pytest.param(1.0, marks=SLOW), 1.5, pytest.param(3.0, marks=SLOW)]

@@ -37,7 +37,7 @@ def test_plate_that_moves_along_a_duct(element, thickness):
     points, facets, normal = plate(thickness, np.random.default_rng(0))
     off, fluid = pushed(points - [0.2, 0.0, 0.0], facets, normal, element, (8, 3, 3), 1.0)
     assert (off < 1e-9).all()
-    assert fluid.thin.follows
+    assert fluid.moving.thin.follows
 
 
 @pytest.mark.slow
@@ -58,4 +58,4 @@ def test_without_a_direct_solver():
     solver = SolverSettings(Tolerance(residual=1e-12), linear="ilu", linear_tolerance=1e-12)
     off, fluid = pushed(points - [0.2, 0.0, 0.0], facets, normal, "q1q1", (8, 3, 3), 1.0, solver=solver)
     assert (off < 1e-9).all()
-    assert fluid.sequence.current == "ilu"
+    assert fluid.iterative.sequence.current == "ilu"

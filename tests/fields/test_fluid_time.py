@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, errors, field, loop, make_fluid, nodal_errors, step, symbolic, wall
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
 
 RHO, MU, END = 1.3, 0.05, 0.8
 
@@ -40,10 +40,9 @@ def error(scheme, element, steps, moving=True):
 @pytest.mark.parametrize(("scheme", "order"), [("backward_euler", 1), ("bdf2", 2), ("bdf2_optimized", 2)])
 @pytest.mark.parametrize("element", ["q1q1", "q2q1"])
 def test_order_in_time(element, scheme, order):
-    found = np.array([error(scheme, element, steps) for steps in (16, 32, 64)])
-    rates = np.log2(found[:-1] / found[1:])
-    assert rates[-1, 0] > order - 0.15, (found, rates)
-    assert rates[-1, 1] > order - 0.15, (found, rates)
+    found = np.array([error(scheme, element, steps) for steps in (32, 64)])
+    rates = np.log2(found[0] / found[1])
+    assert rates.min() > order - 0.15, (found, rates)
 
 
 @pytest.mark.slow

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from fluid_setup import block, body, field, loop, make_fluid, step, turned
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.thin.regions import area_of
-from solvers.fluid.thin.sheets import find_sheets
+from solvers.fluid.geometry.regions.regions import area_of
+from solvers.fluid.geometry.thin.sheets import find_sheets
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.terms.boundary.patches import Patch
 
 H = 0.1
 DRAWS = (range(2), pytest.param(range(2, 20), marks=pytest.mark.slow))

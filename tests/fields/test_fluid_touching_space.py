@@ -6,13 +6,13 @@ from fluid_setup import block, body, field, solve_steady, step
 from thin_space import SIZE, duct, turn
 
 from solvers import kernels
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.thin.face_regions import in_cells
-from solvers.fluid.thin.sheets import find_sheets
-from solvers.fluid.thin.sliced_facets import sliced_facets
-from solvers.fluid.thin.wet_edges import EdgeLattice
-from solvers.gauss import gauss
-from solvers.tessellation import unit_normals
+from solvers.fluid.geometry.regions.face_regions import in_cells
+from solvers.fluid.geometry.regions.sliced_facets import sliced_facets
+from solvers.fluid.geometry.regions.wet_edges import EdgeLattice
+from solvers.fluid.geometry.thin.sheets import find_sheets
+from solvers.fluid.grid.box import uniform
+from solvers.mesh.gauss import gauss
+from solvers.mesh.tessellation import unit_normals
 
 DRAWS = (range(1), pytest.param(range(1, 20), marks=pytest.mark.slow))
 PRESSURES, AREA = (2.0, 0.7), (3 * SIZE) ** 2

@@ -3,17 +3,17 @@
 import numpy as np
 
 from solvers import kernels
-from solvers.fluid.background.box import Grid
-from solvers.fluid.cutting.pieces import place_of
-from solvers.fluid.cutting.triangle_pieces import CHUNK, parts_of_triangles
-from solvers.gauss import gauss
+from solvers.fluid.geometry.pieces import place_of
+from solvers.fluid.geometry.triangle_pieces import TRIANGLES_AT_ONCE, parts_of_triangles
+from solvers.fluid.grid.box import Grid
+from solvers.mesh.gauss import gauss
 
 
 def test_whole_triangles():
     """One or more triangles within each cell of a graded grid: moments, masses and normals; more than one chunk."""
     rng, points = np.random.default_rng(3), gauss(3)[0]
     grid = Grid(tuple(np.cumsum(rng.uniform(0.2, 1.0, count + 1)) for count in (5, 4, 3)))
-    cell = np.repeat(np.arange(grid.size), CHUNK // grid.size + 2)
+    cell = np.repeat(np.arange(grid.size), TRIANGLES_AT_ONCE // grid.size + 2)
     low, size = place_of(grid, cell)
     corners = rng.uniform(0.1, 0.9, (len(cell), 3, 3))
     x = (low[:, None] + corners * size[:, None]).reshape(-1, 3)

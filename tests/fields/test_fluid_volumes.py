@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from fluid_setup import block, body, field, make_fluid, step
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.background.nested import RefinedBox, refined
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.conservation.regions import RegionsOfCut
-from solvers.fluid.conservation.volume_balance import VolumeBalance
-from solvers.fluid.conservation.volumes import Volumes
+from solvers.fluid.flow.conservation.regions import RegionsOfCut
+from solvers.fluid.flow.conservation.volume_balance import VolumeBalance
+from solvers.fluid.flow.conservation.volumes import Volumes
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.grid.nested import RefinedBox, refined
+from solvers.fluid.terms.boundary.patches import Patch
 
 OUT = Patch("out", ("x+",), "outflow")
 SLIP = Patch("slip", ("y-", "y+"), "slip")

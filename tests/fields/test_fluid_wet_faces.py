@@ -5,13 +5,13 @@ import pytest
 from fluid_setup import block, body, circle, field, loop, make_fluid, sphere, step, turned, wall
 from mpi4py import MPI
 
-from solvers.fluid.background.grid import Grid, uniform
-from solvers.fluid.bodies.surface import Motion
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.boundary.wet_faces import wet_face
-from solvers.fluid.conservation.regions import RegionsOfCut
-from solvers.fluid.conservation.volume_balance import VolumeBalance
-from solvers.fluid.probes import on_patch
+from solvers.fluid.flow.conservation.regions import RegionsOfCut
+from solvers.fluid.flow.conservation.volume_balance import VolumeBalance
+from solvers.fluid.flow.probes import on_patch
+from solvers.fluid.grid.box import Grid, uniform
+from solvers.fluid.surfaces.surface import Motion
+from solvers.fluid.terms.boundary.patches import Patch
+from solvers.fluid.terms.boundary.wet_faces import wet_face
 
 POINTS = np.polynomial.legendre.leggauss(3)[0] / 2.0 + 0.5
 

@@ -95,7 +95,7 @@ def pressure_and_force(cells, order):
     return sum(share * p[k + n] for n, share in enumerate(shares)), contact.resultant(0)[1]
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=80)
 def test_hertz_orders():
     """Pressure in L2: 1/2 to 1 with first order, 1 with second order (Wohlmuth 2011); the edge of contact is the bound.
 

@@ -18,7 +18,7 @@ from structure_setup import constant
 
 from fsci import shapes
 from fsci.run.history import read_history
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 from solvers.structure.body import Support
 from solvers.structure.elastic_constants import lame
 from solvers.structure.materials import NeoHooke

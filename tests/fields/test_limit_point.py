@@ -2,38 +2,39 @@
 
 import numpy as np
 import pytest
+from advised import require_advice
 from contact_setup import make_body, make_contact
 from structure_setup import vector
 
 from fsci import shapes
-from solvers.api import StepFailed
+from solvers.api import FailureKind, StepFailed
 from solvers.contact.surface import Surface
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support
+from solvers.structure.deformation import LimitPoint
 from solvers.structure.elastic_constants import lame
-from solvers.structure.limit_point import LimitPoint
 from solvers.structure.materials import NeoHooke
 
 SETTINGS = SolverSettings(Tolerance(residual=1e-10, max_iterations=20), linear="direct")
 
 
 def go_on(structure, t, step, end):
-    """(time of the last equilibrium, message of the step that failed with a sixteenth of the length, or "")."""
+    """(time of the last equilibrium, failure of the step with a sixteenth of the length, or None)."""
     while t < end:
-        state, message = structure.save(), ""
+        state, failed = structure.save(), None
         for dt in step * 0.5 ** np.arange(5):
             try:
                 structure.step(t, float(dt))
             except StepFailed as failure:
-                message = str(failure)
+                failed = failure
                 structure.restore(state)
             else:
-                t, message = t + float(dt), ""
+                t, failed = t + float(dt), None
                 break
-        if message:
-            return t, message
-    return t, ""
+        if failed is not None:
+            return t, failed
+    return t, None
 
 
 @pytest.mark.parametrize("step", [0.025, 0.0125])
@@ -49,10 +50,11 @@ def test_a_plate_on_an_arch(step, length):
     )
     structure, _ = make_contact([body], [(("arch", "outer"), plate)], settings=SETTINGS)
     structure.initialise(0.0, step)
-    t, message = go_on(structure, 0.0, step, 1.0)
+    t, failed = go_on(structure, 0.0, step, 1.0)
     assert t == pytest.approx(0.39, abs=0.01)
-    assert f"no equilibrium beyond t = {t:.4g}" in message
-    assert "use dynamics" in message
+    assert f"no equilibrium beyond t = {t:.4g}" in str(failed)
+    assert "use dynamics" in str(failed)
+    require_advice(failed, FailureKind.LIMIT_POINT)
 
 
 def test_growth_that_is_usual_is_no_limit():

@@ -254,7 +254,7 @@ solver: {newton: {residual: 1e-11}}
 def test_processes(tmp_path):
     (tmp_path / "case.yaml").write_text(CASE)
     found = []
-    for processes in (1, 2, 3):
+    for processes in (1, 3):
         done = fsci("run", tmp_path, "-o", tmp_path / str(processes), processes=processes)
         assert done.returncode == 0, done.stdout + done.stderr
         found.append(read_history(tmp_path / str(processes) / "history.csv"))
@@ -262,8 +262,7 @@ def test_processes(tmp_path):
     assert len(columns) == 13
     assert abs(found[0]["tip.z"][-1]) > 0.1
     for column in columns:
-        for other in found[1:]:
-            assert other[column] == pytest.approx(found[0][column], rel=1e-8, abs=1e-9), column
+        assert found[1][column] == pytest.approx(found[0][column], rel=1e-8, abs=1e-9), column
 
 
 REFUSED = """

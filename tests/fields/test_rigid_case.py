@@ -27,7 +27,7 @@ fluid:
         gravity: [0, -5]
         springs: [{at: [0.6, 0.55], stiffness: [3, 1], damping: 0.1}]
         held: []
-        initial_spin: [1]
+        initial_angular_velocity: [180/pi]
 coupling: {scheme: monolithic}
 probes:
   centre: {body: disc, quantity: centre}
@@ -86,10 +86,27 @@ MISTAKES = [
     ),
     ("grid:", "scheme: steady\n  grid:", "a free body needs a time-dependent flow: choose the scheme bdf2"),
     ("held: []", "held: [z]", "a body in 2D has no degree of freedom 'z'; choose 'x', 'y' or 'rotation'"),
-    ("initial_spin: [1]", "initial_spin: [1, 2, 3]", "'initial_spin' must have 1 entry in 2D, not 3"),
+    (
+        "initial_angular_velocity: [180/pi]",
+        "initial_angular_velocity: [1, 2, 3]",
+        "'initial_angular_velocity' must have 1 entry in 2D, not 3",
+    ),
     ("stiffness: [3, 1]", "stiffness: [3, 1, 1]", "'stiffness' must have 2 entries in 2D, not 3"),
     ("gravity: [0, -5]", "gravity: [0, -5, 0]", "'gravity' must have 2 entries in 2D, not 3"),
     ("free:", "motion: {displacement: [0, t]}\n      free:", "give either 'motion' or 'free', not both"),
+    (
+        "probes:\n",
+        "rigid: {bodies: {bar: {mesh: {shape: rectangle, size: [1, 1], cells: [1, 1]}, density: 1}}}\nprobes:\n",
+        "free bodies of a case with 'fluid' are in the flow: put it into 'fluid.bodies', with 'free'",
+    ),
+    (
+        "probes:\n",
+        "contact:\n  obstacles:\n    bar: {mesh: {shape: rectangle, size: [1, 1], cells: [1, 1]}, on: top, "
+        "free: {density: 1}}\nprobes:\n",
+        "free bodies of a case with 'fluid' are in the flow: put it into 'fluid.bodies', with 'free'",
+    ),
+    ("stiffness: [3, 1]", "stiffness: 3, to: {body: disk, at: [0, 0]}", "there is no free rigid body 'disk'"),
+    ("held: []", "pivot: [0.5, 0.5, 0.5]", "'pivot' must have 2 entries in 2D, not 3"),
     (
         "{body: disc, quantity: c",
         "{field: rigid, body: disk, quantity: c",
@@ -107,26 +124,86 @@ def test_mistakes_are_located(tmp_path, right, wrong, message):
     assert "case.yaml:" in str(error.value)
 
 
-def test_elastic_bodies_beside_it_are_refused(tmp_path):
-    text = (
-        SINKING
-        + """\
-structure:
-  dynamics: {}
-  bodies:
-    block:
-      mesh: {shape: rectangle, size: [0.1, 0.1], cells: [1, 1]}
-      material: {law: neo_hooke, E: 1000, nu: 0.3, density: 2}
-"""
+#: Values of the old setting in rad/s, and the new one, as messages say it.
+OLD_SPINS = [
+    ("3", "171.887338539"),
+    ("[3]", "[171.887338539]"),
+    ("2*pi", "360"),
+    ("[-0.5*pi, 0, 1e-3]", "[-90, 0, 0.0572957795131]"),
+]
+
+
+@pytest.mark.parametrize(("old", "new"), OLD_SPINS)
+def test_the_old_setting_in_radians_is_refused_with_the_new_one(tmp_path, old, new):
+    with pytest.raises(CaseError) as error:
+        load_case(write(tmp_path, SINKING.replace("initial_angular_velocity: [180/pi]", f"initial_spin: {old}")))
+    (problem,) = error.value.problems
+    assert problem.message == (
+        f"'initial_spin' [rad/s] is now 'initial_angular_velocity' [degrees/s]: write 'initial_angular_velocity: {new}'"
     )
-    with pytest.raises(CaseError, match="a case has either free rigid bodies or elastic ones"):
-        load_case(write(tmp_path, text))
+    line = SINKING.splitlines().index("        initial_angular_velocity: [180/pi]") + 1
+    assert (problem.place.line, problem.place.column) == (line, 23)
+
+
+@pytest.mark.parametrize("old", ["fast", "null", "{z: 1}", "[]"])
+def test_the_old_setting_without_a_number_is_refused_with_the_name_of_the_new_one(tmp_path, old):
+    with pytest.raises(CaseError, match=r"'initial_spin' \[rad/s\] is now 'initial_angular_velocity'"):
+        load_case(write(tmp_path, SINKING.replace("initial_angular_velocity: [180/pi]", f"initial_spin: {old}")))
+
+
+def test_the_initial_angular_velocity_is_in_degrees_per_second(tmp_path):
+    """A quarter of a turn in a second, as a number or a list: the angular momentum of the thrown disc is I pi/2."""
+    from mpi4py import MPI
+
+    from fsci.builder.rigid import build_free_bodies
+    from solvers.timing import Timer
+
+    for given in ("90", "[90]"):
+        path = write(tmp_path, SINKING.replace("[180/pi]", given))
+        bodies = build_free_bodies(load_case(path), MPI.COMM_SELF, Timer())
+        assert bodies.bodies[0].initial_spin == pytest.approx((0.0, 0.0, np.pi / 2))
+
+
+def test_friction_and_restitution_of_free_bodies(tmp_path):
+    """They are those of all pairs; a case without elastic bodies may have the section for them alone."""
+    from mpi4py import MPI
+
+    from fsci.builder.rigid import build_free_bodies
+    from solvers.timing import Timer
+
+    for given, mu, e in (
+        ("{friction: {coefficient: 0.3}, restitution: 0.5}", 0.3, 0.5),
+        ("{friction: none}", 0.0, 0.0),
+    ):
+        path = write(tmp_path, SINKING + f"contact: {given}\n")
+        contact = build_free_bodies(load_case(path), MPI.COMM_SELF, Timer()).contact
+        assert [pair.friction for pair in contact.pairs] == [mu] * 4
+        assert contact.restitution == e
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("{c_n: 2}", "'c_n' needs the section 'structure': it is not for contact of free bodies"),
+        ("{friction: {bound: 2}}", "free rigid bodies have Coulomb's friction: give 'coefficient'"),
+        ("{restitution: 1.5}", "restitution"),
+    ],
+)
+def test_contact_of_free_bodies_has_no_other_settings(tmp_path, given, message):
+    with pytest.raises(CaseError, match=message):
+        load_case(write(tmp_path, SINKING + f"contact: {given}\n"))
+
+
+def test_restitution_is_for_free_bodies(tmp_path):
+    text = SINKING.replace("free:", "slip_length: 0\n      unused:").split("      unused:")[0]
+    with pytest.raises(CaseError, match="'contact' needs the section 'structure'"):
+        load_case(write(tmp_path, text + "contact: {restitution: 0.5}\n"))
 
 
 def test_a_held_body_does_not_move(tmp_path):
     """All ways held: the flow is that around a body at rest."""
     text = SINKING.replace("held: []", "held: [x, y, rotation]").replace(
-        "initial_spin: [1]", "initial_velocity: [0, 0]"
+        "initial_angular_velocity: [180/pi]", "initial_velocity: [0, 0]"
     )
     assert run_case(load_case(write(tmp_path, text)), tmp_path / "out") == FINISHED
     history = read_history(tmp_path / "out" / "history.csv")

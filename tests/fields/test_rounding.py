@@ -7,7 +7,7 @@ from petsc4py import PETSc
 from fsci.case import load_case
 from fsci.run.history import read_history
 from fsci.run.run import FINISHED, run_case
-from solvers.rounding import rounding_error
+from solvers.algebra.rounding import rounding_error
 
 
 def test_estimate_is_the_size_of_the_error():

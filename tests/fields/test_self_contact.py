@@ -13,8 +13,7 @@ from fsci.case import CaseError, load_case
 from fsci.run.history import read_history
 from fsci.run.run import FINISHED, run_case
 from solvers.contact.dual_tree import DualTree
-from solvers.contact.roles import MASTER, SLAVE, choose_roles
-from solvers.contact.self_search import SelfSearch, wall_thickness
+from solvers.contact.self_search import MASTER, SLAVE, SelfSearch, choose_roles, wall_thickness
 from solvers.structure.body import Support
 
 ZERO = constant(0)

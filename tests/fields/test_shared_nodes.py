@@ -7,7 +7,7 @@ from structure_setup import constant
 
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 from solvers.structure.body import Support
 
 ZERO = constant(0)

@@ -8,14 +8,14 @@ from test_contact_several import HIGH, HIGH_3D, LOW, LOW_3D, STIFF, wall
 
 from coupling.contact_surfaces import contact_surface
 from fsci import shapes
-from solvers.cell_types import CELL_TYPES
 from solvers.contact.contact import Contact
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.tied import Tied
 from solvers.contact.pair import Pair
 from solvers.contact.sharp_edges import split_nodes
 from solvers.contact.surface import Surface
-from solvers.mesh_topology import cut_out
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.topology import cut_out
 from solvers.structure.body import Support, Traction
 from solvers.structure.field import Structure
 from solvers.structure.time_scheme import Statics

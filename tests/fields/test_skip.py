@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, field, loop, make_fluid, solve_steady
 from mpi4py import MPI
+from small_scenes import BEAM, BLOCK, FLOW, POST
 
-import solvers.fluid.cutting.cut
-import solvers.fluid.cutting.pressure_level
-import solvers.fluid.system
-from fsci.bench.small import BEAM, BLOCK, FLOW, POST
+import solvers.fluid.cut.cut
+import solvers.fluid.solve.pressure_level
+import solvers.fluid.solve.system
 from fsci.builder.build import build
 from fsci.case import load_case
 from fsci.run.run import FINISHED, Run, run_case
 from solvers.contact.mortar import Mortar
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.system import FlowSystem
-from solvers.search import Search
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.solve.system import FlowSystem
+from solvers.fluid.terms.boundary.patches import Patch
+from solvers.mesh.search import Search
 from solvers.structure.field import Structure
 from solvers.timing import Timer
 
@@ -35,12 +35,16 @@ PLOTTING = ("pyvista", "matplotlib", "gmsh")
 #: numbers that `fsci check` needs, too
 LIGHT = (
     "solvers.structure.elastic_constants",
-    "solvers.fluid.bodies.fast_bodies",
-    "solvers.fluid.bodies",
-    "solvers.fluid.boundary",
-    "solvers.fluid.boundary.patch_kinds",
-    "solvers.fluid.thin",
-    "solvers.fluid.thin.thickness",
+    "solvers.fluid.grid",
+    "solvers.fluid.grid.box",
+    "solvers.fluid.surfaces",
+    "solvers.fluid.surfaces.fast_bodies",
+    "solvers.fluid.terms",
+    "solvers.fluid.terms.boundary",
+    "solvers.fluid.terms.boundary.patch_kinds",
+    "solvers.fluid.geometry",
+    "solvers.fluid.geometry.thin",
+    "solvers.fluid.geometry.thin.thickness",
 )
 
 
@@ -78,7 +82,7 @@ def iterations_of(case, steps):
         (BEAM, ("solvers.fluid.", "solvers.contact", "solvers.rigid", "coupling")),
         (BLOCK, ("solvers.fluid.", "solvers.rigid", "coupling.monolithic", "coupling.partitioned")),
         (FLOW, ("solvers.structure.", "solvers.contact", "solvers.rigid", "coupling")),
-        (FLOW + POST, ("solvers.contact.contact", "solvers.contact.mortar")),
+        (FLOW + POST + "contact: none\n", ("solvers.contact.contact", "solvers.contact.mortar")),
     ],
     ids=["beam", "block", "flow", "post"],
 )
@@ -124,13 +128,13 @@ def test_bodies_that_come_near_are_searched_in_time(law, tmp_path, monkeypatch):
 
 def test_bodies_at_rest_are_cut_once(tmp_path, monkeypatch):
     calls = Counter()
-    moments = solvers.fluid.cutting.cut.kernels.moments
+    moments = solvers.fluid.cut.cut.kernels.moments
 
     def counting(*arguments, **keywords):
         calls["moments"] += 1
         return moments(*arguments, **keywords)
 
-    monkeypatch.setattr(solvers.fluid.cutting.cut.kernels, "moments", counting)
+    monkeypatch.setattr(solvers.fluid.cut.cut.kernels, "moments", counting)
     iterations_of(written(tmp_path, FLOW + RESTING, 0.1), 4)
     assert calls["moments"] == 2  # to look for thin bodies, and the cut
     iterations_of(written(tmp_path, FLOW + MOVING, 0.1), 4)
@@ -139,7 +143,7 @@ def test_bodies_at_rest_are_cut_once(tmp_path, monkeypatch):
 
 def test_a_body_outside_of_the_box_changes_nothing(tmp_path, monkeypatch):
     """A disc at rest there: the same flow, bit for bit; no pocket is looked for."""
-    monkeypatch.setattr(solvers.fluid.cutting.pressure_level, "find_pockets", None)
+    monkeypatch.setattr(solvers.fluid.solve.pressure_level, "find_pockets", None)
     found = []
     for text in (FLOW, FLOW + RESTING.replace("0.78, 0.51", "5, 5")):
         simulation = build(written(tmp_path, text, 0.1), MPI.COMM_WORLD, Timer())
@@ -156,8 +160,8 @@ def test_a_body_outside_of_the_box_changes_nothing(tmp_path, monkeypatch):
 )
 def test_surfaces_that_cut_no_cell_have_no_terms(where, motion, count, tmp_path, monkeypatch):
     """The first step finds that all of them are zero; those of surfaces in the flow follow its scales in each step."""
-    made, terms = [], solvers.fluid.system.InterfaceTerms
-    monkeypatch.setattr(solvers.fluid.system, "InterfaceTerms", lambda *a: made.append(terms(*a)) or made[-1])
+    made, terms = [], solvers.fluid.solve.system.InterfaceTerms
+    monkeypatch.setattr(solvers.fluid.solve.system, "InterfaceTerms", lambda *a: made.append(terms(*a)) or made[-1])
     text = FLOW + DISC.replace("0.78, 0.51", where).replace("MOTION", motion)
     iterations_of(written(tmp_path, text, 0.1), 4)
     assert len(made) == count
@@ -282,7 +286,7 @@ def test_cells_in_a_body_have_no_integrals_and_no_equations(monkeypatch):
     assert sum(map(len, fluid.system.cells)) == len(fluid.cut.active) < len(fluid.grid.numbers) - 40
     inside = ~fluid.system.active_dofs
     assert inside.sum() > 100
-    assert fluid.held[inside].all()
+    assert fluid.iterate.held[inside].all()
     starts, _, values = tangents[-1].getValuesCSR()
     assert (np.diff(starts)[inside] == 1).all()
     assert (values[starts[:-1][inside]] != 0.0).all()

@@ -4,9 +4,9 @@ import time
 
 import ffcx.codegeneration.jit
 import pytest
+from small_scenes import BEAM
 
 import fsci.run.run
-from fsci.bench.small import BEAM
 from fsci.case import load_case
 
 CASE = (

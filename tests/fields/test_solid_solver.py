@@ -5,8 +5,8 @@ from mpi4py import MPI
 from pressed_block import assert_same_results, press_block
 
 from fsci import shapes
+from solvers.algebra.solid_factors import SolidFactors
 from solvers.newton import Tolerance
-from solvers.solid_factors import SolidFactors
 from solvers.solver_settings import SolverSettings
 from solvers.structure import solid_solver
 
@@ -31,20 +31,20 @@ def test_auto_solves_as_the_direct_solver(size, cells, position):
     solver = auto[0].solver
     assert solver.sequence == ("ilu", "direct")
     assert solver.position == position
-    kind = auto[0].constrained_solver.getPC().getType()
+    kind = auto[0].create_solver(contact=True).getPC().getType()
     assert kind == ("lu" if position else "python")
 
 
 def test_the_choice_is_part_of_the_state():
     structure, _, _ = pressed("auto", size=(2.0, 1.1, 1.0), cells=(4, 3, 2))
     first = structure.save()
-    assert isinstance(structure.constrained_solver.getPC().getPythonContext(), SolidFactors)
+    assert isinstance(structure.create_solver(contact=True).getPC().getPythonContext(), SolidFactors)
     structure.solver.position = 1
     second = structure.save()
     structure.restore(first)
     assert structure.solver.position == 0
     structure.restore(second)
-    assert structure.constrained_solver.getPC().getType() == "lu"
+    assert structure.create_solver(contact=True).getPC().getType() == "lu"
 
 
 def test_first_system_of_a_step_is_solved_to_the_square(monkeypatch):

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from advised import require_advice
 from structure_setup import TIGHT, block, constant, load_step, make_structure, vector
 
 from fsci import shapes
-from solvers.api import StepFailed
+from solvers.api import FailureKind, StepFailed
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure import probes
 from solvers.structure.body import Pressure, Support, Symmetry, Traction
@@ -210,8 +211,9 @@ def test_a_body_that_nothing_holds(cell_type, law):
     mesh = block(cell_type, 2)
     load = vector(*[0.1] * mesh.points.shape[1])
     structure = make_structure(mesh, law, tractions=[Traction("top", load)])
-    with pytest.raises(StepFailed, match="is a body not supported"):
+    with pytest.raises(StepFailed, match="is a body not supported") as failed:
         load_step(structure)
+    require_advice(failed.value, FailureKind.UNSUPPORTED)
 
 
 @pytest.mark.parametrize("scale", [1e-5, 1e-8])

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from advised import require_advice
 from structure_setup import block, constant, make_structure, vector
 
 from fsci import shapes
-from solvers.api import StepFailed
+from solvers.api import FailureKind, StepFailed
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
@@ -44,9 +45,8 @@ def swing(rho_inf, dt):
     return structure.now.u.copy()
 
 
-@pytest.mark.parametrize("rho_inf", [1.0, 0.8, 0.0])
-def test_second_order(rho_inf):
-    dt = 0.00125
+@pytest.mark.parametrize(("rho_inf", "dt"), [(1.0, 0.0025), (0.8, 0.0025), (0.0, 0.00125)])
+def test_second_order(rho_inf, dt):
     coarse, middle, fine = (swing(rho_inf, dt / 2**k) for k in range(3))
     ratio = np.linalg.norm(coarse - middle) / np.linalg.norm(middle - fine)
     assert np.abs(coarse).max() > 0.8
@@ -190,7 +190,7 @@ def test_acceleration_at_the_start():
     )
     structure.initialise(0.0, 0.1)
     (body,), now = structure.bodies, structure.now
-    mass = structure.inertia.mass.convert("dense").getDenseArray()
+    mass = structure.inertia.assemble_mass().convert("dense").getDenseArray()
     weight = mass @ np.tile([0.0, -10.0], len(now.u) // 2)
     parts = weight, -body.internal_force(), -now.damping
     assert min(np.abs(part).max() for part in parts) > 0.1
@@ -203,5 +203,6 @@ def test_no_acceleration_at_the_start():
     structure = make_structure(block("quad", 2), NeoHooke(30.0, 50.0, 2.0), time=time, gravity=vector(0.0, np.nan))
     with pytest.raises(
         StepFailed, match=r"the acceleration at the start cannot be computed \(a force is not a number\)"
-    ):
+    ) as failed:
         structure.initialise(0.0, 0.1)
+    require_advice(failed.value, FailureKind.NOT_FINITE)

@@ -18,9 +18,9 @@ from structure_setup import distort
 
 from fsci import shapes
 from solvers import fem
-from solvers.cell_types import CELL_TYPES
 from solvers.kernels import basis_transformation, mortar, nodal_normals
-from solvers.mesh_topology import cut_out
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.topology import cut_out
 
 
 def tie(xs, fs, slave, xm, fm, master):

@@ -10,7 +10,7 @@ from unconnected_scenes import Scene, case_of, computed, difference, dragged, dr
 
 from fsci import shapes
 from fsci.run.history import read_history
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 from solvers.structure.body import Body, Support
 from solvers.structure.field import Structure
 from solvers.structure.materials import NeoHooke

@@ -8,7 +8,7 @@ from structure_setup import CELL_TYPES, block, make_structure
 from test_contact_start import TIGHT, advance
 from test_rigid_inertia import probe, spins
 
-from solvers.blocks import times
+from solvers.algebra.blocks import times
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.dynamics import Dynamics
 from solvers.structure.materials import (

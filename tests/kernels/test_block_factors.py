@@ -5,9 +5,10 @@ import pytest
 from petsc4py import PETSc
 from scipy import sparse
 
-from solvers import kernels, linear
-from solvers.incomplete import Incomplete
-from solvers.petsc_blocks import entry_rows
+from solvers import kernels
+from solvers.algebra import linear
+from solvers.algebra.incomplete import Incomplete
+from solvers.algebra.petsc_blocks import entry_rows
 
 PETSC_SELF = PETSc.COMM_SELF
 

@@ -10,8 +10,8 @@ from programs import on_processes
 from scipy import sparse
 
 from solvers import kernels
-from solvers.fluid.linear_systems import coarse_matrix
-from solvers.fluid.linear_systems.coarse_matrix import CoarseMatrix
+from solvers.fluid.solve.linear_systems import coarse_matrix
+from solvers.fluid.solve.linear_systems.coarse_matrix import CoarseMatrix
 
 PROGRAM = Path(__file__).parents[1] / "setups" / "coarse_parallel.py"
 

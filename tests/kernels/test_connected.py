@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from solvers.connected import connected_parts
+from solvers.algebra.connected import connected_parts
 
 
 @pytest.mark.parametrize("edges", [0, 10, 40, 70, 200])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from moments_setup import all_cells, box, corners_and_sizes, graded, moved, sphere, star, tensor
 
-from solvers.fluid.films.film_crossings import crossing_moments
-from solvers.gauss import gauss
+from solvers.fluid.terms.shape_derivatives.film_crossings import crossing_moments
 from solvers.kernels import moments
-from solvers.tessellation import unit_normals
+from solvers.mesh.gauss import gauss
+from solvers.mesh.tessellation import unit_normals
 
 STEP = 1e-6
 BODIES = {

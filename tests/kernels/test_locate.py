@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fsci import shapes
-from solvers.cell_types import reference_nodes
-from solvers.locate import locate
+from solvers.mesh.cell_types import reference_nodes
+from solvers.mesh.locate import locate
 
 CELLS = [("tri", 1), ("tri", 2), ("quad", 1), ("quad", 2), ("tet", 1), ("tet", 2), ("hex", 1), ("hex", 2)]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mortar_surfaces import DIM, SECOND_ORDER, TYPES_2D, TYPES_3D, all_pairs, dense, patch, rotation
 
-from solvers.kernels import mortar, nodal_normals, nodal_tangents
+from solvers.kernels import mortar, nodal_normals
 
 STEP = 1e-6
 
@@ -145,19 +145,6 @@ def test_derivatives_of_normals(facet_type):
         _, slope = nodal_normals(x, facets, facet_type, m)
         expected = difference(lambda y, m=m: nodal_normals(y, facets, facet_type, m, derivatives=False)[0], x)
         assert_derivative(dense(slope, x.size, x.size), expected)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_derivatives_of_tangents(dim):
-    rng = np.random.default_rng(31)
-    n = rng.normal(size=(10, dim))
-    n /= np.linalg.norm(n, axis=1)[:, None]
-    if dim == 3:
-        n[0] = [0.5e-5, -0.5e-5, np.sqrt(1 - 0.5e-10)]
-    _, slope = nodal_tangents(n)
-    for j in range(len(n)):
-        expected = difference(lambda y: nodal_tangents(y)[0], n[j : j + 1])
-        assert_derivative(slope[j].reshape(-1, dim), expected)
 
 
 def test_all_derivatives_together_follow_the_positions():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from mortar_surfaces import DIM, TYPES_2D, TYPES_3D, dense, jittered, patch, rotation
 
-from solvers.kernels import nodal_normals, nodal_tangents
+from solvers.kernels import nodal_normals
 
 
 @pytest.mark.parametrize("facet_type", [*TYPES_2D, *TYPES_3D])
@@ -36,18 +36,6 @@ def test_masked_normals_lie_in_the_symmetry_plane():
     assert not normals[on_plane, 0].any()
     np.testing.assert_array_equal(normals[~on_plane], plain[~on_plane])
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0)
-
-
-def test_tangents_complete_the_normal_to_a_right_handed_frame():
-    rng = np.random.default_rng(10)
-    n = rng.normal(size=(20, 3))
-    n = np.vstack([n / np.linalg.norm(n, axis=1)[:, None], [[0, 0, 1.0], [0, 0, -1.0]]])
-    t, _ = nodal_tangents(n)
-    frame = np.concatenate([n[:, None], t], axis=1)
-    np.testing.assert_allclose(frame @ frame.transpose(0, 2, 1), np.tile(np.eye(3), (len(n), 1, 1)), atol=1e-14)
-    np.testing.assert_allclose(np.linalg.det(frame), 1.0)
-    t, _ = nodal_tangents(np.array([[0.6, 0.8]]))
-    np.testing.assert_allclose(t, [[[-0.8, 0.6]]])
 
 
 def test_derivatives_of_chosen_normals():

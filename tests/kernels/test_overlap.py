@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from solvers.overlap import OverlappingBlocks
+from solvers.algebra.overlap import OverlappingBlocks
 
 
 @pytest.mark.parametrize(("r", "c"), [(2, 3), (3, 1), (1, 1)])

@@ -8,9 +8,10 @@ import pytest
 from mpi4py import MPI
 from programs import on_processes
 
-from solvers.fluid.background.grid import DistributedGrid, Grid, uniform
-from solvers.fluid.cutting.cut import cells_between
-from solvers.fluid.cutting.pockets import find_pockets
+from solvers.fluid.cut.cut import cells_between
+from solvers.fluid.cut.pockets import find_pockets
+from solvers.fluid.grid.box import Grid, uniform
+from solvers.fluid.mesh.distributed_grid import DistributedGrid
 
 SHAPES = [((9, 8), ()), ((9, 8), (0,)), ((6, 5, 4), ()), ((6, 5, 4), (1, 2))]
 

@@ -9,7 +9,7 @@ from programs import on_processes
 from scipy import sparse
 
 from solvers import kernels
-from solvers.rounded_product import RoundedProducts
+from solvers.algebra.rounded_product import RoundedProducts
 
 PROGRAM = Path(__file__).parents[1] / "setups" / "rounded_product.py"
 NODES = 30

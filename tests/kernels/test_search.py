@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from fsci.bench.search import measure_search, wavy_sheet
-from solvers import search as search_module
 from solvers.api import StepFailed
 from solvers.kernels import KdopTree2, KdopTree3
-from solvers.search import REBUILD_ABOVE, Search
+from solvers.mesh import search as search_module
+from solvers.mesh.search import REBUILD_ABOVE, Search
 
 TYPES = {"line2": (2, 2), "line3": (2, 3), "tri3": (3, 3), "quad4": (3, 4), "tri6": (3, 6), "quad9": (3, 9)}
 

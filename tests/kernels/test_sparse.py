@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from solvers import sparse as module
-from solvers import sparse_public
-from solvers.sparse import counted_order, diagonal, nothing, sparse, sparse_from_array, sparse_from_entries, stack
+from solvers.algebra import sparse as module
+from solvers.algebra import sparse_public
+from solvers.algebra.sparse import (
+    counted_order,
+    diagonal,
+    nothing,
+    sparse,
+    sparse_from_array,
+    sparse_from_entries,
+    stack,
+)
 
 NUMBERS = np.random.default_rng(3)
 
@@ -22,9 +30,6 @@ def random(rows, columns):
 A, DENSE_A = random(7, 5)
 B, DENSE_B = random(5, 6)
 C, DENSE_C = random(7, 5)
-
-DENSE_A_WITH_ROWS_OF_C = np.where(np.arange(7)[:, None] == 5, DENSE_C[3], DENSE_A)
-DENSE_A_WITH_ROWS_OF_C[2] = DENSE_C[0]
 
 
 @pytest.mark.parametrize(
@@ -43,7 +48,6 @@ DENSE_A_WITH_ROWS_OF_C[2] = DENSE_C[0]
         (A.with_columns(np.array([2, -1, 0, -1, 8]), 9), DENSE_A[:, [0, 2, 4]] @ np.eye(9)[[2, 0, 8]]),
         (A.with_columns(np.arange(5)[::-1], 5), DENSE_A[:, ::-1]),
         (A.with_rows(np.array([8, 0, 1, 2, 3, 4, 5]), 10), np.eye(10)[:, [8, 0, 1, 2, 3, 4, 5]] @ DENSE_A),
-        (A.with_other_rows(np.array([5, 2]), C[np.array([3, 0])]), DENSE_A_WITH_ROWS_OF_C),
         (A.scaled_rows(np.arange(7.0)), np.arange(7.0)[:, None] * DENSE_A),
         ((A @ B).ordered(), DENSE_A @ DENSE_B),
         (A.without_small(0.5), np.where(DENSE_A > 0.5, DENSE_A, 0.0)),
@@ -93,7 +97,7 @@ def test_shapes_that_do_not_fit(wrong):
 
 
 def test_scipy_still_has_the_compiled_routines():
-    """If not, results stay and small contacts take three times as long: `solvers/sparse.py` has to learn new names."""
+    """If not, results stay but small contacts take three times as long: `algebra/sparse.py` must learn new names."""
     assert module.compiled.__name__ == "scipy.sparse._sparsetools"
     used = {name for name in vars(sparse_public) if name.startswith(("csr_", "coo_"))}
     assert used <= set(dir(module.compiled))
@@ -124,10 +128,10 @@ def test_without_the_compiled_routines_the_public_classes_serve():
     code = (
         "import scipy.sparse, sys; from solvers.api import Array; import numpy\n"
         "del scipy.sparse._sparsetools; sys.modules['scipy.sparse._sparsetools'] = None\n"
-        "from solvers import sparse; print(sparse.compiled.__name__)"
+        "from solvers.algebra import sparse; print(sparse.compiled.__name__)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout.strip() == "solvers.sparse_public", done.stderr
+    assert done.stdout.strip() == "solvers.algebra.sparse_public", done.stderr
 
 
 def test_counted_order():
@@ -135,12 +139,3 @@ def test_counted_order():
     keys = NUMBERS.integers(0, 6, 50).astype(np.int32)
     np.testing.assert_array_equal(counted_order(keys, 9), np.argsort(keys, kind="stable"))
     assert len(counted_order(np.empty(0, dtype=np.int32), 9)) == 0
-
-
-def test_many_other_rows(monkeypatch):
-    """The same, bit for bit, by another way."""
-    few = A.with_other_rows(np.array([5, 2]), C[np.array([3, 0])])
-    monkeypatch.setattr("solvers.sparse.MANY_ROWS", 1)
-    many = A.with_other_rows(np.array([5, 2]), C[np.array([3, 0])])
-    for name in ("data", "indices", "indptr"):
-        assert np.array_equal(getattr(few, name), getattr(many, name))

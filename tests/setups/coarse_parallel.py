@@ -7,10 +7,10 @@ from fluid_setup import body, field, make_fluid, sphere, wall
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from solvers.fluid.background.grid import Grid, uniform
-from solvers.fluid.background.nested import RefinedBox, refined
-from solvers.fluid.linear_systems import coarse_matrix
-from solvers.fluid.linear_systems.coarse_matrix import CoarseMatrix
+from solvers.fluid.grid.box import Grid, uniform
+from solvers.fluid.grid.nested import RefinedBox, refined
+from solvers.fluid.solve.linear_systems import coarse_matrix
+from solvers.fluid.solve.linear_systems.coarse_matrix import CoarseMatrix
 from solvers.solver_settings import SolverSettings
 
 comm = MPI.COMM_WORLD
@@ -25,8 +25,8 @@ def compare(grid: Grid) -> None:
     fluid.begin_step(0.0, 0.1)
     fluid.residual()
     by_blocks = fluid.linearise()
-    by_rows, free = by_blocks, (~fluid.held).astype(float)
-    for P in fluid.linear_solver.multigrid._interpolations:
+    by_rows, free = by_blocks, (~fluid.iterate.held).astype(float)
+    for P in fluid.iterate.solver.create_multigrid()._interpolations:
         first, second = CoarseMatrix(P), CoarseMatrix(P)
         first.mark(free)
         second.mark(free)

@@ -16,7 +16,7 @@ from solvers.contact.law.frictionless import Frictionless
 from solvers.contact.law.law import Law
 from solvers.contact.pair import Pair
 from solvers.contact.surface import Surface
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body, Support

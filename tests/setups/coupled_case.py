@@ -1,6 +1,6 @@
 """The text of a small coupled case that several tests change: a post on the floor of a channel."""
 
-from fsci.bench.small import CHANNEL, COLUMN
+from small_scenes import CHANNEL, COLUMN
 
 PROBES = """\
 probes:

@@ -9,7 +9,7 @@ import sys
 from mpi4py import MPI
 
 from fsci import cli
-from solvers import unlocked
+from solvers.algebra import unlocked
 
 
 class Library:

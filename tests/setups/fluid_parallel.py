@@ -7,13 +7,13 @@ import numpy as np
 from fluid_setup import SolverSettings, Tolerance, block, body, circle, field, loop, make_fluid, sphere, step
 from mpi4py import MPI
 
-from solvers.distributed import Nodal, gather_nodal
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.background.nested import RefinedBox, RefinedSurface, refined
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.conservation.regions import RegionsOfCut
-from solvers.fluid.conservation.volume_balance import VolumeBalance
-from solvers.fluid.extreme_pressure import extreme_pressure
+from solvers.fluid.flow.conservation.regions import RegionsOfCut
+from solvers.fluid.flow.conservation.volume_balance import VolumeBalance
+from solvers.fluid.flow.extreme_pressure import extreme_pressure
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.grid.nested import RefinedBox, RefinedSurface, refined
+from solvers.fluid.terms.boundary.patches import Patch
+from solvers.mesh.distributed import Nodal, gather_nodal
 
 
 def scene(dim, element, comm, box="channel"):

@@ -7,7 +7,7 @@ import numpy as np
 from fluid_setup import SolverSettings, Tolerance, body, field, make_fluid, sphere, step, wall
 from mpi4py import MPI
 
-from solvers.fluid.background.grid import uniform
+from solvers.fluid.grid.box import uniform
 
 if __name__ == "__main__":
     ball = body("ball", *sphere((0.5, 0.5, 0.5), 0.33, 2))
@@ -17,4 +17,4 @@ if __name__ == "__main__":
     inner = np.flatnonzero(~fluid.system.active_dofs[: fluid.unknowns.owned])
     assert fluid.comm.allreduce(len(inner)) > 0
     assert step(fluid, 0.0, 1.0).iterations > 2
-    assert fluid.sequence.current == "multigrid"
+    assert fluid.iterative.sequence.current == "multigrid"

@@ -9,13 +9,13 @@ import numpy as np
 from mpi4py import MPI
 
 from solvers import fem
-from solvers.fluid.background.grid import Grid, uniform
-from solvers.fluid.bodies.immersed import ImmersedBody
-from solvers.fluid.bodies.surface import ImmersedSurface, Motion
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.cutting.cut import Cutter
-from solvers.fluid.field import Fluid
-from solvers.fluid.flow_settings import FlowSettings
+from solvers.fluid.cut.cut import Cutter
+from solvers.fluid.flow.field import Fluid
+from solvers.fluid.grid.box import Grid, uniform
+from solvers.fluid.settings.flow_settings import FlowSettings
+from solvers.fluid.surfaces.immersed import ImmersedBody
+from solvers.fluid.surfaces.surface import ImmersedSurface, Motion
+from solvers.fluid.terms.boundary.patches import Patch
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 
@@ -232,7 +232,7 @@ def errors(fluid: Fluid, velocity, gradient, pressure, t: float = 0.0, points: i
     )
     off = p - pressure(*x, t)
     total = fluid.comm.allreduce
-    if fluid.boundary.closed():
+    if fluid.parts.boundary.closed():
         off -= total(float((rule.weights * off).sum())) / total(float(rule.weights.sum()))
     squares = [((u - exact) ** 2).sum(axis=-1), ((du - slope) ** 2).sum(axis=(-1, -2)), off**2]
     return np.sqrt([total(float((rule.weights * square).sum())) for square in squares])

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from fluid_setup import body, circle, field, loop, make_fluid, solve_steady, sphere, step, with_slip
 
-from solvers.fluid.background.grid import Grid
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.field import Fluid
+from solvers.fluid.flow.field import Fluid
+from solvers.fluid.grid.box import Grid
+from solvers.fluid.terms.boundary.patches import Patch
 
 
 def cylinder_drag(gap: float) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 from contact_setup import make_body, make_contact, solve_step
 from structure_setup import constant
 
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Support

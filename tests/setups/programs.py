@@ -1,4 +1,4 @@
-"""Running the program as a user does, on one process or several."""
+"""Running the program on one process or several."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+
+import copied_process
 
 ENVIRONMENT = {
     **os.environ,
@@ -22,6 +24,9 @@ ENVIRONMENT = {
 #: for mpirun: processes that wait give their core to others
 PARALLEL = {**ENVIRONMENT, "OMPI_MCA_mpi_yield_when_idle": "1"}
 
+#: commands that get a process of their own: what draws may have threads here, which a copy would wait for
+DRAWING = ("plot", "report")
+
 
 def command(*arguments, processes: int = 1) -> list[str]:
     launcher = ["mpirun", "-n", str(processes)] if processes > 1 else []
@@ -29,11 +34,25 @@ def command(*arguments, processes: int = 1) -> list[str]:
 
 
 def fsci(*arguments, processes: int = 1, timeout: float = 600.0) -> subprocess.CompletedProcess[str]:
-    """Run `fsci` to its end."""
+    """Run `fsci` to its end, on one process in a copy of this one, without its start and imports; see `new_process`."""
+    if processes > 1 or str(arguments[0]) in DRAWING:
+        return new_process(*arguments, processes=processes, timeout=timeout)
+    return copied_process.run_in_copy(copied_process.fsci, [str(word) for word in arguments], ENVIRONMENT, timeout)
+
+
+def new_process(*arguments, processes: int = 1, timeout: float = 600.0) -> subprocess.CompletedProcess[str]:
+    """Run `fsci` as a user does: for what a process has from its start, such as its options of PETSc."""
     environment = PARALLEL if processes > 1 else ENVIRONMENT
     return subprocess.run(
         command(*arguments, processes=processes), capture_output=True, text=True, env=environment, timeout=timeout
     )
+
+
+def run_command(words, env=None, timeout=None, **pipes) -> subprocess.CompletedProcess[str]:
+    """As subprocess.run, but a run of `fsci` on one process is a copy of this one."""
+    if words[:3] != command()[:3]:
+        return subprocess.run(words, env=env, timeout=timeout, **pipes)
+    return copied_process.run_in_copy(copied_process.fsci, words[3:], env or {}, timeout or 600.0)
 
 
 def run_whole(name: str, folder, *changes: str, processes: int = 1, timeout: float = 1200.0) -> str:
@@ -54,11 +73,14 @@ def warnings_of(out) -> list[dict]:
 
 
 def on_processes(processes: int, *program, timeout: float = 600.0) -> subprocess.CompletedProcess[str]:
-    """Run a Python program of the tests by mpirun; an exception in one process ends all, instead of a wait."""
-    launcher = ["mpirun", "-n", str(processes)] if processes > 1 else []
-    command = [*launcher, sys.executable, "-m", "mpi4py", *map(str, program)]
-    environment = {**(PARALLEL if processes > 1 else ENVIRONMENT), "PYTHONPATH": str(Path(__file__).parent)}
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=timeout)
+    """Run a Python program of the tests; an exception in one process ends all, instead of a wait."""
+    words = [str(word) for word in program]
+    if processes == 1:
+        done = copied_process.run_in_copy(copied_process.python, words, ENVIRONMENT, timeout)
+    else:
+        command = ["mpirun", "-n", str(processes), sys.executable, "-m", "mpi4py", *words]
+        environment = {**PARALLEL, "PYTHONPATH": str(Path(__file__).parent)}
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=timeout)
     assert done.returncode == 0, done.stdout + done.stderr
     return done
 

@@ -5,8 +5,8 @@ from fluid_setup import body, field, make_fluid, sphere, wall
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from solvers.fluid.background.grid import uniform
-from solvers.rounded_product import RoundedProducts
+from solvers.algebra.rounded_product import RoundedProducts
+from solvers.fluid.grid.box import uniform
 from solvers.solver_settings import SolverSettings
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fsci import shapes
-from solvers.cell_types import reference_nodes
-from solvers.mesh import Mesh
+from solvers.mesh.cell_types import reference_nodes
+from solvers.mesh.mesh import Mesh
 from solvers.newton import Tolerance
 from solvers.solver_settings import SolverSettings
 from solvers.structure.body import Body, Support

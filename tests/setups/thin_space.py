@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from fluid_setup import block, body, field, make_fluid
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.bodies.immersed import ImmersedBody
-from solvers.fluid.boundary.patches import Patch
-from solvers.fluid.field import Fluid
+from solvers.fluid.flow.field import Fluid
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.surfaces.immersed import ImmersedBody
+from solvers.fluid.terms.boundary.patches import Patch
 
 SIZE = 0.25  #: of a cell
 

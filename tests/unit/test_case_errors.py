@@ -32,7 +32,7 @@ solver:
     max_iterations: 20
 """
 MESH = "mesh: {shape: rectangle, size: [2, 1], cells: [4, 2]}"
-SECTIONS = "title, units, time, curves, structure, fluid, coupling, contact, probes, output, verify, solver"
+SECTIONS = "title, units, time, curves, structure, fluid, rigid, coupling, contact, probes, output, verify, solver"
 SHAPES = "rectangle, disc, ring, box, beam, cylinder, tube, annulus, solid_torus, hollow_torus, hollow_sphere, "
 SHAPES += "sphere, leaflet"
 CONSTANTS = "needs two constants, either E and nu, or lambda and mu, or mu and nu"
@@ -211,6 +211,7 @@ MISTAKES = [
         "400",
     ),
     (MESH, MESH[:-1] + ", rotate: {axis: [0, 0, 1], angle: 90}}", "8:69: a rotation in 2D has no 'axis'", "{axis"),
+    (MESH, MESH[:-1] + ", mirror: z}", "8:69: 'mirror' must be x or y in 2D", "z}"),
     (MESH, MESH[:-1] + ", rotate: [{angel: 90}]}", "8:71: unknown setting 'angel'; did you mean 'angle'?", "angel"),
     (MESH, MESH[:-1] + ", translate: [1, 2, 3]}", "8:72: 'translate' must have 2 entries in 2D, not 3", "[1"),
     (

@@ -12,7 +12,7 @@ from fsci.check.check import summary
 from fsci.check.meshes import check_meshes, thickness
 from fsci.cli import execute
 from fsci.run.run import FINISHED, run_case
-from solvers.mesh import Mesh
+from solvers.mesh.mesh import Mesh
 
 SOLID = """\
 title: two blocks from files

@@ -94,7 +94,7 @@ MISTAKES = [
     (
         "contact:\n",
         "contact:\n  gap: 1\n",
-        "10:3: unknown setting 'gap' (available: pairs, bodies, friction, reach, obstacles, film, c_n)",
+        "10:3: unknown setting 'gap' (available: pairs, bodies, friction, restitution, reach, obstacles, film, c_n)",
         "gap",
     ),
     (

@@ -7,8 +7,8 @@ import pytest
 from coupled_case import POST as CHANNEL_AND_POST
 from programs import fsci
 from small_cases import PLATE
+from small_scenes import BLOCK
 
-from fsci.bench.small import BLOCK
 from fsci.case import load_case
 from fsci.check import cost
 from fsci.check.cost import MEASURED, Cost, describe_cost, estimate
@@ -64,7 +64,7 @@ def test_check_says_it(tmp_path):
 def test_numbers_of_this_machine(tmp_path, monkeypatch):
     """Those of `fsci bench cost` if they are there and complete, else those that come with the program."""
     path = tmp_path / "cost.json"
-    monkeypatch.setattr(cost, "OWN", path)
+    monkeypatch.setattr(cost, "OWN_COSTS", path)
     assert cost.costs() is MEASURED
     rows = [{"kind": kind, "dofs": 10, "step [s]": 1.0, "memory [MB]": 100.0} for kind in MEASURED]
     path.write_text(json.dumps({"results": {"cost": rows}}))

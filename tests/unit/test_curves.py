@@ -94,7 +94,7 @@ def test_what_is_not_a_file_is_not_read(case, name):
 
 
 def test_the_largest_file(case, monkeypatch):
-    monkeypatch.setattr("fsci.case.curve.MOST_BYTES", 10)
+    monkeypatch.setattr("fsci.case.curve.MOST_BYTES_OF_CURVE", 10)
     assert first_lines(refused(CASE))[0] == "case.yaml:5:17: 'csv': '../data/inflow.csv' is larger than 1e-05 MB"
 
 

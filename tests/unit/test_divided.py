@@ -9,8 +9,8 @@ import pytest
 
 from coupling.divided import lengths, step_in_parts
 from solvers.api import StepInfo
-from solvers.fluid.history import History
-from solvers.fluid.time_scheme import SCHEMES
+from solvers.fluid.flow.history import History
+from solvers.fluid.settings.time_scheme import SCHEMES
 
 
 @pytest.mark.parametrize(

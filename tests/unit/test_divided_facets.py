@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from coupling.divided_facets import divide_facets
-from coupling.joined_sides import join_vertices
-from solvers.tessellation import area_vectors, is_closed
+from coupling.ties import join_vertices
+from solvers.mesh.tessellation import area_vectors, is_closed
 
 
 def line(xs, y, *, up):

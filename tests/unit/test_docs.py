@@ -1,5 +1,6 @@
 """What the pages name exists: settings, files, options of commands; their YAML blocks are cases that can be run."""
 
+import json
 import os
 import re
 import subprocess
@@ -13,6 +14,8 @@ from pathlib import Path
 import pytest
 from docs_pages import PAGES, ROOT, SCHEMA, fits_somewhere, has_setting, in_backticks, is_case, parsed, yaml_blocks
 
+from fsci.bench.family import function, read_families
+from fsci.bench.measures import checks
 from fsci.case import load_case
 from fsci.case.verify import (
     BODY_COLUMN,
@@ -24,8 +27,10 @@ from fsci.case.verify import (
 )
 from fsci.check.meshes import check_meshes
 from fsci.cli import execute
+from fsci.stress.draw import draw
 
 READMES = sorted(ROOT.glob("cases/*/README.md"))
+NOTES = sorted(ROOT.glob("docs/notes/*.md"))
 SECTIONS = set(SCHEMA["properties"])
 FOLDERS = ("cases", "docs", "tests", "solvers", "fsci", "coupling")
 MADE = ("docs/_build", "docs/reference", "cases/stage")  #: by make docs
@@ -42,12 +47,30 @@ def by_name(pages):
 def test_yaml_blocks(page, tmp_path):
     """Whole cases pass `fsci check`; parts of cases have settings that exist."""
     for block in yaml_blocks(page):
+        if "\n  words: " in block:
+            continue
         if not is_case(block):
             assert fits_somewhere(parsed(block)), block
             continue
         (tmp_path / "case.yaml").write_text(block)
         case = load_case(tmp_path)
         assert not check_meshes(case).problems, block
+
+
+def test_families_and_scenes_of_the_pages(tmp_path):
+    """Each run of the family could begin, and the case that is drawn, too."""
+    family, scene = (block for page in PAGES for block in yaml_blocks(page) if "\n  words: " in block)
+    for name, block in (("family.yaml", family), ("scene.yaml", scene)):
+        (tmp_path / name).write_text(block)
+    (flag,) = read_families(tmp_path / "family.yaml").values()
+    for member in flag.members():
+        assert callable(function(member.measure))
+        settings = {**member.settings, **checks(member.scene(tmp_path))}
+        load_case(ROOT / "cases" / str(member.case), [(key, json.dumps(value)) for key, value in settings.items()])
+    for seed in range(400_000, 400_005):
+        one = draw(seed, tmp_path / "scene.yaml")
+        (tmp_path / "case.yaml").write_text(json.dumps(one.case(one.frame, twin=True)))
+        assert not check_meshes(load_case(tmp_path)).problems
 
 
 @pytest.mark.parametrize("page", by_name(page for page in PAGES if page.stem not in NOT_OF_CASES))
@@ -72,12 +95,12 @@ def test_files_exist(page):
             assert list(ROOT.glob(path)) or path.endswith("_"), path
 
 
-@pytest.mark.parametrize("page", by_name([*PAGES, *READMES]))
+@pytest.mark.parametrize("page", by_name([*PAGES, *READMES, *NOTES]))
 def test_links_lead_to_headings(page):
     """Files that links name exist, and so do the headings after #."""
     for target, _, anchor in re.findall(r"\]\((?!https?:)([^)#]*)(#([\w-]+))?\)", page.read_text()):
         file = page.parent / target if target else page
-        if target in ("reference/case.md", "reference/api.md"):
+        if target in ("reference/case.md", "reference/api.md", "reference/constants.md"):
             continue
         assert file.exists(), target
         assert page.parent.name != "docs" or file.resolve().is_relative_to(ROOT / "docs"), f"{target}: not in the site"
@@ -156,3 +179,11 @@ def test_the_python_api_has_every_public_name():
         assert set(import_module(package).__all__) <= {name for name, _, _ in entries}
     assert [name for name, _, words in entries if len(words.strip()) < 20] == []
     assert " object at 0x" not in page.stdout
+
+
+def test_notes_are_dated_and_named_by_a_page():
+    """They are outside of the site; a page says where its measurements are."""
+    pages = "".join(page.read_text() for page in PAGES)
+    for note in NOTES:
+        assert note.stem == "README" or re.fullmatch(r"\d{4}-\d\d-\d\d-[a-z-]+", note.stem), note.name
+        assert note.stem == "README" or f"docs/notes/{note.name}" in pages, note.name

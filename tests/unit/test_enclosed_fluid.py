@@ -5,6 +5,7 @@ from case_mistakes import first_lines, load, refused
 from programs import fsci
 
 from fsci.check.meshes import check_meshes
+from fsci.run.history import read_history
 from fsci.run.run import run_case
 
 pytestmark = pytest.mark.usefixtures("in_new_folder")
@@ -130,9 +131,6 @@ probes: {v: {field: fluid, quantity: volume}}
 output: {fields_every: 0}
 """
     (tmp_path / "case.yaml").write_text(lowered)
-    for processes in (2, 4):
-        run = fsci("run", tmp_path, "-o", tmp_path / f"out{processes}", processes=processes)
-        assert run.returncode == 0, run.stdout + run.stderr
-        last = (tmp_path / f"out{processes}" / "history.csv").read_text().split("\n")
-        column = last[0].split(",").index("v")
-        assert float([row for row in last if row][-1].split(",")[column]) == pytest.approx(1.335, rel=1e-12)
+    run = fsci("run", tmp_path, "-o", tmp_path / "out", processes=4)
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert read_history(tmp_path / "out" / "history.csv")["v"][-1] == pytest.approx(1.335, rel=1e-12)

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter
 
-from fsci.case.shapes import Shape
+from fsci.case.shapes import AnyShape
 from fsci.meshes.mesh import build_mesh
 
 SHAPES: list[dict[str, Any]] = [
@@ -29,30 +29,30 @@ SHAPES: list[dict[str, Any]] = [
 
 
 def shape(settings):
-    return TypeAdapter(Shape).validate_python(settings)
+    return TypeAdapter(AnyShape).validate_python(settings)
 
 
 @pytest.mark.parametrize("settings", SHAPES, ids=[s["shape"] for s in SHAPES])
 def test_cells_nodes_and_surfaces(settings, tmp_path):
     for order, simplex in itertools.product((1, 2), (False, True)):
-        cell = {2: ("quad", "tri"), 3: ("hex", "tet")}[shape(settings).dimension][simplex]
+        cell = {2: ("quad", "tri"), 3: ("hex", "tet")}[shape(settings).plan.dimension][simplex]
         model = shape(settings | {"order": order, "cell": cell})
         mesh = build_mesh(model, tmp_path)
-        assert model.counts == (len(mesh.cells), len(mesh.points))
-        assert set(model.surfaces) == set(mesh.surfaces)
+        assert model.plan.counts == (len(mesh.cells), len(mesh.points))
+        assert set(model.plan.surfaces) == set(mesh.surfaces)
 
 
 @pytest.mark.parametrize("settings", SHAPES, ids=[s["shape"] for s in SHAPES])
 def test_extents(settings):
     """One for each number in `cells`, and none is shorter than half of the thickness."""
     model = shape(settings)
-    assert len(model.extents) == len(model.cells)
-    assert min(model.extents) >= 0.5 * model.thickness
+    assert len(model.plan.extents) == len(model.cells)
+    assert min(model.plan.extents) >= 0.5 * model.plan.thickness
 
 
 def test_aspect():
-    assert shape({"shape": "rectangle", "size": [2, 1], "cells": [2, 10]}).aspect == pytest.approx(10)
-    assert shape({"shape": "box", "size": [1, 1, 1], "cells": [1, 2, 4]}).aspect == pytest.approx(4)
+    assert shape({"shape": "rectangle", "size": [2, 1], "cells": [2, 10]}).plan.aspect == pytest.approx(10)
+    assert shape({"shape": "box", "size": [1, 1, 1], "cells": [1, 2, 4]}).plan.aspect == pytest.approx(4)
     # a sixth of the middle circle is 2 pi 1.5/6 = pi/2 long, the layers are 0.1 thick
     ring = {"shape": "ring", "inner_radius": 1, "outer_radius": 2, "cells": [6, 10]}
-    assert shape(ring).aspect == pytest.approx(5 * 3.14159265)
+    assert shape(ring).plan.aspect == pytest.approx(5 * 3.14159265)

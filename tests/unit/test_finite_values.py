@@ -252,7 +252,7 @@ fluid:
   bodies:
     c:
       mesh: {shape: disc, radius: 0.3, cells: [24, 1], translate: [0.8, 1]}
-      free: {density: 2, held: [rotation, x], initial_spin: [3], initial_velocity: [1, 0]}
+      free: {density: 2, held: [rotation, x], initial_angular_velocity: [3], initial_velocity: [1, 0]}
 coupling: {}
 """
 IN_SPACE = (
@@ -270,9 +270,14 @@ IN_SPACE = (
 def test_a_free_body_that_begins_to_move_where_it_is_held():
     words = "the body begins to move in a way that is held: remove '{}' from 'held', or give 0 here"
     error = refused(HELD)
-    assert_located(HELD, error, f"10:62: {words.format('rotation')}", "3]")
-    assert_located(HELD, error, f"10:85: {words.format('x')}", "1, 0]")
-    load(HELD.replace("initial_spin: [3], initial_velocity: [1, 0]", "initial_spin: [0], initial_velocity: [0, 1]"))
+    assert_located(HELD, error, f"10:74: {words.format('rotation')}", "3]")
+    assert_located(HELD, error, f"10:97: {words.format('x')}", "1, 0]")
+    load(
+        HELD.replace(
+            "initial_angular_velocity: [3], initial_velocity: [1, 0]",
+            "initial_angular_velocity: [0], initial_velocity: [0, 1]",
+        )
+    )
     for held, spin, word in (("rotation_y", "[0, 1, 0]", "rotation_y"), ("rotation", "[0, 0, 1]", "rotation")):
         text = (
             IN_SPACE.replace("held: [rotation, x]", f"held: [{held}]")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solvers.fluid.time_scheme import BLEND, SCHEMES, bdf2, bdf3, blended
+from solvers.fluid.settings.time_scheme import BLEND, SCHEMES, bdf2, bdf3, blended
 
 
 def derivative(difference, function, lengths):

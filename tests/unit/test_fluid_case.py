@@ -191,7 +191,7 @@ def test_message(old, new, message, at):
 
 def test_a_case_without_any_field():
     assert str(refused("title: a\ntime: {step: 1, end: 2}\n").problems[0]).startswith(
-        "case.yaml:1:1: a case needs a section 'structure' or 'fluid'"
+        "case.yaml:1:1: a case needs a section 'structure', 'fluid' or 'rigid'"
     )
 
 

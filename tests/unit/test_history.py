@@ -102,3 +102,16 @@ def test_a_new_run_replaces_the_file_and_a_missing_one_may_be_resumed(tmp_path):
     HistoryWriter(path, resume_after=0).write(1, 1.0, 1.0, 1, 0.0, {"A": 1.0})
     HistoryWriter(path)
     assert read_history(path) == {}
+
+
+def test_columns_that_begin_later_were_zero_before(tmp_path):
+    """As those of contact with a wall. What is gone is an error still."""
+    writer = HistoryWriter(tmp_path / "history.csv")
+    writer.write(1, 0.1, 0.1, 3, 0.0, {"A": 1.0})
+    writer.write(2, 0.2, 0.1, 3, 0.0, {"A": 2.0, "B": 5.0})
+    with pytest.raises(ValueError, match="columns B"):
+        writer.write(3, 0.3, 0.1, 3, 0.0, {"A": 1.0})
+    writer.write(3, 0.3, 0.1, 3, 0.0, {"B": 6.0, "A": 3.0})
+    history = read_history(tmp_path / "history.csv")
+    assert history["A"].tolist() == [1.0, 2.0, 3.0]
+    assert history["B"].tolist() == [0.0, 5.0, 6.0]

@@ -5,8 +5,8 @@ import pytest
 from petsc4py import PETSc
 from scipy import sparse
 
-from solvers.lagged import Lagged, LaggedFactors
-from solvers.linear import LinearSolveFailed, flexible_solver
+from solvers.algebra.lagged import Lagged, LaggedFactors
+from solvers.algebra.linear import LinearSolveFailed, flexible_solver
 
 SIZE = 60
 NUMBERS = np.random.default_rng(3)

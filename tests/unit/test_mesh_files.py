@@ -9,11 +9,13 @@ import meshio  # noqa: TID253
 import numpy as np
 import pytest
 from cell_geometry import smallest_determinant, volume
+from pydantic import TypeAdapter
 
 from fsci import shapes
+from fsci.case.shapes import AnyShape
 from fsci.meshes.mesh import MeshError, build_mesh, extract_region, place, require_region, require_surface
-from solvers.mesh import Mesh
-from solvers.mesh_topology import boundary_facets, surface_facets
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.topology import boundary_facets, surface_facets
 
 CSM3 = Path(__file__).parents[2] / "cases" / "csm3"
 
@@ -68,6 +70,26 @@ def test_second_order_gmsh_mesh_is_positive_and_curved(cell_type, tmp_path):
         assert np.allclose(np.linalg.norm(mesh.points[facets], axis=2), 1)
         middle, (dx, dy) = mesh.points[facets[:, 2]], (mesh.points[facets[:, 1]] - mesh.points[facets[:, 0]]).T
         assert ((dy, -dx) * middle.T).sum(axis=0).max() < 0
+
+
+@pytest.mark.parametrize("script", ["transfinite", "sizes", "own factor"])
+@pytest.mark.parametrize("factor", [2.0, 2**0.5, 0.5])
+def test_size_factor(script, factor, tmp_path):
+    """Edges so many times as long, whether the script counts cells or gives sizes; its own factor stays."""
+    text = {
+        "transfinite": QUARTER.replace("n = 2", "n = 40"),
+        "sizes": QUARTER.split("Transfinite")[0] + "MeshSize {:} = 0.05;\n",
+        "own factor": QUARTER.split("Transfinite")[0] + "MeshSize {:} = 0.1;\nMesh.MeshSizeFactor = 0.5;\n",
+    }[script]
+    (tmp_path / "part.geo").write_text(text + QUADS * (script == "transfinite"))
+    cells = [len(build(tmp_path, "part.geo", order=1, parameters={}, size_factor=f).cells) for f in (1.0, factor)]
+    assert (cells[0] / cells[1]) ** 0.5 == pytest.approx(factor, rel=0.05)
+
+
+def test_size_factor_of_a_mesh(tmp_path):
+    meshio.write_points_cells(tmp_path / "one.vtu", np.eye(3), [("triangle", [[0, 1, 2]])])
+    with pytest.raises(MeshError, match=r"'size_factor' is for .geo files, the cells of one.vtu have their sizes"):
+        build(tmp_path, "one.vtu", size_factor=2.0)
 
 
 def test_parameters_reach_the_script(tmp_path):
@@ -276,15 +298,10 @@ def test_files_that_are_no_mesh(tmp_path):
 
 
 def test_shape_takes_its_settings():
-    settings = SimpleNamespace(
-        shape="ring", inner_radius=1, outer_radius=2, cells=[4, 1], angle=90, start=0, order=2, cell="tri"
-    )
-    mesh = build_mesh(settings, Path())
+    settings = {"shape": "ring", "inner_radius": 1, "outer_radius": 2, "cells": [4, 1], "angle": 90}
+    mesh = build_mesh(TypeAdapter(AnyShape).validate_python({**settings, "order": 2, "cell": "tri"}), Path())
     assert (mesh.cell_type, len(mesh.cells)) == ("triangle6", 8)
     assert set(mesh.surfaces) == {"inner", "outer", "start", "end"}
-    settings.inner_radius = 3
-    with pytest.raises(MeshError, match="ring: radii must be 0 < inner < outer"):
-        build_mesh(settings, Path())
 
 
 def test_unknown_names_list_those_there_are():

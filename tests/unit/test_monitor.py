@@ -7,7 +7,7 @@ import io
 import pytest
 
 from fsci.run.monitor import Monitor, duration
-from solvers.api import StepFailed, StepInfo
+from solvers.api import FailureKind, StepFailed, StepInfo
 
 
 @pytest.fixture(autouse=True)
@@ -29,7 +29,7 @@ def run(monitor: Monitor, steps: int = 3, numbers: dict[str, float] | None = Non
         monitor.start("Flag", {"structure": 12345}, 2, begin=0.0, end=steps * 0.1, time=0.0)
         for step in range(1, steps + 1):
             monitor.step(step, 0.1 * step, 0.1, StepInfo(4, (2.5e3, 1.0, 3e-9), numbers or {}), 0.2)
-        monitor.retry(StepFailed("structure", "Newton diverged", iteration=7), 0.05)
+        monitor.retry(StepFailed("structure", FailureKind.NEWTON, "Newton diverged", iteration=7), 0.05)
         monitor.finish("finished")
 
 

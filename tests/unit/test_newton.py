@@ -5,8 +5,9 @@ import math
 
 import numpy as np
 import pytest
+from advised import require_advice
 
-from solvers.api import StepFailed
+from solvers.api import FailureKind, StepFailed
 from solvers.newton import ENOUGH, Tolerance, converge, enough, iterates
 
 
@@ -21,6 +22,8 @@ class Scalar:
         self.increment, self.solves, self.kept, self.reductions = 0.0, 0, [], []
         self.used = math.nan  #: slope of the last iterate
         self._round_off, self.settled_after = round_off, settled_after
+
+    def follow(self): ...
 
     def residual(self):
         return np.array([abs(self.f(self.x))])
@@ -106,14 +109,16 @@ def test_diverged_is_named():
         StepFailed, match=r"scalar: Newton did not converge in 3 iterations \(residual .*\) at iter"
     ) as e:
         converge(Scalar(lambda x: x * x + 1, lambda x: 2 * x, 0.5), Tolerance(max_iterations=3))
+    require_advice(e.value, FailureKind.NEWTON)
     assert e.value.iteration == 3
     assert len(e.value.history) == 4
     assert e.value.where is not None
 
 
 def test_not_a_number_is_named():
-    with pytest.raises(StepFailed, match="the residual is not a number at iteration 1"):
+    with pytest.raises(StepFailed, match="the residual is not a number at iteration 1") as e:
         converge(Scalar(lambda x: x if x == 1 else math.nan, lambda x: 2.0, 1.0), Tolerance())
+    require_advice(e.value, FailureKind.NOT_FINITE)
 
 
 def test_round_off_is_good_enough():
@@ -162,6 +167,10 @@ class Together:
 
     def _each(self, what):
         return np.concatenate([what(system) for system in self.systems])
+
+    def follow(self):
+        for system in self.systems:
+            system.follow()
 
     def residual(self):
         return self._each(lambda system: system.residual())
@@ -263,3 +272,23 @@ def test_reduction_that_is_enough():
     assert of((1e-4, 1e-4, 1e-8)) == pytest.approx(1e-6)  # a hundredth of the tolerance
     assert of((1e-9, 1.0, 1e-8)) == ENOUGH
     assert of((1.0, 1e-2, 1e-8), (0.0, 0.0, 0.0), (1e-4, 1e-4, 1e-8)) == pytest.approx(1e-6)  # the strictest of all
+
+
+class Placed(Scalar):
+    """A residual is that of the place to which the system has followed."""
+
+    place, places = math.nan, 0
+
+    def follow(self):
+        self.place, self.places = self.x, self.places + 1
+
+    def residual(self):
+        assert self.place == self.x
+        return super().residual()
+
+
+def test_systems_follow_each_iterate_before_its_residual():
+    """In a line search, too, whose halved increments are other places."""
+    system = Placed(math.atan, lambda x: 1 / (1 + x * x), 3.0)
+    info = converge(system, Tolerance(residual=1e-10, line_search=True))
+    assert system.places > info.iterations + 1

@@ -5,8 +5,8 @@ import pytest
 
 from fsci.builder.dry_side import Closing, DrySideError
 from fsci.builder.outside import find_rims, meets, surround
-from solvers.fluid.bodies.inside import winding
-from solvers.fluid.bodies.surface import Motion
+from solvers.fluid.surfaces.inside import winding
+from solvers.fluid.surfaces.surface import Motion
 
 BOX = np.zeros(3), np.array([1.0, 1.0, 1.5])
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from fluid_setup import body, circle, loop
 
-from solvers.fluid.background.grid import uniform
-from solvers.fluid.background.partition import COUPLED, CUT, MOVING, blocks, destinations, work
-from solvers.fluid.bodies.immersed import ImmersedBody
+from solvers.fluid.grid.box import uniform
+from solvers.fluid.mesh.partition import COST_OF_COUPLED, COST_OF_MOVING, CUT, blocks, destinations, work
+from solvers.fluid.surfaces.immersed import ImmersedBody
 
 
 def extent(owner, shape, rank):
@@ -44,7 +44,7 @@ def test_work_of_cells():
     given = ImmersedBody(rests.surface, rests.motion)
     moved = ImmersedBody(rests.surface, None, start=rests.motion(0.0).x)
     rim = {}
-    for some, of_piece in ((rests, 0.0), (given, MOVING), (moved, COUPLED)):
+    for some, of_piece in ((rests, 0.0), (given, COST_OF_MOVING), (moved, COST_OF_COUPLED)):
         amount = work(grid, [some]).reshape(10, 10, order="F")
         assert np.all(amount[4:6, 4:6] == 0.0)
         assert np.all(amount[0] == 1.0)
@@ -52,8 +52,8 @@ def test_work_of_cells():
         assert pieces[0] == pytest.approx(pieces[1])
         rim[of_piece] = pieces[0]
     assert rim[0.0] == 0.0
-    assert rim[COUPLED] / COUPLED == pytest.approx(rim[MOVING] / MOVING)
-    assert 3 <= round(rim[COUPLED] / COUPLED, 9) <= 5  # a segment has 0.029, a cell 0.1
+    assert rim[COST_OF_COUPLED] / COST_OF_COUPLED == pytest.approx(rim[COST_OF_MOVING] / COST_OF_MOVING)
+    assert 3 <= round(rim[COST_OF_COUPLED] / COST_OF_COUPLED, 9) <= 5  # a segment has 0.029, a cell 0.1
     assert np.all(work(grid, [ImmersedBody(rests.surface, None)]) == 1.0)
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solvers.fluid.bodies.inside import winding
-from solvers.fluid.bodies.surface import Motion
-from solvers.penetration import depths, inside
+from solvers.fluid.surfaces.inside import winding
+from solvers.fluid.surfaces.surface import Motion
+from solvers.mesh.penetration import depths, inside
 
 
 def polygon(count, radius=1.0):

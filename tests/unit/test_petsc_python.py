@@ -6,7 +6,7 @@ import weakref
 
 from petsc4py import PETSc
 
-from solvers.petsc_python import PythonContext, free_deleted
+from solvers.algebra.petsc_python import PythonContext, free_deleted
 
 
 class Copies(PythonContext):

@@ -1,5 +1,7 @@
 """The table of quantities against the probes that the fields have, and what a case may say of each."""
 
+import importlib
+
 import pytest
 
 from fsci.case.probes import Probe
@@ -24,6 +26,12 @@ def test_every_quantity_can_be_asked_for_where_it_is(name, field, place):
     reference = {"reference": {"velocity": 1.0, "length": 1.0}} if "reference" in QUANTITIES[name].needs else {}
     probe = Probe(quantity=name, **where, **reference)
     assert field in probe.fields
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_a_builder_makes_each_quantity_where_it_is(field):
+    table = getattr(importlib.import_module(f"fsci.builder.{field}"), f"{field.upper()}_PROBES")
+    assert set(table) == {(name, place) for name, of, place in each_place() if of == field}
 
 
 @pytest.mark.parametrize("name", QUANTITIES)

@@ -10,11 +10,11 @@ from case_text import without
 
 from fsci import shapes
 from fsci.case import load_case
-from fsci.case.errors import distinct
 from fsci.check.check import summary
 from fsci.check.meshes import check_meshes
-from solvers.penetration import depths, inside
-from solvers.tessellation import tessellate
+from fsci.distinct import distinct
+from solvers.mesh.penetration import depths, inside
+from solvers.mesh.tessellation import tessellate
 
 CASES = Path(__file__).parents[2] / "cases"
 
@@ -43,6 +43,24 @@ structure:
       supports: [{on: top, displacement: [0, 0]}]
 """
 PAIR = "contact: {pairs: {p: {slave: {body: upper, on: bottom}, master: {body: lower, on: top}}}}\n"
+
+
+SLAVE = "{shape: rectangle, size: [1, 1], cells: [%d, 4], origin: [0, 1]}\n      material: {law: neo_hooke, E: %g,"
+
+
+@pytest.mark.usefixtures("in_new_folder")
+@pytest.mark.parametrize(("stiffness", "cells", "warns"), [(1e5, 5, True), (1e5, 4, False), (1e4, 5, False)])
+def test_a_slave_that_is_stiffer_and_finer(stiffness, cells, warns):
+    """The other way round it is as it should be; ties, and pairs that the program finds, are left alone."""
+    text = TWO.replace("0.7", "1").replace(SLAVE % (4, 1000), SLAVE % (cells, stiffness))
+    said = (
+        "case.yaml:12:22: the slave 'upper' is 100 times stiffer than 'lower' and has smaller facets: "
+        "pressures will alternate from node to node; exchange 'slave' and 'master'"
+    )
+    assert warnings(text + PAIR) == ([said] if warns else [], [])
+    other = PAIR.replace("slave", "?").replace("master", "slave").replace("?", "master")
+    for pair in (other, PAIR.replace("top}}", "top}, tied: true}"), "contact: {bodies: all}\n"):
+        assert warnings(text + pair)[0] == []
 
 
 FALLING = """\
@@ -226,6 +244,30 @@ def test_bodies_beyond_a_plane_of_symmetry():
     driven = without(FREE, "coupling").replace("free: {density: 2}", "motion: {displacement: [0, 0.1*t]}")
     for text in (FREE.replace("0.1, 0.5]", "0.4, 0.5]"), FREE.replace("symmetry: true", "slip: true"), driven):
         assert warnings(text) == ([], [])
+
+
+@pytest.mark.usefixtures("in_new_folder")
+def test_friction_by_default_beside_free_bodies():
+    """Free bodies have Coulomb's, too; a check says that Tresca's, which bounds tractions, is not for them."""
+    block = """\
+structure:
+  dynamics: {}
+  bodies:
+    b:
+      mesh: {shape: rectangle, size: [0.2, 0.2], cells: [4, 4], origin: [0.7, 0.1]}
+      material: {law: neo_hooke, E: 1e4, nu: 0.3, density: 2}
+contact: {bodies: all, friction: {bound: 0.2}}
+"""
+    text = FREE.replace("0.1, 0.5]", "0.35, 0.5]") + block
+    line = next(number for number, words in enumerate(text.splitlines(), 1) if "friction" in words)
+    said = [words for words in load(text).warnings if "friction" in words]
+    assert said == [
+        f"case.yaml:{line}:34: free rigid bodies touch each other, bodies of given motion and walls without friction: "
+        "a bound of tractions needs elastic surfaces; give a 'coefficient'"
+    ]
+    coulomb, none = (text.replace("{bound: 0.2}", new) for new in ("{coefficient: 0.2}", "none"))
+    for other in (coulomb, none, text.replace("free: {density: 2}", "slip_length: 0")):
+        assert not [words for words in load(other).warnings if "friction" in words]
 
 
 @pytest.mark.usefixtures("in_new_folder")

@@ -62,6 +62,7 @@ def test_json_schema():
     assert {"lambda", "E"} <= schema["$defs"]["Elastic"]["properties"].keys()
     shapes = schema["$defs"]["Body"]["properties"]["mesh"]["oneOf"][1]["discriminator"]["mapping"]
     assert sorted(shapes) == sorted(SHAPES)
+    assert {"const": "none"} in schema["properties"]["contact"]["anyOf"]
 
 
 def sections(base=Section):

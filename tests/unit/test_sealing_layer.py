@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from coupling.sealing_layer import FARTHEST, SealingLayer
-from solvers.tessellation import unit_normals
+from coupling.sealing_layer import LARGEST_MOVE, SealingLayer
+from solvers.mesh.tessellation import unit_normals
 
 H = 0.01
 
@@ -37,6 +37,6 @@ def test_sharp_edges_move_by_a_bounded_length():
     x = np.array([[1.0, 1e-3], [0, 0], [1, -1e-3]])
     facets = np.array([[0, 1], [1, 2]])
     _, covered = heights(facets, x)
-    assert np.linalg.norm(covered - x, axis=1).max() == pytest.approx(FARTHEST * H)
+    assert np.linalg.norm(covered - x, axis=1).max() == pytest.approx(LARGEST_MOVE * H)
     x[[0, 2]] = [1.0, 0.0]  # both sides of a plate without thickness: no direction
     assert np.array_equal(SealingLayer(facets, H).cover(x)[1], x[1])

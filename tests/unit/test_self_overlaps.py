@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from fsci import shapes
-from solvers.penetration import windings
+from solvers.api import FailureKind
+from solvers.mesh.penetration import windings
+from solvers.mesh.tessellation import tessellate
 from solvers.sentinels.bodies import MovingBody
 from solvers.sentinels.self_overlaps import SelfOverlaps
-from solvers.tessellation import tessellate
 
 WALL = 0.2
 OPENING = 60.0  #: degrees
@@ -59,7 +60,7 @@ def test_windings():
 def test_ends_that_overlap(dim, scale, origin):
     """The ends of a clip meet after 30 degrees each; with more they are in each other."""
     points, facets = clip(dim)
-    for closed, kinds in ((29.0, []), (30.0, []), (33.2 if dim == 2 else 31.9, [""]), (40.0, ["repeat"])):
+    for closed, kinds in ((29.0, []), (30.0, []), (33.2 if dim == 2 else 31.9, [None]), (40.0, [FailureKind.PASSAGE])):
         states = [scale * (bent(points, by) + origin) for by in (0.0, closed)]
         found = watch(states, facets).look(1.0, 1.0)
         assert [finding.worthless for finding in found] == kinds, closed
@@ -79,7 +80,7 @@ def test_ends_that_pass_through_each_other(dim, base):
     tips = points[:, 0] > 0.4
     states = [points, points + 1.4 * along * tips[:, None]]
     [found] = watch(states, facets).look(1.0, 1.0)
-    assert (found.kind, found.worthless) == ("passage", "repeat")
+    assert (found.kind, found.worthless) == ("passage", FailureKind.PASSAGE)
     assert found.message.startswith("clip passes through itself within the step at (")
 
 
@@ -87,7 +88,7 @@ def test_without_a_pair():
     points, facets = clip(2)
     states = [points, bent(points, 45.0)]
     [found] = watch(states, facets, pairs=()).look(1.0, 1.0)
-    assert (found.kind, found.worthless) == ("overlap", "end")
+    assert (found.kind, found.worthless) == ("overlap", FailureKind.NOT_HELD)
     assert "no pair of contact names its surface, so nothing holds it apart; give it a pair 'self'" in found.message
     states = [bent(points, 45.0), bent(points, 45.1)]  # it was so at the start
     assert watch(states, facets, pairs=()).look(1.0, 1.0) == []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from solvers.api import FailureKind
 from solvers.sentinels.bodies import MovingBody
 from solvers.sentinels.overlaps import Meeting, Overlaps
 
@@ -61,7 +62,7 @@ def test_overlap_is_named_with_its_depth(dim, scale, origin, order):
             assert found[0].value == pytest.approx(depth * scale, rel=1e-6)
             assert f"{found[0].value:.3g}" in found[0].message
             assert "no pair of contact" in found[0].message
-            assert found[0].worthless == ("end" if depth == 0.3 else "")
+            assert found[0].worthless is (FailureKind.NOT_HELD if depth == 0.3 else None)
 
 
 @pytest.mark.parametrize("count", [3, 7])
@@ -86,7 +87,7 @@ def test_passage_within_a_step(dim, free):
     along, across = np.eye(dim)[:2]
     ball = moving("ball", 0.2 * points + 0.4 * np.ones(dim), facets, [-2 * along, 2 * along], free=True)
     (found,) = watch([wall, ball]).look(1.0, 1.0)
-    assert (found.kind, found.worthless) == ("passage", "repeat")
+    assert (found.kind, found.worthless) == ("passage", FailureKind.PASSAGE)
     beside = moving("ball", 0.2 * points + 0.4 * np.ones(dim), facets, [5 * across - 2 * along, 5 * across + 2 * along])
     assert watch([wall, beside]).look(1.0, 1.0) == []
     back = moving("ball", 0.2 * points + 0.4 * np.ones(dim), facets, [-2 * along, -0.7 * along], free=free)
@@ -118,9 +119,9 @@ def test_bodies_that_overlap_on_purpose_go_on():
     one = moving("one", points * np.array([2.0, 0.1]), facets, [(0.0, 0.0)] * 2)
     two = moving("two", points * np.array([0.1, 2.0]), facets, [(1.0, -1.0), (1.5, -1.0)])
     (found,) = watch([one, two]).look(1.0, 1.0)
-    assert (found.kind, found.worthless) == ("overlap", "")
+    assert (found.kind, found.worthless) == ("overlap", None)
     apart = moving("two", points * np.array([0.1, 2.0]), facets, [(3.0, -1.0), (1.5, -1.0)])
-    assert [finding.worthless for finding in watch([one, apart]).look(1.0, 1.0)] == ["end"]
+    assert [finding.worthless for finding in watch([one, apart]).look(1.0, 1.0)] == [FailureKind.NOT_HELD]
 
 
 def test_a_pair_must_remove_the_overlap_of_its_surfaces():
@@ -132,7 +133,7 @@ def test_a_pair_must_remove_the_overlap_of_its_surfaces():
     assert watch([lower, upper], meeting).look(1.0, 1.0) == []
     (found,) = watch([lower, upper], meeting).look(0.0, 1.0)
     assert found.value == pytest.approx(0.3)
-    assert found.worthless == "repeat"
+    assert found.worthless is FailureKind.PASSAGE
     assert "contact (p) does not hold them apart" in found.message
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from test_sentinel_overlaps import block, circle, moving, ring_facets
 
+from solvers.api import FailureKind
 from solvers.sentinels.walls import BoxWalls, Wall
 
 BOX = np.array([-2.0, 0.0]), np.array([2.0, 4.0])
@@ -29,7 +30,7 @@ def test_a_body_behind_a_wall(depth, scale):
     for finding in found:
         assert (finding.kind, finding.body) == ("wall", "a")
         assert finding.value == pytest.approx(depth * scale)
-        assert finding.worthless == ("end" if depth == 0.2 else "")
+        assert finding.worthless is (FailureKind.NOT_HELD if depth == 0.2 else None)
         assert finding.message.startswith(
             f"a has passed through the face y- of the box (patch w) by {depth * scale:.3g}"
         )
@@ -88,7 +89,7 @@ def test_a_body_that_leaves_the_box():
     sentinel = watch([body], [])
     assert sentinel.look(1.0, 1.0) == []
     (found,) = sentinel.look(2.0, 1.0)
-    assert (found.kind, found.body, found.worthless) == ("outside", "a", "")
+    assert (found.kind, found.body, found.worthless) == ("outside", "a", None)
     assert watch([moving("a", points, facets, [(5.0, 1.0)] * 2)], []).look(1.0, 1.0) == []
 
 

@@ -7,14 +7,9 @@ import pytest
 from cell_geometry import smallest_determinant, volume, vtk_nodes
 
 from fsci import shapes
-from solvers.cell_types import CELL_TYPES
-from solvers.mesh import Mesh
-from solvers.mesh_topology import (
-    boundary_facets,
-    cell_facets,
-    signed_volumes,
-    surface_facets,
-)
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.topology import boundary_facets, cell_facets, signed_volumes, surface_facets
 
 
 def radius(points, *axes):
@@ -196,11 +191,14 @@ def test_cells_count_in_the_directions_named():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: shapes.disc(1, (6, 2)), "multiple of 4, got 6"),
+        (lambda: shapes.disc(1, (6, 2)), "cells: the number of cells around must be a multiple of 4, not 6"),
         (lambda: shapes.ring(1, 2, (2, 1)), "at least 3 cells"),
-        (lambda: shapes.ring(1, 2, (8, 1), 400), "at most 360 degrees, got 400"),
-        (lambda: shapes.tube(2, 1, 1, (8, 1, 1)), "0 < inner < outer, got 2 and 1"),
-        (lambda: shapes.hollow_torus(2, 1, 2, (8, 8, 1)), "below the major radius 2"),
+        (lambda: shapes.ring(1, 2, (8, 1), 400), "angle: must be at most 360 degrees, not 400"),
+        (lambda: shapes.tube(2, 1, 1, (8, 1, 1)), "outer_radius: must be greater than 'inner_radius', 2, not 1"),
+        (lambda: shapes.hollow_torus(2, 1, 2, (8, 8, 1)), "outer_radius: must be less than 'major_radius', 2, not 2"),
+        (lambda: shapes.disc(-1, (8, 2)), "radius: must be greater than 0, not -1"),
+        (lambda: shapes.rectangle((1, 1), (1, 0)), "cells: must be at least 1, not 0"),
+        (lambda: shapes.rectangle((1, 1, 1), (1, 1)), "size: must have 2 entries, not 3"),
         (lambda: shapes.rectangle((1, 1), (1, 1), cell="hex"), "unknown cell 'hex'; there are: quad, tri"),
     ],
 )
@@ -280,12 +278,21 @@ def test_lips_are_whole_rows_of_cells(lip, rows):
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"cells": (7, 1, 6)}, "must be even, got 7"),
-        ({"cells": (8, 1, 1)}, "at least 2, got 1"),
-        ({"lip": 1.1}, "lip and post, 1.1 and 0.2, must be lower"),
+        ({"cells": (7, 1, 6)}, "must be even, not 7"),
+        ({"cells": (8, 1, 1)}, "at least 2, not 1"),
+        ({"lip": 1.1}, "'lip' and 'post' must be lower together than 'height', 1.2"),
     ],
 )
 def test_leaflets_that_are_none(settings, message):
     sizes = {"radius": 1, "thickness": 0.06, "height": 1.2, "lip": 0.4, "post": 0.2, "cells": (8, 1, 6)}
     with pytest.raises(ValueError, match=message):
         shapes.leaflet(**(sizes | settings))
+
+
+def test_sizes_and_counts_as_arrays():
+    """Functions of shapes take arrays and numpy's numbers where they take lists and numbers."""
+    mesh = shapes.box(np.array([1.0, 2.0, 3.0]), np.array([1, 2, 2]), origin=np.zeros(3))
+    assert np.array_equal(mesh.points, shapes.box([1.0, 2.0, 3.0], [1, 2, 2]).points)
+    assert np.array_equal(shapes.disc(np.float64(1.0), np.array([8, 1])).points, shapes.disc(1.0, [8, 1]).points)
+    with pytest.raises(ValueError, match="size: must have 2 entries, not 3"):
+        shapes.rectangle(np.ones(3), [1, 1])

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from solvers.fluid.bodies.sweep import Sweep, swept
-from solvers.fluid.conservation.cavities import enclosed
-from solvers.fluid.time_scheme import SCHEMES
-from solvers.tessellation import area_vectors
+from solvers.fluid.flow.conservation.cavities import enclosed
+from solvers.fluid.settings.time_scheme import SCHEMES
+from solvers.fluid.surfaces.sweep import Sweep, swept
+from solvers.mesh.tessellation import area_vectors
 
 STEPS = (0.1, 0.07, 0.13)
 

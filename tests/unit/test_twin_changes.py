@@ -8,7 +8,7 @@ import pytest
 
 from fsci.case import load_case
 from fsci.case.grid import GridSection
-from fsci.twin.changes import twins
+from fsci.twin.changes import COSTS, QUICK_COST, Twin, quick, twins
 from fsci.twin.grids import low_discrepancy
 
 CASES = sorted(path.parent for path in (Path(__file__).parents[2] / "cases").glob("*/case.yaml"))
@@ -23,7 +23,7 @@ fluid:
     to: [4, 1]
     cells: [10, null]
     y: [{to: 0, cells: 5, ratio: 2}, {to: 1, cells: 4}]
-    refine: [{around: disc, layers: 5}]
+    refine: [{around: disc, layers: 12}, {around: box, layers: 4}]
   patches: {all: {on: [x-, x+, y-, y+], no_slip: true}}
   bodies:
     disc: {mesh: {shape: disc, radius: 0.3, cells: [24, 2]}}
@@ -39,6 +39,29 @@ def test_twins_are_cases(folder):
     for twin in found:
         other = load_case(folder, twin.settings)
         assert (json.dumps(other.settings) != json.dumps(case.settings)) == bool(twin.settings), twin.name
+
+
+@pytest.mark.parametrize("folder", CASES, ids=lambda folder: folder.name)
+def test_quick_twins_of_cases(folder):
+    """Each case has one or two, and they cost at most 2.5 times the case."""
+    names = [twin.name for twin in quick(twins(load_case(folder)))]
+    assert len(names) in (1, 2)
+    assert sum(COSTS[name] for name in names) <= QUICK_COST
+
+
+@pytest.mark.parametrize(
+    ("there", "chosen"),
+    [
+        (["coarse", "element", "scheme", "step", "shift_1"], ["coarse", "scheme"]),
+        (["coarse", "element", "processes"], ["coarse"]),  # a steady flow: the same element in small cells costs more
+        (["element", "scheme", "step"], ["scheme", "element"]),  # q1q1 in place of q2q1
+        (["scheme", "step", "order"], ["scheme", "order"]),
+        (["step", "order", "c_n"], ["order"]),
+        (["step", "processes"], ["step"]),
+    ],
+)
+def test_quick_twins(there, chosen):
+    assert [twin.name for twin in quick([Twin(name, name, "space") for name in there])] == chosen
 
 
 @pytest.fixture
@@ -58,7 +81,7 @@ def test_cells_twice_as_large(flow):
     assert other.fluid.element == "q2q1"
     assert not other.fluid.narrow_gaps
     assert other.fluid.grid.shape == (5, 5)
-    assert other.fluid.grid.refine[0].layers == 3
+    assert [part.layers for part in other.fluid.grid.refine] == [6, 4]  # three are needed
 
 
 @pytest.mark.parametrize("number", range(1, 9))
@@ -121,7 +144,7 @@ def test_roles(tmp_path):
     path = tmp_path / "case.yaml"
     path.write_text(CONTACT)
     found = {twin.name: twin for twin in twins(load_case(path))}
-    assert set(found) == {"step", "order", "exchange", "reversed", "c_n", "processes"}
+    assert set(found) == {"step", "order", "exchange", "reversed", "c_n", "mirrored", "turned", "processes"}
     pair = load_case(path, found["exchange"].settings).contact.pairs
     assert (pair["blocks"].slave.body, pair["blocks"].master.body) == ("low", "high")
     assert pair["blocks"].friction.coefficient == 0.3

@@ -12,13 +12,13 @@ from fsci.check.meshes import check_meshes
 from fsci.meshes.folds import folded
 from fsci.meshes.jacobians import inverted
 from fsci.meshes.of_case import read_body
-from fsci.meshes.serendipity import FULL
+from fsci.meshes.serendipity import COMPLETE
 from fsci.meshes.valid import BadMesh, require_valid
 from fsci.run.run import FINISHED, run_case
-from solvers.cell_types import CELL_TYPES
-from solvers.locate import shape_functions
-from solvers.mesh import Mesh
-from solvers.mesh_topology import facet_ids
+from solvers.mesh.cell_types import CELL_TYPES
+from solvers.mesh.locate import shape_functions
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.topology import facet_ids
 
 pytestmark = pytest.mark.usefixtures("in_new_folder")
 
@@ -109,7 +109,7 @@ def test_a_mid_node_that_lies_across(cell, serendipity):
     if serendipity:
         if cell in ("tri", "tet"):
             pytest.skip("simplices have no other second-order cells")
-        short = next(name for name, full in FULL.items() if full == mesh.cell_type)
+        short = next(name for name, full in COMPLETE.items() if full == mesh.cell_type)
         used, cells = np.unique(cells[:, : int(short.lstrip("quadhexron"))], return_inverse=True)
         node, cells = int(np.searchsorted(used, node)), cells.reshape(len(mesh.cells), -1)
         mesh = Mesh(mesh.points[used], cells, short)

@@ -1,35 +1,32 @@
 """Friction laws: the tangential traction is the projection of a trial traction onto a disc.
 
-Let u_t be the tangential slip of the step, z_t = z - n (n.z), c_t > 0, and s the radius of the disc, which is the bound
-of the traction. For each multiplier, stick and slip are one equation,
+    z_t = P_s(q),   q = z_t + c_t u_t,   P_s(q) = q min(1, s / |q|)
 
-    z_t = P_s(q),   q = z_t + c_t u_t,   P_s(q) = q min(1, s / |q|).
-
-Inside the disc it gives u_t = 0, on and outside of it z_t = s q / |q|. Hence |z_t| <= s, and slip occurs only at the
-bound, along the traction. The equation is C = max(s, |q|) z_t - s q = 0 divided by max(s, |q|). All derivatives are
-exact (semi-smooth Newton).
+with the slip u_t of the step and the radius s, for stick and slip alike (docs/theory_contact.md, Friction). The
+equation is C = max(s, |q|) z_t - s q = 0 divided by max(s, |q|). All derivatives are exact (semi-smooth Newton).
 Source: Alart & Curnier, Comput. Methods Appl. Mech. Engng 92 (1991); Gitterle, Popp, Gee & Wall, Int. J. Numer. Meth.
 Engng 84 (2010).
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.sparse import Sparse, sparse, stack
 from solvers.api import Array
 from solvers.contact.blocks import components
 from solvers.contact.law.law import OPEN, SLIP, STICK, Point, Rows, Slopes, Statuses, along
-from solvers.sparse import Sparse, sparse, stack
 
 #: Distance of a trial traction from the edge of the disc, relative to its radius, below which a node slips. A node that
 #: slips has its trial traction there at the beginning of the next step, up to the tolerance of Newton's method.
-EDGE = 1e-6
+EDGE_OF_DISC = 1e-6
 
 
-class Bound(Protocol):
+@runtime_checkable
+class FrictionBound(Protocol):
     """The bound of the tangential traction, in which friction laws differ. The functions below are their methods."""
 
     def radius(self, at: Point) -> Array:
@@ -47,7 +44,7 @@ def trial_traction(at: Point) -> Array:
     return y - np.einsum("nd,nd->n", y, at.normals)[:, None] * at.normals
 
 
-def friction_status(law: Bound, at: Point) -> Statuses:
+def friction_status(law: FrictionBound, at: Point) -> Statuses:
     """Status: contact where the trial pressure is positive, stick inside the disc.
 
     A node whose trial traction is opposed to the present one sticks first, once in a solve: its slip could reverse in
@@ -59,7 +56,7 @@ def friction_status(law: Bound, at: Point) -> Statuses:
     return np.where(at.covered & (at.trial_pressure > 0.0), np.where(inside, STICK, SLIP), OPEN).astype(np.int8)
 
 
-def friction_residual(law: Bound, at: Point, status: Statuses, weight: float) -> Array:
+def friction_residual(law: FrictionBound, at: Point, status: Statuses, weight: float) -> Array:
     """Residual [N]: gap times stiffness along the normal, z_t - P_s(q) along the surface, shape (m, dim)."""
     q, radius = trial_traction(at), law.radius(at)
     return _missed(at, _on_disc(q, np.where(_within(q, radius), STICK, SLIP), radius)[0], weight)
@@ -67,7 +64,7 @@ def friction_residual(law: Bound, at: Point, status: Statuses, weight: float) ->
 
 def _within(q: Array, radius: Array) -> NDArray[np.bool_]:
     """Mask of the trial traction inside the disc, shape (m,)."""
-    return np.linalg.norm(q, axis=1) < (1.0 - EDGE) * radius
+    return np.linalg.norm(q, axis=1) < (1.0 - EDGE_OF_DISC) * radius
 
 
 def _missed(at: Point, projected: Array, weight: float) -> Array:
@@ -75,7 +72,7 @@ def _missed(at: Point, projected: Array, weight: float) -> Array:
     return (at.stiffness * at.gap)[:, None] * at.normals + (weight * at.D)[:, None] * missed
 
 
-def friction_rows(law: Bound, at: Point, slopes: Slopes, status: Statuses, weight: float) -> Rows:
+def friction_rows(law: FrictionBound, at: Point, slopes: Slopes, status: Statuses, weight: float) -> Rows:
     """The residual and its derivatives."""
     by_z, by_normal, by_gap = law.radius_slopes(at)
     dim = at.z.shape[1]

@@ -8,8 +8,8 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.algebra.sparse import Sparse
 from solvers.api import Array
-from solvers.sparse import Sparse
 
 #: Status of a multiplier: no contact; contact with slip; contact without slip.
 OPEN, SLIP, STICK = 0, 1, 2
@@ -32,6 +32,7 @@ class Point:
     stiffness: Array  #: of slave and masters in series, per area [Pa/m], shape (m,)
     slip: Array  #: [m], shape (m, dim); with friction that of the step, of which the tangential part is used
     slip_defined: NDArray[np.bool_]  #: mask of those that a master covered at the beginning of the step, shape (m,)
+    shares: Array  #: of each pair in the area that was covered at the beginning of the step, shape (m, pairs)
     stuck: NDArray[np.bool_]  #: mask of those that were chosen to stick in this solve, shape (m,)
     c_n: Array  #: complementarity parameter of the gap [Pa/m], (m,); the solution does not depend on it
     c_t: Array  #: complementarity parameter of the slip [Pa/m], (m,)

@@ -1,0 +1,60 @@
+"""What a case or its run has that makes its error fall slowly, or not by a law."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fsci.case import Case
+from fsci.run.history import History
+
+#: Steps until a flow or a body that starts at once has forgotten how; all that moves in `cases/` has as many or more.
+STEPS_TO_FORGET = 10
+
+
+def first_order(case: Case, history: History, summary: Mapping[str, Any]) -> list[str]:
+    """Reasons for errors of first order."""
+    return [*_backward_euler(case), *_impacts(case, history), *_films(summary)]
+
+
+def indicative(case: Case, history: History, summary: Mapping[str, Any], fixed: Sequence[str] = ()) -> list[str]:
+    """Reasons to trust no band; `fixed` are bodies from mesh files, the facets of whose curved surfaces stay."""
+    return [*_impacts(case, history), *_films(summary), *_start(case), *_files(fixed)]
+
+
+def _backward_euler(case: Case) -> Iterator[str]:
+    if case.fluid is not None and case.fluid.scheme == "backward_euler":
+        yield "the scheme is backward_euler"
+
+
+def _impacts(case: Case, history: History) -> Iterator[str]:
+    """Contact that begins while inertia counts."""
+    active = history.get("contact.active", np.zeros(0))
+    free = case.fluid is not None and bool(case.fluid.free_bodies)
+    moves = free or (case.structure is not None and case.structure.dynamics is not None)
+    if moves and len(active) and active.max() > 0 and (active == 0).any():
+        yield "an impact"
+
+
+def _films(summary: Mapping[str, Any]) -> Iterator[str]:
+    """A gap once, whichever of its two sides was measured."""
+    cells: dict[frozenset[str], float] = {}
+    for found in summary.get("resolution", ()):
+        if found["to"] and found["warns"]:
+            pair = frozenset((found["body"], found["to"]))
+            cells[pair] = min(cells.get(pair, found["cells"]), found["cells"])
+    yield from (f"{count:.2g} cells in the film between {' and '.join(sorted(pair))}" for pair, count in cells.items())
+
+
+def _start(case: Case) -> Iterator[str]:
+    flows = case.fluid is not None and case.fluid.scheme != "steady"
+    moves = case.structure is not None and case.structure.dynamics is not None
+    if (flows or moves) and case.time.steps < STEPS_TO_FORGET:
+        yield f"a start: {case.time.steps} steps"
+
+
+def _files(fixed: Sequence[str]) -> Iterator[str]:
+    if fixed:
+        yield f"the facets of curved surfaces in mesh files are the same on all levels: {', '.join(fixed)}"

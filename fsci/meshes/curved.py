@@ -1,0 +1,49 @@
+"""Whether the facets of a mesh stand for a curved surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.mesh.mesh import Mesh
+from solvers.mesh.tessellation import tessellate, unit_normals
+
+#: Below this angle two facets are one plane, up to the seven digits of files.
+FLAT = np.radians(0.1)
+#: From this angle on they meet in an edge: a circle has more than six facets.
+EDGE = np.radians(60.0)
+
+
+def is_curved(mesh: Mesh, names: Sequence[str] | None = None) -> bool:
+    """Whether a plane part of named surfaces, by default of all, is bent on two sides, as a facet of a circle is."""
+    simplices, nodes = tessellate(mesh, names)
+    normals = unit_normals(mesh.points[nodes][simplices])
+    first, second = _neighbours(simplices)
+    cosines = (normals[first] * normals[second]).sum(axis=1)
+    flat = cosines >= np.cos(FLAT)
+    bent = (cosines > np.cos(EDGE) + 1e-9) & ~flat
+    planes = _joined(len(simplices), first[flat], second[flat])
+    sides = np.sort(np.stack([planes[first[bent]], planes[second[bent]]], axis=1), axis=1)
+    sides = np.unique(sides[sides[:, 0] != sides[:, 1]], axis=0)
+    return bool((np.bincount(sides.ravel(), minlength=1) > 1).any())
+
+
+def _neighbours(simplices: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of simplices with a common end, in 3D a common edge."""
+    count = simplices.shape[1]
+    rims = np.sort(np.concatenate([np.delete(simplices, corner, axis=1) for corner in range(count)]), axis=1)
+    of = np.tile(np.arange(len(simplices)), count)
+    order = np.lexsort(rims.T)
+    same = (rims[order][1:] == rims[order][:-1]).all(axis=1)
+    return of[order[:-1][same]], of[order[1:][same]]
+
+
+def _joined(count: int, first: NDArray[np.int64], second: NDArray[np.int64]) -> NDArray[np.int64]:
+    """A number for each simplex, equal for those that pairs join."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = coo_array((np.ones(len(first)), (first, second)), shape=(count, count))
+    return np.asarray(connected_components(pairs, directed=False)[1])

@@ -1,0 +1,1 @@
+"""Sparse matrices, blocks and linear solvers."""

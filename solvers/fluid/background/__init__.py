@@ -1,1 +1,0 @@
-"""The background grid: cells, processes, unknowns on it."""

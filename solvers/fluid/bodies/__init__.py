@@ -1,1 +1,0 @@
-"""Bodies in the flow: their surfaces and motion."""

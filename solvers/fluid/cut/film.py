@@ -1,0 +1,170 @@
+"""Films between walls that are closer than a cell: the factor by which stabilisation is reduced in their cells.
+
+The penalty on the distance to the extension is multiplied by eps min(1, (g/h)^3 / (12 gamma)), in a film of height g
+and a cell of size h, so that its contribution relative to the flux and the resistance of the film is below eps. PSPG
+and grad-div terms are left out (docs/theory_fluid.md, Films).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from solvers.api import Array
+from solvers.fluid.cut.extension import FREE_SHARE
+from solvers.fluid.geometry.pieces import FLUSH
+from solvers.fluid.grid.box import Grid
+from solvers.fluid.mesh.distributed_grid import DistributedGrid
+
+#: eps, the largest relative contribution of the penalty to a film. Drags are the same to 1.6 % from 3e-3 to 1e-6.
+SHARE_OF_FILM = 3e-3
+#: g / h below which the factor is constant. Nodes with little fluid have rounding errors of 1e-9 of the velocity,
+#: divided by the factor. Drags of films from 0.05 cells on are the same to 1.3 % from 0.1 to 1e-4.
+LEAST_RATIO = 0.1
+#: Sine of half of 45 degrees: normals are grouped by the nearest of eight directions in the plane.
+OCTANT = np.sin(np.pi / 8)
+#: Product of the unit normals below which two walls are opposite: the angle between them is at most 60 degrees.
+OPPOSITE = -0.5
+
+
+@dataclass(frozen=True)
+class Walls:
+    """Plane pieces of surface, sorted by cell."""
+
+    cell: NDArray[np.int64]  #: number in the box
+    x: Array  #: middle [m], shape (n, dim)
+    n: Array  #: unit normal out of the fluid, shape (n, dim)
+
+
+@dataclass(frozen=True)
+class Films:
+    """Faces of the box that are walls, and the penalty factor; `factor` reduces it in films."""
+
+    faces: Sequence[tuple[int, int]]  #: axis and side (0, 1)
+    penalty: float  #: gamma
+
+    def factor(self, grid: Grid, walls: Walls, solid: NDArray[np.bool_]) -> Array | None:
+        """Factor of the penalty in each cell of the box; 1 outside of films. None if there is no film."""
+        sizes, across = sizes_of(grid, walls)
+        gap = np.minimum(to_faces(grid, walls, self.faces), to_walls(grid, walls, across))
+        near = gap < (1.0 - FLUSH) * across  # a gap of one cell is no film, whatever the rounding
+        if not near.any():
+            return None
+        ratio = np.maximum(gap[near] / sizes[near].max(axis=1), LEAST_RATIO)
+        factor = np.ones(grid.size)
+        np.minimum.at(factor, walls.cell[near], SHARE_OF_FILM * np.minimum(1.0, ratio**3 / (12.0 * self.penalty)))
+        return with_solid(grid, factor, solid)
+
+
+def with_solid(grid: Grid, factor: Array, solid: NDArray[np.bool_]) -> Array:
+    """Factors of cells of the box; solid cells around those of a film get its factor: they share nodes with it."""
+    around: Array = ndimage.minimum_filter(grid.as_box(factor), 3).ravel(order="F")
+    return np.where(solid, around, factor)
+
+
+def sizes_of(grid: Grid, walls: Walls) -> tuple[Array, Array]:
+    """Edge lengths of the cells of walls, shape (n, dim), and their lengths along the normals, (n,) [m]."""
+    index = np.unravel_index(walls.cell, grid.shape, order="F")
+    sizes = np.stack([np.diff(edge)[i] for edge, i in zip(grid.edges, index, strict=True)], axis=1)
+    return sizes, 1.0 / np.linalg.norm(walls.n / sizes, axis=1)
+
+
+def to_faces(grid: Grid, walls: Walls, faces: Sequence[tuple[int, int]]) -> Array:
+    """Distance [m] through the fluid to faces of the box (axis and side), along the normal."""
+    gap = np.full(len(walls.cell), np.inf)
+    for axis, side in faces:
+        slope = walls.n[:, axis] if side == 0 else -walls.n[:, axis]
+        height = np.abs(walls.x[:, axis] - grid.edges[axis][-side])
+        facing = slope > -OPPOSITE
+        gap[facing] = np.minimum(gap[facing], height[facing] / slope[facing])
+    return gap
+
+
+def walls_of(cell: NDArray[np.int64], corners: NDArray[np.int64], x: Array, lengths: Array, normal: Array) -> Walls:
+    """Merge connected pieces of one cell with similar normals, in 2D within one of eight directions, into planes.
+
+    corners: vertices of the pieces' facets, shape (pieces, dim), with positions x [m]; lengths: int lambda_v ds over
+    each piece [m^(dim-1)], of the same shape; normal: unit normals out of the fluid.
+    """
+    count, dim = corners.shape
+    # a vertex has one number per cell: pieces in different cells are not connected
+    corner = np.unique(cell[:, None] * len(x) + corners, return_inverse=True)[1].ravel()
+    links = coo_array((np.ones(corner.size), (np.repeat(np.arange(count), dim), count + corner)), [2 * corner.size] * 2)
+    part = connected_components(links, directed=False)[1][:count]
+    facing = (np.where(np.abs(normal) > OCTANT, np.sign(normal), 0.0) + 1.0) @ 3.0 ** np.arange(dim)
+    _, first, group = np.unique(3**dim * part + facing.astype(np.int64), return_index=True, return_inverse=True)
+    area = lengths.sum(axis=1)
+
+    def total(values: Array) -> Array:
+        return np.stack([np.bincount(group, column) for column in values.T], axis=1)
+
+    n, middle = total(area[:, None] * normal), total(np.einsum("pv,pvi->pi", lengths, x[corners]))
+    middle, n = middle / total(area[:, None]), n / np.linalg.norm(n, axis=1, keepdims=True)
+    order = np.argsort(cell[first], kind="stable")
+    return Walls(cell[first][order], middle[order], n[order])
+
+
+def to_walls(grid: Grid, walls: Walls, reach: Array, layers: int = 1) -> Array:
+    """Distance [m] through the fluid, along the normal, to the closest opposite wall in so many layers of cells around.
+
+    Infinite where there is none within `reach` [m]. Surfaces at negative distance do not count: they are on the other
+    side of the body.
+    """
+    index = np.stack(np.unravel_index(walls.cell, grid.shape, order="F"), axis=1)
+    a, b = cKDTree(index).query_pairs(layers, p=np.inf, output_type="ndarray").T
+    opposing = np.einsum("ai,ai->a", walls.n[a], walls.n[b])
+    a, b, opposing = (v[opposing < OPPOSITE] for v in (a, b, opposing))
+    a, b, opposing = np.concatenate([a, b]), np.concatenate([b, a]), np.tile(opposing, 2)
+    away = walls.x[a] - walls.x[b]
+    distance = np.einsum("ai,ai->a", away, walls.n[b]) / opposing
+    aside = away - distance[:, None] * walls.n[a]
+    far = distance**2 + (aside**2).sum(axis=1)
+    some = np.flatnonzero((distance > 0.0) & (distance < reach[a]))
+    # of several that are equally close, the one in the first cell in the order of the lattice's axes
+    some = some[np.lexsort((b[some], *index[b[some]].T[::-1], far[some], a[some]))]
+    first = np.unique(a[some], return_index=True)[1]
+    gap = np.full(len(walls.cell), np.inf)
+    gap[a[some[first]]] = distance[some[first]]
+    return gap
+
+
+def creeping_cells(grid: Grid, factor: Array, solid: NDArray[np.bool_], share: Array) -> NDArray[np.bool_]:
+    """Cells of the box with creeping flow: those of films, and poorly cut ones at their ends.
+
+    The latter share nodes behind the surface with the solid cells of films, hence the film's velocity continued. Its
+    convection is as inexact as in the film, and steps had no solution with it.
+    factor: of `Films`; solid: solid cells; share: of fluid; all by cells of the box.
+    """
+    beside = ndimage.maximum_filter(grid.as_box(solid & (factor < 1.0)), 3).ravel(order="F")
+    return (factor < 1.0) | (beside & (share < FREE_SHARE))
+
+
+def film_cells(
+    grid: DistributedGrid, cells: NDArray[np.int32], creeping: NDArray[np.bool_] | None
+) -> NDArray[np.int32] | None:
+    """Owned cells among some local ones with creeping flow; None if no process has any (collective)."""
+    if not grid.comm.allreduce(creeping is not None, op=MPI.LOR):
+        return None
+    owned = cells[cells < grid.owned]
+    return owned[:0] if creeping is None else owned[creeping[grid.numbers[owned]]]
+
+
+def coercive(films: NDArray[np.bool_], cell: NDArray[np.int64], volume: Array, area: Array) -> Array:
+    """Least Nitsche penalty over the viscosity [1/m], 4 |Gamma_K| / |K in fluid| in films, by pieces.
+
+    From there on Nitsche's method is coercive in a film (docs/theory_fluid.md, Films). Below, the flow's matrix gets
+    negative eigenvalues in cells with slivers, and Newton's method meets iterates where it is singular.
+    films: pieces in cells with creeping flow; cell: number of their cells; volume: of fluid in the cell [m^dim];
+    area: of each piece [m^(dim-1)].
+    Source: Dolbow, Harari, Int. J. Numer. Meth. Engng 78 (2009) 229-252.
+    """
+    surface = np.bincount(cell, area)[cell]
+    return np.where(films, 4.0 * surface / np.where(films, volume, 1.0), 0.0)

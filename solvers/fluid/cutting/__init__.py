@@ -1,1 +1,0 @@
-"""The cut of the grid by surfaces, and the integrals over it."""

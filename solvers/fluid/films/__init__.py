@@ -1,1 +1,0 @@
-"""Films between walls that are closer than a cell."""

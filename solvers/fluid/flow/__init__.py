@@ -1,0 +1,1 @@
+"""The field and its steps, and what is evaluated in them."""

@@ -1,0 +1,81 @@
+"""How well the grid resolves the flow along each body: cells across the body, its boundary layer and its gaps.
+
+The boundary layer is as thick as the layer in which the mean shear stress tau on the free part of the surface would
+change the velocity by U linearly,
+
+    delta = mu U / tau,
+
+U the largest velocity relative to the body within half of its extent around it. Gaps count by what acts there: the
+share of the force in them is the part of int |t - t_0 n| dS over the surface that lies in front of another wall, within
+`NARROW` cells; t is the traction and t_0 the median of its normal part, which the level of the pressure changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from mpi4py import MPI
+
+from solvers.api import Array
+from solvers.fluid.flow.field import Fluid
+from solvers.fluid.flow.resolution.cells import BodyCells
+from solvers.fluid.flow.resolution.shape import NARROW, SurfaceScene, present, scene_of, shape_of, walls_of_box
+from solvers.mesh.tessellation import unit_normals
+
+#: Force that friction and dynamic pressure may explain, in multiples of them, around bodies and in films. Around bodies
+#: friction is a third of the drag or more, else dynamic pressure counts; in films the pressure is by their length over
+#: their height larger. What is more is weight or inertia of the fluid, which needs no boundary layer.
+AROUND_BODIES, IN_FILMS = 3.0, 100.0
+
+
+def measure(fluid: Fluid) -> list[BodyCells]:
+    """Of all bodies with wet surfaces, in the present cut and flow (collective)."""
+    if not fluid.bodies or fluid.system.cut is None:
+        return []
+    cut, starts = fluid.cut, np.cumsum([len(body.surface.facets) for body in fluid.bodies])[:-1]
+    corners = np.split(cut.motion.x[cut.facets], starts)
+    bodies = [(body.surface.name, part) for body, part in zip(fluid.bodies, corners, strict=True)]
+    walls = walls_of_box((patch.faces, patch.record) for patch in fluid.patches)
+    force, wet = fluid.system.force_on_facets()
+    scene = scene_of(fluid.grid.grid, walls, bodies, wet > 0.0)
+    return [_of_body(fluid, scene, body, force, wet) for body in present(scene)]
+
+
+def _of_body(fluid: Fluid, scene: SurfaceScene, body: int, force: Array, wet: Array) -> BodyCells:
+    normal, speed = unit_normals(scene.corners), _speed(fluid, body)
+    along = np.einsum("fi,fi->f", force, normal)
+    level = _median(along / np.maximum(wet, 1e-300), np.where(scene.owner == body, wet, 0.0))
+    acting = np.linalg.norm(force - level * wet[:, None] * normal, axis=1)
+    shear = np.linalg.norm(force - along[:, None] * normal, axis=1)
+    dynamic = fluid.settings.density * speed**2 * wet if fluid.settings.convection else 0.0
+    samples, of_flow = scene.samples, scene.of_samples(shear + dynamic)
+    all_of_it = scene.of_samples(acting)
+    free = (scene.owner[samples.facet] == body) & (scene.gaps.cells >= NARROW)
+    around = AROUND_BODIES * float(of_flow[free].sum()) / max(float(all_of_it[free].sum()), 1e-300)
+    counts = np.where(free, min(1.0, around) * all_of_it, np.minimum(all_of_it, IN_FILMS * of_flow))
+    found = shape_of(scene, body, all_of_it, counts)
+    area, drag = scene.of_samples(wet)[free], float(scene.of_samples(shear)[free].sum())
+    if drag == 0.0:
+        return replace(found, layer=np.inf)
+    across = float((area / samples.across[free]).sum())  # the area in cells along the normal
+    return replace(found, layer=fluid.settings.viscosity * speed * across / drag)
+
+
+def _median(values: Array, weights: Array) -> float:
+    """The value with half of the weight below it."""
+    order = np.argsort(values)
+    sums = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(sums, 0.5 * sums[-1])])
+
+
+def _speed(fluid: Fluid, body: int) -> float:
+    """Largest velocity relative to a body within half of its extent around it [m/s] (collective)."""
+    motion, nodes = fluid.moving.motions[body], fluid.unknowns.velocity
+    low, high = motion.x.min(axis=0), motion.x.max(axis=0)
+    margin = 0.5 * (high - low).max()
+    x = nodes.points[: nodes.owned, : fluid.dim]
+    near = ((x > low - margin) & (x < high + margin)).all(axis=1)
+    active = fluid.system.active_dofs[nodes.dofs[: nodes.owned]].all(axis=1)
+    velocity = fluid.flow[nodes.dofs[: nodes.owned]][near & active] - motion.v.mean(axis=0)
+    return float(fluid.comm.allreduce(np.linalg.norm(velocity, axis=1).max(initial=0.0), op=MPI.MAX))

@@ -1,0 +1,147 @@
+"""The shape of bodies in cells: across them, and in the gaps between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.fluid.flow.resolution.cells import BodyCells, GapCells
+from solvers.fluid.flow.resolution.gaps import SampledGaps, SurfaceSamples, WallPlane, gaps, samples_of
+from solvers.fluid.grid.box import Grid
+from solvers.fluid.terms.boundary.patch_kinds import PatchKind
+from solvers.mesh.tessellation import unit_normals
+
+#: Gaps up to so many cells count as such; the flow in wider ones is that around the body.
+NARROW = 5.0
+#: Cosine of the least angle between facets that meet in an edge of the body.
+EDGE_OF_BODY = 0.7
+
+
+def walls_of_box(patches: Iterable[tuple[Sequence[str], PatchKind]]) -> list[tuple[WallPlane, str]]:
+    """Faces of the box that hold the normal velocity, with their names; those that hold no other one mirror the flow.
+
+    patches: faces and kind of each.
+    """
+    return [
+        (WallPlane("xyz".index(face[0]), int(face[1] == "+"), kind.prescribed == "normal"), face)
+        for faces, kind in patches
+        if kind.normal_given
+        for face in faces
+    ]
+
+
+@dataclass(frozen=True)
+class SurfaceScene:
+    """Surfaces in the box, with the gaps in front of them."""
+
+    bodies: list[str]
+    faces: list[str]  #: names of the walls of the box, in the order of the planes
+    corners: Array  #: of the facets of all bodies, (facets, dim, dim) [m]
+    owner: NDArray[np.int64]  #: body of each facet
+    samples: SurfaceSamples
+    gaps: SampledGaps
+    mirrors: list[tuple[int, float]]  #: axis and position [m] of the planes of symmetry
+
+    def of_samples(self, by_facet: Array) -> Array:
+        """Values that are spread over facets, at the samples: in proportion to their areas."""
+        facet, area = self.samples.facet, self.samples.area
+        return by_facet[facet] * area / np.bincount(facet, area, len(self.owner))[facet]
+
+
+def scene_of(
+    grid: Grid,
+    walls: Sequence[tuple[WallPlane, str]],
+    bodies: Sequence[tuple[str, Array]],
+    wet: NDArray[np.bool_] | None = None,
+) -> SurfaceScene:
+    """Of bodies by (name, corners of their facets).
+
+    walls: of the box, with names; wet: mask of the facets that count.
+    """
+    corners = np.concatenate([corners for _, corners in bodies])
+    owner = np.repeat(np.arange(len(bodies)), [len(corners) for _, corners in bodies])
+    samples = samples_of(grid, corners)
+    if wet is not None:
+        samples = samples[wet[samples.facet]]
+    found = gaps(grid, samples, [plane for plane, _ in walls])
+    mirrors = [(plane.axis, float(grid.edges[plane.axis][-plane.side])) for plane, _ in walls if plane.mirror]
+    names, faces = [name for name, _ in bodies], [face for _, face in walls]
+    return SurfaceScene(names, faces, corners, owner, samples, found, mirrors)
+
+
+def at_start(
+    grid: Grid, walls: Sequence[tuple[WallPlane, str]], bodies: Sequence[tuple[str, Array]]
+) -> list[BodyCells]:
+    """Of bodies as in `scene_of`, without a flow.
+
+    Shares of the force are those of films: what acts is proportional to 1 / gap^2.
+    """
+    if not bodies:
+        return []
+    scene = scene_of(grid, walls, bodies)
+    acting = scene.samples.area / np.minimum(scene.gaps.cells, 1e6) ** 2
+    return [shape_of(scene, body, acting, acting) for body in present(scene)]
+
+
+def present(scene: SurfaceScene) -> list[int]:
+    """Numbers of the bodies with samples."""
+    found: list[int] = np.unique(scene.owner[scene.samples.facet]).tolist()
+    return found
+
+
+def shape_of(scene: SurfaceScene, body: int, acting: Array, counts: Array) -> BodyCells:
+    """Of one body; acting: size of the force at each sample; counts: the part of it that shares are of."""
+    samples = scene.samples
+    some = np.flatnonzero(scene.owner[samples.facet] == body)
+    corners = scene.corners[np.unique(samples.facet[some])]
+    points = scene.corners[scene.owner == body].reshape(-1, scene.corners.shape[2])
+    extent = np.ptp(points, axis=0)
+    for axis, position in scene.mirrors:  # half of a body, or a quarter
+        if np.abs(points[:, axis] - position).min() < 1e-6 * extent[axis]:
+            extent[axis] *= 2.0
+    per_length = np.average(1.0 / samples.across[some], weights=samples.area[some])
+    edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean()
+    share = counts / max(float(acting[some].sum()), 1e-300)
+    narrow = scene.gaps.cells[some] < NARROW
+    return BodyCells(
+        scene.bodies[body],
+        across=float(np.sort(extent)[1] * per_length),
+        layer=np.nan,
+        sharp=has_edges(corners),
+        facets=float(1.0 / (edge * per_length)),
+        share=float(share[some[~narrow]].sum()),
+        gaps=tuple(_gaps_of(scene, body, some[narrow], share)),
+    )
+
+
+def _gaps_of(scene: SurfaceScene, body: int, some: NDArray[np.int64], share: Array) -> Iterator[GapCells]:
+    """Gaps in front of some samples, by what is opposite."""
+    partner = scene.gaps.partner[some]
+    of_bodies = scene.owner[scene.samples.facet[np.maximum(partner, 0)]]
+    opposite = np.where(partner < 0, len(scene.bodies) - 1 - partner, of_bodies)
+    names = [*scene.bodies, *scene.faces]
+    for other in np.unique(opposite).tolist():
+        here = some[opposite == other]
+        weight, cells = share[here], np.maximum(scene.gaps.cells[here], 1e-6)
+        total = float(weight.sum())
+        mean = float(np.exp((weight * np.log(cells)).sum() / total)) if total > 0.0 else float(cells.min())
+        yield GapCells(scene.bodies[body], names[other], mean, float(cells.min()), total)
+
+
+def has_edges(corners: Array) -> bool:
+    """Whether facets meet at an angle; corners: (facets, dim, dim), those that meet have equal corners."""
+    normal, dim = unit_normals(corners), corners.shape[2]
+    _, vertex = np.unique(corners.reshape(-1, dim), axis=0, return_inverse=True)
+    vertex = vertex.reshape(corners.shape[:2])
+    # what two facets share: in 2D a vertex, in space an edge
+    pairs = [[0], [1]] if dim == 2 else [[0, 1], [1, 2], [0, 2]]
+    sides = np.sort(np.concatenate([vertex[:, pair] for pair in pairs]), axis=1)
+    _, side = np.unique(sides, axis=0, return_inverse=True)
+    order = np.argsort(side.ravel(), kind="stable")
+    facet = np.tile(np.arange(len(corners)), len(pairs))[order]
+    meet = np.diff(side.ravel()[order]) == 0
+    return bool((np.einsum("ni,ni->n", normal[facet[1:]], normal[facet[:-1]])[meet] < EDGE_OF_BODY).any())

@@ -1,0 +1,89 @@
+"""Snapshots of the flow for files and pictures: cells with fluid, and the surfaces of bodies at their positions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solvers.api import Array, Snapshot
+from solvers.fluid.flow.field import Fluid
+from solvers.mesh.distributed import Nodal, gather_nodal
+from solvers.mesh.tessellation import area_vectors
+
+
+def snapshots(fluid: Fluid) -> list[Snapshot]:
+    """Snapshots of the flow and of each body on rank 0, an empty list on others (collective)."""
+    flow, bodies = _flow(fluid), _bodies(fluid)
+    return [] if flow is None else [flow, *bodies]
+
+
+def _flow(fluid: Fluid) -> Snapshot | None:
+    """Velocity and pressure at the corners of all cells with fluid; other nodes of q2q1 are left out.
+
+    Corners inside of bodies have the values of the smooth extension, so that pictures are correct up to the surface.
+    """
+    unknowns, grid = fluid.unknowns, fluid.grid
+    velocity, pressure = (
+        gather_nodal(fluid.comm, Nodal(fluid.flow[nodes.dofs[: nodes.owned]], nodes.consecutive[: nodes.owned]))
+        for nodes in (unknowns.velocity, unknowns.pressure)
+    )
+    share = np.zeros(len(grid.numbers))
+    wet = np.concatenate([fluid.cut.uncut, fluid.cut.cut])
+    share[wet] = np.maximum(fluid.cut.fraction[wet], np.finfo(float).tiny)
+    shares = gather_nodal(fluid.comm, Nodal(share[: grid.owned, None], grid.original[: grid.owned]))
+    if velocity is None or pressure is None or shares is None:
+        return None
+    mesh = grid.grid.mesh() if grid.nested is None else grid.nested.picture()
+    place = np.arange(len(shares)) if grid.sheets is None else grid.sheets.box_cells(np.arange(len(shares)))
+    fraction = np.bincount(place, shares[:, 0])[:, None]
+    active = fraction[:, 0] > 0.0
+    nodes, cells = np.unique(mesh.cells[active], return_inverse=True)
+    at_corners = [values[_corners(fluid, degree)] for values, degree in ((velocity, unknowns.degree), (pressure, 1))]
+    fields = {"velocity": _in_space(at_corners[0][nodes]), "pressure": at_corners[1][nodes, 0]}
+    cells = cells.reshape(-1, mesh.cells.shape[1])
+    inside = {"fluid_fraction": fraction[active, 0]}
+    return Snapshot("fluid", _in_space(mesh.points[nodes]), cells, mesh.cell_type, fields, inside)
+
+
+def _corners(fluid: Fluid, degree: int) -> np.ndarray:
+    """Index of each corner of the cells, x fastest, among the nodes of a degree."""
+    if (nested := fluid.grid.nested) is not None:
+        return np.searchsorted(nested.all_nodes(degree), nested.corners(degree))
+    counts = fluid.unknowns.lattice_shape(degree)
+    lattice = np.arange(int(np.prod(counts))).reshape(counts, order="F")
+    indices = [
+        degree * np.arange(n + 1) % count for n, count in zip(fluid.grid.grid.shape, counts, strict=True)
+    ]  # fmt: skip
+    return lattice[np.ix_(*indices)].ravel(order="F")
+
+
+def _bodies(fluid: Fluid) -> list[Snapshot]:
+    """Rigid surfaces with their velocity and the traction of the fluid on them (zero before the first step).
+
+    Elastic bodies are in the snapshots of the structure.
+    """
+    found, start = [], 0
+    forces = fluid.force() if fluid.bodies and fluid.started else {}
+    for body in fluid.bodies:
+        surface, dim = body.surface, fluid.dim
+        part = slice(start, start + surface.vertices)
+        start = part.stop
+        if body.deforms:
+            continue
+        x, v = fluid.cut.motion.x[part], fluid.cut.motion.v[part]
+        force = forces.get(surface.name, np.zeros_like(x))
+        area = vertex_areas(x, surface.facets)[:, None]
+        traction = np.divide(force, area, out=np.zeros_like(force), where=area > 0.0)
+        fields = {"velocity": _in_space(v), "traction": _in_space(traction)}
+        kind = "line" if dim == 2 else "triangle"
+        found.append(Snapshot(surface.name, _in_space(x), surface.facets, kind, fields))
+    return found
+
+
+def vertex_areas(x: Array, facets: np.ndarray) -> Array:
+    """Share of each vertex in the area [m^2] (length in 2D) of segments or triangles: int N_b ds, shape (n,)."""
+    dim, size = x.shape[1], np.linalg.norm(area_vectors(x[facets]), axis=1)
+    return np.asarray(np.bincount(facets.ravel(), weights=np.repeat(size / dim, dim), minlength=len(x)), dtype=float)
+
+
+def _in_space(vectors: Array) -> Array:
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))

@@ -1,0 +1,176 @@
+"""Moving thin bodies: detection of changes of the sheets, and transfer of the flow to the nodes of new sheets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from solvers.api import Array, State
+from solvers.fluid.flow.carrier import Carrier
+from solvers.fluid.flow.history import Past
+from solvers.fluid.flow.sheet_transfer import Sides, along_surface, sides_of, transfer
+from solvers.fluid.geometry.pieces import off_boundary
+from solvers.fluid.geometry.thin.sheet_cycles import joined_in, recurring
+from solvers.fluid.geometry.thin.sheets import Sheets, find_sheets
+from solvers.fluid.geometry.thin.thickness import THIN, THIN_IF_MOVING
+from solvers.fluid.geometry.thin.thinness import cell_sizes_at, may_be_thin
+from solvers.fluid.grid.box import Grid
+from solvers.fluid.grid.nested import Nested
+from solvers.fluid.mesh.space import Unknowns
+from solvers.fluid.settings.time_scheme import FlowStep
+from solvers.fluid.surfaces.immersed import ImmersedBody
+from solvers.fluid.surfaces.surface import Motion, tied, wetness
+
+#: Thickness in cells up to which moving bodies have separate cells with contact, by dimension: in 2D that of bodies at
+#: rest. Where thicker ones touch, Newton's method may not converge: fluid between them appears and disappears in its
+#: course. In 3D elastic bodies of 0.3 cells were computed; from one cell on it is as without separate cells, because
+#: no elastic body between one and two cells has been tried. They leak little (docs/theory_fsci.md).
+THICK_IN_CONTACT = {2: float(THIN), 3: 1.0}
+
+
+def thickest(dim: int) -> float:
+    """Thickness in cells up to which moving bodies have separate cells for each side.
+
+    Thicker ones have a strip of cells behind each side instead, and fluid would pass where both strips share nodes:
+    where cut cells are THIN_IF_MOVING apart or less in all directions. A body is so thick if it is parallel to a
+    diagonal plane.
+    """
+    return math.sqrt(dim) * (THIN_IF_MOVING + 1)
+
+
+class ThinBodies:
+    """Finds the sheets of the fluid for each position of the bodies, after one of these has been thin."""
+
+    def __init__(self, grid: Grid, bodies: Sequence[ImmersedBody], periodic: bool, sheets: Sheets | None):
+        self._grid, self.follows, self._sheets = grid, False, sheets
+        surfaces = [body.surface for body in bodies]
+        self._wet, self._tied = wetness(surfaces), tied(surfaces)
+        moving = bool(bodies) and not all(body.rests for body in bodies)
+        touch = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
+        self._thick = THICK_IN_CONTACT[grid.dim] if touch else thickest(grid.dim)
+        plain = not periodic and not isinstance(grid, Nested)
+        self._possible: bool | None = None if moving and plain else False
+        self._x: Array | None = None
+        self._searched = False  #: in this step, without a result: a search takes as long as a tenth of an iterate
+        self._closed: NDArray[np.int64] | None = None  #: `Sheets.closed` of this step; None: it has no sheets yet
+        self._tried: list[Sheets] = []  #: sheets of this step, in their order
+        self._joined: dict[int, frozenset[int]] = {}  #: parts that stay joined in this step
+
+    @property
+    def may_follow(self) -> bool:
+        """Whether the cells may change during the run."""
+        return self._possible is not False
+
+    def sheets(self, facets: NDArray[np.int64], motion: Motion) -> Sheets | None:
+        """Sheets of the fluid around surfaces at their present positions.
+
+        None if no body has been thin yet, which the first position in a step decides.
+        """
+        if self._possible is None:
+            self._possible = may_be_thin(self._grid, facets[self._wet], motion.x, self._thick)
+        if not self._possible or (self._searched and not self.follows):
+            return self._sheets
+        if self._x is None or not np.array_equal(self._x, motion.x):
+            found = self._find(facets, motion.x)
+            if found is not None and self._join(joined_in(recurring(self._tried, found))):
+                found = self._find(facets, motion.x)
+            if found is not None and not (self._tried and self._tried[-1].same_unknowns(found)):
+                self._tried.append(found)
+            self._sheets, self._x, self.follows, self._searched = found, motion.x, found is not None, True
+        if self._sheets is not None:
+            if self._closed is None:
+                self._closed = self._sheets.touching
+            if not np.array_equal(self._sheets.closed, self._closed):
+                self._sheets = replace(self._sheets, closed=self._closed)
+        return self._sheets
+
+    def _find(self, facets: NDArray[np.int64], x: Array) -> Sheets | None:
+        off = off_boundary(self._grid, x[facets])
+        thin, always = THIN_IF_MOVING, self.follows
+        ties = None if self._tied is None else (self._tied, self._wet)
+        return find_sheets(self._grid, facets, x, off, thin=thin, always=always, joined=self._joined, tied=ties)
+
+    def _join(self, parts: dict[int, frozenset[int]]) -> bool:
+        """Keep parts joined until the step ends; returns whether some are new."""
+        before = self._joined
+        self._joined = before | {cell: before.get(cell, frozenset()) | some for cell, some in parts.items()}
+        return self._joined != before
+
+    def begin_step(self) -> None:
+        """Forget the sheets of the last step, and search once for thin bodies if there has been none."""
+        self._tried, self._searched, self._closed = [], False, None
+        if self._joined:
+            self._joined, self._x = {}, None
+
+    def save(self) -> State:
+        """The state: whether a body has been thin, and (cell, facet) of joined parts."""
+        pairs = [(cell, facet) for cell, some in sorted(self._joined.items()) for facet in sorted(some)]
+        return {"follows": self.follows, "joined": np.array(pairs, dtype=np.int64).reshape(-1, 2)}
+
+    def restore(self, state: State) -> None:
+        """Restore a saved state."""
+        self.begin_step()
+        self.follows, self._searched = bool(state["follows"]), True
+        for cell, facet in np.asarray(state["joined"]).tolist():
+            self._joined[cell] = self._joined.get(cell, frozenset()) | {facet}
+        if self._possible is not False:
+            self._x = self._sheets = None
+
+
+@dataclass(frozen=True)
+class Began:
+    """The state at the beginning of a step: unknowns, sheets, earlier velocities, and positions of the bodies [m]."""
+
+    unknowns: Unknowns
+    sheets: Sheets | None
+    step: FlowStep  #: that the system has the terms of
+    past: tuple[Past, ...]
+    motions: tuple[Motion, ...]
+    layers: int  #: of cells behind surfaces with velocities
+
+    def way(self, x: Array) -> float:
+        """The farthest way [m] along an axis of a vertex to the positions x of all vertices."""
+        before = [motion.x for motion in self.motions]
+        return float(np.abs(x - np.concatenate(before)).max(initial=0.0)) if before else 0.0
+
+
+class Carrying:
+    """Transfers to the unknowns of new sheets, around facets with this motion now.
+
+    What the new sheets need for it is found once, for any number of transfers and, with `q1q1`, for velocity and
+    pressure, whose nodes are the same.
+    """
+
+    def __init__(self, new: Unknowns, facets: NDArray[np.int64], motion: Motion):
+        after, x = new.grid.sheets, motion.x
+        assert after is not None
+        self._new, self._after = new, after
+        cell = max(float(cell_sizes_at(edge, x[:, axis]).max()) for axis, edge in enumerate(after.grid.edges))
+        self._along = cache(lambda: along_surface(facets, x, cell))
+        self._sides = cache(lambda degree: sides_of(after, degree, self._along()))
+        self._walls = cache(lambda: _seen(self._sides(new.degree), motion.v[facets].mean(axis=1)))
+
+    def __call__(self, old: Unknowns, before: Sheets | None) -> Carrier:
+        """The transfer from old unknowns; before: their sheets, None: nodes of the box."""
+        degree = self._new.degree
+        matrices = {one: self._matrix(before, one) for one in {degree, 1}}
+        return Carrier(old, self._new, matrices[degree], matrices[1], self._walls())
+
+    def _matrix(self, before: Sheets | None, degree: int) -> sparse.csr_matrix:
+        if before is not None:
+            return transfer(sides_of(before, degree, self._along()), self._sides(degree))
+        count = self._after.node_count(degree)
+        entries = (np.ones(count), (np.arange(count), self._after.on_lattice(np.arange(count), degree)))
+        return sparse.csr_matrix(entries, shape=(count, self._after.lattice_size(degree)))
+
+
+def _seen(sides: Sides, of_facets: Array) -> Array:
+    """Weighted mean of values of the facets that each node sees, nan where it sees none."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(sides.of_nodes @ of_facets) / np.asarray(sides.of_nodes.sum(axis=1))

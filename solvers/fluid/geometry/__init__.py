@@ -1,0 +1,1 @@
+"""Surfaces in the cells of a grid: pieces, regions, overlaps. Without finite elements, PETSc and MPI."""

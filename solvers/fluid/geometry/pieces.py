@@ -1,0 +1,171 @@
+"""Pieces of surface: parts of facets, each in the cell whose fluid it bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array, Indices
+from solvers.fluid.grid.box import Grid
+from solvers.mesh.gauss import gauss
+from solvers.mesh.lagrange import lagrange
+
+#: Distance from a plane of the grid, in cells, up to which a piece lies in it.
+FLUSH = 1e-6
+#: Share of a cell (of its face) below which fluid (surface) in it is rounding error of the geometry.
+NOTHING = 1e-10
+#: Rounding error of a position, relative to the largest coordinate of the box: of some sums of rotated coordinates.
+ROUNDING_OF_POSITION = 16 * np.finfo(float).eps
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Pieces of surface in local cut cells, sorted by cell."""
+
+    cell: NDArray[np.int64]  #: index into the cut cells
+    facet: NDArray[np.int64]
+    moments: Array  #: int L_q lambda_v ds [m^(dim-1)], shape (pieces, points, dim)
+    mass: Array  #: int lambda_v lambda_w ds, shape (pieces, dim, dim)
+    normal: Array  #: unit normal out of the fluid, shape (pieces, dim)
+
+    @cached_property
+    def area(self) -> Array:
+        """int L_q ds, shape (pieces, points)."""
+        first, *others = np.moveaxis(self.moments, 2, 0)
+        return sum(others, start=first)  # NumPy's sum over three neighbours takes five times as long
+
+
+def in_planes(grid: Grid, x: Array) -> Array:
+    """Vertices [m], those beside a plane of the grid by rounding put into it.
+
+    Then the kernel knows from the normal which of the two cells has the fluid.
+    """
+    placed = x.copy()
+    for axis, edge in enumerate(grid.edges):
+        above = np.clip(np.searchsorted(edge, x[:, axis]), 1, len(edge) - 1)
+        for plane in (edge[above - 1], edge[above]):
+            near = np.abs(x[:, axis] - plane) <= ROUNDING_OF_POSITION * np.abs(edge).max()
+            placed[near, axis] = plane[near]
+    return placed
+
+
+def off_boundary(grid: Grid, corners: Array) -> NDArray[np.bool_]:
+    """Mask of the facets that do not lie on the boundary of the box; those that do are in dry contact with it."""
+    off = np.ones(len(corners), dtype=bool)
+    for axis, edge in enumerate(grid.edges):
+        near = FLUSH * float(np.diff(edge).min())
+        for end in (edge[0], edge[-1]):
+            off &= (np.abs(corners[:, :, axis] - end) > near).any(axis=1)
+    return off
+
+
+def put_where_fluid_is(
+    grid: Grid, points: Array, moments, normal: Array, full: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], Array]:
+    """(cell of the box whose fluid each piece bounds, -1: none; moments of the piece in that cell).
+
+    A piece in a `full` cell bounds no fluid there, nor does one in a face of a cell that is solid: it is inside of
+    another body, or rounding put it on the wrong side of the face. In the latter case it is moved to the cell behind
+    the face.
+    moments: result of the kernel; normal: out of the fluid, (pieces, dim); points: of the quadrature in one direction.
+    """
+    cell, found = moments.cells[moments.piece_cell], moments.piece_moments
+    solid = moments.fraction >= 1.0 - NOTHING
+    inside = np.flatnonzero((solid | full)[cell])
+    if not len(inside):
+        return cell, found
+    found, count, dim = found.copy(), len(points), grid.dim
+    bounds = np.where(full[cell], -1, cell)
+    axes = np.argmax(np.abs(normal), axis=1)
+    index = np.stack(np.unravel_index(cell, grid.shape, order="F"))
+    for axis in range(dim):
+        for side in (0, 1):
+            at = inside[(axes[inside] == axis) & ((normal[inside, axis] < 0.0) == bool(side))]
+            if not len(at):
+                continue
+            by_layer = np.moveaxis(found[at].reshape(len(at), *[count] * dim, dim), dim - axis, 1)
+            across = by_layer.sum(axis=1)
+            area = across.reshape(len(at), -1).sum(axis=1)
+            level = by_layer.reshape(len(at), count, -1).sum(axis=2)
+            flush, covered = (level @ (points - face) ** 2 <= FLUSH**2 * area for face in (side, 1 - side))
+            bounds[at[covered]] = -1
+            next_index = index[axis, at] + (1 if side else -1)
+            flush &= (next_index >= 0) & (next_index < grid.shape[axis])
+            at, across = at[flush], across[flush]
+            behind = cell[at] + (1 if side else -1) * int(np.prod(grid.shape[:axis]))
+            bounds[at] = np.where((solid | full)[behind], -1, behind)
+            moved = np.moveaxis(np.multiply.outer(lagrange(points, np.array(1.0 - side)), across), 1, 0)
+            found[at] = np.moveaxis(moved, 1, dim - axis).reshape(len(at), count**dim, dim)
+    return bounds, found
+
+
+def cells_across(grid: Grid, points: Array, moments) -> NDArray[np.int64]:
+    """For pieces in a face of their cell, the cell of the box on the other side of the face; -1: there is none.
+
+    moments: result of the kernel; points: of the quadrature in one direction.
+    """
+    cell, count, dim = moments.cells[moments.piece_cell], len(points), grid.dim
+    by_point = moments.piece_moments.sum(axis=2).reshape(len(cell), *[count] * dim)
+    area = moments.piece_moments.sum(axis=(1, 2))
+    index = np.stack(np.unravel_index(cell, grid.shape, order="F"))
+    across = np.full(len(cell), -1)
+    for axis in range(dim):
+        level = np.moveaxis(by_point, dim - axis, 1).reshape(len(cell), count, count ** (dim - 1)).sum(axis=2)
+        for side, step in ((0, -1), (1, 1)):
+            within = (index[axis] + step >= 0) & (index[axis] + step < grid.shape[axis])
+            flush = level @ (points - side) ** 2 <= FLUSH**2 * area
+            across = np.where(within & flush, cell + step * int(np.prod(grid.shape[:axis])), across)
+    return across
+
+
+def selected(pieces: Pieces, cell: NDArray[np.int64]) -> Pieces:
+    """Pieces with other cells; those with a negative one are left out."""
+    kept = np.flatnonzero(cell >= 0)
+    return Pieces(cell[kept], pieces.facet[kept], pieces.moments[kept], pieces.mass[kept], pieces.normal[kept])
+
+
+def joined_pieces(some: Sequence[Pieces]) -> Pieces:
+    """All pieces, sorted by cell."""
+    order = np.argsort(np.concatenate([pieces.cell for pieces in some]), kind="stable")
+    names = ("cell", "facet", "moments", "mass", "normal")
+    return Pieces(*(np.concatenate([getattr(pieces, name) for pieces in some])[order] for name in names))
+
+
+def place_of(grid: Grid, cells: Indices) -> tuple[Array, Array]:
+    """(lowest corners, edges) [m] of cells of the box, shape (cells, dim)."""
+    index = np.unravel_index(cells, grid.shape, order="F")
+    low, high = (
+        np.stack([edge[i + side] for edge, i in zip(grid.edges, index, strict=True)], axis=1) for side in (0, 1)
+    )
+    return low, high - low
+
+
+def parts_of_facets(
+    grid: Grid, cell: Indices, row: Indices, parts: Array, facets: Indices, x: Array, points: Array
+) -> Pieces:
+    """Pieces in cells of the box that are parts of facets, in 2D.
+
+    cell: number in the box of that of each part; row: among the cut cells; parts: (facet, begin, end) in reference
+    coordinates of the cell, shape (n, 5); x: vertices of the facets [m]; points: of the quadrature in one direction.
+    """
+    facet, ends = parts[:, 0].astype(np.int64), parts[:, 1:].reshape(-1, 2, 2)
+    low, size = place_of(grid, cell)
+    corners = (x[facets[facet]] - low[:, None]) / size[:, None]
+    nodes, weights = gauss(len(points) + 1)
+    along = ends[:, 1] - ends[:, 0]
+    at = ends[:, None, 0] + nodes[:, None] * along[:, None]
+    weight = np.linalg.norm(along * size, axis=1)[:, None] * weights
+    way = corners[:, 1] - corners[:, 0]
+    t = np.einsum("pgi,pi->pg", at - corners[:, None, 0], way) / (way**2).sum(axis=1)[:, None]
+    vertex = np.stack([1.0 - t, t], axis=2)
+    L = np.einsum("pga,pgb->pgba", lagrange(points, at[..., 0]), lagrange(points, at[..., 1]))
+    L = L.reshape(len(facet), len(nodes), len(points) ** 2)
+    moments = np.einsum("pgq,pgv,pg->pqv", L, vertex, weight)
+    mass = np.einsum("pgv,pgw,pg->pvw", vertex, vertex, weight)
+    tangent = way * size
+    normal = -np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.linalg.norm(tangent, axis=1)[:, None]
+    return Pieces(row, facet, moments, mass, normal)

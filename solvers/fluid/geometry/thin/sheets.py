@@ -1,0 +1,371 @@
+"""Sheets: separate cells, and hence unknowns, for the fluid on each side of a thin body (docs/theory_fluid.md).
+
+New cells follow those of the box in the mesh. Faces between a new cell and its neighbour, which the ghost penalty
+integrates over, are represented by further pairs of cells, which have no other purpose. The numbers of nodes determine
+which cells share unknowns.
+Source: the rule by which 4C's cut library gives nodes several sets of unknowns: Schott, Wall, Comput. Methods Appl.
+Mech. Engrg. 276 (2014) 233-265, section 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import product
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from solvers import kernels
+from solvers.algebra.connected import connected_parts
+from solvers.api import Array, Indices, Mask
+from solvers.fluid.geometry.pieces import in_planes, off_boundary
+from solvers.fluid.geometry.regions.sliced_facets import ragged
+from solvers.fluid.geometry.regions.space_parts import parts_in_space
+from solvers.fluid.geometry.thin.closing import are_apart, close_a_way, may_touch, uncut_cells
+from solvers.fluid.geometry.thin.sheet_nodes import Joined, node_copies, same_nodes
+from solvers.fluid.geometry.thin.sheet_parts import LAYERS_AROUND, Part, facing_of, grown, links_of, parts_of_fluid
+from solvers.fluid.geometry.thin.thickness import AROUND_PAIR, THIN
+from solvers.fluid.geometry.thin.thinness import OPPOSITE_NORMALS, may_be_thin
+from solvers.fluid.geometry.tied_slits import slivers_of, without_slits
+from solvers.fluid.grid.box import CORNER_STEPS, Grid
+from solvers.fluid.grid.nested import Nested
+from solvers.fluid.surfaces.immersed import ImmersedBody
+from solvers.fluid.surfaces.surface import together
+from solvers.mesh.gauss import gauss
+from solvers.mesh.mesh import Mesh
+
+#: Distance [cells], in 3D, of points in cells whose indices differ by one in each direction.
+CELL_DIAGONAL = 3.0**0.5
+
+
+@dataclass(frozen=True)
+class FluidShare:
+    """The regions of fluid in a cell of the box that one cell of the mesh has, if it does not have all."""
+
+    regions: tuple[Part, ...]
+
+    @property
+    def fraction(self) -> float:
+        return sum(region.share for region in self.regions)
+
+    def integrals(self, points: Array) -> Array | None:
+        """int L_q over the fluid, relative to the cell; None if the cell has all of the fluid."""
+        if any(region.facets is None for region in self.regions):
+            return None
+        return np.asarray(sum(region.integrals(points) for region in self.regions))
+
+    @property
+    def surface(self) -> Array | None:
+        """Parts of facets that bound the regions, as in `Region`; None: whole facets."""
+        found = [region.surface for region in self.regions if region.surface is not None]
+        return np.concatenate(found) if found else None
+
+    def has(self, facet: int) -> bool:
+        """Whether the facet bounds this fluid, with all of it that is in the cell."""
+        return any(
+            region.facets is None or (region.surface is None and facet in region.facets) for region in self.regions
+        )
+
+    def wet(self, axis: int, side: int, points: Array) -> Array:
+        """int L_q over the wet part of a face, relative to the face."""
+        return np.asarray(sum(region.wet(axis, side, points) for region in self.regions))
+
+
+@dataclass(frozen=True)
+class Sheets:
+    """Cells that follow those of the box: first those with fluid, then pairs of cells with a face between them."""
+
+    grid: Grid
+    shares: dict[int, FluidShare]  #: of cells of the mesh, by their numbers in it
+    left: Indices  #: cells of the box whose fluid belongs to new cells only
+    parted: frozenset[tuple[int, int]]  #: neighbours in the box, the lower first, with no fluid on their common face
+    cells: Indices  #: number in the box of each new cell
+    pairs: int  #: how many pairs there are
+    #: number of the copy that each node of a new cell is, in the lattice of second degree; 0: the node of the box
+    copies: Indices
+    around: Mask  #: cells of the box near surfaces, where only `links` are neighbours
+    links: Indices  #: cells of the mesh with fluid on both sides of the face between them, shape (n, 2)
+    fluid: Array  #: share of fluid in each cell of the mesh
+    bounds: Indices  #: (cell of the mesh, facet that bounds its fluid), shape (n, 2)
+    #: cells of the box in which bodies touched when the step began, sorted
+    closed: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def same_unknowns(self, other: Sheets) -> bool:
+        """The mesh and what is linked in it are the same, wherever the surface is in the cells."""
+        tables = ("left", "cells", "copies", "around", "links")
+        alike = all(np.array_equal(getattr(self, name), getattr(other, name)) for name in tables)
+        return alike and self.pairs == other.pairs and self.parted == other.parted
+
+    @property
+    def singles(self) -> int:
+        """New cells with fluid."""
+        return len(self.cells) - 2 * self.pairs
+
+    @property
+    def size(self) -> int:
+        """Cells of the mesh."""
+        return self.grid.size + len(self.cells)
+
+    @cached_property
+    def successors(self) -> dict[int, list[int]]:
+        """Cells of the mesh that have the fluid of a cell of the box, for those that share or lose it."""
+        found: dict[int, list[int]] = {int(cell): [] for cell in self.left}
+        for cell in self.shares:
+            found.setdefault(int(self.box_cells(np.array([cell]))[0]), []).append(cell)
+        return found
+
+    @cached_property
+    def touching(self) -> Indices:
+        """Cells of the box with fluid in which bodies touch."""
+        cells = [cell for cell, share in self.shares.items() if share.surface is not None]
+        return np.unique(self.box_cells(np.array(cells, dtype=np.int64)))
+
+    def cell_at(self, cell: int, x: Array) -> int:
+        """Cell of the mesh that has the fluid at x, given in the reference coordinates of a cell of the box."""
+        there = self.successors.get(cell) or [cell]
+        regions = ((c, region) for c in there if c in self.shares for region in self.shares[c].regions)
+        return next((c for c, region in regions if region.contains(x)), there[0])
+
+    def mesh(self) -> Mesh:
+        """Mesh of the box and of the new cells, which are not connected to others, except pairs to each other."""
+        box, dim = self.grid.mesh(), self.grid.dim
+        index = np.stack(np.unravel_index(self.cells, self.grid.shape, order="F"), axis=1)
+        points, cells, count = [box.points], [box.cells], len(box.points)
+        for units in (index[: self.singles, None], index[self.singles :].reshape(-1, 2, dim)):
+            if len(units):
+                corners, numbers = _corners_of(units)
+                at = corners.reshape(-1, dim).T
+                points.append(np.stack([edge[i] for edge, i in zip(self.grid.edges, at, strict=True)], axis=1))
+                first = count + corners.shape[1] * np.arange(len(units))
+                cells.append((first[:, None, None] + numbers).reshape(-1, numbers.shape[2]))
+                count += len(points[-1])
+        return Mesh(np.concatenate(points), np.concatenate(cells), box.cell_type)
+
+    def box_cells(self, original: Indices) -> Indices:
+        """Number in the box of each cell of the mesh; new cells have that of the cell they are a copy of."""
+        return np.concatenate([np.arange(self.grid.size), self.cells])[original]
+
+    def nodes(self, original: Indices, degree: int, steps: Indices) -> Indices:
+        """Numbers of the nodes of cells of the mesh, shape (cells, nodes); copies have those after the lattice's.
+
+        steps: from the first node of a cell to each in the lattice of this degree, shape (nodes, dim).
+        """
+        number, copy = (
+            self._lattice(self.box_cells(original), degree, steps),
+            np.zeros((len(original), len(steps)), int),
+        )
+        new = original >= self.grid.size
+        copy[new] = self.copies[original[new] - self.grid.size][:, _in_cell(steps, degree)]
+        size = self.lattice_size(degree)
+        further = size + np.searchsorted(self._further(degree), copy * size + number)
+        return np.where(copy > 0, further, number)
+
+    def lattice_size(self, degree: int) -> int:
+        """Nodes of the lattice of the box."""
+        return int(np.prod([degree * n + 1 for n in self.grid.shape]))
+
+    def node_count(self, degree: int) -> int:
+        """Count of nodes: those of the lattice and the copies."""
+        return self.lattice_size(degree) + len(self._further(degree))
+
+    def on_lattice(self, numbers: Indices, degree: int) -> Indices:
+        """Number in the lattice of each node; copies have that of the node they are a copy of."""
+        size = self.lattice_size(degree)
+        keys = np.concatenate([self._further(degree), [0]])[np.maximum(numbers - size, -1)]
+        return np.where(numbers < size, numbers, keys % size)
+
+    def among_finer(self, numbers: Indices, degree: int) -> Indices:
+        """Numbers of nodes of first degree among those of a higher degree."""
+        size, finer = self.lattice_size(1), self.lattice_size(degree)
+        keys = np.concatenate([self._further(1), [0]])[np.maximum(numbers - size, -1)]
+        copy = np.where(numbers < size, 0, keys // size)
+        index = np.unravel_index(self.on_lattice(numbers, 1), [n + 1 for n in self.grid.shape], order="F")
+        counts = [degree * n + 1 for n in self.grid.shape]
+        there = np.ravel_multi_index([degree * i for i in index], counts, order="F")
+        return np.where(copy > 0, finer + np.searchsorted(self._further(degree), copy * finer + there), there)
+
+    def _lattice(self, cells: Indices, degree: int, steps: Indices) -> Indices:
+        index = np.stack(np.unravel_index(cells, self.grid.shape, order="F"), axis=1)
+        counts = [degree * n + 1 for n in self.grid.shape]
+        return np.ravel_multi_index(tuple(np.moveaxis(degree * index[:, None, :] + steps, 2, 0)), counts, order="F")
+
+    def _further(self, degree: int) -> Indices:
+        """All copies of nodes, each as copy * size + number in the lattice."""
+        steps = np.array(list(product(range(degree + 1), repeat=self.grid.dim)))
+        copy = self.copies[:, _in_cell(steps, degree)]
+        return np.unique((copy * self.lattice_size(degree) + self._lattice(self.cells, degree, steps))[copy > 0])
+
+
+def _corners_of(units: Indices) -> tuple[Indices, Indices]:
+    """Corners of units of one or two cells, shape (units, corners, dim), and the numbers of each cell's among them.
+
+    units: indices of their cells, shape (units, cells, dim).
+    """
+    ways = (units - units[:, :1]).reshape(len(units), -1)
+    kinds, kind = np.unique(ways, axis=0, return_inverse=True)
+    found = []
+    for way in kinds.reshape(len(kinds), *units.shape[1:]):
+        lattice = (way[:, None] + CORNER_STEPS[units.shape[2]]).reshape(-1, units.shape[2])
+        corners, number = np.unique(lattice, axis=0, return_inverse=True)
+        found.append((corners, number.reshape(units.shape[1], -1)))
+    corners, numbers = (np.stack(some) for some in zip(*found, strict=True))
+    kind = kind.ravel()
+    return units[:, :1] + corners[kind], numbers[kind]
+
+
+def _in_cell(steps: Indices, degree: int) -> Indices:
+    """Numbers of nodes among those of a cell of second degree."""
+    return (steps * (2 // degree)) @ 3 ** np.arange(steps.shape[1])
+
+
+def find_sheets(
+    grid: Grid,
+    facets: Indices,
+    x: Array,
+    bounds: NDArray[np.bool_],
+    *,
+    thin: int = THIN,
+    always: bool = False,
+    closing: bool = False,
+    joined: Joined = MappingProxyType({}),
+    tied: tuple[Mask, Mask] | None = None,
+) -> Sheets | None:
+    """Sheets of the fluid around surfaces with vertices at x [m]; None if no body is thin, unless `always`.
+
+    closing: also where bodies close a way, however thick they are.
+
+    bounds: facets that are not on the boundary of the box. thin: cells apart, at most, of the fluid on both sides.
+    joined: parts of fluid in these cells at these facets share their nodes. tied: masks of the facets that are tied and
+    of those that the flow acts on; None: no body is tied.
+    """
+    if not len(facets):
+        return None
+    may_close = closing and may_touch(grid, facets, x)
+    may_part = always or grid.dim == 2 or may_be_thin(grid, facets, x, CELL_DIAGONAL * (thin + 1))
+    if not (may_part or may_close):
+        return None
+    x = in_planes(grid, x)
+    moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
+    may_close &= are_apart(grid, uncut_cells(grid, moments))
+    if not (may_part or may_close):
+        return None
+    if tied is not None:
+        moments = without_slits(moments, gauss(3)[0], tied[0], tied[1] & bounds, slivers_of(grid))
+    if grid.dim == 3:
+        parts, links, special, touching = parts_in_space(grid, moments, facets, x, LAYERS_AROUND)
+    else:
+        parts, special, touching = parts_of_fluid(grid, moments, facets, x, bounds)
+        links = links_of(grid, parts)
+    if not parts and not always:  # all surfaces are outside of the box
+        return None
+    cells = np.array([part.cell for part in parts], dtype=np.int64)
+    if not always:
+        close, facing = np.flatnonzero(grown(grid, special, 1)[cells]), facing_of(parts, x[facets])
+        if grid.dim == 3:
+            close = _opposed(grid, cells, facing, close, thin)
+        if not (may_part and _is_thin(grid, parts, links, facing, close, thin)) and not (
+            may_close and close_a_way(grid, moments, cells, links)
+        ):
+            return None
+    copies = node_copies(grid, parts, links, same_nodes(parts, joined), special)
+    moved = (copies > 0).any(axis=1)
+    linked = np.zeros(len(parts), dtype=bool)
+    linked[links[:, :2]] = True
+    new = np.flatnonzero(moved & linked)  # fluid that is enclosed within one cell counts as solid
+    by_cell: dict[int, list[int]] = {}
+    for number, part in enumerate(parts):
+        by_cell.setdefault(part.cell, []).append(number)
+    shares = {grid.size + k: FluidShare((parts[n],)) for k, n in enumerate(new)}
+    staying = {cell: [n for n in numbers if not moved[n]] for cell, numbers in by_cell.items()}
+    staying |= {cell: [] for cell in touching.tolist() if cell not in by_cell}
+    some = {cell for cell, kept in staying.items() if len(kept) < len(by_cell.get(cell, []))} | set(touching.tolist())
+    shares |= {
+        cell: FluidShare(tuple(parts[n] for n in kept)) for cell, kept in staying.items() if kept and cell in some
+    }
+    cell_of = np.where(moved, -1, cells)
+    cell_of[new] = grid.size + np.arange(len(new))
+    ends = links[:, :2]
+    linked_cells, changed = cell_of[ends], moved[ends].any(axis=1)
+    passing = set(map(tuple, cells[ends[~changed]].tolist()))
+    adjacent = _neighbours(grid, [cell for cell, kept in staying.items() if kept])
+    at_faces = ends[changed & special[cells[ends]].any(axis=1)]
+    fluid = np.concatenate([np.clip(1.0 - moments.fraction, 0.0, 1.0), np.zeros(len(new) + 2 * len(at_faces))])
+    fluid[sorted(some)] = 0.0
+    for number, share in shares.items():
+        fluid[number] = share.fraction
+    bounding = [(cell_of[n], facet) for n, part in enumerate(parts) if cell_of[n] >= 0 for facet in part.facets or ()]
+    members = np.concatenate([new, at_faces.ravel()])
+    return Sheets(
+        grid,
+        shares,
+        np.array(sorted(cell for cell, kept in staying.items() if not kept), dtype=np.int64),
+        frozenset(adjacent - passing),
+        cells[members],
+        len(at_faces),
+        copies[members],
+        grown(grid, special, LAYERS_AROUND),
+        np.unique(linked_cells[(linked_cells >= 0).all(axis=1)], axis=0),
+        fluid,
+        np.array(bounding, dtype=np.int64).reshape(-1, 2),
+    )
+
+
+def _opposed(grid: Grid, cells: Indices, facing: Array, close: Indices, thin: int) -> Indices:
+    """Those parts that face the opposite direction of another one nearby: in 3D all others would take too long."""
+    close = close[~np.isnan(facing[close]).any(axis=1)]
+    index = np.stack(np.unravel_index(cells[close], grid.shape, order="F"), axis=1)
+    pairs = cKDTree(index).query_pairs(thin + 0.5, p=np.inf, output_type="ndarray") if len(close) else index[:, :2]
+    first, second = close[pairs].T
+    return np.unique(close[pairs][(facing[first] * facing[second]).sum(axis=1) < OPPOSITE_NORMALS])
+
+
+def _is_thin(grid: Grid, parts: Sequence[Part], links: Indices, facing: Array, close: Indices, thin: int) -> bool:
+    """Whether a thin body is between two parts: they face opposite directions and are not linked nearby.
+
+    Parts around a corner of a thick body do not face opposite directions, or are linked around it.
+    facing: mean normal of the surface in each part, nan where there is none; close: parts to test; thin: their largest
+    distance [cells].
+    """
+    index = np.stack(np.unravel_index([part.cell for part in parts], grid.shape, order="F"), axis=1)
+    ends = links[:, :2]
+    linked = np.zeros(len(parts), dtype=bool)
+    linked[ends.ravel()] = True
+    some = close[linked[close]]
+    around = cKDTree(index).query_ball_point(index[some], thin + AROUND_PAIR, p=np.inf, return_sorted=True)
+    ends = ends[np.argsort(ends[:, 0], kind="stable")]
+    begins = np.searchsorted(ends[:, 0], np.arange(len(parts) + 1))
+    number = np.full(len(parts), -1)
+    for part, near in zip(some, map(np.array, around), strict=True):
+        number[near] = np.arange(len(near))
+        first, place = ragged(begins[near + 1] - begins[near])
+        second = number[ends[begins[near][first] + place, 1]]
+        group = connected_parts(first[second >= 0], second[second >= 0], len(near))
+        opposed = ~(facing[near] @ facing[part] > OPPOSITE_NORMALS)
+        opposed &= np.abs(index[near] - index[part]).max(axis=1) <= thin
+        if (group != group[number[part]])[linked[near] & opposed].any():
+            return True
+        number[near] = -1
+    return False
+
+
+def _neighbours(grid: Grid, cells: Sequence[int]) -> set[tuple[int, int]]:
+    """Pairs of these cells with a common face, the lower first."""
+    members, found = set(cells), set()
+    index = np.stack(np.unravel_index(np.array(cells, dtype=np.int64), grid.shape, order="F"), axis=1)
+    for axis, count in enumerate(grid.shape):
+        stride = int(np.prod(grid.shape[:axis]))
+        found |= {(c, c + stride) for c, i in zip(cells, index[:, axis], strict=True) if i + 1 < count}
+    return {pair for pair in found if pair[1] in members}
+
+
+def sheets_of(grid: Grid, bodies: Sequence[ImmersedBody]) -> Sheets | None:
+    """Sheets of the fluid around bodies at rest that are thin or close a way; None if none is, or in nested cells."""
+    if isinstance(grid, Nested) or not bodies or not all(body.rests for body in bodies):
+        return None
+    motions = [body.motion(0.0) for body in bodies if body.motion is not None]
+    facets, motion = together([body.surface for body in bodies], motions, grid.dim)
+    return find_sheets(grid, facets, motion.x, off_boundary(grid, motion.x[facets]), closing=True)

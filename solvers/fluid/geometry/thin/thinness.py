@@ -1,0 +1,82 @@
+"""Whether bodies are thin somewhere, from their surface alone."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from solvers.api import Array, Indices
+from solvers.fluid.grid.box import Grid
+from solvers.mesh.tessellation import unit_normals
+
+#: Product of unit normals below which two surfaces face opposite directions: corners below 45 degrees.
+OPPOSITE_NORMALS = -0.7
+ALIKE_NORMALS = 4  #: normals of facets in one cell whose components differ by less than 1 / ALIKE_NORMALS count as one
+
+
+def may_be_thin(grid: Grid, facets: Indices, x: Array, thick: float) -> bool:
+    """Whether two parts of the surface face opposite directions with less than `thick` cells of solid between them."""
+    if not len(facets):
+        return False
+    cell = max(float(cell_sizes_at(edge, x[:, axis]).max()) for axis, edge in enumerate(grid.edges))
+    if grid.dim == 2:
+        points, normal = _on_segments(x[facets], cell)
+        first, second = cKDTree(points).query_pairs(thick * cell, output_type="ndarray").T
+    else:
+        points, normal = _on_triangles(x[facets], cell)
+        first, second = _opposed(points / (thick * cell), normal)
+    opposed = np.einsum("pi,pi->p", normal[first], normal[second]) < OPPOSITE_NORMALS
+    way = points[second] - points[first]
+    behind = np.einsum("pi,pi->p", way, normal[first]) <= 0.0
+    sizes = np.stack([cell_sizes_at(edge, points[:, axis]) for axis, edge in enumerate(grid.edges)], axis=1)
+    size = 1.0 / np.linalg.norm(normal / sizes, axis=1)
+    close = np.linalg.norm(way, axis=1) <= thick * np.maximum(size[first], size[second])
+    return bool((opposed & behind & close).any())
+
+
+def _opposed(points: Array, normal: Array) -> tuple[Indices, Indices]:
+    """Pairs (of indices, each twice) of points up to 1 apart with opposed normals, and some more.
+
+    Opposed normals n, m have |n + m|^2 = 2 + 2 n m below a bound, so that both are close to each other in a space of
+    points and normals. There are few such pairs if nothing is thin.
+    """
+    bound = 2.0 + 2.0 * OPPOSITE_NORMALS
+    one, other = (cKDTree(np.concatenate([points * np.sqrt(bound), way], axis=1)) for way in (normal, -normal))
+    found = one.sparse_distance_matrix(other, np.sqrt(2.0 * bound), output_type="ndarray")
+    return found["i"], found["j"]
+
+
+def cell_sizes_at(edge: Array, x: Array) -> Array:
+    """Edge lengths [m] of the cells at coordinates x [m]."""
+    return np.diff(edge)[np.clip(np.searchsorted(edge, x) - 1, 0, len(edge) - 2)]
+
+
+def _on_segments(ends: Array, cell: float) -> tuple[Array, Array]:
+    """(points, their normals) on segments, at most a cell apart."""
+    a, b = ends[:, 0], ends[:, 1]
+    length = np.linalg.norm(b - a, axis=1)
+    count = np.maximum(1, np.ceil(length / cell)).astype(int)
+    of = np.repeat(np.arange(len(ends)), count)
+    part = (np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[of]
+    along = (b - a) / np.where(length > 0.0, length, 1.0)[:, None]
+    return a[of] + part[:, None] * (b - a)[of], np.stack([along[:, 1], -along[:, 0]], axis=1)[of]
+
+
+def _on_triangles(corners: Array, cell: float) -> tuple[Array, Array]:
+    """(points, their normals) on triangles, at most a cell apart; one for all alike in a cube as large as a cell."""
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    count = np.maximum(1, np.ceil(longest / cell)).astype(int)
+    normals, points, normal = unit_normals(corners), [], []
+    for n in np.unique(count):
+        # middles of the n^2 triangles into which a triangle is divided, by their barycentric coordinates
+        i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+        up, down = i + j < n, i + j < n - 1
+        st = np.concatenate([np.stack([i, j], axis=2)[up] + 1.0 / 3.0, np.stack([i, j], axis=2)[down] + 2.0 / 3.0]) / n
+        weights = np.column_stack([1.0 - st.sum(axis=1), st])
+        some = count == n
+        points.append(np.einsum("sv,tvi->tsi", weights, corners[some]).reshape(-1, 3))
+        normal.append(np.repeat(normals[some], len(st), axis=0))
+    at, way = np.concatenate(points), np.concatenate(normal)
+    keys = np.concatenate([np.floor(at / cell), np.round(ALIKE_NORMALS * way)], axis=1)
+    first = np.sort(np.unique(keys, axis=0, return_index=True)[1])
+    return at[first], way[first]

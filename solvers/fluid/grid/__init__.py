@@ -1,0 +1,1 @@
+"""Cells of the box as plain numbers: uniform, graded and nested ones."""

@@ -1,0 +1,1 @@
+"""The distributed mesh of the cells, and the unknowns on it."""

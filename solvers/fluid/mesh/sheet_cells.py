@@ -1,0 +1,152 @@
+"""Cuts and unknowns on a grid with sheets: each new cell has its share of the fluid and of the surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers import fem
+from solvers.algebra.connected import connected_parts
+from solvers.api import Array, Indices
+from solvers.fluid.geometry.pieces import joined_pieces, parts_of_facets, selected
+from solvers.fluid.geometry.triangle_pieces import parts_of_triangles
+from solvers.fluid.mesh.distributed_grid import DistributedGrid
+from solvers.fluid.mesh.periodic import BEYOND_NODES, LatticeNodes
+from solvers.mesh.gauss import tensor_weights
+
+
+def on_sheets(grid: DistributedGrid, points: Array, cut: Any, counts: NDArray[np.bool_]) -> Any:
+    """A `Cut` of the box extended to new cells: each has its own share of the fluid and of the pieces of surface.
+
+    counts: facets that the flow acts on.
+    """
+    sheets, original = grid.sheets, grid.original
+    assert sheets is not None
+    box, local = sheets.grid.size, np.full(sheets.grid.size + len(sheets.cells), -1)
+    local[original] = np.arange(len(original))
+    for_faces, new = original >= box + sheets.singles, (original >= box) & (original < box + sheets.singles)
+    empty = for_faces | np.isin(original, sheets.left)
+    is_cut = np.zeros(len(original), dtype=bool)
+    is_cut[cut.cut] = True
+    row_of = np.full(box, -1)
+    row_of[grid.numbers[cut.cut]] = np.arange(len(cut.cut))
+    is_cut = (is_cut | new) & ~empty
+    cells = np.flatnonzero(is_cut).astype(np.int32)
+    rows = row_of[grid.numbers[cells]]
+    fluid = np.where(rows[:, None] < 0, 1.0, cut.fluid[rows])
+    fraction = np.where(empty, 0.0, cut.fraction)
+    weights = tensor_weights(len(points), grid.dim)
+    share, is_active = (
+        np.concatenate([some, np.zeros(len(sheets.cells), some.dtype)]) for some in (cut.share, cut.is_active)
+    )
+    share[sheets.left], is_active[sheets.left], is_active[box : box + sheets.singles] = 0.0, False, True
+    for number, of_cell in sheets.shares.items():
+        share[number] = of_cell.fraction
+    place = np.full(len(original), -1)
+    place[cells] = np.arange(len(cells))
+    for number, of_cell in sheets.shares.items():
+        if (cell := local[number]) >= 0 and (found := of_cell.integrals(points)) is not None:
+            fluid[place[cell]], fraction[cell] = found / weights, of_cell.fraction
+    piece_box, target = grid.numbers[cut.cut[cut.pieces.cell]], np.full(len(cut.pieces.cell), -1)
+    for piece, (number, facet) in enumerate(zip(piece_box.tolist(), cut.pieces.facet.tolist(), strict=True)):
+        cells_there = sheets.successors.get(number)
+        if cells_there is None:
+            owner = number
+        else:
+            owner = next((c for c in cells_there if sheets.shares[c].has(facet)), None)
+        target[piece] = -1 if owner is None or local[owner] < 0 else place[local[owner]]
+
+    touching = [
+        (place[cell], surface[counts[surface[:, 0].astype(int)]])
+        for number, of_cell in sheets.shares.items()
+        if (cell := local[number]) >= 0 and (surface := of_cell.surface) is not None
+    ]
+    parts = [selected(cut.pieces, target)]
+    if touching:
+        row = np.repeat([row for row, _ in touching], [len(surface) for _, surface in touching])
+        surface = np.concatenate([surface for _, surface in touching])
+        parts_of = parts_of_facets if grid.dim == 2 else parts_of_triangles
+        there = grid.numbers[cells[row]]
+        parts.append(parts_of(grid.grid, there, row, surface, cut.facets, cut.motion.x, points))
+    return replace(
+        cut,
+        uncut=cut.uncut[~(empty | new)[cut.uncut]],
+        cut=cells,
+        strip=cut.strip[original[cut.strip] < box],
+        ghost_faces=cut.ghost_faces[_passable(grid, cut.ghost_faces, empty, for_faces)],
+        contact_cells=cut.contact_cells[original[cut.contact_cells] < box],
+        is_active=is_active,
+        share=share,
+        fluid=fluid,
+        fraction=fraction,
+        pieces=joined_pieces(parts),
+    )
+
+
+def _passable(
+    grid: DistributedGrid, faces: NDArray[np.int32], empty: NDArray[np.bool_], for_faces: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Faces with linked fluid on both sides."""
+    assert grid.sheets is not None
+    interior, sides = grid.find_interior_faces()
+    ends = sides[np.searchsorted(interior, faces)]
+    pairs = np.sort(grid.numbers[ends], axis=1)
+    parted = np.array([pair in grid.sheets.parted for pair in map(tuple, pairs.tolist())], dtype=bool)
+    return for_faces[ends].all(axis=1) | ~(empty[ends].any(axis=1) | parted)
+
+
+def join_nodes(
+    grid: DistributedGrid, space: Any, degree: int, nodes: list[LatticeNodes]
+) -> tuple[Any, list[LatticeNodes]]:
+    """Identify nodes with equal numbers (collective).
+
+    degree: of the velocity. Returns (the new space, the nodes of velocity and pressure with their numbers).
+    """
+    size, dim, comm = int(space.dofmap.index_map_bs), grid.dim, grid.comm
+    everything = np.arange(len(grid.original), dtype=np.int32)
+    start, end = space.dofmap.index_map.local_range
+    columns = [(0, degree)] if size > 1 else [*((axis, degree) for axis in range(dim)), (dim, 1)]
+    number = np.zeros(end - start + int(space.dofmap.index_map.num_ghosts), dtype=np.int64)
+    for component, its_degree in columns:
+        blocks = fem.component_cell_dofs(space, component) // size
+        number[blocks] = component * BEYOND_NODES + grid.cell_nodes(everything, its_degree)
+    new = np.unique(number[fem.cell_blocks(space)[grid.apart]])
+    shared = np.flatnonzero(np.isin(number, np.unique(np.concatenate(comm.allgather(new)))))
+    mine = shared[shared < end - start]
+    tables = comm.allgather((number[mine], start + mine))
+    owners = np.repeat(np.arange(comm.size, dtype=np.int32), [len(numbers) for numbers, _ in tables])
+    numbers, masters = (np.concatenate(column) for column in zip(*tables, strict=True))
+    numbers, first = np.unique(numbers, return_index=True)
+    twin = first[np.searchsorted(numbers, number[shared])]
+    space, local = fem.identify_blocks(space, shared.astype(np.int32), masters[twin], owners[twin])
+    joined = np.arange(len(number), dtype=np.int32)
+    joined[shared] = local
+
+    def renumbered(part: LatticeNodes) -> LatticeNodes:
+        blocks = part.dofs // size
+        return replace(part, dofs=size * joined[blocks] + part.dofs % size, numbers=number[blocks[:, 0]] % BEYOND_NODES)
+
+    return space, [renumbered(part) for part in nodes]
+
+
+def connected_cells(grid: DistributedGrid, cells: NDArray[np.int32]) -> tuple[Indices, int]:
+    """Connected parts of some cells on all processes; cells are connected if they share corners (collective).
+
+    cells: those of this process. Returns (part of each local cell, from 1 on, 0 for other cells; count of parts).
+    """
+    corners = grid.cell_nodes(cells, 1)
+    gathered = grid.comm.allgather((grid.original[cells], corners))
+    everything, nodes = (np.concatenate(column) for column in zip(*gathered, strict=True))
+    ends = np.unique(nodes, return_inverse=True)[1].reshape(nodes.shape) + len(everything)
+    first = np.repeat(np.arange(len(everything)), nodes.shape[1])
+    part = connected_parts(first, ends.ravel(), len(everything) + int(ends.max(initial=0)) + 1)[: len(everything)]
+    order = np.full(len(everything), np.iinfo(np.int64).max)
+    np.minimum.at(order, part, everything)  # parts by their first cell, on any number of processes
+    first_cells = np.unique(order[part])
+    labels = np.zeros(len(grid.original), dtype=np.int64)
+    before = sum(len(numbers) for numbers, _ in gathered[: grid.comm.rank])
+    labels[cells] = 1 + np.searchsorted(first_cells, order[part[before : before + len(cells)]])
+    return labels, len(first_cells)

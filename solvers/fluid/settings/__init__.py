@@ -1,0 +1,1 @@
+"""What a user sets: fluid, element, time scheme, factors of the stabilisation."""

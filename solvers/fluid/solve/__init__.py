@@ -1,0 +1,1 @@
+"""The system that the terms make, and its solution."""

@@ -1,0 +1,257 @@
+"""Geometric multigrid for the flow: each level has a subset of the nodes of the next finer one (`level_grid`).
+
+P is the multilinear interpolation to the others, and coarse matrices are P^T A P. Held unknowns, which include those
+without fluid and hanging nodes, get no correction. The first coarse level of a velocity of second degree has the
+vertices.
+Source: Trottenberg, Oosterlee, Schuller, Multigrid (2001), sections 2.4, 5.1 and 8.7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy import sparse
+
+from solvers.algebra.linear import BLOCKS, incomplete_factors
+from solvers.api import Indices
+from solvers.fluid.mesh.space import Unknowns
+from solvers.fluid.solve.linear_systems.coarse_matrix import CoarseMatrix
+from solvers.fluid.solve.linear_systems.decoupled import decoupled
+from solvers.fluid.solve.linear_systems.level_grid import LevelGrid
+from solvers.fluid.solve.linear_systems.near_smoother import NearSmoother
+
+#: Marks some of the owned unknowns.
+Marker = Callable[[], NDArray[np.bool_]]
+
+#: Unknowns below which a level is solved directly, in less time than the levels above take to smooth.
+COARSEST = 2_000
+
+
+@dataclass(frozen=True)
+class Component:
+    """Owned nodes of one velocity component, or of the pressure, on one level."""
+
+    lattice: LevelGrid
+    nodes: Indices  #: indices of their planes, shape (owned, dim)
+    dofs: Indices  #: their global unknowns, shape (owned,)
+
+    @property
+    def numbers(self) -> Indices:
+        return self.lattice.numbers(self.nodes)
+
+
+@dataclass(frozen=True)
+class Level:
+    """All components, the pressure last; the global numbers of this process' unknowns start at `start`."""
+
+    components: Sequence[Component]
+    start: int
+    owned: int
+
+    def component_of(self) -> Indices:
+        """Component of each owned unknown; unknowns without one have that of the pressure."""
+        found = np.full(self.owned, len(self.components) - 1, dtype=np.int64)
+        for number, component in enumerate(self.components):
+            found[component.dofs - self.start] = number
+        return found
+
+
+def finest(unknowns: Unknowns) -> Level:
+    """The finest level: the unknowns of the flow."""
+    found = []
+    for nodes, degree in ((unknowns.velocity, unknowns.degree), (unknowns.pressure, 1)):
+        planes = tuple(
+            np.interp(np.arange(degree * (len(edge) - 1) + 1) / degree, np.arange(len(edge)), edge)
+            for edge in unknowns.grid.grid.edges
+        )
+        lattice = LevelGrid(planes, unknowns.periodic, unknowns.grid.nested if degree == 1 else None)
+        index = np.stack(np.unravel_index(nodes.numbers[: nodes.owned], lattice.shape, order="F"), axis=1)
+        found += [Component(lattice, index, unknowns.global_dofs[dofs]) for dofs in nodes.dofs[: nodes.owned].T]
+    return Level(found, int(unknowns.index_map.local_range[0]) * unknowns.block_size, unknowns.owned)
+
+
+def coarsen(comm: MPI.Comm, fine: Level, lattices: Sequence[LevelGrid]) -> Level:
+    """A level on coarser lattices (collective).
+
+    A node belongs to the process that owns it on the finer level. Unknowns are numbered point by point, in the order of
+    the lattice.
+    """
+    kept, points = [], []
+    for component, lattice in zip(fine.components, lattices, strict=True):
+        nodes, own = np.empty_like(component.nodes), np.ones(len(component.nodes), dtype=bool)
+        for axis, (some, every) in enumerate(zip(lattice.planes, component.lattice.planes, strict=True)):
+            coordinate = every[component.nodes[:, axis]]
+            nodes[:, axis] = np.searchsorted(some, coordinate)
+            own &= some[nodes[:, axis]] == coordinate
+        own[own] = lattice.has(nodes[own])
+        kept.append(nodes[own])
+        points.append(lattice.points(nodes[own]))
+    every = np.concatenate(points)
+    number = np.empty(len(every), dtype=np.int64)
+    number[np.lexsort(every.T)] = np.arange(len(every))
+    start = comm.exscan(len(every)) or 0  # type: ignore[attr-defined]
+    parts = np.split(start + number, np.cumsum([len(nodes) for nodes in kept])[:-1])
+    components = [Component(*part) for part in zip(lattices, kept, parts, strict=True)]
+    return Level(components, start, len(every))
+
+
+def interpolation(comm: MPI.Comm, fine: Level, coarse: Level) -> PETSc.Mat:
+    """P: values on the finer level from those on the coarser one (collective)."""
+    rows, columns, data = [], [], []
+    for here, there in zip(fine.components, coarse.components, strict=True):
+        unknown = _everywhere(comm, there)
+        nodes, parents, weights = there.lattice.interpolation(here.lattice.points(here.nodes))
+        rows.append(here.dofs[nodes] - fine.start)
+        columns.append(unknown[parents])
+        data.append(weights)
+    entries = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
+    local = sparse.csr_matrix(entries, shape=(fine.owned, comm.allreduce(coarse.owned)))
+    csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
+    return PETSc.Mat().createAIJ(((fine.owned, None), (coarse.owned, None)), csr=csr, comm=comm)
+
+
+def _everywhere(comm: MPI.Comm, component: Component) -> Indices:
+    """Global unknown of every node of a coarse lattice (collective)."""
+    found = np.zeros(int(np.prod(component.lattice.shape)), dtype=np.int64)
+    found[component.numbers] = component.dofs
+    return found if comm.size == 1 else comm.allreduce(found)
+
+
+class Multigrid:
+    """The levels of one flow, the same for all cuts, and preconditioners on them."""
+
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        unknowns: Unknowns,
+        cycle: PETSc.PC.MGCycleType = PETSc.PC.MGCycleType.V,
+        *,
+        smoothed: bool = False,
+    ):
+        """smoothed: smoothers of first degree are those that converge on stretched cells, too."""
+        self.comm, self._second, self._kind, self._smoothed = comm, unknowns.degree > 1, cycle, smoothed
+        self.levels = [finest(unknowns)]
+        self._interpolations: list[PETSc.Mat] = []
+        #: the finest matrix of the last preconditioner, and the coarse ones, reused while it, and thus its pattern,
+        #: is the same
+        self._last: PETSc.Mat | None = None
+        self._coarse: list[CoarseMatrix] = []
+        self._cycle: PETSc.PC | None = None
+        while comm.allreduce(self.levels[-1].owned) > COARSEST:
+            lattices = [component.lattice for component in self.levels[-1].components]
+            if lattices[-1].smallest:
+                break
+            finer_velocity = lattices[0].shape != lattices[-1].shape
+            next_one = lattices[-1] if finer_velocity else lattices[-1].coarser()
+            self.levels.append(coarsen(comm, self.levels[-1], [next_one] * len(lattices)))
+            self._interpolations.append(interpolation(comm, *self.levels[-2:]))
+
+    def preconditioner(
+        self, matrix: PETSc.Mat, held: NDArray[np.bool_], near: Marker, product: PETSc.Mat | None = None
+    ) -> PETSc.PC:
+        """One cycle for a matrix; it does not follow later changes (collective).
+
+        With first degree the next call overwrites it if the pattern of the matrix is the same: subdomains and patterns
+        of factors are found once. held: owned unknowns with rows of the identity; near: marks those near surfaces;
+        product: the matrix that multiplies vectors, None: `matrix`.
+        """
+        matrices, interpolations = self._galerkin(matrix, held)
+        cycle = self._cycle = self._cycle or self._new_cycle(interpolations)
+        if self._second and interpolations:
+            self._cycle = None  # the smoothers depend on where the surfaces are
+            for level, marked in enumerate(reversed(self._near_by_level(near() & ~held, interpolations[:-1])), 1):
+                self._solve_near_surfaces(cycle.getMGSmoother(level), marked)
+        for level, (here, of) in enumerate(zip(reversed(self.levels), reversed(matrices), strict=True)):
+            smoother = cycle.getMGSmoother(level)
+            if level == 0:
+                smoother.reset()  # the pivots of LU factors may depend on those before
+                smoother.setOperators(of)
+            else:
+                smoother.getPC().setReusePreconditioner(False)
+                multiplied = product or matrix if of is matrix else of
+                smoother.setOperators(multiplied, decoupled(of, here.component_of()) if self._second else of)
+        cycle.setUseAmat(True)  # PETSc gives the finest smoother the operators of the cycle
+        cycle.setOperators(product or matrix, matrix)
+        cycle.setUp()
+        for level in range(len(matrices)):
+            smoother = cycle.getMGSmoother(level)
+            smoother.setUp()
+            smoother.getPC().setReusePreconditioner(True)
+        cycle.setReusePreconditioner(True)
+        return cycle
+
+    def _new_cycle(self, interpolations: Sequence[PETSc.Mat]) -> PETSc.PC:
+        cycle, count = PETSc.PC().create(self.comm), len(self.levels)
+        cycle.setType(PETSc.PC.Type.MG)
+        cycle.setMGLevels(count)
+        cycle.setMGCycleType(self._kind)
+        for level in range(1, count):
+            cycle.setMGInterpolation(level, interpolations[count - 1 - level])
+        for level in range(count):
+            smoother = cycle.getMGSmoother(level)
+            smoother.setNormType(PETSc.KSP.NormType.NONE)
+            if level == 0:
+                smoother.setType(PETSc.KSP.Type.PREONLY)
+                smoother.getPC().setType(PETSc.PC.Type.LU)
+                smoother.getPC().setFactorSolverType("mumps")
+            else:
+                self._smooth(smoother)
+        return cycle
+
+    def _smooth(self, smoother: PETSc.KSP) -> None:
+        """Smoother: incomplete factors on each process with one layer of overlap, which halves the time.
+
+        A single step with them diverges on stretched cells, and where convection is strong on nested ones.
+        """
+        prefix = "flow_second_" if self._second else "flow_first_"
+        smoother.setOptionsPrefix(prefix)
+        if self._second:
+            # without reordering there are 20 iterations instead of 13
+            options = incomplete_factors(self.comm, sub_pc_factor_mat_ordering_type="rcm")
+        else:
+            options = incomplete_factors(self.comm, **BLOCKS)
+        if self._second or self._smoothed:
+            smoother.setType(PETSc.KSP.Type.GMRES)
+            smoother.setTolerances(max_it=2)
+        else:
+            smoother.setType(PETSc.KSP.Type.RICHARDSON)
+            smoother.setTolerances(max_it=1)
+        for name, value in options.items():
+            PETSc.Options(prefix)[name] = value
+        smoother.getPC().setFromOptions()
+
+    def _near_by_level(self, near: NDArray[np.bool_], interpolations: list[PETSc.Mat]) -> list[NDArray[np.bool_]]:
+        """Unknowns near surfaces by level, finest first: those on which finer ones depend (collective)."""
+        found = [near]
+        for P in interpolations:
+            coarse, fine = P.createVecs()
+            fine.array[:] = found[-1]
+            P.multTranspose(fine, coarse)
+            found.append(coarse.array > 0.0)
+        return found
+
+    def _solve_near_surfaces(self, smoother: PETSc.KSP, near: NDArray[np.bool_]) -> None:
+        """Let a smoother have exact factors of marked owned unknowns, incomplete ones of others (collective)."""
+        if not self.comm.allreduce(bool(near.any()), op=MPI.LOR):
+            return
+        both = PETSc.PC().create(self.comm)
+        both.setType(PETSc.PC.Type.PYTHON)
+        both.setPythonContext(NearSmoother(smoother.getPC(), near))
+        smoother.setPC(both)
+
+    def _galerkin(self, matrix: PETSc.Mat, held: NDArray[np.bool_]) -> tuple[list[PETSc.Mat], list[PETSc.Mat]]:
+        """Matrices and interpolations, finest first (collective)."""
+        matrices, interpolations, free = [matrix], [], (~held).astype(float)
+        if self._last is None or self._last.handle != matrix.handle:
+            self._last = matrix
+            self._coarse, self._cycle = [CoarseMatrix(level) for level in self._interpolations], None
+        for coarse in self._coarse:
+            interpolations.append(coarse.mark(free))
+            matrices.append(coarse.update(matrices[-1], free))
+            free = coarse.free
+        return matrices, interpolations

@@ -1,0 +1,1 @@
+"""Surfaces of bodies: their facets, their motion, what is inside of them."""

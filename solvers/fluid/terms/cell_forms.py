@@ -1,0 +1,98 @@
+"""The compiled forms of the flow over cells: bulk, stabilisation, interface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import ufl
+
+from solvers import fem
+from solvers.fluid.cut.weights import Weights
+from solvers.fluid.mesh.space import Unknowns
+from solvers.fluid.settings.flow_settings import FlowSettings
+from solvers.fluid.terms import forms, nitsche
+
+
+@dataclass(frozen=True)
+class CellForms:
+    """Residuals and tangents over uncut cells and, with bodies, cut ones and films."""
+
+    residuals: tuple[fem.Integral, ...]
+    tangents: tuple[fem.Integral, ...]
+
+    def integrals(self) -> list[fem.Integral]:
+        """Forms to compile at the start; those of films are compiled when a film appears."""
+        return [*self.residuals[:2], *self.tangents[:2]]
+
+
+def coefficients(
+    domain: fem.Domain, settings: FlowSettings, a: Any, history: Any, force: Any, *, alpha: tuple[Any, Any], newton: Any
+) -> forms.Coefficients:
+    """Coefficients of the terms of a flow: functions a [m/s], history [m/s^2] and force [N/m^3], and its constants.
+
+    alpha: of the time derivative and of the scales of the stabilisation [1/s].
+    """
+    return forms.Coefficients(
+        rho=fem.constant(domain, settings.density),
+        mu=fem.constant(domain, settings.viscosity),
+        alpha=alpha[0],
+        scale_alpha=alpha[1],
+        a=a,
+        newton=newton,
+        history=history,
+        force=forms.nothing(domain.dim) if settings.body_force is None else force,
+        convection=settings.convection,
+        steady=settings.steady,
+        degree=settings.degree,
+        mesh=domain.mesh.ufl_domain(),
+    )
+
+
+def cell_forms(
+    unknowns: Unknowns,
+    flow: forms.Coefficients,
+    function: Any,
+    weights: Weights | None,
+    gaps: forms.GapScales | None = None,
+) -> CellForms:
+    """Forms at a function of velocity and pressure; weights: coefficients of cut cells, None without bodies.
+
+    gaps: coefficients of gaps, for first degree.
+    """
+    domain = unknowns.grid.domain
+    test, trial = ufl.TestFunction(unknowns.space), ufl.TrialFunction(unknowns.space)
+    residuals = _residuals(unknowns, flow, function, test, weights, gaps)
+    # the body force has no derivative: without it, all flows share their compiled tangents
+    unloaded = replace(flow, force=forms.nothing(unknowns.grid.dim))
+    same_slope = _residuals(unknowns, unloaded, function, test, weights, gaps)
+    tangents = [ufl.derivative(form, function, trial) for form in same_slope]
+    return CellForms(
+        tuple(fem.Integral(domain, form) for form in residuals),
+        tuple(fem.Integral(domain, form) for form in tangents),
+    )
+
+
+def _residuals(
+    unknowns: Unknowns,
+    flow: forms.Coefficients,
+    function: Any,
+    test: Any,
+    weights: Weights | None,
+    gaps: forms.GapScales | None,
+) -> list[Any]:
+    """Forms over uncut cells and, with weights, over cut ones and films; in gaps: what is added in cut, uncut cells."""
+    domain, degree = unknowns.grid.domain, unknowns.degree
+    (u, p), (v, q) = (unknowns.parts(f) for f in (function, test))
+    everywhere = forms.bulk(flow, u, p, v, q) + forms.residual_based(flow, u, p, v, q)
+    uncut = everywhere * fem.measure(domain, "dx", 2 * degree + 1)
+    if weights is None:
+        return [uncut]
+    dx_cut = fem.measure(domain, "dx", weights.degree)
+    on_interface = nitsche.own(flow, weights, u, p, v, q)
+    if gaps is not None:
+        added = forms.in_gaps(flow, gaps, u, p, q)
+        in_cut = weights.fluid * everywhere * dx_cut + on_interface * dx_cut
+        return [uncut, in_cut, weights.fluid * added * dx_cut, added * fem.measure(domain, "dx", 2 * degree + 1)]
+    film = forms.film(flow, u, p, v, q)
+    return [uncut, *(weights.fluid * bulk * dx_cut + on_interface * dx_cut for bulk in (everywhere, film))]

@@ -1,0 +1,156 @@
+"""The coupling blocks of a monolithic system: derivatives of the flow's rows and force by the motion of surfaces.
+
+With the operators of `interface` and the derivatives of `shape`, for displacements d of the vertices of some bodies,
+whose velocity is g = alpha d - ..., rows r and force f of the flow change by
+
+    dr = (alpha C + S) dd,    df = C^T S dw - (alpha M + S_f) dd.
+
+In films S and S_f are those of `film_shape`. Those of `cut_shape` are taken in first-degree flows in time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.algebra.overlap import OverlappingBlocks
+from solvers.algebra.sparse import Sparse, sparse_from_entries
+from solvers.api import Array
+from solvers.exchange import InterfaceEntries
+from solvers.fluid.mesh.space import Unknowns
+from solvers.fluid.terms.interface import InterfaceTerms, MotionOperator
+from solvers.fluid.terms.shape_derivatives.cut_shape import CutDerivatives
+from solvers.fluid.terms.shape_derivatives.film_shape import FilmDerivatives
+from solvers.fluid.terms.shape_derivatives.shape import shape_derivatives
+
+
+def interface_entries(
+    operator: InterfaceTerms,
+    unknowns: Unknowns,
+    flow: Array,
+    alpha: float,
+    held: NDArray[np.bool_],
+    vertices: NDArray[np.int64],
+    shape: FilmDerivatives | CutDerivatives | None = None,
+    swept: Array | None = None,
+) -> InterfaceEntries:
+    """Entries for the motion of some vertices, in the given order.
+
+    flow: velocity and pressure at local dofs; held: local dofs with rows of the identity; alpha [1/s]: dg/dd;
+    shape: derivatives by the shape of some or all pieces, which replace those of the module `shape`; swept: that of the
+    velocity of facets beside that of their vertices, `Sweep.by_motion`.
+    """
+    C, sums = operator.coupling, _Sums(operator, unknowns, vertices)
+    of_sweep = None if swept is None else _of_sweep(operator, swept[operator.facet])
+    if isinstance(shape, CutDerivatives):
+        rows, load_by_shape = shape.rows, shape.force
+        if of_sweep is not None:
+            rows = rows + np.concatenate(
+                [of_sweep.momentum.transpose(0, 1, 3, 4, 2), of_sweep.continuity[..., None]], axis=4
+            )
+        into = sums.with_flow(alpha * C + shape.operator, rows)
+    else:
+        by_shape, load_by_shape = shape_derivatives(operator, flow)
+        if shape is not None:
+            for part in (by_shape.fields, by_shape.psi, load_by_shape):
+                part[shape.pieces] = 0.0
+            load_by_shape[shape.pieces] += shape.force.transpose(0, 1, 3, 2, 4)
+        into = sums.with_flow(alpha * C + by_shape)
+        if shape is not None:
+            into = into + sums.of_films(shape)
+        if of_sweep is not None:
+            into = into + sums.of_films(of_sweep)
+    if of_sweep is not None:
+        load_by_shape = load_by_shape + of_sweep.force.transpose(0, 1, 3, 2, 4)
+    into.data[held[into.indices]] = 0.0
+    back = sums.with_flow(replace(-1.0 * C, psi=C.psi))
+    load = sums.with_surface(-alpha * operator.mass_blocks + load_by_shape)
+    if unknowns.grid.comm.size > 1:
+        into, back = (part.with_columns(unknowns.global_dofs, unknowns.size()) for part in (into, back))
+    return InterfaceEntries(into, back, load)
+
+
+def _of_sweep(operator: InterfaceTerms, by_motion: Array) -> FilmDerivatives:
+    """Derivatives of all pieces by the velocity of their facets; by_motion: its own, (pieces, k, vertices, j)."""
+    C, D = operator.coupling, by_motion
+    of_facet = np.einsum("paf,pfik->paik", operator.fields.sum(axis=2), C.fields)
+    flux = np.einsum("pk,pkcj->pcj", C.psi, D)
+    load = np.einsum("pki,pkcj->picj", operator.penalty, D)
+    return FilmDerivatives(
+        np.arange(len(D)),
+        np.einsum("paik,pkcj->paicj", of_facet, D),
+        np.einsum("pa,pcj->pacj", operator.psi.sum(axis=2), flux),
+        -np.einsum("pv,picj->pvicj", operator.mass_of_pieces.sum(axis=2), load),
+    )
+
+
+class _Sums:
+    """Assembles matrices from blocks of pieces; rows are the dofs of some of the vertices."""
+
+    def __init__(self, operator: InterfaceTerms, unknowns: Unknowns, vertices: NDArray[np.int64]):
+        self._dim, number = operator.dim, np.full(operator.vertices, -1, dtype=np.int32)
+        number[vertices] = np.arange(len(vertices))
+        corner = number[operator.corners]
+        self._ours = corner[:, 0] >= 0  # all vertices of a facet are of the same body
+        self._corner = corner[self._ours]
+        self._shape = (len(vertices), unknowns.local)
+        self._u, self._p = operator.u, operator.p
+        self._together = operator.u.shape[1] == operator.p.shape[1]  #: the functions of velocity are those of pressure
+        if self._together:
+            self._both = self._beside(np.concatenate([operator.u, operator.p[..., None]], axis=2), operator.fields)
+        else:
+            self._velocity = self._beside(operator.u, operator.fields)
+            self._pressure = self._beside(operator.p[:, :, None], operator.psi[..., None])
+
+    def _beside(self, dofs: NDArray[np.int32], weights: Array) -> OverlappingBlocks:
+        """Couplings of the vertices of each piece with functions of its cell.
+
+        dofs: (pieces, functions, components); weights: of the coefficients, (pieces, functions, vertices, fields).
+        """
+        dofs, weights, shape = dofs[self._ours], weights[self._ours], (*dofs.shape[1:2], self._corner.shape[1])
+        numbers = np.repeat(dofs.reshape(-1, dofs.shape[2]), shape[1], axis=0)
+        rows = np.repeat(self._corner[:, None], shape[0], axis=1).ravel()
+        pieces = np.repeat(np.arange(len(dofs), dtype=np.int32), shape[0] * shape[1])
+        weights = weights.reshape(len(rows), weights.shape[3])
+        columns = np.ascontiguousarray(numbers[:, 0])
+        return OverlappingBlocks(rows, columns, numbers, weights, pieces, self._shape, self._shape[1])
+
+    def with_flow(self, coefficients: MotionOperator, blocks: Array | None = None) -> Sparse:
+        """The transposed matrix of an operator; columns are local dofs of the flow.
+
+        blocks: added to it, for first degree, (pieces, functions, vertices, dim, dim + 1).
+        """
+        velocity = np.swapaxes(coefficients.fields[self._ours], 2, 3)
+        pressure = coefficients.psi[self._ours][:, None, :, None]
+        if self._together:
+            both = np.zeros((*velocity.shape[:3], self._dim + 1))
+            both[..., :-1], both[:, :1, :, -1:] = velocity, pressure
+            more = None if blocks is None else blocks[self._ours].reshape(-1, *both.shape[2:])
+            return self._both.matrix(both, more).ordered()
+        return (self._velocity.matrix(velocity) + self._pressure.matrix(pressure)).ordered()
+
+    def of_films(self, films: FilmDerivatives) -> Sparse:
+        """The transposed matrix of the derivatives of rows in films; columns are local dofs of the flow."""
+        some = self._ours[films.pieces]
+        pieces = films.pieces[some]
+        corner = np.cumsum(self._ours)[pieces] - 1
+        rows = self._corner[corner][:, :, None] * self._dim + np.arange(self._dim)
+        entries = []
+        for dofs, blocks in ((self._u[pieces], films.momentum[some]), (self._p[pieces], films.continuity[some])):
+            columns = dofs.reshape(*dofs.shape, 1, 1)
+            motion = rows.reshape(len(rows), *[1] * (dofs.ndim - 1), *rows.shape[1:])
+            entries.append([np.broadcast_to(part, blocks.shape).ravel() for part in (motion, columns, blocks)])
+        into, by, values = (np.concatenate(parts) for parts in zip(*entries, strict=True))
+        return sparse_from_entries(into, by, values, (self._shape[0] * self._dim, self._shape[1]))
+
+    def with_surface(self, blocks: Array) -> Sparse:
+        """The matrix of blocks (pieces, vertices, vertices, dim, dim); columns are dofs of the vertices."""
+        dim, n, corner = self._dim, self._shape[0], self._corner
+        rows, columns = (np.repeat(corner, corner.shape[1], axis=1).ravel(), np.tile(corner, corner.shape[1]).ravel())
+        numbers = columns[:, None] * np.int32(dim) + np.arange(dim, dtype=np.int32)
+        count = len(rows)
+        each = np.ones((count, 1)), np.arange(count, dtype=np.int32)
+        at = OverlappingBlocks(rows, columns, numbers, *each, (n, n), n * dim)
+        return at.matrix(blocks[self._ours].reshape(count, 1, dim, dim))

@@ -1,0 +1,1 @@
+"""Derivatives of the terms by the motion of surfaces."""

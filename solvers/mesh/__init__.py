@@ -1,0 +1,1 @@
+"""Meshes as plain arrays: cells, facets, surfaces, distances."""

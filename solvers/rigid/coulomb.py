@@ -1,0 +1,261 @@
+"""Coulomb friction of rigid bodies: the cone problem of motions u and contact forces z that Newton's method linearises.
+
+    K u = f + B^T z,    w = w_0 + B u,    0 <= w_n,  0 <= z_n,  w_n z_n = 0,
+    |z_t| <= mu z_n,  and where w_t is not zero, z_t = -mu z_n w_t / |w_t|.
+
+The forces on two rigid bodies are redundant: many z belong to one motion. Each proximal step (augmented Lagrangian)
+
+    z <- P(z - r w(u), mu),    K u = f + B^T P(z - r w(u), mu),
+
+has one solution u whatever the rank of B; P projects the normal part on z_n >= 0 and then the tangential part on
+|z_t| <= mu z_n. From z = 0, z comes near to the shortest one. The equation for u is solved by Newton's method, with one
+sparse factorisation of the size of the bodies' unknowns each.
+Sources: Rockafellar, SIAM J. Control Optim. 14 (1976) 877-898 (proximal steps); Alart, Curnier, Comput. Methods Appl.
+Mech. Engng 92 (1991) 353-375 (Newton's method for them).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.algebra.sparse import Sparse, sparse_from_entries
+from solvers.api import Array, FailureKind, StepFailed
+
+NO_MOTION = "bodies in contact have no room: no motion of them opens all overlaps"
+NO_FORCES = "the friction of rigid bodies has no contact forces"
+
+#: Stiffness r of a proximal step over that of the bodies at a contact, 1 / diag(B K^-1 B^T). The error falls by about
+#: this factor in each; from 1e2 to 1e5 results are the same.
+PROXIMAL = 1e3
+
+#: Change of the contact forces in a proximal step, relative to the largest, at which they are found.
+FOUND = 1e-13
+
+#: The same, from which on rounding errors may keep them from changing less.
+FORCE_ROUNDING = 1e-9
+
+#: Difference of the changes in two proximal steps, relative to them, below which they go on like that.
+STEADY_CHANGE = 1e-2
+
+#: Change of the contact forces in a Newton iteration, relative to the largest, after which the next one is rounding.
+SAME_FORCES = 1e-9
+
+#: Change of the normal forces, relative to the largest, of such steps: the gaps that are missed are a thousandth of it,
+#: relative to the motion by these forces. Rounding errors of positions cause 3e-9.
+NEGLIGIBLE_CHANGE = 1e-7
+
+#: Proximal steps: with tree-like contacts 5 suffice, with a bracing of bodies some tens.
+PROXIMAL_STEPS = 200
+
+#: Newton iterations of a proximal step with whole increments, which mostly converge.
+WHOLE_INCREMENTS = 8
+
+#: Newton iterations with increments that may be halved, if those do not converge; then r is too large.
+HALVED_INCREMENTS = 12
+
+#: Halvings of such an increment, to 2e-4 of it.
+INCREMENT_HALVINGS = 12
+
+#: The share of r in the first step, of forces of which nothing is known: a small one finds which contacts close.
+FIRST_SHARE = 1e-2
+
+#: A proximal step that Newton's method does not solve is taken with a tenth of r; the next ones with more of it again.
+SHARE_GROWTH = 3.0
+
+#: Reduction of the change by a proximal step, above which the next one has a larger r: vertices that nearly coincide
+#: have nearly the same motion. Its rounding errors are larger, too.
+SLOW_CHANGE = 0.3
+
+#: The largest share of r then: rounding errors of w times r are below 1e-5 of the forces.
+LARGEST_SHARE = 1e4
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Contacts of two bodies at most: relative motions w = B u in a frame with the normal first, and forces F^T z."""
+
+    B: Array  #: derivative of the relative motion by the unknowns of both bodies, shape (m, 2, dim, unknowns of a body)
+    body: NDArray[np.int64]  #: their indices, shape (m, 2), -1: none, where B is zero
+    friction: Array  #: coefficients, shape (m,)
+    F: Array | None = None  #: as B; None: B
+
+    def __getitem__(self, which: NDArray) -> Touch:
+        F = None if self.F is None else self.F[which]
+        return Touch(self.B[which], self.body[which], self.friction[which], F)
+
+    @property
+    def pushed(self) -> Array:
+        """F."""
+        return self.B if self.F is None else self.F
+
+    def sliding(self, slope: Array) -> Touch:
+        """The contacts with forces z_n slope along the tangents beside z; slope: shape (m, dim - 1)."""
+        F = self.pushed.copy()
+        F[:, :, 0] += np.einsum("md,msdk->msk", slope, self.B[:, :, 1:])
+        return Touch(self.B, self.body, self.friction, F)
+
+    def motion(self, u: Array) -> Array:
+        """B u, shape (m, dim); u: all unknowns."""
+        by_body = u.reshape(-1, self.B.shape[3])[self.body]
+        return np.einsum("msdk,msk->md", self.B, by_body)
+
+    def force(self, z: Array, unknowns: int) -> Array:
+        """F^T z by unknown; z: shape (m, dim)."""
+        found = np.zeros((unknowns // self.B.shape[3], self.B.shape[3]))
+        np.add.at(found, self.body, np.einsum("msdk,md->msk", self.pushed, z))
+        return found.ravel()
+
+    def dofs(self) -> NDArray[np.int64]:
+        """Unknowns of both bodies, shape (m, 2, k); of no body those of the first one, where B is zero."""
+        k = self.B.shape[3]
+        return np.maximum(self.body, 0)[:, :, None] * k + np.arange(k)
+
+    def square(self, D: Array, unknowns: int) -> Sparse:
+        """F^T D B; D: shape (m, dim, dim)."""
+        blocks = np.einsum("msdk,mde,mtel->msktl", self.pushed, D, self.B, optimize=True)
+        dofs = self.dofs()
+        rows = np.broadcast_to(dofs[:, :, :, None, None], blocks.shape)
+        columns = np.broadcast_to(dofs[:, None, None, :, :], blocks.shape)
+        return sparse_from_entries(rows.ravel(), columns.ravel(), blocks.ravel(), (unknowns, unknowns))
+
+    def rows(self, unknowns: int) -> Sparse:
+        """B as a matrix, rows (contact, direction)."""
+        return self._matrix(self.B, unknowns)
+
+    def rows_of_force(self, unknowns: int) -> Sparse:
+        """F as a matrix, rows (contact, direction)."""
+        return self._matrix(self.pushed, unknowns)
+
+    def _matrix(self, blocks: Array, unknowns: int) -> Sparse:
+        m, _, dim, _ = blocks.shape
+        values = blocks.transpose(0, 2, 1, 3)
+        rows = np.broadcast_to(np.arange(m * dim).reshape(m, dim, 1, 1), values.shape)
+        columns = np.broadcast_to(self.dofs()[:, None], values.shape)
+        return sparse_from_entries(rows.ravel(), columns.ravel(), values.ravel(), (m * dim, unknowns))
+
+
+def project(p: Array, friction: Array) -> tuple[Array, Array]:
+    """(P(p, mu), its derivative) of the shapes (m, dim) and (m, dim, dim)."""
+    z, D = np.zeros_like(p), np.zeros((*p.shape, p.shape[1]))
+    normal = np.maximum(p[:, 0], 0.0)
+    closed = p[:, 0] > 0.0
+    z[:, 0], D[closed, 0, 0] = normal, 1.0
+    tangent = p[:, 1:]
+    size, bound = np.linalg.norm(tangent, axis=1), friction * normal
+    stuck = closed & (size <= bound) & (friction > 0.0)
+    z[stuck, 1:] = tangent[stuck]
+    D[stuck, 1:, 1:] = np.eye(tangent.shape[1])
+    slid = closed & ~stuck & (friction > 0.0)
+    way = tangent[slid] / size[slid, None]
+    z[slid, 1:] = bound[slid, None] * way
+    D[slid, 1:, 0] = friction[slid, None] * way
+    across = np.eye(tangent.shape[1]) - way[:, :, None] * way[:, None, :]
+    D[slid, 1:, 1:] = (bound[slid] / size[slid])[:, None, None] * across
+    return z, D
+
+
+def solver(K: Sparse) -> Callable[[Array], Array]:
+    """K^-1 of a right side, by a sparse factorisation."""
+    from scipy.sparse import csc_matrix  # the import takes a fifth of a second: only runs with contact need it
+    from scipy.sparse.linalg import splu
+
+    turned = K.T  # compressed rows of K^T are compressed columns of K
+    return splu(csc_matrix((turned.data, turned.indices, turned.indptr), shape=K.shape)).solve
+
+
+def contact_forces(K: Sparse, f: Array, touch: Touch, w0: Array, start: Array | None = None) -> tuple[Array, Array]:
+    """(u, z) of shapes (n,) and (m, dim). start: z of a problem nearby.
+
+    Raises StepFailed if there is no motion with w_n >= 0: bodies that are held, or between others, have no room.
+    """
+    free = solver(K)(f)
+    m = len(w0)
+    near = (w0 + touch.motion(free))[:, 0] < 0.0 if start is None else np.ones(m, dtype=bool)
+    if not near.any():
+        return free, np.zeros_like(w0)
+    r = _stiffness(K, touch)
+    if (w0[~(r > 0.0), 0] < 0.0).any():
+        raise StepFailed("rigid bodies", FailureKind.NO_ROOM, NO_MOTION)
+    z = np.zeros_like(w0) if start is None else start * (r > 0.0)[:, None]
+    u, share, change = free, FIRST_SHARE if start is None else 10.0 * FIRST_SHARE, np.full_like(w0, np.inf)
+    for _ in range(PROXIMAL_STEPS):
+        solved = _proximal_step(K, f, touch, w0, share * r, z, u)
+        if solved is None:
+            share *= 0.1
+            continue
+        last, before, u = change, z, solved
+        w = w0 + touch.motion(u)
+        z = project(before - share * r[:, None] * w, touch.friction)[0]
+        change = (z - before) / share
+        if _found(z, change, last):
+            return u, z
+        slow = float(np.abs(change).max()) > SLOW_CHANGE * float(np.abs(last).max())
+        share = min(LARGEST_SHARE if slow else max(1.0, share), SHARE_GROWTH * share)
+    if (change[:, 0] > FORCE_ROUNDING * np.abs(z).max()).any():
+        raise StepFailed("rigid bodies", FailureKind.NO_ROOM, NO_MOTION)
+    raise StepFailed("rigid bodies", FailureKind.JAMMED, NO_FORCES)
+
+
+def _found(z: Array, change: Array, last: Array) -> bool:
+    """Whether proximal steps have found z; change, last: its change in the last one and in that before.
+
+    Vertices of one body that stick need not agree on its motion: in a step a second one lands beside the first one, and
+    its way before belongs to the step. Their friction then grows by the same in each step, at the same motion, without
+    any change of the normal forces: it need not be followed to the end, where one of them slides.
+    """
+    scale, missed = float(np.abs(z).max()), float(np.abs(change).max())
+    if missed <= FOUND * scale:
+        return True
+    if not np.isfinite(last).all():
+        return False
+    if missed <= FORCE_ROUNDING * scale and missed >= 0.5 * float(np.abs(last).max()):
+        return True
+    steady = float(np.abs(change - last).max()) <= STEADY_CHANGE * missed
+    return steady and float(np.abs(change[:, 0]).max()) <= NEGLIGIBLE_CHANGE * scale
+
+
+def _stiffness(K: Sparse, touch: Touch) -> Array:
+    """r, shape (m,), zero of contacts that no unknown moves."""
+    k = touch.B.shape[3]
+    blocks = np.zeros((K.shape[0] // k, k, k))
+    rows, columns = K.row_numbers(), K.indices
+    own = rows // k == columns // k
+    blocks[rows[own] // k, rows[own] % k, columns[own] % k] = K.data[own]
+    solved = np.linalg.solve(blocks[np.maximum(touch.body, 0)], touch.B.transpose(0, 1, 3, 2))
+    soft = np.abs(np.einsum("msdk,mskd->m", touch.B, solved)) / touch.B.shape[2]
+    return np.divide(PROXIMAL, soft, out=np.zeros_like(soft), where=soft > 0.0)
+
+
+def _proximal_step(K: Sparse, f: Array, touch: Touch, w0: Array, r: Array, z: Array, u: Array) -> Array | None:
+    """u with K u = f + B^T P(z - r w(u)); None if Newton's method does not find it."""
+    n = len(f)
+
+    def state(u: Array) -> tuple[Array, Array, Array]:
+        forces, D = project(z - r[:, None] * (w0 + touch.motion(u)), touch.friction)
+        return f + touch.force(forces, n) - K @ u, forces, D
+
+    for iterations, halvings in ((WHOLE_INCREMENTS, 1), (HALVED_INCREMENTS, INCREMENT_HALVINGS)):
+        at = u
+        missed, forces, D = state(at)
+        for _ in range(iterations):
+            step, size = solver(K + touch.square(r[:, None, None] * D, n))(missed), float(np.linalg.norm(missed))
+            before, slopes = forces, D
+            for halving in range(halvings):
+                new = at + 0.5**halving * step
+                missed, forces, D = state(new)
+                if halvings == 1 or float(np.linalg.norm(missed)) < size:
+                    break
+            else:
+                scale = float(touch.force(np.abs(forces), n).max(initial=0.0)) + float(np.abs(f).max())
+                if size <= FORCE_ROUNDING * scale:
+                    return at
+                break
+            at = new
+            same = np.array_equal(D, slopes) or np.abs(forces - before).max() <= SAME_FORCES * np.abs(forces).max()
+            if halving == 0 and same:  # the equations are linear between both iterates, or nearly
+                return at
+    return None

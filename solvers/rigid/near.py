@@ -1,0 +1,266 @@
+"""Which vertices of rigid bodies, obstacles and walls are near another surface, and how they move relative to it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.api import Array
+from solvers.rigid.body import RigidBody, in_space
+from solvers.rigid.coulomb import Touch
+from solvers.rigid.gaps import Gaps, RigidWall, gaps, unit_normals
+from solvers.rigid.motion import RigidInstant
+from solvers.rigid.surface import positions
+
+#: Share of the extent of a body up to which vertices of others are near it. They are looked at again in each iterate,
+#: so that the result does not depend on it.
+NEAR_BODY = 0.25
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A rigid obstacle of segments or triangles, whose right-hand normals point towards the bodies."""
+
+    name: str
+    points: Array  #: vertices [m], shape (n, dim)
+    facets: NDArray[np.int64]  #: shape (m, dim)
+    motion: Callable[[float], Array] | None = None  #: time [s] -> positions of the vertices [m]; None: it rests
+
+    def at(self, t: float) -> Array:
+        """Positions [m] of the vertices at the time t [s]."""
+        return self.points if self.motion is None else self.motion(t)
+
+
+@dataclass(frozen=True)
+class RigidPair:
+    """A body that may touch another one, an obstacle or a wall."""
+
+    body: int  #: index of the body
+    other: int | Obstacle | RigidWall  #: index of the other body, or what it is
+    friction: float = 0.0  #: Coulomb's coefficient
+
+
+@dataclass(frozen=True)
+class Moment:
+    """All bodies at the end of a step."""
+
+    bodies: Sequence[RigidBody]
+    now: Sequence[RigidInstant]
+    old: Sequence[RigidInstant]  #: at the start of the step
+    t: float  #: [s]
+    dt: float  #: [s]
+
+    def centre(self, body: int) -> Array:
+        """[m], shape (dim,)."""
+        return self.bodies[body].inertia.centre + self.now[body].shift[: self.bodies[body].dim]
+
+    def carried(self, body: int, points: Array) -> Array:
+        """Displacements [m] in the step of the points of a body that are at `points` now, shape (n, dim)."""
+        now, old, dim = self.now[body], self.old[body], points.shape[1]
+        arms = in_space(points - self.centre(body))
+        return (now.shift - old.shift)[:dim] + (arms - arms @ (old.R @ now.R.T).T)[:, :dim]
+
+
+@dataclass(frozen=True)
+class _Side:
+    """A surface at one time."""
+
+    body: int  #: index of its body, -1 of an obstacle
+    x: Array  #: positions of the vertices [m], shape (n, dim)
+    facets: NDArray[np.int64]
+    moved: Array | None  #: displacements of the vertices of an obstacle in the step [m]; None: it rests, or is a body
+
+
+@dataclass(frozen=True)
+class Near:
+    """Vertices near another surface, shape (m,). Frames have the normal as their first row, then the tangents."""
+
+    vertex: NDArray[np.int64]  #: numbers among those of all pairs
+    body: NDArray[np.int64]  #: indices of the bodies of the vertex and of the surface, -1: none, shape (m, 2)
+    gap: Array  #: [m]
+    frame: Array  #: unit vectors, shape (m, dim, dim)
+    x: Array  #: positions of the vertices [m], shape (m, dim)
+    carried: Array  #: displacements in the step of the vertices relative to the surface [m], shape (m, dim)
+    given: Array  #: the same, by motions of obstacles alone [m], shape (m, dim)
+    friction: Array  #: coefficients
+    facet: NDArray[np.int64]  #: of the surface, shape (m,)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Near], dim: int) -> Near:
+        """One of many."""
+        if not parts:
+            vectors, ones = np.empty((0, dim)), np.empty(0)
+            numbers = np.empty(0, dtype=np.int64)
+            frame = np.empty((0, dim, dim))
+            return cls(numbers, numbers.reshape(0, 2), ones, frame, vectors, vectors, vectors, ones, numbers)
+        return cls(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(cls)))
+
+    def __getitem__(self, which: NDArray) -> Near:
+        return Near(*(getattr(self, one.name)[which] for one in fields(self)))
+
+    def arms(self, moment: Moment) -> Array:
+        """Vectors from the centres of both bodies to the vertex and to its foot [m], shape (m, 2, 3)."""
+        centres = np.array([moment.centre(index) for index in range(len(moment.bodies))])
+        ends = np.stack([self.x, self.x - self.gap[:, None] * self.frame[:, 0]], axis=1)
+        found = ends - centres[np.maximum(self.body, 0)]
+        return np.pad(found, ((0, 0), (0, 0), (0, 3 - found.shape[2])))
+
+    def touch(self, moment: Moment, components: NDArray[np.int64], free: NDArray[np.bool_]) -> Touch:
+        """Relative motions in the frames; components: the unknowns of a body; free: mask of those not held."""
+        frame = np.pad(self.frame, ((0, 0), (0, 0), (0, 3 - self.frame.shape[2])))[:, None]
+        turning = np.cross(self.arms(moment)[:, :, None], frame)
+        whole = np.concatenate([np.broadcast_to(frame, turning.shape), turning], axis=3)[..., components]
+        signs = np.where(self.body < 0, 0.0, [1.0, -1.0])
+        open_ways = free.reshape(-1, len(components))[np.maximum(self.body, 0)]
+        return Touch(whole * signs[:, :, None, None] * open_ways[:, :, None], self.body, self.friction)
+
+    def in_frame(self, vectors: Array) -> Array:
+        """Components of vectors (m, dim) in the frames."""
+        return np.einsum("mde,me->md", self.frame, vectors)
+
+
+def vertices(bodies: Sequence[RigidBody], pair: RigidPair) -> int:
+    """Vertices of both sides of a pair."""
+    count, other = len(bodies[pair.body].points), pair.other
+    if isinstance(other, RigidWall):
+        return count
+    return count + len(bodies[other].points if isinstance(other, int) else other.points)
+
+
+def search(pairs: Sequence[RigidPair], starts: Sequence[int], moment: Moment, kept: Near | None = None) -> Near:
+    """All vertices that are near; starts: number of the first vertex of each pair.
+
+    kept: vertices that it has keep their facets there, whose planes they face.
+    """
+    x = positions(moment.bodies, moment.now)
+    low, high = (np.array([getattr(own, end)(axis=0) for own in x]) for end in ("min", "max"))
+    found: list[Near] = []
+    obstacles: dict[int, _Side] = {}
+    for number in _near_pairs(pairs, low, high):
+        pair, start = pairs[number], starts[number]
+        body, other = pair.body, pair.other
+        own = _Side(body, x[body], moment.bodies[body].facets, None)
+        if isinstance(other, RigidWall):
+            at = other.gaps(own.x)
+            close = np.flatnonzero(at.gap < NEAR_BODY * float((high[body] - low[body]).max()))
+            at = Gaps(at.gap[close], at.normal[close], close)
+            found.append(_near(start + close, own, close, at, None, pair.friction, moment))
+            continue
+        if isinstance(other, int):
+            beside = _Side(other, x[other], moment.bodies[other].facets, None)
+        else:
+            beside = obstacles.setdefault(id(other), _side(other, moment))
+        for first, points, surface in ((start, own, beside), (start + len(own.x), beside, own)):
+            found += _vertices_near(first, points, surface, pair.friction, moment, kept)
+    return Near.joined(found, x[0].shape[1])
+
+
+def _near_pairs(pairs: Sequence[RigidPair], low: Array, high: Array) -> Iterator[int]:
+    """Numbers of the pairs whose boxes are near each other; of obstacles all."""
+    extents = (high - low).max(axis=1)
+    both = np.array([(number, p.body, p.other) for number, p in enumerate(pairs) if isinstance(p.other, int)])
+    apart = np.zeros(len(pairs), dtype=bool)
+    if len(both):
+        number, one, other = both.T
+        margin = NEAR_BODY * np.minimum(extents[one], extents[other])[:, None]
+        apart[number] = ((low[one] > high[other] + margin) | (low[other] > high[one] + margin)).any(axis=1)
+    for index in np.flatnonzero(~apart):
+        wall, body = pairs[index].other, pairs[index].body
+        if isinstance(wall, RigidWall):
+            nearest = np.where(wall.normal > 0.0, low[body], high[body])
+            if not (nearest - wall.at) @ wall.normal < NEAR_BODY * extents[body]:
+                continue
+        yield int(index)
+
+
+def _side(obstacle: Obstacle, moment: Moment) -> _Side:
+    here = obstacle.at(moment.t)
+    rests = obstacle.motion is None or moment.dt <= 0.0
+    return _Side(-1, here, obstacle.facets, None if rests else here - obstacle.at(moment.t - moment.dt))
+
+
+def _vertices_near(
+    start: int, points: _Side, surface: _Side, friction: float, moment: Moment, kept: Near | None
+) -> list[Near]:
+    """The vertices of one side near the facets of the other one."""
+    margin = NEAR_BODY * float(min(np.ptp(side.x, axis=0).max() for side in (points, surface)))
+    low, high = surface.x.min(axis=0) - margin, surface.x.max(axis=0) + margin
+    near = np.flatnonzero(((points.x >= low) & (points.x <= high)).all(axis=1))
+    if len(near) == 0:
+        return []
+    x, corners = points.x[near], surface.x[surface.facets]
+    low, high = x.min(axis=0) - margin, x.max(axis=0) + margin
+    facing = np.flatnonzero(((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1))
+    if len(facing) == 0:
+        return []
+    at = gaps(x, corners[facing], _outward(points)[near], margin)
+    close = at.gap < margin
+    if not close.any():
+        return []
+    near, at = near[close], Gaps(at.gap[close], at.normal[close], facing[at.facet[close]])
+    if kept is not None:
+        _keep(at, start + near, points.x[near], surface, kept)
+    return [_near(start + near, points, near, at, surface, friction, moment)]
+
+
+def _keep(at: Gaps, vertex: NDArray[np.int64], x: Array, surface: _Side, kept: Near) -> None:
+    """Let vertices that `kept` has face the planes of their facets there."""
+    _, here, there = np.intersect1d(vertex, kept.vertex, return_indices=True)
+    corners = surface.x[surface.facets[kept.facet[there]]]
+    at.normal[here], at.facet[here] = unit_normals(corners), kept.facet[there]
+    at.gap[here] = np.einsum("nd,nd->n", x[here] - corners[:, 0], at.normal[here])
+
+
+def _near(
+    vertex: NDArray[np.int64],
+    points: _Side,
+    chosen: NDArray[np.int64],
+    at: Gaps,
+    surface: _Side | None,
+    friction: float,
+    moment: Moment,
+) -> Near:
+    x = points.x[chosen]
+    foot = x - at.gap[:, None] * at.normal
+    given = np.zeros_like(x) if points.moved is None else points.moved[chosen].copy()
+    if surface is not None and surface.moved is not None:
+        given -= _moved_below(foot, surface, at.facet)
+    carried = given.copy()
+    if points.body >= 0:
+        carried += moment.carried(points.body, x)
+    if surface is not None and surface.body >= 0:
+        carried -= moment.carried(surface.body, foot)
+    body = np.tile([points.body, -1 if surface is None else surface.body], (len(x), 1))
+    friction_of = np.full(len(x), friction)
+    return Near(vertex, body, at.gap, _frames(at.normal), x, carried, given, friction_of, at.facet)
+
+
+def _frames(normals: Array) -> Array:
+    """Orthonormal frames, shape (m, dim, dim), whose first vectors are the normals."""
+    if normals.shape[1] == 2:
+        return np.stack([normals, np.stack([-normals[:, 1], normals[:, 0]], axis=1)], axis=1)
+    axis = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(normals, axis)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([normals, first, np.cross(normals, first)], axis=1)
+
+
+def _outward(side: _Side) -> Array:
+    """Sums of the unit normals of the facets at the vertices, shape (n, dim)."""
+    found = np.zeros_like(side.x)
+    normals = unit_normals(side.x[side.facets])
+    for corner in side.facets.T:
+        np.add.at(found, corner, normals)
+    return found
+
+
+def _moved_below(feet: Array, surface: _Side, facets: NDArray[np.int64]) -> Array:
+    """Displacements in the step [m] of the points of an obstacle's facets at the feet, shape (n, dim)."""
+    assert surface.moved is not None
+    corners, v = surface.x[surface.facets[facets]], surface.moved[surface.facets[facets]]
+    edges = corners[:, 1:] - corners[:, :1]
+    shares = np.einsum("nd,nde->ne", feet - corners[:, 0], np.linalg.pinv(edges))
+    return v[:, 0] + np.einsum("ne,ned->nd", shares, v[:, 1:] - v[:, :1])

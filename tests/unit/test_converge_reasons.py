@@ -1,0 +1,50 @@
+"""Reasons for slow or irregular errors, by what a case has and what its run has done."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fsci.case import load_case
+from fsci.converge.reasons import first_order, indicative
+
+CASES = Path(__file__).parents[2] / "cases"
+
+
+def both(name, active=(), resolution=(), changes=()):
+    case = load_case(CASES / name, changes)
+    history = {"contact.active": np.array(active)} if len(active) else {}
+    summary = {"resolution": list(resolution)}
+    return first_order(case, history, summary), indicative(case, history, summary)
+
+
+def test_none():
+    assert both("cylinder_2d1") == ([], [])
+    assert both("tied_cube", active=[3, 3]) == ([], [])  # statics
+
+
+def test_backward_euler():
+    assert both("hydrostatic_contact") == (["the scheme is backward_euler"], [])
+
+
+@pytest.mark.parametrize(
+    ("active", "impact"), [([0, 0, 2], True), ([2, 2, 0], True), ([2, 2, 2], False), ([0, 0, 0], False)]
+)
+def test_impacts(active, impact):
+    slow, told = both("two_tori", active=active)
+    assert ("an impact" in slow, "an impact" in told) == (impact, impact)
+
+
+def film(body, to, cells, warns=True):
+    return {"body": body, "to": to, "cells": cells, "warns": warns}
+
+
+def test_films():
+    """A gap once, with the smaller count; what does not warn is resolved, and a body itself is no film."""
+    found = [film("a", "b", 1.6), film("b", "a", 1.2), film("a", "wall", 9.0, warns=False), film("a", "", 2.0)]
+    slow, told = both("cylinder_2d1", resolution=found)
+    assert slow == told == ["1.2 cells in the film between a and b"]
+
+
+def test_starts():
+    assert "a start: 5 steps" in both("cylinder_2d2", changes=[("time.step", "1.0"), ("time.end", "5.0")])[1]
