@@ -204,7 +204,7 @@ class Monolithic:
         blocks.hold(solid, b, x)
         try:
             with flow.timer("solve"):
-                self._solve(blocks, b, x)
+                self._solve(blocks, b, x, reduction)
         except linear.LinearSolveFailed as failure:
             raise StepFailed(self.name, failure.kind, str(failure), where=self.worst()) from failure
         increment = self._corrected(x.array)
@@ -223,28 +223,30 @@ class Monolithic:
         moved = solid.jacobian() @ gather(self.comm, increment[: solid.size])
         return self._secant.corrected(increment, moved)
 
-    def _solve(self, blocks: Blocks, b: PETSc.Vec, x: PETSc.Vec) -> None:
+    def _solve(self, blocks: Blocks, b: PETSc.Vec, x: PETSc.Vec, reduction: float) -> None:
         flow = self.coupled.flow.iterative
         while flow is not None and flow.sequence.current != "direct":
             try:
-                matrix = blocks.product(self._solvers.numbering, flow.product(blocks.flow))
+                of_flow = flow.product(blocks.flow, reduction)
+                matrix = blocks.product(self._solvers.numbering, of_flow)
                 whole = blocks.with_added(matrix)
-                iterations = self._solvers.krylov.solve_again(whole, b, x)
+                iterations = self._solvers.krylov.solve_again(whole, b, x, reduction=reduction)
                 if iterations is None:
-                    iterations = self._solvers.krylov.solve(self._krylov_solver(flow, blocks), whole, b, x, matrix)
+                    ksp = self._krylov_solver(flow, blocks, of_flow)
+                    iterations = self._solvers.krylov.solve(ksp, whole, b, x, matrix, reduction=reduction)
                 self._linear_iterations += iterations
                 return
             except linear.LinearSolveFailed as failure:
                 flow.sequence.advance(failure)
         matrix = blocks.assembled()
-        self._solvers.direct.solve(blocks.with_added(matrix), b, x, matrix)
+        self._solvers.direct.solve(blocks.with_added(matrix), b, x, matrix, reduction=reduction)
 
-    def _krylov_solver(self, flow: IterativeFlow, blocks: Blocks) -> PETSc.KSP:
+    def _krylov_solver(self, flow: IterativeFlow, blocks: Blocks, of_flow: PETSc.Mat) -> PETSc.KSP:
         fill = flow.sequence.current == "fill"
         krylov = linear.coupled_solver(self.comm, tolerance=flow.linear_tolerance, fill=fill)
         if flow.sequence.multigrid:
             flow.sequence.limit(krylov)
-            krylov.getPC().getPythonContext().second = flow.multigrid(blocks.flow)
+            krylov.getPC().getPythonContext().second = flow.multigrid(blocks.flow, of_flow)
         return krylov
 
     def blocks(self, *, keep: bool = False) -> Blocks:

@@ -306,12 +306,12 @@ class IterativeFlow(Protocol):
     @property
     def linear_tolerance(self) -> float: ...
 
-    def multigrid(self, matrix: PETSc.Mat) -> PETSc.PC:
-        """A cycle of multigrid for the tangent."""
+    def multigrid(self, matrix: PETSc.Mat, product: PETSc.Mat) -> PETSc.PC:
+        """A cycle of multigrid for the tangent, which it multiplies by `product`."""
         ...
 
-    def product(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        """The tangent as it multiplies vectors in a Krylov method."""
+    def product(self, matrix: PETSc.Mat, reduction: float) -> PETSc.Mat:
+        """The tangent as it multiplies vectors in a Krylov method that reduces the residual so far."""
         ...
 
 

@@ -13,54 +13,69 @@ class Lagged:
     """Solves with the preconditioner of an earlier matrix of the step while it is good enough.
 
     The first `fresh` matrices of a step get their own preconditioners. The last of these is reused until a solve fails
-    or takes more than `patience` times the iterations that it took for its own matrix. Nothing is kept from step to
-    step, so that resumed runs give the same results.
+    or takes more than `patience` times the iterations per digit that it took for its own matrix. Nothing is kept from
+    step to step, so that resumed runs give the same results. few: see `linear.solve`.
     """
 
-    def __init__(self, *, fresh: float = 1, patience: float = 2.0):
-        self.fresh, self.patience = fresh, patience
+    def __init__(self, *, fresh: float = 1, patience: float = 2.0, few: int = 0):
+        self.fresh, self.patience, self._few = fresh, patience, few
         self.made = 0  #: count of preconditioners in this step
-        self._kept: tuple[PETSc.KSP, PETSc.Mat, int] | None = None  # with its matrix and iterations
+        self._kept: tuple[PETSc.KSP, PETSc.Mat, float] | None = None  # with its matrix and iterations per digit
 
     def begin_step(self) -> None:
         """Discard the preconditioner of the last step."""
         self.made, self._kept = 0, None
 
-    def solve_again(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec) -> int | None:
+    def solve_again(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, *, reduction: float = 0.0) -> int | None:
         """Solve matrix x = b with the kept preconditioner. Returns the iterations, or None: a new solver is needed."""
         kept, self._kept = self._kept, None
         if kept is None or self.made < self.fresh:
             return None
         ksp, made_of, first = kept
         try:
-            linear.solve(ksp, matrix, b, x, made_of)
+            linear.solve(ksp, matrix, b, x, made_of, reduction=reduction, few=self._few)
         except linear.LinearSolveFailed:
             return None
         iterations = int(ksp.getIterationNumber())
-        if iterations <= self.patience * first:
+        if iterations / digits(ksp, reduction) <= self.patience * first:
             self._kept = kept
         return iterations
 
     def solve(
-        self, ksp: PETSc.KSP, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, entries: PETSc.Mat | None = None
+        self,
+        ksp: PETSc.KSP,
+        matrix: PETSc.Mat,
+        b: PETSc.Vec,
+        x: PETSc.Vec,
+        entries: PETSc.Mat | None = None,
+        *,
+        reduction: float = 0.0,
     ) -> int:
         """Solve matrix x = b with a solver for this matrix, which is kept; iterations. Raises LinearSolveFailed.
 
         entries: the matrix with its entries, if `matrix` has products with vectors alone.
         """
-        linear.solve(ksp, matrix, b, x, entries)
+        linear.solve(ksp, matrix, b, x, entries, reduction=reduction, few=self._few)
         ksp.getPC().setReusePreconditioner(True)  # also when the matrix changes
         self.made += 1
-        first = int(ksp.getIterationNumber())
-        self._kept = ksp, entries or matrix, first
-        return first
+        iterations = int(ksp.getIterationNumber())
+        self._kept = ksp, entries or matrix, iterations / digits(ksp, reduction)
+        return iterations
+
+
+def digits(ksp: PETSc.KSP, reduction: float) -> float:
+    """By which a solver reduces a residual: the negative logarithm of the factor."""
+    return -math.log10(max(ksp.getTolerances()[0], reduction))
 
 
 class LaggedFactors:
     """Lagged LU factors by MUMPS, which pivots for velocity and pressure; reused for solves of up to 20 iterations."""
 
     def __init__(self, comm, *, fresh: float):
-        self._lagged, self._ksp = Lagged(fresh=fresh, patience=math.inf), linear.factored_solver(comm, iterations=20)
+        self._lagged, self._ksp = (
+            Lagged(fresh=fresh, patience=math.inf, few=linear.FEW),
+            linear.factored_solver(comm, iterations=20),
+        )
 
     @property
     def factored(self) -> int:
@@ -71,13 +86,21 @@ class LaggedFactors:
         """Discard the factors of the last step."""
         self._lagged.begin_step()
 
-    def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, entries: PETSc.Mat | None = None) -> int:
+    def solve(
+        self,
+        matrix: PETSc.Mat,
+        b: PETSc.Vec,
+        x: PETSc.Vec,
+        entries: PETSc.Mat | None = None,
+        *,
+        reduction: float = 0.0,
+    ) -> int:
         """Solve matrix x = b. Returns the count of iterations. Raises LinearSolveFailed.
 
         entries: what to factor, if `matrix` has products with vectors alone.
         """
-        iterations = self._lagged.solve_again(matrix, b, x)
+        iterations = self._lagged.solve_again(matrix, b, x, reduction=reduction)
         if iterations is not None:
             return iterations
         self._ksp.getPC().setReusePreconditioner(False)  # the order of elimination stays
-        return self._lagged.solve(self._ksp, matrix, b, x, entries)
+        return self._lagged.solve(self._ksp, matrix, b, x, entries, reduction=reduction)

@@ -340,12 +340,13 @@ def solve(
     *,
     reduction: float = 0.0,
     squared: bool = False,
+    few: int = FEW,
 ) -> None:
     """Solve matrix x = b (collective). Raises LinearSolveFailed.
 
     preconditioned_by: the matrix of an earlier solve whose preconditioner is reused; None: `matrix`. reduction: of the
-    residual that is good enough for a Krylov method. Where that costs few iterations, or if `squared`, it is solved to
-    the square, with which Newton's method converges as with an exact solution.
+    residual that is good enough for a Krylov method. Where that costs `few` iterations, or if `squared`, it is solved
+    to the square, with which Newton's method converges as with an exact solution.
     """
     if ksp.getOptionsPrefix() == "elastic_":
         ksp.setPC(_multigrid(ksp.comm))
@@ -357,7 +358,7 @@ def solve(
         exact = max(tolerance, reduction**2)
         ksp.setTolerances(rtol=exact if squared else reduction)
         unlocked.solve(ksp, b, x)
-        if not squared and ksp.getConvergedReason() > 0 and ksp.getIterationNumber() <= FEW:
+        if not squared and ksp.getConvergedReason() > 0 and ksp.getIterationNumber() <= few:
             ksp.setTolerances(rtol=exact)
             ksp.setInitialGuessNonzero(True)
             unlocked.solve(ksp, b, x)

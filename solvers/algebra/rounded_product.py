@@ -21,20 +21,18 @@ LOOSE = 1e-5
 
 
 class RoundedProducts:
-    """Gives each matrix as its product with vectors: rounded if the tolerance of the linear systems allows it."""
+    """Gives each matrix as its product with vectors: rounded if the tolerance of the linear system allows it."""
 
-    def __init__(self, tolerance: float):
-        """tolerance: of the residual of linear systems, relative to the first."""
-        self._loose = tolerance >= LOOSE
+    def __init__(self) -> None:
         self._last: tuple[int, int] | None = None  #: the matrix and its state
         self._product: PETSc.Mat | None = None
 
-    def of(self, matrix: PETSc.Mat) -> PETSc.Mat:
+    def of(self, matrix: PETSc.Mat, tolerance: float) -> PETSc.Mat:
         """The matrix with rounded entries, without the entries themselves, or the matrix itself (collective).
 
-        The next call overwrites it.
+        The next call overwrites it. tolerance: of the residual of the linear system, relative to the first.
         """
-        if not self._loose or (rows := shared_block_rows(matrix)) is None or rows.own.values.shape[1] != BLOCK_SIZE:
+        if tolerance < LOOSE or (rows := shared_block_rows(matrix)) is None or rows.own.values.shape[1] != BLOCK_SIZE:
             return matrix
         if self._product is None or self._last is None or self._last[0] != matrix.handle:
             sizes = matrix.getSizes()

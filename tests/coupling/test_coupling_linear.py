@@ -5,6 +5,7 @@ import pytest
 from coupling_setup import post_in_flow
 
 from coupling.monolithic import Monolithic
+from solvers import newton
 from solvers.algebra import linear
 from solvers.newton import Tolerance
 
@@ -72,6 +73,21 @@ def test_a_method_that_stalls_is_followed_by_the_next(direct, monkeypatch):
     assert infos[0].notes[0].startswith(f"the linear solver stalled with multigrid: {following} from here on")
     assert made[1:2] == ([False] if element == "q1q1" else [])
     same_state(coupled, exact)
+
+
+@pytest.mark.parametrize("method", ["iterative", "ilu"])
+def test_early_systems_are_solved_inexactly(direct, method, monkeypatch):
+    """As many Newton steps as with exact solutions, at most four fifths of the linear iterations, the same state."""
+    element, exact = direct
+    counts = []
+    for enough in (newton.ENOUGH, 0.0):
+        monkeypatch.setattr(newton, "ENOUGH", enough)
+        coupled, infos = after_two_steps(method, element)
+        same_state(coupled, exact)
+        counts.append([sum(i.iterations for i in infos), sum(i.numbers["coupling.linear"] for i in infos)])
+    inexact, whole = counts
+    assert inexact[0] == whole[0], counts
+    assert inexact[1] < 0.8 * whole[1]
 
 
 def test_an_increment_can_be_taken_back():

@@ -35,7 +35,7 @@ def test_entries_are_rounded_whatever_their_units(units):
     x = matrix.createVecRight()
     x.array[:] = np.tile(1.0 / scale, NODES) * rng.standard_normal(4 * NODES)
     dense = sparse.bsr_matrix((blocks, PATTERN.indices, PATTERN.indptr)).toarray()
-    found = RoundedProducts(1e-4).of(matrix) * x
+    found = RoundedProducts().of(matrix, 1e-4) * x
     error, bound = np.abs(found.array - dense @ x.array), ROUNDING * (np.abs(dense) @ np.abs(x.array))
     assert (error <= 1.01 * bound).all()
     assert (error > 1e-3 * bound).any()
@@ -46,25 +46,25 @@ def test_numbers_of_single_precision_are_exact():
     matrix = blocked(4, blocks)
     x = matrix.createVecRight()
     x.array[:] = np.arange(4 * NODES)
-    assert ((RoundedProducts(1e-4).of(matrix) * x).array == (matrix * x).array).all()
+    assert ((RoundedProducts().of(matrix, 1e-4) * x).array == (matrix * x).array).all()
 
 
 def test_the_product_follows_the_values():
     """Those of the matrix that it was asked for last; the object is the same while the pattern is."""
-    matrix, products = blocked(4, np.ones((PATTERN.nnz, 4, 4))), RoundedProducts(1e-4)
+    matrix, products = blocked(4, np.ones((PATTERN.nnz, 4, 4))), RoundedProducts()
     x = matrix.createVecRight()
     x.set(1.0)
-    before = products.of(matrix)
+    before = products.of(matrix, 1e-4)
     first = (before * x).array.copy()
     matrix.scale(2.0)
-    assert products.of(matrix).handle == before.handle
+    assert products.of(matrix, 1e-4).handle == before.handle
     assert ((before * x).array == 2.0 * first).all()
 
 
 def test_tight_tolerances_and_other_blocks_have_the_matrix_itself():
     matrix, other = (blocked(size, np.ones((PATTERN.nnz, size, size))) for size in (4, 3))
-    assert RoundedProducts(1e-8).of(matrix) is matrix
-    assert RoundedProducts(1e-4).of(other) is other
+    assert RoundedProducts().of(matrix, 1e-8) is matrix
+    assert RoundedProducts().of(other, 1e-4) is other
 
 
 def test_mistakes():

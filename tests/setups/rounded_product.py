@@ -18,12 +18,12 @@ def main() -> None:
     )  # fmt: skip
     fluid.begin_step(0.0, 1.0)
     fluid.residual()
-    matrix, products = fluid.linearise(), RoundedProducts(1e-4)
+    matrix, products = fluid.linearise(), RoundedProducts()
     x = matrix.createVecRight()
     x.array[:] = np.random.default_rng(MPI.COMM_WORLD.rank).standard_normal(x.getLocalSize())
     for factor in (1.0, -3.0):
         matrix.scale(factor)
-        product = products.of(matrix)
+        product = products.of(matrix, 1e-4)
         assert product.getType() == PETSc.Mat.Type.PYTHON
         difference = (product * x - matrix * x).norm() / (matrix * x).norm()
         assert 0.0 < difference < 1e-6, difference

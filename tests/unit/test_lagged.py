@@ -83,3 +83,14 @@ def test_a_preconditioner_that_no_longer_serves_is_discarded() -> None:
     assert last is not None
     assert last > 2 * first
     assert lagged.solve_again(*system(BASE)) is None
+
+
+def test_a_preconditioner_is_judged_by_iterations_per_digit() -> None:
+    """A system that is solved less exactly takes fewer iterations; its preconditioner is not a better one for that."""
+    lagged, ksp = Lagged(), flexible_solver(PETSc.COMM_SELF, tolerance=1e-8)
+    ksp.getPC().setType(PETSc.PC.Type.ILU)
+    rough = lagged.solve(ksp, *system((BASE + 0.5 * NEAR).tocsr()), reduction=1e-2)
+    exact = lagged.solve_again(*system((BASE + 0.51 * NEAR).tocsr()))
+    assert exact is not None
+    assert exact > 2 * rough
+    assert lagged.solve_again(*system((BASE + 0.51 * NEAR).tocsr())) == exact

@@ -381,10 +381,10 @@ class Fluid:
 
         keep: use the tangent of the last iterate if the same unknowns are held and the flow is unsteady.
         """
-        return self._advance(self.iterate.solver, keep=keep and self.keeps_tangent())
+        return self._advance(self.iterate.solver, keep=keep and self.keeps_tangent(), reduction=reduction)
 
-    def _advance(self, solver: FlowSolver, *, keep: bool) -> Array:
-        increment = self.iterate.solve(solver, keep=keep, picard=self._picard)
+    def _advance(self, solver: FlowSolver, *, keep: bool, reduction: float = 0.0) -> Array:
+        increment = self.iterate.solve(solver, keep=keep, picard=self._picard, reduction=reduction)
         self._iterations_of_step += self.iterate.linear_iterations
         return self.update(increment)
 

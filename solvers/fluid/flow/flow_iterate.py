@@ -99,26 +99,33 @@ class FlowIterate:
         """Whether the last tangent has its rows of the identity where this iterate has them, on this process."""
         return self._tangent.holds(self.held)
 
-    def solve(self, solver: FlowSolver, *, keep: bool, picard: bool) -> Array:
-        """The next increment; keep: with the tangent of the last one. Raises StepFailed."""
+    def solve(self, solver: FlowSolver, *, keep: bool, picard: bool, reduction: float) -> Array:
+        """The next increment; keep: with the tangent of the last one. Raises StepFailed.
+
+        reduction: of the residual that is good enough.
+        """
         matrix = self._tangent.of_increment(lambda: self.linearise(picard=picard), keep=keep)
         b, x = matrix.createVecs()
         b.array[:] = -self.rows
         try:
             with self._timer("solve"):
-                self.linear_iterations = solver.solve(matrix, b, x, self.held, self._system.dofs_near_surfaces)
+                near = self._system.dofs_near_surfaces
+                self.linear_iterations = solver.solve(matrix, b, x, self.held, near, reduction=reduction)
         except linear.LinearSolveFailed as failure:
             raise StepFailed("fluid", failure.kind, str(failure), where=self.worst()) from failure
         return x.array
 
-    def multigrid(self, matrix: PETSc.Mat) -> PETSc.PC:
-        """A multigrid cycle for the tangent; the next call overwrites it."""
-        near, product = self._system.dofs_near_surfaces, self.product(matrix)
+    def multigrid(self, matrix: PETSc.Mat, product: PETSc.Mat) -> PETSc.PC:
+        """A multigrid cycle for the tangent, which it multiplies by `product`; the next call overwrites it."""
+        near = self._system.dofs_near_surfaces
         return self.solver.create_multigrid().preconditioner(matrix, self.held, near, product)
 
-    def product(self, matrix: PETSc.Mat) -> PETSc.Mat:
-        """The tangent as it multiplies vectors in a Krylov method; the next call overwrites it."""
-        return self.solver.products.of(matrix)
+    def product(self, matrix: PETSc.Mat, reduction: float) -> PETSc.Mat:
+        """The tangent as it multiplies vectors in a Krylov method; the next call overwrites it.
+
+        reduction: of the residual that is good enough.
+        """
+        return self.solver.products.of(matrix, max(self.linear_tolerance, reduction))
 
     def add_rounding(self, error: Array) -> None:
         """Add rounding errors that another field causes in these equations; call it after `linearise`."""

@@ -94,7 +94,7 @@ class FlowSolver:
 
     def __init__(self, unknowns: Unknowns, sequence: SolverSequence, tolerance: float, *, steady: bool):
         self.sequence, self._unknowns, self._tolerance = sequence, unknowns, tolerance
-        self.products = RoundedProducts(tolerance)
+        self.products = RoundedProducts()
         self._cycle = STEADY_CYCLE if steady else PETSc.PC.MGCycleType.V
         self._levels: dict[bool, Multigrid] = {}  #: with stronger smoothers or without
         fresh = math.inf if steady else 1  # a steady flow changes too much from iterate to iterate
@@ -124,27 +124,40 @@ class FlowSolver:
         self._krylov.begin_step()
         self._direct.begin_step()
 
-    def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, held: NDArray[np.bool_], near: Marker) -> int:
+    def solve(
+        self,
+        matrix: PETSc.Mat,
+        b: PETSc.Vec,
+        x: PETSc.Vec,
+        held: NDArray[np.bool_],
+        near: Marker,
+        *,
+        reduction: float = 0.0,
+    ) -> int:
         """Solve matrix x = b. Returns the count of iterations. Raises LinearSolveFailed (collective).
 
-        held: owned unknowns whose rows are those of the identity; near: marks those near surfaces.
+        held: owned unknowns whose rows are those of the identity; near: marks those near surfaces; reduction: of the
+        residual that is good enough.
         """
+        tolerance = max(self._tolerance, reduction)
         while self.sequence.current != "direct":
             try:
-                product = self.products.of(matrix)
-                iterations = self._krylov.solve_again(product, b, x)
+                product = self.products.of(matrix, tolerance)
+                iterations = self._krylov.solve_again(product, b, x, reduction=reduction)
                 if iterations is not None:
                     return iterations
-                return self._krylov.solve(self._create(matrix, held, near), product, b, x, matrix)
+                return self._krylov.solve(
+                    self._create(matrix, held, near, product), product, b, x, matrix, reduction=reduction
+                )
             except linear.LinearSolveFailed as failure:
                 self.sequence.advance(failure)
-        return self._direct.solve(matrix, b, x)
+        return self._direct.solve(matrix, b, x, reduction=reduction)
 
-    def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_], near: Marker) -> PETSc.KSP:
+    def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_], near: Marker, product: PETSc.Mat) -> PETSc.KSP:
         comm, method = self.sequence.comm, self.sequence.current
         if not self.sequence.multigrid:
             return linear.flow_solver(comm, tolerance=self._tolerance, fill=method == "fill")
         ksp = linear.flexible_solver(comm, tolerance=self._tolerance)
         self.sequence.limit(ksp)
-        ksp.setPC(self.create_multigrid().preconditioner(matrix, held, near, self.products.of(matrix)))
+        ksp.setPC(self.create_multigrid().preconditioner(matrix, held, near, product))
         return ksp
