@@ -107,6 +107,16 @@ def test_a_body_that_stays_away_moves_as_without_contact(tmp_path):
         assert np.array_equal(found[column], alone[column]), column
 
 
+def test_bodies_all_does_not_find_walls_anew(tmp_path):
+    """Bit for bit as without a section."""
+    text = changed(BLOCK, ("end: 0.8", "end: 0.2"), ("0.333, 0.05", "0.333, 0.02"))
+    found, plain = run(text + "contact: {bodies: all}\n", tmp_path / "section"), run(text, tmp_path / "plain")
+    assert plain["contact.block_floor_y_low.y"].max() > 1.0
+    assert list(found) == list(plain)
+    for column in found.keys() - {"wall"}:
+        assert np.array_equal(found[column], plain[column]), column
+
+
 def test_a_disc_bounces_in_both_schemes_alike(tmp_path):
     """A disc reaches the floor at 1.5 m/s; `contact: none` lets it through."""
     disc = changed(
@@ -216,6 +226,13 @@ def test_all_closed_faces(tmp_path):
     assert pairs(BLOCK + "contact: none\n", tmp_path) == {}
     lid = changed(BLOCK, ("outflow: true", "velocity: [1, 0]"), ("viscosity: 0.1", "viscosity: 0.1\n  gravity: [0, 0]"))
     assert pairs(lid, tmp_path) == ALL | {"block_top_y_high": 14}
+
+
+def test_friction_of_walls_needs_no_pairs(tmp_path):
+    (tmp_path / "case.yaml").write_text(BLOCK + "contact: {friction: {coefficient: 0.3}}\n")
+    case = with_pairs(load_case(tmp_path / "case.yaml"))
+    found = wall_pairs(case, {"block": read_body(case, "block")})
+    assert [pair.friction.coefficient for pair in found] == [0.3] * 3
 
 
 def test_names_are_free(tmp_path):
