@@ -90,6 +90,17 @@ def test_the_floor_carries_the_weight_less_the_force_of_the_fluid(tmp_path, sche
     assert abs(found["contact.block_floor_y_low.x"][-1]) < 1e-9 * WEIGHT
 
 
+@pytest.mark.parametrize("film", ["zone: wetted", "roughness: 0.002"])
+def test_with_fluid_below_it_the_floor_carries_the_weight_less_the_buoyancy(tmp_path, film):
+    """Wetted and seeping contact have the pressure of the fluid below the block, too."""
+    deep = changed(BLOCK, ("  viscosity: 0.1", "  viscosity: 0.1\n  gravity: [0, -10]"), ("end: 0.8", "end: 1.2"))
+    found = run(deep + f"contact: {{film: {{{film}}}}}\n", tmp_path)
+    buoyancy = 10.0 * 0.4 * 0.2
+    force = found["contact.block_floor_y_low.y"][-1]
+    assert force == pytest.approx(WEIGHT - found["on_block.y"][-1], rel=1e-6)
+    assert force == pytest.approx(WEIGHT - buoyancy, rel=1e-3)
+
+
 def test_a_block_in_space(tmp_path):
     found = run(changed(BLOCK, *SPACE.items()), tmp_path)
     weight = 0.4 * WEIGHT
