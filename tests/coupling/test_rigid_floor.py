@@ -74,7 +74,7 @@ output: {fields_every: 0}
 
 @pytest.mark.parametrize(("friction", "held"), [(0.5, False), (0.25, True), (0.1, True)])
 def test_friction_with_the_floor_in_a_flow(tmp_path, friction, held):
-    """A disc rolls as without a fluid; one that does not turn stays below the angle of friction, slides beyond it with g_x - mu g_y."""
+    """A disc rolls as without a fluid. One that does not turn rests below the angle of friction, or slides."""
     texts = [
         text.replace("WAYS", ", held: [rotation]" if held else "").replace("MU", str(friction)) for text in (SLOPE, DRY)
     ]

@@ -115,7 +115,7 @@ def test_the_order_of_bodies_does_not_matter():
 def test_the_force_on_what_is_held_is_that_of_contact():
     """A block lies on a table that cannot move."""
     table = polygon("table", SQUARE * [4.0, 1.0], held=dict.fromkeys(("x", "y", "rotation_z"), lambda t: 0.0))
-    block = polygon("block", SQUARE + [0.0, 1.0], gravity=(0.0, -10.0))
+    block = polygon("block", SQUARE + np.array([0.0, 1.0]), gravity=(0.0, -10.0))
     bodies = field([table, block], [RigidPair(1, 0)], rho_inf=0.5)
     for _ in march(bodies, 0.3, 15):
         pass
