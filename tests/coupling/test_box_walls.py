@@ -108,6 +108,31 @@ def test_a_block_in_space(tmp_path):
     assert found["contact.block_floor_z_low.z"][-1] == pytest.approx(weight - found["on_block.z"][-1], rel=1e-6)
 
 
+PROBES = """probes:
+  gap: {quantity: gap, pair: block_floor_y_low}
+  pressure: {quantity: pressure, pair: block_floor_y_low}
+  first: {quantity: first_contact, pair: block_floor_y_low}
+"""
+
+
+def test_probes_of_pairs_with_walls(tmp_path):
+    """The floor comes in during the run; then the gap closes, and there is a pressure."""
+    text = changed(BLOCK, ("probes:\n", PROBES), ("end: 0.8", "end: 0.3"))
+    found = run(text, tmp_path)
+    assert np.isnan(found["gap"][0])
+    assert found["pressure"][0] == 0.0
+    touching = found["contact.block_floor_y_low.y"] > 0.0
+    assert touching.any()
+    assert (found["pressure"] > 0.0).tolist() == touching.tolist()
+    assert np.abs(found["gap"][touching]).max() < 1e-3
+    assert found["first"][-1] == pytest.approx(found["time"][touching][0])
+    for wrong, said in (("roof_y_high", "unknown pair"), ("top_y_high", "available: block_sides_x_low")):
+        with pytest.raises(CaseError, match=said):
+            run(
+                changed(text, ("first_contact, pair: block_floor_y_low", f"gap, pair: block_{wrong}")), tmp_path / wrong
+            )
+
+
 def test_a_body_that_stays_away_moves_as_without_contact(tmp_path):
     """Bit for bit, in all columns."""
     text = changed(BLOCK, ("0.333, 0.05", "0.3, 0.4"), ("end: 0.8", "end: 0.1"))

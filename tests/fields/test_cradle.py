@@ -37,7 +37,7 @@ def cradle(around, through):
 @pytest.mark.slow(seconds=80)
 @pytest.mark.parametrize(("around", "through", "bar"), [(24, 4, 0.07), (48, 8, 0.03)])
 def test_the_last_ball_takes_the_speed_of_the_first(tmp_path, around, through, bar):
-    """As equal bars exchange their speeds in one-dimensional wave theory; half of the error with cells of half the size."""
+    """As equal bars exchange their speeds in one-dimensional wave theory. Cells of half the size: half of the error."""
     (tmp_path / "case.yaml").write_text(cradle(around, through))
     assert run_case(load_case(tmp_path / "case.yaml"), tmp_path / "out") == FINISHED
     found = read_history(tmp_path / "out" / "history.csv")
