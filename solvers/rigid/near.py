@@ -20,6 +20,11 @@ from solvers.rigid.surface import positions
 #: so that the result does not depend on it.
 NEAR_BODY = 0.25
 
+#: Share of the extent of a body up to which the boxes of two are looked into: between iterates bodies move by less, as
+#: the first one has the velocities of the step before. Another body that is hit is seen in the next iterate. From 0.01
+#: to 0.25 piles of discs move alike, in as many iterations; with 0.25 a step costs a third more.
+NEAR_BOXES = 0.05
+
 
 @dataclass(frozen=True)
 class Obstacle:
@@ -186,7 +191,7 @@ def _near_pairs(pairs: Sequence[RigidPair], low: Array, high: Array) -> Iterator
     apart = np.zeros(len(pairs), dtype=bool)
     if len(both):
         number, one, other = both.T
-        margin = NEAR_BODY * np.minimum(extents[one], extents[other])[:, None]
+        margin = NEAR_BOXES * np.minimum(extents[one], extents[other])[:, None]
         apart[number] = ((low[one] > high[other] + margin) | (low[other] > high[one] + margin)).any(axis=1)
     for index in np.flatnonzero(~apart):
         wall, body = pairs[index].other, pairs[index].body
