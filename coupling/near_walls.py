@@ -105,6 +105,11 @@ class NearWalls:
         return pair.pair.slave.dofs
 
     @property
+    def dofs(self) -> NDArray[np.int64]:
+        """Global dofs of the nodes of all slaves, shape (n, dim)."""
+        return self._dofs
+
+    @property
     def waiting(self) -> bool:
         """Whether any pair has not come in yet."""
         return len(self._present) < len(self._pairs)

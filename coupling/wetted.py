@@ -33,19 +33,28 @@ class WettedSurface:
     mixture: Sparse | None = None
 
 
-def wetted_surfaces(structure: Structure, skins: Sequence[Skin]) -> list[WettedSurface]:
-    """The wetted surfaces of all bodies of a structure, from their skins (collective)."""
+def wetted_surfaces(
+    structure: Structure, skins: Sequence[Skin], near_walls: NDArray[np.int64] | None = None
+) -> list[WettedSurface]:
+    """The wetted surfaces of all bodies of a structure, from their skins (collective).
+
+    near_walls: dofs of nodes that take part in contact beside those of the structure's constraint.
+    """
     ties = tied_sides(structure)
-    surfaces = [_wetted_surface(structure, index, skin, ties) for index, skin in enumerate(skins)]
+    touching = [] if structure.constraint is None else [structure.constraint.touching_dofs().ravel()]
+    touching += [] if near_walls is None else [near_walls.ravel()]
+    dofs = np.concatenate([np.empty(0, dtype=np.int64), *touching])
+    surfaces = [_wetted_surface(structure, index, skin, ties, dofs) for index, skin in enumerate(skins)]
     return joined(surfaces, [skin.points for skin in skins]) if ties else surfaces
 
 
-def _wetted_surface(structure: Structure, index: int, skin: Skin, ties: Sequence[Tie]) -> WettedSurface:
-    bodies, constraint = structure.bodies, structure.constraint
+def _wetted_surface(
+    structure: Structure, index: int, skin: Skin, ties: Sequence[Tie], touching: NDArray[np.int64]
+) -> WettedSurface:
+    bodies = structure.bodies
     body = bodies[index]
     layout = Layout(body.domain.comm, [other.size for other in bodies])
     dofs = global_dofs(layout, index, body, skin.nodes)
-    touching = np.empty(0, dtype=np.int64) if constraint is None else constraint.touching_dofs()
     in_contact = np.isin(dofs[:, 0], touching)[skin.facets].all(axis=1)
     candidates = candidate_facets(body.name, skin, ties)
     if not candidates:

@@ -3,8 +3,8 @@
 Candidates are the named surfaces of the bodies that no support holds across. Two of them are a pair if they face each
 other (see `facing`), at any distance: a pair that is far apart costs no more than the bounds of its motion. The softer
 body is the slave; of two that are equally stiff the one with the smaller facets; then the first one in the case.
-Obstacles, rigid bodies and closed faces of the flow's box are masters. Bodies that a pair of the case names are
-left to such pairs.
+Obstacles and rigid bodies are masters. Free rigid bodies may come to any side of an elastic
+one. Bodies that a pair of the case names are left to such pairs. Faces of the box need none (`wall_pairs`).
 """
 
 from __future__ import annotations
@@ -17,11 +17,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.builder.box_obstacles import with_faces
 from fsci.builder.facing import Face, face, faces, meeting
 from fsci.builder.on_first import shared
 from fsci.case import Case
-from fsci.case.contact import Friction, ObstacleSection, PairSection, Side
+from fsci.case.contact import Friction, PairSection, Side
 from fsci.case.material import Material
 from fsci.case.supports import SupportSection
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body
@@ -46,6 +45,7 @@ class Candidate:
     side: dict[str, str]  #: body or obstacle -> name
     faces: list[Face]
     stiffness: float  #: mean of Young's modulus [Pa], infinite if rigid
+    free: bool = False  #: a rigid body that forces move
 
     @property
     def name(self) -> str:
@@ -67,24 +67,16 @@ def with_pairs(case: Case, comm: MPI.Comm | None = None) -> Case:
         return case.model_copy(update={"contact": contact})
     chosen = list(case.elastic_bodies) if case.contact.bodies == "all" else list(case.contact.bodies)
 
-    def find() -> tuple[dict[str, PairSection], dict[str, ObstacleSection]]:
-        meshes = {name: read_body(case, name) for name in chosen}
-        walled = with_faces(case, meshes)
-        assert walled.contact is not None
+    def find() -> dict[str, PairSection]:
         assert case.contact is not None
-        pairs, own = find_pairs(walled, meshes), case.contact
-        touched = {side.obstacle for pair in pairs.values() for _, side in pair.sides}
-        new = {name: one for name, one in walled.contact.obstacles.items() if name in touched - own.obstacles.keys()}
-        return {name: pair for name, pair in pairs.items() if name not in own.pairs}, new
+        pairs = find_pairs(case, {name: read_body(case, name) for name in chosen})
+        return {name: pair for name, pair in pairs.items() if name not in case.contact.pairs}
 
     # what the case names stays where it is: its formulas cannot be sent
-    found, faces = find() if comm is None else shared(comm, find)
-    pairs, obstacles = case.contact.complete_pairs | found, case.contact.obstacles | faces
-    if not pairs:
+    pairs = case.contact.complete_pairs | (find() if comm is None else shared(comm, find))
+    if not pairs and case.coupling is None:  # in a flow there are walls
         raise case.error(("contact", "bodies"), "no named surfaces of these bodies can meet: name the pairs")
-    return case.model_copy(
-        update={"contact": case.contact.model_copy(update={"pairs": pairs, "obstacles": obstacles, "bodies": None})}
-    )
+    return case.model_copy(update={"contact": case.contact.model_copy(update={"pairs": pairs, "bodies": None})})
 
 
 def find_pairs(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, PairSection]:
@@ -96,7 +88,7 @@ def find_pairs(case: Case, meshes: Mapping[str, Mesh]) -> dict[str, PairSection]
     for first, second in combinations(candidates(case, meshes), 2):
         if first.rigid or not first.faces or not second.faces or {first.name, second.name} in named:
             continue
-        for pair in meeting(first.faces, second.faces, case.contact.reach):
+        for pair in meeting(first.faces, second.faces, case.contact.reach, anywhere=second.free):
             name, settings = _pair(case, (first, second), pair, tied)
             if settings.slave not in tied:
                 found[name] = settings
@@ -125,8 +117,11 @@ def _pair(
     words = []
     for body, surface in sides:
         words += [*body.side.values(), *([] if body.rigid else [surface.name])]
-    name = "_".join("".join(c if c.isalnum() or c in "_-" else "_" for c in word) for word in words)
-    return name, PairSection(slave=found[0], master=found[1], friction=case.contact.friction or Friction())
+    return _name(words), PairSection(slave=found[0], master=found[1], friction=case.contact.friction or Friction())
+
+
+def _name(words: Sequence[str]) -> str:
+    return "_".join("".join(c if c.isalnum() or c in "_-" else "_" for c in word) for word in words)
 
 
 def _side(body: Candidate, surface: Face) -> Side:
@@ -161,7 +156,7 @@ def _obstacle(case: Case, name: str) -> Candidate:
 
 def _rigid_body(case: Case, name: str) -> Candidate:
     found = [face(read_rigid_body(case, name)[0], case.rigid_surfaces[name].on)]
-    return Candidate({"obstacle": name}, found, np.inf)
+    return Candidate({"obstacle": name}, found, np.inf, free=name in (case.rigid or {}))
 
 
 def holds(support: SupportSection, face: Face) -> bool:

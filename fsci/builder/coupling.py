@@ -54,15 +54,16 @@ def build_coupled(
     assert case.coupling is not None
     assert case.fluid is not None
     skins = [_skin(case, comm, body) for body in bodies]
-    surfaces = wetted_surfaces(structure, [skin for skin, _ in skins])
+    walls, film = _walls(case, comm, structure), None if case.contact is None else case.contact.film
+    # with dry contact, bodies move as without contact until they are near a wall
+    near_walls = walls.dofs if walls is not None and film is not None and film.closed != "dry" else None
+    surfaces = wetted_surfaces(structure, [skin for skin, _ in skins], near_walls)
     given, elastic = build_rigid_bodies(case, comm), [in_fluid(surface) for surface in surfaces]
     immersed = immerse(elastic + _moved(rigid), given, case.time.start, rigid=_names(rigid))
     dry_sides = [_dry_side(s, c) for s, (_, c) in zip(surfaces, skins, strict=True) if c is not None]
     immersed += [ImmersedBody(_dry_surface(side), None, deforms=True, sweeps=True) for side in dry_sides]
     fluid = build_fluid(case, comm, timer, immersed)
-    seal = None if case.contact is None else case.contact.film.seal
-    layers = {} if seal is None else sealing_layers(surfaces, seal)
-    walls = _walls(case, comm, structure)
+    layers = {} if film is None or film.seal is None else sealing_layers(surfaces, film.seal)
     if rigid is None:
         return _scheme(case, coupled_elastic(fluid, Elastic(structure, surfaces), dry_sides, layers, walls)), fluid
     from coupling.composite_parts import coupled_both

@@ -67,14 +67,25 @@ def faces(mesh: Mesh) -> list[Face]:
     return found
 
 
-def meeting(first: Sequence[Face], second: Sequence[Face], reach: float | None = None) -> list[tuple[Face, Face]]:
-    """Surfaces of two bodies that may touch. A surface within a cavity may touch that cavity only."""
+def meeting(
+    first: Sequence[Face], second: Sequence[Face], reach: float | None = None, *, anywhere: bool = False
+) -> list[tuple[Face, Face]]:
+    """Surfaces of two bodies that may touch. A surface within a cavity may touch that cavity only.
+
+    anywhere: one of the bodies may come to any side of the other one; else they face each other.
+    """
     hulls = [_hull(first), _hull(second)]
     sides = []
     for own, other in ((first, hulls[1]), (second, hulls[0])):
         around = [face for face in own if face.cavity and _contains(face.box, other)]
         sides.append(around or [face for face in own if not face.cavity])
-    return [(a, b) for a in sides[0] for b in sides[1] if face_each_other(a, b, reach)]
+    found = _within if anywhere else face_each_other
+    return [(a, b) for a in sides[0] for b in sides[1] if found(a, b, reach)]
+
+
+def _within(a: Face, b: Face, reach: float | None) -> bool:
+    """Some of their facets are at most so far [m] apart."""
+    return reach is None or any(float(np.linalg.norm(b.middles - x, axis=1).min()) <= reach for x in a.middles)
 
 
 def face_each_other(a: Face, b: Face, reach: float | None = None) -> bool:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import nan
 from typing import TYPE_CHECKING
 
 from mpi4py import MPI
 
+from fsci.builder.closed_parts import closed_parts
 from fsci.builder.columns import Table
 from fsci.builder.loads import build_loads
 from fsci.builder.named import named
@@ -163,18 +165,33 @@ def _overlap(case: Case, structure: Structure, name: str) -> probes.Probe:
 def _on_pair(
     case: Case, structure: Structure, name: str, of_contact: Callable[[Contact, int], probes.Probe]
 ) -> probes.Probe:
-    """The probe of a pair of the present contact, which grows when a body comes near to a wall. Raises CaseError."""
+    """The probe of a pair of the present contact, which has pairs with walls once they are near. Raises CaseError.
+
+    Until then it has no pressure and no overlap, and its gap is not a number.
+    """
     from solvers.contact.contact import Contact
 
-    pairs, wanted = [] if case.contact is None else list(case.contact.pairs), case.probes[name].pair
+    settings = case.probes[name]
+    wanted = settings.pair
+    pairs = [*([] if case.contact is None else case.contact.pairs), *_wall_pairs(case)]
     if wanted not in pairs:
         raise case.error(("probes", name, "pair"), f"unknown pair '{wanted}' (available: {', '.join(pairs)})")
+    away = 0.0 if settings.quantity in ("pressure", "overlap") else nan
 
     def probe() -> dict[str, float]:
-        assert isinstance(structure.constraint, Contact)
-        return of_contact(structure.constraint, pairs.index(wanted))()
+        contact = structure.constraint
+        if not isinstance(contact, Contact) or wanted not in contact.names:
+            return {"": away}
+        return of_contact(contact, contact.names.index(wanted))()
 
     return probe
+
+
+def _wall_pairs(case: Case) -> list[str]:
+    """Names of the pairs of elastic bodies with closed faces of the box."""
+    if case.contact_off or case.coupling is None:
+        return []
+    return [f"{body}_{wall.name}" for body in case.elastic_bodies for wall in closed_parts(case)]
 
 
 #: How the probes of a structure are made.

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.builder.automatic_pairs import holds
-from fsci.builder.box_obstacles import ON_FACE
 from fsci.builder.closed_parts import ClosedPart, closed_parts
 from fsci.builder.facing import face
 from fsci.case import Case
@@ -25,6 +24,9 @@ from solvers.mesh.topology import boundary_facets, cut_out, surface_facets
 
 Array = NDArray[np.float64]
 Facets = NDArray[np.int64]
+
+#: Distance from a face relative to the box or the body up to which something lies on it: rounding of meshes.
+ON_FACE = 1e-6
 
 
 @dataclass(frozen=True)

@@ -106,6 +106,8 @@ class Case(Section):
         """Elastic bodies that may touch something."""
         if self.contact is None:
             return set()
+        if self.coupling is not None:  # there are walls
+            return set(self.elastic_bodies)
         named = self.elastic_bodies if self.contact.bodies == "all" else self.contact.bodies or ()
         sides = [side for pair in self.contact.pairs.values() for _, side in pair.sides]
         return {*named, *(side.body for side in sides if side.body is not None)}

@@ -171,8 +171,8 @@ def _needs(case: Case, structure: StructureSection, body: BodySection, keys: Key
 
 
 def _contact(case: Case, contact: ContactSection) -> Iterator[Mistake]:
-    of_free_bodies = case.rigid is not None
-    if not contact.pairs and contact.bodies is None and not of_free_bodies:
+    without_pairs = case.rigid is not None or case.coupling is not None  # of free bodies, and with walls
+    if not contact.pairs and contact.bodies is None and not without_pairs:
         missing: Keys = ("contact", "pairs") if "pairs" in contact.model_fields_set else ("contact",)
         yield missing, "'contact' needs 'pairs', or 'bodies: all' for automatic pairs"
     if "restitution" in contact.model_fields_set and case.rigid is None:

@@ -44,7 +44,7 @@ def probe_mistakes(case: Case) -> Iterator[Mistake]:
         if set(probe.columns(name, 3)) & set(RESERVED_COLUMNS):
             yield keys, f"a probe cannot be called '{name}': history.csv has a column of this name"
         yield from length_mistakes(probe.at, case.dimension, (*keys, "at"))
-        pairs = {} if case.contact is None else case.contact.pairs
+        pairs = [*([] if case.contact is None else case.contact.pairs), *_wall_pairs(case)]
         found_later = case.contact is not None and case.contact.bodies is not None
         if probe.pair is not None and probe.pair not in pairs and not found_later:
             yield (*keys, "pair"), f"unknown pair '{probe.pair}'{did_you_mean(probe.pair, pairs)}"
@@ -170,14 +170,17 @@ def verify_mistakes(case: Case) -> Iterator[Mistake]:
             yield (*keys, "from"), f"'from' must be a time of the run, {span}, not {check.start:g}"
 
 
-def _of_walls(case: Case) -> list[str]:
-    """Columns of elastic bodies that meet faces of the box, whichever of them may."""
-    if case.fluid is None or case.coupling is None or case.contact_off or not case.elastic_bodies:
+def _wall_pairs(case: Case) -> list[str]:
+    """Pairs of elastic bodies with faces of the box, whichever of them may meet."""
+    if case.fluid is None or case.coupling is None or case.contact_off:
         return []
     faces = [(name, face) for name, patch in case.fluid.patches.items() for face in patch.on]
     names = [f"{name}_{face[0]}_{'low' if face[1] == '-' else 'high'}" for name, face in faces]
-    axes = "xyz"[: case.fluid.grid.dimension]
-    return [
-        *CONTACT_COLUMNS,
-        *(f"contact.{body}_{name}.{axis}" for body in case.elastic_bodies for name in names for axis in axes),
-    ]
+    return [f"{body}_{name}" for body in case.elastic_bodies for name in names]
+
+
+def _of_walls(case: Case) -> list[str]:
+    """Columns of pairs with walls."""
+    pairs = _wall_pairs(case)
+    columns = [f"contact.{pair}.{axis}" for pair in pairs for axis in "xyz"[: case.dimension or 3]]
+    return [*(CONTACT_COLUMNS if pairs else ()), *columns]

@@ -47,26 +47,37 @@ class Placed:
 
 def overlaps(case: Case, bodies: list[Placed], pairs: dict[str, PairSection]) -> Iterator[tuple[bool, Keys, str]]:
     """(only a note, path, text) of bodies that overlap at the start."""
-    by_name = {body.name: body for body in bodies if body.moves}
-    if len(by_name) < 2:
+    by_name = {body.name: body for body in bodies if body.moves or _rests(case, body.name)}
+    if not any(body.moves for body in by_name.values()):
         return
     found = Overlaps([_at_rest(body) for body in by_name.values()], {}, case.joined)
     found.start(case.time.start)
     for one, other, depth in found.overlapping():
         first, second = by_name[one], by_name[other]
+        if {first.moves, second.moves} != {True} and (first.elastic or second.elastic):
+            continue  # an elastic body that is held in a given one
         pair = _pair(pairs, first.name, second.name)
         how = f"{depth:.3g} {case.units.length} deep"
         if pair is not None:
             names = f"bodies '{first.name}' and '{second.name}' of pair '{pair}'"
             yield True, second.keys, f"{names} overlap, {how}, which contact has to push apart at once"
         else:
-            remedy = "move one of them, or make their surfaces a pair of contact"
+            remedy = "move one of them"
+            if first.elastic or second.elastic:
+                remedy += ", or make their surfaces a pair of contact"
+            else:
+                remedy += ": they have no contact"
             yield False, second.keys, f"bodies '{first.name}' and '{second.name}' overlap, {how}: {remedy}"
 
 
 def _at_rest(body: Placed) -> MovingBody:
     facets, nodes = tessellate(body.mesh)
-    return MovingBody(body.name, facets, lambda t: body.mesh.points[nodes], free=True)
+    return MovingBody(body.name, facets, lambda t: body.mesh.points[nodes], free=body.moves)
+
+
+def _rests(case: Case, name: str) -> bool:
+    body = None if case.fluid is None else case.fluid.bodies.get(name)
+    return body is not None and body.motion is None and body.free is None
 
 
 def _pair(pairs: dict[str, PairSection], first: str, second: str) -> str | None:

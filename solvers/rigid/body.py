@@ -137,4 +137,6 @@ def hinged(body: RigidBody, pivot: Sequence[float]) -> RigidBody:
 
 def in_space(vectors: Array) -> Array:
     """Vectors in 3D, with zeros as the missing components, shape (n, 3)."""
-    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
+    found = np.zeros((len(vectors), 3))
+    found[:, : vectors.shape[1]] = vectors
+    return found

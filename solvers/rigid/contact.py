@@ -77,6 +77,11 @@ class RigidContact:
         return self.touch.force(self.z, self._unknowns) if len(self.z) else np.zeros(self._unknowns)
 
     @property
+    def whole_force(self) -> Array:
+        """The same with that on held unknowns, which the bodies do not feel."""
+        return self._of_all(self.near).force(self.z, self._unknowns) if len(self.z) else np.zeros(self._unknowns)
+
+    @property
     def active(self) -> NDArray[np.bool_]:
         """Mask of the near vertices in contact, shape (m,)."""
         return self.z[:, 0] > 0.0
@@ -162,11 +167,15 @@ class RigidContact:
 
     def closed(self, mass: Sparse, without: Array, force: Array, gyroscopic: Array) -> Closed:
         """The contacts that are closed; all by unknown, see `Closed`; without: velocities, also of held unknowns."""
-        assert self._moment is not None
         near, touch = self.near[self.active], self.touch[self.active]
-        held = near.touch(self._moment, self._components, np.ones(self._unknowns, dtype=bool))
-        given = near.in_frame(near.given) / self._moment.dt + held.motion(without) - touch.motion(without)
+        assert self._moment is not None
+        given = near.in_frame(near.given) / self._moment.dt + self._of_all(near).motion(without) - touch.motion(without)
         return Closed(near, touch, self._moment, mass, given, force, gyroscopic)
+
+    def _of_all(self, near: Near) -> Touch:
+        """Relative motions by all unknowns, those that are held, too."""
+        assert self._moment is not None
+        return near.touch(self._moment, self._components, np.ones(self._unknowns, dtype=bool))
 
     def numbers(self, forces: Array) -> dict[str, float]:
         """Columns of the history; forces: on each body [N], shape (bodies, dim)."""

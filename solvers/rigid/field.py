@@ -483,7 +483,7 @@ class RigidBodies:
         if self.contact is None:
             return {}
         w = self._pressed_weight
-        total = self.contact.force + w * self.pressed + (1.0 - w) * self.pressed_old
+        total = self.contact.whole_force + w * self.pressed + (1.0 - w) * self.pressed_old
         return self.contact.numbers(total.reshape(len(self.bodies), -1)[:, : self.dim])
 
     def save(self) -> State:

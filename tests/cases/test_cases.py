@@ -130,7 +130,7 @@ def assert_same(first, second):
 
 #: tests of their own run them to their end
 WHOLE = ("double_arch", "falling_sphere", "ironing", "piston_impact", "rebound_stokes", "sphere_tube", "two_tori")
-WHOLE += ("valve", "valve_thin", "valve_3d")
+WHOLE += ("valve", "valve_thin", "valve_3d", "hopper")
 #: earlier ends [s]: two of three maxima, one of four periods, after the largest force
 EARLIER = {"flap": 2.6, "cavity_flexible_bottom": 56.0, "torus_rough": 0.42}
 VERIFIED = [folder.name for folder in CASES if folder.name not in (*LONG, *WHOLE, "fsi3")]

@@ -90,11 +90,47 @@ def test_the_floor_carries_the_weight_less_the_force_of_the_fluid(tmp_path, sche
     assert abs(found["contact.block_floor_y_low.x"][-1]) < 1e-9 * WEIGHT
 
 
+@pytest.mark.parametrize("film", ["zone: wetted", "roughness: 0.002"])
+def test_with_fluid_below_it_the_floor_carries_the_weight_less_the_buoyancy(tmp_path, film):
+    """Wetted and seeping contact have the pressure of the fluid below the block, too."""
+    deep = changed(BLOCK, ("  viscosity: 0.1", "  viscosity: 0.1\n  gravity: [0, -10]"), ("end: 0.8", "end: 1.2"))
+    found = run(deep + f"contact: {{film: {{{film}}}}}\n", tmp_path)
+    buoyancy = 10.0 * 0.4 * 0.2
+    force = found["contact.block_floor_y_low.y"][-1]
+    assert force == pytest.approx(WEIGHT - found["on_block.y"][-1], rel=1e-6)
+    assert force == pytest.approx(WEIGHT - buoyancy, rel=1e-3)
+
+
 def test_a_block_in_space(tmp_path):
     found = run(changed(BLOCK, *SPACE.items()), tmp_path)
     weight = 0.4 * WEIGHT
     assert found["centre.z"].min() > 0.09
     assert found["contact.block_floor_z_low.z"][-1] == pytest.approx(weight - found["on_block.z"][-1], rel=1e-6)
+
+
+PROBES = """probes:
+  gap: {quantity: gap, pair: block_floor_y_low}
+  pressure: {quantity: pressure, pair: block_floor_y_low}
+  first: {quantity: first_contact, pair: block_floor_y_low}
+"""
+
+
+def test_probes_of_pairs_with_walls(tmp_path):
+    """The floor comes in during the run; then the gap closes, and there is a pressure."""
+    text = changed(BLOCK, ("probes:\n", PROBES), ("end: 0.8", "end: 0.3"))
+    found = run(text, tmp_path)
+    assert np.isnan(found["gap"][0])
+    assert found["pressure"][0] == 0.0
+    touching = found["contact.block_floor_y_low.y"] > 0.0
+    assert touching.any()
+    assert (found["pressure"] > 0.0).tolist() == touching.tolist()
+    assert np.abs(found["gap"][touching]).max() < 1e-3
+    assert found["first"][-1] == pytest.approx(found["time"][touching][0])
+    for wrong, said in (("roof_y_high", "unknown pair"), ("top_y_high", "available: block_sides_x_low")):
+        with pytest.raises(CaseError, match=said):
+            run(
+                changed(text, ("first_contact, pair: block_floor_y_low", f"gap, pair: block_{wrong}")), tmp_path / wrong
+            )
 
 
 def test_a_body_that_stays_away_moves_as_without_contact(tmp_path):
@@ -105,6 +141,16 @@ def test_a_body_that_stays_away_moves_as_without_contact(tmp_path):
     assert list(found) == list(alone)
     for column in found.keys() - {"wall"}:
         assert np.array_equal(found[column], alone[column]), column
+
+
+def test_bodies_all_does_not_find_walls_anew(tmp_path):
+    """Bit for bit as without a section."""
+    text = changed(BLOCK, ("end: 0.8", "end: 0.2"), ("0.333, 0.05", "0.333, 0.02"))
+    found, plain = run(text + "contact: {bodies: all}\n", tmp_path / "section"), run(text, tmp_path / "plain")
+    assert plain["contact.block_floor_y_low.y"].max() > 1.0
+    assert list(found) == list(plain)
+    for column in found.keys() - {"wall"}:
+        assert np.array_equal(found[column], plain[column]), column
 
 
 def test_a_disc_bounces_in_both_schemes_alike(tmp_path):
@@ -216,6 +262,13 @@ def test_all_closed_faces(tmp_path):
     assert pairs(BLOCK + "contact: none\n", tmp_path) == {}
     lid = changed(BLOCK, ("outflow: true", "velocity: [1, 0]"), ("viscosity: 0.1", "viscosity: 0.1\n  gravity: [0, 0]"))
     assert pairs(lid, tmp_path) == ALL | {"block_top_y_high": 14}
+
+
+def test_friction_of_walls_needs_no_pairs(tmp_path):
+    (tmp_path / "case.yaml").write_text(BLOCK + "contact: {friction: {coefficient: 0.3}}\n")
+    case = with_pairs(load_case(tmp_path / "case.yaml"))
+    found = wall_pairs(case, {"block": read_body(case, "block")})
+    assert [pair.friction.coefficient for pair in found] == [0.3] * 3
 
 
 def test_names_are_free(tmp_path):

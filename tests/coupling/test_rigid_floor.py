@@ -48,6 +48,45 @@ def test_a_disc_stops_on_the_floor(tmp_path):
     assert found["contact.on_disc.y"][-1] == pytest.approx(WEIGHT - found["on_disc.y"][-1], rel=1e-6)
 
 
+#: The same disc on the floor, which gravity makes a slope, in next to no fluid.
+SLOPE = (
+    FALLING.split("verify:")[0]
+    .replace("density: 1\n  viscosity: 0.05", "density: 1.0e-5\n  viscosity: 1.0e-8")
+    .replace("gravity: [0, -10]", "gravity: [2, -10]WAYS")
+    .replace("[0.528, 0.25]", "[0.228, 0.15008]")
+    .replace("end: 0.5", "end: 0.3")
+    + "contact: {friction: {coefficient: MU}}\n"
+)
+#: Without fluid, on an obstacle that is higher by what a flow leaves open.
+DRY = """\
+time: {step: 0.02, end: 0.3}
+rigid:
+  dynamics: {rho_inf: 0}
+  bodies:
+    disc: {mesh: {shape: disc, radius: 0.15, cells: [24, 1], translate: [0.228, 0.15008]}, density: 8, gravity: [2, -10]WAYS}
+contact:
+  friction: {coefficient: MU}
+  obstacles: {floor: {mesh: {shape: rectangle, size: [3, 0.2], cells: [1, 1], origin: [-1, -0.19992]}, on: top}}
+probes: {centre: {body: disc, quantity: centre}}
+output: {fields_every: 0}
+"""  # noqa: E501
+
+
+@pytest.mark.parametrize(("friction", "held"), [(0.5, False), (0.25, True), (0.1, True)])
+def test_friction_with_the_floor_in_a_flow(tmp_path, friction, held):
+    """A disc rolls as without a fluid. One that does not turn rests below the angle of friction, or slides."""
+    texts = [
+        text.replace("WAYS", ", held: [rotation]" if held else "").replace("MU", str(friction)) for text in (SLOPE, DRY)
+    ]
+    wet, dry = run(texts[0], tmp_path / "wet")["centre.x"], run(texts[1], tmp_path / "dry")["centre.x"]
+    way = wet[-1] - 0.228
+    assert way == pytest.approx(dry[-1] - 0.228, rel=1e-3, abs=1e-9)
+    if held:
+        assert way == pytest.approx(0.5 * max(0.0, 2.0 - 10.0 * friction) * 0.3**2, rel=1e-3, abs=1e-9)
+    else:
+        assert way > 0.05
+
+
 def test_without_contact_it_ends_at_the_wall(tmp_path):
     text = FALLING.split("verify:")[0] + "contact: none\n"
     (tmp_path / "case.yaml").write_text(text)

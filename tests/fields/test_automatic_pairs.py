@@ -279,3 +279,24 @@ def test_verify_knows_the_columns_of_friction_by_default(tmp_path):
         else:
             with pytest.raises(CaseError, match=r"contact\.friction"):
                 load_case(path)
+
+
+def test_free_bodies_come_to_any_side(tmp_path):
+    """A ball above a block may fall down beside it: all sides that are not held, within the reach."""
+    path = tmp_path / "case.yaml"
+    path.write_text(
+        """\
+time: {step: 1, end: 1}
+structure:
+  dynamics: {}
+  bodies:
+    block:
+      mesh: {shape: rectangle, size: [1, 1], cells: [2, 2]}
+      material: {law: neo_hooke, E: 1, nu: 0.3, density: 1}
+      supports: [{on: left, displacement: [0, 0]}]
+rigid: {bodies: {ball: {mesh: {shape: disc, radius: 0.2, cells: [8, 1], translate: [0.5, 1.5]}, density: 1}}}
+contact: {bodies: all}
+"""
+    )
+    assert pairs_of(path) == {("block.top", "ball"), ("block.right", "ball"), ("block.bottom", "ball")}
+    assert pairs_of(path, ("contact.reach", "0.5")) == {("block.top", "ball")}

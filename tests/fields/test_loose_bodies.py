@@ -196,8 +196,11 @@ def test_in_statics_nothing_moves_a_body_that_nothing_holds(tmp_path):
     assert "and springs where it is near other rigid bodies" in done.stdout + done.stderr
 
 
+SIDES = ("top", "left", "right")
+
+
 def test_the_tool_is_as_well_a_body_of_the_section_rigid(tmp_path):
-    """The same stamp under `rigid`: the same numbers; so is `bodies: all`."""
+    """The same stamp under `rigid`: the same numbers; `bodies: all` pairs it with all sides that are not held."""
     force = run(tmp_path / "a", PRESS, ("time.end", "12"))
     settings = PRESS[PRESS.index("free: {density: 1.0e-3, ") : PRESS.index("\nprobes")]
     inner = settings[len("free: {") : -1]
@@ -207,9 +210,11 @@ def test_the_tool_is_as_well_a_body_of_the_section_rigid(tmp_path):
     loose = run(tmp_path / "b", rigid, ("time.end", "12"))
     pairs = rigid[rigid.index("  pairs:") : rigid.index("probes:")]
     found = run(tmp_path / "c", rigid.replace(pairs, "  bodies: all\n"), ("time.end", "12"))
+    sides = ", ".join(f"{a}: {{slave: {{body: block, on: {a}}}, master: {{obstacle: stamp}}}}" for a in SIDES)
+    named = run(tmp_path / "d", rigid.replace(pairs, f"  pairs: {{{sides}}}\n"), ("time.end", "12"))
     for name in ("stamp.y", "depth.x", "depth.y"):
         assert loose[name] == pytest.approx(force[name], rel=1e-9, abs=1e-12)
-        assert found[name] == pytest.approx(force[name], rel=1e-9, abs=1e-12)
+        assert found[name] == pytest.approx(named[name], rel=1e-9, abs=1e-12)
 
 
 def test_an_obstacle_turns(tmp_path):

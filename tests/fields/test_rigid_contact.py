@@ -112,6 +112,19 @@ def test_the_order_of_bodies_does_not_matter():
     assert one["d3"][1] < -0.5
 
 
+def test_the_force_on_what_is_held_is_that_of_contact():
+    """A block lies on a table that cannot move."""
+    table = polygon("table", SQUARE * [4.0, 1.0], held=dict.fromkeys(("x", "y", "rotation_z"), lambda t: 0.0))
+    block = polygon("block", SQUARE + np.array([0.0, 1.0]), gravity=(0.0, -10.0))
+    bodies = field([table, block], [RigidPair(1, 0)], rho_inf=0.5)
+    for _ in march(bodies, 0.3, 15):
+        pass
+    found = bodies.numbers()
+    weight = 10.0 * block.inertia.mass
+    assert found["contact.on_block.y"] == pytest.approx(weight, rel=1e-8)
+    assert found["contact.on_table.y"] == pytest.approx(-weight, rel=1e-8)
+
+
 def test_a_wall_ends_where_its_patch_does():
     part = RigidWall("part", np.zeros(2), np.array([0.0, 1.0]), lambda x: x[0] > 0.0)
     found = part.gaps(np.array([[0.5, -0.1], [-0.5, -0.1], [0.5, 2.0]]))

@@ -89,6 +89,29 @@ def test_bodies_that_overlap():
 
 
 @pytest.mark.usefixtures("in_new_folder")
+def test_a_free_body_in_a_given_one():
+    """Contact leaves them out, so that the case should not begin like this; two given bodies may overlap."""
+    text = """\
+time: {step: 0.1, end: 1}
+fluid:
+  density: 1
+  viscosity: 1
+  grid: {from: [0, 0], to: [4, 4], cells: [120, 120]}
+  patches: {walls: {on: [x-, x+, y-, y+], no_slip: true}}
+  bodies:
+    post: {mesh: {shape: rectangle, size: [0.5, 1], cells: [1, 1], origin: [1, 1]}}
+    beam: {mesh: {shape: rectangle, size: [1, 0.5], cells: [1, 1], origin: [1.25, 1.5]}}
+    disc: {mesh: {shape: disc, radius: 0.5, cells: [32, 1], translate: [0.6, 1.5]}, free: {density: 2}}
+coupling: {}
+"""
+    said = [line for line in warnings(text)[0] if "overlap" in line]
+    assert said == [
+        "case.yaml:10:11: bodies 'post' and 'disc' overlap, 0.1 m deep: move one of them: they have no contact"
+    ]
+    assert [line for line in warnings(text.replace("0.6, 1.5", "0.4, 1.5"))[0] if "overlap" in line] == []
+
+
+@pytest.mark.usefixtures("in_new_folder")
 @pytest.mark.parametrize("origin", ["1", "1.2", "1 - 1e-12"])
 def test_bodies_side_by_side(origin):
     assert warnings(TWO.replace("0.7", origin)) == ([], [])
