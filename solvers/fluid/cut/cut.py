@@ -25,7 +25,7 @@ from solvers.mesh.tessellation import unit_normals
 #: Layers of cells around those of a process that it cuts too, beyond those of the strip: roots may lie there.
 MARGIN = 4
 
-#: Share of fluid up to which a cell stays solid if surfaces touch in it, in steady flows. Forces and displacements of a
+#: Share of fluid up to which a cell stays solid once surfaces touch in it. In steady flows forces and displacements of a
 #: flap on a stop are the same to six digits from 1e-5 to 1e-3; 1e-2 takes wedges beside the contact for slits (8 %).
 SLIT = 1e-3
 
@@ -80,12 +80,17 @@ class Cutter:
         unions: bool = False,
         tied: NDArray[np.bool_] | None = None,
         closing: NDArray[np.bool_] | None = None,
+        steady: bool = True,
     ):
-        """Masks of facets, None: of no one. tied: to another body; closing: whose slits stay closed in a step."""
+        """Masks of facets, None: of no one. tied: to another body; closing: whose slits stay closed in a step.
+
+        steady: also slits that were closed when it began. Others may open then: unsteady flows have a history.
+        """
         self.grid, self.points, self.films, self.gaps, self.unions = grid, points, films, gaps, unions
-        self._tied, self._closing = tied, closing
+        self._tied, self._closing, self._steady = tied, closing, steady
         #: box cells in which surfaces touch in the latest cut, and those in which they did in this step, with `closing`
         self.closed, self._closed = (np.zeros(grid.grid.size, dtype=bool) for _ in range(2))
+        self._open = np.full(grid.grid.size, steady)  #: box cells that had fluid in this step; steady: all
         self._own = grid.grid.as_box(grid.in_box)
         self._special = np.zeros(grid.grid.size, dtype=bool)
         self._depth = 0
@@ -105,7 +110,7 @@ class Cutter:
 
     def begin_step(self) -> None:
         """Discard the cells with cut penalty of the last step, and those whose surfaces touch no more."""
-        self._closed = self.closed.copy()
+        self._closed, self._open = self.closed & self._steady, np.full(len(self.closed), self._steady)
         self.forget()
 
     def restore(self, closed: NDArray[np.int64]) -> None:
@@ -178,7 +183,8 @@ class Cutter:
             self.closed = still
             self.closed[moments.cells[moments.piece_cell[self._closing[moments.piece_facet]]]] = True
             self.closed &= touching
-            self._closed |= self.closed
+            self._closed |= self.closed & self._open
+            self._open |= ~solid
         local_cut, local_strip = is_cut[grid.numbers], strip[grid.numbers]
         is_active = (~solid | strip) & np.isfinite(moments.fraction)
         active = is_active[grid.numbers]
