@@ -1,4 +1,4 @@
-"""Bodies that sink in very viscous fluid, in steps of many relaxation times: their velocity is that at which drag is their weight."""
+"""Bodies that sink in very viscous fluid, in steps of many relaxation times: drag is soon their weight."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ def test_cylinder_that_slides_between_walls(element, scheme, dt, place):
     """It drives before it what it sweeps, and when it stops nothing flows: 0.18 % of an open channel did."""
 
     def slides(x, t):
-        return x + [min(t, 0.2) * 0.4, 0.0], np.broadcast_to([0.4 * (t < 0.2 + 1e-9), 0.0], x.shape)
+        return x + np.array([min(t, 0.2) * 0.4, 0.0]), np.broadcast_to([0.4 * (t < 0.2 + 1e-9), 0.0], x.shape)
 
     moved = body("c", disc(place, 0.5, 0.5), loop(48), motion=slides)
     found = rates([moved], element, dt, round(0.4 / dt), scheme)
@@ -127,7 +127,7 @@ def test_two_cylinders_that_touch_and_part(shift):
         return 0.08 * min(max(0.0, abs(t - 0.4) - 0.1) / 0.1, 1.0)
 
     def moves(x, t):
-        return x + [0.0, lift(t)], np.broadcast_to([0.0, (lift(t) - lift(t - 0.1)) / 0.1], x.shape)
+        return x + np.array([0.0, lift(t)]), np.broadcast_to([0.0, (lift(t) - lift(t - 0.1)) / 0.1], x.shape)
 
     lower = body("lower", disc(shift, 0.25, 0.25), loop(48))
     upper = body("upper", disc(shift, 0.8, 0.3), loop(48), motion=moves)

@@ -25,8 +25,8 @@ from solvers.mesh.tessellation import unit_normals
 #: Layers of cells around those of a process that it cuts too, beyond those of the strip: roots may lie there.
 MARGIN = 4
 
-#: Share of fluid up to which a cell stays solid once surfaces touch in it. In steady flows forces and displacements of a
-#: flap on a stop are the same to six digits from 1e-5 to 1e-3; 1e-2 takes wedges beside the contact for slits (8 %).
+#: Share of fluid up to which a cell stays solid once surfaces touch in it. Forces and displacements of a flap on a stop
+#: in a steady flow are the same to six digits from 1e-5 to 1e-3; 1e-2 takes wedges beside the contact for slits (8 %).
 SLIT = 1e-3
 
 
