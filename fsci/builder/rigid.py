@@ -39,13 +39,18 @@ def build_free_bodies(case: Case, comm: MPI.Comm, timer: Timer) -> RigidBodies:
 
 
 def _scheme(case: Case) -> GeneralisedAlpha:
-    """That of elastic bodies unless another one is given, so that momentum is kept where they touch."""
+    """That of elastic bodies unless another one is given, so that momentum is kept where they touch.
+
+    In a flow alone that with rho_inf 0: drag stops light bodies within a step, and anything else would let them swing.
+    """
     section = case.fluid or case.rigid_section
     own = None if section is None else section.dynamics
     if _static(case):
         return BACKWARD_EULER
     if own is None and case.structure is not None and case.structure.dynamics is not None:
         return case.structure.dynamics.generalised_alpha()
+    if own is None and case.fluid is not None:
+        return GeneralisedAlpha.from_rho_inf(0.0)
     return GeneralisedAlpha.from_rho_inf((own or RigidDynamics()).rho_inf)
 
 

@@ -190,7 +190,9 @@ class FluidSection(Section):
         ..., "conditions on the boundary of the box by name; where patches overlap, the one named last decides"
     )
     bodies: dict[Name, RigidBodySection] = setting(dict, "rigid bodies by name")
-    dynamics: RigidDynamics = setting(RigidDynamics, "time integration of free bodies")
+    dynamics: RigidDynamics | None = setting(
+        None, "time integration of free bodies; default: that of 'structure', or rho_inf 0, which damps like the flow"
+    )
     gravity: Vector | None = setting(None, "acceleration of gravity", unit="m/s^2")
     body_force: Vector | None = setting(None, "force per volume", unit="N/m^3")
     initial_velocity: Vector | None = setting(None, "velocity at the start; default: at rest", unit="m/s")

@@ -80,12 +80,21 @@ class Cutter:
         unions: bool = False,
         tied: NDArray[np.bool_] | None = None,
         closing: NDArray[np.bool_] | None = None,
+        steady: bool = True,
     ):
-        """Masks of facets, None: of no one. tied: to another body; closing: whose slits stay closed in a step."""
+        """Masks of facets, None: of no one. tied: to another body; closing: whose slits stay closed in a step.
+
+        In a steady flow those stay closed that have touched, up to a width. An unsteady one has a history on each side:
+        there a cell that has had fluid in a step loses it once, and for the rest of the step if it loses it again.
+        Fluid in a wedge beside contact pulls it shut, and without fluid it opens.
+        """
         self.grid, self.points, self.films, self.gaps, self.unions = grid, points, films, gaps, unions
-        self._tied, self._closing = tied, closing
+        self._tied, self._closing, self._steady = tied, closing, steady
         #: box cells in which surfaces touch in the latest cut, and those in which they did in this step, with `closing`
         self.closed, self._closed = (np.zeros(grid.grid.size, dtype=bool) for _ in range(2))
+        self._open = np.full(grid.grid.size, steady)  #: box cells that had fluid in this step; steady: all
+        #: box cells that had fluid again after they had closed in this step, and those that closed once more
+        self._again, self._shut = (np.zeros(grid.grid.size, dtype=bool) for _ in range(2))
         self._own = grid.grid.as_box(grid.in_box)
         self._special = np.zeros(grid.grid.size, dtype=bool)
         self._depth = 0
@@ -105,7 +114,8 @@ class Cutter:
 
     def begin_step(self) -> None:
         """Discard the cells with cut penalty of the last step, and those whose surfaces touch no more."""
-        self._closed = self.closed.copy()
+        self._closed, self._open = self.closed & self._steady, np.full(len(self.closed), self._steady)
+        self._again[:] = self._shut[:] = False
         self.forget()
 
     def restore(self, closed: NDArray[np.int64]) -> None:
@@ -156,7 +166,7 @@ class Cutter:
         if self._tied is not None:
             moments = without_slits(moments, self.points, self._tied, counts, self._slivers)
         if self._closing is not None:
-            still = self._closed & (moments.fraction > 1.0 - SLIT)
+            still = self._closed & (moments.fraction > 1.0 - SLIT) if self._steady else self._shut
             moments = filled(moments, self.points, still)
         if self.unions:
             moments = with_unions(box, self.points, moments, facets, x, off, self._tied, self._overlaps)
@@ -175,10 +185,13 @@ class Cutter:
         touching = solid & (self._facing(moments, counts, normal) | self._covered(motion.x[facets[~off]]))
         if self._closing is not None:
             touching |= still
-            self.closed = still
+            self.closed = still.copy()
             self.closed[moments.cells[moments.piece_cell[self._closing[moments.piece_facet]]]] = True
             self.closed &= touching
-            self._closed |= self.closed
+            self._shut |= self.closed & self._again
+            self._again |= self._closed & ~solid
+            self._closed |= self.closed & self._open
+            self._open |= ~solid
         local_cut, local_strip = is_cut[grid.numbers], strip[grid.numbers]
         is_active = (~solid | strip) & np.isfinite(moments.fraction)
         active = is_active[grid.numbers]

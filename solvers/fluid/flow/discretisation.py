@@ -84,9 +84,15 @@ def discretise(
     gaps = GapFinder(wall_faces(patches), settings.penalties) if settings.with_gaps and sheets is None else None
     in_contact = any(surface.in_contact is not None and surface.in_contact.any() for surface in surfaces)
     unions = grid.dim == 2 and sheets is None and len(bodies) > 1 and not in_contact
-    closing = dry_contact(surfaces) if settings.steady else None  # unsteady flows have a history on each side
     cutter = Cutter(
-        distributed, system.weights.points, films, gaps, unions=unions, tied=tied(surfaces), closing=closing
+        distributed,
+        system.weights.points,
+        films,
+        gaps,
+        unions=unions,
+        tied=tied(surfaces),
+        closing=dry_contact(surfaces),
+        steady=settings.steady,
     )
     levels = PressureLevels(system, bodies)
     moved = not settings.steady and not all(body.rests for body in bodies)

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from solvers.api import Array, State
+from solvers.api import Array, FailureKind, State, StepFailed
 from solvers.fluid.flow.carrier import Carrier
 from solvers.fluid.flow.history import Past
 from solvers.fluid.flow.sheet_transfer import Sides, along_surface, sides_of, transfer
 from solvers.fluid.geometry.pieces import off_boundary
 from solvers.fluid.geometry.thin.sheet_cycles import joined_in, recurring
-from solvers.fluid.geometry.thin.sheets import Sheets, find_sheets
+from solvers.fluid.geometry.thin.sheets import Sheets, find_sheets, way_is_closed
 from solvers.fluid.geometry.thin.thickness import THIN, THIN_IF_MOVING
 from solvers.fluid.geometry.thin.thinness import cell_sizes_at, may_be_thin
 from solvers.fluid.grid.box import Grid
@@ -32,6 +32,11 @@ from solvers.fluid.surfaces.surface import Motion, tied, wetness
 #: course. In 3D elastic bodies of 0.3 cells were computed; from one cell on it is as without separate cells, because
 #: no elastic body between one and two cells has been tried. They leak little (docs/theory_fsci.md).
 THICK_IN_CONTACT = {2: float(THIN), 3: 1.0}
+
+CLOSED_WAY = (
+    "bodies close a way of the fluid by touching each other or a wall; in nested and periodic cells both sides share "
+    "unknowns there, and fluid would pass: let them overlap by half a cell, or leave out 'refine' and 'periodic'"
+)
 
 
 def thickest(dim: int) -> float:
@@ -55,6 +60,9 @@ class ThinBodies:
         touch = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
         self._thick = THICK_IN_CONTACT[grid.dim] if touch else thickest(grid.dim)
         plain = not periodic and not isinstance(grid, Nested)
+        # what moves with the iterates would touch and part in the course of a step
+        self._thin, self._may_close = True, all(body.motion is not None for body in bodies)
+        self._plain = plain
         self._possible: bool | None = None if moving and plain else False
         self._x: Array | None = None
         self._searched = False  #: in this step, without a result: a search takes as long as a tenth of an iterate
@@ -70,10 +78,14 @@ class ThinBodies:
     def sheets(self, facets: NDArray[np.int64], motion: Motion) -> Sheets | None:
         """Sheets of the fluid around surfaces at their present positions.
 
-        None if no body has been thin yet, which the first position in a step decides.
+        None if no body has been thin yet, which the first position in a step decides. Raises StepFailed where bodies
+        close a way in nested or periodic cells.
         """
+        if self._may_close and not self._plain:
+            self._require_open(facets, motion.x)
         if self._possible is None:
-            self._possible = may_be_thin(self._grid, facets[self._wet], motion.x, self._thick)
+            self._thin = may_be_thin(self._grid, facets[self._wet], motion.x, self._thick)
+            self._possible = self._thin or self._may_close
         if not self._possible or (self._searched and not self.follows):
             return self._sheets
         if self._x is None or not np.array_equal(self._x, motion.x):
@@ -94,7 +106,24 @@ class ThinBodies:
         off = off_boundary(self._grid, x[facets])
         thin, always = THIN_IF_MOVING, self.follows
         ties = None if self._tied is None else (self._tied, self._wet)
-        return find_sheets(self._grid, facets, x, off, thin=thin, always=always, joined=self._joined, tied=ties)
+        return find_sheets(
+            self._grid,
+            facets,
+            x,
+            off,
+            thin=thin if self._thin else 0,
+            always=always,
+            closing=self._may_close,
+            joined=self._joined,
+            tied=ties,
+        )
+
+    def _require_open(self, facets: NDArray[np.int64], x: Array) -> None:
+        if self._x is not None and np.array_equal(self._x, x):
+            return
+        if way_is_closed(self._grid, facets, x):
+            raise StepFailed("fluid", FailureKind.CLOSED_WAY, CLOSED_WAY)
+        self._x = x
 
     def _join(self, parts: dict[int, frozenset[int]]) -> bool:
         """Keep parts joined until the step ends; returns whether some are new."""

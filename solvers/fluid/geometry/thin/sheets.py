@@ -238,14 +238,15 @@ def find_sheets(
 
     closing: also where bodies close a way, however thick they are.
 
-    bounds: facets that are not on the boundary of the box. thin: cells apart, at most, of the fluid on both sides.
+    bounds: facets that are not on the boundary of the box. thin: cells apart, at most, of the fluid on both sides; 0:
+    no body is thin.
     joined: parts of fluid in these cells at these facets share their nodes. tied: masks of the facets that are tied and
     of those that the flow acts on; None: no body is tied.
     """
     if not len(facets):
         return None
     may_close = closing and may_touch(grid, facets, x)
-    may_part = always or grid.dim == 2 or may_be_thin(grid, facets, x, CELL_DIAGONAL * (thin + 1))
+    may_part = always or (thin > 0 and (grid.dim == 2 or may_be_thin(grid, facets, x, CELL_DIAGONAL * (thin + 1))))
     if not (may_part or may_close):
         return None
     x = in_planes(grid, x)
@@ -255,11 +256,7 @@ def find_sheets(
         return None
     if tied is not None:
         moments = without_slits(moments, gauss(3)[0], tied[0], tied[1] & bounds, slivers_of(grid))
-    if grid.dim == 3:
-        parts, links, special, touching = parts_in_space(grid, moments, facets, x, LAYERS_AROUND)
-    else:
-        parts, special, touching = parts_of_fluid(grid, moments, facets, x, bounds)
-        links = links_of(grid, parts)
+    parts, links, special, touching = _all_parts(grid, moments, facets, x, bounds)
     if not parts and not always:  # all surfaces are outside of the box
         return None
     cells = np.array([part.cell for part in parts], dtype=np.int64)
@@ -312,6 +309,29 @@ def find_sheets(
         fluid,
         np.array(bounding, dtype=np.int64).reshape(-1, 2),
     )
+
+
+def _all_parts(grid: Grid, moments, facets: Indices, x: Array, bounds: Mask):
+    """(parts of fluid, their links, mask of special cells, cells in which bodies touch) of `find_sheets`."""
+    if grid.dim == 3:
+        return parts_in_space(grid, moments, facets, x, LAYERS_AROUND)
+    parts, special, touching = parts_of_fluid(grid, moments, facets, x, bounds)
+    return parts, links_of(grid, parts), special, touching
+
+
+def way_is_closed(grid: Grid, facets: Indices, x: Array) -> bool:
+    """Whether bodies close a way of the fluid by touching, so that both sides share nodes of the grid.
+
+    facets, x: as in `find_sheets`.
+    """
+    if not len(facets) or not may_touch(grid, facets, x):
+        return False
+    bounds, x = off_boundary(grid, x[facets]), in_planes(grid, x)
+    moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
+    if not are_apart(grid, uncut_cells(grid, moments)):
+        return False
+    parts, links, _, _ = _all_parts(grid, moments, facets, x, bounds)
+    return close_a_way(grid, moments, np.array([part.cell for part in parts], dtype=np.int64), links)
 
 
 def _opposed(grid: Grid, cells: Indices, facing: Array, close: Indices, thin: int) -> Indices:
