@@ -8,6 +8,10 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import pytest
 
+from fsci.run.copied_process import start_mpi_alone
+
+start_mpi_alone()
+
 START = time.monotonic()
 NO_TIME = "no time is left"
 

@@ -27,12 +27,28 @@ COMMON = (
     "meshio",
     "gmsh",
 )
+TRANSPORT = "OMPI_MCA_btl"  #: Open MPI reads it at its start
 
 
 def import_common() -> None:
     """Import what runs need."""
+    start_mpi_alone()
     for module in COMMON:
         import_module(module)
+
+
+def start_mpi_alone() -> None:
+    """MPI for this process alone, if it has not been started.
+
+    Open MPI would listen on a port. Copies share it, and have no thread to answer: a stranger that connects stops them.
+    """
+    before = os.environ.get(TRANSPORT)
+    os.environ[TRANSPORT] = "self"
+    import_module("mpi4py.MPI")
+    if before is None:
+        del os.environ[TRANSPORT]
+    else:
+        os.environ[TRANSPORT] = before
 
 
 def fsci(arguments: Sequence[str]) -> int:

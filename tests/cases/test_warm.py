@@ -6,6 +6,7 @@ import subprocess
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 from programs import new_process
@@ -28,6 +29,9 @@ structure:
 probes:
   end: {quantity: displacement, at: [1, 0.05]}
 """
+
+
+LONG = ("--set", "time.step=1e-5", "--set", "output.fields_every=0")
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +71,27 @@ def test_the_same_as_a_new_process(case, one, tmp_path):
             assert found[column].tolist() == expected[column].tolist()
 
 
+def listening():
+    """Numbers of the sockets that wait for connections from anywhere."""
+    lines = [
+        line.split() for path in ("/proc/net/tcp", "/proc/net/tcp6") for line in Path(path).read_text().splitlines()
+    ]
+    return {line[9] for line in lines if line[3] == "0A"}
+
+
+def test_nobody_can_connect_to_a_copy(case, one, tmp_path):
+    """Else a port of MPI is one of all copies; one that gets a stranger's message there waits for ever."""
+    out = tmp_path / "long"
+    with ThreadPoolExecutor(1) as pool:
+        run = pool.submit(one.run, "run", case, "-o", str(out), *LONG)
+        process = wait_for_steps(out)
+        sockets = {os.readlink(path).strip("socket:[]") for path in Path(f"/proc/{process}/fd").iterdir()}
+        waiting = sockets & listening()
+        os.kill(process, signal.SIGKILL)
+        run.result(60)
+    assert not waiting
+
+
 def test_one_process_is_started(case, tmp_path, monkeypatch):
     started = []
     monkeypatch.setattr(warm.subprocess, "Popen", lambda *a, **b: started.append(a) or POPEN(*a, **b))
@@ -92,9 +117,7 @@ def test_a_run_that_is_killed(case, one, tmp_path):
     """Its code says the signal; the next run is as good as ever."""
     out = tmp_path / "long"
     with ThreadPoolExecutor(1) as pool:
-        run = pool.submit(
-            one.run, "run", case, "-o", str(out), "--set", "time.step=1e-5", "--set", "output.fields_every=0"
-        )
+        run = pool.submit(one.run, "run", case, "-o", str(out), *LONG)
         os.kill(wait_for_steps(out), signal.SIGKILL)
         assert run.result(60).returncode == -signal.SIGKILL
     assert one.run("run", case, "-o", str(tmp_path / "next")).returncode == 0
@@ -104,9 +127,7 @@ def test_an_interrupted_run(case, one, tmp_path):
     """SIGINT ends it as it ends any run: code 3, and a checkpoint to go on from."""
     out = tmp_path / "long"
     with ThreadPoolExecutor(1) as pool:
-        run = pool.submit(
-            one.run, "run", case, "-o", str(out), "--set", "time.step=1e-5", "--set", "output.fields_every=0"
-        )
+        run = pool.submit(one.run, "run", case, "-o", str(out), *LONG)
         os.kill(wait_for_steps(out), signal.SIGINT)
         assert run.result(60).returncode == 3
     assert list((out / "checkpoint").iterdir())
