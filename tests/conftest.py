@@ -8,6 +8,10 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import pytest
 
+from fsci.run.copied_process import start_mpi_alone
+
+start_mpi_alone()
+
 START = time.monotonic()
 NO_TIME = "no time is left"
 
@@ -47,8 +51,8 @@ def runs_in_copies(monkeypatch):
     """Runs that `fsci twin`, `converge` and `stress` start on one process need no new process."""
     from types import SimpleNamespace
 
-    from programs import run_command
+    from programs import Copies, run_command
 
-    for module in ("fsci.twin.runs", "fsci.stress.program"):
-        changed = SimpleNamespace(**{**vars(subprocess), "run": run_command})
-        monkeypatch.setattr(f"{module}.subprocess", changed)
+    monkeypatch.setattr("fsci.stress.program.subprocess", SimpleNamespace(**{**vars(subprocess), "run": run_command}))
+    for module in ("fsci.twin.twin", "fsci.converge.converge"):
+        monkeypatch.setattr(f"{module}.WarmProcess", Copies)

@@ -70,11 +70,11 @@ def row(scene: str, value: str, exact: float, found: Mapping[str, Any], seconds:
 
 def markdown(rows: list[Row]) -> str:
     """The table of docs/converge.md: a line for each scene, errors and bands of its values [%]."""
-    lines = ["| scene | value: error/band [%] | verdict |", "|---|---|---|"]
+    lines = ["| scene | value: error/band [%] |", "|---|---|"]
     for scene, group in groupby(rows, key=lambda one: one["scene"]):
         of_scene = list(group)
         numbers = [f"{one['value']}: {_digits(one['error [%]'])}/{_digits(one['band [%]'])}" for one in of_scene]
-        lines.append(f"| {scene} | {', '.join(numbers)} | {_verdicts(of_scene)} |".replace("|  |", "| |"))
+        lines.append(f"| {scene} | {'; '.join(filter(None, (', '.join(numbers), _verdicts(of_scene))))} |")
     return "\n".join([*lines, ""])
 
 

@@ -28,6 +28,9 @@ COUPLING_COLUMNS = ("interface.force", "interface.momentum", "interface.power", 
 CONTACT_COLUMNS = ("contact.active", "contact.changes")
 FRICTION_COLUMNS = ("contact.sticking", "contact.friction")
 
+#: columns that say what the program did: they have no exact value
+COUNTERS = (*RUN_COLUMNS, *CONTACT_COLUMNS, "contact.sticking")
+
 
 class Check(Section):
     """A reference value for a result of the run; exactly one of `relative` and `absolute` is its tolerance.

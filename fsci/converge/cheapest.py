@@ -23,7 +23,7 @@ POWER = 1.15
 class Option:
     """The case, or a twin of it with better cells of one source, and what its run has cost."""
 
-    seconds: float
+    seconds: float  #: without the start
     twin: str = ""  #: name of the run
     better: str = ""  #: the source that it has a tenth of the error of
 
@@ -91,4 +91,4 @@ def _cost(option: Option, factors: Mapping[str, float], dimension: int) -> float
     fields = [factors[name] for name in ("cells", "bodies", "files") if name in factors]
     work = sum(factor ** (-dimension * POWER) for factor in fields) / len(fields) if fields else 1.0
     work *= factors.get("facets", 1.0) ** -0.1 / factors.get("step", 1.0)
-    return SECONDS_TO_START + max(option.seconds - SECONDS_TO_START, 0.1) * work
+    return SECONDS_TO_START + option.seconds * work

@@ -13,13 +13,14 @@ from fsci.case import Case, load_case
 from fsci.converge.cheapest import Option, cheapest
 from fsci.converge.estimate import BAND
 from fsci.converge.page import write_page
-from fsci.converge.plan import Plan, PlannedRun, Refused
+from fsci.converge.plan import SECONDS_TO_START, Plan, PlannedRun, Refused
 from fsci.converge.results import BandedValue, Done, as_json, done, findings
 from fsci.converge.values import wanted
 from fsci.converge.words import helps, percent, run_row, seconds_in_words, sentences, settings
 from fsci.run.files import write_text
 from fsci.run.kept_case import keep_case
 from fsci.run.summary import plain
+from fsci.run.warm import WarmProcess
 from fsci.twin.changes import Twin
 from fsci.twin.grids import NO_FIELDS, Settings
 from fsci.twin.runs import TwinEnded, has_run, known_runs, run_all
@@ -46,7 +47,11 @@ def converge(
     """
     case = load_case(path, overrides)
     wanted(case, only)
-    study = LevelStudy(case, overrides, out, only, tolerance, budget, say)
+    with WarmProcess() as warm:
+        return _study(LevelStudy(case, overrides, out, only, tolerance, budget, say, warm))
+
+
+def _study(study: LevelStudy) -> bool:
     levels = [study.plan.base(), *study.plan.coarser(), *study.plan.in_place_of_coarser()]
     others = [*study.plan.alone(), *study.plan.twins(), *study.plan.shifts()]
     study.announce([*levels, *others])
@@ -55,8 +60,8 @@ def converge(
         return False
     study.run(others)
     study.run(_in_place_of_the_element(study))
-    if tolerance is not None:
-        _go_upwards(study, tolerance)
+    if study.tolerance is not None:
+        _go_upwards(study, study.tolerance)
     study.tell()
     return True
 
@@ -73,9 +78,10 @@ class LevelStudy:
         tolerance: float | None,
         budget: float | None,
         say: Any,
+        warm: WarmProcess,
     ):
         self.case, self.overrides, self.out, self.only, self.say = case, overrides, out, only, say
-        self.tolerance, self.budget = tolerance, budget
+        self.tolerance, self.budget, self.warm = tolerance, budget, warm
         self.plan = Plan(case, lambda changes: load_case(case.path, (*overrides, *changes)))
         self.runs: list[Done] = []
         self.found: dict[str, BandedValue] = {}
@@ -89,6 +95,7 @@ class LevelStudy:
         runs = [one for one in made if isinstance(one, PlannedRun)]
         new = [run for run in runs if not self._has_run(run)]
         together = max(sum(run.seconds for run in new) / self._cores, *(run.seconds for run in new), 0.0)
+        together += SECONDS_TO_START if new else 0.0
         there = f" ({len(runs) - len(new)} of them are there)" if len(new) < len(runs) else ""
         own = f", the case itself {seconds_in_words(runs[0].seconds)} of it" if runs[0] in new else ""
         self.say(
@@ -111,7 +118,7 @@ class LevelStudy:
         by_name = {run.name: run for run in allowed}
         twins = [_without_fields(run.twin) for run in allowed]
         count = len(self.runs) + len(twins)
-        for ended in run_all(self.case, self.overrides, twins, self.out, self.known):
+        for ended in run_all(self.case, self.overrides, twins, self.out, self.known, self.warm):
             self.known[ended.twin.name] = ended.checksum
             self._add(done(self.case, by_name.pop(ended.twin.name), ended), count, by_name.values())
         return len(allowed) == len(runs)

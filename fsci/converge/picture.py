@@ -45,6 +45,8 @@ def draw(path: Path, found: Mapping[str, BandedValue], runs: Sequence[Done]) -> 
 
     with plt.rc_context(CURVE_STYLE):
         figure, panel = plt.subplots(figsize=CURVE_SIZE, layout="constrained")
+        errors = [y for some in points.values() for _, y, _ in some]
+        panel.set_ylim(0.5 * min(errors), 2.0 * max(errors))  # they may be one number
         for number, (role, some) in enumerate(points.items()):
             marker, label = MARKERS[role]
             if some:

@@ -21,7 +21,8 @@ COARSER = (ROOT, 2.0)
 FINER = (1.0 / ROOT, 0.5, 0.5 / ROOT, 0.25)
 FILE_SIZES = (2.0, 4.0)  #: of mesh files
 SHIFTED_RUNS = 3
-SECONDS_TO_START = 1.1  #: seconds until a run computes
+SECONDS_TO_START = 1.1  #: until a process has imported all; each run is a copy of one
+SECONDS_OF_A_COPY = 0.2  #: start and end of a run
 #: Schemes of the flow -> those with half of their error or less; the spectral radius of bodies from which on the error
 #: is that of its limit 1.
 BETTER_SCHEMES = {"backward_euler": "bdf2", "bdf2": "bdf2_optimized"}
@@ -198,7 +199,7 @@ class Plan:
         unknowns = (count * ratios.get(name, 1.0) ** -self.dimension for name, count in self._unknowns.items())
         structure = None if self.case.structure is None else round(sum(unknowns))
         found = estimate(other, structure, costs(), self.dimension)
-        return SECONDS_TO_START + (0.0 if found is None else found.step * other.time.steps)
+        return SECONDS_OF_A_COPY + (0.0 if found is None else found.step * other.time.steps)
 
 
 def _better_scheme(case: Case) -> Settings:

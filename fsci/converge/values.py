@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fsci.case import Case, CaseError
 from fsci.case.errors import Place, Problem, did_you_mean
-from fsci.case.verify import Check
+from fsci.case.verify import COUNTERS, Check
 from fsci.run.history import History
 from fsci.run.verify import extremes, window
 from fsci.twin.compare import values as twin_values
@@ -36,7 +36,8 @@ class Observed:
 def observed(case: Case, history: History, summary: Mapping[str, Any]) -> dict[str, Observed]:
     """All values of a run.
 
-    What `verify` compares with zero is an error of the method, and no value. The end of a column is one value only.
+    What `verify` compares with zero is an error of the method, and no value; nor are COUNTERS. The end of a column is
+    one value only.
     """
     found = {
         name: Observed(value.value, value.scale, 0.0, value.time, value.curve)
@@ -44,7 +45,7 @@ def observed(case: Case, history: History, summary: Mapping[str, Any]) -> dict[s
     }
     for check, result in zip(case.verify, summary.get("verify", ()), strict=True):
         name = result["name"]
-        if check.reference != 0.0 and not (check.value in found and name == f"{check.value} final"):
+        if _is_value(check) and not (check.value in found and name == f"{check.value} final"):
             value = math.nan if result["value"] is None else float(result["value"])
             size = abs(value) if math.isfinite(value) else 0.0
             found[name] = Observed(value, size, _sampling(history, check, value), *_until(history, check))
@@ -104,6 +105,9 @@ def wanted(case: Case, only: Sequence[str]) -> None:
         message = "the case has neither 'probes' nor 'verify': there is no value whose error could be estimated"
         raise CaseError([Problem(Place(str(case.path), 1, 1), message)])
     for name in only:
+        if name in COUNTERS:
+            message = f"'{name}' says what the program did: it has no exact value, and no band"
+            raise CaseError([Problem(Place("--probe"), message)])
         if name not in names:
             raise CaseError([Problem(Place("--probe"), f"there is no probe '{name}'{did_you_mean(name, names)}")])
 
@@ -119,8 +123,12 @@ def _names(case: Case) -> Iterator[str]:
         yield name
         yield from (column for column in probe.columns(name, dimension) if column != name)
     for check in case.verify:
-        if check.reference != 0.0:
+        if _is_value(check):
             yield from _parts(check.value)
+
+
+def _is_value(check: Check) -> bool:
+    return check.reference != 0.0 and check.value not in COUNTERS
 
 
 def _parts(name: str) -> list[str]:

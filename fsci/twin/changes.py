@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from fsci.builder.automatic_pairs import with_pairs
 from fsci.case import Case
 from fsci.case.contact import PairSection
 from fsci.case.mesh import FileMesh
@@ -126,17 +127,30 @@ def _orders_of_cells(case: Case) -> Iterator[Twin]:
 
 
 def _roles(case: Case) -> Iterator[Twin]:
-    pairs = {} if case.contact is None else case.contact.pairs
-    swapped = [name for name, pair in pairs.items() if _can_be_swapped(pair)]
-    given = _section(case, "contact", "pairs")
-    settings = tuple(
-        (f"contact.pairs.{name}.{side}", json.dumps(given[name][other]))
-        for name in swapped
-        for side, other in (("slave", "master"), ("master", "slave"))
-    )
-    if settings:
+    pairs = _pairs(case)
+    own = {} if case.contact is None else case.contact.pairs
+    swapped = [name for name in pairs if name not in own or _can_be_swapped(own[name])]
+    for name in swapped:
+        pairs[name] = {**pairs[name], "slave": pairs[name]["master"], "master": pairs[name]["slave"]}
+    if swapped:
         columns = tuple(f"contact.{name}.{axis}" for name in swapped for axis in "xyz")
+        settings = (("contact.pairs", json.dumps(pairs)),)
         yield Twin("exchange", "slave and master exchanged", "roles", settings, opposite=columns)
+
+
+def _pairs(case: Case) -> dict[str, Any]:
+    """Pairs as the file says them, and those of elastic bodies that it leaves to the program, with their roles.
+
+    Raises CaseError where meshes of these cannot be read.
+    """
+    found = dict(_section(case, "contact", "pairs"))
+    if case.contact is not None and case.contact.bodies is not None:
+        complete = with_pairs(case).contact
+        assert complete is not None
+        for name, pair in complete.pairs.items():
+            if name not in found and _can_be_swapped(pair):
+                found[name] = {role: {"body": side.body, "on": list(side.on or ())} for role, side in pair.sides}
+    return found
 
 
 def _can_be_swapped(pair: PairSection) -> bool:
@@ -144,10 +158,17 @@ def _can_be_swapped(pair: PairSection) -> bool:
 
 
 def _orders_of_bodies(case: Case) -> Iterator[Twin]:
+    """Roles stay: of two equal bodies the first one would be the slave."""
+    members = {
+        "structure.bodies": _section(case, "structure", "bodies"),
+        "fluid.bodies": _section(case, "fluid", "bodies"),
+        "contact.pairs": _pairs(case),
+    }
+    left_to_the_program = members["contact.pairs"].keys() - _section(case, "contact", "pairs").keys()
     settings = tuple(
-        (".".join(keys), json.dumps(dict(reversed(members.items()))))
-        for keys in (("structure", "bodies"), ("fluid", "bodies"), ("contact", "pairs"))
-        if len(members := _section(case, *keys)) > 1
+        (name, json.dumps(dict(reversed(some.items()))))
+        for name, some in members.items()
+        if len(some) > 1 or (name == "contact.pairs" and left_to_the_program)
     )
     if settings:
         yield Twin("reversed", "bodies and pairs in the opposite order", "defect", settings)

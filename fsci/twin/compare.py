@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fsci.case.verify import COUNTERS
 from fsci.run.history import History
 
 
@@ -37,7 +38,8 @@ def values(history: History, summary: Mapping[str, Any], opposite: Collection[st
     """All that can be compared of a run: columns of probes, and numbers of `verify` with a reference.
 
     The scale of a column is the largest number in the columns of its probe, that of a number its own size. What
-    `verify` compares with zero is an error of the method, and no value. Columns in `opposite` have the other sign.
+    `verify` compares with zero is an error of the method, and no value; nor are COUNTERS. Columns in `opposite` have
+    the other sign.
     """
     columns = [name for name in summary.get("probes", ()) if name in history]
     found = {}
@@ -46,8 +48,9 @@ def values(history: History, summary: Mapping[str, Any], opposite: Collection[st
         curve = history[name] * (-1.0 if name in opposite else 1.0)
         found[name] = Value(float(curve[-1]), max(map(_largest, of_probe)), history["time"], curve)
     for check in summary.get("verify", ()):
-        if check["value"] is not None and check["reference"] != 0.0 and check["name"].split()[0] not in columns:
-            sign = -1.0 if check["name"].split()[0] in opposite else 1.0
+        column = check["name"].split()[0]
+        if check["value"] is not None and check["reference"] != 0.0 and column not in (*columns, *COUNTERS):
+            sign = -1.0 if column in opposite else 1.0
             found[check["name"]] = Value(sign * check["value"], abs(check["value"]))
     return found
 

@@ -1,4 +1,4 @@
-"""The runs of twins: each is a program of its own, as many at a time as there are cores, and none twice."""
+"""The runs of twins: each is a process of its own, as many at a time as there are cores, and none twice."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from fsci.case import Case, CaseError, load_case
 from fsci.run.child import ENVIRONMENT, command
 from fsci.run.history import History, read_history
 from fsci.run.kept_case import copies
+from fsci.run.warm import WarmProcess
 from fsci.twin.changes import Twin
 from fsci.twin.grids import Settings
 
@@ -55,12 +57,13 @@ def has_run(case: Case, overrides: Settings, twin: Twin, out: Path, known: Mappi
 
 
 def run_all(
-    case: Case, overrides: Settings, twins: Sequence[Twin], out: Path, known: Mapping[str, str]
+    case: Case, overrides: Settings, twins: Sequence[Twin], out: Path, known: Mapping[str, str], warm: WarmProcess
 ) -> Iterator[TwinEnded]:
     """The ends of all runs, each as soon as it is there, with results in the folders of their names in `out`.
 
-    `overrides` are those that the case was read with. A twin whose checksum is in `known` has been run. An exception,
-    as KeyboardInterrupt, starts no more runs; those under way get the signal, too, and end by themselves.
+    `overrides` are those that the case was read with. A twin whose checksum is in `known` has been run. Runs on one
+    process are copies of `warm`. An exception, as KeyboardInterrupt, starts no more runs; those under way get the
+    signal, too, and end by themselves.
     """
     cores = len(os.sched_getaffinity(0))
     with ThreadPoolExecutor(max(1, cores // max((twin.processes for twin in twins), default=1))) as pool:
@@ -73,7 +76,8 @@ def run_all(
                 yield TwinEnded(twin, message=str(error))
                 continue
             done = _is_there(checksum, twin, out, known)
-            runs.append(pool.submit(_read if done else _run, case.path, settings, twin, out / twin.name, checksum))
+            program = _read if done else partial(_run, warm)
+            runs.append(pool.submit(program, case.path, settings, twin, out / twin.name, checksum))
         try:
             for run in as_completed(runs):
                 yield run.result()
@@ -82,14 +86,13 @@ def run_all(
                 run.cancel()
 
 
-def _run(case: Path, settings: Settings, twin: Twin, folder: Path, checksum: str) -> TwinEnded:
-    arguments = [f"--set={name}={value}" for name, value in settings]
-    ended = subprocess.run(
-        command("run", str(case), "-o", str(folder), *arguments, processes=twin.processes),
-        capture_output=True,
-        text=True,
-        env=ENVIRONMENT,
-    )
+def _run(warm: WarmProcess, case: Path, settings: Settings, twin: Twin, folder: Path, checksum: str) -> TwinEnded:
+    words = ["run", str(case), "-o", str(folder), *(f"--set={name}={value}" for name, value in settings)]
+    if twin.processes == 1:
+        ended = warm.run(*words)
+    else:
+        launched = command(*words, processes=twin.processes)
+        ended = subprocess.run(launched, capture_output=True, text=True, env=ENVIRONMENT)
     if not (folder / "summary.json").exists() or ended.returncode not in (0, 1):
         return TwinEnded(twin, message=(ended.stderr or ended.stdout).strip())
     return _read(case, settings, twin, folder, checksum)

@@ -16,6 +16,7 @@ from fsci.case.errors import Place, Problem, did_you_mean
 from fsci.run.files import write_text
 from fsci.run.summary import plain
 from fsci.run.verify import evaluate
+from fsci.run.warm import WarmProcess
 from fsci.twin.changes import Meaning, Twin, quick, twins
 from fsci.twin.compare import TwinChange, Value, changes, values
 from fsci.twin.grids import NO_FIELDS, Settings
@@ -52,13 +53,15 @@ def run_twins(
     say(f"{case.path}: {len(chosen)} twins in {out}")
     ended: dict[str, TwinEnded] = {}
     runs = [BASE, *(replace(twin, settings=(*twin.settings, *NO_FIELDS)) for twin in chosen)]
-    for one in (_in_coordinates_of(case, one) for one in run_all(case, overrides, runs, out, known)):
-        ended[one.twin.name] = one
-        known[one.twin.name] = one.checksum
-        say(_progress(one))
-        write_text(out / TWIN_RESULTS, json.dumps(plain(_results(runs, ended, known)), indent=1) + "\n")
-        if one.twin is BASE and one.message:
-            return False
+    with WarmProcess() as warm:
+        for run in run_all(case, overrides, runs, out, known, warm):
+            one = _in_coordinates_of(case, run)
+            ended[one.twin.name] = one
+            known[one.twin.name] = one.checksum
+            say(_progress(one))
+            write_text(out / TWIN_RESULTS, json.dumps(plain(_results(runs, ended, known)), indent=1) + "\n")
+            if one.twin is BASE and one.message:
+                return False
     say("\n" + "\n".join(_table(runs, ended)))
     return not any(one.message for one in ended.values())
 

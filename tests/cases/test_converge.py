@@ -1,6 +1,7 @@
 """`fsci converge`: a flow and a body whose errors are known; what is not run again; what it refuses."""
 
 import json
+import os
 import signal
 import subprocess
 import time
@@ -230,6 +231,8 @@ def test_words_of_mistakes(tmp_path):
         return ended.stderr
 
     assert "--probe: there is no probe 'drga'; did you mean 'drag'?" in refused("--probe", "drga")
+    said = refused("--probe", "iterations")
+    assert "--probe: 'iterations' says what the program did: it has no exact value, and no band" in said
     assert "write a share between 0 and 1 such as 0.02 or 2%, not '2'" in refused("--tolerance", "2")
     assert "write a time such as 30s, 20min or 2h, not 'soon'" in refused("--budget", "soon")
     (tmp_path / "case.yaml").write_text(FLOW.split("probes:")[0])
@@ -237,7 +240,7 @@ def test_words_of_mistakes(tmp_path):
 
 
 def test_interrupted(tmp_path):
-    """Ctrl-C keeps the runs that have ended; the same command goes on."""
+    """Ctrl-C, which all processes get, keeps the runs that have ended; the same command goes on."""
     (tmp_path / "case.yaml").write_text(FLOW)
     out = tmp_path / "out"
     program = subprocess.Popen(
@@ -248,10 +251,10 @@ def test_interrupted(tmp_path):
     until = time.monotonic() + 120.0
     while not (out / "converge.json").exists() and time.monotonic() < until:
         time.sleep(0.05)
-    program.send_signal(signal.SIGINT)
+    os.killpg(program.pid, signal.SIGINT)
     _, said = program.communicate(timeout=120)
     assert program.returncode == 3
-    assert "stopped; the same command goes on from here" in said
+    assert said == "stopped; the same command goes on from here\n"
     kept = json.loads((out / "converge.json").read_text())["runs"]
     assert 1 <= len(kept) < 9
     _, found = converge(tmp_path, FLOW)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import runpy
 import subprocess
 import sys
 from pathlib import Path
 
-import copied_process
+from fsci.run.copied_process import exit_code, import_common, run_in_copy
+from fsci.run.copied_process import fsci as fsci_here
 
 ENVIRONMENT = {
     **os.environ,
@@ -37,7 +39,8 @@ def fsci(*arguments, processes: int = 1, timeout: float = 600.0) -> subprocess.C
     """Run `fsci` to its end, on one process in a copy of this one, without its start and imports; see `new_process`."""
     if processes > 1 or str(arguments[0]) in DRAWING:
         return new_process(*arguments, processes=processes, timeout=timeout)
-    return copied_process.run_in_copy(copied_process.fsci, [str(word) for word in arguments], ENVIRONMENT, timeout)
+    import_common()
+    return run_in_copy(fsci_here, [str(word) for word in arguments], ENVIRONMENT, timeout)
 
 
 def new_process(*arguments, processes: int = 1, timeout: float = 600.0) -> subprocess.CompletedProcess[str]:
@@ -52,7 +55,7 @@ def run_command(words, env=None, timeout=None, **pipes) -> subprocess.CompletedP
     """As subprocess.run, but a run of `fsci` on one process is a copy of this one."""
     if words[:3] != command()[:3]:
         return subprocess.run(words, env=env, timeout=timeout, **pipes)
-    return copied_process.run_in_copy(copied_process.fsci, words[3:], env or {}, timeout or 600.0)
+    return run_in_copy(fsci_here, words[3:], env or {}, timeout or 600.0)
 
 
 def run_whole(name: str, folder, *changes: str, processes: int = 1, timeout: float = 1200.0) -> str:
@@ -72,11 +75,30 @@ def warnings_of(out) -> list[dict]:
     return found
 
 
+def python_here(words) -> int:
+    """Run a Python program, the first one of the words, in this process; returns its exit code."""
+    sys.argv = list(words)
+    return exit_code(lambda: runpy.run_path(words[0], run_name="__main__"))
+
+
+class Copies:
+    """As WarmProcess, but runs are copies of this process."""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error) -> None:
+        pass
+
+    def run(self, *words) -> subprocess.CompletedProcess[str]:
+        return run_in_copy(fsci_here, words, {})
+
+
 def on_processes(processes: int, *program, timeout: float = 600.0) -> subprocess.CompletedProcess[str]:
     """Run a Python program of the tests; an exception in one process ends all, instead of a wait."""
     words = [str(word) for word in program]
     if processes == 1:
-        done = copied_process.run_in_copy(copied_process.python, words, ENVIRONMENT, timeout)
+        done = run_in_copy(python_here, words, ENVIRONMENT, timeout)
     else:
         command = ["mpirun", "-n", str(processes), sys.executable, "-m", "mpi4py", *words]
         environment = {**PARALLEL, "PYTHONPATH": str(Path(__file__).parent)}

@@ -47,8 +47,8 @@ def test_the_table_of_the_docs():
         row("cube", "low.x", 1.0, found(1.0 + 1e-9, 1e-6), 3.0),
     ]
     assert markdown(rows).splitlines()[2:] == [
-        "| cylinder | drag: 5/10, lift: 50/200 | lift not resolved |",
-        "| cube | low.x: 0/0.0001 | |",
+        "| cylinder | drag: 5/10, lift: 50/200; lift not resolved |",
+        "| cube | low.x: 0/0.0001 |",
     ]
 
 

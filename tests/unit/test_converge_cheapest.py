@@ -21,13 +21,13 @@ def any_size(*sources):
 def test_only_what_is_wrong_gets_finer():
     """All of the error is that of the step: of second order, a quarter of it needs half of the step."""
     found = finding(0.015, {"cells": 0.0, "step": 0.01})
-    choice = cheapest([found], [Option(101.1)], any_size("cells", "step"), 2, 0.015 / 4.0)
+    choice = cheapest([found], [Option(100.0)], any_size("cells", "step"), 2, 0.015 / 4.0)
     assert choice.factors == pytest.approx({"cells": 2.0, "step": 0.5})
 
 
 def test_first_order_needs_more():
     found = finding(0.015, {"step": 0.01}, order=1.0)
-    choice = cheapest([found], [Option(101.1)], any_size("step"), 2, 0.015 / 4.0)
+    choice = cheapest([found], [Option(100.0)], any_size("step"), 2, 0.015 / 4.0)
     assert choice.factors == pytest.approx({"step": 0.25})
     assert choice.seconds == pytest.approx(401.1)
 
@@ -83,5 +83,5 @@ def test_out_of_reach():
 
 def test_all_values_count():
     cells, step = finding(0.015, {"cells": 0.01, "step": 0.0}), finding(0.015, {"cells": 0.0, "step": 0.01})
-    choice = cheapest([cells, step], [Option(101.1)], any_size("cells", "step"), 2, 0.0151)
+    choice = cheapest([cells, step], [Option(100.0)], any_size("cells", "step"), 2, 0.0151)
     assert choice.factors == pytest.approx({"cells": 1.0, "step": 1.0})

@@ -37,6 +37,17 @@ def test_columns_and_checks():
     assert top.sampling > 1e-4
 
 
+def test_counters_are_no_values():
+    """How many steps an iteration takes has no exact value: a finer level may need more, and none is wrong."""
+    found = run(
+        *({"value": name, "statistic": "max", "reference": 3.0} for name in ("iterations", "contact.active", "force")),
+        iterations=np.full(30, 3.0),
+        contact_active=np.full(30, 7.0),
+        force=np.full(30, 2.0),
+    )
+    assert [name for name in found if " " in name] == ["force max"]
+
+
 def test_a_check_without_a_value():
     found = run({"value": "u.x", "statistic": "frequency", "reference": 1.0}, u_x=TIME)
     assert math.isnan(found["u.x frequency"].value)

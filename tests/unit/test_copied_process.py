@@ -9,7 +9,7 @@ PROGRAM = """\
 import sys, time
 from mpi4py import MPI
 comm = MPI.COMM_WORLD
-print("rank", comm.rank)
+print(f"rank {comm.rank}\\n", end="")  # in one piece: others write between two
 if sys.argv[1] == "fails" and comm.rank == comm.size - 1:
     raise RuntimeError("on purpose")
 if sys.argv[1] == "sleeps":

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fsci.builder.automatic_pairs import with_pairs
 from fsci.case import load_case
 from fsci.case.grid import GridSection
 from fsci.twin.changes import COSTS, QUICK_COST, Twin, quick, twins
@@ -153,3 +154,23 @@ def test_roles(tmp_path):
     bodies = load_case(path, found["order"].settings).structure.bodies
     assert [body.mesh.order for body in bodies.values()] == [2, 2]
     assert list(load_case(path, found["reversed"].settings).contact.pairs) == ["support", "blocks"]
+
+
+def test_roles_that_the_program_chooses(tmp_path):
+    """Of two equal blocks the first one is the slave. In the opposite order it still is; roles are exchanged alone."""
+    path = tmp_path / "case.yaml"
+    text = CONTACT.replace("cells: [3, 3], order: 2", "cells: [2, 2]")
+    path.write_text(text[: text.index("contact:")] + "contact: {bodies: all}\n")
+    found = {twin.name: twin for twin in twins(load_case(path))}
+    name = "low_top_high_bottom"
+
+    def slave(twin):
+        case = load_case(path, twin.settings)
+        pairs = with_pairs(case).contact.pairs
+        assert list(pairs) == [name]
+        return list(case.elastic_bodies), pairs[name].slave.body, pairs[name].slave.on
+
+    assert slave(Twin("case", "", "space")) == (["low", "high"], "low", ("top",))
+    assert slave(found["reversed"]) == (["high", "low"], "low", ("top",))
+    assert slave(found["exchange"]) == (["low", "high"], "high", ("bottom",))
+    assert found["exchange"].opposite == (f"contact.{name}.x", f"contact.{name}.y", f"contact.{name}.z")

@@ -43,12 +43,13 @@ def test_values_that_one_run_lacks():
 
 
 def test_numbers_of_verify():
-    """An error that should be zero is no value; a force on the slave is the opposite one if roles are exchanged."""
+    """Errors and counters are no values; a force on the slave is the opposite one if roles are exchanged."""
 
     def verify(force, mass):
         return (
             {"name": "contact.p.x max", "value": force, "reference": 5.0},
             {"name": "fluid.mass max_abs", "value": mass, "reference": 0.0},
+            {"name": "iterations max", "value": 5.0, "reference": 5.0},
         )
 
     base = values(*run(1.0, verify=verify(5.0, 1e-14)))
@@ -56,3 +57,4 @@ def test_numbers_of_verify():
     found = changes(base, twin)
     assert found["contact.p.x max"].value == pytest.approx(-0.2)
     assert "fluid.mass max_abs" not in found
+    assert "iterations max" not in found

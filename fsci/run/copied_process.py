@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import runpy
 import subprocess
@@ -13,47 +14,67 @@ from importlib import import_module
 from tempfile import TemporaryFile
 from typing import IO
 
-#: what runs import first when they need it; to import it here saves each copy about a second
-COMMON = ("fsci.run.run", "fsci.builder.build", "h5py", "meshio", "gmsh")
+Program = Callable[[Sequence[str]], int]
+
+#: What runs import: to do so here saves each copy about a second.
+COMMON = (
+    "fsci.run.run",
+    "fsci.builder.build",
+    "fsci.builder.fluid",
+    "fsci.builder.structure",
+    "fsci.builder.contact",
+    "h5py",
+    "meshio",
+    "gmsh",
+)
+TRANSPORT = "OMPI_MCA_btl"  #: Open MPI reads it at its start
+
+
+def import_common() -> None:
+    """Import what runs need."""
+    start_mpi_alone()
+    for module in COMMON:
+        import_module(module)
+
+
+def start_mpi_alone() -> None:
+    """MPI for this process alone, if it has not been started.
+
+    Open MPI would listen on a port. Copies share it, and have no thread to answer: a stranger that connects stops them.
+    """
+    before = os.environ.get(TRANSPORT)
+    os.environ[TRANSPORT] = "self"
+    import_module("mpi4py.MPI")
+    if before is None:
+        del os.environ[TRANSPORT]
+    else:
+        os.environ[TRANSPORT] = before
 
 
 def fsci(arguments: Sequence[str]) -> int:
     """Run a command of `fsci` in this process; returns its exit code."""
-    from fsci.cli import execute
-
     sys.argv = ["fsci", *arguments]
-    return _exit_code(lambda: execute(arguments))
+    return exit_code(lambda: runpy.run_module("fsci", run_name="__main__"))
 
 
-def python(arguments: Sequence[str]) -> int:
-    """Run a Python program, the first one of the words, in this process; returns its exit code."""
-    sys.argv = list(arguments)
-    return _exit_code(lambda: (runpy.run_path(arguments[0], run_name="__main__"), 0)[1])
-
-
-def _exit_code(program: Callable[[], int]) -> int:
-    """What it returns, or the code that it would end this process with."""
+def exit_code(program: Callable[[], object]) -> int:
+    """The code that a program ends this process with, 0 if it returns."""
     try:
-        return program()
+        program()
     except SystemExit as end:
         if isinstance(end.code, str):
             print(end.code, file=sys.stderr)
         return end.code if isinstance(end.code, int) else int(end.code is not None)
-
-
-def printing_to(out: int, errors: int) -> None:
-    """From now on the output of this process goes to these file descriptors, that of C and C++ as well."""
-    os.dup2(out, 1)
-    os.dup2(errors, 2)
-    sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))
+    return 0
 
 
 def run_in_copy(
-    program: Callable[[Sequence[str]], int], arguments: Sequence[str], environment: Mapping[str, str], timeout: float
+    program: Program, arguments: Sequence[str], environment: Mapping[str, str], timeout: float = math.inf
 ) -> subprocess.CompletedProcess[str]:
-    """Call `program(arguments)` in a copy of this process. Raises TimeoutExpired like subprocess.run."""
-    for module in COMMON:
-        import_module(module)
+    """Call `program(arguments)` in a copy of this process, which must have no threads that hold locks.
+
+    Raises TimeoutExpired like subprocess.run.
+    """
     with TemporaryFile() as out, TemporaryFile() as errors:
         for stream in (sys.stdout, sys.stderr):
             stream.flush()  # else the copy would print it again
@@ -62,7 +83,7 @@ def run_in_copy(
             code = 1
             try:
                 os.environ.update(environment)
-                printing_to(out.fileno(), errors.fileno())
+                _print_to(out.fileno(), errors.fileno())
                 code = program(arguments)
             except BaseException:
                 traceback.print_exc()
@@ -72,6 +93,13 @@ def run_in_copy(
                 os._exit(code)
         code = _wait(child, arguments, timeout)
         return subprocess.CompletedProcess(list(arguments), code, _text(out), _text(errors))
+
+
+def _print_to(out: int, errors: int) -> None:
+    """From now on the output of this process goes to these file descriptors, that of C and C++ as well."""
+    os.dup2(out, 1)
+    os.dup2(errors, 2)
+    sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))
 
 
 def _wait(child: int, arguments: Sequence[str], timeout: float) -> int:
