@@ -46,7 +46,7 @@ def flattened(table: CutTable, vertices: int, height: float) -> CutTable:
     return replace(
         table,
         shape=table.shape[:2],
-        vertices=table.vertices[:vertices, :2],
+        vertices=np.ascontiguousarray(table.vertices[:vertices, :2]),
         moments=table.moments.reshape(regions, n, n * n).sum(axis=1),
         piece_region=table.piece_region[first],
         piece_facet=segment[first],

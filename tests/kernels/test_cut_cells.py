@@ -14,10 +14,10 @@ def test_poses(name):
         assert_same(assert_pose(FAMILIES[name], seed), assert_pose(FAMILIES[name], seed, only_exact=True))
 
 
-@pytest.mark.slow(seconds=300)
+@pytest.mark.slow(seconds=20)
 @pytest.mark.parametrize("name", FAMILIES)
 def test_many_poses(name):
-    for seed in range(1000, 3000):
+    for seed in range(1000, 1300):
         assert_same(assert_pose(FAMILIES[name], seed), assert_pose(FAMILIES[name], seed, only_exact=True))
 
 
