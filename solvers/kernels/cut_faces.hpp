@@ -88,7 +88,7 @@ private:
       const int keep = k % 2 ? -1 : 1;
       const int s = keep * context_.side(segment.a, sides[k]), t = keep * context_.side(segment.b, sides[k]);
       if (s <= 0 && t <= 0 && (s || t)) return false;
-      if (s * t < 0) (s < 0 ? segment.a : segment.b) = context_.crossing(face_, segment.plane, sides[k]);
+      if (s * t < 0) (s < 0 ? segment.a : segment.b) = context_.meet(face_, segment.plane, sides[k]);
     }
     return true;
   }
@@ -98,7 +98,7 @@ private:
     const int s = context_.side(segment.a, plane), t = context_.side(segment.b, plane);
     if (s * t < 0) {
       Segment below = segment, above = segment;
-      const int between = context_.crossing(face_, segment.plane, plane);
+      const int between = context_.meet(face_, segment.plane, plane);
       (s < 0 ? below.b : below.a) = between;
       (s < 0 ? above.a : above.b) = between;
       low.push_back(below);

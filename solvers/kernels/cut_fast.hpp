@@ -234,13 +234,16 @@ private:
 
   bool join_along_edges() {
     const int count = static_cast<int>(polygons_.size());
-    std::array<int, 8> wet;
-    wet.fill(-1);
-    const auto mark = [&](int corner, bool is_wet) {
-      const bool agree = wet[corner] < 0 || wet[corner] == is_wet;
-      wet[corner] = is_wet;
+    // Of corners: wet, in which body, or not known. A part of an edge within solid is in one body at both of its ends:
+    // else bodies overlap, though their surfaces are apart.
+    constexpr int unknown = -2, wet = -1;
+    at_corner_.fill(unknown);
+    const auto mark = [&](int corner, int what) {
+      const bool agree = at_corner_[corner] == unknown || what == unknown || at_corner_[corner] == what;
+      if (what != unknown) at_corner_[corner] = what;
       return agree;
     };
+    const auto body = [&](const Crossing& c) { return lattice_.body[polygons_[c.polygon].facet]; };
     for (int k = 0; k < 12; ++k) {
       auto& crossings = edges_[k];
       const auto [low, high] = ends_of_edge(k);
@@ -252,20 +255,20 @@ private:
       for (std::size_t i = 0; i + 1 < crossings.size(); ++i) {
         const auto &a = crossings[i], &b = crossings[i + 1];
         if (a.sign == b.sign || b.at - a.at <= a.error + b.error) return false;
+        if (a.sign < 0 && body(a) != body(b)) return false;
         if (a.sign > 0) join(a.polygon, b.polygon);
       }
       const auto &first = crossings.front(), &last = crossings.back();
-      if (!mark(low, first.sign < 0) || !mark(high, last.sign > 0)) return false;
+      if (!mark(low, first.sign < 0 ? wet : body(first)) || !mark(high, last.sign > 0 ? wet : body(last))) return false;
       if (first.sign < 0) join(first.polygon, count + low);
       if (last.sign > 0) join(last.polygon, count + high);
     }
-    for (int k = 0; k < 12; ++k)  // an edge that nothing crosses is wet or dry as a whole
-      if (edges_[k].empty()) {
+    for (int pass = 0; pass < 3; ++pass)  // along edges that nothing crosses, at most three from corner to corner
+      for (int k = 0; k < 12; ++k) {
+        if (!edges_[k].empty()) continue;
         const auto [low, high] = ends_of_edge(k);
-        if (wet[low] >= 0 && !mark(high, wet[low])) return false;
-        if (wet[high] >= 0 && !mark(low, wet[high])) return false;
+        if (!mark(high, at_corner_[low]) || !mark(low, at_corner_[high])) return false;
       }
-    wet_ = wet;
     return true;
   }
 
@@ -300,7 +303,7 @@ private:
     }
     for (int k = 0; k < 12; ++k)
       if (k % 2) add_wet_edges(k);
-    for (int k = 0; k < 8; ++k) out.at_corner[k] = wet_[k] == 0 ? -1 : region(count + k);
+    for (int k = 0; k < 8; ++k) out.at_corner[k] = at_corner_[k] >= 0 ? -1 : region(count + k);
     for (const auto& area : areas_)
       for (const double a : area)
         if (a < -1e3 * rounding_error) return false;  // a hole in a face
@@ -337,7 +340,7 @@ private:
     };
     const auto& crossings = edges_[k];
     if (crossings.empty()) {
-      if (wet_[low] != 0) add(number_[root(count + low)], -1, low, 0, size_[axis]);
+      if (at_corner_[low] < 0) add(number_[root(count + low)], -1, low, 0, size_[axis]);
       return;
     }
     const auto region = [&](const Crossing& c) { return number_[root(c.polygon)]; };
@@ -356,7 +359,7 @@ private:
   std::vector<Entry> table_;  // polygons by edges of facets
   std::array<std::vector<Crossing>, 12> edges_;
   std::vector<char> meets_;   // an edge of the cell
-  std::array<int, 8> wet_{};  // corners: 1, 0, or -1: not known from the edges at it
+  std::array<int, 8> at_corner_{};  // the body there, or negative
   std::array<std::vector<Chord>, 6> chords_;
   std::array<std::vector<WetEdge>, 6> wet_edges_;
   std::vector<std::array<double, 6>> areas_;  // of the faces of each region

@@ -43,6 +43,7 @@ struct Point {
   std::array<double, 4> X, size;
   Point3 x;                   // position in units of 2^fine_bits, relative to the cell
   int w = 1;                  // sign of X[3]
+  std::array<int, 2> edge{-1, -1};  // of a facet that it lies on by name
   int exact = -1;
   int asked = -1, answer = 0; // the last plane, and the side of it
 };
@@ -77,8 +78,7 @@ public:
     points.clear();
     corners.clear();
     exact_.clear();
-    fresh_.clear();
-    fresh_of_ = -1;
+    known_count_ = 0;
   }
 
   std::int64_t grid_plane(int axis, int index) const { return lattice_.first_plane[axis] + index; }
@@ -95,6 +95,9 @@ public:
   }
 
   int vertex(int number) {
+    int& known = known_point({-1, number, 0});
+    if (known >= 0) return known;
+    known = static_cast<int>(points.size());
     Point made{};
     made.planes = {-1, number, 0};
     for (int d = 0; d < 3; ++d) made.x[d] = made.X[d] = distance(number, d);
@@ -104,15 +107,17 @@ public:
     return static_cast<int>(points.size()) - 1;
   }
 
-  // Where three planes meet in one point.
+  // Where three planes meet in one point; on an edge of facets it is one for all planes through this edge.
   int meet(int a, int b, int c) {
-    std::array<int, 3> of{a, b, c};  // by names, so that the same three give the same numbers
-    const auto swap = [&](int i, int j) {
-      if (planes[of[i]].name > planes[of[j]].name) std::swap(of[i], of[j]);
-    };
-    swap(0, 1), swap(1, 2), swap(0, 1);
+    std::array<int, 3> of{a, b, c};
+    std::sort(of.begin(), of.end());
+    std::array<int, 2> edge{-1, -1};
+    int& known = known_point(point_key(of, edge));
+    if (known >= 0) return known;
+    known = static_cast<int>(points.size());
     Point made{};
     made.planes = of;
+    made.edge = edge;
     for (int i = 0; i < 3; ++i) {
       const Plane &p = planes[of[i]], &q = planes[of[(i + 1) % 3]], &r = planes[of[(i + 2) % 3]];
       for (int d = 0; d < 3; ++d) {
@@ -174,7 +179,7 @@ public:
       if (s >= 0) high_.push_back({here.point, s == 0 && t < 0 ? plane_number : here.edge});
       if (s <= 0) low_.push_back({here.point, s == 0 && t > 0 ? plane_number : here.edge});
       if (s * t >= 0) continue;
-      const int between = crossing(polygon.plane, here.edge, plane_number);
+      const int between = meet(polygon.plane, here.edge, plane_number);
       high_.push_back({between, t < 0 ? plane_number : here.edge});
       low_.push_back({between, t > 0 ? plane_number : here.edge});
     }
@@ -184,22 +189,6 @@ public:
   Polygon polygon_of(int plane_number, const std::vector<Corner>& from) {
     const Polygon made{plane_number, static_cast<int>(corners.size()), static_cast<int>(from.size())};
     corners.insert(corners.end(), from.begin(), from.end());
-    return made;
-  }
-
-  // The point where the line of two planes crosses a third: one for all polygons with this line.
-  int crossing(int one, int two, int plane_number) {
-    if (fresh_of_ != plane_number) {
-      fresh_.clear();
-      fresh_of_ = plane_number;
-    }
-    const int low = std::min(one, two), high = std::max(one, two);
-    for (const auto& known : fresh_)
-      if (known.low == low && known.high == high) return known.point;
-    const int made = meet(low, high, plane_number);
-    points[made].asked = plane_number;
-    points[made].answer = 0;
-    fresh_.push_back({low, high, made});
     return made;
   }
 
@@ -362,11 +351,11 @@ private:
     const Plane& p = planes[plane_number];
     const Point& point = points[number];
     if (point.planes[0] < 0) {
-      const int v = point.planes[1];
-      if (p.through[0] == v || p.through[1] == v || p.through[2] == v) return 0;
+      if (holds(p, point.planes[1])) return 0;
     } else if (point.planes[0] == plane_number || point.planes[1] == plane_number || point.planes[2] == plane_number) {
       return 0;
     }
+    if (point.edge[0] >= 0 && holds(p, point.edge[0]) && holds(p, point.edge[1])) return 0;
     double sum = -p.d * point.X[3], size = p.d_size * point.size[3];
     for (int d = 0; d < 3; ++d) {
       sum += p.n[d] * point.X[d];
@@ -379,17 +368,62 @@ private:
     return value.sign() * at.W.sign();
   }
 
-  struct Fresh {
-    int low, high, point;
+  static bool holds(const Plane& p, int vertex_number) {
+    return p.through[0] == vertex_number || p.through[1] == vertex_number || p.through[2] == vertex_number;
+  }
+
+  // Name of the point where planes meet: the planes, or an edge that two of them have in common, and the third one.
+  std::array<int, 3> point_key(const std::array<int, 3>& of, std::array<int, 2>& edge) const {
+    for (int i = 0; i < 3; ++i) {
+      const Plane &p = planes[of[(i + 1) % 3]], &q = planes[of[(i + 2) % 3]];
+      if (p.through[0] < 0 || q.through[0] < 0) continue;
+      std::array<int, 3> common;
+      int count = 0;
+      for (const int v : p.through)
+        if (v >= 0 && holds(q, v)) common[count++] = v;
+      if (count != 2) continue;
+      edge = {std::min(common[0], common[1]), std::max(common[0], common[1])};
+      return {-2 - edge[0], edge[1], of[i]};
+    }
+    return of;
+  }
+
+  struct Known {
+    std::array<int, 3> key;
+    int stamp, point;
   };
+
+  // The number of a point, -1: a new one, to be written here.
+  int& known_point(const std::array<int, 3>& key) {
+    if (2 * (known_count_ + 1) > static_cast<int>(known_.size())) enlarge();
+    int& point = entry(key).point;
+    known_count_ += point < 0;
+    return point;
+  }
+
+  Known& entry(const std::array<int, 3>& key) {
+    std::uint64_t hash = 0;
+    for (const int part : key) hash = (hash ^ static_cast<std::uint32_t>(part)) * 0x9E3779B97F4A7C15ull;
+    std::size_t at = hash >> 32 & (known_.size() - 1);
+    while (known_[at].stamp == now_ && known_[at].key != key) at = (at + 1) & (known_.size() - 1);
+    if (known_[at].stamp != now_) known_[at] = {key, now_, -1};
+    return known_[at];
+  }
+
+  void enlarge() {
+    std::vector<Known> old(std::max<std::size_t>(256, 2 * known_.size()), Known{{}, -1, -1});
+    old.swap(known_);
+    for (const Known& one : old)
+      if (one.stamp == now_) entry(one.key) = one;
+  }
 
   const Lattice& lattice_;
   Integers3 origin_{};
   std::vector<int> local_, stamp_;  // number here of each plane, valid where the stamp is `now_`
   int now_ = -1;
   std::vector<ExactPoint> exact_;
-  std::vector<Fresh> fresh_;        // points on the plane `fresh_of_`
-  int fresh_of_ = -1;
+  std::vector<Known> known_;        // points by name, valid where the stamp is `now_`
+  int known_count_ = 0;
   std::vector<Corner> low_, high_;
 };
 

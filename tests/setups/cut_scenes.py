@@ -168,6 +168,9 @@ FAMILIES = {
     "overlapping plates": Family(
         of(block([-0.3, -7, -7], [0.05, 7, 0.6]), block([0, -7, -0.7], [0.3, 7, 7])), slight, components=2
     ),
+    "filled box": Family(
+        of(block([-9, -9, -9], [0.1, 9, 9]), block([-0.1, -9, -9], [9, 9, 9])), slight, components=0
+    ),  # in most cells the surfaces are apart
     "nested": Family(of(OUTER, INNER), volume=first_volume, area=first_area),
     "hollow": Family(hollow, components=2, volume=whole, area=all_area),
     "overlapping cubes": Family(
