@@ -2,6 +2,8 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <array>
+#include <functional>
 
 #include "bindings.hpp"
 #include "cut_table.hpp"
@@ -28,8 +30,9 @@ CutCells cut_cells(const std::vector<Doubles>& edges, const Doubles& points, con
   std::array<std::vector<double>, 3> lines;
   for (int d = 0; d < 3; ++d) {
     lines[d].assign(edges[d].data(), edges[d].data() + edges[d].size());
-    require(lines[d].size() >= 2 && std::adjacent_find(lines[d].begin(), lines[d].end(), std::greater_equal<>()) == lines[d].end(),
-            "edges must increase");
+    const auto& line = lines[d];
+    const auto found = std::adjacent_find(line.begin(), line.end(), std::greater_equal<>());
+    require(line.size() >= 2 && found == line.end(), "edges must increase");
   }
   const std::size_t n = points.size();
   require(n == 2 || n == 3 || n == 5, "points must be 2, 3 or 5 numbers");

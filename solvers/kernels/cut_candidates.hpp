@@ -9,7 +9,7 @@
 namespace cut {
 
 struct Candidates {
-  std::vector<int> cells;        // increasing
+  std::vector<int> cells;          // increasing
   std::vector<std::size_t> first;  // of the facets of each cell, and the end
   std::vector<int> facets;
 
@@ -31,9 +31,10 @@ inline Candidates candidates(const Lattice& lattice) {
         std::minmax({lattice.vertices[v[0]][d], lattice.vertices[v[1]][d], lattice.vertices[v[2]][d]});
       const auto& lines = lattice.lines[d];
       // cells [lines[i], lines[i + 1]] with lines[i + 1] >= least and lines[i] <= most
-      from[d] = std::max<int>(0, static_cast<int>(std::lower_bound(lines.begin(), lines.end(), least) - lines.begin()) - 1);
-      to[d] = std::min<int>(lattice.cells[d],
-                            static_cast<int>(std::upper_bound(lines.begin(), lines.end(), most) - lines.begin())) - 1;
+      const auto below = std::lower_bound(lines.begin(), lines.end(), least) - lines.begin() - 1;
+      const auto above = std::upper_bound(lines.begin(), lines.end(), most) - lines.begin();
+      from[d] = std::max(0, static_cast<int>(below));
+      to[d] = std::min(lattice.cells[d], static_cast<int>(above)) - 1;
       any &= least <= lines.back() && most >= lines.front() && from[d] <= to[d];
     }
     if (!any) continue;

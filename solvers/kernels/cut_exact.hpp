@@ -1,8 +1,8 @@
 // Regions of fluid in one cell, exactly: a BSP of the cell by the planes of the facets in it (Thibault & Naylor 1987),
 // in convex parts with portals between them. A portal is covered by facets or not, uniformly, since the neighbours of a
-// facet divide it along their common edges; so are the parts of the cell's faces (faces.hpp). Facets that coincide, that
-// lie in one plane or in a plane of the grid cover one portal together. The winding number of each body changes by one
-// across its facets; fluid is where all are zero.
+// facet divide it along their common edges; so are the parts of the cell's faces (cut_faces.hpp). Facets that coincide,
+// or that lie in one plane or in a plane of the grid, cover one portal together. The winding number of each body
+// changes by one across its facets; fluid is where all are zero.
 #pragma once
 
 #include <algorithm>
@@ -313,7 +313,7 @@ private:
 
   // Facets that coincide are those of the first body.
   void add_surface(const Portal& portal, int above, int region, const std::array<int, 3>& at, CellRegions& out) {
-    int first = lattice_.bodies;
+    int first = static_cast<int>(lattice_.of_body.size());
     const auto mine = [&](const Fragment& of) { return (of.sign > 0) == (above == 1); };
     for (int c = portal.cover; c >= 0; c = covers_[c].next)
       if (mine(covers_[c].of)) first = std::min(first, lattice_.body[covers_[c].of.facet]);

@@ -1,7 +1,7 @@
-// Regions of fluid in one cell whose surfaces are apart, in double. They are the connected components of the polygons of
-// surface and the corners of the cell, by names alone: polygons are joined at common edges of facets and along the wet
-// parts of the cell's edges. Volumes follow by Gauss' theorem. What rounding could decide is declined, and so are bodies
-// whose polygons may meet, and surfaces that meet no edge of the cell: then the exact kernel decides.
+// Regions of fluid in one cell whose surfaces are apart, in double. They are the connected components of the polygons
+// of surface and the corners of the cell, by names alone: polygons are joined at common edges of facets and along the
+// wet parts of the cell's edges. Volumes follow by Gauss' theorem. What rounding could decide is declined, and so are
+// bodies whose polygons may meet, and surfaces that meet no edge of the cell: then the exact kernel decides.
 #pragma once
 
 #include <algorithm>
@@ -37,8 +37,7 @@ private:
 
   struct Shape {
     int count, facet;
-    Point3 n, n_error, origin;  // of the plane
-    double error_of_vertex;
+    Point3 n;
     Point3 x[most];
     double error[most];
     int label[most];  // of the edge that follows: below 3 of the facet, then 3 + 2 axis + side
@@ -69,7 +68,6 @@ private:
       p->label[v] = v;
       for (int d = 0; d < 3; ++d) most_size = std::max({most_size, std::abs(p->x[v][d]), size_[d]});
     }
-    const Point3 origin = p->x[0];
     for (int v = 0; v < 3; ++v) p->error[v] = 4 * rounding_error * most_size;
     for (int d = 0; d < 3; ++d) {
       bool below = true, above = true, within = true;
@@ -94,40 +92,53 @@ private:
       const int e = next(d), f = next(e);
       const double one = step(1, e) * step(2, f), two = step(1, f) * step(2, e), sum = std::abs(one) + std::abs(two);
       p->n[d] = one - two;
-      p->n_error[d] = doubt * sum;
       n_size = std::max(n_size, sum);
       n_most = std::max(n_most, std::abs(p->n[d]));
     }
     if (n_most <= doubt * n_size) return Clipped::unknown;
-    p->origin = origin;
-    p->error_of_vertex = 4 * rounding_error * most_size;
     polygons_.push_back(*p);
     return Clipped::some;
   }
 
-  // Whether the polygons of different bodies are apart: one is beside the plane of the other.
+  // Whether the polygons of different bodies are apart, and those of layers of one body that face each other: each pair
+  // along the normal of some polygon.
   bool apart() const {
     for (std::size_t i = 0; i < polygons_.size(); ++i)
       for (std::size_t j = i + 1; j < polygons_.size(); ++j) {
         const Shape &a = polygons_[i], &b = polygons_[j];
-        if (lattice_.body[a.facet] != lattice_.body[b.facet] && !beside(a, b) && !beside(b, a)) return false;
+        if (lattice_.body[a.facet] == lattice_.body[b.facet] && (!facing(a, b) || have_vertex(a, b))) continue;
+        if (apart_along(a.n, a, b) || apart_along(b.n, a, b)) continue;
+        if (std::none_of(polygons_.begin(), polygons_.end(), [&](const Shape& c) { return apart_along(c.n, a, b); }))
+          return false;
       }
     return true;
   }
 
-  static bool beside(const Shape& shape, const Shape& plane) {
-    bool below = true, above = true;
-    for (int i = 0; i < shape.count && (below || above); ++i) {
+  static bool facing(const Shape& a, const Shape& b) { return a.n[0] * b.n[0] + a.n[1] * b.n[1] + a.n[2] * b.n[2] < 0; }
+
+  bool have_vertex(const Shape& a, const Shape& b) const {
+    const auto &v = lattice_.facets[a.facet], &w = lattice_.facets[b.facet];
+    return std::find_first_of(v.begin(), v.end(), w.begin(), w.end()) != v.end();
+  }
+
+  static bool apart_along(const Point3& n, const Shape& a, const Shape& b) {
+    const auto [low_a, high_a] = extent(n, a);
+    const auto [low_b, high_b] = extent(n, b);
+    return high_a < low_b || high_b < low_a;
+  }
+
+  // Bounds of n.x over a polygon.
+  static std::array<double, 2> extent(const Point3& n, const Shape& shape) {
+    std::array<double, 2> found{INFINITY, -INFINITY};
+    for (int i = 0; i < shape.count; ++i) {
       double sum = 0, error = 0;
       for (int d = 0; d < 3; ++d) {
-        const double way = shape.x[i][d] - plane.origin[d];
-        sum += plane.n[d] * way;
-        error += plane.n_error[d] * std::abs(way) + 2 * std::abs(plane.n[d]) * (shape.error[i] + plane.error_of_vertex);
+        sum += n[d] * shape.x[i][d];
+        error += std::abs(n[d]) * (shape.error[i] + 4 * rounding_error * std::abs(shape.x[i][d]));
       }
-      below &= sum < -error;
-      above &= sum > error;
+      found = {std::min(found[0], sum - error), std::max(found[1], sum + error)};
     }
-    return below || above;
+    return found;
   }
 
   bool slab(const Shape& p, Shape& q, int d, double most_size) const {
@@ -347,8 +358,10 @@ private:
     const auto facet = [&](const Crossing& c) { return polygons_[c.polygon].facet; };
     const auto &first = crossings.front(), &last = crossings.back();
     if (first.sign < 0) add(region(first), facet(first), -1, 0, first.at);
-    for (std::size_t i = 0; i + 1 < crossings.size(); ++i)
-      if (crossings[i].sign > 0) add(region(crossings[i]), facet(crossings[i]), -1, crossings[i].at, crossings[i + 1].at);
+    for (std::size_t i = 0; i + 1 < crossings.size(); ++i) {
+      const auto &begin = crossings[i], &end = crossings[i + 1];
+      if (begin.sign > 0) add(region(begin), facet(begin), -1, begin.at, end.at);
+    }
     if (last.sign > 0) add(region(last), facet(last), -1, last.at, size_[axis]);
   }
 

@@ -63,7 +63,8 @@ template <int A, int B>
 [[gnu::always_inline]] inline Integer<A + B> operator*(const Integer<A>& a, const Integer<B>& b) {
   Integer<A + B> product;
   if constexpr (A == 1 && B == 1) {
-    const auto value = static_cast<__int128>(static_cast<std::int64_t>(a.limb[0])) * static_cast<std::int64_t>(b.limb[0]);
+    const auto one = static_cast<std::int64_t>(a.limb[0]), two = static_cast<std::int64_t>(b.limb[0]);
+    const auto value = static_cast<__int128>(one) * two;
     product.limb = {static_cast<std::uint64_t>(value), static_cast<std::uint64_t>(value >> 64)};
     return product;
   }

@@ -15,19 +15,19 @@ using Integers3 = std::array<std::int64_t, 3>;
 using Point3 = std::array<double, 3>;
 
 constexpr int fine_bits = 48;    // of the smallest cell
-constexpr int coarse_bits = 61;  // of all coordinates: differences of two fit into 64 bits, see planes.hpp
+constexpr int coarse_bits = 61;  // of all coordinates: differences of two fit into 64 bits, see cut_planes.hpp
 
 struct Lattice {
   std::array<std::vector<std::int64_t>, 3> lines;
   std::array<int, 3> cells;
-  Point3 origin;                        // [m]
-  double quantum;                       // [m], a power of two
+  Point3 origin;                          // [m]
+  double quantum;                         // [m], a power of two
   std::vector<Integers3> vertices;
   std::vector<std::array<int, 3>> facets;
-  std::vector<int> body;                // of each facet
-  int bodies = 0;
-  std::array<int, 3> first_plane;       // number of the first grid plane of each axis
-  int planes = 0;                       // grid planes
+  std::vector<int> body;                  // of each facet
+  std::vector<std::vector<int>> of_body;  // facets of each body
+  std::array<int, 3> first_plane;         // number of the first grid plane of each axis
+  int planes = 0;                         // grid planes
 
   Lattice(const std::array<std::vector<double>, 3>& edges, const double* x, std::size_t vertex_count,
           const std::int64_t* nodes, const std::int64_t* bodies_of_facets, std::size_t facet_count) {
@@ -61,7 +61,8 @@ struct Lattice {
     for (std::size_t f = 0; f < facet_count; ++f) {
       for (int v = 0; v < 3; ++v) facets[f][v] = static_cast<int>(nodes[3 * f + v]);
       body[f] = static_cast<int>(bodies_of_facets[f]);
-      bodies = std::max(bodies, body[f] + 1);
+      of_body.resize(std::max(of_body.size(), static_cast<std::size_t>(body[f]) + 1));
+      of_body[body[f]].push_back(static_cast<int>(f));
     }
   }
 

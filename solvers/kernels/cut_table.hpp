@@ -37,7 +37,7 @@ public:
     table_.state.assign(lattice_.count(), fluid);
     table_.kernel.assign(lattice_.count(), 0);
     compute_cells();
-    for (int body = 0; body < lattice_.bodies; ++body) fill(body);
+    for (std::size_t body = 0; body < lattice_.of_body.size(); ++body) fill(static_cast<int>(body));
     number_regions();
     integrate_surface();
     link_faces();
@@ -78,13 +78,12 @@ private:
   // Turns of a body about a point relative to `origin_`: its solid angle (Van Oosterom & Strackee 1983).
   int turns(int body, const Point3& x) const {
     double sum = 0;
-    for (std::size_t f = 0; f < lattice_.facets.size(); ++f) {
-      if (lattice_.body[f] != body) continue;
+    for (const int f : lattice_.of_body[body]) {
       std::array<Point3, 3> way;
       std::array<double, 3> length;
       for (int v = 0; v < 3; ++v) {
-        for (int d = 0; d < 3; ++d)
-          way[v][d] = to_unit * static_cast<double>(lattice_.vertices[lattice_.facets[f][v]][d] - origin_[d]) - x[d];
+        const auto& at = lattice_.vertices[lattice_.facets[f][v]];
+        for (int d = 0; d < 3; ++d) way[v][d] = to_unit * static_cast<double>(at[d] - origin_[d]) - x[d];
         length[v] = std::sqrt(dot(way[v], way[v]));
       }
       const auto& [a, b, c] = way;
@@ -104,13 +103,11 @@ private:
     std::array<int, 3> from, to;
     for (int d = 0; d < 3; ++d) {
       std::int64_t least = std::numeric_limits<std::int64_t>::max(), most = std::numeric_limits<std::int64_t>::min();
-      for (std::size_t f = 0; f < lattice_.facets.size(); ++f) {
-        if (lattice_.body[f] != body) continue;
+      for (const int f : lattice_.of_body[body])
         for (const int v : lattice_.facets[f]) {
           least = std::min(least, lattice_.vertices[v][d]);
           most = std::max(most, lattice_.vertices[v][d]);
         }
-      }
       const auto& lines = lattice_.lines[d];
       from[d] = 0;
       to[d] = lattice_.cells[d] - 1;
@@ -121,7 +118,8 @@ private:
     const std::array<int, 3> n{to[0] - from[0] + 1, to[1] - from[1] + 1, to[2] - from[2] + 1};
     std::vector<char> seen(static_cast<std::size_t>(n[0]) * n[1] * n[2], 0);
     const auto local = [&](const std::array<int, 3>& at) {
-      return (at[0] - from[0]) + static_cast<std::size_t>(n[0]) * ((at[1] - from[1]) + static_cast<std::size_t>(n[1]) * (at[2] - from[2]));
+      const std::size_t column = (at[1] - from[1]) + static_cast<std::size_t>(n[1]) * (at[2] - from[2]);
+      return (at[0] - from[0]) + n[0] * column;
     };
     for (std::size_t c = 0; c < cells_.size(); ++c) {
       const auto& bodies = cells_[c].bodies;
@@ -209,14 +207,16 @@ private:
           table_.piece_moments.resize(table_.piece_moments.size() + 3 * size, 0);
         }
         std::array<Point3, 3> facet;
-        for (int v = 0; v < 3; ++v)
-          for (int d = 0; d < 3; ++d)
-            facet[v][d] = static_cast<double>(lattice_.vertices[lattice_.facets[piece.facet][v]][d] - low[d]) / relative[d];
+        for (int v = 0; v < 3; ++v) {
+          const auto& corner = lattice_.vertices[lattice_.facets[piece.facet][v]];
+          for (int d = 0; d < 3; ++d) facet[v][d] = static_cast<double>(corner[d] - low[d]) / relative[d];
+        }
         integrals_.add_surface(here.corners.data() + piece.first, piece.count, facet, metres,
                                table_.moments.data() + region * size,
                                table_.piece_moments.data() + table_.piece_moments.size() - 3 * size);
       }
-      for (int k = 0; k < here.regions; ++k) integrals_.to_volume(table_.moments.data() + (first_region_[c] + k) * size);
+      for (int k = 0; k < here.regions; ++k)
+        integrals_.to_volume(table_.moments.data() + (first_region_[c] + k) * size);
     }
   }
 

@@ -64,11 +64,12 @@ def test_numbers_of_bodies_and_facets_do_not_matter():
 
 
 def test_scale_and_place_do_not_matter():
-    """The same scene a thousand times smaller, far from the origin: rounding of the input is all that differs."""
+    """A thousand times smaller, far from the origin, flat cells: rounding of the input is all that differs."""
     edges, x, facets, body = FAMILIES["overlapping cubes"].pose(3)
     one = table_of(edges, x, facets, body)
-    for scale, shift in ((1e-3, 0.0), (1e3, 0.0), (1e-3, 5.0)):
-        other = table_of([scale * edge + shift for edge in edges], scale * x + shift, facets, body)
+    for scale, shift in ((1e-3, 0.0), (1e3, 0.0), (1e-3, 5.0), (np.array([1.0, 1e-3, 1.0]), 0.0)):
+        stretched = [edge * s + shift for edge, s in zip(edges, scale * np.ones(3), strict=True)]
+        other = table_of(stretched, scale * x + shift, facets, body)
         assert len(one.cell) == len(other.cell)
         assert np.abs(one.share - other.share).max() < 1e-11
         assert np.abs(one.face_area - other.face_area).max() < 1e-11

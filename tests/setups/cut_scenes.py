@@ -134,6 +134,16 @@ def hollow(rng) -> Scene:
     return x, facets, 0 * body
 
 
+def one_body(*bodies: Shape):
+    """Layers of one body that touch."""
+
+    def scene(rng) -> Scene:
+        x, facets, body = joined(*bodies)
+        return x, facets, 0 * body
+
+    return scene
+
+
 def grid_block(rng) -> Scene:
     return joined(block(-rng.integers(1, 3, 3) * 0.5, rng.integers(1, 3, 3) * 0.5))
 
@@ -162,6 +172,10 @@ FAMILIES = {
     "plate within": Family(of(block([-0.005, -1.1, -1.2], [0.005, 1.1, 1.2])), volume=whole, area=all_area),
     "identical faces": Family(of(HALF_PLATE, mirrored(HALF_PLATE)), slight, components=2),
     "flap of two bodies": Family(of(FLAP, mirrored(FLAP)), volume=whole, area=uncommon_area),
+    "flap of two layers": Family(one_body(FLAP, mirrored(FLAP)), volume=whole, area=uncommon_area),
+    "layers beside each other": Family(
+        one_body(block([-0.3, -7, -7], [0, 7, 0.6]), block([0, -7, -0.7], [0.3, 7, 7])), right, on_grid, components=2
+    ),
     "plates beside each other": Family(
         of(block([-0.3, -7, -7], [0, 7, 0.6]), block([0, -7, -0.7], [0.3, 7, 7])), right, on_grid, components=2
     ),
