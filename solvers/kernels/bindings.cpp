@@ -2,6 +2,7 @@
 #include <nanobind/nanobind.h>
 
 void bind_coarse(nanobind::module_& module);
+void bind_cut(nanobind::module_& module);
 void bind_division(nanobind::module_& module);
 void bind_factors(nanobind::module_& module);
 void bind_kdop(nanobind::module_& module);
@@ -12,6 +13,7 @@ void bind_surface(nanobind::module_& module);
 NB_MODULE(_kernels, module)
 {
   bind_coarse(module);
+  bind_cut(module);
   bind_division(module);
   bind_factors(module);
   bind_kdop(module);

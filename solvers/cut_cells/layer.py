@@ -1,0 +1,60 @@
+"""2D as one layer of cells in 3D: segments become walls that stand across the layer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from solvers.api import Array, Indices
+from solvers.cut_cells.table import CutTable
+
+
+def walls(facets: Indices, body: Indices, x: Array, height: float) -> tuple[Indices, Indices, Array]:
+    """(triangles, body of each, vertices) of walls from -height to 2 height on segments, closed above and below.
+
+    Triangles 2 i and 2 i + 1 are those on segment i. The ends are fans about a vertex of each body: they overlap
+    themselves, but turn about a point as often as the body does, and no cell meets them.
+    """
+    count = len(x)
+    low, high = facets, facets + count
+    sides = np.stack([low[:, 0], low[:, 1], high[:, 1], low[:, 0], high[:, 1], high[:, 0]], axis=1).reshape(-1, 3)
+    bodies, first = np.unique(body, return_index=True)
+    centre = facets[first[np.searchsorted(bodies, body)], 0]
+    below = np.stack([centre, low[:, 1], low[:, 0]], axis=1)
+    above = np.stack([centre + count, high[:, 0], high[:, 1]], axis=1)
+    some = (facets != centre[:, None]).all(axis=1)
+    levels = np.repeat([-height, 2.0 * height], count)
+    vertices = np.column_stack([np.tile(x, (2, 1)), levels])
+    triangles = np.concatenate([sides, below[some], above[some]])
+    return triangles, np.concatenate([np.repeat(body, 2), body[some], body[some]]), vertices
+
+
+def flattened(table: CutTable, vertices: int, height: float) -> CutTable:
+    """The table of a layer of this height [m] as that of its plane.
+
+    vertices: number of them in the plane.
+    """
+    regions, n = len(table.cell), round(table.face_moments.shape[1] ** 0.5)
+    segment, second = np.divmod(table.piece_facet, 2)
+    ends = np.zeros((2, 3, 2))  # the end of the segment that each vertex of its two triangles stands on
+    ends[0, [0, 1, 2], [0, 1, 1]] = ends[1, [0, 1, 2], [0, 1, 0]] = 1.0
+    pieces = table.piece_moments.reshape(len(segment), n, n * n, 3).sum(axis=1) @ ends[second] / height
+    key = table.piece_region * (segment.max(initial=0) + 1) + segment
+    first = np.flatnonzero(np.diff(key, prepend=-1))
+    sides = table.face_axis < 2
+    return replace(
+        table,
+        shape=table.shape[:2],
+        vertices=np.ascontiguousarray(table.vertices[:vertices, :2]),
+        moments=table.moments.reshape(regions, n, n * n).sum(axis=1),
+        piece_region=table.piece_region[first],
+        piece_facet=segment[first],
+        piece_body=table.piece_body[first],
+        piece_moments=np.add.reduceat(pieces, first) if len(first) else pieces,
+        face_axis=table.face_axis[sides],
+        face_cells=table.face_cells[sides],
+        face_regions=table.face_regions[sides],
+        face_area=table.face_area[sides],
+        face_moments=table.face_moments.reshape(-1, n, n).sum(axis=1)[sides],
+    )

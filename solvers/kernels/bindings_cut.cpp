@@ -1,0 +1,94 @@
+// Python names of the geometry of cut cells: cut_cells, CutCells.
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <array>
+#include <functional>
+
+#include "bindings.hpp"
+#include "cut_table.hpp"
+
+namespace {
+
+using Doubles = Values<const double, 1>;
+using Integers = Values<const std::int64_t, 1>;
+
+struct CutCells {
+  double quantum;
+  nb::object vertices, state, kernel, cell, share, moments, piece_region, piece_facet, piece_moments, face_axis,
+    face_cells, face_regions, face_area, face_moments;
+};
+
+CutCells cut_cells(const std::vector<Doubles>& edges, const Doubles& points, const Values<const double, 2>& vertices,
+                   const Values<const std::int64_t, 2>& facets, const Integers& body, bool only_exact) {
+  require(edges.size() == 3, "edges must be 3 arrays");
+  require(vertices.shape(1) == 3 && facets.shape(1) == 3, "vertices and facets must have 3 columns");
+  require(body.size() == facets.shape(0), "body must have one number for each facet");
+  require(std::all_of(facets.data(), facets.data() + facets.size(),
+                      [&](std::int64_t v) { return v >= 0 && v < static_cast<std::int64_t>(vertices.shape(0)); }),
+          "facets name vertices that are not there");
+  std::array<std::vector<double>, 3> lines;
+  for (int d = 0; d < 3; ++d) {
+    lines[d].assign(edges[d].data(), edges[d].data() + edges[d].size());
+    const auto& line = lines[d];
+    const auto found = std::adjacent_find(line.begin(), line.end(), std::greater_equal<>());
+    require(line.size() >= 2 && found == line.end(), "edges must increase");
+  }
+  const std::size_t n = points.size();
+  require(n == 2 || n == 3 || n == 5, "points must be 2, 3 or 5 numbers");
+  cut::Table table;
+  std::vector<double> rounded;
+  double quantum = 0;
+  {
+    nb::gil_scoped_release released;
+    const cut::Lattice lattice(lines, vertices.data(), vertices.shape(0), facets.data(), body.data(), facets.shape(0));
+    quantum = lattice.quantum;
+    for (const auto& vertex : lattice.vertices)
+      for (int d = 0; d < 3; ++d) rounded.push_back(static_cast<double>(vertex[d]) * quantum);
+    switch (n) {
+      case 2: table = cut::TableMaker<2>(lattice, points.data(), only_exact).make(); break;
+      case 3: table = cut::TableMaker<3>(lattice, points.data(), only_exact).make(); break;
+      default: table = cut::TableMaker<5>(lattice, points.data(), only_exact).make();
+    }
+  }
+  const std::size_t cells = table.state.size(), regions = table.cell.size(), pieces = table.piece_facet.size();
+  const std::size_t faces = table.face_axis.size(), all = n * n * n;
+  return {quantum,
+          to_numpy(std::move(rounded), {vertices.shape(0), 3}),
+          to_numpy(std::move(table.state), {cells}),
+          to_numpy(std::move(table.kernel), {cells}),
+          to_numpy(std::move(table.cell), {regions}),
+          to_numpy(std::move(table.share), {regions}),
+          to_numpy(std::move(table.moments), {regions, all}),
+          to_numpy(std::move(table.piece_region), {pieces}),
+          to_numpy(std::move(table.piece_facet), {pieces}),
+          to_numpy(std::move(table.piece_moments), {pieces, all, 3}),
+          to_numpy(std::move(table.face_axis), {faces}),
+          to_numpy(std::move(table.face_cells), {faces, 2}),
+          to_numpy(std::move(table.face_regions), {faces, 2}),
+          to_numpy(std::move(table.face_area), {faces}),
+          to_numpy(std::move(table.face_moments), {faces, n * n})};
+}
+
+}  // namespace
+
+void bind_cut(nb::module_& module) {
+  nb::class_<CutCells>(module, "CutCells", "Columns of the table of the fluid in cut cells; see solvers.cut_cells.")
+    .def_ro("quantum", &CutCells::quantum)
+    .def_ro("vertices", &CutCells::vertices)
+    .def_ro("state", &CutCells::state)
+    .def_ro("kernel", &CutCells::kernel)
+    .def_ro("cell", &CutCells::cell)
+    .def_ro("share", &CutCells::share)
+    .def_ro("moments", &CutCells::moments)
+    .def_ro("piece_region", &CutCells::piece_region)
+    .def_ro("piece_facet", &CutCells::piece_facet)
+    .def_ro("piece_moments", &CutCells::piece_moments)
+    .def_ro("face_axis", &CutCells::face_axis)
+    .def_ro("face_cells", &CutCells::face_cells)
+    .def_ro("face_regions", &CutCells::face_regions)
+    .def_ro("face_area", &CutCells::face_area)
+    .def_ro("face_moments", &CutCells::face_moments);
+  module.def("cut_cells", &cut_cells, "edges"_a, "points"_a, "vertices"_a, "facets"_a, "body"_a, "only_exact"_a = false,
+             "Regions of the fluid in the cells that closed surfaces of bodies cut, in 3D; see solvers.cut_cells.");
+}
