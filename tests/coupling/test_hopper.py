@@ -11,7 +11,7 @@ from fsci.run.history import read_history
 
 @pytest.mark.slow(seconds=170)
 def test_hopper(tmp_path):
-    """Its numbers hold and no disc enters another one or the floor; only films below a cell are warned of."""
+    """Its numbers hold and no disc enters another one; only films below a cell are warned of."""
     out = tmp_path / "out"
     done = fsci("run", "cases/hopper", "-o", out, "--set", "output.fields_every=0", timeout=1800)
     assert done.returncode == 0, done.stdout[-3000:]
@@ -23,5 +23,4 @@ def test_hopper(tmp_path):
     chord = 0.16 * np.cos(np.pi / 32)  # of two polygons with 32 sides
     for one, other in combinations(centres, 2):
         assert np.linalg.norm(one - other, axis=0).min() > chord - 1e-9
-    assert history["contact.on_disc_1.y"].max() > 0.1
-    assert min(history[f"contact.flap_top_disc_{k}.y"].min() for k in (1, 2, 3)) < -0.1
+    assert history["contact.on_disc_2.y"].max() > 0.5
