@@ -8,9 +8,9 @@ double with a bound of their rounding error, or else in integers. Zeros are deci
 lie in one plane or in a plane of the grid, cover one portal together, that of the first body counts; facets in a plane
 of the grid divide that face of both cells along their edges. No tolerance and no perturbation.
 
-A body is one or several closed surfaces that do not cross each other; where the surface of a body overlaps itself, the
-regions of a cell inside of both layers are wrong. Surfaces of two bodies that touch after a rotation touch to rounding
-only: whether fluid passes between them is then undefined.
+A body is one or several closed surfaces that may touch, but not cross each other: a cell inside of two layers of one
+body is not seen to be solid. Surfaces that touch after a rotation touch to rounding only: whether fluid passes between
+them is then decided by the rounded vertices.
 """
 
 from solvers.cut_cells.components import Components, components_of

@@ -103,14 +103,18 @@ private:
   // Whether the polygons of different bodies are apart, and those of layers of one body that face each other: each pair
   // along the normal of some polygon.
   bool apart() const {
-    for (std::size_t i = 0; i < polygons_.size(); ++i)
+    for (std::size_t i = 0; i < polygons_.size(); ++i) {
+      const Shape& a = polygons_[i];
+      const auto [low, high] = extent(a.n, a);
       for (std::size_t j = i + 1; j < polygons_.size(); ++j) {
-        const Shape &a = polygons_[i], &b = polygons_[j];
+        const Shape& b = polygons_[j];
         if (lattice_.body[a.facet] == lattice_.body[b.facet] && (!facing(a, b) || have_vertex(a, b))) continue;
-        if (apart_along(a.n, a, b) || apart_along(b.n, a, b)) continue;
+        const auto [low_b, high_b] = extent(a.n, b);  // along its own normal a polygon takes least room
+        if (high < low_b || high_b < low) continue;
         if (std::none_of(polygons_.begin(), polygons_.end(), [&](const Shape& c) { return apart_along(c.n, a, b); }))
           return false;
       }
+    }
     return true;
   }
 
