@@ -10,14 +10,18 @@ import pytest
 
 from fsci.run.copied_process import start_mpi_alone
 
-start_mpi_alone()
-
 START = time.monotonic()
 NO_TIME = "no time is left"
 
 
 def pytest_addoption(parser):
     parser.addoption("--minutes", type=float, help="begin no test after so many")
+
+
+def pytest_configure(config):
+    """Start MPI before a test imports it; not where other processes run the tests, which would inherit its variables."""
+    if hasattr(config, "workerinput") or not config.getoption("numprocesses", None):
+        start_mpi_alone()
 
 
 def pytest_collection_modifyitems(items):

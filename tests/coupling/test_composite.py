@@ -42,7 +42,7 @@ fluid:
     left: {{on: x-, traction: [0, 0]}}
     right: {{on: x+, traction: [0, 0]}}
     walls: {{on: [y-, y+], no_slip: true}}
-  bodies:
+{dynamics}  bodies:
     wall: {{mesh: {{shape: rectangle, size: [0.43, 1.4], origin: [0.91, -0.2], cells: [1, 1]}}}}
 {free}{elastic}coupling: {{scheme: {scheme}{tolerance}}}
 probes:
@@ -66,6 +66,7 @@ def scene(scheme: str, *, elastic: bool = True, free: bool = True) -> str:
         scheme=scheme,
         tolerance="" if scheme == "monolithic" else ", tolerance: 1.0e-11",
         elastic=ELASTIC if elastic else "",
+        dynamics="" if elastic else "  dynamics: {rho_inf: 0.8}\n",  # else the disc has that of the flap
         free=(FREE if free else "") + ("" if elastic else STILL),
         probes=(OF_FLAP if elastic else "") + (OF_DISC if free else ""),
     )
