@@ -239,7 +239,7 @@ def test_no_matrix_is_kept_from_step_to_step(tmp_path, monkeypatch):
     case.write_text(POST)
     monkeypatch.setitem(ENVIRONMENT, "PETSC_OPTIONS", f"-log_view :{log}")
     kept = []
-    for steps in (1, 3):
+    for steps in (2, 6):  # both end with an iterate of the same number: what the last one has is there at the end
         run = new_process("run", case, "-o", tmp_path / f"{steps}", "--set", f"time.end={0.02 * steps}")
         assert run.returncode == 0, run.stdout
         line = next(line for line in log.read_text().splitlines() if line.split()[:1] == ["Matrix"])
