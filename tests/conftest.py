@@ -19,7 +19,7 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
-    """Start MPI before a test imports it; not where other processes run the tests, which would inherit its variables."""
+    """Start MPI before a test imports it; not where other processes run the tests: they would inherit its variables."""
     if hasattr(config, "workerinput") or not config.getoption("numprocesses", None):
         start_mpi_alone()
 
