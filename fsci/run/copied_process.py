@@ -17,7 +17,7 @@ from typing import IO
 Program = Callable[[Sequence[str]], int]
 
 #: What runs import: to do so here saves each copy about a second.
-COMMON = (
+MODULES_OF_RUNS = (
     "fsci.run.run",
     "fsci.builder.build",
     "fsci.builder.fluid",
@@ -33,7 +33,7 @@ TRANSPORT = "OMPI_MCA_btl"  #: Open MPI reads it at its start
 def import_common() -> None:
     """Import what runs need."""
     start_mpi_alone()
-    for module in COMMON:
+    for module in MODULES_OF_RUNS:
         import_module(module)
 
 

@@ -19,7 +19,7 @@ from typing import Any
 from fsci.run.child import ENVIRONMENT
 from fsci.run.copied_process import fsci, import_common, run_in_copy
 
-LOST = "the process that runs are copies of has ended"
+PROCESS_HAS_ENDED = "the process that runs are copies of has ended"
 
 
 class WarmProcess:
@@ -51,7 +51,7 @@ class WarmProcess:
                 _send(ours, list(arguments))
                 code, out, errors = _receive(ours)
             except (OSError, ValueError):
-                code, out, errors = -signal.SIGKILL, "", LOST
+                code, out, errors = -signal.SIGKILL, "", PROCESS_HAS_ENDED
         return subprocess.CompletedProcess(arguments, code, out, errors)
 
     def _started(self) -> socket.socket:

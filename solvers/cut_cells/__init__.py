@@ -16,4 +16,4 @@ them is then decided by the rounded vertices.
 from solvers.cut_cells.components import Components, components_of
 from solvers.cut_cells.make import cut_cells
 from solvers.cut_cells.surfaces import ClosedSurfaces
-from solvers.cut_cells.table import CUT, FLUID, SOLID, CutTable
+from solvers.cut_cells.table import CellState, CutTable

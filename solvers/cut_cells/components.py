@@ -9,7 +9,7 @@ from scipy import ndimage, sparse
 from scipy.sparse.csgraph import connected_components
 
 from solvers.api import Indices
-from solvers.cut_cells.table import FLUID, CutTable
+from solvers.cut_cells.table import CellState, CutTable
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Components:
 def components_of(table: CutTable) -> Components:
     """Components over the open parts of faces; cells that are all fluid are linked to each other."""
     regions = len(table.cell)
-    label, labels = ndimage.label((table.state == FLUID).reshape(table.shape, order="F"))
+    label, labels = ndimage.label((table.state == CellState.FLUID).reshape(table.shape, order="F"))
     number = np.where(label > 0, regions + label - 1, -1).ravel(order="F").astype(np.int64)
     beside = np.where(table.face_cells >= 0, number[table.face_cells], -1)
     ends = np.where(table.face_regions >= 0, table.face_regions, beside)

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array, Indices
 
-#: States of a cell: all fluid and no surface, all solid, or with surface in it or in its faces.
-FLUID, SOLID, CUT = 0, 1, 2
+
+class CellState(IntEnum):
+    """All fluid and no surface, all solid, or with surface in it or in its faces."""
+
+    FLUID = 0
+    SOLID = 1
+    CUT = 2
 
 
 @dataclass(frozen=True)
@@ -25,7 +31,7 @@ class CutTable:
     shape: tuple[int, ...]  #: cells in each direction
     quantum: float  #: vertices and grid lines are multiples of it [m], seen from the first corner of the box
     vertices: Array  #: rounded, relative to the first corner of the box [m], shape (vertices, dim)
-    state: NDArray[np.int8]  #: FLUID, SOLID or CUT, shape (C,)
+    state: NDArray[np.int8]  #: CellState, shape (C,)
     exact: NDArray[np.bool_]  #: cells of the exact kernel, shape (C,)
 
     # Regions, sorted by cell

@@ -16,7 +16,7 @@
 namespace cut {
 
 constexpr double to_unit = 1.0 / (std::int64_t{1} << fine_bits);  // from integers to numbers of the size of cells
-constexpr double rounding_error = 1.1102230246251565e-16;
+constexpr double rounding_error = 1.1102230246251565e-16;  // half of the distance from 1 to the next number
 // First-order bounds, in units of the rounding error, of sums of absolute values: n 4, d 8, X 21, W 17, side 29.
 constexpr double doubt = 64 * rounding_error;
 

@@ -108,10 +108,12 @@ def three_steps(name, out, processes=1):
 
 def first_steps(folder, out):
     """Arguments of `fsci` for three steps."""
-    time = load_case(folder / "case.yaml").time
+    case = load_case(folder / "case.yaml")
+    time, residual = case.time, min(case.solver.newton.residual, 1e-10)
     end = min(time.end, time.start + 3 * time.step)
-    # iterative solvers are as exact as they can be, so that what they leave over does not tell processes apart
-    settings = [f"time.end={end!r}", "verify=[]", "solver.linear.tolerance=1e-12", *SMALLER.get(folder.name, [])]
+    # solved as exactly as they can be, so that what iterations leave over does not tell processes apart
+    exact = ["solver.linear.tolerance=1e-12", f"solver.newton.residual={residual!r}"]
+    settings = [f"time.end={end!r}", "verify=[]", *exact, *SMALLER.get(folder.name, [])]
     return ["run", str(folder), "-o", str(out), *(w for setting in settings for w in ("--set", setting))]
 
 

@@ -14,7 +14,7 @@ from programs import new_process
 from fsci.run import warm
 from fsci.run.files import LOCK
 from fsci.run.history import read_history
-from fsci.run.warm import LOST, WarmProcess
+from fsci.run.warm import PROCESS_HAS_ENDED, WarmProcess
 
 BAR = """
 time: {step: 0.1, end: 1}
@@ -156,4 +156,4 @@ def test_the_process_is_lost(case):
         thread.start()
         thread.join(20.0)
         assert lost[0].returncode == -signal.SIGKILL
-        assert lost[0].stderr == LOST
+        assert lost[0].stderr == PROCESS_HAS_ENDED

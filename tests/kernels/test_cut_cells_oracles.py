@@ -7,7 +7,7 @@ from fluid_setup import circle, loop
 from scipy import ndimage
 
 from solvers import kernels
-from solvers.cut_cells import CUT, SOLID, components_of
+from solvers.cut_cells import CellState, components_of
 from solvers.fluid.geometry.regions.cell_regions import cell_regions
 from solvers.fluid.geometry.regions.space_parts import parts_in_space
 from solvers.fluid.geometry.thin.sheet_parts import links_of, parts_of_fluid
@@ -68,14 +68,14 @@ def test_blocks_against_voxels(first):
         solid = with_outside[1:-1, 1:-1, 1:-1]
         table = table_of(edges, x, facets, body)
         region, cells, shares = regions_of_voxels(solid)
-        whole = ~np.isin(np.arange(27), table.cell) & (table.state != SOLID)
+        whole = ~np.isin(np.arange(27), table.cell) & (table.state != CellState.SOLID)
         mine = np.concatenate([table.cell, np.flatnonzero(whole)])
         assert (np.sort(mine) == cells).all(), seed
         order = np.lexsort((np.concatenate([table.share, np.ones(whole.sum())]), mine))
         assert np.abs(np.concatenate([table.share, np.ones(whole.sum())])[order] - shares[np.lexsort((shares, cells))]).max(initial=0) < 1e-14, seed  # fmt: skip  # noqa: E501
         assert components_of(table).count == ndimage.label(~solid)[1], seed
         links = links_of_voxels(region)
-        cut = table.state == CUT
+        cut = table.state == CellState.CUT
         wanted = sorted((*key[:1], *cells[list(key[1:])], size) for key, size in links.items() if cut[cells[list(key[1:])]].any())  # fmt: skip  # noqa: E501
         inside = (table.face_cells >= 0).all(axis=1)
         found = sorted(zip(table.face_axis[inside], *table.face_cells[inside].T, table.face_area[inside].round(12), strict=True))  # fmt: skip  # noqa: E501
@@ -129,7 +129,7 @@ def compared_with_parts(edges, x, facets, body, smallest=1e-8):
     table, grid = table_of(edges, x, facets, body), Grid(edges)
     moments = kernels.moments(edges, POINTS, table.vertices, facets, np.ones(grid.size, dtype=bool))
     parts, links, *_ = parts_in_space(grid, moments, facets, table.vertices, 1)
-    cut = np.flatnonzero(table.state == CUT)
+    cut = np.flatnonzero(table.state == CellState.CUT)
     old = np.array([(part.cell, part.share) for part in parts if part.cell in set(cut.tolist())])
     old = old[old[:, 1] > smallest]
     some = table.share > smallest
@@ -211,7 +211,7 @@ def test_plane_against_the_moments_kernel_and_its_finder(kind):
         pieces[there] = 0.0
         assert not pieces.any()
         parts, *_ = parts_of_fluid(grid, moments, facets, table.vertices, np.ones(len(facets), dtype=bool))
-        cut = set(np.flatnonzero(table.state == CUT).tolist())
+        cut = set(np.flatnonzero(table.state == CellState.CUT).tolist())
         old = np.array([(part.cell, part.share) for part in parts if part.cell in cut])
         cells, shares = by_cell_and_share(*old.T)
         mine, my_shares = by_cell_and_share(table.cell, table.share)
@@ -262,8 +262,8 @@ def test_three_crossing_bodies_in_the_plane():
             shapes.append(box(low / 8.0, high / 8.0))
         facets = np.concatenate([loop(4) + 4 * k for k in range(3)])
         table = table_of(SQUARE_GRIDS[0], np.concatenate(shapes), facets, np.repeat(np.arange(3), 4))
-        fluid = np.where(table.state == SOLID, 0.0, 1.0)
-        fluid[table.state == CUT] = 0.0
+        fluid = np.where(table.state == CellState.SOLID, 0.0, 1.0)
+        fluid[table.state == CellState.CUT] = 0.0
         np.add.at(fluid, table.cell, table.share)
         expected = 1.0 - solid.reshape(5, 8, 5, 8).mean(axis=(1, 3))
         assert np.abs(fluid - expected.ravel(order="F")).max() < 1e-14, seed

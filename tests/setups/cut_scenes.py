@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from fluid_setup import block, sphere
 
-from solvers.cut_cells import CUT, FLUID, ClosedSurfaces, CutTable, components_of, cut_cells
+from solvers.cut_cells import CellState, ClosedSurfaces, CutTable, components_of, cut_cells
 from solvers.mesh.gauss import gauss
 
 N = 5
@@ -257,13 +257,13 @@ def assert_pose(family: Family, seed: int, *, only_exact: bool = False) -> CutTa
     assert components_of(table).count == family.components, seed
     index = np.unravel_index(np.arange(table.state.size), table.shape, order="F")
     cells = np.prod([np.diff(edge)[i] for edge, i in zip(edges, index, strict=True)], axis=0)
-    fluid = cells[table.state == FLUID].sum() + (table.share * cells[table.cell]).sum()
+    fluid = cells[table.state == CellState.FLUID].sum() + (table.share * cells[table.cell]).sum()
     scene = x, facets, body
     if family.volume:
         assert abs(cells.sum() - fluid - family.volume(table.vertices, scene)) < 1e-13, seed
     if family.area:
         assert abs(table.piece_area.sum() - family.area(table.vertices, scene)) < 1e-13, seed
-    assert (np.isin(np.flatnonzero(table.state == CUT), table.cell)).all()
+    assert (np.isin(np.flatnonzero(table.state == CellState.CUT), table.cell)).all()
     return table
 
 
