@@ -13,6 +13,7 @@ import socket
 import subprocess
 import sys
 import threading
+from array import array
 from collections.abc import Sequence
 from typing import Any
 
@@ -47,7 +48,7 @@ class WarmProcess:
         with ours:
             try:
                 with theirs, self._lock:
-                    socket.send_fds(self._started(), [b"r"], [theirs.fileno()])
+                    _send_handle(self._started(), theirs.fileno())
                 _send(ours, list(arguments))
                 code, out, errors = _receive(ours)
             except (OSError, ValueError):
@@ -68,8 +69,13 @@ class WarmProcess:
         return self._control
 
 
+def _send_handle(control: socket.socket, handle: int) -> None:
+    """As socket.send_fds, but without SIGPIPE where the other end is gone: PETSc ends this process for it."""
+    control.sendmsg([b"r"], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array("i", [handle]))], socket.MSG_NOSIGNAL)
+
+
 def _send(connection: socket.socket, content: Any) -> None:
-    connection.sendall(json.dumps(content).encode())
+    connection.sendall(json.dumps(content).encode(), socket.MSG_NOSIGNAL)
     connection.shutdown(socket.SHUT_WR)
 
 

@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from petsc4py import PETSc
 from programs import new_process
 
 from fsci.run import warm
@@ -146,7 +147,11 @@ def test_an_interrupted_run(case, one, tmp_path):
 
 
 def test_the_process_is_lost(case):
-    """What runs ends, and so does all that comes after it, with words instead of a wait."""
+    """What runs ends, and so does all that comes after it, with words instead of a wait.
+
+    PETSc's handler of signals ends this process where it writes to one that is gone.
+    """
+    PETSc.Vec().createSeq(1)
     with WarmProcess() as process:
         assert process.run("check", case).returncode == 0
         process._process.kill()
