@@ -430,11 +430,17 @@ class Contact:
         return self._integration.shares.imbalance
 
     def mean_gap(self) -> Array:
-        """Mean gap [m] at each multiplier, NaN where too little area is covered, shape (C,)."""
+        """Mean gap [m] at each multiplier, NaN where too little area is covered, shape (C,).
+
+        Contact makes it zero: multipliers with a constraint have their share of those without one.
+        """
+        found = np.full(len(self.z), np.nan)
         if self.terms is None:
-            return np.full(len(self.z), np.nan)
+            return found
         covered = self._constraints.coverage.enough(self.terms.D)
-        return np.divide(self.terms.gap, self.terms.D, out=np.full(len(self.z), np.nan), where=covered)
+        np.divide(self.terms.gap, self.terms.D, out=found, where=covered)
+        np.divide(self._redistributed(self.terms.gap), self._D, out=found, where=self._constrained)
+        return found
 
     def save(self) -> State:
         return {
