@@ -239,7 +239,7 @@ class Monolithic:
             except linear.LinearSolveFailed as failure:
                 flow.sequence.advance(failure)
         matrix = blocks.assembled()
-        self._solvers.direct.solve(blocks.with_added(matrix), b, x, matrix, reduction=reduction)
+        self._solvers.direct.solve(blocks.with_added(matrix), b, x, matrix)
 
     def _krylov_solver(self, flow: IterativeFlow, blocks: Blocks, of_flow: PETSc.Mat) -> PETSc.KSP:
         fill = flow.sequence.current == "fill"

@@ -14,11 +14,11 @@ class Lagged:
 
     The first `fresh` matrices of a step get their own preconditioners. The last of these is reused until a solve fails
     or takes more than `patience` times the iterations per digit that it took for its own matrix. Nothing is kept from
-    step to step, so that resumed runs give the same results. few: see `linear.solve`.
+    step to step, so that resumed runs give the same results.
     """
 
-    def __init__(self, *, fresh: float = 1, patience: float = 2.0, few: int = 0):
-        self.fresh, self.patience, self._few = fresh, patience, few
+    def __init__(self, *, fresh: float = 1, patience: float = 2.0):
+        self.fresh, self.patience = fresh, patience
         self.made = 0  #: count of preconditioners in this step
         self._kept: tuple[PETSc.KSP, PETSc.Mat, float] | None = None  # with its matrix and iterations per digit
 
@@ -33,7 +33,7 @@ class Lagged:
             return None
         ksp, made_of, first = kept
         try:
-            linear.solve(ksp, matrix, b, x, made_of, reduction=reduction, few=self._few)
+            linear.solve(ksp, matrix, b, x, made_of, reduction=reduction, few=0)
         except linear.LinearSolveFailed:
             return None
         iterations = int(ksp.getIterationNumber())
@@ -55,7 +55,7 @@ class Lagged:
 
         entries: the matrix with its entries, if `matrix` has products with vectors alone.
         """
-        linear.solve(ksp, matrix, b, x, entries, reduction=reduction, few=self._few)
+        linear.solve(ksp, matrix, b, x, entries, reduction=reduction, few=0)
         ksp.getPC().setReusePreconditioner(True)  # also when the matrix changes
         self.made += 1
         iterations = int(ksp.getIterationNumber())
@@ -69,11 +69,14 @@ def digits(ksp: PETSc.KSP, reduction: float) -> float:
 
 
 class LaggedFactors:
-    """Lagged LU factors by MUMPS, which pivots for velocity and pressure; reused for solves of up to 20 iterations."""
+    """Lagged LU factors by MUMPS, which pivots for velocity and pressure; reused for solves of up to 20 iterations.
+
+    An iteration with them costs next to nothing: systems are solved to the end.
+    """
 
     def __init__(self, comm, *, fresh: float):
         self._lagged, self._ksp = (
-            Lagged(fresh=fresh, patience=math.inf, few=linear.FEW),
+            Lagged(fresh=fresh, patience=math.inf),
             linear.factored_solver(comm, iterations=20),
         )
 
@@ -86,21 +89,13 @@ class LaggedFactors:
         """Discard the factors of the last step."""
         self._lagged.begin_step()
 
-    def solve(
-        self,
-        matrix: PETSc.Mat,
-        b: PETSc.Vec,
-        x: PETSc.Vec,
-        entries: PETSc.Mat | None = None,
-        *,
-        reduction: float = 0.0,
-    ) -> int:
+    def solve(self, matrix: PETSc.Mat, b: PETSc.Vec, x: PETSc.Vec, entries: PETSc.Mat | None = None) -> int:
         """Solve matrix x = b. Returns the count of iterations. Raises LinearSolveFailed.
 
         entries: what to factor, if `matrix` has products with vectors alone.
         """
-        iterations = self._lagged.solve_again(matrix, b, x, reduction=reduction)
+        iterations = self._lagged.solve_again(matrix, b, x)
         if iterations is not None:
             return iterations
         self._ksp.getPC().setReusePreconditioner(False)  # the order of elimination stays
-        return self._lagged.solve(self._ksp, matrix, b, x, entries, reduction=reduction)
+        return self._lagged.solve(self._ksp, matrix, b, x, entries)

@@ -151,7 +151,7 @@ class FlowSolver:
                 )
             except linear.LinearSolveFailed as failure:
                 self.sequence.advance(failure)
-        return self._direct.solve(matrix, b, x, reduction=reduction)
+        return self._direct.solve(matrix, b, x)
 
     def _create(self, matrix: PETSc.Mat, held: NDArray[np.bool_], near: Marker, product: PETSc.Mat) -> PETSc.KSP:
         comm, method = self.sequence.comm, self.sequence.current
