@@ -33,6 +33,7 @@ probes:
   flow: {quantity: flow_rate, through: outlet}
   plate: {quantity: force, body: plate}
   speed: {body: plate, quantity: displacement, at: [0, 0, 1.02]}
+solver: {newton: {residual: 1.0e-11}}
 """
 
 
