@@ -18,7 +18,7 @@ class EnergyBalance:
         #: the initial energy, and half of the sum of all |changes| since: each passes from one form to another [J]
         self.exchanged = 0.0
         self.last = 0.0  #: what the last step has exchanged [J]
-        #: by how much the work may be wrong: between forces at both ends of steps, and by residuals [J]
+        #: by how much the balance may be wrong: between forces at both ends of steps, by residuals and rounding [J]
         self.doubt = 0.0
 
     def start(self, kinetic: float, internal: float, friction: float) -> None:

@@ -264,6 +264,7 @@ class Structure:
             0.5 * (now.surface - old.surface) @ du,
             0.5 * (after - before) @ at_supports,
             self.held.free_part(self.residual_force) @ du,
+            0.0 if self.rounding is None else self.rounding @ self.rounded(),  # of the internal energy
         ]
         if isinstance(self.time, Statics) and self.current.dt > 0.0:
             self._limit_point.accept(self.current.t, self.norm(du) / self.current.dt)
