@@ -75,10 +75,7 @@ class LaggedFactors:
     """
 
     def __init__(self, comm, *, fresh: float):
-        self._lagged, self._ksp = (
-            Lagged(fresh=fresh, patience=math.inf),
-            linear.factored_solver(comm, iterations=20),
-        )
+        self._lagged, self._ksp = Lagged(fresh=fresh, patience=math.inf), linear.factored_solver(comm, iterations=20)
 
     @property
     def factored(self) -> int:
