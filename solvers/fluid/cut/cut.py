@@ -85,8 +85,8 @@ class Cutter:
         """Masks of facets, None: of no one. tied: to another body; closing: whose slits stay closed in a step.
 
         In a steady flow those stay closed that have touched, up to a width. An unsteady one has a history on each side:
-        there a cell that loses its fluid for the second time in a step stays solid until the step ends. Fluid in a wedge
-        beside contact pulls it shut, and without fluid it opens.
+        there a cell that loses its fluid for the second time in a step stays solid until the step ends. Fluid in a
+        wedge beside contact pulls it shut, and without fluid it opens.
         """
         self.grid, self.points, self.films, self.gaps, self.unions = grid, points, films, gaps, unions
         self._tied, self._closing, self._steady = tied, closing, steady
