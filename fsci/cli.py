@@ -160,6 +160,24 @@ def _parser() -> argparse.ArgumentParser:
         "--budget", metavar="TIME", type=_duration, help="leave out runs that would not end within it: --budget 20min"
     )
 
+    sweep = command(_sweep, "run a case with several values of settings, and compare what comes out")
+    sweep.add_argument("case", metavar="CASE", type=Path, help="case file, or folder with a case.yaml")
+    settings(sweep, "values with commas between them: --set fluid.viscosity=1,2,3; one value is the same for all runs")
+    sweep.add_argument(
+        "-o", "--out", metavar="OUT", type=Path, required=True, help="folder for the runs, sweep.csv and pictures"
+    )
+
+    diff = command(_diff, "show what runs differ in from the first one: settings, values, curves")
+    diff.add_argument("outs", metavar="OUT", nargs="+", type=Path, help="folders with the results of two or more runs")
+    diff.add_argument(
+        "-o",
+        "--pictures",
+        metavar="FOLDER",
+        type=Path,
+        default=Path("diff"),
+        help="folder for pictures (default: diff)",
+    )
+
     bench = command(_bench, "measure run time against error, in a copy of the repository")
     bench.add_argument(
         "names",
@@ -388,6 +406,36 @@ def _converge(options: argparse.Namespace) -> int:
     except OSError as error:
         return _fail(f"fsci converge: {error}")
     return int(not right)
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError
+    from fsci.sweep.sweep import sweep
+
+    try:
+        right = sweep(options.case, options.overrides, options.out, lambda line: print(line, flush=True))
+    except CaseError as error:
+        return _fail(str(error))
+    except KeyboardInterrupt:
+        return _fail("stopped; the same command goes on from here") + 1
+    except OSError as error:
+        return _fail(f"fsci sweep: {error}")
+    return int(not right)
+
+
+def _diff(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError
+    from fsci.diff import diff
+
+    if len(options.outs) < 2:
+        return _fail("fsci diff: give the folders of two or more runs")
+    try:
+        print("\n".join(diff(options.outs, options.pictures)))
+    except CaseError as error:
+        return _fail(str(error))
+    except (OSError, ValueError) as error:
+        return _fail(f"fsci diff: {error}")
+    return 0
 
 
 def _bench(options: argparse.Namespace) -> int:
