@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from fsci.plot.curves import COLOURS, CURVE_DOTS, CURVE_SIZE, CURVE_STYLE, PANEL, literal, save_figure
 
 FEW = 30  #: points of a line that are marked
 DASHES = ("-", "--", ":", "-.")  #: of lines that share a colour
 
-Line = tuple[Sequence[float], Sequence[float]]  #: positions and values
+Line = tuple[ArrayLike, ArrayLike]  #: positions and values
 
 
 def plot_lines(
@@ -39,11 +42,11 @@ def plot_lines(
                 number = names.index(name)
                 style: Any = {"color": COLOURS[number % len(COLOURS)], "label": literal(name)}
                 style["linestyle"] = DASHES[number // len(COLOURS) % len(DASHES)]
-                axes.plot(positions, values, marker="o" if len(positions) < FEW else "", **style)
+                axes.plot(positions, values, marker="o" if np.size(positions) < FEW else "", **style)
             axes.set_title(title, loc="left", fontsize=CURVE_STYLE["font.size"])
         if len(names) > 1:
-            lines = {line.get_label(): line for axes in rows for line in axes.get_lines()}
-            figure.legend(lines.values(), lines.keys(), loc="outside upper left", ncols=2)
+            drawn = {line.get_label(): line for axes in rows for line in axes.get_lines()}
+            figure.legend(list(drawn.values()), list(drawn), loc="outside upper left", ncols=2)
         if logarithmic:
             rows[-1].set_xscale("log")
         if ticks is not None:

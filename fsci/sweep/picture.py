@@ -46,7 +46,7 @@ def draw(
                 if row[column] is not None:
                     points.setdefault(name, []).append((at[point.values[0]], row[column]))
             beside = label(column, "" if probe is None else probe.quantity, case.units.model_dump())
-            panels[beside] = {name: tuple(zip(*sorted(some), strict=True)) for name, some in points.items()}
+            panels[beside] = {name: _line(some) for name, some in points.items()}
         yield plot_lines(
             out / f"sweep_{family.replace(' ', '_')}.png",
             panels,
@@ -54,6 +54,11 @@ def draw(
             ticks=None if known is not None else {place: literal(text) for text, place in at.items()},
             logarithmic=known is not None and min(known) > 0.0 and max(known) > SPREAD * min(known),
         )
+
+
+def _line(points: Sequence[tuple[float, float]]) -> Line:
+    ordered = sorted(points)
+    return [x for x, _ in ordered], [y for _, y in ordered]
 
 
 def numbers(texts: Sequence[str]) -> list[float] | None:
