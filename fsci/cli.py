@@ -294,8 +294,8 @@ def _run(options: argparse.Namespace) -> int:
         case = load_case(options.case, options.overrides)
         for warning in case.warnings if first else ():
             print(f"warning: {warning}", file=sys.stderr)
-        from fsci.run.processes import ending_together
-        from fsci.run.run import run_case
+        from fsci.running.processes import ending_together
+        from fsci.running.run import run_case
 
         out = options.out or Path("results") / case.folder.absolute().name
         with ending_together(MPI.COMM_WORLD, CaseError):
@@ -310,8 +310,8 @@ def _resume(options: argparse.Namespace) -> int:
     from mpi4py import MPI
 
     from fsci.case import CaseError
-    from fsci.run.processes import ending_together
-    from fsci.run.run import resume_run
+    from fsci.running.processes import ending_together
+    from fsci.running.run import resume_run
 
     try:
         with ending_together(MPI.COMM_WORLD, CaseError, FileNotFoundError):
@@ -493,7 +493,7 @@ def _fail(message: str) -> int:
 
 def _broken(command: str, error: BaseException) -> int:
     """A run on one process that the machine or the user has ended."""
-    from fsci.run.processes import describe
+    from fsci.running.processes import describe
 
     print(f"fsci {command}: {describe(error)}", file=sys.stderr)
     return 3 if isinstance(error, KeyboardInterrupt) else 1

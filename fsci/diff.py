@@ -13,9 +13,9 @@ from fsci.case import Case, load_case
 from fsci.case.settings import differences, dotted, in_words, settings_of
 from fsci.plot.curves import label
 from fsci.plot.lines import plot_lines
-from fsci.run.files import refused, require_own
-from fsci.run.history import History, read_history
-from fsci.run.kept_case import copies
+from fsci.running.files import refused, require_own
+from fsci.running.history import History, read_history
+from fsci.running.kept_case import copies
 from fsci.twin.compare import changes, values
 
 ROUNDING = 1e-12  #: changes relative to the largest value of a probe that are none

@@ -8,7 +8,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import pytest
 
-from fsci.run.copied_process import start_mpi_alone
+from fsci.running.copied_process import start_mpi_alone
 
 START = time.monotonic()
 NO_TIME = "no time is left"

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from fsci.case.quantities import QUANTITIES
-from fsci.run.files import replacing
-from fsci.run.history import COLUMNS, History
+from fsci.running.files import replacing
+from fsci.running.history import COLUMNS, History
 
 CURVE_SIZE = (8.0, 5.0)  #: of a picture in inches; 1600 x 1000 pixels
 PANEL = 2.2  #: height of each of several panels [inch]

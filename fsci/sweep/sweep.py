@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from fsci.case import load_case
-from fsci.run.files import write_text
-from fsci.run.summary import plain
-from fsci.run.warm import WarmProcess
+from fsci.running.files import write_text
+from fsci.running.summary import plain
+from fsci.running.warm import WarmProcess
 from fsci.sweep.picture import draw
 from fsci.sweep.points import Parameter, Point, parameters, points, short_names
 from fsci.twin.changes import Twin

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from programs import fsci
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 DOCS = Path(__file__).parents[2] / "docs"
 STAGES = ("solid", "contact", "flow", "coupled", "together")

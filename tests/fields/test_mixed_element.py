@@ -10,7 +10,7 @@ from test_structure_tangent import MATERIALS, tangent_error
 
 from fsci import shapes
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.api import StepFailed
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance

@@ -17,24 +17,24 @@ from fsci.case import Case, CaseError, load_case
 from fsci.case.resume import changed, end_error, meshes_changed
 from fsci.case.settings import settings_of
 from fsci.resolution.words import resolved, worst_by_body
-from fsci.run.cause import alike, with_cause
-from fsci.run.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
-from fsci.run.clock import Clock
-from fsci.run.files import LOCK, make_folder, require_own, write_text
-from fsci.run.finite import not_numbers
-from fsci.run.history import HistoryWriter, read_history
-from fsci.run.jump import require_continuous
-from fsci.run.kept_case import keep_case, kept_case
-from fsci.run.lock import Lock
-from fsci.run.memory import require_memory
-from fsci.run.monitor import Monitor
-from fsci.run.output import FieldWriter
-from fsci.run.processes import describe
-from fsci.run.results_folder import prepare_folder
-from fsci.run.stop import StopWatch
-from fsci.run.summary import RunRecord, memory_mb, shares, summarize, write_summary
-from fsci.run.verify import evaluate
-from fsci.run.watch import Watched
+from fsci.running.cause import alike, with_cause
+from fsci.running.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
+from fsci.running.clock import Clock
+from fsci.running.files import LOCK, make_folder, require_own, write_text
+from fsci.running.finite import not_numbers
+from fsci.running.history import HistoryWriter, read_history
+from fsci.running.jump import require_continuous
+from fsci.running.kept_case import keep_case, kept_case
+from fsci.running.lock import Lock
+from fsci.running.memory import require_memory
+from fsci.running.monitor import Monitor
+from fsci.running.output import FieldWriter
+from fsci.running.processes import describe
+from fsci.running.results_folder import prepare_folder
+from fsci.running.stop import StopWatch
+from fsci.running.summary import RunRecord, memory_mb, shares, summarize, write_summary
+from fsci.running.verify import evaluate
+from fsci.running.watch import Watched
 from solvers.api import Finding, State, StepFailed, StepInfo
 
 if TYPE_CHECKING:
