@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,9 +12,9 @@ from fsci.case import Case, load_case
 from fsci.case.settings import differences, dotted, in_words, settings_of
 from fsci.plot.curves import label
 from fsci.plot.lines import plot_lines
-from fsci.running.files import refused, require_own
-from fsci.running.history import History, read_history
+from fsci.running.history import History
 from fsci.running.kept_case import copies
+from fsci.running.results import read_results
 from fsci.twin.compare import changes, values
 
 ROUNDING = 1e-12  #: changes relative to the largest value of a probe that are none
@@ -46,14 +45,10 @@ def diff(folders: Sequence[Path], out: Path) -> list[str]:
 
 
 def _read(folder: Path, name: str) -> Kept:
-    if not (folder / "history.csv").is_file():
-        raise refused(folder, "has no results of a run")
-    require_own(folder)
+    found = read_results(folder)
     case = load_case(folder)
     files = {str(kept): file.read_bytes() for file, kept in copies(case)}
-    path = folder / "summary.json"
-    summary = json.loads(path.read_text()) if path.exists() else {"status": "not finished"}
-    return Kept(name, case, files, summary, read_history(folder / "history.csv"))
+    return Kept(name, case, files, {"status": "not finished", **found.summary}, found.history)
 
 
 def _names(folders: Sequence[Path]) -> list[str]:

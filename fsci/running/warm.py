@@ -1,7 +1,7 @@
 """One process that has imported what runs need: each run is a copy of it, and starts at once.
 
-It is started as `python -m fsci.running.warm` with a socket as its standard input. For each run it gets a byte with one end
-of a connection, over which a copy of it reads the words of the command and writes how the run has ended.
+It is started as `python -m fsci.running.warm` with a socket as its standard input. For each run it gets a byte with one
+end of a connection, over which a copy of it reads the words of the command and writes how the run has ended.
 """
 
 from __future__ import annotations

@@ -40,10 +40,8 @@ def steps(tmp_path, monkeypatch):
 
     def run(end):
         (tmp_path / "case.yaml").write_text(CASE)
-        assert (
-            fsci.running.run.run_case(load_case(tmp_path / "case.yaml", [("time.end", str(end))]), tmp_path / "out")
-            == 0
-        )
+        case = load_case(tmp_path / "case.yaml", [("time.end", str(end))])
+        assert fsci.running.run.run_case(case, tmp_path / "out") == 0
         return cpu, asked
 
     return run
