@@ -17,7 +17,7 @@ from fsci.running.kept_case import copies
 from fsci.running.results import read_results
 from fsci.twin.compare import changes, values
 
-ROUNDING = 1e-12  #: changes relative to the largest value of a probe that are none
+UNCHANGED = 1e-12  #: changes relative to the largest value of a probe that are none
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def _table(first: Kept, other: Kept) -> Iterator[str]:
 def _percent(share: float, sign: str = "-") -> str:
     if not math.isfinite(share):
         return "-"
-    return "0" if abs(share) <= ROUNDING else f"{100.0 * share:{sign}.3g} %"
+    return "0" if abs(share) <= UNCHANGED else f"{100.0 * share:{sign}.3g} %"
 
 
 def _draw(runs: Sequence[Kept], out: Path) -> Iterator[Path]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from fsci.plot.curves import COLOURS, CURVE_DOTS, CURVE_SIZE, CURVE_STYLE, PANEL, literal, save_figure
 
-FEW = 30  #: points of a line that are marked
+MARKED = 30  #: points of a line that are marked
 DASHES = ("-", "--", ":", "-.")  #: of lines that share a colour
 
 Line = tuple[ArrayLike, ArrayLike]  #: positions and values
@@ -42,7 +42,7 @@ def plot_lines(
                 number = names.index(name)
                 style: Any = {"color": COLOURS[number % len(COLOURS)], "label": literal(name)}
                 style["linestyle"] = DASHES[number // len(COLOURS) % len(DASHES)]
-                axes.plot(positions, values, marker="o" if np.size(positions) < FEW else "", **style)
+                axes.plot(positions, values, marker="o" if np.size(positions) < MARKED else "", **style)
             axes.set_title(title, loc="left", fontsize=CURVE_STYLE["font.size"])
         if len(names) > 1:
             drawn = {line.get_label(): line for axes in rows for line in axes.get_lines()}

@@ -10,7 +10,7 @@ from itertools import product
 from fsci.case.errors import CaseError, Place, Problem
 from fsci.twin.grids import Settings
 
-OPENING, CLOSING = "([{", ")]}"
+OPENING_BRACKETS, CLOSING_BRACKETS = "([{", ")]}"
 LONGEST_NAME = 100  #: of a folder; file systems allow 255 bytes
 _MANY = "give at least one setting several values: --set fluid.viscosity=1,2,3"
 
@@ -62,7 +62,7 @@ def between_commas(text: str) -> Iterator[str]:
         elif letter in "\"'":
             quote = letter
         else:
-            depth += (letter in OPENING) - (letter in CLOSING)
+            depth += (letter in OPENING_BRACKETS) - (letter in CLOSING_BRACKETS)
         if letter == "," and not quote and depth == 0:
             yield part.strip()
             part = ""
