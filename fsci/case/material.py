@@ -32,6 +32,10 @@ def _values(*settings: Expression | None) -> list[Value]:
     return [value_of(setting) for setting in settings if setting is not None]
 
 
+def _or_zero(setting: Expression | None) -> Value:
+    return 0.0 if setting is None else value_of(setting)
+
+
 class ElasticSection(Section):
     """A hyperelastic law with two constants: exactly E and nu, or lambda and mu, or mu and nu.
 
@@ -117,8 +121,8 @@ class YeohSection(Section):
 
     law: Literal["yeoh"] = setting(..., "stored energy")
     c10: PositiveFormula = setting(..., "factor of I - 3", unit="Pa")
-    c20: SpaceFormula = setting(0, "factor of (I - 3)^2", unit="Pa")
-    c30: SpaceFormula = setting(0, "factor of (I - 3)^3", unit="Pa")
+    c20: SpaceFormula | None = setting(None, "factor of (I - 3)^2; default: 0", unit="Pa")
+    c30: SpaceFormula | None = setting(None, "factor of (I - 3)^3; default: 0", unit="Pa")
     bulk: PositiveFormula = setting(..., "bulk modulus", unit="Pa")
     density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
 
@@ -131,7 +135,7 @@ class YeohSection(Section):
     @property
     def parameters(self) -> tuple[Value, ...]:
         """The arguments of the law before the density."""
-        return value_of(self.c10), value_of(self.c20), value_of(self.c30), value_of(self.bulk)
+        return value_of(self.c10), _or_zero(self.c20), _or_zero(self.c30), value_of(self.bulk)
 
 
 class HolzapfelGasserOgdenSection(Section):
@@ -145,7 +149,7 @@ class HolzapfelGasserOgdenSection(Section):
     mu: PositiveFormula = setting(..., "shear modulus of the matrix", unit="Pa")
     k1: NotNegativeFormula = setting(..., "stiffness of a family of fibres", unit="Pa")
     k2: PositiveFormula = setting(..., "how fast fibres stiffen", unit="1")
-    dispersion: Dispersion = setting(0, "spread of directions: 0 if all fibres of a family are parallel", unit="1")
+    dispersion: Dispersion | None = setting(None, "spread of the directions of a family; default: 0, none", unit="1")
     fibres: Annotated[tuple[SpaceVector, ...], EntryCount(1, 2)] = setting(
         ..., "direction of each family in the undeformed body, of any length"
     )
@@ -156,7 +160,7 @@ class HolzapfelGasserOgdenSection(Section):
     def _directions(self) -> HolzapfelGasserOgdenSection:
         for direction in self.fibres:
             if all(entry.constant == 0.0 for entry in direction):
-                raise fault("a direction must not be zero", "fibres")
+                raise fault("a direction in 'fibres' must not be zero", "fibres")
         return self
 
     @property
@@ -171,7 +175,7 @@ class HolzapfelGasserOgdenSection(Section):
         k1 = combine(lambda k1: k1 * len(self.fibres) / 2, value_of(self.k1))
         first, *others = ([*map(value_of, direction), 0.0][:3] for direction in self.fibres)
         return (
-            *(value_of(self.mu), k1, value_of(self.k2), value_of(self.dispersion), value_of(self.bulk)),
+            *(value_of(self.mu), k1, value_of(self.k2), _or_zero(self.dispersion), value_of(self.bulk)),
             *first,
             *(others[0] if others else first),
         )

@@ -45,7 +45,9 @@ class HolzapfelGasserOgden:
     def volumetric(self, J: Tensor, *, bulk: Tensor, **constants: Tensor) -> Tensor:
         return bulk / 2 * (J - 1) ** 2
 
-    def distortional(self, F: Tensor, *, mu: Tensor, k1: Tensor, k2: Tensor, dispersion: Tensor, **more: Tensor) -> Tensor:
+    def distortional(
+        self, F: Tensor, *, mu: Tensor, k1: Tensor, k2: Tensor, dispersion: Tensor, **more: Tensor
+    ) -> Tensor:
         matrix = isochoric_trace(F) - 3
         scale = ufl.exp(-2 / 3 * ufl.ln(ufl.det(F)))
         found = mu / 2 * matrix
