@@ -40,7 +40,7 @@ POWERS = {
     "time": (0, 0, 1),
     "von_mises": (-1, 1, -2),
     "contact_pressure": (-1, 1, -2),
-    "contact_traction": (-1, 1, -2),
+    **dict.fromkeys(("contact_traction", "traction", "wall_shear_stress"), (-1, 1, -2)),
     "contact_gap": (1, 0, 0),
     "power": (2, 1, -3),
 }
