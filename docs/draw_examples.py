@@ -20,7 +20,7 @@ from make_pictures import draw
 
 from fsci.plot.curves import COLOURS
 from fsci.plot.picture import Labels, plot_state
-from fsci.run.output import write_vtu
+from fsci.running.output import write_vtu
 from solvers.fluid.flow import snapshot as flow
 from solvers.structure import snapshot as solid
 

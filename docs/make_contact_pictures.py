@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from fsci.plot.curves import COLOURS, CURVE_STYLE
 from fsci.plot.render import ROUND, SUPERSAMPLING, View, face_edges, frame, import_pyvista, photograph, polylines
-from fsci.run.history import read_history
-from fsci.run.output import read_collection
+from fsci.running.history import read_history
+from fsci.running.output import read_collection
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "verification_contact.md"

@@ -17,8 +17,8 @@ import numpy as np
 
 from fsci.bench.program import run_case
 from fsci.case import load_case
-from fsci.run.checkpoint import read_checkpoint
-from fsci.run.history import read_history
+from fsci.running.checkpoint import read_checkpoint
+from fsci.running.history import read_history
 
 DOCS = Path(__file__).parent
 CASES = DOCS.parent / "cases"

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from fsci.bench.program import run_case
 from fsci.plot.curves import COLOURS, CURVE_STYLE
-from fsci.run.history import read_history
-from fsci.run.output import read_collection
-from fsci.run.verify import amplitude, frequency, mean, window
+from fsci.running.history import read_history
+from fsci.running.output import read_collection
+from fsci.running.verify import amplitude, frequency, mean, window
 
 DOCS = Path(__file__).parent
 PAGE = DOCS / "verification_structure.md"

@@ -160,6 +160,24 @@ def _parser() -> argparse.ArgumentParser:
         "--budget", metavar="TIME", type=_duration, help="leave out runs that would not end within it: --budget 20min"
     )
 
+    sweep = command(_sweep, "run a case with several values of settings, and compare what comes out")
+    sweep.add_argument("case", metavar="CASE", type=Path, help="case file, or folder with a case.yaml")
+    settings(sweep, "values with commas between them: --set fluid.viscosity=1,2,3; one value is the same for all runs")
+    sweep.add_argument(
+        "-o", "--out", metavar="OUT", type=Path, required=True, help="folder for the runs, sweep.csv and pictures"
+    )
+
+    diff = command(_diff, "show what runs differ in from the first one: settings, values, curves")
+    diff.add_argument("outs", metavar="OUT", nargs="+", type=Path, help="folders with the results of two or more runs")
+    diff.add_argument(
+        "-o",
+        "--pictures",
+        metavar="FOLDER",
+        type=Path,
+        default=Path("diff"),
+        help="folder for pictures (default: diff)",
+    )
+
     bench = command(_bench, "measure run time against error, in a copy of the repository")
     bench.add_argument(
         "names",
@@ -276,8 +294,8 @@ def _run(options: argparse.Namespace) -> int:
         case = load_case(options.case, options.overrides)
         for warning in case.warnings if first else ():
             print(f"warning: {warning}", file=sys.stderr)
-        from fsci.run.processes import ending_together
-        from fsci.run.run import run_case
+        from fsci.running.processes import ending_together
+        from fsci.running.run import run_case
 
         out = options.out or Path("results") / case.folder.absolute().name
         with ending_together(MPI.COMM_WORLD, CaseError):
@@ -292,8 +310,8 @@ def _resume(options: argparse.Namespace) -> int:
     from mpi4py import MPI
 
     from fsci.case import CaseError
-    from fsci.run.processes import ending_together
-    from fsci.run.run import resume_run
+    from fsci.running.processes import ending_together
+    from fsci.running.run import resume_run
 
     try:
         with ending_together(MPI.COMM_WORLD, CaseError, FileNotFoundError):
@@ -390,6 +408,36 @@ def _converge(options: argparse.Namespace) -> int:
     return int(not right)
 
 
+def _sweep(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError
+    from fsci.sweep.sweep import sweep
+
+    try:
+        right = sweep(options.case, options.overrides, options.out, lambda line: print(line, flush=True))
+    except CaseError as error:
+        return _fail(str(error))
+    except KeyboardInterrupt:
+        return _fail("stopped; the same command goes on from here") + 1
+    except OSError as error:
+        return _fail(f"fsci sweep: {error}")
+    return int(not right)
+
+
+def _diff(options: argparse.Namespace) -> int:
+    from fsci.case import CaseError
+    from fsci.diff import diff
+
+    if len(options.outs) < 2:
+        return _fail("fsci diff: give the folders of two or more runs")
+    try:
+        print("\n".join(diff(options.outs, options.pictures)))
+    except CaseError as error:
+        return _fail(str(error))
+    except (OSError, ValueError) as error:
+        return _fail(f"fsci diff: {error}")
+    return 0
+
+
 def _bench(options: argparse.Namespace) -> int:
     try:
         from fsci.bench.run import BenchmarkError, describe, run
@@ -445,7 +493,7 @@ def _fail(message: str) -> int:
 
 def _broken(command: str, error: BaseException) -> int:
     """A run on one process that the machine or the user has ended."""
-    from fsci.run.processes import describe
+    from fsci.running.processes import describe
 
     print(f"fsci {command}: {describe(error)}", file=sys.stderr)
     return 3 if isinstance(error, KeyboardInterrupt) else 1

@@ -8,7 +8,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import pytest
 
-from fsci.run.copied_process import start_mpi_alone
+from fsci.running.copied_process import start_mpi_alone
 
 START = time.monotonic()
 NO_TIME = "no time is left"
@@ -52,11 +52,11 @@ def in_new_folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def runs_in_copies(monkeypatch):
-    """Runs that `fsci twin`, `converge` and `stress` start on one process need no new process."""
+    """Runs that `fsci twin`, `converge`, `sweep` and `stress` start on one process need no new process."""
     from types import SimpleNamespace
 
     from programs import Copies, run_command
 
     monkeypatch.setattr("fsci.stress.program.subprocess", SimpleNamespace(**{**vars(subprocess), "run": run_command}))
-    for module in ("fsci.twin.twin", "fsci.converge.converge"):
+    for module in ("fsci.twin.twin", "fsci.converge.converge", "fsci.sweep.sweep"):
         monkeypatch.setattr(f"{module}.WarmProcess", Copies)

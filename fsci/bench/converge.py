@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 from fsci.bench.family import CASES
 from fsci.bench.table import Row
 from fsci.converge.converge import CONVERGE_RESULTS, converge
-from fsci.run.files import write_text
+from fsci.running.files import write_text
 
 SCENES = Path(__file__).with_name("converge_scenes.yaml")
 #: Runs stay here, and what has been run is not run again.

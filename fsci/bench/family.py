@@ -54,7 +54,7 @@ class FamilyScene:
 
     def run(self, settings: Settings | None = None) -> FamilyRun:
         """Run it with some settings more; what has been run is not run again. Raises RunFailed."""
-        from fsci.run.history import read_history
+        from fsci.running.history import read_history
 
         together = {**self.settings, **(settings or {})}
         key = json.dumps([(self.folder / "case.yaml").read_text(), together], sort_keys=True)

@@ -15,7 +15,7 @@ from fsci.bench.family import FamilyScene, Settings
 from fsci.bench.table import Row
 from fsci.builder.build import Simulation, build
 from fsci.case import load_case
-from fsci.run.watch import Watched
+from fsci.running.watch import Watched
 from solvers.api import Scheme
 from solvers.timing import Timer
 

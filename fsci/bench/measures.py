@@ -11,7 +11,7 @@ import numpy as np
 from fsci.bench.bands import ELEMENTS, SCHEMES, level
 from fsci.bench.family import FamilyRun, FamilyScene, Settings
 from fsci.bench.table import ERROR, LEVEL, MEMORY, TIME, UNKNOWNS, Row
-from fsci.run.verify import amplitude, frequency
+from fsci.running.verify import amplitude, frequency
 
 if TYPE_CHECKING:
     from fsci.case import Case

@@ -19,7 +19,7 @@ from fsci.bench.program import RunFailed
 from fsci.bench.table import FRONT, Row, show
 from fsci.case.errors import did_you_mean
 from fsci.expression import ExpressionError
-from fsci.run.summary import plain, versions
+from fsci.running.summary import plain, versions
 
 
 class BenchmarkError(Exception):

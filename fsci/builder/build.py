@@ -179,6 +179,7 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
     from fsci.builder import structure as build_structure
     from fsci.builder.coupling import build_coupled, start
     from fsci.builder.dry_side import outlines
+    from fsci.builder.flow_loads import loads_of_flow
     from fsci.builder.sentinels import build_sentinels
     from fsci.builder.watch_flow import WatchedFlow
     from solvers.fluid.flow.probes import Forces
@@ -205,7 +206,8 @@ def _coupled(case: Case, comm: MPI.Comm, timer: Timer) -> Simulation:
 
     def snapshots() -> list[Snapshot]:
         dry = outlines(fluid, coupled.interface.dry_sides)
-        return of_structure(structure, _contact_fields(structure)) + of_fluid(fluid) + dry
+        loads = loads_of_flow(coupled.solid, fluid)
+        return of_structure(structure, _contact_fields(structure), loads) + of_fluid(fluid) + dry
 
     return Simulation(
         scheme=scheme,

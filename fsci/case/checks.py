@@ -12,7 +12,7 @@ from fsci.case.errors import did_you_mean
 from fsci.case.fluid import Movement
 from fsci.case.fluid_checks import fluid_mistakes, movement_mistakes
 from fsci.case.free_checks import free_mistakes
-from fsci.case.material import has_mass
+from fsci.case.material import HolzapfelGasserOgdenSection, has_mass
 from fsci.case.mesh_checks import Mistake, length_mistakes, mesh_mistakes, surfaces_mistakes
 from fsci.case.probe_checks import probe_mistakes, verify_mistakes
 from fsci.case.shapes import ShapeSection
@@ -118,6 +118,8 @@ def _plane(case: Case, structure: StructureSection) -> Iterator[Mistake]:
 
 
 def _element(case: Case, structure: StructureSection, body: BodySection, keys: Keys) -> Iterator[Mistake]:
+    if body.kinematics == "linear" and isinstance(body.material, HolzapfelGasserOgdenSection):
+        yield (*keys, "material", "law"), "'kinematics: linear' needs an isotropic law, and fibres carry tension only"
     if body.element != "mixed":
         return
     if case.dimension == 2 and structure.plane == "stress":
@@ -140,12 +142,14 @@ def _surfaces(body: BodySection, keys: Keys) -> Iterator[Mistake]:
 def _vectors(case: Case, body: BodySection, keys: Keys) -> Iterator[Mistake]:
     for name in VECTORS:
         yield from length_mistakes(getattr(body, name), case.dimension, (*keys, name))
-    for place, vector in load_vectors(body):
+    for place, vector in vectors_of(body):
         yield from length_mistakes(vector, case.dimension, (*keys, *place))
 
 
-def load_vectors(body: BodySection) -> Iterator[tuple[Keys, tuple[Any, ...]]]:
-    """Path from a body and value of all vectors of its supports, springs and loads."""
+def vectors_of(body: BodySection) -> Iterator[tuple[Keys, tuple[Any, ...]]]:
+    """Path from a body and value of all vectors of its material, supports, springs and loads."""
+    for i, direction in enumerate(getattr(body.material, "fibres", ())):
+        yield ("material", "fibres", i), direction
     for kind in ("supports", "springs", "tractions", "line_forces", "point_forces"):
         for i, item in enumerate(getattr(body, kind)):
             for name in ("at", "displacement", "direction", "value"):

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
 from fsci.case.section import Section, fault, setting
-from fsci.case.values import NotNegativeFormula, PoissonFormula, PositiveFormula, SpaceFormula, chosen, value_of
+from fsci.case.values import (
+    Dispersion,
+    EntryCount,
+    NotNegativeFormula,
+    PoissonFormula,
+    PositiveFormula,
+    SpaceFormula,
+    SpaceVector,
+    chosen,
+    value_of,
+)
 from fsci.distinct import distinct
 from fsci.expression import Expression
 from solvers.structure import elastic_constants as constants
@@ -20,6 +30,10 @@ PAIRS = ({"E", "nu"}, {"lambda", "mu"}, {"mu", "nu"})
 def _values(*settings: Expression | None) -> list[Value]:
     """Mistakes in the given settings."""
     return [value_of(setting) for setting in settings if setting is not None]
+
+
+def _or_zero(setting: Expression | None) -> Value:
+    return 0.0 if setting is None else value_of(setting)
 
 
 class ElasticSection(Section):
@@ -99,16 +113,90 @@ class MooneyRivlinSection(Section):
         return value_of(self.c10), value_of(self.c01), value_of(self.bulk)
 
 
-def has_mass(material: ElasticSection | MooneyRivlinSection) -> bool:
+class YeohSection(Section):
+    """W = c10 (I - 3) + c20 (I - 3)^2 + c30 (I - 3)^3 + bulk/2 (J - 1)^2, I = J^(-2/3) I1; for rubber.
+
+    The shear modulus is 2 c10.
+    """
+
+    law: Literal["yeoh"] = setting(..., "stored energy")
+    c10: PositiveFormula = setting(..., "factor of I - 3", unit="Pa")
+    c20: SpaceFormula | None = setting(None, "factor of (I - 3)^2; default: 0", unit="Pa")
+    c30: SpaceFormula | None = setting(None, "factor of (I - 3)^3; default: 0", unit="Pa")
+    bulk: PositiveFormula = setting(..., "bulk modulus", unit="Pa")
+    density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
+
+    @property
+    def lame(self) -> tuple[Value, Value]:
+        """(mu, lambda) at small strains."""
+        mu = combine(lambda c10: 2 * c10, value_of(self.c10))
+        return mu, combine(constants.lambda_of_bulk, mu, value_of(self.bulk))
+
+    @property
+    def parameters(self) -> tuple[Value, ...]:
+        """The arguments of the law before the density."""
+        return value_of(self.c10), _or_zero(self.c20), _or_zero(self.c30), value_of(self.bulk)
+
+
+class HolzapfelGasserOgdenSection(Section):
+    """A matrix with one or two families of fibres that carry tension only, for arteries and other soft tissue.
+
+    W = mu/2 (I - 3) + sum of k1/(2 k2) (exp(k2 E^2) - 1) where E > 0, + bulk/2 (J - 1)^2; I = J^(-2/3) I1 and
+    E = dispersion (I - 3) + (1 - 3 dispersion) (J^(-2/3) a.C a - 1) for the direction a of a family.
+    """
+
+    law: Literal["holzapfel_gasser_ogden"] = setting(..., "stored energy")
+    mu: PositiveFormula = setting(..., "shear modulus of the matrix", unit="Pa")
+    k1: NotNegativeFormula = setting(..., "stiffness of a family of fibres", unit="Pa")
+    k2: PositiveFormula = setting(..., "how fast fibres stiffen", unit="1")
+    dispersion: Dispersion | None = setting(None, "spread of the directions of a family; default: 0, none", unit="1")
+    fibres: Annotated[tuple[SpaceVector, ...], EntryCount(1, 2)] = setting(
+        ..., "direction of each family in the undeformed body, of any length"
+    )
+    bulk: PositiveFormula = setting(..., "bulk modulus", unit="Pa")
+    density: NotNegativeFormula | None = setting(None, DENSITY, unit="kg/m^3")
+
+    @model_validator(mode="after")
+    def _directions(self) -> HolzapfelGasserOgdenSection:
+        for direction in self.fibres:
+            if all(entry.constant == 0.0 for entry in direction):
+                raise fault("a direction in 'fibres' must not be zero", "fibres")
+        return self
+
+    @property
+    def lame(self) -> tuple[Value, Value]:
+        """(mu, lambda) at small strains, of the matrix."""
+        mu = value_of(self.mu)
+        return mu, combine(constants.lambda_of_bulk, mu, value_of(self.bulk))
+
+    @property
+    def parameters(self) -> tuple[Value, ...]:
+        """The arguments of the law before the density; one family is two alike with half of the stiffness."""
+        k1 = combine(lambda k1: k1 * len(self.fibres) / 2, value_of(self.k1))
+        first, *others = ([*map(value_of, direction), 0.0][:3] for direction in self.fibres)
+        return (
+            *(value_of(self.mu), k1, value_of(self.k2), _or_zero(self.dispersion), value_of(self.bulk)),
+            *first,
+            *(others[0] if others else first),
+        )
+
+
+def has_mass(material: MaterialSection) -> bool:
     """Whether it has a density that is not zero everywhere."""
     return material.density is not None and material.density.constant != 0.0
 
 
-LAWS = ("st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke", "mooney_rivlin")
-Material = Annotated[ElasticSection | MooneyRivlinSection, Field(discriminator="law"), chosen("law", LAWS)]
+LAWS = ("st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke", "mooney_rivlin", "yeoh", "holzapfel_gasser_ogden")
+MaterialSection: TypeAlias = ElasticSection | MooneyRivlinSection | YeohSection | HolzapfelGasserOgdenSection
+Material = Annotated[MaterialSection, Field(discriminator="law"), chosen("law", LAWS)]
 
 #: Section -> an example of it.
 MATERIAL_EXAMPLES = {
     "Elastic": "material: {law: neo_hooke, E: 4000, nu: 0.4, density: 1000}",
     "MooneyRivlin": "material: {law: mooney_rivlin, c10: 3e5, c01: 1e5, bulk: 5e8, density: 1100}",
+    "Yeoh": "material: {law: yeoh, c10: 2e5, c20: -4e3, c30: 300, bulk: 1e8, density: 1100}",
+    "HolzapfelGasserOgden": (
+        "material: {law: holzapfel_gasser_ogden, mu: 7.6e3, k1: 9.966e5, k2: 524.6, dispersion: 0.226,\n"
+        "           fibres: [[1, 0, 0.85], [1, 0, -0.85]], bulk: 1e6, density: 1100}"
+    ),
 }

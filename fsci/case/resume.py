@@ -9,7 +9,7 @@ from typing import Any
 from fsci.case.case import Case
 from fsci.case.errors import CaseError, Place, Problem
 from fsci.case.fluid import KINDS_OF_PATCH
-from fsci.case.settings import Settings, differences, in_words, settings_of
+from fsci.case.settings import Settings, differences, dotted, in_words, settings_of
 
 Keys = tuple[str | int, ...]
 
@@ -69,7 +69,7 @@ class Change:
     new: Any
 
     def __str__(self) -> str:
-        return f"{_dotted(self.keys)}: {in_words(self.old)} -> {in_words(self.new)}"
+        return f"{dotted(self.keys)}: {in_words(self.old)} -> {in_words(self.new)}"
 
     def concerns(self, *patterns: str) -> bool:
         """Whether it is one of these settings, or within one of these sections; a star is any name."""
@@ -108,12 +108,8 @@ def end_error(case: Case, changes: Sequence[tuple[str, str]], reached: float) ->
 
 def _refusal(keys: Keys, old: object, new: object) -> str:
     reason = _REASONS_TO_STAY.get(str(keys[-1]), _REASON)
-    was = f"{_dotted(keys)} was {in_words(old)}, is {in_words(new)}"
+    was = f"{dotted(keys)} was {in_words(old)}, is {in_words(new)}"
     return f"{was}: it cannot change when a run is resumed, {reason}; {_ANEW}"
-
-
-def _dotted(keys: Keys) -> str:
-    return ".".join(map(str, keys))
 
 
 def _matches(keys: Keys, pattern: Sequence[str]) -> bool:

@@ -61,6 +61,11 @@ def differences(old: Any, new: Any, keys: Keys = ()) -> Iterator[tuple[Keys, Any
         yield keys, old, new
 
 
+def dotted(keys: Keys) -> str:
+    """The name of a setting as users write it."""
+    return ".".join(map(str, keys))
+
+
 def in_words(value: Any) -> str:
     """A value as messages show it, in the form of a case file."""
     text = _text(value)

@@ -146,6 +146,11 @@ PoissonFormula = Annotated[
     _formula(_SPACE, lambda v: -1 < v < 0.5, "above -1 and below 0.5"),
     _schema("expression of x, y, z, above -1 and below 0.5", exclusiveMinimum=-1, exclusiveMaximum=0.5),
 ]
+Dispersion = Annotated[
+    Expression,
+    _formula(_SPACE, lambda v: 0 <= 3 * v <= 1, "from 0 to 1/3"),
+    _schema("expression of x, y, z, from 0 to 1/3", minimum=0, maximum=1 / 3),
+]
 
 
 @dataclass(frozen=True)
@@ -201,6 +206,7 @@ class OrNone:
 
 
 Vector = Annotated[tuple[Formula, ...], EntryCount(2, 3)]
+SpaceVector = Annotated[tuple[SpaceFormula, ...], EntryCount(2, 3)]
 TimeVector = Annotated[tuple[TimeFormula, ...], EntryCount(2, 3)]
 NumberVector = Annotated[tuple[Number, ...], EntryCount(2, 3)]
 

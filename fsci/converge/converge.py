@@ -17,10 +17,10 @@ from fsci.converge.plan import SECONDS_TO_START, Plan, PlannedRun, Refused
 from fsci.converge.results import BandedValue, Done, as_json, done, findings
 from fsci.converge.values import wanted
 from fsci.converge.words import helps, percent, run_row, seconds_in_words, sentences, settings
-from fsci.run.files import write_text
-from fsci.run.kept_case import keep_case
-from fsci.run.summary import plain
-from fsci.run.warm import WarmProcess
+from fsci.running.files import write_text
+from fsci.running.kept_case import keep_case
+from fsci.running.summary import plain
+from fsci.running.warm import WarmProcess
 from fsci.twin.changes import Twin
 from fsci.twin.grids import NO_FIELDS, Settings
 from fsci.twin.runs import TwinEnded, has_run, known_runs, run_all

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.run.verify import peak
+from fsci.running.verify import peak
 
 Array = NDArray[np.float64]
 

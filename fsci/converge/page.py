@@ -9,7 +9,7 @@ from fsci.converge.picture import draw
 from fsci.converge.results import BandedValue, Done
 from fsci.converge.words import percent, sentences
 from fsci.report.html import REPORT_FILE, heading, page, paragraph, pictures, preformatted, section, table
-from fsci.run.files import write_text
+from fsci.running.files import write_text
 
 PICTURE = "error_against_time.png"
 STYLE_OF_VERDICT = {"resolved": "ok", "indicative": "", "not resolved": "bad"}

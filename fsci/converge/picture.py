@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fsci.converge.results import BandedValue, Done
-from fsci.run.files import replacing
+from fsci.running.files import replacing
 
 #: What roles are drawn as.
 MARKERS = {"level": ("o-", "levels"), "source": ("s", "one source alone"), "twin": ("D", "other methods")}

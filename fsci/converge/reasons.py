@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fsci.case import Case
-from fsci.run.history import History
+from fsci.running.history import History
 
 #: Steps until a flow or a body that starts at once has forgotten how; all that moves in `cases/` has as many or more.
 STEPS_TO_FORGET = 10

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from fsci.case import Case, CaseError
 from fsci.case.errors import Place, Problem, did_you_mean
 from fsci.case.verify import COUNTERS, Check
-from fsci.run.history import History
-from fsci.run.verify import extremes, window
+from fsci.running.history import History
+from fsci.running.verify import extremes, window
 from fsci.twin.compare import values as twin_values
 
 Array = NDArray[np.float64]

@@ -14,9 +14,9 @@ from fsci.explain import advice
 from fsci.explain.place import describe, nearest_node
 from fsci.explain.replay import write_replay
 from fsci.explain.residuals import convergence_of, curve
-from fsci.run.files import require_own
-from fsci.run.history import read_history
-from fsci.run.summary import shares
+from fsci.running.files import require_own
+from fsci.running.history import read_history
+from fsci.running.summary import shares
 from solvers.api import FailureKind
 from solvers.counted import counted
 

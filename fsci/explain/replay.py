@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from fsci.case import load_case
-from fsci.run.checkpoint import list_checkpoints
-from fsci.run.files import MARKER, copy_file, write_text
-from fsci.run.kept_case import keep_case
-from fsci.run.results_folder import MARKER_TEXT
+from fsci.running.checkpoint import list_checkpoints
+from fsci.running.files import MARKER, copy_file, write_text
+from fsci.running.kept_case import keep_case
+from fsci.running.results_folder import MARKER_TEXT
 
 
 def write_replay(failure: Path, folder: Path, what: dict[str, Any]) -> Path:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.case import Case
-from fsci.case.checks import VECTORS, load_vectors
+from fsci.case.checks import VECTORS, vectors_of
 from fsci.case.free_checks import free_mistakes
 from fsci.case.mesh import FileMesh
 from fsci.case.mesh import Mesh as MeshSection
@@ -139,7 +139,7 @@ def _check_lengths(case: Case, name: str, dim: int) -> None:
     body = case.elastic_bodies[name]
     base = ("structure", "bodies", name)
     vectors: list[tuple[Keys, Any]] = [((*base, key), getattr(body, key)) for key in VECTORS]
-    vectors += [((*base, *place), vector) for place, vector in load_vectors(body)]
+    vectors += [((*base, *place), vector) for place, vector in vectors_of(body)]
     probes = [(key, p) for key, p in case.probes.items() if p.field == "structure" and p.body == name]
     vectors += [(("probes", key, "at"), p.at) for key, p in probes]
     for keys, vector in vectors:

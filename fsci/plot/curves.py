@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from fsci.case.quantities import QUANTITIES
-from fsci.run.files import replacing
-from fsci.run.history import COLUMNS, History
+from fsci.running.files import replacing
+from fsci.running.history import COLUMNS, History
 
 CURVE_SIZE = (8.0, 5.0)  #: of a picture in inches; 1600 x 1000 pixels
 PANEL = 2.2  #: height of each of several panels [inch]
@@ -40,7 +40,7 @@ POWERS = {
     "time": (0, 0, 1),
     "von_mises": (-1, 1, -2),
     "contact_pressure": (-1, 1, -2),
-    "contact_traction": (-1, 1, -2),
+    **dict.fromkeys(("contact_traction", "traction", "wall_shear_stress"), (-1, 1, -2)),
     "contact_gap": (1, 0, 0),
     "power": (2, 1, -3),
 }

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from fsci.plot.render import import_pyvista
-from fsci.run.output import Series
+from fsci.running.output import Series
 
 AXES = "xyz"
 BEYOND_PLANE = 1e-6  #: part of a mesh, relative to its size, that may be beyond the plane

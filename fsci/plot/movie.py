@@ -9,7 +9,7 @@ from typing import Any
 from fsci.plot.render import DrawnBody, Pixels
 from fsci.plot.render_flow import load_state
 from fsci.plot.scene import animate, compose
-from fsci.run.files import replacing
+from fsci.running.files import replacing
 
 FRAMES = 200  #: at most; of a longer series every second, third, ... time is shown
 MOVIE_DOTS = 120  #: pixels per inch: 960 x 600

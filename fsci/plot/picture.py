@@ -17,10 +17,10 @@ from fsci.plot.render import ISOMETRIC, Array, import_pyvista, load_body
 from fsci.plot.render_flow import is_flow, load_meshes, load_state
 from fsci.plot.scene import compose, draw
 from fsci.plot.storyboard import choose, plot_story
-from fsci.run.files import make_folder, require_own
-from fsci.run.history import read_history
-from fsci.run.output import Series, read_collection
-from fsci.run.results_folder import list_pictures
+from fsci.running.files import make_folder, require_own
+from fsci.running.history import read_history
+from fsci.running.output import Series, read_collection
+from fsci.running.results_folder import list_pictures
 
 STRUCTURE_FIELDS = ("displacement",)  #: default field of structures
 FLUID_FIELDS = ("velocity", "pressure")

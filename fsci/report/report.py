@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fsci.report.html import REPORT_FILE, bars, folded, heading, page, paragraph, pictures, preformatted, section, table
-from fsci.run.files import require_own, write_text
+from fsci.running.files import require_own, write_text
 
 LOG_LINES = 40  #: of the log that are shown
 

@@ -13,7 +13,7 @@ import numpy as np
 from fsci.case.case import Case
 from fsci.case.quantities import QUANTITIES
 from fsci.case.section import Section
-from fsci.run.history import History
+from fsci.running.history import History
 
 Powers = tuple[int, int, int]  #: of length, mass and time
 

@@ -11,8 +11,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from fsci.run.child import ENVIRONMENT, command
-from fsci.run.history import History, read_history
+from fsci.running.child import ENVIRONMENT, command
+from fsci.running.history import History, read_history
 from fsci.stress.mutants import cases
 from fsci.stress.program import steps_done, write
 

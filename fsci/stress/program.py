@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fsci.run.child import ENVIRONMENT, command
-from fsci.run.history import History, read_history
+from fsci.running.child import ENVIRONMENT, command
+from fsci.running.history import History, read_history
 
 NEVER_ENDED = -1000  #: code of a run that was given up
 PATIENCE = 600.0  #: [s] until then; draws take seconds alone on a core, but a busy machine must not look like a hang

@@ -173,6 +173,6 @@ def write(outcomes: Sequence[Outcome], path: Path) -> None:
 
 def _write(name: str, rows: Sequence[Any], path: Path) -> None:
     """With the versions that they were computed with."""
-    from fsci.run.summary import plain, versions
+    from fsci.running.summary import plain, versions
 
     path.write_text(json.dumps(plain({"versions": versions(), name: rows}), indent=1) + "\n")

@@ -16,8 +16,8 @@ from fsci.twin.frames import MIRRORED, TURNED, Coordinates
 from fsci.twin.grids import Settings, coarser, low_discrepancy, shifted
 
 #: What a difference means: the error of cells or steps, the scatter by where cells lie, contact that depends on the
-#: roles of its surfaces, or a defect of the program.
-Meaning = Literal["space", "time", "scatter", "roles", "defect"]
+#: roles of its surfaces, a defect of the program, or nothing but another problem.
+Meaning = Literal["space", "time", "scatter", "roles", "defect", "study"]
 SHIFTED_TWINS = 8
 #: Twins, those first that find most, and what they cost in 2D over the case; `element` is that of a case with q2q1.
 COSTS = {"coarse": 1.0, "scheme": 1.0, "exchange": 1.0, "facets": 1.0, "order": 1.5, "step": 2.0, "element": 0.5}

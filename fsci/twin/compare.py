@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fsci.case.verify import COUNTERS
-from fsci.run.history import History
+from fsci.running.history import History
 
 
 @dataclass(frozen=True)

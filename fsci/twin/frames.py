@@ -20,7 +20,7 @@ from fsci.case.probes import Probe, Reference
 from fsci.case.section import Section
 from fsci.case.shapes import PlacedMesh, Rotation
 from fsci.expression import Expression
-from fsci.run.history import History
+from fsci.running.history import History
 from fsci.twin.grids import Settings
 
 AXIS_NAMES = "xyz"

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from fsci.case import Case, CaseError, load_case
-from fsci.run.child import ENVIRONMENT, command
-from fsci.run.history import History, read_history
-from fsci.run.kept_case import copies
-from fsci.run.warm import WarmProcess
+from fsci.running.child import ENVIRONMENT, command
+from fsci.running.history import History, read_history
+from fsci.running.kept_case import copies
+from fsci.running.warm import WarmProcess
 from fsci.twin.changes import Twin
 from fsci.twin.grids import Settings
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from fsci.case import Case, CaseError, load_case
 from fsci.case.errors import Place, Problem, did_you_mean
-from fsci.run.files import write_text
-from fsci.run.summary import plain
-from fsci.run.verify import evaluate
-from fsci.run.warm import WarmProcess
+from fsci.running.files import write_text
+from fsci.running.summary import plain
+from fsci.running.verify import evaluate
+from fsci.running.warm import WarmProcess
 from fsci.twin.changes import Meaning, Twin, quick, twins
 from fsci.twin.compare import TwinChange, Value, changes, values
 from fsci.twin.grids import NO_FIELDS, Settings

@@ -61,3 +61,10 @@ def is_closed(simplices: Indices) -> bool:
     forward, first = np.sort(edges, axis=1), np.where(edges[:, 0] < edges[:, 1], 1, -1)
     _, number = np.unique(forward, axis=0, return_inverse=True)
     return not np.bincount(number.ravel(), weights=first).any()
+
+
+def tangential(vectors: Array, normals: Array) -> Array:
+    """The part of each vector along the surface, shape (n, dim); normals may have any length but zero, and any sign."""
+    size = np.linalg.norm(normals, axis=1, keepdims=True)
+    unit = np.divide(normals, size, out=np.zeros_like(normals), where=size > 0.0)
+    return vectors - np.einsum("nd,nd->n", vectors, unit)[:, None] * unit

@@ -9,7 +9,10 @@ __getattr__, __all__ = lazy_names(
         "field": ["Structure"],
         "loads": ["LineForce", "PointForce", "Pressure", "Traction"],
         "elastic_constants": ["lame"],
-        "materials": ["CoupNeoHooke", "LinearElastic", "MooneyRivlin", "NeoHooke", "StVenantKirchhoff"],
+        "materials": [
+            *("CoupNeoHooke", "HolzapfelGasserOgden", "LinearElastic", "MooneyRivlin", "NeoHooke"),
+            *("StVenantKirchhoff", "Yeoh"),
+        ],
         "springs": ["Spring"],
         "supports": ["Roller", "Support", "Symmetry"],
         "dynamics": ["Damping", "Dynamics"],

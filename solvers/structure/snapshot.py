@@ -16,21 +16,25 @@ from solvers.structure.field import Structure
 PartFields = Mapping[str, Mapping[str, tuple[NDArray[np.int64], Array]]]
 
 
-def snapshots(structure: Structure, on_surfaces: PartFields | None = None) -> list[Snapshot]:
+def snapshots(
+    structure: Structure, on_surfaces: PartFields | None = None, vectors: Mapping[str, Array] | None = None
+) -> list[Snapshot]:
     """One snapshot per body on rank 0, an empty list on others (collective).
 
-    on_surfaces: further fields on surfaces, which are zero at other nodes.
+    on_surfaces: further fields on surfaces, which are zero at other nodes; vectors: field -> values at owned dofs.
     """
     found = []
-    now = structure.now
-    for body, u, v in zip(structure.bodies, structure.split(now.u), structure.split(now.v), strict=True):
-        displacement, velocity = (_gather(body, array) for array in (u, v))
+    nodal = {"displacement": structure.now.u, "velocity": structure.now.v, **(vectors or {})}
+    for number, body in enumerate(structure.bodies):
+        gathered = {name: _gather(body, structure.split(values)[number]) for name, values in nodal.items()}
         von_mises = gather_nodal(structure.comm, Nodal(_von_mises(body.stress())[:, None], body.nodes[: body.owned]))
-        if displacement is None or velocity is None or von_mises is None:
+        known = {name: values for name, values in gathered.items() if values is not None}
+        if von_mises is None:
             continue
         mesh = body.domain.source
         assert mesh is not None
-        fields = {"displacement": displacement, "velocity": velocity, "von_mises": von_mises[:, 0]}
+        displacement, velocity, *_ = known.values()
+        fields = {"displacement": displacement, "velocity": velocity, "von_mises": von_mises[:, 0], **known}
         for name, (nodes, values) in (on_surfaces or {}).get(body.name, {}).items():
             fields[name] = np.zeros((len(mesh.points), *values.shape[1:]))
             fields[name][nodes] = np.nan_to_num(values)

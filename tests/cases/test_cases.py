@@ -8,7 +8,7 @@ from programs import fsci, run_whole, warnings_of
 
 from fsci.case import load_case
 from fsci.case.verify import FIELD_COLUMNS
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 CASES = sorted(path.parent for path in Path("cases").glob("*/case.yaml"))
 LONG = ("torus_wall_fine", "valve_3d")

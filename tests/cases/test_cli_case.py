@@ -38,7 +38,7 @@ def calls(monkeypatch):
 
     run = SimpleNamespace(run_case=note("run", 1), resume_run=note("resume", 3))
     picture = SimpleNamespace(plot_run=note("plot", [Path("a.png"), Path("b.png")]))
-    monkeypatch.setitem(sys.modules, "fsci.run.run", run)
+    monkeypatch.setitem(sys.modules, "fsci.running.run", run)
     monkeypatch.setitem(sys.modules, "fsci.plot.picture", picture)
     return made
 

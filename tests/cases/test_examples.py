@@ -26,12 +26,24 @@ def test_all_are_tested_and_shown():
     library = {
         "cylinder", "flap", "hertz", "own_material", "own_probe", "parameter_study", "torus_and_wall", "two_blocks",
     }  # fmt: skip
-    assert names == {*library, "post_process"}
-    pages = [(EXAMPLES.parent / name).read_text() for name in ("library.md", "howto.md")]
-    assert all(f"examples/{name}.py" in pages[name not in library] for name in names)
-    assert all(f"pictures/{name}_example.png" in pages[0] for name in library)
+    assert names == {*library, "case_file"}
+    page = (EXAMPLES.parent / "library.md").read_text()
+    assert all(f"examples/{name}.py" in page for name in names)
+    assert all(f"pictures/{name}_example.png" in page for name in library)
     drawn = (EXAMPLES.parent / "draw_examples.py").read_text()
     assert set(re.findall(r"^def (\w+)\(found", drawn, re.MULTILINE)) == library
+
+
+def test_case_file():
+    """The tip as the tutorial says; with half of the pressure as in half of the time."""
+    lines = numbers("case_file")
+    tips = [line for line in lines if len(line) in (2, 3) and 0.0 < line[0] <= 1.0 and line[1] < 1.0]
+    halves, whole = tips[-7:-3], tips[-3:]
+    assert [line[0] for line in halves] == [0.25, 0.5, 0.75, 1.0]
+    assert [line[0] for line in whole] == [0.25, 0.5, 0.75]
+    assert whole[0][1] == pytest.approx(halves[1][1], rel=1e-4)
+    assert whole[1][1] == pytest.approx(halves[3][1], rel=1e-4)
+    assert lines[-1] == [105.0, 3.0, 105.0, 3.0]
 
 
 def test_two_blocks():

@@ -159,7 +159,7 @@ def test_lists_of_pictures_name_no_other_files(out, results):
 def test_checkpoints_have_no_links(out, capsys):
     import h5py
 
-    from fsci.run.checkpoint import USER_BLOCK, checksum
+    from fsci.running.checkpoint import USER_BLOCK, checksum
 
     (path,) = (out / "checkpoint").glob("*.h5")
     with h5py.File(path, "r+") as file:

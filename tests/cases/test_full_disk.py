@@ -8,8 +8,8 @@ import pytest
 from small_cases import PLATE
 
 from fsci.cli import execute
-from fsci.run.checkpoint import list_checkpoints, write_checkpoint
-from fsci.run.history import HistoryWriter, read_history
+from fsci.running.checkpoint import list_checkpoints, write_checkpoint
+from fsci.running.history import HistoryWriter, read_history
 
 CASE = PLATE + "output: {fields_every: 0}\n"
 FULL = (28, "No space left on device", "history.csv")
@@ -56,7 +56,7 @@ def test_full_disk_without_space_for_a_checkpoint(tmp_path, full_disk, monkeypat
             raise OSError(*FULL)
         return original(folder, *what)
 
-    monkeypatch.setattr("fsci.run.run.write_checkpoint", fails)
+    monkeypatch.setattr("fsci.running.run.write_checkpoint", fails)
     assert run(tmp_path) == 1
     errors = capfd.readouterr().err
     (folder,) = (tmp_path / "elsewhere").iterdir()

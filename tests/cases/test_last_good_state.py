@@ -9,8 +9,8 @@ import fsci.builder.build as build
 from fsci.case import CaseError
 from fsci.case.errors import Place, Problem
 from fsci.cli import execute
-from fsci.run.history import read_history
-from fsci.run.run import Run
+from fsci.running.history import read_history
+from fsci.running.run import Run
 
 ERRORS = [
     ValueError("a probe went wrong"),

@@ -13,9 +13,9 @@ from small_cases import PLATE
 
 from fsci.case import CaseError
 from fsci.cli import execute
-from fsci.run.files import LOCK
-from fsci.run.history import read_history
-from fsci.run.lock import Lock
+from fsci.running.files import LOCK
+from fsci.running.history import read_history
+from fsci.running.lock import Lock
 
 HERE = platform.node()
 

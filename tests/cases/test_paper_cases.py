@@ -9,7 +9,7 @@ from programs import run_whole
 
 from fsci.builder.build import build
 from fsci.case import load_case
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.timing import Timer
 

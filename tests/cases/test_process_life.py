@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from programs import ENVIRONMENT, PARALLEL, fsci
 from small_cases import PLATE
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.algebra import unlocked
 
 PROGRAM = Path(__file__).parents[1] / "setups" / "disturbed_run.py"

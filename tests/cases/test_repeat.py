@@ -5,11 +5,11 @@ import shutil
 import numpy as np
 import pytest
 
-import fsci.run.run as run
+import fsci.running.run as run
 from fsci.case import load_case
 from fsci.case.settings import settings_of
-from fsci.run.history import read_history
-from fsci.run.run import FAILED, FINISHED, resume_run, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FAILED, FINISHED, resume_run, run_case
 
 #: two bodies side by side, held on the left, under their weight
 TWO = """\

@@ -5,7 +5,7 @@ from programs import fsci
 from small_cases import BLOCK
 
 from fsci.case import CaseError, load_case
-from fsci.run.results_folder import list_pictures, prepare_folder
+from fsci.running.results_folder import list_pictures, prepare_folder
 
 FOREIGN = [
     "case.yaml",

@@ -12,7 +12,7 @@ from fsci.case.load import load_case
 from fsci.case.resume import changed
 from fsci.case.settings import in_words, settings_of
 from fsci.cli import execute
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 BEAM = """\
 time: {step: 0.002, end: 0.1}

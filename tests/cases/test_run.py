@@ -15,8 +15,8 @@ import pytest
 from programs import fsci, start_fsci
 
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
-from fsci.run.run import FAILED, FINISHED, STOPPED, resume_run, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FAILED, FINISHED, STOPPED, resume_run, run_case
 from solvers.api import FailureKind, StepFailed
 
 CASE = """\
@@ -48,7 +48,7 @@ def case(tmp_path):
 
 
 def final_state(out):
-    from fsci.run.checkpoint import read_checkpoint
+    from fsci.running.checkpoint import read_checkpoint
 
     state, _ = read_checkpoint(out / "checkpoint")
     return {name: state["scheme"][name]["beam"] for name in ("u", "v", "a")}
@@ -237,7 +237,7 @@ def test_resume_without_checkpoint(case, tmp_path):
 
 def test_resume_of_another_version(case, tmp_path, monkeypatch, capsys):
     """Its checkpoint lacks something that this version keeps."""
-    import fsci.run.run as run
+    import fsci.running.run as run
     from fsci.cli import execute
 
     out = tmp_path / "out"

@@ -7,9 +7,9 @@ import pytest
 from programs import fsci
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.results_folder import prepare_folder
-from fsci.run.run import FAILED, FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.results_folder import prepare_folder
+from fsci.running.run import FAILED, FINISHED, run_case
 
 CASE = """
 time: {step: 0.5, end: 1}  # a comment

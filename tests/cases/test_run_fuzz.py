@@ -24,7 +24,7 @@ def test_mutants_are_the_same_every_time():
 
 
 def test_failures_are_reported(tmp_path, monkeypatch):
-    monkeypatch.setattr("fsci.run.run.run_case", lambda *arguments, **more: print("Traceback") or 1)
+    monkeypatch.setattr("fsci.running.run.run_case", lambda *arguments, **more: print("Traceback") or 1)
     assert "Traceback" in trouble(json.dumps(cases()["beam"]), tmp_path)
 
 

@@ -7,9 +7,9 @@ import pytest
 from programs import fsci, warnings_of
 
 from fsci.case import load_case
-from fsci.run.finite import not_numbers
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.finite import not_numbers
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 from solvers.fluid.surfaces.sweep import Sweep
 
 RING = """\

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fsci.run.summary import RunRecord, Timer, memory_mb, shares, summarize, write_summary
+from fsci.running.summary import RunRecord, Timer, memory_mb, shares, summarize, write_summary
 from solvers.api import StepInfo
 
 

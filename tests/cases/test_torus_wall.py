@@ -11,9 +11,9 @@ from programs import fsci
 
 from fsci.builder.build import build
 from fsci.case import load_case
-from fsci.run.checkpoint import read_checkpoint
-from fsci.run.history import read_history
-from fsci.run.output import read_collection
+from fsci.running.checkpoint import read_checkpoint
+from fsci.running.history import read_history
+from fsci.running.output import read_collection
 from solvers.mesh.distributed import scatter
 from solvers.structure.probes import of_bodies
 from solvers.timing import Timer

@@ -1,13 +1,11 @@
 """The cases of the tutorials: the first two as a whole, of the others the first steps; their pages show them."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from programs import fsci
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 DOCS = Path(__file__).parents[2] / "docs"
 STAGES = ("solid", "contact", "flow", "coupled", "together")
@@ -39,19 +37,6 @@ def test_first_steps(stage, tmp_path):
     history = read_history(tmp_path / "history.csv")
     assert len(history["step"]) == 3
     assert max(abs(history["fluid.mass"])) < 1e-9
-
-
-def test_post_processing(tmp_path):
-    """The example of the how-tos reads what a run wrote."""
-    assert fsci("run", DOCS / "tutorials" / "solid", "-o", tmp_path).returncode == 0
-    example = [sys.executable, DOCS / "examples" / "post_process.py", tmp_path]
-    done = subprocess.run(example, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines() == [
-        "columns: step time dt iterations wall residual tip.x tip.y clamp.x clamp.y structure.energy",
-        "steps, last time: 4 1.0",
-        "flap 20 cells; displacement velocity von_mises",
-    ]
 
 
 def test_forces_balance_in_contact(tmp_path):

@@ -9,7 +9,7 @@ from contact_cases import PLATE
 from coupled_case import post
 from programs import fsci
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 TWISTED = """\
 title: a block of second order is twisted and moves

@@ -12,10 +12,10 @@ import pytest
 from petsc4py import PETSc
 from programs import new_process
 
-from fsci.run import warm
-from fsci.run.files import LOCK
-from fsci.run.history import read_history
-from fsci.run.warm import PROCESS_HAS_ENDED, WarmProcess
+from fsci.running import warm
+from fsci.running.files import LOCK
+from fsci.running.history import read_history
+from fsci.running.warm import PROCESS_HAS_ENDED, WarmProcess
 
 BAR = """
 time: {step: 0.1, end: 1}

@@ -10,8 +10,8 @@ from fsci.builder.automatic_pairs import with_pairs
 from fsci.builder.wall_pairs import wall_pairs
 from fsci.case import CaseError, load_case
 from fsci.meshes.of_case import read_body
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, resume_run, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, resume_run, run_case
 
 #: A block falls on the floor, a third of a cell beside the middle; damping brings it to rest.
 BLOCK = """\

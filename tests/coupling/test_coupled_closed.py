@@ -11,7 +11,7 @@ from test_coupled_run import run
 
 from coupling.coupled import Coupled
 from fsci.case import CaseError, load_case
-from fsci.run.run import FAILED, run_case
+from fsci.running.run import FAILED, run_case
 from solvers.api import FailureKind, StepFailed
 
 #: fluid inside of a ring, and outside of it in an open channel

@@ -10,7 +10,7 @@ from test_coupled_run import run
 
 from fsci.builder.dry_side import DrySideError, close, find_ends
 from fsci.case import CaseError, load_case
-from fsci.run.run import run_case
+from fsci.running.run import run_case
 
 #: a block across the box, half way up, with fluid above it and none below
 COLUMN = """\

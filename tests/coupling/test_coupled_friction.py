@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from programs import fsci
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 OBLIQUE = {
     "fluid.grid.cells": "[8, 8, 13]",

@@ -8,8 +8,8 @@ from programs import fsci
 from small_scenes import CHANNEL
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 from solvers.api import FailureKind
 
 NESTED = POST.replace("cells: [20, 10]}", "cells: [10, 5], refine: [{around: post, layers: 4, level: 1}]}")

@@ -8,9 +8,9 @@ from programs import ENVIRONMENT, fsci, new_process
 from coupling.coupled import Coupled
 from fsci.case import load_case
 from fsci.plot.picture import plot_run
-from fsci.run.history import read_history
-from fsci.run.output import read_collection
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.output import read_collection
+from fsci.running.run import FINISHED, run_case
 from solvers.api import FailureKind, StepFailed
 
 SCHEMES = {

@@ -7,8 +7,8 @@ import math
 import pytest
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, resume_run, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, resume_run, run_case
 
 #: A cylinder of the fluid's density in the middle of a round tank of three times its radius; nothing rubs. The added
 #: mass of the cylinder is (9 + 1) / (9 - 1) of its own (Lamb, Hydrodynamics (1932), section 69), hence 1 / 2.25 of

@@ -9,7 +9,7 @@ from coupled_case import POST
 from test_coupled_run import BLOCK, run
 
 from fsci.case import load_case
-from fsci.run.run import FINISHED, run_case
+from fsci.running.run import FINISHED, run_case
 
 SHORT = ("time.end", "0.1"), ("verify", "[]")
 

@@ -9,8 +9,8 @@ from coupling_setup import BAR_MODES, TIGHT, bar_and_column, post_in_flow
 from coupling.monolithic import Monolithic
 from coupling.start import NO_BALANCE, start_together
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 from solvers.api import FailureKind, StepFailed
 
 #: A disc of the density of the fluid is let go. Waves cross it in 0.01 s, less than most steps.

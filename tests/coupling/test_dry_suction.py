@@ -6,8 +6,8 @@ import pytest
 from advised import require_explained
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FAILED, FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FAILED, FINISHED, run_case
 from solvers.api import FailureKind
 
 #: A block pressed on the floor by 5 Pa, in water at rest whose pressure falls to -10 Pa.

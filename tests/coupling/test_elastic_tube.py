@@ -7,7 +7,7 @@ import pytest
 from tube_waves import FLUID, RADIUS, WALL, E, missed, pressure_on_axis, wave_number
 
 from fsci.case import load_case
-from fsci.run.verify import peak
+from fsci.running.verify import peak
 
 CASE = Path(__file__).parents[2] / "cases" / "elastic_tube"
 

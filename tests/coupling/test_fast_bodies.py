@@ -4,7 +4,7 @@ import pytest
 
 from fsci.case import load_case
 from fsci.check.meshes import check_meshes
-from fsci.run.run import FAILED, FINISHED, run_case
+from fsci.running.run import FAILED, FINISHED, run_case
 
 CASE = """
 time: {step: 0.1, end: 0.2}

@@ -9,7 +9,7 @@ from test_coupled_run import MEETING, run
 from test_fsci_lubrication import SETTLING
 
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.fluid.grid.box import uniform
 from solvers.fluid.terms import seepage
 from solvers.fluid.terms.boundary.patches import Patch

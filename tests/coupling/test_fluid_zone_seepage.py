@@ -10,7 +10,7 @@ from programs import fsci
 from test_coupled_run import MEETING, run
 
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.fluid.flow.balances import seepage
 from solvers.fluid.flow.probes import flow_rate
 from solvers.fluid.grid.box import uniform

@@ -7,8 +7,8 @@ import pytest
 from programs import fsci
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, resume_run, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, resume_run, run_case
 
 #: A heavy disc settles on an elastic plate in a viscous fluid.
 SCENE = """\

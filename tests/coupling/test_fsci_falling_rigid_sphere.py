@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from programs import fsci
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 COARSE = [
     *(f"fluid.grid.{a}=[{{to: 0.012, cells: 4}}, {{to: 0.05, cells: 5, ratio: 4}}]" for a in "xy"),

@@ -9,7 +9,7 @@ import pytest
 from programs import run_whole
 from test_coupled_run import run
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 #: changes of the case for the second fluid
 REYNOLDS_12 = (

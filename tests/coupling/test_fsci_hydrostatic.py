@@ -9,7 +9,7 @@ import pytest
 from fluid_setup import block, body, field, make_fluid, solve_steady
 from programs import fsci
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.fluid.grid.box import uniform
 from solvers.fluid.terms.boundary.patches import Patch
 

@@ -7,7 +7,7 @@ import pytest
 from lubrication import closing_ratios, cylinder_drag, drag_ratio, settling_ratio, sphere_drag
 from programs import fsci
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 H = 0.05
 

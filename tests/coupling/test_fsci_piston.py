@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from programs import run_whole
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 #: time: way, velocity and pressure on the block; P = rho = L0 = m_s = 1, gap 0.1
 EXACT = {

@@ -9,7 +9,7 @@ from programs import fsci
 
 from fsci.builder.build import build
 from fsci.case import load_case
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.timing import Timer
 
 CASE = "cases/rebound/case.yaml"

@@ -12,7 +12,7 @@ from programs import run_whole
 from scipy.integrate import quad
 from scipy.special import zeta
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 
 def test_rigid_ball_without_a_layer():

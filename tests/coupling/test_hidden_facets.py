@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import run_case
+from fsci.running.history import read_history
+from fsci.running.run import run_case
 
 #: A rod is pushed out of a sleeve that hides all of it, into a chamber with an outlet.
 ROD = """\

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from programs import fsci, warnings_of
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 
 @pytest.mark.slow(seconds=170)

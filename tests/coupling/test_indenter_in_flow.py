@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 
 #: It is pressed in until t = 2.
 SOLID = """\

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 
 #: One disc hangs on a spring of the other one, which a growing moment turns about a point beside its centre.
 JOINTED = """\

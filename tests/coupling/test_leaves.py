@@ -7,7 +7,7 @@ import pytest
 from programs import fsci
 
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 LEAVING = """\
 title: a disc leaves

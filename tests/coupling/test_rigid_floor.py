@@ -7,8 +7,8 @@ import pytest
 
 from fsci.builder.rigid_contact import STANDOFF
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, resume_run, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, resume_run, run_case
 
 #: A heavy disc falls on the floor, a third of a cell beside the middle; two more stand beside it.
 FALLING = """\

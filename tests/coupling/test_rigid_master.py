@@ -7,8 +7,8 @@ from programs import fsci
 
 from fsci.builder.automatic_pairs import with_pairs
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 
 #: A ram comes down in a channel and presses an elastic block against the floor; it turns a little.
 RAM = """\

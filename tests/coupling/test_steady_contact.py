@@ -8,8 +8,8 @@ from mpi4py import MPI
 
 from fsci.builder.build import build
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, resume_run, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, resume_run, run_case
 from solvers.timing import Timer
 
 #: The slit behind the flap is less than a cell wide. Contact closes it, so that the fluid below is a pocket.

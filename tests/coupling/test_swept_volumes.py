@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 
 #: A heavy ring full of water that spins freely, by 0.06 in a step.
 RING = """\

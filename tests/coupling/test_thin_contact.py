@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import run_case
+from fsci.running.history import read_history
+from fsci.running.run import run_case
 
 CASE = """\
 time: {{step: 0.05, end: {end}}}

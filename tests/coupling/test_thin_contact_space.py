@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from programs import fsci
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 #: what iterations leave over does not tell processes apart
 EXACT = ("--set", "solver.newton.residual=1e-10")

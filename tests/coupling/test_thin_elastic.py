@@ -8,8 +8,8 @@ import pytest
 from programs import fsci
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import run_case
+from fsci.running.history import read_history
+from fsci.running.run import run_case
 
 CASES = Path(__file__).parents[2] / "cases"
 CASE = """\

@@ -5,8 +5,8 @@ import pytest
 from programs import fsci
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import run_case
+from fsci.running.history import read_history
+from fsci.running.run import run_case
 
 WALL = """\
 time: {step: 0.05, end: 0.15}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from programs import run_whole
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 
 @pytest.mark.slow(seconds=900)

@@ -22,9 +22,9 @@ from coupling import contact_surface
 from fsci.builder import structure as build_structure
 from fsci.case import load_case
 from fsci.case.quantities import QUANTITIES
-from fsci.run.history import read_history
-from fsci.run.output import FORMATS, FieldWriter
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.output import FORMATS, FieldWriter
+from fsci.running.run import FINISHED, run_case
 from fsci.shapes import rectangle
 from solvers.algebra.blocks import times
 from solvers.contact import Contact, Pair

@@ -6,8 +6,8 @@ from programs import fsci
 
 from fsci.builder.automatic_pairs import with_pairs
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 from solvers.mesh.search import Search
 
 #: A soft block between two stiff ones, and a rigid floor below.

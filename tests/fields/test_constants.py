@@ -14,7 +14,7 @@ from fsci import shapes
 from fsci.bench import fluid as flows
 from fsci.builder import facing
 from fsci.case import load_case
-from fsci.run import cause
+from fsci.running import cause
 from solvers.api import StepFailed
 from solvers.contact import dual_tree, mortar, overlap_at_start, self_search, share, sharp_edges
 from solvers.contact.sharp_edges import split_nodes

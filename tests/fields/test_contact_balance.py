@@ -8,7 +8,7 @@ import pytest
 from programs import fsci
 from test_automatic_pairs import STACK
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.contact.share import OVERLAP_COST, Shares
 
 

@@ -7,8 +7,8 @@ import pytest
 from programs import fsci
 
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 
 #: Weight 10, mu = 0.1, pulled by 3: a = 2. The base is as stiff as the block.
 SLIDING = """\

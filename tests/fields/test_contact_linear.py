@@ -6,7 +6,7 @@ from pressed_block import assert_same_results, press_block
 from programs import fsci
 
 from fsci import shapes
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers import newton
 from solvers.algebra import linear
 from solvers.algebra.solid_factors import SolidFactors

@@ -15,9 +15,9 @@ from structure_setup import make_structure
 from coupling.contact_surfaces import contact_surface
 from fsci import shapes
 from fsci.case import load_case
-from fsci.run.checkpoint import read_checkpoint
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, resume_run, run_case
+from fsci.running.checkpoint import read_checkpoint
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, resume_run, run_case
 from solvers.structure.elastic_constants import lame
 from solvers.structure.materials import NeoHooke
 

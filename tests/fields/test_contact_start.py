@@ -8,7 +8,7 @@ from test_contact_friction_run import SLIDING
 
 from fsci import shapes
 from fsci.case import CaseError, load_case
-from fsci.run.run import run_case
+from fsci.running.run import run_case
 from solvers.algebra.blocks import times
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless

@@ -10,7 +10,7 @@ from programs import run_whole
 from structure_setup import constant
 
 from fsci import shapes
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.contact.surface import Surface
 from solvers.structure.body import Support
 from solvers.structure.elastic_constants import lame

@@ -6,7 +6,7 @@ import pytest
 from programs import fsci, warnings_of
 
 from coupling.balance import InterfaceSentinel
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.structure.energy import EnergyBalance, EnergySentinel
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from programs import fsci, on_processes
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 ONE_CELL_ON_A_BLOCK = """\
 time: {step: 1, end: 1}

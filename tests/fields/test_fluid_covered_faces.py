@@ -5,7 +5,7 @@ import pytest
 from fluid_setup import block, body, field, make_fluid, nodal_errors, solve_steady, turned
 from programs import fsci
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.fluid.flow.balances import Balances
 from solvers.fluid.flow.conservation.regions import RegionsOfCut
 from solvers.fluid.flow.conservation.volume_balance import VolumeBalance

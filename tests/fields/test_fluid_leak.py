@@ -5,8 +5,8 @@ import pytest
 from case_text import without
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import run_case
+from fsci.running.history import read_history
+from fsci.running.run import run_case
 
 #: cells of 0.1, and a plate that seals the channel, pressure 1 on its left side
 CASE = """\

@@ -12,7 +12,7 @@ from programs import on_processes
 
 from fsci.bench.fluid import ring_in_channel
 from fsci.case import load_case
-from fsci.run.run import FAILED, run_case
+from fsci.running.run import FAILED, run_case
 from solvers import newton
 from solvers.algebra import linear
 from solvers.algebra.linear import LinearSolveFailed

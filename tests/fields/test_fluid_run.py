@@ -15,9 +15,9 @@ from fsci.case.rigid_motion import rigid_motion
 from fsci.meshes.mesh import place
 from fsci.plot.picture import plot_run
 from fsci.plot.scene import UPRIGHT
-from fsci.run.history import read_history
-from fsci.run.output import read_collection
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.output import read_collection
+from fsci.running.run import FINISHED, run_case
 from solvers.fluid.flow.snapshot import vertex_areas
 from solvers.fluid.surfaces.inside import winding
 from solvers.fluid.surfaces.surface import Motion

@@ -5,7 +5,7 @@ import pytest
 from fluid_setup import block, body, field, fluid_rule, loop, make_fluid, solve_steady, step, turned, values
 from programs import fsci
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.fluid.flow.probes import at_point
 from solvers.fluid.geometry.thin.sheet_windows import SheetWindows
 from solvers.fluid.geometry.thin.sheets import find_sheets

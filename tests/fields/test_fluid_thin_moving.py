@@ -8,7 +8,7 @@ from fluid_setup import block, body, field, make_fluid, step, turned
 from programs import fsci
 
 from fsci.case.plausible_flow import CELLS_ACROSS_IN_CONTACT
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.api import StepFailed
 from solvers.fluid.flow.sheet_transfer import along_surface, sides_of, transfer
 from solvers.fluid.flow.thin_bodies import THICK_IN_CONTACT, ThinBodies, may_be_thin

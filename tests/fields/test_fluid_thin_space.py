@@ -6,7 +6,7 @@ from fluid_setup import block, body, field, fluid_rule, make_fluid, solve_steady
 from programs import fsci
 from thin_space import duct, sealing, turn
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.fluid.flow.probes import at_point
 from solvers.fluid.geometry.thin.sheets import find_sheets
 from solvers.fluid.grid.box import uniform

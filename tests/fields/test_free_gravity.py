@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 
 #: A disc of the density of the water around it, off the planes of the grid.
 FLOATING = """\

@@ -17,7 +17,7 @@ from programs import run_whole
 from structure_setup import constant
 
 from fsci import shapes
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.mesh.mesh import Mesh
 from solvers.structure.body import Support
 from solvers.structure.elastic_constants import lame

@@ -8,7 +8,7 @@ from structure_setup import CELL_TYPES, block, constant, distort, held_everywher
 from test_structure_tangent import tangent_error
 
 from fsci import shapes
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.structure.body import Pressure, Support, Symmetry, Traction
 from solvers.structure.dynamics import Dynamics

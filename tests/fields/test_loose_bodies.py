@@ -6,8 +6,8 @@ from programs import fsci
 from scipy.integrate import solve_ivp
 
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 
 #: A pendulum, two squares on a spring, one of which lies on a floor.
 ALONE = """\

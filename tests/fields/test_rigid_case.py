@@ -5,8 +5,8 @@ import pytest
 from programs import fsci
 
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 
 #: A disc sinks in a box, held back by an eccentric spring.
 SINKING = """\

@@ -5,8 +5,8 @@ import pytest
 from petsc4py import PETSc
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 from solvers.algebra.rounding import rounding_error
 
 

@@ -10,8 +10,8 @@ from structure_setup import constant
 
 from fsci import shapes
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 from solvers.contact.dual_tree import DualTree
 from solvers.contact.self_search import MASTER, SLAVE, SelfSearch, choose_roles, wall_thickness
 from solvers.structure.body import Support

@@ -3,7 +3,7 @@
 import pytest
 from programs import fsci
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 
 BODIES = {
     "bar": """

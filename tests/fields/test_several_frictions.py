@@ -10,8 +10,8 @@ from structure_setup import constant
 from test_contact_friction import LOOSER
 
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 from solvers.contact.law.by_pair import ByPair
 from solvers.contact.law.coulomb import Coulomb
 from solvers.contact.law.frictionless import Frictionless

@@ -16,7 +16,7 @@ import solvers.fluid.solve.pressure_level
 import solvers.fluid.solve.system
 from fsci.builder.build import build
 from fsci.case import load_case
-from fsci.run.run import FINISHED, Run, run_case
+from fsci.running.run import FINISHED, Run, run_case
 from solvers.contact.mortar import Mortar
 from solvers.fluid.grid.box import uniform
 from solvers.fluid.solve.system import FlowSystem

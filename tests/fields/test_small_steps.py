@@ -6,7 +6,7 @@ import ffcx.codegeneration.jit
 import pytest
 from small_scenes import BEAM
 
-import fsci.run.run
+import fsci.running.run
 from fsci.case import load_case
 
 CASE = (
@@ -27,7 +27,7 @@ def steps(tmp_path, monkeypatch):
     for name in names:
         original = getattr(ffcx.codegeneration.jit, name)
         monkeypatch.setattr(ffcx.codegeneration.jit, name, lambda *a, f=original, **k: (asked.append(a), f(*a, **k))[1])
-    one_step = fsci.run.run.Run.take_step
+    one_step = fsci.running.run.Run.take_step
 
     def timed(run):
         begin = time.process_time()
@@ -36,11 +36,12 @@ def steps(tmp_path, monkeypatch):
         if run.clock.step == 1:
             asked.clear()
 
-    monkeypatch.setattr(fsci.run.run.Run, "take_step", timed)
+    monkeypatch.setattr(fsci.running.run.Run, "take_step", timed)
 
     def run(end):
         (tmp_path / "case.yaml").write_text(CASE)
-        assert fsci.run.run.run_case(load_case(tmp_path / "case.yaml", [("time.end", str(end))]), tmp_path / "out") == 0
+        case = load_case(tmp_path / "case.yaml", [("time.end", str(end))])
+        assert fsci.running.run.run_case(case, tmp_path / "out") == 0
         return cpu, asked
 
     return run

@@ -11,10 +11,12 @@ from solvers.structure.dynamics import Dynamics
 from solvers.structure.elastic_constants import lame, plane_stress_lambda
 from solvers.structure.materials import (
     CoupNeoHooke,
+    HolzapfelGasserOgden,
     MooneyRivlin,
     NeoHooke,
     PlaneStressStVenantKirchhoff,
     StVenantKirchhoff,
+    Yeoh,
 )
 from solvers.structure.rayleigh import Damping
 
@@ -24,6 +26,8 @@ MATERIALS = {
     "coup_neo_hooke": CoupNeoHooke(3.0, 5.0, 2.0),
     "coup_neo_hooke, nu = 0": CoupNeoHooke(3.0, 0.0, 2.0),
     "mooney_rivlin": MooneyRivlin(1.0, 0.5, 7.0, 2.0),
+    "yeoh": Yeoh(1.5, -0.4, 0.2, 7.0, 2.0),
+    "holzapfel_gasser_ogden": HolzapfelGasserOgden(3.0, 2.0, 4.0, 0.1, 7.0, 1.0, 0.5, 0.0, 2.0, -3.0, 0.0, 2.0),
     "varying": NeoHooke(lambda x, t: 3.0 + x[0], lambda x, t: 5.0 - x[1], 2.0),
 }
 
@@ -90,10 +94,11 @@ def small_stress(material, gradient):
     return body.stress()[0].reshape(3, 3)
 
 
-@pytest.mark.parametrize("law", ["st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke", "mooney_rivlin"])
+@pytest.mark.parametrize("law", ["st_venant_kirchhoff", "neo_hooke", "coup_neo_hooke", "mooney_rivlin", "yeoh"])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_small_strain_is_hookes_law(law, dim):
-    mu, lmbda = (3.0, 7.0 - 2.0) if law == "mooney_rivlin" else (3.0, 5.0)
+    """All have mu = 3 Pa and lambda = 5 Pa: a bulk modulus of 7 Pa."""
+    mu, lmbda = 3.0, 5.0
     gradient = 1e-6 * np.array([[1.0, 2.0, 0.5], [-0.5, 3.0, 1.0], [0.2, 0.1, -2.0]])[:dim, :dim]
     strain = np.zeros((3, 3))
     strain[:dim, :dim] = (gradient + gradient.T) / 2

@@ -10,8 +10,8 @@ from programs import fsci
 
 from fsci.case import CaseError, load_case
 from fsci.meshes.mesh import build_mesh, extract_region
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 from solvers.structure.elastic_constants import lame
 
 ROOT = Path(__file__).parents[2]

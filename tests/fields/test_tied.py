@@ -7,8 +7,8 @@ from programs import fsci
 from structure_setup import constant
 
 from fsci.case import CaseError, load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 from solvers.contact import ties
 from solvers.contact.law.tied import Tied
 from solvers.structure.body import Support

@@ -9,7 +9,7 @@ from programs import fsci
 from unconnected_scenes import Scene, case_of, computed, difference, dragged, draw_pair, tied
 
 from fsci import shapes
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.mesh.mesh import Mesh
 from solvers.structure.body import Body, Support
 from solvers.structure.field import Structure

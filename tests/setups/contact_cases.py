@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 
 #: A rigid plate comes down on a block, slides and leaves it, twice.
 PLATE = """\

@@ -9,8 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from fsci.run.copied_process import exit_code, import_common, run_in_copy
-from fsci.run.copied_process import fsci as fsci_here
+from fsci.running.copied_process import exit_code, import_common, run_in_copy
+from fsci.running.copied_process import fsci as fsci_here
 
 ENVIRONMENT = {
     **os.environ,

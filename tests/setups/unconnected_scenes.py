@@ -7,8 +7,8 @@ import json
 import numpy as np
 
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 
 STEPS = 3
 

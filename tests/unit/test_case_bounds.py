@@ -10,7 +10,7 @@ from small_cases import BLOCK
 
 from fsci.case import CaseError, load_case
 from fsci.case.yaml_text import MOST_VALUES
-from fsci.run.memory import require_memory
+from fsci.running.memory import require_memory
 
 
 def message(tmp_path, text):

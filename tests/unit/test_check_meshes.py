@@ -11,7 +11,7 @@ from fsci.case import load_case
 from fsci.check.check import summary
 from fsci.check.meshes import check_meshes, thickness
 from fsci.cli import execute
-from fsci.run.run import FINISHED, run_case
+from fsci.running.run import FINISHED, run_case
 from solvers.mesh.mesh import Mesh
 
 SOLID = """\

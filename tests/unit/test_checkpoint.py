@@ -13,7 +13,7 @@ import time
 import numpy as np
 import pytest
 
-from fsci.run.checkpoint import read_checkpoint, write_checkpoint
+from fsci.running.checkpoint import read_checkpoint, write_checkpoint
 
 
 def same(left, right) -> bool:
@@ -134,7 +134,7 @@ WRITER = """
 import sys
 from pathlib import Path
 import numpy as np
-from fsci.run.checkpoint import write_checkpoint
+from fsci.running.checkpoint import write_checkpoint
 folder, step = Path(sys.argv[1]), int(sys.argv[2])
 while True:
     step += 1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fsci.case.time import number_of_steps
-from fsci.run.clock import Clock
+from fsci.running.clock import Clock
 
 
 def clock(end, step, *, start=0.0, halvings=4, recover_after=5):

@@ -8,7 +8,7 @@ import pytest
 
 from fsci.case.verify import Check
 from fsci.converge.values import Observed, chosen, distance, observed
-from fsci.run.verify import evaluate
+from fsci.running.verify import evaluate
 
 TIME = np.linspace(0.1, 3.0, 30)
 

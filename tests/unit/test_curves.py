@@ -8,7 +8,7 @@ import pytest
 from case_mistakes import first_lines, refused
 
 from fsci.case import CaseError, load_case
-from fsci.run.results_folder import prepare_folder
+from fsci.running.results_folder import prepare_folder
 
 CASE = """\
 time: {step: 0.5, end: 1}

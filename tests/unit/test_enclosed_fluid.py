@@ -5,8 +5,8 @@ from case_mistakes import first_lines, load, refused
 from programs import fsci
 
 from fsci.check.meshes import check_meshes
-from fsci.run.history import read_history
-from fsci.run.run import run_case
+from fsci.running.history import read_history
+from fsci.running.run import run_case
 
 pytestmark = pytest.mark.usefixtures("in_new_folder")
 

@@ -10,7 +10,7 @@ from fsci.case.jumps import find_jump
 from fsci.case.rigid_motion import differentiated
 from fsci.check.meshes import check_meshes
 from fsci.expression import Expression
-from fsci.run.run import FAILED, FINISHED, run_case
+from fsci.running.run import FAILED, FINISHED, run_case
 
 pytestmark = pytest.mark.usefixtures("in_new_folder")
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fsci.case import CaseError
-from fsci.run.history import HistoryWriter, read_history
+from fsci.running.history import HistoryWriter, read_history
 
 
 def test_numbers_come_back_bit_for_bit(tmp_path):

@@ -12,8 +12,8 @@ from structure_setup import constant, load_step, make_structure, vector
 
 from fsci import shapes
 from fsci.case import load_case
-from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.running.history import read_history
+from fsci.running.run import FINISHED, run_case
 from solvers.algebra import linear
 from solvers.algebra.gauss_seidel import TwoFields, matrix_of
 from solvers.newton import Tolerance

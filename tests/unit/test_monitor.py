@@ -6,7 +6,7 @@ import io
 
 import pytest
 
-from fsci.run.monitor import Monitor, duration
+from fsci.running.monitor import Monitor, duration
 from solvers.api import FailureKind, StepFailed, StepInfo
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fsci.run.output import FieldWriter, read_collection, write_collection
+from fsci.running.output import FieldWriter, read_collection, write_collection
 from solvers.api import Snapshot
 
 #: reference nodes of one cell in VTK order; any points will do, only the order must survive

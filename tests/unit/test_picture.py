@@ -11,9 +11,9 @@ from fsci.plot.curves import contact_panels, label, plot_history
 from fsci.plot.picture import plot_run
 from fsci.plot.render import axes_of_view, frame, load_body, render
 from fsci.plot.scene import compose
-from fsci.run.history import HistoryWriter
-from fsci.run.output import FieldWriter, write_text, write_vtu
-from fsci.run.summary import write_summary
+from fsci.running.history import HistoryWriter
+from fsci.running.output import FieldWriter, write_text, write_vtu
+from fsci.running.summary import write_summary
 from solvers.api import Snapshot
 
 SI = {"length": "m", "mass": "kg", "time": "s"}

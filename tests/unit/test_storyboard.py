@@ -11,7 +11,7 @@ from fsci.plot.picture import look_at, plot_run
 from fsci.plot.render import import_pyvista
 from fsci.plot.render_flow import connect, load_meshes, load_state, slice_plane, surrounds
 from fsci.plot.storyboard import arrange, boundary, choose, plane_state
-from fsci.run.output import FieldWriter
+from fsci.running.output import FieldWriter
 from solvers.api import Snapshot
 
 HEXAHEDRON = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])

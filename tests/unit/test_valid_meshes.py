@@ -14,7 +14,7 @@ from fsci.meshes.jacobians import inverted
 from fsci.meshes.of_case import read_body
 from fsci.meshes.serendipity import COMPLETE
 from fsci.meshes.valid import BadMesh, require_valid
-from fsci.run.run import FINISHED, run_case
+from fsci.running.run import FINISHED, run_case
 from solvers.mesh.cell_types import CELL_TYPES
 from solvers.mesh.locate import shape_functions
 from solvers.mesh.mesh import Mesh

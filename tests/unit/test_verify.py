@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fsci.case.verify import Check
-from fsci.run.verify import evaluate
+from fsci.running.verify import evaluate
 
 
 def check(

@@ -7,7 +7,7 @@ import numpy as np
 from solvers.api import Array, Snapshot
 from solvers.fluid.flow.field import Fluid
 from solvers.mesh.distributed import Nodal, gather_nodal
-from solvers.mesh.tessellation import area_vectors
+from solvers.mesh.tessellation import area_vectors, tangential
 
 
 def snapshots(fluid: Fluid) -> list[Snapshot]:
@@ -57,7 +57,7 @@ def _corners(fluid: Fluid, degree: int) -> np.ndarray:
 
 
 def _bodies(fluid: Fluid) -> list[Snapshot]:
-    """Rigid surfaces with their velocity and the traction of the fluid on them (zero before the first step).
+    """Rigid surfaces with their velocity, and traction and wall shear stress of the fluid (zero before the first step).
 
     Elastic bodies are in the snapshots of the structure.
     """
@@ -73,7 +73,12 @@ def _bodies(fluid: Fluid) -> list[Snapshot]:
         force = forces.get(surface.name, np.zeros_like(x))
         area = vertex_areas(x, surface.facets)[:, None]
         traction = np.divide(force, area, out=np.zeros_like(force), where=area > 0.0)
-        fields = {"velocity": _in_space(v), "traction": _in_space(traction)}
+        normals = np.zeros_like(x)
+        for corner in surface.facets.T:
+            np.add.at(normals, corner, area_vectors(x[surface.facets]))
+        shear = tangential(traction, normals)
+        fields = {"velocity": v, "traction": traction, "wall_shear_stress": shear}
+        fields = {name: _in_space(values) for name, values in fields.items()}
         kind = "line" if dim == 2 else "triangle"
         found.append(Snapshot(surface.name, _in_space(x), surface.facets, kind, fields))
     return found

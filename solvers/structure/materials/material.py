@@ -63,6 +63,11 @@ def in_space(F: Tensor) -> Tensor:
     return ufl.as_tensor([[F[0, 0], F[0, 1], 0], [F[1, 0], F[1, 1], 0], [0, 0, 1]])
 
 
+def isochoric_trace(F: Tensor) -> Tensor:
+    """J^(-2/3) I_1, the trace of C without its change of volume."""
+    return ufl.exp(-2 / 3 * ufl.ln(ufl.det(F))) * ufl.tr(in_space(F).T * in_space(F))
+
+
 def cube_root(J: Tensor) -> Tensor:
     """J^(1/3)."""
     return ufl.exp(ufl.ln(J) / 3)

@@ -11,7 +11,7 @@ from typing import Any
 
 from fsci.case import Case, load_case
 from fsci.meshes.parts import Named, all_files, real
-from fsci.run.files import FILES, FOLDERS, LOCK, MARKER, UNFINISHED, copy_file, make_folder, replacing, write_text
+from fsci.running.files import FILES, FOLDERS, LOCK, MARKER, UNFINISHED, copy_file, make_folder, replacing, write_text
 
 #: Names that copies cannot have at the top of a results folder, as file systems that ignore case see them.
 RESERVED_FILES = {name.casefold() for name in (*FILES, *FOLDERS, MARKER, LOCK)}

@@ -17,24 +17,24 @@ from fsci.case import Case, CaseError, load_case
 from fsci.case.resume import changed, end_error, meshes_changed
 from fsci.case.settings import settings_of
 from fsci.resolution.words import resolved, worst_by_body
-from fsci.run.cause import alike, with_cause
-from fsci.run.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
-from fsci.run.clock import Clock
-from fsci.run.files import LOCK, make_folder, require_own, write_text
-from fsci.run.finite import not_numbers
-from fsci.run.history import HistoryWriter, read_history
-from fsci.run.jump import require_continuous
-from fsci.run.kept_case import keep_case, kept_case
-from fsci.run.lock import Lock
-from fsci.run.memory import require_memory
-from fsci.run.monitor import Monitor
-from fsci.run.output import FieldWriter
-from fsci.run.processes import describe
-from fsci.run.results_folder import prepare_folder
-from fsci.run.stop import StopWatch
-from fsci.run.summary import RunRecord, memory_mb, shares, summarize, write_summary
-from fsci.run.verify import evaluate
-from fsci.run.watch import Watched
+from fsci.running.cause import with_cause
+from fsci.running.checkpoint import list_checkpoints, read_checkpoint, write_checkpoint
+from fsci.running.files import LOCK, make_folder, require_own, write_text
+from fsci.running.finite import not_numbers
+from fsci.running.history import HistoryWriter, read_history
+from fsci.running.jump import require_continuous
+from fsci.running.kept_case import keep_case, kept_case
+from fsci.running.lock import Lock
+from fsci.running.memory import require_memory
+from fsci.running.monitor import Monitor
+from fsci.running.output import FieldWriter
+from fsci.running.processes import describe
+from fsci.running.results_folder import prepare_folder
+from fsci.running.steps import clock_of, initialise, take_step
+from fsci.running.stop import StopWatch
+from fsci.running.summary import RunRecord, memory_mb, shares, summarize, write_summary
+from fsci.running.verify import evaluate
+from fsci.running.watch import Watched
 from solvers.api import Finding, State, StepFailed, StepInfo
 
 if TYPE_CHECKING:
@@ -45,11 +45,6 @@ FINISHED, FAILED, BAD_CASE, STOPPED = 0, 1, 2, 3  #: exit codes
 #: Settings that decide where rigid bodies are, and those that decide which forces and energies a state has.
 SETTINGS_OF_MOTION = ("fluid.bodies.*.motion", "curves", "time.step")
 MATERIALS = ("structure.bodies.*.material", "structure.bodies.*.springs")
-
-_NO_START = (
-    "contact surfaces have no mass in dynamics, and no equilibrium was found for the loads and the overlap at the "
-    "start; increase both from zero in time"
-)
 
 
 def run_case(case: Case, out: Path, *, force: bool = False) -> int:
@@ -114,12 +109,8 @@ class Run:
     fields: FieldWriter = field(init=False)  #: on rank 0
 
     def __post_init__(self) -> None:
-        time = self.case.time
         self.root = self.comm.rank == 0
-        # a steady flow does not depend on the step: half of it is the same problem again, with bodies or without
-        steady = self.case.fluid is not None and self.case.fluid.scheme == "steady"
-        halvings = 0 if steady else time.retry.halvings
-        self.clock = Clock(time.start, time.end, time.step, halvings, time.retry.recover_after)
+        self.clock = clock_of(self.case)
         self.record.residual_steps = self.case.output.residuals
         self.stop = StopWatch(self._give_up if self.root else None)
         self.monitor = Monitor(enabled=self.root, live=self.comm.size == 1, log=self.out / "log.txt")
@@ -138,15 +129,9 @@ class Run:
             return self._watched_loop()
 
     def _initialise(self, simulation: Simulation) -> None:
-        """Set the state at the first time. Raises CaseError if it cannot be computed: a smaller step would not help."""
-        try:
-            with self.record.timer("start"):
-                simulation.initialise(self.case.time.start, self.clock.nominal)
-                self.scheme.start(self.case.time.start)
-        except StepFailed as failure:
-            if self.case.contact is None:
-                raise self.case.error(("structure",), str(failure)) from None
-            raise self.case.error(("contact",), f"{_NO_START}: {failure}") from None
+        """Set the state at the first time. Raises CaseError if it cannot be computed."""
+        with self.record.timer("start"):
+            initialise(self.case, simulation, self.scheme, self.clock.nominal)
 
     def from_checkpoint(self, state: State) -> int:
         """Compute from a checkpoint. Raises OSError for one of another version of fsci."""
@@ -256,27 +241,8 @@ class Run:
     def take_step(self) -> None:
         """Take one accepted step. Raises StepFailed if it fails after all halvings."""
         before, clock = self.record.wall(), self.clock
-        earlier: StepFailed | None = None
-        while True:
-            try:
-                dt = clock.dt
-                info = self.scheme.step(clock.time, dt)
-                break
-            except StepFailed as failed:
-                failure = with_cause(failed, self.case, clock.time, self.comm)
-                if unchanged := earlier is not None and alike(earlier, failure):
-                    failure = failure.with_reason(
-                        f"{failure.reason}; as with twice the step, so that shorter ones do not help"
-                    )
-                if failure.hopeless or unchanged or not clock.halve():
-                    self._keep_failure(failure)
-                    self.scheme.restore(self.state)
-                    raise failure from None
-                self.scheme.restore(self.state)
-                self.state = self.scheme.save()
-                self.record.retry()
-                self.monitor.retry(failure, clock.dt)
-                earlier = failure
+        info = take_step(self.scheme, clock, self.state, self._explained, self._repeat, self._keep_failure)
+        dt = clock.dt
         with self.stop.files:
             clock.accept()
             self.ended_by = next((finding for finding in info.findings if finding.ends_run), None)
@@ -288,6 +254,14 @@ class Run:
             if clock.done or self.ended_by is not None or (every and clock.step % every == 0):
                 self._write_fields()
             self._keep()
+
+    def _explained(self, failure: StepFailed) -> StepFailed:
+        return with_cause(failure, self.case, self.clock.time, self.comm)
+
+    def _repeat(self, failure: StepFailed) -> None:
+        """Note that a step is taken again."""
+        self.record.retry()
+        self.monitor.retry(failure, self.clock.dt)
 
     def _keep(self) -> None:
         """Store the state of the last accepted step, for retries and checkpoints."""

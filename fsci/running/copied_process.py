@@ -18,7 +18,7 @@ Program = Callable[[Sequence[str]], int]
 
 #: What runs import: to do so here saves each copy about a second.
 MODULES_OF_RUNS = (
-    "fsci.run.run",
+    "fsci.running.run",
     "fsci.builder.build",
     "fsci.builder.fluid",
     "fsci.builder.structure",

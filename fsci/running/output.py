@@ -11,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fsci.run.files import make_folder, refused, replacing, write_text
+from fsci.running.files import make_folder, refused, replacing, write_text
 from solvers.api import Snapshot
 
 Series = list[tuple[float, Path]]  #: (time, VTU file) of each output, in order of time

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TextIO
 
-from fsci.run.files import open_to_append
+from fsci.running.files import open_to_append
 from solvers.api import StepFailed, StepInfo
 
 ACTIVE = "contact.active"  #: the number of StepInfo that counts active contact nodes

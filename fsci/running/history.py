@@ -11,7 +11,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.run.files import open_to_append, refused, write_text
+from fsci.running.files import open_to_append, refused, write_text
 
 COLUMNS = ("step", "time", "dt", "iterations", "wall")
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from fsci.case import Case, CaseError
-from fsci.run.files import FILES, FOLDERS, LOCK, MARKER, UNFINISHED, refused, require_own, write_text
-from fsci.run.kept_case import copies, keep_case
-from fsci.run.lock import Lock
-from fsci.run.output import FORMATS, is_output_of
+from fsci.running.files import FILES, FOLDERS, LOCK, MARKER, UNFINISHED, refused, require_own, write_text
+from fsci.running.kept_case import copies, keep_case
+from fsci.running.lock import Lock
+from fsci.running.output import FORMATS, is_output_of
 
 MARKER_TEXT = "The results of a run of fsci. Another run into this folder replaces the files that runs write.\n"
 

@@ -8,7 +8,7 @@ import platform
 import re
 from pathlib import Path
 
-from fsci.run.files import LOCK, refused
+from fsci.running.files import LOCK, refused
 
 #: What a lock says of its holder.
 HOLDER = re.compile(r"process (\d+) on (\S+)\n")

@@ -1,7 +1,7 @@
 """One process that has imported what runs need: each run is a copy of it, and starts at once.
 
-It is started as `python -m fsci.run.warm` with a socket as its standard input. For each run it gets a byte with one end
-of a connection, over which a copy of it reads the words of the command and writes how the run has ended.
+It is started as `python -m fsci.running.warm` with a socket as its standard input. For each run it gets a byte with one
+end of a connection, over which a copy of it reads the words of the command and writes how the run has ended.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from array import array
 from collections.abc import Sequence
 from typing import Any
 
-from fsci.run.child import ENVIRONMENT
-from fsci.run.copied_process import fsci, import_common, run_in_copy
+from fsci.running.child import ENVIRONMENT
+from fsci.running.copied_process import fsci, import_common, run_in_copy
 
 PROCESS_HAS_ENDED = "the process that runs are copies of has ended"
 
@@ -62,7 +62,7 @@ class WarmProcess:
             before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
             try:
                 with theirs:
-                    program = [sys.executable, "-m", "fsci.run.warm"]
+                    program = [sys.executable, "-m", "fsci.running.warm"]
                     self._process = subprocess.Popen(program, stdin=theirs.fileno(), env=ENVIRONMENT)
             finally:
                 signal.pthread_sigmask(signal.SIG_SETMASK, before)

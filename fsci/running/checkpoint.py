@@ -19,7 +19,7 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 
-from fsci.run.files import make_folder, replacing
+from fsci.running.files import make_folder, replacing
 from solvers.api import State
 
 KEEP = 2  #: checkpoints kept

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fsci.run.files import write_text
-from fsci.run.history import History
+from fsci.running.files import write_text
+from fsci.running.history import History
 from solvers.api import Finding, State, StepInfo
 from solvers.timing import Timer
 

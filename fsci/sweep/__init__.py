@@ -1,0 +1,1 @@
+"""A case with several values of some settings: the command `fsci sweep`."""
