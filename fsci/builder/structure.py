@@ -156,6 +156,13 @@ def _first_contact(case: Case, structure: Structure, name: str) -> probes.Probe:
     return _on_pair(case, structure, name, first_contact)
 
 
+def _of_area(case: Case, structure: Structure, name: str) -> probes.Probe:
+    from solvers.contact.probes import of_area
+
+    quantity = case.probes[name].quantity
+    return _on_pair(case, structure, name, lambda contact, pair: of_area(contact, pair, quantity))  # type: ignore[arg-type]
+
+
 def _overlap(case: Case, structure: Structure, name: str) -> probes.Probe:
     from solvers.contact.probes import overlap
 
@@ -167,7 +174,7 @@ def _on_pair(
 ) -> probes.Probe:
     """The probe of a pair of the present contact, which has pairs with walls once they are near. Raises CaseError.
 
-    Until then it has no pressure and no overlap, and its gap is not a number.
+    Until then its gap is not a number, and all else is zero.
     """
     from solvers.contact.contact import Contact
 
@@ -176,7 +183,7 @@ def _on_pair(
     pairs = [*([] if case.contact is None else case.contact.pairs), *_wall_pairs(case)]
     if wanted not in pairs:
         raise case.error(("probes", name, "pair"), f"unknown pair '{wanted}' (available: {', '.join(pairs)})")
-    away = 0.0 if settings.quantity in ("pressure", "overlap") else nan
+    away = nan if settings.quantity in ("gap", "mean_gap", "first_contact") else 0.0
 
     def probe() -> dict[str, float]:
         contact = structure.constraint
@@ -206,6 +213,7 @@ STRUCTURE_PROBES: Table[Structure] = {
     ("gap", "pair"): _of_pair,
     ("mean_gap", "pair"): _of_pair,
     ("pressure", "pair"): _of_pair,
+    **{(quantity, "pair"): _of_area for quantity in ("contact_area", "stick_area", "mean_pressure")},
     ("overlap", "pair"): _overlap,
     ("first_contact", "pair"): _first_contact,
     **{(quantity, ""): _whole for quantity in probes.OF_BODIES},

@@ -10,6 +10,8 @@ from fsci.case.quantities import FIELDS, LOCATIONS, QUANTITIES, Field, Quantity,
 from fsci.case.section import Section, fault, setting
 from fsci.case.values import Name, NumberVector, Positive, Text
 
+#: Quantities of a pair that have no place.
+OF_WHOLE_PAIRS = ("contact_area", "stick_area", "mean_pressure", "first_contact", "overlap")
 #: columns of history.csv that cannot be names of probes
 RESERVED_COLUMNS = ("step", "time", "dt", "iterations", "wall", "residual")
 
@@ -122,7 +124,7 @@ column NAME. In 2D everything is per unit of depth.
         if self.extreme is not None and self.at is not None:
             raise fault("give either 'at' or 'extreme', not both", "extreme")
         for key in ("at", "extreme"):
-            if self.quantity in ("first_contact", "overlap") and getattr(self, key) is not None:
+            if self.quantity in OF_WHOLE_PAIRS and getattr(self, key) is not None:
                 raise fault(f"'{self.quantity}' is measured on the whole pair: remove '{key}'", key)
 
     def columns(self, name: str, dimension: int) -> tuple[str, ...]:

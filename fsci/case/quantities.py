@@ -73,6 +73,9 @@ _QUANTITIES = (
         ("at", "on", WHOLE),
         meaning="of a patch the mean over its area, of all fluid the `extreme`",
     ),
+    Quantity("contact_area", (2, 0, 0), "one", ("pair",), meaning="area in which a pair touches"),
+    Quantity("stick_area", (2, 0, 0), "one", ("pair",), meaning="area in which it touches without slip"),
+    Quantity("mean_pressure", _STRESS, "one", ("pair",), meaning="normal force over the area in contact"),
     Quantity(
         "first_contact", (0, 0, 1), "one", ("pair",), meaning="time of the end of the first step with contact, else nan"
     ),

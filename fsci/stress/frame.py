@@ -42,6 +42,7 @@ LOCAL = (
     "mean_gap",
     "overlap",
     "pressure",
+    "mean_pressure",
     "centre",
     "first_contact",
 )

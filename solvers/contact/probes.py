@@ -1,4 +1,4 @@
-"""Probes of contact: pressure, gap and mean gap at a slave node, or their extremes.
+"""Probes of contact: pressure, gap and mean gap at a slave node, or their extremes; areas in contact.
 
 A probe is a function without arguments that every process calls. It returns values by component.
 """
@@ -12,6 +12,7 @@ import numpy as np
 
 from solvers.api import Array
 from solvers.contact.contact import Contact
+from solvers.contact.law.law import OPEN, STICK
 from solvers.contact.surface import Surface
 from solvers.kernels import nodal_normals
 from solvers.mesh.cell_types import CELL_TYPES
@@ -62,6 +63,30 @@ def mean_gaps(contact: Contact, pair: int) -> Array:
     Those of all masters of the slave together.
     """
     return contact.interface.at_nodes(contact.pairs[pair].slave, contact.mean_gap(), np.fmin)
+
+
+Of = Literal["contact_area", "stick_area", "mean_pressure"]
+
+
+def of_area(contact: Contact, pair: int, quantity: Of) -> Probe:
+    """Probe of the area [m^2] (length in 2D) in which a pair touches or sticks, or the mean pressure [Pa] in contact.
+
+    Each slave node has the area int Phi_j over what the master covers, so that mean pressure times area is the normal
+    force. All are zero without contact.
+    """
+
+    def probe() -> dict[str, float]:
+        if contact.terms is None:
+            return {"": 0.0}
+        status = contact.active_set.status
+        area = contact.terms.D_of_pair[pair] * (status == STICK if quantity == "stick_area" else status != OPEN)
+        total = float(area.sum())
+        if quantity != "mean_pressure":
+            return {"": total}
+        force = float(area @ np.einsum("nd,nd->n", contact.z, contact.terms.normals))
+        return {"": force / total if total > 0.0 else 0.0}
+
+    return probe
 
 
 def overlap(contact: Contact, pair: int) -> Probe:
