@@ -70,7 +70,7 @@ def test_a_pressed_block(tmp_path, exchanged):
     assert force[1:] == pytest.approx(found["area"][1:] * found["mean"][1:], rel=2e-5)
     if not exchanged:
         assert found["area"][touching] == pytest.approx(1.0, rel=1e-3)  # strains are 0.15 %
-        assert found["mean"][touching] == pytest.approx(force[touching], rel=2e-5)
+        assert found["mean"][touching] == pytest.approx(force[touching], rel=1e-3)
     else:
         assert found["area"][-1] == pytest.approx(1.0, abs=2 / 7)  # within a facet of the slave
 
