@@ -139,8 +139,11 @@ def _reference(reference: Reference, dimension: int, keys: Keys) -> Iterator[Mis
             yield (*keys, "lift"), "the direction of the lift must be at a right angle to that of the drag"
 
 
-def verify_mistakes(case: Case) -> Iterator[Mistake]:
-    """Mistakes in all checks: columns that the run does not have, times outside of the run."""
+def known_columns(case: Case) -> list[str]:
+    """Columns of history.csv and counters, as far as the case file alone tells them.
+
+    Pairs that the program finds and pockets of the fluid have more.
+    """
     columns = [column for name, probe in case.probes.items() for column in probe.columns(name, case.dimension or 3)]
     columns += RUN_COLUMNS
     columns += [column for field, column in FIELD_COLUMNS.items() if getattr(case, field) is not None]
@@ -157,7 +160,12 @@ def verify_mistakes(case: Case) -> Iterator[Mistake]:
         columns += [SEEPAGE_COLUMN] if case.contact.film.closed == "seeping" else []
         if any(pair.law in ("coulomb", "tresca") for pair in case.contact.complete_pairs.values()):
             columns += FRICTION_COLUMNS
-    columns += _of_walls(case)
+    return columns + _of_walls(case)
+
+
+def verify_mistakes(case: Case) -> Iterator[Mistake]:
+    """Mistakes in all checks: columns that the run does not have, times outside of the run."""
+    columns = known_columns(case)
     for i, check in enumerate(case.verify):
         keys: Keys = ("verify", i)
         found_later = case.contact is not None and case.contact.bodies is not None and check.value[:8] == "contact."

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from textwrap import wrap
 
 from fsci.case import Case
 from fsci.case.contact import Friction, PairSection
 from fsci.case.fluid import FluidSection
 from fsci.case.mesh import Mesh
+from fsci.case.probe_checks import CONTACT_COLUMNS, FRICTION_COLUMNS, known_columns
 from fsci.case.shapes import ShapeSection
 from fsci.case.structure import StructureSection
 from fsci.meshes.nested import cells_of, fluid_dofs
 from solvers.mesh.mesh import Mesh as BodyMesh
 
 Row = tuple[str, str]
+
+COMPONENTS = ("x", "y", "z")
+LINE = 120  #: characters of a line of text, longer ones are divided
 
 
 def summary(
@@ -46,12 +51,36 @@ def summary(
         rows.append(("coupling", scheme if scheme == "monolithic" else f"{scheme}, {by}"))
     rows += [(f"pair {name}", _sides(pair)) for name, pair in pairs.items()]
     rows += [(f"walls of {name}", f"pairs {', '.join(found)}, once it is near") for name, found in walls.items()]
-    if case.probes:
-        rows.append(("probes", ", ".join(case.probes)))
+    rows.append(("columns", _columns(case, bool(pairs or walls))))
     if case.verify:
         rows.append(("verify", _count(len(case.verify), "value")))
     width = max(len(word) for word, _ in rows)
-    return "\n".join(f"  {word:<{width}}  {text}" for word, text in rows if text)
+    return "\n".join(f"  {word:<{width}}  {_wrapped(text, width + 4)}" for word, text in rows if text)
+
+
+def _wrapped(text: str, indent: int) -> str:
+    """Lists of many names in lines below each other."""
+    lines = wrap(text, max(LINE - indent, LINE // 2), break_long_words=False, break_on_hyphens=False)
+    return ("\n" + " " * indent).join(lines)
+
+
+def _columns(case: Case, pairs: bool) -> str:
+    """What history.csv will have beside its counters; the columns of pairs have their names."""
+    known = [name for name in known_columns(case) if "." in name or name in case.probes]
+    columns = [name for name in known if not name.startswith("contact.") or name.startswith("contact.on_")]
+    if pairs:
+        axes = "xyz"[: case.dimension or 3]
+        columns += [f"contact.PAIR.{axis}" for axis in axes] + [
+            n for n in known if n in (*CONTACT_COLUMNS, *FRICTION_COLUMNS)
+        ]
+    families: dict[str, list[str]] = {}
+    for name in dict.fromkeys(columns):
+        family, _, axis = name.rpartition(".")
+        families.setdefault(family if axis in COMPONENTS else name, []).append(axis)
+    return ", ".join(
+        " .".join([f"{name}.{axes[0]}", *axes[1:]]) if axes[0] in COMPONENTS else name
+        for name, axes in families.items()
+    )
 
 
 def _structure(case: Case, structure: StructureSection, meshes: Mapping[str, BodyMesh]) -> Iterator[Row]:

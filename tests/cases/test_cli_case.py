@@ -88,6 +88,7 @@ def test_check_describes_a_good_case(beam, capsys):
     assert out.startswith("beam/case.yaml\n")
     assert "0 to 0.4 s, 100 steps of 0.004" in out
     assert "dofs       410" in out  # (2*20 + 1)(2*2 + 1) nodes
+    assert "columns    tip.x .y, clamp.x .y, energy.kinetic, energy.internal, energy.work, energy.total, struct" in out
     assert out.endswith("\nok\n")
     assert err == ""
     assert execute(["check", "beam/case.yaml"]) == 0

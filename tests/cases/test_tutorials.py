@@ -5,9 +5,12 @@ from pathlib import Path
 import pytest
 from programs import fsci
 
+from fsci.case import load_case
+from fsci.case.probe_checks import known_columns
 from fsci.running.history import read_history
 
 DOCS = Path(__file__).parents[2] / "docs"
+COUNTS = {"step", "time", "dt", "wall", "fluid.linear", "coupling.linear"}
 STAGES = ("solid", "contact", "flow", "coupled", "together")
 
 
@@ -37,6 +40,10 @@ def test_first_steps(stage, tmp_path):
     history = read_history(tmp_path / "history.csv")
     assert len(history["step"]) == 3
     assert max(abs(history["fluid.mass"])) < 1e-9
+    known = known_columns(load_case(tmp_path))
+    later = {name for name in known if name.startswith("contact.")}  # of walls, once a body is near
+    assert set(known) - later <= set(history)
+    assert set(history) - COUNTS <= set(known)
 
 
 def test_forces_balance_in_contact(tmp_path):
