@@ -93,20 +93,6 @@ def own_material(found: Names, lines: Lines) -> None:
     draw(picture("own_material"), content, SIZE)
 
 
-def parameter_study(found: Names, lines: Lines) -> None:
-    def content(figure: Any) -> None:
-        axes = figure.subplots()
-        E, tip = np.array(lines).T
-        beam = (1.0 - 0.3**2) * 1e4 / 8.0 * 12.0 / E  # q L^4 / (8 E' I), small deflections
-        axes.loglog(E, beam, color="black", label="Euler and Bernoulli")
-        axes.loglog(E, -tip, "o", color=COLOURS[0], label="computed")
-        axes.set_xlabel("Young's modulus [Pa]")
-        axes.set_ylabel("deflection of the tip [m]")
-        axes.legend()
-
-    draw(picture("parameter_study"), content, SIZE)
-
-
 def hertz(found: Names, lines: Lines) -> None:
     def content(figure: Any) -> None:
         axes = figure.subplots()
@@ -124,7 +110,7 @@ def hertz(found: Names, lines: Lines) -> None:
 
 PICTURES: Mapping[str, Callable[[Names, Lines], None]] = {
     function.__name__: function
-    for function in (two_blocks, hertz, cylinder, own_material, own_probe, parameter_study, flap, torus_and_wall)
+    for function in (two_blocks, hertz, cylinder, own_material, own_probe, flap, torus_and_wall)
 }
 
 
