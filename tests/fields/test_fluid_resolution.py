@@ -116,12 +116,12 @@ def test_samples_in_flat_cells(flat):
     """Their number does not grow with the shape of the cells, nor with that of the facets; areas stay."""
     grid = uniform([-1, -1, -1], [1, 1, 1], [20, 20, 20 * flat])
     rod = shapes.box([1.6, 0.01, 0.01], [1, 1, 1])
-    for corners, area, most in (
-        (in_space(shapes.sphere(0.4, [8, 1]), 0.0), None, 25_000),
-        (in_space(rod, (-0.8, 0.013, 0.017)), 4 * 0.016 + 2e-4, 25_000 if flat > 1 else 400),
+    for corners, area in (
+        (in_space(shapes.sphere(0.4, [8, 1]), 0.0), None),
+        (in_space(rod, (-0.8, 0.013, 0.017)), 4 * 0.016 + 2e-4),
     ):
         samples = samples_of(grid, corners)
-        assert len(samples.x) < most
+        assert len(samples.x) < 25_000
         whole = np.linalg.norm(np.cross(*np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)), axis=1).sum() / 2
         assert samples.area.sum() == pytest.approx(whole)
         assert area is None or whole == pytest.approx(area)

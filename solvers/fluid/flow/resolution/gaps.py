@@ -22,7 +22,7 @@ from solvers.mesh.tessellation import area_vectors
 #: Cosine of the largest angle between the normal of a wall and the direction to the opposite one.
 ACROSS = 0.7
 #: Pieces of facets from which on none is halved: long facets, or flat cells, would cost more than the flow.
-ENOUGH_PIECES = 10_000
+ENOUGH_PIECES = 5_000
 #: Points closest to the middle of a ball, of which one that faces the wall counts first: at corners, others are close.
 NEAREST_POINTS = 8
 #: Balls that are tried at most: five to ten are needed.
@@ -78,12 +78,18 @@ def samples_of(grid: Grid, corners: Array) -> SurfaceSamples:
 
 
 def _halved(grid: Grid, corners: Array) -> tuple[Array, NDArray[np.int64]]:
-    """(corners of the pieces, facet of each): the edge with most cells is halved while it has more than one, or until there are enough."""
+    """(corners of the pieces, facet of each): the edge with most cells is halved while it has more than one.
+
+    Pieces outside of the box are left out.
+    """
     dim = corners.shape[2]
     left, facet = corners, np.arange(len(corners))
+    low, high = (np.array([edge[end] for edge in grid.edges]) for end in (0, -1))
     pieces, of_facet = [np.empty((0, dim, dim))], [np.empty(0, dtype=np.int64)]
     while len(left):
         enough = len(left) + sum(map(len, pieces)) > ENOUGH_PIECES
+        inside = ((left.max(axis=1) > low) & (left.min(axis=1) < high)).all(axis=1)
+        left, facet = left[inside], facet[inside]
         index = _index(grid, left.reshape(-1, dim)).reshape(left.shape)
         cells = np.linalg.norm(np.roll(index, -1, axis=1) - index, axis=2)
         short = enough | (cells.max(axis=1) <= 1.0)
@@ -142,8 +148,10 @@ def _to_surfaces(samples: SurfaceSamples, farthest: float) -> tuple[Array, NDArr
 
 
 def _index(grid: Grid, x: Array) -> Array:
-    """Positions counted in cells along each axis."""
-    return np.stack([np.interp(x[:, i], edge, np.arange(len(edge))) for i, edge in enumerate(grid.edges)], axis=1)
+    """Positions counted in cells along each axis, which go on outside of the box as they are at its faces."""
+    inside = [np.interp(x[:, i], edge, np.arange(len(edge))) for i, edge in enumerate(grid.edges)]
+    beyond = x - np.clip(x, [edge[0] for edge in grid.edges], [edge[-1] for edge in grid.edges])
+    return np.stack(inside, axis=1) + beyond / _sizes(grid, x)
 
 
 def _sizes(grid: Grid, x: Array) -> Array:
