@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 from itertools import groupby
 from pathlib import Path
+from shutil import copyfile
 from statistics import median
 from typing import Any
 
@@ -35,11 +36,7 @@ def run() -> list[Row]:
 def measure(name: str, scene: Mapping[str, Any], out: Path = OUT) -> Iterator[Row]:
     """Rows of one scene."""
     folder = out / name
-    folder.mkdir(parents=True, exist_ok=True)
-    case = scene["case"]
-    if isinstance(case, Mapping):
-        (folder / "case.yaml").write_text(json.dumps({"title": name, **case}))
-    path = folder / "case.yaml" if isinstance(case, Mapping) else CASES / case
+    path = case_of(name, scene, folder)
     settings = tuple((key, str(value)) for key, value in scene.get("set", {}).items())
     said: list[str] = []
     converge(path, settings, folder / "runs", say=said.append)
@@ -48,6 +45,19 @@ def measure(name: str, scene: Mapping[str, Any], out: Path = OUT) -> Iterator[Ro
     seconds = sum(one["seconds"] or 0.0 for one in found["runs"].values())
     for value, exact in scene["exact"].items():
         yield row(name, value, float(exact), found["values"][value], seconds)
+
+
+def case_of(name: str, scene: Mapping[str, Any], folder: Path) -> Path:
+    """The case of a scene: one of the repository, or written into the folder with its mesh files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    case = scene["case"]
+    if isinstance(case, str):
+        return CASES / case
+    for file in scene.get("meshes", ()):
+        copyfile(CASES / file, folder / Path(file).name)
+    path = folder / "case.yaml"
+    path.write_text(json.dumps({"title": name, **case}))
+    return path
 
 
 def row(scene: str, value: str, exact: float, found: Mapping[str, Any], seconds: float) -> Row:

@@ -8,11 +8,12 @@ the error of the finest level. e is the largest of all pairs of levels, and of t
 sources of the error, each changed alone: they may cancel when all change together. With the scatter s of the value on
 grids that are moved, the band is
 
-    b = sqrt((1.5 e)^2 + (2 s)^2),
+    b = sqrt((1.3 e)^2 + (2 s)^2).
 
-and at least 1.25 times the change by another element or time scheme, and what the curve of an oscillation changes by
-within the band of its time. p is 2, or less if less is known or seen. Sources, shifts and other methods are those of
-the case itself, of size 1; a finer level than that has h^p of their changes.
+s is measured on a coarser level and falls with the first power of the size or faster (docs/converge.md). The band is
+at least 1.25 times the change by another element or time scheme, and what the curve of an oscillation changes by within
+the band of its time. p is 2, or less if less is known or seen. Sources and other methods are those of the case itself,
+of size 1; a finer level than that has h^p of their changes.
 """
 
 from __future__ import annotations
@@ -25,9 +26,11 @@ from typing import Literal
 
 #: Relative difference that the tolerance of solvers explains.
 SOLVER_DIFFERENCE = 1e-6
-SAFETY, SCATTER, TWIN = 1.5, 2.0, 1.25
+SAFETY, SCATTER, TWIN = 1.3, 2.0, 1.25
 #: Orders between which values are taken to follow C h^p.
 LEAST_ORDER, MOST_ORDER = 0.8, 2.6
+#: Order that is assumed of values below that: displacements at the end of a crack have it.
+SLOWEST = 0.5
 
 #: Relative band that is good enough if nothing else is asked for: in it, another method may be outside of what levels
 #: say.
@@ -66,6 +69,7 @@ class Evidence:
     scale: float  #: what relative numbers are relative to
     sources: Mapping[str, LevelValue] = field(default_factory=dict)  #: one source alone; the rest as in the case
     shifts: Sequence[float] = ()  #: on one level, with the planes of the grid as they are and moved
+    shifted: float = 1.0  #: size of that level
     twins: Mapping[str, float] = field(default_factory=dict)  #: by another element or scheme
     sampling: float = 0.0  #: what may be between the samples of a maximum
     instant: OscillationInstant | None = None
@@ -114,7 +118,7 @@ def estimate(known: Evidence) -> Estimate:
     if base is not None and base.value is not None:
         errors = {name: finer * _error(base, one, assumed) for name, one in known.sources.items() if one.usable}
         twins = {name: abs(other - base.value) for name, other in known.twins.items() if math.isfinite(other)}
-    scatter *= finer
+    scatter *= finer / known.shifted
     levels_say = band = None
     if len(usable) > 1 or errors:
         together = max((finer * _error(a, b, assumed) for a, b in combinations(usable, 2)), default=0.0)
@@ -129,7 +133,7 @@ def estimate(known: Evidence) -> Estimate:
     words += tuple(_further_words(known, usable))
     verdict: Verdict = "resolved"
     no_phase = known.instant is not None and known.instant.late is None
-    if len(usable) < 3 or known.indicative or seen.assumed == LEAST_ORDER or no_phase:
+    if len(usable) < 3 or known.indicative or seen.assumed == SLOWEST or no_phase:
         verdict = "indicative"
     if band is None or levels_say is None or (outside and band > known.tolerance * known.scale):
         verdict = "not resolved"
@@ -174,7 +178,7 @@ def _order(usable: Sequence[LevelValue], rounding: float, scatter: float) -> _Se
     most = (far + SCATTER * scatter) / sure
     if most < _growth(sizes, LEAST_ORDER):
         words = f"finer levels change it hardly less than coarser ones: its order is below {LEAST_ORDER:g}"
-        return _Seen((words,), assumed=LEAST_ORDER)
+        return _Seen((words,), assumed=SLOWEST)
     if not _growth(sizes, LEAST_ORDER) <= far / near <= _growth(sizes, MOST_ORDER):
         return _Seen()
     order = _bisect(sizes, far / near)

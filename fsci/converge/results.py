@@ -104,6 +104,7 @@ def _evidence(runs: Sequence[Done], levels: Sequence[Done], value: Callable[[Don
         scale=scale,
         sources={_source(one): _level(one, value, one.run.size) for one in runs if one.run.role == "source"},
         shifts=[value(one) for one in [*near, *shifts]] if shifts else (),
+        shifted=shifts[0].run.size if shifts else 1.0,
         twins={one.run.name: value(one) for one in runs if one.run.role == "twin" and not one.ended.message},
     )
 

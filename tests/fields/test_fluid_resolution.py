@@ -93,6 +93,40 @@ def test_gap_in_space():
     assert found.cells[inner] == pytest.approx(0.2)
 
 
+def in_space(mesh, shift):
+    facets, nodes = tessellate(mesh)
+    return (mesh.points[nodes] + shift)[facets]
+
+
+def test_facets_longer_than_the_box():
+    """Cells count along the part inside: a sample in each cell of the floor, and the gap of 1.2 cells above it."""
+    grid = uniform([-1, -1, -1], [1, 1, 1], [20, 20, 20])
+    floor = in_space(shapes.box([40.0, 40.0, 1.0], [1, 1, 1]), (-20.0, -20.0, -1.8))
+    plate = in_space(shapes.box([1.0, 1.0, 0.5], [1, 1, 1]), (-0.5, -0.5, -0.68))
+    samples = samples_of(grid, np.concatenate([floor, plate]))
+    of_floor = samples.facet < len(floor)
+    column = np.floor((samples.x[of_floor, :2] + 1.0) / 0.1)
+    assert len(np.unique(column, axis=0)) == 400
+    below = of_floor & (np.abs(samples.x[:, :2]) < 0.4).all(axis=1)
+    assert gaps(grid, samples, []).cells[below] == pytest.approx(1.2)
+
+
+@pytest.mark.parametrize("flat", [1, 10, 1000])
+def test_samples_in_flat_cells(flat):
+    """Their number does not grow with the shape of the cells, nor with that of the facets; areas stay."""
+    grid = uniform([-1, -1, -1], [1, 1, 1], [20, 20, 20 * flat])
+    rod = shapes.box([1.6, 0.01, 0.01], [1, 1, 1])
+    for corners, area in (
+        (in_space(shapes.sphere(0.4, [8, 1]), 0.0), None),
+        (in_space(rod, (-0.8, 0.013, 0.017)), 4 * 0.016 + 2e-4),
+    ):
+        samples = samples_of(grid, corners)
+        assert len(samples.x) < 25_000
+        whole = np.linalg.norm(np.cross(*np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)), axis=1).sum() / 2
+        assert samples.area.sum() == pytest.approx(whole)
+        assert area is None or whole == pytest.approx(area)
+
+
 def test_edges():
     """Polygons of circles have none up to 45 degrees of a corner, rectangles and boxes do."""
     assert not has_edges(corners_of(shapes.disc(1.0, [12, 1])))

@@ -36,10 +36,10 @@ def bands(rows, count):
 
 
 def test_bands_of_coarser_runs():
-    """1.5 times the error, by the order that is assumed; what has one size in all runs is no level."""
-    assert bands(SECOND, 2) == [None, pytest.approx(0.03), pytest.approx(0.0075)]
-    assert bands(SECOND, 3) == [None, None, pytest.approx(0.0075)]
-    assert bands(FIRST, 2) == [None, pytest.approx(0.015)]
+    """1.3 times the error, by the order that is assumed; what has one size in all runs is no level."""
+    assert bands(SECOND, 2) == [None, pytest.approx(0.026), pytest.approx(0.0065)]
+    assert bands(SECOND, 3) == [None, None, pytest.approx(0.0065)]
+    assert bands(FIRST, 2) == [None, pytest.approx(0.013)]
 
 
 def test_bands_of_a_better_method():
@@ -49,7 +49,7 @@ def test_bands_of_a_better_method():
     assert [one.twin[LEVEL]["sizes"]["cells"] for one in (first, second, third)] == [4.0, 4.0, 2.0]
     assert [one.twin for one in better] == [None, None]
     assert bands([*SECOND, *BETTER], 2)[:3] == [pytest.approx(0.0125 * change) for change in (7.4, 1.4, 0.4)]
-    assert bands([*SECOND, *BETTER], 3)[:3] == [None, pytest.approx(0.03), pytest.approx(0.0075)]
+    assert bands([*SECOND, *BETTER], 3)[:3] == [None, pytest.approx(0.026), pytest.approx(0.0065)]
     assert third.seconds(2) == 14.0
     assert third.seconds(3) == 17.0
 
@@ -65,12 +65,12 @@ def test_columns():
     rows = with_bands([*SECOND, *FIRST])
     assert [one["band of 2 [%]"] for one in rows] == [
         "",
-        pytest.approx(3.0),
-        pytest.approx(0.75),
+        pytest.approx(2.6),
+        pytest.approx(0.65),
         "",
-        pytest.approx(1.5),
+        pytest.approx(1.3),
     ]
-    assert [one["band of 3 [%]"] for one in rows] == ["", "", pytest.approx(0.75), "", ""]
+    assert [one["band of 3 [%]"] for one in rows] == ["", "", pytest.approx(0.65), "", ""]
     assert "level" not in show(rows)
 
 

@@ -1,12 +1,9 @@
 """The scenes whose bands are compared with exact values: they are cases, and have these values."""
 
-import json
-
 import pytest
 from ruamel.yaml import YAML
 
-from fsci.bench.converge import SCENES, markdown, row, summary
-from fsci.bench.family import CASES
+from fsci.bench.converge import SCENES, case_of, markdown, row, summary
 from fsci.case import load_case
 from fsci.converge.values import wanted
 
@@ -16,12 +13,9 @@ ALL = YAML(typ="safe", pure=True).load(SCENES.read_text())
 @pytest.mark.parametrize("name", ALL)
 def test_scenes(name, tmp_path):
     scene = ALL[name]
-    if isinstance(scene["case"], str):
-        path = CASES / scene["case"]
-    else:
-        path = tmp_path / "case.yaml"
-        path.write_text(json.dumps(scene["case"]))
-    case = load_case(path, tuple((key, str(value)) for key, value in scene.get("set", {}).items()))
+    case = load_case(
+        case_of(name, scene, tmp_path), tuple((key, str(value)) for key, value in scene.get("set", {}).items())
+    )
     assert scene["exact"]
     wanted(case, [value.split()[0] for value in scene["exact"]])
 

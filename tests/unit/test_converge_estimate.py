@@ -26,7 +26,7 @@ def test_monotone_values(order, sizes):
     assert found.order == pytest.approx(order, abs=1e-6)
     error = 0.01 * sizes[0] ** order
     assert error <= found.band
-    assert order > 2.0 or found.band <= 1.51 * error
+    assert order > 2.0 or found.band <= 1.31 * error
     assert found.verdict == "resolved"
 
 
@@ -47,23 +47,24 @@ def test_faster_than_second_order_is_no_order(order):
     assert found.verdict == "resolved"
 
 
-def test_slower_than_first_order():
-    """The square root of the size: second order would say a fifth of the error."""
-    found = estimate(evidence(levels(0.6)))
+@pytest.mark.parametrize("order", [0.5, 0.6, 0.7])
+def test_slower_than_first_order(order):
+    """About the square root of the size: second order would say a fifth of the error."""
+    found = estimate(evidence(levels(order)))
     assert found.order is None
     assert found.verdict == "indicative"
     assert 0.01 < found.band
     assert "finer levels change it hardly less than coarser ones: its order is below 0.8" in found.words
 
 
-@pytest.mark.parametrize(("scatter", "order"), [(0.0, 0.8), (1e-5, 0.8), (0.01, 2.0)])
+@pytest.mark.parametrize(("scatter", "order"), [(0.0, 0.5), (1e-5, 0.5), (0.01, 2.0)])
 def test_scatter_that_explains_a_slow_order(scatter, order):
     """Where the place of cells moves values by as much as the level does, no slow order is seen."""
     shifts = (EXACT - scatter, EXACT, EXACT + scatter)
     found = estimate(evidence(levels(0.6), shifts=shifts))
     first, second, third = (level.value for level in levels(0.6))
     pairs = ((second - first) / (2 ** (order / 2) - 1), (third - first) / (2**order - 1))
-    assert found.band == pytest.approx(math.hypot(1.5 * max(pairs), 2.0 * scatter), rel=0.02)
+    assert found.band == pytest.approx(math.hypot(1.3 * max(pairs), 2.0 * scatter), rel=0.02)
     assert found.verdict == ("resolved" if order == 2.0 else "indicative")
 
 
@@ -71,7 +72,7 @@ def test_alternating_values():
     values = [3.01, 2.98, 3.05]
     found = estimate(evidence([LevelValue(size, value) for size, value in zip(SIZES, values, strict=True)]))
     assert found.order is None
-    assert found.band == pytest.approx(1.5 * 0.07 / 2.0)  # between the levels 2 and 3: 0.07 / (4 - 2)
+    assert found.band == pytest.approx(1.3 * 0.07 / 2.0)  # between the levels 2 and 3: 0.07 / (4 - 2)
     assert "it goes up and down between levels: no order" in found.words
     assert found.verdict == "resolved"
 
@@ -80,8 +81,8 @@ def test_first_order_methods():
     """With p = 1 the same change means more."""
     second = estimate(evidence(levels(1.0)[:2]))
     first = estimate(evidence(levels(1.0)[:2], first_order=("backward Euler",)))
-    assert first.band == pytest.approx(1.5 * 0.01)
-    assert second.band == pytest.approx(1.5 * 0.01 * (2**0.5 - 1.0))
+    assert first.band == pytest.approx(1.3 * 0.01)
+    assert second.band == pytest.approx(1.3 * 0.01 * (2**0.5 - 1.0))
     assert "first order is assumed: backward Euler" in first.words
 
 
@@ -136,11 +137,23 @@ def test_scatter_of_shifts():
     assert found.band == pytest.approx(2.0 * found.scatter)
 
 
+@pytest.mark.parametrize("size", [1.0, 2**0.5, 2.0])
+def test_scatter_of_shifts_on_a_coarser_level(size):
+    """It falls with the first power of the size; a finer level than the case has as much less as of other errors."""
+    coarse = [LevelValue(level, EXACT) for level in SIZES]
+    shifts = (2.9, 3.1, 2.9, 3.1)
+    found = estimate(evidence(coarse, shifts=shifts, shifted=size))
+    assert found.scatter == pytest.approx(0.1 * (4.0 / 3.0) ** 0.5 / size)
+    assert found.band == pytest.approx(2.0 * found.scatter)
+    finer = estimate(evidence([LevelValue(0.5, EXACT), *coarse], shifts=shifts, shifted=size))
+    assert finer.scatter == pytest.approx(found.scatter / 4.0)
+
+
 def test_sources_that_cancel():
     """Cells and facets have errors of opposite signs: all together hardly change."""
     cells, facets = LevelValue(2.0, EXACT + 0.3), LevelValue(2.0, EXACT - 0.3)
     found = estimate(evidence([LevelValue(size, EXACT) for size in SIZES], sources={"cells": cells, "facets": facets}))
-    assert found.band == pytest.approx(1.5 * 0.1 * 2**0.5)
+    assert found.band == pytest.approx(1.3 * 0.1 * 2**0.5)
     assert found.shares == pytest.approx({"cells": 0.5, "facets": 0.5})
 
 
@@ -156,7 +169,7 @@ def test_shares():
 
 def test_twin_inside():
     found = estimate(evidence(levels(), twins={"element": 2.999}))
-    assert found.band == pytest.approx(max(1.5 * 0.01, 1.25 * 0.011))
+    assert found.band == pytest.approx(max(1.3 * 0.01, 1.25 * 0.011))
     assert found.outside == ()
     assert found.verdict == "resolved"
 
@@ -164,7 +177,7 @@ def test_twin_inside():
 def test_false_convergence():
     """Three levels agree on a wrong value; the other element says so."""
     found = estimate(evidence(levels(coefficient=0.001), twins={"element": 2.7, "scheme": 3.001}))
-    assert found.levels_say == pytest.approx(0.0015, rel=1e-3)
+    assert found.levels_say == pytest.approx(0.0013, rel=1e-3)
     assert found.band == pytest.approx(1.25 * 0.301)
     assert found.outside == ("element",)
     assert found.verdict == "not resolved"
@@ -208,5 +221,5 @@ def test_one_reason_for_both():
 
 def test_sampling_of_a_maximum():
     found = estimate(evidence(levels(), sampling=0.5))
-    assert found.band == pytest.approx(1.5 * 0.01 + 0.5)
+    assert found.band == pytest.approx(1.3 * 0.01 + 0.5)
     assert "its steps sample the curve: up to 0.5 of it is between them" in found.words

@@ -21,8 +21,8 @@ from solvers.mesh.tessellation import area_vectors
 
 #: Cosine of the largest angle between the normal of a wall and the direction to the opposite one.
 ACROSS = 0.7
-#: Parts of the edges of a facet at most, where facets are larger than cells.
-PARTS = 64
+#: Pieces of facets from which on none is halved: long facets, or flat cells, would cost more than the flow.
+ENOUGH_PIECES = 5_000
 #: Points closest to the middle of a ball, of which one that faces the wall counts first: at corners, others are close.
 NEAREST_POINTS = 8
 #: Balls that are tried at most: five to ten are needed.
@@ -61,26 +61,47 @@ class SampledGaps:
 
 
 def samples_of(grid: Grid, corners: Array) -> SurfaceSamples:
-    """Points on facets in the box, one at least on each; corners: (facets, dim, dim) [m]."""
-    vector = area_vectors(corners)
+    """The middles of facets in the box, halved until none is longer than a cell; corners: (facets, dim, dim) [m].
+
+    Cells are counted along each edge, so that neither the other side of a slender facet nor of a flat cell matters.
+    """
+    pieces, facet = _halved(grid, corners)
+    vector = area_vectors(pieces)
     area = np.linalg.norm(vector, axis=1)
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    parts = np.clip(np.ceil(longest / _sizes(grid, corners.mean(axis=1)).min(axis=1)), 1, PARTS).astype(int)
-    dim = corners.shape[2]
-    places, facets = [np.empty((0, dim))], [np.empty(0, dtype=np.int64)]
-    for count in np.unique(parts):
-        some = np.flatnonzero(parts == count)
-        weights = _middles(count, dim)
-        places.append(np.einsum("wv,fvi->fwi", weights, corners[some]).reshape(-1, dim))
-        facets.append(np.repeat(some, len(weights)))
-    x, facet = np.concatenate(places), np.concatenate(facets)
-    share = 1.0 / np.maximum(np.bincount(facet, minlength=len(corners)), 1)[facet]
-    normal = np.divide(vector, area[:, None], out=np.zeros_like(vector), where=area[:, None] > 0.0)[facet]
+    normal = np.divide(vector, area[:, None], out=np.zeros_like(vector), where=area[:, None] > 0.0)
+    x = pieces.mean(axis=1)
     across = 1.0 / np.maximum(np.linalg.norm(normal / _sizes(grid, x), axis=1), 1e-300)
-    found = SurfaceSamples(x, normal, area[facet] * share, facet, across)
+    found = SurfaceSamples(x, normal, area, facet, across)
     low, high = (np.array([edge[end] for edge in grid.edges]) for end in (0, -1))
     near = 1e-6 * (high - low)
     return found[((x > low + near) & (x < high - near)).all(axis=1) & (found.area > 0.0)]
+
+
+def _halved(grid: Grid, corners: Array) -> tuple[Array, NDArray[np.int64]]:
+    """(corners of the pieces, facet of each): the edge with most cells is halved while it has more than one.
+
+    Pieces outside of the box are left out.
+    """
+    dim = corners.shape[2]
+    left, facet = corners, np.arange(len(corners))
+    low, high = (np.array([edge[end] for edge in grid.edges]) for end in (0, -1))
+    pieces, of_facet = [np.empty((0, dim, dim))], [np.empty(0, dtype=np.int64)]
+    while len(left):
+        enough = len(left) + sum(map(len, pieces)) > ENOUGH_PIECES
+        inside = ((left.max(axis=1) > low) & (left.min(axis=1) < high)).all(axis=1)
+        left, facet = left[inside], facet[inside]
+        index = _index(grid, left.reshape(-1, dim)).reshape(left.shape)
+        cells = np.linalg.norm(np.roll(index, -1, axis=1) - index, axis=2)
+        short = enough | (cells.max(axis=1) <= 1.0)
+        pieces.append(left[short])
+        of_facet.append(facet[short])
+        left, facet, first = left[~short], facet[~short], cells[~short].argmax(axis=1)
+        each, second = np.arange(len(left)), (first + 1) % dim
+        middle = 0.5 * (left[each, first] + left[each, second])
+        halves = np.repeat(left[None], 2, axis=0)
+        halves[0, each, first], halves[1, each, second] = middle, middle
+        left, facet = halves.reshape(-1, dim, dim), np.tile(facet, 2)
+    return np.concatenate(pieces), np.concatenate(of_facet)
 
 
 def gaps(grid: Grid, samples: SurfaceSamples, planes: Sequence[WallPlane]) -> SampledGaps:
@@ -127,22 +148,13 @@ def _to_surfaces(samples: SurfaceSamples, farthest: float) -> tuple[Array, NDArr
 
 
 def _index(grid: Grid, x: Array) -> Array:
-    """Positions counted in cells along each axis."""
-    return np.stack([np.interp(x[:, i], edge, np.arange(len(edge))) for i, edge in enumerate(grid.edges)], axis=1)
+    """Positions counted in cells along each axis, which go on outside of the box as they are at its faces."""
+    inside = [np.interp(x[:, i], edge, np.arange(len(edge))) for i, edge in enumerate(grid.edges)]
+    beyond = x - np.clip(x, [edge[0] for edge in grid.edges], [edge[-1] for edge in grid.edges])
+    return np.stack(inside, axis=1) + beyond / _sizes(grid, x)
 
 
 def _sizes(grid: Grid, x: Array) -> Array:
     """Edge lengths [m] of the cells at points, (n, dim)."""
     at = [np.clip(np.searchsorted(edge, x[:, i]) - 1, 0, len(edge) - 2) for i, edge in enumerate(grid.edges)]
     return np.stack([np.diff(edge)[index] for edge, index in zip(grid.edges, at, strict=True)], axis=1)
-
-
-def _middles(parts: int, vertices: int) -> Array:
-    """Weights of the vertices at the middles of the parts of a segment or triangle whose edges have so many parts."""
-    if vertices == 2:
-        t = (np.arange(parts) + 0.5) / parts
-        return np.stack([1.0 - t, t], axis=1)
-    lower = np.argwhere(np.add.outer(np.arange(parts), np.arange(parts)) < parts)
-    upper = np.argwhere(np.add.outer(np.arange(parts), np.arange(parts)) < parts - 1)
-    st = np.concatenate([lower + 1.0 / 3.0, upper + 2.0 / 3.0]) / parts
-    return np.concatenate([1.0 - st.sum(axis=1, keepdims=True), st], axis=1)
