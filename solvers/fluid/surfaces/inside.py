@@ -40,24 +40,28 @@ def windings(points: Array, motion: Motion, facets: NDArray[np.int64]) -> Array:
     whose plane contains the point contributes zero: rounding would decide its sign.
     Source: van Oosterom, Strackee, IEEE Trans. Biomed. Eng. 30 (1983) 125-126.
     """
-    corners, found = motion.x[facets], np.empty(len(points))
-    together = max(1, PAIRS_AT_ONCE // max(1, len(facets)))
+    used, numbers = np.unique(facets, return_inverse=True)
+    vertices, facets, found = motion.x[used].T, numbers.reshape(facets.shape).T, np.empty(len(points))
+    together = max(1, PAIRS_AT_ONCE // max(1, len(facets.T)))
     for first in range(0, len(points), together):
         some = slice(first, first + together)
-        found[some] = _angles(corners - points[some, None, None]).sum(axis=1) / (2.0 * np.pi)
+        found[some] = _angles(vertices[:, None] - points[some].T[:, :, None], facets).sum(axis=1) / (2.0 * np.pi)
     return found
 
 
-def _angles(corners: Array) -> Array:
-    """Angles at the origin, those of triangles halved; corners: (..., corner, dim)."""
-    lengths = np.linalg.norm(corners, axis=-1)
-    if corners.shape[-1] == 2:
-        a, b = corners[..., 0, :], corners[..., 1, :]
-        across, along = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0], (a * b).sum(axis=-1)
+def _angles(way: Array, facets: NDArray[np.int64]) -> Array:
+    """Angles of facets seen from points, those of triangles halved, (points, facets).
+
+    way: from each point to each vertex, (dim, points, vertices); facets: (dim, facets).
+    """
+    length = np.sqrt((way * way).sum(axis=0))
+    ends, lengths = [way[:, :, vertex] for vertex in facets], [length[:, vertex] for vertex in facets]
+    if len(way) == 2:
+        a, b = ends
+        across, along = a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1]
     else:
-        a, b, c = (corners[..., k, :] for k in range(3))
-        la, lb, lc = (lengths[..., k] for k in range(3))
-        across = np.linalg.det(corners)
-        along = la * lb * lc + (a * b).sum(axis=-1) * lc + (b * c).sum(axis=-1) * la + (c * a).sum(axis=-1) * lb
-    seen = np.abs(across) > 1e-9 * lengths.prod(axis=-1)
+        (a, b, c), (la, lb, lc) = ends, lengths
+        across = (a * np.cross(b, c, axis=0)).sum(axis=0)
+        along = la * lb * lc + (a * b).sum(axis=0) * lc + (b * c).sum(axis=0) * la + (c * a).sum(axis=0) * lb
+    seen = np.abs(across) > 1e-9 * np.prod(lengths, axis=0)
     return np.where(seen, np.arctan2(across, along), 0.0)
