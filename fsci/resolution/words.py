@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 #: Error [%] from which on a message is a warning. The table is known to a factor of two: what is above 5 % warns, and
 #: what is below 1 % does not, with any value from 2 to 3.
-WARNED = 2.5
+WARNED = 2.0
 #: The same before the flow is known: what acts on the body may be another force.
 SURE = 5.0
 #: Error [%] that the remedy aims at.
