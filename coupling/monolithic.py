@@ -172,6 +172,7 @@ class Monolithic:
         if flow.renewals > self._solvers.renewals:
             self._solvers = self._number_unknowns()
             self._prepared = self._of_flow = None
+            self._secant.forget()
         flow.follow()
 
     def residual(self) -> Array:

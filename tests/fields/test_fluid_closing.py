@@ -144,8 +144,12 @@ def nested_channel():
 @pytest.mark.parametrize("place", [0.0, H / 3.0])
 def test_nested_cells_refuse_a_cylinder_that_closes_them(place):
     """Both sides share unknowns there. With an overlap they do not, and a cylinder that leaves a way is no matter."""
-    with pytest.raises(StepFailed, match="bodies close a way of the fluid by touching") as failed:
+    with pytest.raises(
+        StepFailed, match=r"touching each other or a wall \('c' and face y-, 'c' and face y\+\)"
+    ) as failed:
         pushed([body("c", disc(place, 0.5, 0.5), loop(48))], grid=nested_channel())
+    assert failed.value.where is not None
+    assert np.abs(np.array(failed.value.where) - [place, 0.5]) == pytest.approx([0.0, 0.5], abs=1.01 * H)
     require_advice(failed.value, FailureKind.CLOSED_WAY)
     _, speed = pushed([body("c", disc(place, 0.5, 0.55), loop(48))], grid=nested_channel())
     assert speed < 1e-9
@@ -161,7 +165,11 @@ def test_nested_cells_refuse_cylinders_once_they_touch():
         body("lower", disc(0.03, 0.25, 0.25), loop(48)),
         body("upper", disc(0.03, 0.88, 0.3), loop(48), motion=falls),
     ]
-    fluid = channel(nested_channel(), bodies, element="q1q1", scheme="backward_euler", dt=0.1)
+    bystander = body("bystander", disc(0.6, 0.5, 0.1), loop(48))
+    fluid = channel(nested_channel(), [bystander, *bodies], element="q1q1", scheme="backward_euler", dt=0.1)
     step(fluid, 0.0, 0.1)
-    with pytest.raises(StepFailed, match="bodies close a way of the fluid by touching"):
+    with pytest.raises(
+        StepFailed, match=r"touching each other or a wall \('lower' and 'upper', 'lower' and face y-\)"
+    ) as failed:
         step(fluid, 0.1, 0.1)
+    assert failed.value.where == pytest.approx((0.03, 0.5), abs=2.0 * H)

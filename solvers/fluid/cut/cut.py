@@ -192,6 +192,8 @@ class Cutter:
             self._again |= self._closed & ~solid
             self._closed |= self.closed & self._open
             self._open |= ~solid
+        if layers:
+            touching |= solid & self._entered(motion.x[facets], layers)
         local_cut, local_strip = is_cut[grid.numbers], strip[grid.numbers]
         is_active = (~solid | strip) & np.isfinite(moments.fraction)
         active = is_active[grid.numbers]
@@ -309,6 +311,18 @@ class Cutter:
         marked = np.zeros(box.size, dtype=bool)
         marked[cells_between(box, corners.min(axis=1), corners.max(axis=1))] = True
         return marked
+
+    def _entered(self, corners: Array, layers: int) -> NDArray[np.bool_]:
+        """Box cells that facets beyond the box's boundary may reach by a way of so many cells: fluid enters them."""
+        box = self.grid.grid
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        ends = np.array([[edge[0], edge[-1]] for edge in box.edges]).T
+        way = layers * np.array([[edge[1] - edge[0], edge[-1] - edge[-2]] for edge in box.edges]).T
+        near = ((high >= ends[0] - way[0]) & (low <= ends[1] + way[1])).all(axis=1)
+        beyond = ((high <= ends[0]) | (low >= ends[1])).any(axis=1) & near
+        marked = np.zeros(box.size, dtype=bool)
+        marked[cells_between(box, low[beyond], high[beyond])] = True
+        return _grow(box.as_box(marked), layers - 1).ravel(order="F")
 
     def _fluid_weights(self, moments, cut: Indices32) -> Array:
         """int_fluid L_q dx / (w_q |K|) on local cut cells, shape (cut, points)."""

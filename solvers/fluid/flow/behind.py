@@ -82,6 +82,19 @@ class BehindWalls:
         return inside & (dofs >= 0).all(axis=(1, 2)), (weights[..., None] * values).sum(axis=1)
 
 
+def with_walls(velocity: Array, unknowns: Unknowns, cut: Cut, without: NDArray[np.bool_]) -> Array:
+    """Velocity [m/s] at local dofs, that of the nearest wall at nodes within walls that have none (mask of dofs)."""
+    nodes, dofs = unknowns.velocity.points, unknowns.velocity.dofs
+    some = np.flatnonzero(without[dofs].any(axis=1))
+    if not len(some) or not len(cut.facets):
+        return velocity
+    cell = max(float(np.diff(edge).max()) for edge in unknowns.grid.grid.edges)
+    behind, _, wall = mirrored(nodes[some], cut.facets, cut.motion, (cut.depth + 1) * cell)
+    result = velocity.copy()
+    result[dofs[some[behind]]] = wall
+    return result
+
+
 def mirrored(points: Array, facets: Indices, motion: Motion, reach: float) -> tuple[Indices, Array, Array]:
     """(points behind facets and no farther than `reach` [m], their mirror images, the wall's velocity [m/s] there)."""
     normals = unit_normals(motion.x[facets])

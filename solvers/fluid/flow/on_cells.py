@@ -9,6 +9,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from solvers.api import Array, State
+from solvers.fluid.flow.behind import with_walls
 from solvers.fluid.flow.carrier import Carrier
 from solvers.fluid.flow.discretisation import Discretisation, discretise
 from solvers.fluid.flow.flow_iterate import FlowIterate
@@ -132,6 +133,7 @@ class FlowOnCells:
         velocity = self.velocity()
         if self.parts.behind is not None:
             velocity = self.parts.behind.bounded(velocity, system.cut, wet)
+        velocity = with_walls(velocity, self.parts.unknowns, system.cut, found & ~system.active_dofs)
         self.history.end_step(dt, velocity, found, self.pressure())
 
     def continue_back(self, dt: float, short: float) -> None:

@@ -17,10 +17,10 @@ from solvers.fluid.flow.history import Past
 from solvers.fluid.flow.sheet_transfer import Sides, along_surface, sides_of, transfer
 from solvers.fluid.geometry.pieces import off_boundary
 from solvers.fluid.geometry.thin.sheet_cycles import joined_in, recurring
-from solvers.fluid.geometry.thin.sheets import Sheets, find_sheets, way_is_closed
+from solvers.fluid.geometry.thin.sheets import Sheets, closed_way, find_sheets
 from solvers.fluid.geometry.thin.thickness import THIN, THIN_IF_MOVING
 from solvers.fluid.geometry.thin.thinness import cell_sizes_at, may_be_thin
-from solvers.fluid.grid.box import Grid
+from solvers.fluid.grid.box import FACES, Grid
 from solvers.fluid.grid.nested import Nested
 from solvers.fluid.mesh.space import Unknowns
 from solvers.fluid.settings.time_scheme import FlowStep
@@ -34,8 +34,9 @@ from solvers.fluid.surfaces.surface import Motion, tied, wetness
 THICK_IN_CONTACT = {2: float(THIN), 3: 1.0}
 
 CLOSED_WAY = (
-    "bodies close a way of the fluid by touching each other or a wall; in nested and periodic cells both sides share "
-    "unknowns there, and fluid would pass: let them overlap by half a cell, or leave out 'refine' and 'periodic'"
+    "bodies close a way of the fluid by touching each other or a wall ({names}); in nested and periodic cells both "
+    "sides share unknowns there, and fluid would pass: let them overlap by half a cell, or leave out 'refine' and "
+    "'periodic'"
 )
 
 
@@ -56,6 +57,7 @@ class ThinBodies:
         self._grid, self.follows, self._sheets = grid, False, sheets
         surfaces = [body.surface for body in bodies]
         self._wet, self._tied = wetness(surfaces), tied(surfaces)
+        self._names = np.repeat([surface.name for surface in surfaces], [len(s.facets) for s in surfaces])
         moving = bool(bodies) and not all(body.rests for body in bodies)
         touch = any(body.surface.in_contact is not None and body.surface.in_contact.any() for body in bodies)
         self._thick = THICK_IN_CONTACT[grid.dim] if touch else thickest(grid.dim)
@@ -121,9 +123,23 @@ class ThinBodies:
     def _require_open(self, facets: NDArray[np.int64], x: Array) -> None:
         if self._x is not None and np.array_equal(self._x, x):
             return
-        if way_is_closed(self._grid, facets, x):
-            raise StepFailed("fluid", FailureKind.CLOSED_WAY, CLOSED_WAY)
+        places = {self._around(place, facets, x): place for place in closed_way(self._grid, facets, x)}
+        if places:
+            names = min(places, key=lambda some: sum(name.startswith("face") for name in some))
+            all_names = ", ".join(map(" and ".join, [names, *(other for other in places if other != names)]))
+            where = tuple(places[names].tolist())
+            raise StepFailed("fluid", FailureKind.CLOSED_WAY, CLOSED_WAY.format(names=all_names), where=where)
         self._x = x
+
+    def _around(self, place: Array, facets: NDArray[np.int64], x: Array) -> tuple[str, ...]:
+        """Names of the bodies and faces of the box in the cells around a node [m]."""
+        edges = self._grid.edges
+        size = np.array([cell_sizes_at(edge, np.array([c])).max() for edge, c in zip(edges, place, strict=True)])
+        near = (x[facets].min(axis=1) <= place + size) & (x[facets].max(axis=1) >= place - size)
+        bodies = dict.fromkeys(self._names[near.all(axis=1)].tolist())
+        away = np.abs([edge[[0, -1]] - c for edge, c in zip(edges, place, strict=True)]).ravel()
+        faces = [name for name, near_it in zip(FACES, away <= np.repeat(size, 2), strict=False) if near_it]
+        return (*(f"'{name}'" for name in bodies), *(f"face {name}" for name in faces))
 
     def _join(self, parts: dict[int, frozenset[int]]) -> bool:
         """Keep parts joined until the step ends; returns whether some are new."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.api import Array
-from solvers.fluid.surfaces.inside import winding
+from solvers.fluid.surfaces.inside import windings
 from solvers.fluid.surfaces.surface import ImmersedSurface, Motion
 
 #: Winding number above which the middle of a facet is in another body; on the surface of the body it is one half.
@@ -29,9 +29,8 @@ def hidden_facets(
         if other == index:
             continue
         near = np.all((middles > x.min(axis=0)) & (middles < x.max(axis=0)), axis=1)
-        motion = Motion(x, np.zeros_like(x))
-        for facet in np.flatnonzero(near & those & ~found):
-            found[facet] = winding(middles[facet], motion, surface.facets) >= HIDDEN
+        some = np.flatnonzero(near & those & ~found)
+        found[some] = windings(middles[some], Motion(x, np.zeros_like(x)), surface.facets) >= HIDDEN
     return found
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from solvers.algebra.connected import connected_parts
 from solvers.api import Array, Indices
 from solvers.fluid.geometry.pieces import NOTHING
-from solvers.fluid.surfaces.inside import winding
+from solvers.fluid.surfaces.inside import windings
 from solvers.fluid.surfaces.surface import Motion
 
 #: Points of a surface or region that are tested for lying in a cavity.
@@ -107,5 +107,5 @@ def points_inside(points: Array, x: Array, wall: Indices) -> NDArray[np.bool_]:
     """Whether points [m] lie inside of a closed surface, whichever way its normals point."""
     at, motion = x[wall].reshape(-1, x.shape[1]), Motion(x, x)
     inside = ((points >= at.min(axis=0)) & (points <= at.max(axis=0))).all(axis=1)
-    inside[inside] = [abs(winding(point, motion, wall)) > 0.5 for point in points[inside]]
+    inside[inside] = np.abs(windings(points[inside], motion, wall)) > 0.5
     return inside

@@ -25,7 +25,7 @@ from solvers.api import Array, Indices, Mask
 from solvers.fluid.geometry.pieces import in_planes, off_boundary
 from solvers.fluid.geometry.regions.sliced_facets import ragged
 from solvers.fluid.geometry.regions.space_parts import parts_in_space
-from solvers.fluid.geometry.thin.closing import are_apart, close_a_way, may_touch, uncut_cells
+from solvers.fluid.geometry.thin.closing import are_apart, closed_at, may_touch, uncut_cells
 from solvers.fluid.geometry.thin.sheet_nodes import Joined, node_copies, same_nodes
 from solvers.fluid.geometry.thin.sheet_parts import LAYERS_AROUND, Part, facing_of, grown, links_of, parts_of_fluid
 from solvers.fluid.geometry.thin.thickness import AROUND_PAIR, THIN
@@ -265,7 +265,7 @@ def find_sheets(
         if grid.dim == 3:
             close = _opposed(grid, cells, facing, close, thin)
         if not (may_part and _is_thin(grid, parts, links, facing, close, thin)) and not (
-            may_close and close_a_way(grid, moments, cells, links)
+            may_close and len(closed_at(grid, moments, cells, links))
         ):
             return None
     copies = node_copies(grid, parts, links, same_nodes(parts, joined), special)
@@ -319,19 +319,19 @@ def _all_parts(grid: Grid, moments, facets: Indices, x: Array, bounds: Mask):
     return parts, links_of(grid, parts), special, touching
 
 
-def way_is_closed(grid: Grid, facets: Indices, x: Array) -> bool:
-    """Whether bodies close a way of the fluid by touching, so that both sides share nodes of the grid.
+def closed_way(grid: Grid, facets: Indices, x: Array) -> Array:
+    """Points [m] where bodies close a way of the fluid by touching, so that both sides share nodes, shape (n, dim).
 
     facets, x: as in `find_sheets`.
     """
     if not len(facets) or not may_touch(grid, facets, x):
-        return False
+        return np.empty((0, grid.dim))
     bounds, x = off_boundary(grid, x[facets]), in_planes(grid, x)
     moments = kernels.moments(grid.edges, gauss(3)[0], x, facets, np.ones(grid.size, dtype=bool))
     if not are_apart(grid, uncut_cells(grid, moments)):
-        return False
+        return np.empty((0, grid.dim))
     parts, links, _, _ = _all_parts(grid, moments, facets, x, bounds)
-    return close_a_way(grid, moments, np.array([part.cell for part in parts], dtype=np.int64), links)
+    return closed_at(grid, moments, np.array([part.cell for part in parts], dtype=np.int64), links)
 
 
 def _opposed(grid: Grid, cells: Indices, facing: Array, close: Indices, thin: int) -> Indices:
