@@ -5,7 +5,7 @@ import pytest
 from fluid_setup import block, body, field, make_fluid, step
 from programs import fsci
 
-from fsci.run.history import read_history
+from fsci.running.history import read_history
 from solvers.fluid.flow.probes import flow_rate
 from solvers.fluid.grid.box import uniform
 from solvers.fluid.terms.boundary.patches import Patch

@@ -17,7 +17,7 @@ from fsci.case import load_case
 from fsci.report.report import report
 from fsci.resolution import table as tables
 from fsci.resolution.words import before_the_run, resolved
-from fsci.run.run import run_case
+from fsci.running.run import run_case
 from solvers.fluid.flow.field import Fluid
 from solvers.fluid.flow.resolution.cells import BodyCells, GapCells
 from solvers.fluid.flow.resolution.gaps import WallPlane, gaps, samples_of
