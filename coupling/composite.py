@@ -210,8 +210,11 @@ class Composite:
         for part in self.parts:
             part.retreat(fraction)
 
-    def astray(self, rises: int) -> str:
-        return self.elastic.astray(rises) or self.rigid.astray(rises)
+    def astray(self, risen: Sequence[NDArray[np.bool_]] = ()) -> str:
+        first = len(self._residuals[0]) if risen else 0
+        return self.elastic.astray([rise[:first] for rise in risen]) or self.rigid.astray(
+            [rise[first:] for rise in risen]
+        )
 
     def settled(self) -> bool:
         found = [part.settled() for part in self.parts]

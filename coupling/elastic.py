@@ -184,8 +184,8 @@ class Elastic:
     def retreat(self, fraction: float) -> None:
         self.structure.retreat(fraction)
 
-    def astray(self, rises: int) -> str:
-        return self.structure.astray(rises)
+    def astray(self, risen: Sequence[NDArray[np.bool_]] = ()) -> str:
+        return self.structure.astray(risen)
 
     def settled(self) -> bool:
         return self.structure.settled()

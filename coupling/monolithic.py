@@ -16,6 +16,7 @@ Source: Schott, Ager, Wall, Int. J. Numer. Meth. Engng 119 (2019) 757-796.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -130,7 +131,7 @@ class Monolithic:
             if predicted and isinstance(failure, NoResidual):
                 raise
             self._require_numbers(failure)
-            cycles = self.comm.allreduce(bool(coupled.solid.astray(0)), op=MPI.LOR)
+            cycles = self.comm.allreduce(bool(coupled.solid.astray()), op=MPI.LOR)
             raise with_cause(coupled, failure, cycles=cycles) from None
         coupled.solid.check(info)
         coupled.end_step()
@@ -303,9 +304,9 @@ class Monolithic:
         self.coupled.flow.retreat(fraction)
         self._secant.retreat(fraction)
 
-    def astray(self, rises: int) -> str:
+    def astray(self, risen: Sequence[NDArray[np.bool_]] = ()) -> str:
         """Why whole increments may not converge: an active set that cycles. Residuals of two parts may well rise."""
-        return self.coupled.solid.astray(0)
+        return self.coupled.solid.astray()
 
     def settled(self) -> bool:
         """Whether supports and active sets are fulfilled."""

@@ -62,10 +62,10 @@ class System(Protocol):
         """Whether the iterate fulfils supports, and its active set has not changed."""
         ...
 
-    def astray(self, rises: int) -> str:
+    def astray(self, risen: Sequence[Flags] = ()) -> str:
         """Why whole increments may not converge, such as an active set that cycles; empty if they may.
 
-        rises: how often the residual has risen above all earlier ones of this solution.
+        risen: the parts whose residual rose above all earlier ones of this solution, each time that one did.
         """
         ...
 
@@ -109,7 +109,7 @@ def iterates(system: System, tolerance: Tolerance = Tolerance()) -> Iterator[Ite
     """
     number, residual = 0, _residual(system)
     increment, ratio = np.full(len(residual), math.inf), np.full(len(residual), math.inf)
-    largest, rises = residual, 0
+    largest, risen = residual, list[Flags]()
     while True:
         small, settled = tolerance.small(system.forces()), system.settled()
         yield Iterate(number, residual, small, increment, settled)
@@ -117,9 +117,9 @@ def iterates(system: System, tolerance: Tolerance = Tolerance()) -> Iterator[Ite
         keep = number > 0 and bool((2.0 * ratio * residual <= small).all())
         increment = system.advance(keep=keep, reduction=enough(residual, ratio, tolerance=small))
         residual = _residual(system)
-        finite = bool(np.isfinite(residual).all())  # not a number: elements are inverted
-        rises += bool(((residual > largest) & (residual > small)).any()) + 2 * (not finite)
-        if (tolerance.line_search and settled) or (number > 0 and system.astray(rises)):
+        infinite = ~np.isfinite(residual)  # elements are inverted; it counts twice
+        risen += [rise for rise in ((residual > largest) & (residual > small), infinite, infinite) if rise.any()]
+        if (tolerance.line_search and settled) or (number > 0 and system.astray(risen)):
             increment, residual = _halve(system, before, small, increment, residual)
         ratio = residual / np.maximum(before, ZERO_RESIDUAL)
         largest, number = np.fmax(largest, residual), number + 1
@@ -199,7 +199,7 @@ def converge(system: System, tolerance: Tolerance) -> StepInfo:
         size = _norms(history, open_parts)[-1]
         reason = f"Newton did not converge in {counted(iterate.number, 'iteration')} (residual {size:.3g})"
         kind, norms = FailureKind.NEWTON, _norms(history, open_parts)
-        if cycle := system.astray(0):
+        if cycle := system.astray():
             kind, reason = FailureKind.ACTIVE_SET, f"{reason}: {cycle}"
         raise StepFailed(system.name, kind, reason, iteration=iterate.number, where=system.worst(), history=norms)
     raise AssertionError("unreachable: iterates() has no end")

@@ -152,22 +152,25 @@ class Mortar:
         if self._evaluations >= KEEP_AFTER:
             self._kept = np.union1d(self._kept, self._codes(used))
 
-    def near(self, x: Array, x_previous: Array, travel: float = 0.0) -> tuple[NDArray[np.int32], float]:
+    def near(
+        self, x: Array, x_previous: Array, travel: float = 0.0, beyond: float = 0.0
+    ) -> tuple[NDArray[np.int32], float]:
         """(facet pairs that may touch, the length [m] by which their reach is larger); x: positions [m] of all nodes.
 
-        The reach grows by the largest motion of a node in this step and by the interference.
+        The reach grows by the largest motion of a node in this step, by the interference and by `beyond` [m], at most
+        one edge.
 
         travel: upper bound of the path of any node so far [m]. When it has increased by s, each of the two boxes has
         grown by s at most, and the motion of a step, which inflates them, by 2 s. Hence boxes with a clearance of 4 s
-        do not overlap.
+        do not overlap, whatever `beyond` is.
         """
         if travel < self.clear_until and not len(self._kept):
             return np.empty((0, 2), dtype=np.int32), 0.0
         slave, master = self.patch.nodes, self.masters.nodes
-        motion = max(float(np.abs(x[nodes] - x_previous[nodes]).max(initial=0.0)) for nodes in (slave, master))
-        motion += max(self.interference, 0.0)
+        ways = (np.linalg.norm(x[nodes] - x_previous[nodes], axis=1) for nodes in (slave, master))
+        motion = max(float(way.max(initial=0.0)) for way in ways) + max(self.interference, 0.0) + beyond
         found = self.search.pairs(x[slave], x[master], self.edge + motion, x_previous[slave], x_previous[master])
-        self.clear_until = travel + self.search.clearance / 4.0
+        self.clear_until = travel + (self.search.clearance - (self.edge - beyond)) / 4.0
         codes = self._codes(found)
         if len(self._kept) == 0 or np.isin(self._kept, codes).all():
             return found, motion

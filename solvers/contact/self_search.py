@@ -66,6 +66,7 @@ class SelfSearch:
             raise StepFailed("contact", FailureKind.NOT_FINITE, reason)
         found = self.tree.pairs(xs, inflation, xs_previous)
         found = found[~self._through_the_wall(found, xs)]
+        found = found[~self._apart(found, [xs] if xs_previous is None else [xs, xs_previous], inflation)]
         k = self._count
         has_roles = np.isin(found @ [k, 1], self._directed) | np.isin(found @ [1, k], self._directed)
         new = found[~has_roles]
@@ -81,6 +82,24 @@ class SelfSearch:
     def _normals(self, x: Array) -> Array:
         mean = self.tree.normals(x).mean(axis=1)
         return mean / np.linalg.norm(mean, axis=1, keepdims=True)
+
+    def _apart(self, pairs: Indices, path: list[Array], inflation: float) -> NDArray[np.bool_]:
+        """Mask of the pairs that a plane keeps farther apart than `inflation` [m] all along their path.
+
+        Its normal is that of a facet or the line between their middles. The directions of the tree are those of the
+        axes, so that what it finds besides, and with it who becomes a slave, would depend on the rotation of a scene.
+        """
+        i, j = pairs.T
+        at = np.concatenate([x[self.tree.facets] for x in path], axis=1)
+        middles, normals = at.mean(axis=1), self._normals(path[0])
+        between = middles[j] - middles[i]
+        between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), np.finfo(float).tiny)
+        apart = np.zeros(len(pairs), dtype=bool)
+        for direction in (normals[i], normals[j], between):
+            first, second = (np.einsum("pnd,pd->pn", at[k], direction) for k in (i, j))
+            apart |= second.min(axis=1) - first.max(axis=1) > inflation
+            apart |= first.min(axis=1) - second.max(axis=1) > inflation
+        return apart
 
     def _through_the_wall(self, pairs: Indices, x: Array) -> NDArray[np.bool_]:
         normals, middles = self._normals(x), x[self.tree.facets].mean(axis=1)

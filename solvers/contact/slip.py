@@ -77,7 +77,7 @@ class Sliding:
         D, covered, parts = np.zeros(C), np.zeros((C, pairs)), []
         normals = find_normals(self._multipliers, x) if self.mortars else None
         for index, mortar in enumerate(self.mortars):
-            facet_pairs, _ = mortar.near(x, x, travel)
+            facet_pairs, _ = mortar.near(x, x, travel, beyond=mortar.edge)
             facet_pairs = self._shares.mine(index, facet_pairs, len(mortar.facets))
             if normals is None or len(facet_pairs) == 0:
                 continue

@@ -405,7 +405,7 @@ class RigidBodies:
         """Take back a fraction of the last increment."""
         self.set_increments(self._u - fraction * self._last)
 
-    def astray(self, rises: int) -> str:
+    def astray(self, risen: Sequence[NDArray[np.bool_]] = ()) -> str:
         """Empty: the contact of rigid bodies has no active set."""
         return ""
 

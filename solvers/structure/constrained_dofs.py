@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from solvers.algebra.blocks import Layout
 from solvers.algebra.rows import TakenRows, gather_at
@@ -33,6 +36,13 @@ class ConstrainedDofs:
         mine, numbers = self._layout.among_owned(self._constraint.dofs())
         found[numbers] = at_nodes[mine]
         return found
+
+    def touched(self, pieces: Sequence[NDArray[np.bool_]]) -> int:
+        """In how many of the masks of pieces, (count,), there is one that the constraint exerts a force on."""
+        if not pieces:
+            return 0
+        on = self.pieces[self._constraint.force().any(axis=1)]
+        return sum(bool(mask[on].any()) for mask in pieces)
 
     def recover(self, taken: TakenRows, du: Array) -> None:
         """Compute the multipliers from the rows before the transformation and the increment of all unknowns."""

@@ -440,11 +440,11 @@ class Structure:
         if self.constraint is not None:
             self.constraint.retreat(fraction)
 
-    def astray(self, rises: int) -> str:
+    def astray(self, risen: Sequence[NDArray[np.bool_]] = ()) -> str:
         """Why whole increments may not converge: an active set that cycles, or a residual that grows in contact."""
-        if self.constraint is None or not self.constraint.near:
+        if self.constraint is None or self._constrained is None or not self.constraint.near:
             return ""
-        return self.constraint.cycle() or ("the residual grows" if rises > 1 and self.constraint.active().any() else "")
+        return self.constraint.cycle() or ("the residual grows" if self._constrained.touched(risen) > 1 else "")
 
     def settled(self) -> bool:
         """Whether the prescribed displacements are reached and the active set has not changed (collective)."""

@@ -250,6 +250,20 @@ def test_a_block_that_begins_on_the_floor_and_leaves_it():
     assert (one.scene, one.parameters["height"], one.verdict) == ("fall", 0.0, "right")
 
 
+@pytest.mark.slow
+def test_a_stack_beside_a_column_whose_residual_grows():
+    """Residuals that grow in a body without contact call for no line search, as without the stack."""
+    one = run.judge(300011)
+    assert (one.scene, one.twin, one.verdict) == ("stack", "beside a body of 0.018 Pa", "right")
+
+
+@pytest.mark.slow
+def test_a_ring_that_closes_with_friction_at_another_angle():
+    """Which facets are near at the beginning of the step in which its ends meet depended on the angle to the axes."""
+    one = run.judge(300158)
+    assert (one.scene, one.twin, one.verdict) == ("curl", "rotated by 290.26 degrees", "right")
+
+
 def test_a_beam_in_units_in_which_its_stiffness_is_tiny():
     """1e-21: no pivot is zero because of its units."""
     one = run.judge(215)

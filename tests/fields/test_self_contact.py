@@ -151,6 +151,24 @@ def test_the_other_side_of_a_wall_is_no_master():
     assert len(search.tree.pairs(x, edge)) > len(pairs) + 20  # of the tree alone
 
 
+@pytest.mark.parametrize("name", ["fold", "c"])
+def test_pairs_and_roles_turn_with_the_surface(name):
+    """The sides of the tree's volumes do not turn: of themselves they would find other pairs at another angle."""
+    make, n, facet_type = BODIES[name]
+    x, facets = make(n)
+    edge = np.linalg.norm(x[facets[:, 1]] - x[facets[:, 0]], axis=1).max()
+
+    def found(angle, of):
+        c, s = np.cos(angle), np.sin(angle)
+        turned = x @ np.array([[c, s], [-s, c]])
+        search = SelfSearch(facets, facet_type, turned)
+        return (search if of == "roles" else search.tree).pairs(*[turned] * (2 if of == "roles" else 1), edge).tolist()
+
+    angles = np.linspace(0.1, 6.0, 12)
+    assert all(found(angle, "roles") == found(0.0, "roles") for angle in angles)
+    assert any(found(angle, "tree") != found(0.0, "tree") for angle in angles)
+
+
 def test_thickness_of_a_wall():
     x, facets = closing_c(120)
     middles = x[facets].mean(axis=1)

@@ -108,7 +108,7 @@ class Column:
     def settled(self):
         return True
 
-    def astray(self, rises):
+    def astray(self, risen=()):
         return ""
 
     def worst(self):

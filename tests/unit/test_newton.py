@@ -46,7 +46,7 @@ class Scalar:
     def only_rounding(self):
         return self.residual() <= self._round_off
 
-    def astray(self, rises):
+    def astray(self, risen=()):
         return ""
 
     def settled(self):
@@ -191,7 +191,7 @@ class Together:
     def settled(self):
         return all(system.settled() for system in self.systems)
 
-    def astray(self, rises):
+    def astray(self, risen=()):
         return ""
 
     def worst(self):

@@ -410,7 +410,7 @@ class Fluid:
         change, solution = (self._norm(rows) for rows in self.iterate.add(increment))
         return np.array([change / solution if solution > 0.0 else 0.0])
 
-    def astray(self, rises: int) -> str:
+    def astray(self, risen: Sequence[NDArray[np.bool_]] = ()) -> str:
         """Empty: a flow has no active set."""
         return ""
 
