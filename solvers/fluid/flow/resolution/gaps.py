@@ -64,17 +64,21 @@ def samples_of(grid: Grid, corners: Array) -> SurfaceSamples:
     """Points on facets in the box, one at least on each; corners: (facets, dim, dim) [m]."""
     vector = area_vectors(corners)
     area = np.linalg.norm(vector, axis=1)
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    parts = np.clip(np.ceil(longest / _sizes(grid, corners.mean(axis=1)).min(axis=1)), 1, PARTS).astype(int)
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    cell = _sizes(grid, corners.mean(axis=1)).min(axis=1)
+    along, across = (np.clip(np.ceil(part(axis=1) / cell), 1, PARTS).astype(int) for part in (edges.max, edges.min))
     dim = corners.shape[2]
-    places, facets = [np.empty((0, dim))], [np.empty(0, dtype=np.int64)]
-    for count in np.unique(parts):
-        some = np.flatnonzero(parts == count)
-        weights = _middles(count, dim)
-        places.append(np.einsum("wv,fvi->fwi", weights, corners[some]).reshape(-1, dim))
+    # the first vertex opposite to the shortest edge
+    turn = (edges.argmin(axis=1)[:, None] + np.arange(1, 1 + dim)) % dim
+    turned = np.take_along_axis(corners, turn[:, :, None], axis=1)
+    places, facets, shares = [np.empty((0, dim))], [np.empty(0, dtype=np.int64)], [np.empty(0)]
+    for counts in np.unique(np.stack([along, across], axis=1), axis=0).tolist():
+        some = np.flatnonzero((along == counts[0]) & (across == counts[1]))
+        weights, share = _middles(*counts, dim)
+        places.append(np.einsum("wv,fvi->fwi", weights, turned[some]).reshape(-1, dim))
         facets.append(np.repeat(some, len(weights)))
-    x, facet = np.concatenate(places), np.concatenate(facets)
-    share = 1.0 / np.maximum(np.bincount(facet, minlength=len(corners)), 1)[facet]
+        shares.append(np.tile(share, len(some)))
+    x, facet, share = np.concatenate(places), np.concatenate(facets), np.concatenate(shares)
     normal = np.divide(vector, area[:, None], out=np.zeros_like(vector), where=area[:, None] > 0.0)[facet]
     across = 1.0 / np.maximum(np.linalg.norm(normal / _sizes(grid, x), axis=1), 1e-300)
     found = SurfaceSamples(x, normal, area[facet] * share, facet, across)
@@ -137,12 +141,18 @@ def _sizes(grid: Grid, x: Array) -> Array:
     return np.stack([np.diff(edge)[index] for edge, index in zip(grid.edges, at, strict=True)], axis=1)
 
 
-def _middles(parts: int, vertices: int) -> Array:
-    """Weights of the vertices at the middles of the parts of a segment or triangle whose edges have so many parts."""
+def _middles(along: int, across: int, vertices: int) -> tuple[Array, Array]:
+    """(weights of the vertices at the middles of the parts of a segment or triangle, shares of its area).
+
+    along, across: parts of the longest and of the shortest edge; that one is opposite to the first vertex.
+    """
+    t = (np.arange(along) + 0.5) / along
     if vertices == 2:
-        t = (np.arange(parts) + 0.5) / parts
-        return np.stack([1.0 - t, t], axis=1)
-    lower = np.argwhere(np.add.outer(np.arange(parts), np.arange(parts)) < parts)
-    upper = np.argwhere(np.add.outer(np.arange(parts), np.arange(parts)) < parts - 1)
-    st = np.concatenate([lower + 1.0 / 3.0, upper + 2.0 / 3.0]) / parts
-    return np.concatenate([1.0 - st.sum(axis=1, keepdims=True), st], axis=1)
+        return np.stack([1.0 - t, t], axis=1), np.full(along, 1.0 / along)
+    if across < along:  # strips along the longest edge: a thin triangle would have too many equal parts
+        t, s = (part.ravel() for part in np.meshgrid(t, (np.arange(across) + 0.5) / across, indexing="ij"))
+        return np.stack([1.0 - t, t * (1.0 - s), t * s], axis=1), 2.0 * t / (along * across)
+    lower = np.argwhere(np.add.outer(np.arange(along), np.arange(along)) < along)
+    upper = np.argwhere(np.add.outer(np.arange(along), np.arange(along)) < along - 1)
+    st = np.concatenate([lower + 1.0 / 3.0, upper + 2.0 / 3.0]) / along
+    return np.concatenate([1.0 - st.sum(axis=1, keepdims=True), st], axis=1), np.full(len(st), 1.0 / along**2)
