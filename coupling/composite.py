@@ -23,7 +23,7 @@ from solvers.algebra.linear import LinearSolveFailed
 from solvers.algebra.rows import RowTransformation, TakenRows, gather, transform_rows
 from solvers.algebra.sparse import Sparse
 from solvers.algebra.vertices import VertexJacobian, one_below_the_other
-from solvers.api import Array, State, StepFailed, StepInfo
+from solvers.api import Array, Indices, State, StepFailed, StepInfo
 from solvers.constraint import Constraint
 from solvers.contact.contact import Contact
 from solvers.newton import converge
@@ -235,6 +235,9 @@ class Composite:
         places = [part.worst() for part in self.parts]
         relative = [_relative(r, part.forces()) for r, part in zip(self._residuals, self.parts, strict=True)]
         return places[int(np.argmax(relative))]
+
+    def few(self) -> Indices:
+        return np.concatenate([part.few() for part in self.parts])
 
     def row_transformations(self) -> list[RowTransformation]:
         elastic = self.elastic.row_transformations()

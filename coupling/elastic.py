@@ -16,7 +16,7 @@ from coupling.wetted import WettedSurface
 from solvers.algebra.rows import RowTransformation, TakenRows, gather_at
 from solvers.algebra.sparse import Sparse, stack
 from solvers.algebra.vertices import VertexJacobian
-from solvers.api import Array, State, StepInfo
+from solvers.api import Array, Indices, State, StepInfo
 from solvers.generalised_alpha import BACKWARD_EULER
 from solvers.structure.dynamics import Dynamics
 from solvers.structure.field import Structure
@@ -206,6 +206,9 @@ class Elastic:
     def near_contact(self) -> bool:
         """Whether contact changes the rows at this iterate."""
         return self.structure.constraint is not None and self.structure.constraint.near
+
+    def few(self) -> Indices:
+        return np.empty(0, dtype=np.int64)
 
     def row_transformations(self) -> list[RowTransformation]:
         change = self.structure.row_transformation()

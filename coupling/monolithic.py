@@ -244,11 +244,14 @@ class Monolithic:
         self._solvers.direct.solve(blocks.with_added(matrix), b, x, matrix)
 
     def _krylov_solver(self, flow: IterativeFlow, blocks: Blocks, of_flow: PETSc.Mat) -> PETSc.KSP:
-        fill = flow.sequence.current == "fill"
-        krylov = linear.coupled_solver(self.comm, tolerance=flow.linear_tolerance, fill=fill)
-        if flow.sequence.multigrid:
-            flow.sequence.limit(krylov)
-            krylov.getPC().getPythonContext().second = flow.multigrid(blocks.flow, of_flow)
+        sequence, of_flow_alone = flow.sequence, None
+        if sequence.multigrid:
+            of_flow_alone = flow.multigrid(blocks.flow, of_flow)
+        few, fill = self.coupled.solid.few(), sequence.current == "fill"
+        krylov = linear.coupled_solver(
+            self.comm, tolerance=flow.linear_tolerance, fill=fill, flow=of_flow_alone, few=few
+        )
+        sequence.limit(krylov)
         return krylov
 
     def blocks(self, *, keep: bool = False) -> Blocks:

@@ -21,7 +21,7 @@ from solvers.algebra.linear import LinearSolveFailed
 from solvers.algebra.rows import RowTransformation, TakenRows
 from solvers.algebra.sparse import Sparse
 from solvers.algebra.vertices import VertexJacobian
-from solvers.api import Array, Stateful, StepInfo
+from solvers.api import Array, Indices, Stateful, StepInfo
 from solvers.exchange import Difference, InterfaceEntries, Motion
 from solvers.newton import System
 from solvers.timing import Timer
@@ -142,6 +142,10 @@ class Solid(Part, Protocol):
 
     def exchanged(self) -> float:
         """Energy [J] that has changed its form or its body so far: half of the sum of all |changes| and works."""
+        ...
+
+    def few(self) -> Indices:
+        """Numbers of free unknowns that move whole surfaces, for preconditioners; the same on all processes."""
         ...
 
     def row_transformations(self) -> Sequence[RowTransformation]:

@@ -11,10 +11,11 @@ import numpy as np
 from petsc4py import PETSc
 
 from solvers.algebra import unlocked
+from solvers.algebra.few_unknowns import FewUnknowns
 from solvers.algebra.gauss_seidel import GaussSeidel
-from solvers.algebra.petsc_python import free_deleted
+from solvers.algebra.petsc_python import PythonContext, free_deleted
 from solvers.algebra.solid_factors import NODE_SIZE, SolidFactors
-from solvers.api import Array, FailureKind
+from solvers.api import Array, FailureKind, Indices
 from solvers.counted import counted
 
 Method = Literal["auto", "direct", "iterative", "ilu"]
@@ -171,7 +172,7 @@ def choose_flow(
     degree: of the velocity; incomplete factors with more fill take minutes for second degree, and are left out.
     sheets: there are several nodes in one place, which the coarse lattices of multigrid do not have; incomplete factors
     of second degree mostly stall there. smoothed: multigrid with stronger smoothers, which second degree always has.
-    with_solids: equations of solids may belong to the system. rough: single steps of smoothers diverge in steady flow,
+    with_solids: equations of elastic bodies may belong to the system. rough: single steps of smoothers diverge in steady flow,
     as on stretched cells.
     """
     if method == "direct" or (method == "auto" and dofs <= FLOW_DIRECT_LIMIT[dim]):
@@ -261,17 +262,30 @@ def incomplete_factors(comm, **more: str | float) -> dict[str, str | float]:
     return {name.removeprefix("sub_"): value for name, value in given.items() if name.startswith("sub_")}
 
 
-def coupled_solver(comm, *, tolerance: float, fill: bool = False) -> PETSc.KSP:
+def coupled_solver(
+    comm, *, tolerance: float, fill: bool = False, flow: PETSc.PC | None = None, few: Indices | None = None
+) -> PETSc.KSP:
     """FGMRES for structure and flow together, a matrix of `TwoFields`, with block Gauss-Seidel as preconditioner.
 
-    That of the structure is `solid_preconditioner`; that of the flow are incomplete factors on overlapping subdomains
-    (fill: more fill and overlap), unless the caller sets it up otherwise.
+    That of the structure is `solid_preconditioner`; flow: that of the flow, None: incomplete factors on overlapping
+    subdomains (fill: more fill and overlap). few: numbers of unknowns of the structure that are eliminated exactly.
     """
-    flow = _from_options(comm, "coupled_flow_", incomplete_factors(comm, **(FILL if fill else BLOCKS)))
+    if flow is None:
+        flow = _from_options(comm, "coupled_flow_", incomplete_factors(comm, **(FILL if fill else BLOCKS)))
     ksp = _gmres(comm, tolerance, 600, restart=150, flexible=True)
-    ksp.getPC().setType(PETSc.PC.Type.PYTHON)
-    ksp.getPC().setPythonContext(GaussSeidel(solid_preconditioner, flow))
+    blocks = GaussSeidel(solid_preconditioner, flow)
+    if few is None or len(few) == 0:
+        _set_context(ksp.getPC(), blocks)
+    else:
+        others = PETSc.PC().create(comm)
+        _set_context(others, blocks)
+        _set_context(ksp.getPC(), FewUnknowns(few, others))
     return ksp
+
+
+def _set_context(preconditioner: PETSc.PC, context: PythonContext) -> None:
+    preconditioner.setType(PETSc.PC.Type.PYTHON)
+    preconditioner.setPythonContext(context)
 
 
 #: Unknowns of a solid up to which its LU factors cost next to nothing in a coupled system.

@@ -14,7 +14,7 @@ from solvers.algebra.rounding import rounding_error
 from solvers.algebra.rows import RowTransformation, TakenRows
 from solvers.algebra.sparse import Sparse, block_diagonal
 from solvers.algebra.vertices import VertexJacobian
-from solvers.api import Array, FailureKind, State, Step, StepFailed, StepInfo
+from solvers.api import Array, FailureKind, Indices, State, Step, StepFailed, StepInfo
 from solvers.generalised_alpha import GeneralisedAlpha
 from solvers.newton import Tolerance, converge
 from solvers.rigid import line_springs, motion, surface
@@ -440,6 +440,10 @@ class RigidBodies:
         return tuple((self.bodies[index].inertia.centre + self.now[index].shift[: self.dim]).tolist())
 
     # ------------------------------------------------------------------------------------- rows of a larger system
+
+    def few(self) -> Indices:
+        """Numbers of all unknowns that are not held."""
+        return self.first + np.flatnonzero(self._free)
 
     def row_transformations(self) -> list[RowTransformation]:
         with supported():

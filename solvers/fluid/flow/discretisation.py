@@ -66,7 +66,7 @@ def discretise(
         degree=settings.degree,
         steady=settings.steady,
         sheets=sheets is not None,
-        with_solids=any(body.motion is None for body in bodies),
+        with_solids=any(body.deforms for body in bodies),
         rough=is_rough(grid, convection=settings.convection),
     )
     surfaces = [body.surface for body in bodies]

@@ -142,6 +142,7 @@ class Multigrid:
         self._last: PETSc.Mat | None = None
         self._coarse: list[CoarseMatrix] = []
         self._cycle: PETSc.PC | None = None
+        self._multiplied = 0  #: handle of the matrix with which the cycle computes residuals on the finest level
         while comm.allreduce(self.levels[-1].owned) > COARSEST:
             lattices = [component.lattice for component in self.levels[-1].components]
             if lattices[-1].smallest:
@@ -161,6 +162,10 @@ class Multigrid:
         product: the matrix that multiplies vectors, None: `matrix`.
         """
         matrices, interpolations = self._galerkin(matrix, held)
+        finest = product or matrix
+        if finest.handle != self._multiplied:
+            self._cycle = None  # PETSc's cycles compute residuals with the matrix of their first set-up
+        self._multiplied = finest.handle
         cycle = self._cycle = self._cycle or self._new_cycle(interpolations)
         if self._second and interpolations:
             self._cycle = None  # the smoothers depend on where the surfaces are
@@ -173,10 +178,10 @@ class Multigrid:
                 smoother.setOperators(of)
             else:
                 smoother.getPC().setReusePreconditioner(False)
-                multiplied = product or matrix if of is matrix else of
+                multiplied = finest if of is matrix else of
                 smoother.setOperators(multiplied, decoupled(of, here.component_of()) if self._second else of)
         cycle.setUseAmat(True)  # PETSc gives the finest smoother the operators of the cycle
-        cycle.setOperators(product or matrix, matrix)
+        cycle.setOperators(finest, matrix)
         cycle.setUp()
         for level in range(len(matrices)):
             smoother = cycle.getMGSmoother(level)
