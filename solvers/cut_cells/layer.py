@@ -36,25 +36,40 @@ def flattened(table: CutTable, vertices: int, height: float) -> CutTable:
     vertices: number of them in the plane.
     """
     regions, n = len(table.cell), round(table.face_moments.shape[1] ** 0.5)
-    segment, second = np.divmod(table.piece_facet, 2)
-    ends = np.zeros((2, 3, 2))  # the end of the segment that each vertex of its two triangles stands on
-    ends[0, [0, 1, 2], [0, 1, 1]] = ends[1, [0, 1, 2], [0, 1, 0]] = 1.0
-    pieces = table.piece_moments.reshape(len(segment), n, n * n, 3).sum(axis=1) @ ends[second] / height
-    key = table.piece_region * (segment.max(initial=0) + 1) + segment
-    first = np.flatnonzero(np.diff(key, prepend=-1))
+    piece_region, piece_facet, piece_body, piece_moments = _of_segments(
+        n, height, table.piece_region, table.piece_facet, table.piece_body, table.piece_moments
+    )
+    closed_cell, closed_facet, _, closed_moments = _of_segments(
+        n, height, table.closed_cell, table.closed_facet, table.closed_facet, table.closed_moments
+    )
     sides = table.face_axis < 2
     return replace(
         table,
         shape=table.shape[:2],
         vertices=np.ascontiguousarray(table.vertices[:vertices, :2]),
         moments=table.moments.reshape(regions, n, n * n).sum(axis=1),
-        piece_region=table.piece_region[first],
-        piece_facet=segment[first],
-        piece_body=table.piece_body[first],
-        piece_moments=np.add.reduceat(pieces, first) if len(first) else pieces,
+        piece_region=piece_region,
+        piece_facet=piece_facet,
+        piece_body=piece_body,
+        piece_moments=piece_moments,
         face_axis=table.face_axis[sides],
         face_cells=table.face_cells[sides],
         face_regions=table.face_regions[sides],
         face_area=table.face_area[sides],
         face_moments=table.face_moments.reshape(-1, n, n).sum(axis=1)[sides],
+        closed_cell=closed_cell,
+        closed_facet=closed_facet,
+        closed_moments=closed_moments,
     )
+
+
+def _of_segments(
+    n: int, height: float, place: Indices, facet: Indices, body: Indices, moments: Array
+) -> tuple[Indices, Indices, Indices, Array]:
+    """(place, segment, body, moments) of pieces of segments from those of their triangles, sorted by place and facet."""
+    segment, second = np.divmod(facet, 2)
+    ends = np.zeros((2, 3, 2))  # the end of the segment that each vertex of its two triangles stands on
+    ends[0, [0, 1, 2], [0, 1, 1]] = ends[1, [0, 1, 2], [0, 1, 0]] = 1.0
+    pieces = moments.reshape(len(segment), n, n * n, 3).sum(axis=1) @ ends[second] / height
+    first = np.flatnonzero(np.diff(place * (segment.max(initial=0) + 1) + segment, prepend=-1))
+    return place[first], segment[first], body[first], np.add.reduceat(pieces, first) if len(first) else pieces

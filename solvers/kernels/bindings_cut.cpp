@@ -16,11 +16,11 @@ using Integers = Values<const std::int64_t, 1>;
 struct CutCells {
   double quantum;
   nb::object vertices, state, kernel, cell, share, moments, piece_region, piece_facet, piece_moments, face_axis,
-    face_cells, face_regions, face_area, face_moments;
+    face_cells, face_regions, face_area, face_moments, closed_cell, closed_facet, closed_moments;
 };
 
 CutCells cut_cells(const std::vector<Doubles>& edges, const Doubles& points, const Values<const double, 2>& vertices,
-                   const Values<const std::int64_t, 2>& facets, const Integers& body, bool only_exact) {
+                   const Values<const std::int64_t, 2>& facets, const Integers& body, double closing, bool only_exact) {
   require(edges.size() == 3, "edges must be 3 arrays");
   require(vertices.shape(1) == 3 && facets.shape(1) == 3, "vertices and facets must have 3 columns");
   require(body.size() == facets.shape(0), "body must have one number for each facet");
@@ -45,14 +45,15 @@ CutCells cut_cells(const std::vector<Doubles>& edges, const Doubles& points, con
     quantum = lattice.quantum;
     for (const auto& vertex : lattice.vertices)
       for (int d = 0; d < 3; ++d) rounded.push_back(static_cast<double>(vertex[d]) * quantum);
+    const double length = closing / quantum;
     switch (n) {
-      case 2: table = cut::TableMaker<2>(lattice, points.data(), only_exact).make(); break;
-      case 3: table = cut::TableMaker<3>(lattice, points.data(), only_exact).make(); break;
-      default: table = cut::TableMaker<5>(lattice, points.data(), only_exact).make();
+      case 2: table = cut::TableMaker<2>(lattice, points.data(), length, only_exact).make(); break;
+      case 3: table = cut::TableMaker<3>(lattice, points.data(), length, only_exact).make(); break;
+      default: table = cut::TableMaker<5>(lattice, points.data(), length, only_exact).make();
     }
   }
   const std::size_t cells = table.state.size(), regions = table.cell.size(), pieces = table.piece_facet.size();
-  const std::size_t faces = table.face_axis.size(), all = n * n * n;
+  const std::size_t faces = table.face_axis.size(), closed = table.closed_facet.size(), all = n * n * n;
   return {quantum,
           to_numpy(std::move(rounded), {vertices.shape(0), 3}),
           to_numpy(std::move(table.state), {cells}),
@@ -67,7 +68,10 @@ CutCells cut_cells(const std::vector<Doubles>& edges, const Doubles& points, con
           to_numpy(std::move(table.face_cells), {faces, 2}),
           to_numpy(std::move(table.face_regions), {faces, 2}),
           to_numpy(std::move(table.face_area), {faces}),
-          to_numpy(std::move(table.face_moments), {faces, n * n})};
+          to_numpy(std::move(table.face_moments), {faces, n * n}),
+          to_numpy(std::move(table.closed_cell), {closed}),
+          to_numpy(std::move(table.closed_facet), {closed}),
+          to_numpy(std::move(table.closed_moments), {closed, all, 3})};
 }
 
 }  // namespace
@@ -88,7 +92,11 @@ void bind_cut(nb::module_& module) {
     .def_ro("face_cells", &CutCells::face_cells)
     .def_ro("face_regions", &CutCells::face_regions)
     .def_ro("face_area", &CutCells::face_area)
-    .def_ro("face_moments", &CutCells::face_moments);
-  module.def("cut_cells", &cut_cells, "edges"_a, "points"_a, "vertices"_a, "facets"_a, "body"_a, "only_exact"_a = false,
+    .def_ro("face_moments", &CutCells::face_moments)
+    .def_ro("closed_cell", &CutCells::closed_cell)
+    .def_ro("closed_facet", &CutCells::closed_facet)
+    .def_ro("closed_moments", &CutCells::closed_moments);
+  module.def("cut_cells", &cut_cells, "edges"_a, "points"_a, "vertices"_a, "facets"_a, "body"_a, "closing"_a = 0.0,
+             "only_exact"_a = false,
              "Regions of the fluid in the cells that closed surfaces of bodies cut, in 3D; see solvers.cut_cells.");
 }

@@ -12,6 +12,7 @@
 
 #include "cut_integers.hpp"
 #include "cut_lattice.hpp"
+#include "cut_zones.hpp"
 
 namespace cut {
 
@@ -64,8 +65,10 @@ struct PointName {
 // Planes, points and polygons around one cell or face.
 class Context {
 public:
-  explicit Context(const Lattice& lattice)
-    : lattice_(lattice), local_(lattice.planes + 4 * lattice.facets.size()), stamp_(local_.size(), -1) {}
+  Context(const Lattice& lattice, const Zones& zones)
+    : lattice_(lattice), zones_(zones), first_over_(lattice.planes + 4 * lattice.facets.size()),
+      first_opening_(first_over_ + 3 * zones.over.size()), local_(first_opening_ + 2 * zones.pairs.size()),
+      stamp_(local_.size(), -1) {}
 
   std::vector<Plane> planes;
   std::vector<Point> points;
@@ -86,9 +89,32 @@ public:
   std::int64_t edge_plane(int facet, int edge) const { return facet_plane(facet) + 1 + edge; }
   const Lattice& lattice() const { return lattice_; }
 
+  // A plane, and the side of it where a zone is: -1, 1.
+  using Bounds = std::vector<std::pair<int, int>>;
+
+  // Over a facet.
+  void bounds_over(int facet, Bounds& bounds) {
+    const int slot = zones_.slot[facet];
+    for (int e = 0; e < 3; ++e) bounds.push_back({plane(first_over_ + 3 * slot + e), -1});
+  }
+
+  // The gap of a pair is at most the closing length (0), or at least minus it (1).
+  void bounds_of_gap(int pair, int which, Bounds& bounds) {
+    if (!zones_.opening[pair][which].everywhere()) bounds.push_back({plane(first_opening_ + 2 * pair + which), -1});
+  }
+
+  Bounds bounds_of_zone(int pair) {
+    Bounds bounds;
+    const auto& [a, b] = zones_.pairs[pair];
+    for (const int facet : {a, b}) bounds.push_back({plane(facet_plane(facet)), 1});
+    bounds_of_gap(pair, 0, bounds);
+    for (const int facet : {a, b}) bounds_over(facet, bounds);
+    return bounds;
+  }
+
   int plane(std::int64_t name) {
     if (stamp_[name] == now_) return local_[name];
-    Plane made = name < lattice_.planes ? of_grid(name) : of_facet(name);
+    Plane made = name < lattice_.planes ? of_grid(name) : name < first_over_ ? of_facet(name) : of_zone(name);
     stamp_[name] = now_;
     planes.push_back(std::move(made));
     return local_[name] = static_cast<int>(planes.size()) - 1;
@@ -278,6 +304,29 @@ private:
     return made;
   }
 
+  Plane of_zone(std::int64_t name) const {
+    const std::int64_t over = name - first_over_, opening = name - first_opening_;
+    const HalfSpace& half = opening < 0 ? zones_.over[over / 3][over % 3] : zones_.opening[opening / 2][opening % 2];
+    Plane made{};
+    made.name = name;
+    made.through.fill(-1);
+    made.exact = true;
+    made.D = Integer<2>(std::int64_t{1} << normal_bits) * Integer<1>(half.shift);
+    made.d = to_unit * static_cast<double>(half.shift);
+    made.d_size = std::abs(made.d);
+    for (int d = 0; d < 3; ++d) {
+      const std::int64_t base = half.base[d] - origin_[d];
+      made.N[d] = Integer<2>(half.N[d]);
+      made.D += made.N[d] * Integer<1>(base);
+      made.n[d] = std::ldexp(static_cast<double>(half.N[d]), -normal_bits);
+      made.n_size[d] = std::abs(made.n[d]);
+      made.d += made.n[d] * to_unit * static_cast<double>(base);
+      made.d_size += made.n_size[d] * to_unit * std::abs(static_cast<double>(base));
+      if (made.n_size[d] > made.n_size[made.axis]) made.axis = d;
+    }
+    return made;
+  }
+
   double step(int a, int b, int d) const {
     return to_unit * static_cast<double>(lattice_.vertices[b][d] - lattice_.vertices[a][d]);
   }
@@ -418,6 +467,8 @@ private:
   }
 
   const Lattice& lattice_;
+  const Zones& zones_;
+  std::int64_t first_over_, first_opening_;  // names of planes of zones
   Integers3 origin_{};
   std::vector<int> local_, stamp_;  // number here of each plane, valid where the stamp is `now_`
   int now_ = -1;
