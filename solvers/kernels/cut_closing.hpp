@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <vector>
 
 #include "cut_candidates.hpp"
@@ -20,6 +21,7 @@ public:
   Zones find() {
     normals();
     find_pairs();
+    count_edges();
     zones_.slot.assign(lattice_.facets.size(), -1);
     for (std::size_t p = 0; p < zones_.pairs.size(); ++p)
       for (const int facet : zones_.pairs[p]) {
@@ -151,19 +153,35 @@ private:
     return found;
   }
 
+  // Edges of facets with pairs.
+  void count_edges() {
+    std::vector<int> some;
+    for (const auto& [a, b] : zones_.pairs) some.insert(some.end(), {a, b});
+    std::sort(some.begin(), some.end());
+    some.erase(std::unique(some.begin(), some.end()), some.end());
+    for (const int facet : some)
+      for (int e = 0; e < 3; ++e) ++count_[edge(facet, e)];
+  }
+
+  std::pair<int, int> edge(int facet, int e) const {
+    return std::minmax(lattice_.facets[facet][e], lattice_.facets[facet][(e + 1) % 3]);
+  }
+
   // Unit vector in the plane of a facet, out of it beside an edge.
   Point3 outward(int facet, int edge) const {
     return unit(cross(way(vertex(facet, edge), vertex(facet, (edge + 1) % 3)), normal_[facet]));
   }
 
-  // The zones of neighbours overlap by the gap, so that none is left between them where the surface bends.
+  // The zones of neighbours that both face something overlap by the gap, so that none is left between them where the
+  // surface bends.
   std::array<HalfSpace, 3> over(int facet, double margin) const {
     std::array<HalfSpace, 3> found;
     for (int e = 0; e < 3; ++e) {
       const Point3 side = outward(facet, e), along = way(vertex(facet, e), vertex(facet, (e + 1) % 3));
       for (int d = 0; d < 3; ++d) found[e].N[d] = integer(side[d]);
       found[e].base = vertex(facet, e);
-      found[e].shift = static_cast<std::int64_t>(std::ceil(margin + 4 + 16 * rounding_error * std::sqrt(dot(along, along))));
+      const double bend = count_.at(edge(facet, e)) > 1 ? margin : 0;
+      found[e].shift = static_cast<std::int64_t>(std::ceil(bend + 4 + 16 * rounding_error * std::sqrt(dot(along, along))));
     }
     return found;
   }
@@ -204,6 +222,7 @@ private:
   double length_;
   std::vector<Point3> normal_;
   std::vector<double> margin_;  // quanta
+  std::map<std::pair<int, int>, int> count_;
   Zones zones_;
 };
 

@@ -417,8 +417,10 @@ private:
   // Facets that coincide are those of the first body; without facets it is where a zone ends.
   void add_surface(const Portal& portal, int above, int region, const std::array<int, 3>& at, CellRegions& out) {
     const int other = portal.part[1 - above];
-    if (portal.cover < 0 && other >= 0 && closed_[other])
-      add_piece({portal.shape, -1, 1, above == 1}, region, at, out.surface, out);
+    if (portal.cover < 0 && other >= 0 && closed_[other]) {
+      const Plane& plane = context_.planes[portal.shape.plane];
+      add_piece({portal.shape, -1, 1, (plane.n[plane.axis] > 0) != (above == 1)}, region, at, out.surface, out);
+    }
     int first = static_cast<int>(lattice_.of_body.size());
     const auto mine = [&](const Fragment& of) { return (of.sign > 0) == (above == 1); };
     for (int c = portal.cover; c >= 0; c = covers_[c].next)

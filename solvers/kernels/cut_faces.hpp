@@ -183,7 +183,8 @@ private:
         if (corner.point == corner_[k]) found_.at_corner[k] = number;
     }
     part.area = 0.5 * context_.twice_area(polygon)[axis_] / (size_[0] * size_[1]);
-    for (const auto& segment : beside) part.beside.push_back(segment.facet);
+    for (const auto& segment : beside)
+      if (context_.side(polygon, segment.plane) == 1) part.beside.push_back(segment.facet);
     for (const int facet : covering_) {
       bool covered = true;
       for (int i = 0; i < 3 && covered; ++i) {
