@@ -66,7 +66,7 @@ def flattened(table: CutTable, vertices: int, height: float) -> CutTable:
 def _of_segments(
     n: int, height: float, place: Indices, facet: Indices, body: Indices, moments: Array
 ) -> tuple[Indices, Indices, Indices, Array]:
-    """(place, segment, body, moments) of pieces of segments from those of their triangles, sorted by place and facet."""
+    """(place, segment, body, moments) of pieces of segments from those of their triangles, sorted by place."""
     segment, second = np.divmod(facet, 2)
     ends = np.zeros((2, 3, 2))  # the end of the segment that each vertex of its two triangles stands on
     ends[0, [0, 1, 2], [0, 1, 1]] = ends[1, [0, 1, 2], [0, 1, 0]] = 1.0
