@@ -28,8 +28,8 @@ def cut_cells(
     (0, 1), for L_q; x: vertices of the surfaces [m], shape (vertices, dim); closing: length [m], fluid between facets
     that face each other is solid where the gap is at most this, 0: nowhere; only_exact: the exact kernel for all cells,
     slower by ten times and more.
-    ValueError for arrays and lengths that do not fit, for cells that are too small beside the extent of the box and the surfaces
-    (2^-41 of it), and for a surface whose facets do not turn the same way.
+    ValueError for arrays and lengths that do not fit, for cells that are too small beside the extent of the box and the
+    surfaces (2^-41 of it), and for a surface whose facets do not turn the same way.
     """
     dim = surfaces.dim
     if len(edges) != dim or x.ndim != 2 or x.shape[1] != dim:
