@@ -10,31 +10,30 @@ from solvers.api import Array, Indices
 from solvers.cut_cells.table import CutTable
 
 
-def walls(facets: Indices, body: Indices, x: Array, height: float) -> tuple[Indices, Indices, Array]:
-    """(triangles, body of each, vertices) of walls from -height to 2 height on segments, closed above and below.
+def walls(facets: Indices, body: Indices) -> tuple[Indices, Indices]:
+    """(triangles, body of each) of walls on segments, closed above and below, on vertices of `wall_vertices`.
 
     Triangles 2 i and 2 i + 1 are those on segment i. The ends are fans about a vertex of each body: they overlap
     themselves, but turn about a point as often as the body does, and no cell meets them.
     """
-    count = len(x)
-    low, high = facets, facets + count
+    low, high = 2 * facets, 2 * facets + 1
     sides = np.stack([low[:, 0], low[:, 1], high[:, 1], low[:, 0], high[:, 1], high[:, 0]], axis=1).reshape(-1, 3)
     bodies, first = np.unique(body, return_index=True)
     centre = facets[first[np.searchsorted(bodies, body)], 0]
-    below = np.stack([centre, low[:, 1], low[:, 0]], axis=1)
-    above = np.stack([centre + count, high[:, 0], high[:, 1]], axis=1)
+    below = np.stack([2 * centre, low[:, 1], low[:, 0]], axis=1)
+    above = np.stack([2 * centre + 1, high[:, 0], high[:, 1]], axis=1)
     some = (facets != centre[:, None]).all(axis=1)
-    levels = np.repeat([-height, 2.0 * height], count)
-    vertices = np.column_stack([np.tile(x, (2, 1)), levels])
     triangles = np.concatenate([sides, below[some], above[some]])
-    return triangles, np.concatenate([np.repeat(body, 2), body[some], body[some]]), vertices
+    return triangles, np.concatenate([np.repeat(body, 2), body[some], body[some]])
 
 
-def flattened(table: CutTable, vertices: int, height: float) -> CutTable:
-    """The table of a layer of this height [m] as that of its plane.
+def wall_vertices(x: Array, height: float) -> Array:
+    """Vertices of walls from -height to 2 height, of each vertex of the plane the lower and the upper one."""
+    return np.column_stack([np.repeat(x, 2, axis=0), np.tile([-height, 2.0 * height], len(x))])
 
-    vertices: number of them in the plane.
-    """
+
+def flattened(table: CutTable, height: float) -> CutTable:
+    """The table of a layer of this height [m] as that of its plane."""
     regions, n = len(table.cell), round(table.face_moments.shape[1] ** 0.5)
     piece_region, piece_facet, piece_body, piece_moments = _of_segments(
         n, height, table.piece_region, table.piece_facet, table.piece_body, table.piece_moments
@@ -46,7 +45,7 @@ def flattened(table: CutTable, vertices: int, height: float) -> CutTable:
     return replace(
         table,
         shape=table.shape[:2],
-        vertices=np.ascontiguousarray(table.vertices[:vertices, :2]),
+        vertices=np.ascontiguousarray(table.vertices[::2, :2]),
         moments=table.moments.reshape(regions, n, n * n).sum(axis=1),
         piece_region=piece_region,
         piece_facet=piece_facet,

@@ -58,6 +58,7 @@ private:
 struct CellRegions {
   bool exact = false;
   bool cut = false;   // there is surface in the cell or in its faces
+  bool alone = true;  // only facets in the cell decided
   int regions = 0;
   std::vector<SurfacePiece> surface;
   std::vector<SurfacePiece> closed;                    // where another facet touches; exact kernel only

@@ -10,6 +10,7 @@
 #include "cut_closing.hpp"
 #include "cut_exact.hpp"
 #include "cut_fast.hpp"
+#include "cut_memory.hpp"
 #include "cut_moments.hpp"
 
 namespace cut {
@@ -32,13 +33,14 @@ struct Table {
 template <int N>
 class TableMaker {
 public:
-  // closing: length in quanta, 0: none
-  TableMaker(const Lattice& lattice, const double* points, double closing, bool only_exact)
-    : lattice_(lattice), integrals_(points), only_exact_(only_exact),
+  // closing: length in quanta, 0: none; old: of a table of the same grid, facets, points and choices
+  TableMaker(const Lattice& lattice, const double* points, double closing, bool only_exact, Memory old)
+    : lattice_(lattice), integrals_(points), only_exact_(only_exact), old_(std::move(old)),
       zones_(closing > 0 ? ZoneFinder(lattice, closing).find() : Zones{}),
       zones_of_(zones_by_cell(lattice, zones_, closing)), candidates_(candidates(lattice)) {
     candidates_.add(zones_of_.cells);
     cells_.resize(candidates_.cells.size());
+    kept_.assign(cells_.size(), -1);
   }
 
   Table make() {
@@ -48,19 +50,50 @@ public:
     for (std::size_t body = 0; body < lattice_.of_body.size(); ++body) fill(static_cast<int>(body));
     number_regions();
     integrate_surface();
+    flux_ = table_.moments;
     link_faces();
     return std::move(table_);
+  }
+
+  // After `make`, of what it made.
+  Memory memory(const Table& table) {
+    Memory made;
+    made.filled = true;
+    made.quantum = lattice_.quantum;
+    made.vertices = lattice_.vertices;
+    for (const char filled : filled_) made.whole.push_back(!filled);
+    made.pieces = {std::move(first_piece_), {}, table.piece_facet, table.piece_moments};
+    made.closed = {std::move(first_closed_), {}, table.closed_facet, table.closed_moments};
+    made.first_region.assign(first_region_.begin(), first_region_.end());
+    made.first_region.push_back(table.cell.size());
+    made.pieces.region = table.piece_region;
+    for (std::size_t c = 0; c < cells_.size(); ++c)
+      for (std::size_t k = made.pieces.first[c]; k < made.pieces.first[c + 1]; ++k)
+        made.pieces.region[k] -= first_region_[c];
+    made.closed.region.assign(table.closed_facet.size(), -1);
+    made.flux = std::move(flux_);
+    made.zones = std::move(zones_);
+    made.zones_of = std::move(zones_of_);
+    made.candidates = std::move(candidates_);
+    made.cells = std::move(cells_);
+    made.faces = std::move(faces_);
+    return made;
   }
 
 private:
   static constexpr int size = N * N * N, face_size = N * N;
 
   void compute_cells() {
+    keep_cells();
     FastCell fast(lattice_);
     ExactCell exact(lattice_, zones_);
     std::vector<int> facets;
-    const ExactCell::Winding winding = [&](int body, const Point3& x) { return turns(body, x); };
+    const ExactCell::Winding winding = [&](int body, const Point3& x) {
+      alone_ = false;
+      return turns(body, x);
+    };
     for (std::size_t c = 0; c < cells_.size(); ++c) {
+      if (kept_[c] >= 0) continue;
       const auto at = lattice_.index(candidates_.cells[c]);
       const int* begin = candidates_.facets.data() + candidates_.first[c];
       const int count = static_cast<int>(candidates_.first[c + 1] - candidates_.first[c]);
@@ -71,15 +104,42 @@ private:
       std::array<const FaceParts*, 6> faces;
       for (int k = 0; k < 6; ++k) faces[k] = &parts(k, at, facets, zones);
       origin_ = lattice_.low(at);
+      alone_ = true;
       exact.compute(at, facets, zones, faces, winding, cells_[c]);
+      cells_[c].alone = alone_;
     }
   }
 
-  const FaceParts& parts(int face, std::array<int, 3> at, const std::vector<int>& facets, std::span<const int> zones) {
+  // Cells none of whose facets moved, with the same zones, and their faces.
+  void keep_cells() {
+    if (!old_.filled) return;
+    const auto moved = old_.moved(lattice_);
+    const bool same_zones = zones_ == old_.zones;
+    for (std::size_t c = 0; c < cells_.size(); ++c) {
+      const int cell = candidates_.cells[c], k = old_.candidates.find(cell);
+      if (k < 0 || !old_.cells[k].alone) continue;
+      const auto facets = candidates_.of(cell), before = old_.candidates.of(cell);
+      const auto zones = zones_of_.of(cell), zones_before = old_.zones_of.of(cell);
+      if (!std::ranges::equal(facets, before) || !std::ranges::equal(zones, zones_before)) continue;
+      if (!zones.empty() && !same_zones) continue;
+      if (std::any_of(facets.begin(), facets.end(), [&](int facet) { return moved[facet]; })) continue;
+      kept_[c] = k;
+      cells_[c] = std::move(old_.cells[k]);
+      if (!cells_[c].exact) continue;
+      for (int face = 0; face < 6; ++face)
+        faces_.insert(old_.faces.extract(face_key(face, lattice_.index(cell))));
+    }
+  }
+
+  std::int64_t face_key(int face, std::array<int, 3> at) const {
     at[face / 2] += face % 2;
-    const std::int64_t key = face / 2 + 3 * (at[0] + (lattice_.cells[0] + std::int64_t{1}) *
-                                                       (at[1] + (lattice_.cells[1] + std::int64_t{1}) * at[2]));
-    const auto [found, fresh] = faces_.try_emplace(key);
+    return face / 2 + 3 * (at[0] + (lattice_.cells[0] + std::int64_t{1}) *
+                                     (at[1] + (lattice_.cells[1] + std::int64_t{1}) * at[2]));
+  }
+
+  const FaceParts& parts(int face, std::array<int, 3> at, const std::vector<int>& facets, std::span<const int> zones) {
+    const auto [found, fresh] = faces_.try_emplace(face_key(face, at));
+    at[face / 2] += face % 2;
     if (fresh) found->second = division_.divide(face / 2, at, facets, zones);
     return found->second;
   }
@@ -166,13 +226,14 @@ private:
 
   void number_regions() {
     first_region_.assign(cells_.size(), 0);
+    filled_.assign(cells_.size(), 0);
     for (std::size_t c = 0; c < cells_.size(); ++c) {
       const int cell = candidates_.cells[c];
       CellRegions& here = cells_[c];
-      put_in_order(here);
+      if (kept_[c] < 0) put_in_order(here);
       first_region_[c] = static_cast<std::int64_t>(table_.cell.size());
       if (!here.cut) continue;
-      if (table_.state[cell] == solid) here.closed.clear();
+      filled_[c] = table_.state[cell] == solid;
       table_.kernel[cell] = here.exact ? 2 : 1;
       if (table_.state[cell] == solid || here.regions == 0) {
         table_.state[cell] = solid;
@@ -198,6 +259,12 @@ private:
     std::vector<int> order;
     std::array<double, size> no_flux{};
     for (std::size_t c = 0; c < cells_.size(); ++c) {
+      first_piece_.push_back(table_.piece_facet.size());
+      first_closed_.push_back(table_.closed_facet.size());
+      if (kept_[c] >= 0 && !filled_[c] && old_.whole[kept_[c]]) {
+        copy_rows(c);
+        continue;
+      }
       const CellRegions& here = cells_[c];
       const auto at = lattice_.index(candidates_.cells[c]);
       const auto low = lattice_.low(at);
@@ -235,7 +302,7 @@ private:
         table_.closed_cell.push_back(candidates_.cells[c]);
         table_.closed_facet.push_back(piece.facet);
       };
-      add(here.closed, start_closed, table_.closed_moments, [&](const SurfacePiece&) { return no_flux.data(); });
+      if (!filled_[c]) add(here.closed, start_closed, table_.closed_moments, [&](const SurfacePiece&) { return no_flux.data(); });
       if (!is_mixed(c)) continue;
       const auto start = [&](const SurfacePiece& piece) {
         table_.piece_region.push_back(first_region_[c] + piece.region);
@@ -247,6 +314,29 @@ private:
       for (int k = 0; k < here.regions; ++k)
         integrals_.to_volume(table_.moments.data() + (first_region_[c] + k) * size);
     }
+    first_piece_.push_back(table_.piece_facet.size());
+    first_closed_.push_back(table_.closed_facet.size());
+  }
+
+  void copy_rows(std::size_t c) {
+    const int k = kept_[c];
+    const auto copy = [&](const MemoryRows& rows, std::vector<double>& moments, const auto& start) {
+      const std::size_t begin = rows.first[k], end = rows.first[k + 1];
+      for (std::size_t r = begin; r < end; ++r) start(rows.region[r], rows.facet[r]);
+      const auto from = rows.moments.begin();
+      moments.insert(moments.end(), from + 3 * size * begin, from + 3 * size * end);
+    };
+    copy(old_.closed, table_.closed_moments, [&](std::int64_t, std::int64_t facet) {
+      table_.closed_cell.push_back(candidates_.cells[c]);
+      table_.closed_facet.push_back(facet);
+    });
+    if (!is_mixed(c)) return;
+    copy(old_.pieces, table_.piece_moments, [&](std::int64_t region, std::int64_t facet) {
+      table_.piece_region.push_back(first_region_[c] + region);
+      table_.piece_facet.push_back(facet);
+    });
+    std::copy(old_.flux.begin() + old_.first_region[k] * size, old_.flux.begin() + old_.first_region[k + 1] * size,
+              table_.moments.begin() + first_region_[c] * size);
   }
 
   // What is on one side of a face.
@@ -379,10 +469,16 @@ private:
   const Lattice& lattice_;
   Integrals<N> integrals_;
   bool only_exact_;
+  Memory old_;
   Zones zones_;
   Candidates zones_of_;             // zones of each cell
   Candidates candidates_;
   std::vector<CellRegions> cells_;  // of each candidate
+  std::vector<int> kept_;           // of each candidate, its number in the old table, -1: computed
+  std::vector<char> filled_;        // candidates inside of a body that does not cut them
+  std::vector<std::size_t> first_piece_, first_closed_;
+  std::vector<double> flux_;
+  bool alone_ = true;
   FaceDivision division_{lattice_, zones_};
   std::unordered_map<std::int64_t, FaceParts> faces_;
   Integers3 origin_{};

@@ -19,10 +19,12 @@ struct HalfSpace {
   std::int64_t shift;
 
   bool everywhere() const { return !N[0] && !N[1] && !N[2]; }
+  bool operator==(const HalfSpace&) const = default;
 };
 
 struct Extent {
   Integers3 low, high;
+  bool operator==(const Extent&) const = default;
 };
 
 struct Zones {
@@ -33,7 +35,7 @@ struct Zones {
   std::vector<std::array<HalfSpace, 3>> over;        // of each slot: over the facet, beside each edge
   std::vector<std::vector<int>> of_slot;             // pairs of each slot
 
-  int slot_of(int facet) const { return slot.empty() ? -1 : slot[facet]; }
+  bool operator==(const Zones&) const = default;
 };
 
 }  // namespace cut
