@@ -44,7 +44,8 @@ struct Point {
   std::array<double, 4> X, size;
   Point3 x;                   // position in units of 2^fine_bits, relative to the cell
   int w = 1;                  // sign of X[3]
-  std::array<int, 2> edge{-1, -1};  // of a facet that it lies on by name
+  std::array<int, 2> edge{-1, -1};  // of a facet that it lies on by name, and the plane it crosses there
+  int across = -1;
   int exact = -1;
   int asked = -1, answer = 0; // the last plane, and the side of it
 };
@@ -138,13 +139,18 @@ public:
     std::array<int, 3> of{a, b, c};
     std::sort(of.begin(), of.end());
     std::array<int, 2> edge{-1, -1};
-    int& known = known_point(point_key(of, edge));
+    const auto key = point_key(of, edge);
+    int& known = known_point(key);
     if (known >= 0) return known;
     known = static_cast<int>(points.size());
     Point made{};
     made.planes = of;
     made.edge = edge;
-    for (int i = 0; i < 3; ++i) {
+    if (edge[0] >= 0) {
+      made.across = key[2];
+      cross_edge(made);
+    }
+    for (int i = 0; i < 3 && edge[0] < 0; ++i) {
       const Plane &p = planes[of[i]], &q = planes[of[(i + 1) % 3]], &r = planes[of[(i + 2) % 3]];
       for (int d = 0; d < 3; ++d) {
         const int e = next(d), f = next(e);
@@ -253,6 +259,45 @@ public:
 private:
   double distance(int vertex_number, int d) const {
     return to_unit * static_cast<double>(lattice_.vertices[vertex_number][d] - origin_[d]);
+  }
+
+  // Where an edge from a to b crosses a plane, s(x) = n.x - d: X = s(a) b - s(b) a, W = s(a) - s(b). Its facets may be
+  // in nearly one plane.
+  void cross_edge(Point& point) const {
+    const Plane& p = planes[point.across];
+    std::array<Point3, 2> x;
+    std::array<double, 2> s, size;
+    for (int v = 0; v < 2; ++v) {
+      s[v] = -p.d;
+      size[v] = p.d_size;
+      for (int d = 0; d < 3; ++d) {
+        x[v][d] = distance(point.edge[v], d);
+        s[v] += p.n[d] * x[v][d];
+        size[v] += p.n_size[d] * std::abs(x[v][d]);
+      }
+    }
+    for (int d = 0; d < 3; ++d) {
+      point.X[d] = s[0] * x[1][d] - s[1] * x[0][d];
+      point.size[d] = size[0] * std::abs(x[1][d]) + size[1] * std::abs(x[0][d]);
+    }
+    point.X[3] = s[0] - s[1];
+    point.size[3] = size[0] + size[1];
+  }
+
+  ExactPoint exact_crossing(const Point& point) {
+    const Plane& p = exact_plane(point.across);
+    std::array<Integer<3>, 2> s;
+    for (int v = 0; v < 2; ++v) {
+      const auto& x = lattice_.vertices[point.edge[v]];
+      for (int d = 0; d < 3; ++d) s[v] += p.N[d] * Integer<1>(x[d] - origin_[d]);
+      s[v] -= p.D;
+    }
+    ExactPoint made;
+    const auto &a = lattice_.vertices[point.edge[0]], &b = lattice_.vertices[point.edge[1]];
+    for (int d = 0; d < 3; ++d)
+      made.X[d] = Integer<7>(s[0] * Integer<1>(b[d] - origin_[d]) - s[1] * Integer<1>(a[d] - origin_[d]));
+    made.W = Integer<6>(s[0] - s[1]);
+    return made;
   }
 
   Plane of_grid(std::int64_t name) const {
@@ -378,7 +423,9 @@ private:
     points[number].exact = static_cast<int>(exact_.size());
     ExactPoint made;
     const auto of = points[number].planes;
-    if (of[0] < 0) {
+    if (points[number].across >= 0) {
+      made = exact_crossing(points[number]);
+    } else if (of[0] < 0) {
       for (int d = 0; d < 3; ++d) made.X[d] = Integer<7>(lattice_.vertices[of[1]][d] - origin_[d]);
       made.W = Integer<6>(1);
     } else {
