@@ -18,19 +18,18 @@ namespace cut {
 
 constexpr double to_unit = 1.0 / (std::int64_t{1} << fine_bits);  // from integers to numbers of the size of cells
 constexpr double rounding_error = 1.1102230246251565e-16;  // half of the distance from 1 to the next number
-// First-order bounds, in units of the rounding error, of sums of absolute values: n 4, d 8, X 21, W 17, side 29.
+// First-order bounds, in units of the rounding error, of sums of absolute values: n and d 4, X 17, W 17, side 26.
 constexpr double doubt = 64 * rounding_error;
 
 constexpr int next(int axis) { return axis == 2 ? 0 : axis + 1; }
 
 struct Plane {
   std::int64_t name;
-  Point3 n, n_size;     // normal, and the sums of the absolute values it came from
-  double d, d_size;
+  Point3 n;             // normal, nearest numbers
+  double d;
   int axis;             // along which it is not parallel: of a facet the steepest one
   std::array<int, 3> through;  // vertices in it by name, -1: none
-  bool exact = false;
-  std::array<Integer<2>, 3> N;
+  std::array<Integer<2>, 3> N;  // n.x = d in integers
   Integer<3> D;
 };
 
@@ -155,12 +154,12 @@ public:
       for (int d = 0; d < 3; ++d) {
         const int e = next(d), f = next(e);
         const double minor = q.n[e] * r.n[f] - q.n[f] * r.n[e];
-        const double size = q.n_size[e] * r.n_size[f] + q.n_size[f] * r.n_size[e];
+        const double size = std::abs(q.n[e] * r.n[f]) + std::abs(q.n[f] * r.n[e]);
         made.X[d] += p.d * minor;
-        made.size[d] += p.d_size * size;
+        made.size[d] += std::abs(p.d) * size;
         if (i > 0) continue;
         made.X[3] += p.n[d] * minor;
-        made.size[3] += p.n_size[d] * size;
+        made.size[3] += std::abs(p.n[d]) * size;
       }
     }
     points.push_back(made);
@@ -269,11 +268,11 @@ private:
     std::array<double, 2> s, size;
     for (int v = 0; v < 2; ++v) {
       s[v] = -p.d;
-      size[v] = p.d_size;
+      size[v] = std::abs(p.d);
       for (int d = 0; d < 3; ++d) {
         x[v][d] = distance(point.edge[v], d);
         s[v] += p.n[d] * x[v][d];
-        size[v] += p.n_size[d] * std::abs(x[v][d]);
+        size[v] += std::abs(p.n[d] * x[v][d]);
       }
     }
     for (int d = 0; d < 3; ++d) {
@@ -284,8 +283,8 @@ private:
     point.size[3] = size[0] + size[1];
   }
 
-  ExactPoint exact_crossing(const Point& point) {
-    const Plane& p = exact_plane(point.across);
+  ExactPoint exact_crossing(const Point& point) const {
+    const Plane& p = planes[point.across];
     std::array<Integer<3>, 2> s;
     for (int v = 0; v < 2; ++v) {
       const auto& x = lattice_.vertices[point.edge[v]];
@@ -305,48 +304,35 @@ private:
     made.name = name;
     made.axis = name >= lattice_.first_plane[2] ? 2 : name >= lattice_.first_plane[1] ? 1 : 0;
     const std::int64_t at = lattice_.lines[made.axis][name - lattice_.first_plane[made.axis]] - origin_[made.axis];
-    made.n[made.axis] = made.n_size[made.axis] = 1;
+    made.n[made.axis] = 1;
     made.d = to_unit * static_cast<double>(at);
-    made.d_size = std::abs(made.d);
     made.through.fill(-1);
-    made.exact = true;
     made.N[made.axis] = Integer<2>(1);
     made.D = Integer<3>(at);
     return made;
   }
 
+  // In integers, of which doubles are the nearest numbers: a facet may be long beside the cell.
   Plane of_facet(std::int64_t name) {
     const auto facet = static_cast<std::size_t>((name - lattice_.planes) / 4);
     const int edge = static_cast<int>((name - lattice_.planes) % 4) - 1;
     const auto& v = lattice_.facets[facet];
     Plane made{};
     made.name = name;
+    double unit = to_unit;
     if (edge < 0) {
       made.through = v;
-      for (int d = 0; d < 3; ++d) {
-        const int e = next(d), f = next(e);
-        const double be = step(v[0], v[1], e), bf = step(v[0], v[1], f), ce = step(v[0], v[2], e),
-                     cf = step(v[0], v[2], f);
-        made.n[d] = be * cf - bf * ce;
-        made.n_size[d] = std::abs(be * cf) + std::abs(bf * ce);
-      }
-      made.axis = steepest(made, v);
+      made.N = exact_normal(v);
+      unit *= to_unit;
     } else {
       // n = edge x axis, along the steepest axis of the facet: it is neither parallel to the facet nor to the edge
       const int axis = planes[plane(name - 1 - edge)].axis, e = next(axis), f = next(e);
-      const int a = v[edge], b = v[(edge + 1) % 3];
-      made.through = {a, b, -1};
-      made.n[e] = step(a, b, f);
-      made.n[f] = -step(a, b, e);
-      made.axis = std::abs(made.n[e]) > std::abs(made.n[f]) ? e : f;
-      for (int d = 0; d < 3; ++d) made.n_size[d] = std::abs(made.n[d]);
+      made.through = {v[edge], v[(edge + 1) % 3], -1};
+      const auto &a = lattice_.vertices[made.through[0]], &b = lattice_.vertices[made.through[1]];
+      made.N[e] = Integer<2>(b[f] - a[f]);
+      made.N[f] = Integer<2>(a[e] - b[e]);
     }
-    for (int d = 0; d < 3; ++d) {
-      const double x = distance(made.through[0], d);
-      made.d += made.n[d] * x;
-      made.d_size += made.n_size[d] * std::abs(x);
-    }
-    return made;
+    return in_doubles(made, lattice_.vertices[made.through[0]], unit);
   }
 
   Plane of_zone(std::int64_t name) const {
@@ -355,37 +341,21 @@ private:
     Plane made{};
     made.name = name;
     made.through.fill(-1);
-    made.exact = true;
     made.D = Integer<2>(std::int64_t{1} << normal_bits) * Integer<1>(half.shift);
-    made.d = to_unit * static_cast<double>(half.shift);
-    made.d_size = std::abs(made.d);
+    for (int d = 0; d < 3; ++d) made.N[d] = Integer<2>(half.N[d]);
+    return in_doubles(made, half.base, std::ldexp(1.0, -normal_bits));
+  }
+
+  // Adds N.x to D; unit: of N. The axis is the steepest one, -1: a facet without area.
+  Plane in_doubles(Plane made, const Integers3& x, double unit) const {
+    made.axis = -1;
     for (int d = 0; d < 3; ++d) {
-      const std::int64_t base = half.base[d] - origin_[d];
-      made.N[d] = Integer<2>(half.N[d]);
-      made.D += made.N[d] * Integer<1>(base);
-      made.n[d] = std::ldexp(static_cast<double>(half.N[d]), -normal_bits);
-      made.n_size[d] = std::abs(made.n[d]);
-      made.d += made.n[d] * to_unit * static_cast<double>(base);
-      made.d_size += made.n_size[d] * to_unit * std::abs(static_cast<double>(base));
-      if (made.n_size[d] > made.n_size[made.axis]) made.axis = d;
+      made.D += made.N[d] * Integer<1>(x[d] - origin_[d]);
+      made.n[d] = unit * made.N[d].value();
+      if (std::abs(made.n[d]) > (made.axis < 0 ? 0 : std::abs(made.n[made.axis]))) made.axis = d;
     }
+    made.d = unit * (to_unit * made.D.value());
     return made;
-  }
-
-  double step(int a, int b, int d) const {
-    return to_unit * static_cast<double>(lattice_.vertices[b][d] - lattice_.vertices[a][d]);
-  }
-
-  // -1: a facet without area
-  int steepest(const Plane& facet, const std::array<int, 3>& v) const {
-    int axis = 0;
-    for (int d = 1; d < 3; ++d)
-      if (std::abs(facet.n[d]) > std::abs(facet.n[axis])) axis = d;
-    if (std::abs(facet.n[axis]) > doubt * facet.n_size[axis]) return axis;
-    const auto n = exact_normal(v);
-    for (int d = 0; d < 3; ++d)
-      if (std::abs(n[d].value()) > std::abs(n[axis].value())) axis = d;
-    return n[axis].sign() ? axis : -1;
   }
 
   std::array<Integer<2>, 3> exact_normal(const std::array<int, 3>& v) const {
@@ -400,24 +370,6 @@ private:
     return n;
   }
 
-  const Plane& exact_plane(int number) {
-    Plane& p = planes[number];
-    if (p.exact) return p;
-    p.exact = true;
-    if (p.through[2] >= 0) {
-      p.N = exact_normal(p.through);
-    } else {
-      const auto facet = p.name - (p.name - lattice_.planes) % 4;
-      const int axis = planes[local_[facet]].axis, e = next(axis), f = next(e);
-      const auto &a = lattice_.vertices[p.through[0]], &b = lattice_.vertices[p.through[1]];
-      p.N[e] = Integer<2>(b[f] - a[f]);
-      p.N[f] = Integer<2>(a[e] - b[e]);
-    }
-    const auto& x = lattice_.vertices[p.through[0]];
-    for (int d = 0; d < 3; ++d) p.D += p.N[d] * Integer<1>(x[d] - origin_[d]);
-    return p;
-  }
-
   const ExactPoint& exact_point(int number) {
     if (points[number].exact >= 0) return exact_[points[number].exact];
     points[number].exact = static_cast<int>(exact_.size());
@@ -430,7 +382,7 @@ private:
       made.W = Integer<6>(1);
     } else {
       for (int i = 0; i < 3; ++i) {
-        const Plane &p = exact_plane(of[i]), &q = exact_plane(of[(i + 1) % 3]), &r = exact_plane(of[(i + 2) % 3]);
+        const Plane &p = planes[of[i]], &q = planes[of[(i + 1) % 3]], &r = planes[of[(i + 2) % 3]];
         for (int d = 0; d < 3; ++d) {
           const int e = next(d), f = next(e);
           const auto minor = q.N[e] * r.N[f] - q.N[f] * r.N[e];
@@ -452,15 +404,14 @@ private:
       return 0;
     }
     if (point.edge[0] >= 0 && holds(p, point.edge[0]) && holds(p, point.edge[1])) return 0;
-    double sum = -p.d * point.X[3], size = p.d_size * point.size[3];
+    double sum = -p.d * point.X[3], size = std::abs(p.d) * point.size[3];
     for (int d = 0; d < 3; ++d) {
       sum += p.n[d] * point.X[d];
-      size += p.n_size[d] * point.size[d];
+      size += std::abs(p.n[d]) * point.size[d];
     }
     if (std::abs(sum) > doubt * size) return sum > 0 ? point.w : -point.w;
     const ExactPoint& at = exact_point(number);
-    const Plane& q = exact_plane(plane_number);
-    auto value = q.N[0] * at.X[0] + q.N[1] * at.X[1] + q.N[2] * at.X[2] - q.D * at.W;
+    const auto value = p.N[0] * at.X[0] + p.N[1] * at.X[1] + p.N[2] * at.X[2] - p.D * at.W;
     return value.sign() * at.W.sign();
   }
 
