@@ -9,11 +9,18 @@ lie in one plane or in a plane of the grid, cover one portal together, that of t
 of the grid divide that face of both cells along their edges. No tolerance and no perturbation.
 
 A body is one or several closed surfaces that may touch, but not cross each other: a cell inside of two layers of one
-body is not seen to be solid. Surfaces that touch after a rotation touch to rounding only: whether fluid passes between
-them is then decided by the rounded vertices.
+body is not seen to be solid.
+
+Surfaces that touch after a rotation touch to rounding only, and the rounded vertices would decide whether fluid passes
+between them. The closing length decides instead. Fluid between two facets A, B of any bodies, whose normals are at more
+than 120 degrees, is taken for solid where n_A.(x - a) + n_B.(x - b) is at most this length, over both facets. Each pair
+has such a zone, a convex body of half-spaces with integer coefficients, found before the cells: both cells at a face
+see the same one, and no body is closed by its own thickness. Where neighbours bend the zones overlap by up to the gap.
+The ends of zones bound regions, but have no facet and are in no column; their area is of the order of the length.
 """
 
 from solvers.cut_cells.components import Components, components_of
-from solvers.cut_cells.make import cut_cells
+from solvers.cut_cells.heights import Heights, heights
+from solvers.cut_cells.make import CellCutter, cut_cells
 from solvers.cut_cells.surfaces import ClosedSurfaces
 from solvers.cut_cells.table import CellState, CutTable

@@ -52,6 +52,11 @@ class CutTable:
     face_area: Array  #: relative to the face, shape (F,)
     face_moments: Array  #: int L_q of the face / its area, the lower one of its axes fastest, shape (F, n^(dim - 1))
 
+    # Parts of facets that others touch, sorted by cell and facet: the gap is at most the closing length
+    closed_cell: Indices  #: shape (K,)
+    closed_facet: Indices  #: shape (K,)
+    closed_moments: Array  #: int L_q lambda_v [m^(dim - 1)], shape (K, n^dim, dim)
+
     @property
     def piece_area(self) -> Array:
         """Area of the pieces [m^(dim - 1)], shape (P,)."""

@@ -3,6 +3,7 @@
 from ._kernels import (
     BlockFactors,
     BlockProduct,
+    CellCutter,
     CutCells,
     KdopTree2,
     KdopTree3,
@@ -12,7 +13,6 @@ from ._kernels import (
     changed_rows,
     coarse_pattern,
     coarse_product,
-    cut_cells,
     divide_cells,
     moments,
     mortar,

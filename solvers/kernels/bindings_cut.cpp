@@ -1,9 +1,10 @@
-// Python names of the geometry of cut cells: cut_cells, CutCells.
+// Python names of the geometry of cut cells: CellCutter, CutCells.
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <utility>
 
 #include "bindings.hpp"
 #include "cut_table.hpp"
@@ -16,59 +17,90 @@ using Integers = Values<const std::int64_t, 1>;
 struct CutCells {
   double quantum;
   nb::object vertices, state, kernel, cell, share, moments, piece_region, piece_facet, piece_moments, face_axis,
-    face_cells, face_regions, face_area, face_moments;
+    face_cells, face_regions, face_area, face_moments, closed_cell, closed_facet, closed_moments;
 };
 
-CutCells cut_cells(const std::vector<Doubles>& edges, const Doubles& points, const Values<const double, 2>& vertices,
-                   const Values<const std::int64_t, 2>& facets, const Integers& body, bool only_exact) {
-  require(edges.size() == 3, "edges must be 3 arrays");
-  require(vertices.shape(1) == 3 && facets.shape(1) == 3, "vertices and facets must have 3 columns");
-  require(body.size() == facets.shape(0), "body must have one number for each facet");
-  require(std::all_of(facets.data(), facets.data() + facets.size(),
-                      [&](std::int64_t v) { return v >= 0 && v < static_cast<std::int64_t>(vertices.shape(0)); }),
-          "facets name vertices that are not there");
-  std::array<std::vector<double>, 3> lines;
-  for (int d = 0; d < 3; ++d) {
-    lines[d].assign(edges[d].data(), edges[d].data() + edges[d].size());
-    const auto& line = lines[d];
-    const auto found = std::adjacent_find(line.begin(), line.end(), std::greater_equal<>());
-    require(line.size() >= 2 && found == line.end(), "edges must increase");
-  }
-  const std::size_t n = points.size();
-  require(n == 2 || n == 3 || n == 5, "points must be 2, 3 or 5 numbers");
-  cut::Table table;
-  std::vector<double> rounded;
-  double quantum = 0;
-  {
-    nb::gil_scoped_release released;
-    const cut::Lattice lattice(lines, vertices.data(), vertices.shape(0), facets.data(), body.data(), facets.shape(0));
-    quantum = lattice.quantum;
-    for (const auto& vertex : lattice.vertices)
-      for (int d = 0; d < 3; ++d) rounded.push_back(static_cast<double>(vertex[d]) * quantum);
-    switch (n) {
-      case 2: table = cut::TableMaker<2>(lattice, points.data(), only_exact).make(); break;
-      case 3: table = cut::TableMaker<3>(lattice, points.data(), only_exact).make(); break;
-      default: table = cut::TableMaker<5>(lattice, points.data(), only_exact).make();
+// Grid, facets and choices of tables, and what the latest one left.
+class CellCutter {
+public:
+  CellCutter(const std::vector<Doubles>& edges, const Doubles& points, const Values<const std::int64_t, 2>& facets,
+             const Integers& body, double closing, bool only_exact)
+    : points_(points.data(), points.data() + points.size()), facets_(facets.data(), facets.data() + facets.size()),
+      body_(body.data(), body.data() + body.size()), closing_(closing), only_exact_(only_exact) {
+    require(edges.size() == 3, "edges must be 3 arrays");
+    require(facets.shape(1) == 3, "facets must have 3 columns");
+    require(body.size() == facets.shape(0), "body must have one number for each facet");
+    for (int d = 0; d < 3; ++d) {
+      lines_[d].assign(edges[d].data(), edges[d].data() + edges[d].size());
+      const auto& line = lines_[d];
+      const auto found = std::adjacent_find(line.begin(), line.end(), std::greater_equal<>());
+      require(line.size() >= 2 && found == line.end(), "edges must increase");
     }
+    const std::size_t n = points_.size();
+    require(n == 2 || n == 3 || n == 5, "points must be 2, 3 or 5 numbers");
   }
-  const std::size_t cells = table.state.size(), regions = table.cell.size(), pieces = table.piece_facet.size();
-  const std::size_t faces = table.face_axis.size(), all = n * n * n;
-  return {quantum,
-          to_numpy(std::move(rounded), {vertices.shape(0), 3}),
-          to_numpy(std::move(table.state), {cells}),
-          to_numpy(std::move(table.kernel), {cells}),
-          to_numpy(std::move(table.cell), {regions}),
-          to_numpy(std::move(table.share), {regions}),
-          to_numpy(std::move(table.moments), {regions, all}),
-          to_numpy(std::move(table.piece_region), {pieces}),
-          to_numpy(std::move(table.piece_facet), {pieces}),
-          to_numpy(std::move(table.piece_moments), {pieces, all, 3}),
-          to_numpy(std::move(table.face_axis), {faces}),
-          to_numpy(std::move(table.face_cells), {faces, 2}),
-          to_numpy(std::move(table.face_regions), {faces, 2}),
-          to_numpy(std::move(table.face_area), {faces}),
-          to_numpy(std::move(table.face_moments), {faces, n * n})};
-}
+
+  // keep: for the next table
+  CutCells cut(const Values<const double, 2>& vertices, bool keep) {
+    require(vertices.shape(1) == 3, "vertices must have 3 columns");
+    const auto count = static_cast<std::int64_t>(vertices.shape(0));
+    require(std::all_of(facets_.begin(), facets_.end(), [&](std::int64_t v) { return v >= 0 && v < count; }),
+            "facets name vertices that are not there");
+    cut::Table table;
+    std::vector<double> rounded;
+    double quantum = 0;
+    const std::size_t n = points_.size();
+    {
+      nb::gil_scoped_release released;
+      const cut::Lattice lattice(lines_, vertices.data(), vertices.shape(0), facets_.data(), body_.data(), body_.size());
+      quantum = lattice.quantum;
+      for (const auto& vertex : lattice.vertices)
+        for (int d = 0; d < 3; ++d) rounded.push_back(static_cast<double>(vertex[d]) * quantum);
+      switch (n) {
+        case 2: table = make<2>(lattice, keep); break;
+        case 3: table = make<3>(lattice, keep); break;
+        default: table = make<5>(lattice, keep);
+      }
+    }
+    const std::size_t cells = table.state.size(), regions = table.cell.size(), pieces = table.piece_facet.size();
+    const std::size_t faces = table.face_axis.size(), closed = table.closed_facet.size(), all = n * n * n;
+    return {quantum,
+            to_numpy(std::move(rounded), {vertices.shape(0), 3}),
+            to_numpy(std::move(table.state), {cells}),
+            to_numpy(std::move(table.kernel), {cells}),
+            to_numpy(std::move(table.cell), {regions}),
+            to_numpy(std::move(table.share), {regions}),
+            to_numpy(std::move(table.moments), {regions, all}),
+            to_numpy(std::move(table.piece_region), {pieces}),
+            to_numpy(std::move(table.piece_facet), {pieces}),
+            to_numpy(std::move(table.piece_moments), {pieces, all, 3}),
+            to_numpy(std::move(table.face_axis), {faces}),
+            to_numpy(std::move(table.face_cells), {faces, 2}),
+            to_numpy(std::move(table.face_regions), {faces, 2}),
+            to_numpy(std::move(table.face_area), {faces}),
+            to_numpy(std::move(table.face_moments), {faces, n * n}),
+            to_numpy(std::move(table.closed_cell), {closed}),
+            to_numpy(std::move(table.closed_facet), {closed}),
+            to_numpy(std::move(table.closed_moments), {closed, all, 3})};
+  }
+
+private:
+  template <int N>
+  cut::Table make(const cut::Lattice& lattice, bool keep) {
+    cut::TableMaker<N> maker(lattice, points_.data(), closing_ / lattice.quantum, only_exact_,
+                             std::exchange(memory_, {}));
+    cut::Table table = maker.make();
+    if (keep) memory_ = maker.memory(table);
+    return table;
+  }
+
+  std::array<std::vector<double>, 3> lines_;
+  std::vector<double> points_;
+  std::vector<std::int64_t> facets_, body_;
+  double closing_;
+  bool only_exact_;
+  cut::Memory memory_;
+};
 
 }  // namespace
 
@@ -88,7 +120,13 @@ void bind_cut(nb::module_& module) {
     .def_ro("face_cells", &CutCells::face_cells)
     .def_ro("face_regions", &CutCells::face_regions)
     .def_ro("face_area", &CutCells::face_area)
-    .def_ro("face_moments", &CutCells::face_moments);
-  module.def("cut_cells", &cut_cells, "edges"_a, "points"_a, "vertices"_a, "facets"_a, "body"_a, "only_exact"_a = false,
-             "Regions of the fluid in the cells that closed surfaces of bodies cut, in 3D; see solvers.cut_cells.");
+    .def_ro("face_moments", &CutCells::face_moments)
+    .def_ro("closed_cell", &CutCells::closed_cell)
+    .def_ro("closed_facet", &CutCells::closed_facet)
+    .def_ro("closed_moments", &CutCells::closed_moments);
+  nb::class_<CellCutter>(module, "CellCutter", "Makes tables of the fluid in cut cells, in 3D; see solvers.cut_cells.")
+    .def(nb::init<const std::vector<Doubles>&, const Doubles&, const Values<const std::int64_t, 2>&, const Integers&,
+                  double, bool>(),
+         "edges"_a, "points"_a, "facets"_a, "body"_a, "closing"_a, "only_exact"_a)
+    .def("cut", &CellCutter::cut, "vertices"_a, "keep"_a);
 }

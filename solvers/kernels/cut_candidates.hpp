@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <iterator>
+#include <span>
 #include <vector>
 
 #include "cut_planes.hpp"
@@ -17,18 +19,55 @@ struct Candidates {
     const auto at = std::lower_bound(cells.begin(), cells.end(), cell);
     return at != cells.end() && *at == cell ? static_cast<int>(at - cells.begin()) : -1;
   }
+
+  std::span<const int> of(int cell) const {
+    const int k = find(cell);
+    if (k < 0) return {};
+    return {facets.data() + first[k], facets.data() + first[k + 1]};
+  }
+
+  // Cells without facets.
+  void add(const std::vector<int>& others) {
+    Candidates merged;
+    std::set_union(cells.begin(), cells.end(), others.begin(), others.end(), std::back_inserter(merged.cells));
+    for (const int cell : merged.cells) {
+      merged.first.push_back(merged.facets.size());
+      const auto mine = of(cell);
+      merged.facets.insert(merged.facets.end(), mine.begin(), mine.end());
+    }
+    merged.first.push_back(merged.facets.size());
+    *this = std::move(merged);
+  }
 };
 
-// Never leaves out a facet that meets a cell, its boundary included.
-inline Candidates candidates(const Lattice& lattice) {
+// From keys of a cell in the upper and a facet in the lower 32 bits.
+inline Candidates by_cell(std::vector<std::uint64_t>& pairs) {
+  std::sort(pairs.begin(), pairs.end());
+  Candidates found;
+  for (const auto pair : pairs) {
+    const int cell = static_cast<int>(pair >> 32);
+    if (found.cells.empty() || found.cells.back() != cell) {
+      found.cells.push_back(cell);
+      found.first.push_back(found.facets.size());
+    }
+    found.facets.push_back(static_cast<int>(pair & 0xffffffffu));
+  }
+  found.first.push_back(found.facets.size());
+  return found;
+}
+
+// Never leaves out a facet that comes nearer to a cell than `reach` quanta, or meets its boundary.
+inline Candidates candidates(const Lattice& lattice, std::int64_t reach = 0) {
   std::vector<std::uint64_t> pairs;
   for (int facet = 0; facet < static_cast<int>(lattice.facets.size()); ++facet) {
     const auto& v = lattice.facets[facet];
     std::array<int, 3> from, to;
     bool any = true;
     for (int d = 0; d < 3; ++d) {
-      const auto [least, most] =
+      auto [least, most] =
         std::minmax({lattice.vertices[v[0]][d], lattice.vertices[v[1]][d], lattice.vertices[v[2]][d]});
+      least -= reach;
+      most += reach;
       const auto& lines = lattice.lines[d];
       // cells [lines[i], lines[i + 1]] with lines[i + 1] >= least and lines[i] <= most
       const auto below = std::lower_bound(lines.begin(), lines.end(), least) - lines.begin() - 1;
@@ -57,8 +96,8 @@ inline Candidates candidates(const Lattice& lattice) {
             const auto low = lattice.low(at), high = lattice.high(at);
             double middle = 0, reach = 0, error = 0;
             for (int d = 0; d < 3; ++d) {
-              const double half = 0.5 * static_cast<double>(high[d] - low[d]);
-              const double way = static_cast<double>(low[d] - lattice.vertices[v[0]][d]) + half;
+              const double inner = 0.5 * static_cast<double>(high[d] - low[d]), half = inner + static_cast<double>(reach);
+              const double way = static_cast<double>(low[d] - lattice.vertices[v[0]][d]) + inner;
               middle += n[d] * way;
               reach += std::abs(n[d]) * half;
               error += size[d] * (std::abs(way) + half);
@@ -68,18 +107,7 @@ inline Candidates candidates(const Lattice& lattice) {
           pairs.push_back(static_cast<std::uint64_t>(lattice.number(at)) << 32 | static_cast<std::uint32_t>(facet));
         }
   }
-  std::sort(pairs.begin(), pairs.end());
-  Candidates found;
-  for (const auto pair : pairs) {
-    const int cell = static_cast<int>(pair >> 32);
-    if (found.cells.empty() || found.cells.back() != cell) {
-      found.cells.push_back(cell);
-      found.first.push_back(found.facets.size());
-    }
-    found.facets.push_back(static_cast<int>(pair & 0xffffffffu));
-  }
-  found.first.push_back(found.facets.size());
-  return found;
+  return by_cell(pairs);
 }
 
 }  // namespace cut

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -21,9 +22,10 @@ public:
   // winding: number of turns of a body about a point, given relative to the cell in units of 2^fine_bits quanta
   using Winding = std::function<int(int body, const Point3& x)>;
 
-  explicit ExactCell(const Lattice& lattice) : lattice_(lattice), context_(lattice) {}
+  ExactCell(const Lattice& lattice, const Zones& zones) : lattice_(lattice), zones_(zones), context_(lattice, zones) {}
 
-  void compute(const std::array<int, 3>& at, const std::vector<int>& facets,
+  // zones: pairs of facets whose zones may meet the cell
+  void compute(const std::array<int, 3>& at, const std::vector<int>& facets, std::span<const int> zones,
                const std::array<const FaceParts*, 6>& faces, const Winding& winding, CellRegions& out) {
     context_.start(lattice_.low(at));
     portals_.clear();
@@ -35,10 +37,15 @@ public:
     for (const int facet : facets) add_facet(facet, at);
     out.exact = true;
     out.cut = !inside_[0].empty() || !covers_.empty();
-    if (!out.cut) return;
+    if (!out.cut && zones.empty()) return;
     for (int k = 0; k < parts_; ++k)
       while (!inside_[k].empty()) divide(k);
-    finish(at, faces, winding, out);
+    find_solid(at, winding, out);
+    close(zones);
+    if (!out.cut && std::find(closed_.begin(), closed_.end(), 1) == closed_.end()) return;
+    out.cut = true;
+    finish(at, faces, out);
+    if (!zones.empty()) find_closed(at, zones, out);
   }
 
 private:
@@ -119,11 +126,9 @@ private:
     inside_[0].push_back({shape, facet, 1, false});
   }
 
-  // Divides a part by the plane of a facet in it.
-  void divide(int k) {
-    const Fragment chosen = inside_[k].back();
-    inside_[k].pop_back();
-    const int plane = chosen.shape.plane, up = parts_;
+  // Divides a part by a plane: what is above becomes a new part. The portal between them.
+  int split(int k, int plane) {
+    const int up = parts_;
     new_part();
     old_.clear();
     old_.swap(of_part_[k]);
@@ -142,6 +147,14 @@ private:
     const int number = static_cast<int>(portals_.size()) - 1;
     of_part_[k].push_back(number);
     of_part_[up].push_back(number);
+    return number;
+  }
+
+  // Divides a part by the plane of a facet in it.
+  void divide(int k) {
+    const Fragment chosen = inside_[k].back();
+    inside_[k].pop_back();
+    const int plane = chosen.shape.plane, up = parts_, number = split(k, plane);
     cover(number, chosen);
     fragments_.clear();
     fragments_.swap(inside_[k]);
@@ -213,13 +226,104 @@ private:
     return context_.polygon_of(plane, scratch_);
   }
 
-  void finish(const std::array<int, 3>& at, const std::array<const FaceParts*, 6>& faces, const Winding& winding,
-              CellRegions& out) {
+  // -1, 1: a part is on one side of a plane; 2: it is divided by it.
+  int side(int part, int plane) {
+    bool below = false, above = false;
+    for (const int f : of_part_[part]) {
+      const int s = context_.side(portals_[f].shape, plane);
+      below |= s < 0 || s == 2;
+      above |= s > 0;
+      if (below && above) return 2;
+    }
+    return above ? 1 : -1;
+  }
+
+  // Takes fluid in zones for solid.
+  void close(std::span<const int> zones) {
+    closed_.assign(parts_, 0);
+    if (zones.empty()) return;
+    bounds_.clear();
+    for (const int pair : zones) bounds_.push_back(context_.bounds_of_zone(pair));
+    std::vector<std::pair<int, std::size_t>> ahead;  // parts, and the first zone that may meet them
+    for (int k = 0; k < parts_; ++k)
+      if (!solid_[k]) ahead.push_back({k, 0});
+    while (!ahead.empty()) {
+      auto [k, z] = ahead.back();
+      ahead.pop_back();
+      for (; z < bounds_.size(); ++z) {
+        bool within = true;
+        for (const auto& [plane, keep] : bounds_[z]) within = within && side(k, plane) != -keep;
+        for (const auto& [plane, keep] : bounds_[z]) {
+          if (!within) break;
+          const int s = side(k, plane);
+          within = s != -keep;
+          if (s != 2) continue;
+          const int up = parts_;
+          split(k, plane);
+          solid_.push_back(0);
+          closed_.push_back(0);
+          ahead.push_back({keep > 0 ? k : up, z + 1});
+          k = keep > 0 ? up : k;
+        }
+        if (!within) continue;
+        solid_[k] = closed_[k] = 1;
+        break;
+      }
+    }
+  }
+
+  // Pieces of facets in zones, with no fluid ahead of them.
+  void find_closed(const std::array<int, 3>& at, std::span<const int> zones, CellRegions& out) {
+    for (const Portal& portal : portals_)
+      for (int c = portal.cover; c >= 0; c = covers_[c].next) {
+        const Fragment& of = covers_[c].of;
+        const int slot = zones_.slot[of.facet], ahead = portal.part[of.sign > 0 ? 1 : 0];
+        if (slot < 0 || ahead < 0 || !solid_[ahead]) continue;
+        old_.clear();
+        const auto& pairs = zones_.of_slot[slot];
+        std::set_intersection(pairs.begin(), pairs.end(), zones.begin(), zones.end(), std::back_inserter(old_));
+        find_closed(of, old_, at, out);
+      }
+  }
+
+  void find_closed(const Fragment& fragment, const std::vector<int>& pairs, const std::array<int, 3>& at,
+                   CellRegions& out) {
+    std::vector<std::pair<Polygon, std::size_t>> ahead{{fragment.shape, 0}};
+    while (!ahead.empty()) {
+      auto [polygon, z] = ahead.back();
+      ahead.pop_back();
+      for (; z < pairs.size(); ++z) {
+        const auto& [a, b] = zones_.pairs[pairs[z]];
+        Context::Bounds bounds;
+        for (const int which : {0, 1}) context_.bounds_of_gap(pairs[z], which, bounds);
+        context_.bounds_over(a == fragment.facet ? b : a, bounds);
+        bool within = true;
+        for (const auto& [plane, keep] : bounds) within = within && context_.side(polygon, plane) != -keep;
+        for (const auto& [plane, keep] : bounds) {
+          if (!within) break;
+          const int s = context_.side(polygon, plane);
+          within = s != -keep;
+          if (s != 2) continue;
+          const auto [low, high] = context_.split(polygon, plane);
+          ahead.push_back({keep > 0 ? low : high, z + 1});
+          polygon = keep > 0 ? high : low;
+        }
+        if (!within) continue;
+        add_piece({polygon, fragment.facet, fragment.sign, fragment.reversed}, -1, at, out.closed, out);
+        break;
+      }
+    }
+  }
+
+  void find_solid(const std::array<int, 3>& at, const Winding& winding, CellRegions& out) {
     for (const Cover& c : covers_) out.bodies.push_back(lattice_.body[c.of.facet]);
     std::sort(out.bodies.begin(), out.bodies.end());
     out.bodies.erase(std::unique(out.bodies.begin(), out.bodies.end()), out.bodies.end());
     solid_.assign(parts_, 0);
     for (const int body : out.bodies) turn(body, at, winding);
+  }
+
+  void finish(const std::array<int, 3>& at, const std::array<const FaceParts*, 6>& faces, CellRegions& out) {
     up_.resize(parts_);
     std::iota(up_.begin(), up_.end(), 0);
     for (const Portal& portal : portals_) {
@@ -233,8 +337,7 @@ private:
     for (int k = 0; k < 6; ++k) regions_[k].assign(faces[k]->parts.size(), -2);
     for (const Portal& portal : portals_) {
       for (int above = 0; above < 2; ++above)
-        if (region(portal.part[above]) >= 0 && portal.cover >= 0)
-          add_surface(portal, above, region(portal.part[above]), at, out);
+        if (region(portal.part[above]) >= 0) add_surface(portal, above, region(portal.part[above]), at, out);
       if (portal.face < 0) continue;
       int& known = regions_[portal.face][portal.of_face];
       const int here = region(portal.part[portal.face % 2 ? 0 : 1]);
@@ -311,28 +414,38 @@ private:
     return " in cell (" + std::to_string(at[0]) + ", " + std::to_string(at[1]) + ", " + std::to_string(at[2]) + ")";
   }
 
-  // Facets that coincide are those of the first body.
+  // Facets that coincide are those of the first body; without facets it is where a zone ends.
   void add_surface(const Portal& portal, int above, int region, const std::array<int, 3>& at, CellRegions& out) {
+    const int other = portal.part[1 - above];
+    if (portal.cover < 0 && other >= 0 && closed_[other]) {
+      const Plane& plane = context_.planes[portal.shape.plane];
+      add_piece({portal.shape, -1, 1, (plane.n[plane.axis] > 0) != (above == 1)}, region, at, out.surface, out);
+    }
     int first = static_cast<int>(lattice_.of_body.size());
     const auto mine = [&](const Fragment& of) { return (of.sign > 0) == (above == 1); };
     for (int c = portal.cover; c >= 0; c = covers_[c].next)
       if (mine(covers_[c].of)) first = std::min(first, lattice_.body[covers_[c].of.facet]);
+    for (int c = portal.cover; c >= 0; c = covers_[c].next) {
+      const Fragment& of = covers_[c].of;
+      if (mine(of) && lattice_.body[of.facet] == first) add_piece(of, region, at, out.surface, out);
+    }
+  }
+
+  void add_piece(const Fragment& of, int region, const std::array<int, 3>& at, std::vector<SurfacePiece>& pieces,
+                 CellRegions& out) const {
     const auto low = lattice_.low(at), high = lattice_.high(at);
     Point3 size;
     for (int d = 0; d < 3; ++d) size[d] = to_unit * static_cast<double>(high[d] - low[d]);
-    for (int c = portal.cover; c >= 0; c = covers_[c].next) {
-      const Fragment& of = covers_[c].of;
-      if (!mine(of) || lattice_.body[of.facet] != first) continue;
-      out.surface.push_back({region, of.facet, out.corners.size(), of.shape.count});
-      for (int i = 0; i < of.shape.count; ++i) {
-        const int k = of.reversed ? of.shape.count - 1 - i : i;
-        const Point3& x = context_.points[context_.corners[of.shape.first + k].point].x;
-        out.corners.push_back({x[0] / size[0], x[1] / size[1], x[2] / size[2]});
-      }
+    pieces.push_back({region, of.facet, out.corners.size(), of.shape.count});
+    for (int i = 0; i < of.shape.count; ++i) {
+      const int k = of.reversed ? of.shape.count - 1 - i : i;
+      const Point3& x = context_.points[context_.corners[of.shape.first + k].point].x;
+      out.corners.push_back({x[0] / size[0], x[1] / size[1], x[2] / size[2]});
     }
   }
 
   const Lattice& lattice_;
+  const Zones& zones_;
   Context context_;
   std::array<int, 6> sides_{};
   std::vector<Portal> portals_;
@@ -343,7 +456,8 @@ private:
   std::vector<Corner> scratch_;
   std::vector<int> old_, up_, number_, turns_, stack_;
   std::vector<Fragment> fragments_;
-  std::vector<char> solid_;
+  std::vector<char> solid_, closed_;
+  std::vector<Context::Bounds> bounds_;      // of zones
   std::array<std::vector<int>, 6> regions_;  // of the parts of the faces
   std::array<std::vector<Chord>, 6> chords_;
 };

@@ -2,6 +2,7 @@
 // both cells at the face find the same convex parts, and each part belongs to one region of either cell.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "cut_planes.hpp"
@@ -23,10 +24,12 @@ struct FaceParts {
 
 class FaceDivision {
 public:
-  explicit FaceDivision(const Lattice& lattice) : lattice_(lattice), context_(lattice) {}
+  FaceDivision(const Lattice& lattice, const Zones& zones)
+    : lattice_(lattice), zones_(zones), context_(lattice, zones) {}
 
   // The face between the cell `at` and the one below it along an axis; at[axis] may be one past the last cell.
-  FaceParts divide(int axis, const std::array<int, 3>& at, const std::vector<int>& facets) {
+  // zones: pairs of facets whose zones may meet it.
+  FaceParts divide(int axis, const std::array<int, 3>& at, const std::vector<int>& facets, std::span<const int> zones) {
     context_.start({lattice_.lines[0][at[0]], lattice_.lines[1][at[1]], lattice_.lines[2][at[2]]});
     const int e = next(axis), f = next(e);
     face_ = context_.plane(context_.grid_plane(axis, at[axis]));
@@ -48,6 +51,7 @@ public:
     size_ = {far[e], far[f]};
     corner_ = corner;
     axis_ = axis;
+    find_bounds(at, zones);
     divide(square, std::move(kept), {});
     return std::move(found_);
   }
@@ -126,6 +130,44 @@ private:
       divide(high, std::move(inside_high), std::move(beside_high));
       return;
     }
+    divide_by_zones(polygon, std::move(beside), 0);
+  }
+
+  // Zones that meet the face: the same ones from both of its cells.
+  void find_bounds(const std::array<int, 3>& at, std::span<const int> zones) {
+    bounds_.clear();
+    for (const int pair : zones) {
+      const Extent& around = zones_.extent[pair];
+      bool meets = true;
+      for (int d = 0; d < 3; ++d) {
+        const auto& lines = lattice_.lines[d];
+        meets &= around.low[d] <= lines[at[d] + (d != axis_)] && around.high[d] >= lines[at[d]];
+      }
+      if (meets) bounds_.push_back(context_.bounds_of_zone(pair));
+    }
+  }
+
+  // Divides a part of the face so that each zone, that of either cell, is on all of it or on nothing.
+  void divide_by_zones(Polygon polygon, std::vector<Segment> beside, std::size_t from) {
+    for (std::size_t k = from; k < bounds_.size(); ++k) {
+      const auto outside = [&](const std::pair<int, int>& bound) {
+        return context_.side(polygon, bound.first) == -bound.second;
+      };
+      bool within = true;
+      for (const auto& bound : bounds_[k]) within &= !outside(bound);
+      if (!within) continue;
+      for (const auto& [plane, keep] : bounds_[k]) {
+        const int side = context_.side(polygon, plane);
+        if (side == -keep) break;
+        if (side != 2) continue;
+        const auto [low, high] = context_.split(polygon, plane);
+        std::vector<Segment> beside_low, beside_high;
+        for (const auto& segment : beside) give(segment, plane, beside_low, beside_high);
+        divide_by_zones(keep > 0 ? low : high, keep > 0 ? beside_low : beside_high, k + 1);
+        polygon = keep > 0 ? high : low;
+        beside = keep > 0 ? std::move(beside_high) : std::move(beside_low);
+      }
+    }
     finish(polygon, beside);
   }
 
@@ -141,7 +183,8 @@ private:
         if (corner.point == corner_[k]) found_.at_corner[k] = number;
     }
     part.area = 0.5 * context_.twice_area(polygon)[axis_] / (size_[0] * size_[1]);
-    for (const auto& segment : beside) part.beside.push_back(segment.facet);
+    for (const auto& segment : beside)
+      if (context_.side(polygon, segment.plane) == 1) part.beside.push_back(segment.facet);
     for (const int facet : covering_) {
       bool covered = true;
       for (int i = 0; i < 3 && covered; ++i) {
@@ -155,7 +198,9 @@ private:
   }
 
   const Lattice& lattice_;
+  const Zones& zones_;
   Context context_;
+  std::vector<Context::Bounds> bounds_;  // of zones
   int face_ = -1, axis_ = 0;
   std::array<double, 2> size_{};
   std::array<int, 4> corner_{};

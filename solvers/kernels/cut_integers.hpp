@@ -16,6 +16,13 @@ struct Integer {
     limb[0] = static_cast<std::uint64_t>(value);
   }
 
+  template <int M>
+  explicit Integer(const Integer<M>& narrow) {
+    static_assert(M < N);
+    limb.fill(narrow.negative() ? ~std::uint64_t{0} : 0);
+    for (int i = 0; i < M; ++i) limb[i] = narrow.limb[i];
+  }
+
   bool negative() const { return limb[N - 1] >> 63; }
 
   int sign() const {

@@ -79,6 +79,23 @@ public:
     }
   }
 
+  // Adds the integrals of L_q x n_x alone.
+  void add_flux(const Point3* corners, int count, double* flux) const {
+    for (int k = 1; k + 1 < count; ++k) {
+      const std::array<const Point3*, 3> at{corners, corners + k, corners + k + 1};
+      const double projected = 0.5 * (((*at[1])[1] - (*at[0])[1]) * ((*at[2])[2] - (*at[0])[2]) -
+                                      ((*at[1])[2] - (*at[0])[2]) * ((*at[2])[1] - (*at[0])[1]));
+      for (const auto& point : triangle_) {
+        Point3 x{};
+        for (int v = 0; v < 3; ++v)
+          for (int d = 0; d < 3; ++d) x[d] += point.corner[v] * (*at[v])[d];
+        const auto a = basis_.values(x[0]), b = basis_.values(x[1]), c = basis_.values(x[2]);
+        const double factor = point.weight * projected * x[0];
+        for (int i = 0; i < size; ++i) flux[i] += factor * a[i % N] * b[i / N % N] * c[i / N / N];
+      }
+    }
+  }
+
   // From the flux through the surface of a region to what it adds to the integrals over the region: the fluid lies
   // ahead of its surface, and int_0^x l_a = x sum_q mean_aq l_q(x).
   void to_volume(double* region) const {

@@ -12,24 +12,24 @@
 
 #include "cut_integers.hpp"
 #include "cut_lattice.hpp"
+#include "cut_zones.hpp"
 
 namespace cut {
 
 constexpr double to_unit = 1.0 / (std::int64_t{1} << fine_bits);  // from integers to numbers of the size of cells
 constexpr double rounding_error = 1.1102230246251565e-16;  // half of the distance from 1 to the next number
-// First-order bounds, in units of the rounding error, of sums of absolute values: n 4, d 8, X 21, W 17, side 29.
+// First-order bounds, in units of the rounding error, of sums of absolute values: n and d 4, X 17, W 17, side 26.
 constexpr double doubt = 64 * rounding_error;
 
 constexpr int next(int axis) { return axis == 2 ? 0 : axis + 1; }
 
 struct Plane {
   std::int64_t name;
-  Point3 n, n_size;     // normal, and the sums of the absolute values it came from
-  double d, d_size;
+  Point3 n;             // normal, nearest numbers
+  double d;
   int axis;             // along which it is not parallel: of a facet the steepest one
   std::array<int, 3> through;  // vertices in it by name, -1: none
-  bool exact = false;
-  std::array<Integer<2>, 3> N;
+  std::array<Integer<2>, 3> N;  // n.x = d in integers
   Integer<3> D;
 };
 
@@ -43,7 +43,8 @@ struct Point {
   std::array<double, 4> X, size;
   Point3 x;                   // position in units of 2^fine_bits, relative to the cell
   int w = 1;                  // sign of X[3]
-  std::array<int, 2> edge{-1, -1};  // of a facet that it lies on by name
+  std::array<int, 2> edge{-1, -1};  // of a facet that it lies on by name, and the plane it crosses there
+  int across = -1;
   int exact = -1;
   int asked = -1, answer = 0; // the last plane, and the side of it
 };
@@ -64,8 +65,10 @@ struct PointName {
 // Planes, points and polygons around one cell or face.
 class Context {
 public:
-  explicit Context(const Lattice& lattice)
-    : lattice_(lattice), local_(lattice.planes + 4 * lattice.facets.size()), stamp_(local_.size(), -1) {}
+  Context(const Lattice& lattice, const Zones& zones)
+    : lattice_(lattice), zones_(zones), first_over_(lattice.planes + 4 * lattice.facets.size()),
+      first_opening_(first_over_ + 3 * zones.over.size()), local_(first_opening_ + 2 * zones.pairs.size()),
+      stamp_(local_.size(), -1) {}
 
   std::vector<Plane> planes;
   std::vector<Point> points;
@@ -86,9 +89,32 @@ public:
   std::int64_t edge_plane(int facet, int edge) const { return facet_plane(facet) + 1 + edge; }
   const Lattice& lattice() const { return lattice_; }
 
+  // A plane, and the side of it where a zone is: -1, 1.
+  using Bounds = std::vector<std::pair<int, int>>;
+
+  // Over a facet.
+  void bounds_over(int facet, Bounds& bounds) {
+    const int slot = zones_.slot[facet];
+    for (int e = 0; e < 3; ++e) bounds.push_back({plane(first_over_ + 3 * slot + e), -1});
+  }
+
+  // The gap of a pair is at most the closing length (0), or at least minus it (1).
+  void bounds_of_gap(int pair, int which, Bounds& bounds) {
+    if (!zones_.opening[pair][which].everywhere()) bounds.push_back({plane(first_opening_ + 2 * pair + which), -1});
+  }
+
+  Bounds bounds_of_zone(int pair) {
+    Bounds bounds;
+    const auto& [a, b] = zones_.pairs[pair];
+    for (const int facet : {a, b}) bounds.push_back({plane(facet_plane(facet)), 1});
+    bounds_of_gap(pair, 0, bounds);
+    for (const int facet : {a, b}) bounds_over(facet, bounds);
+    return bounds;
+  }
+
   int plane(std::int64_t name) {
     if (stamp_[name] == now_) return local_[name];
-    Plane made = name < lattice_.planes ? of_grid(name) : of_facet(name);
+    Plane made = name < lattice_.planes ? of_grid(name) : name < first_over_ ? of_facet(name) : of_zone(name);
     stamp_[name] = now_;
     planes.push_back(std::move(made));
     return local_[name] = static_cast<int>(planes.size()) - 1;
@@ -112,23 +138,28 @@ public:
     std::array<int, 3> of{a, b, c};
     std::sort(of.begin(), of.end());
     std::array<int, 2> edge{-1, -1};
-    int& known = known_point(point_key(of, edge));
+    const auto key = point_key(of, edge);
+    int& known = known_point(key);
     if (known >= 0) return known;
     known = static_cast<int>(points.size());
     Point made{};
     made.planes = of;
     made.edge = edge;
-    for (int i = 0; i < 3; ++i) {
+    if (edge[0] >= 0) {
+      made.across = key[2];
+      cross_edge(made);
+    }
+    for (int i = 0; i < 3 && edge[0] < 0; ++i) {
       const Plane &p = planes[of[i]], &q = planes[of[(i + 1) % 3]], &r = planes[of[(i + 2) % 3]];
       for (int d = 0; d < 3; ++d) {
         const int e = next(d), f = next(e);
         const double minor = q.n[e] * r.n[f] - q.n[f] * r.n[e];
-        const double size = q.n_size[e] * r.n_size[f] + q.n_size[f] * r.n_size[e];
+        const double size = std::abs(q.n[e] * r.n[f]) + std::abs(q.n[f] * r.n[e]);
         made.X[d] += p.d * minor;
-        made.size[d] += p.d_size * size;
+        made.size[d] += std::abs(p.d) * size;
         if (i > 0) continue;
         made.X[3] += p.n[d] * minor;
-        made.size[3] += p.n_size[d] * size;
+        made.size[3] += std::abs(p.n[d]) * size;
       }
     }
     points.push_back(made);
@@ -229,69 +260,102 @@ private:
     return to_unit * static_cast<double>(lattice_.vertices[vertex_number][d] - origin_[d]);
   }
 
+  // Where an edge from a to b crosses a plane, s(x) = n.x - d: X = s(a) b - s(b) a, W = s(a) - s(b). Its facets may be
+  // in nearly one plane.
+  void cross_edge(Point& point) const {
+    const Plane& p = planes[point.across];
+    std::array<Point3, 2> x;
+    std::array<double, 2> s, size;
+    for (int v = 0; v < 2; ++v) {
+      s[v] = -p.d;
+      size[v] = std::abs(p.d);
+      for (int d = 0; d < 3; ++d) {
+        x[v][d] = distance(point.edge[v], d);
+        s[v] += p.n[d] * x[v][d];
+        size[v] += std::abs(p.n[d] * x[v][d]);
+      }
+    }
+    for (int d = 0; d < 3; ++d) {
+      point.X[d] = s[0] * x[1][d] - s[1] * x[0][d];
+      point.size[d] = size[0] * std::abs(x[1][d]) + size[1] * std::abs(x[0][d]);
+    }
+    point.X[3] = s[0] - s[1];
+    point.size[3] = size[0] + size[1];
+  }
+
+  ExactPoint exact_crossing(const Point& point) const {
+    const Plane& p = planes[point.across];
+    std::array<Integer<3>, 2> s;
+    for (int v = 0; v < 2; ++v) {
+      const auto& x = lattice_.vertices[point.edge[v]];
+      for (int d = 0; d < 3; ++d) s[v] += p.N[d] * Integer<1>(x[d] - origin_[d]);
+      s[v] -= p.D;
+    }
+    ExactPoint made;
+    const auto &a = lattice_.vertices[point.edge[0]], &b = lattice_.vertices[point.edge[1]];
+    for (int d = 0; d < 3; ++d)
+      made.X[d] = Integer<7>(s[0] * Integer<1>(b[d] - origin_[d]) - s[1] * Integer<1>(a[d] - origin_[d]));
+    made.W = Integer<6>(s[0] - s[1]);
+    return made;
+  }
+
   Plane of_grid(std::int64_t name) const {
     Plane made{};
     made.name = name;
     made.axis = name >= lattice_.first_plane[2] ? 2 : name >= lattice_.first_plane[1] ? 1 : 0;
     const std::int64_t at = lattice_.lines[made.axis][name - lattice_.first_plane[made.axis]] - origin_[made.axis];
-    made.n[made.axis] = made.n_size[made.axis] = 1;
+    made.n[made.axis] = 1;
     made.d = to_unit * static_cast<double>(at);
-    made.d_size = std::abs(made.d);
     made.through.fill(-1);
-    made.exact = true;
     made.N[made.axis] = Integer<2>(1);
     made.D = Integer<3>(at);
     return made;
   }
 
+  // In integers, of which doubles are the nearest numbers: a facet may be long beside the cell.
   Plane of_facet(std::int64_t name) {
     const auto facet = static_cast<std::size_t>((name - lattice_.planes) / 4);
     const int edge = static_cast<int>((name - lattice_.planes) % 4) - 1;
     const auto& v = lattice_.facets[facet];
     Plane made{};
     made.name = name;
+    double unit = to_unit;
     if (edge < 0) {
       made.through = v;
-      for (int d = 0; d < 3; ++d) {
-        const int e = next(d), f = next(e);
-        const double be = step(v[0], v[1], e), bf = step(v[0], v[1], f), ce = step(v[0], v[2], e),
-                     cf = step(v[0], v[2], f);
-        made.n[d] = be * cf - bf * ce;
-        made.n_size[d] = std::abs(be * cf) + std::abs(bf * ce);
-      }
-      made.axis = steepest(made, v);
+      made.N = exact_normal(v);
+      unit *= to_unit;
     } else {
       // n = edge x axis, along the steepest axis of the facet: it is neither parallel to the facet nor to the edge
       const int axis = planes[plane(name - 1 - edge)].axis, e = next(axis), f = next(e);
-      const int a = v[edge], b = v[(edge + 1) % 3];
-      made.through = {a, b, -1};
-      made.n[e] = step(a, b, f);
-      made.n[f] = -step(a, b, e);
-      made.axis = std::abs(made.n[e]) > std::abs(made.n[f]) ? e : f;
-      for (int d = 0; d < 3; ++d) made.n_size[d] = std::abs(made.n[d]);
+      made.through = {v[edge], v[(edge + 1) % 3], -1};
+      const auto &a = lattice_.vertices[made.through[0]], &b = lattice_.vertices[made.through[1]];
+      made.N[e] = Integer<2>(b[f] - a[f]);
+      made.N[f] = Integer<2>(a[e] - b[e]);
     }
+    return in_doubles(made, lattice_.vertices[made.through[0]], unit);
+  }
+
+  Plane of_zone(std::int64_t name) const {
+    const std::int64_t over = name - first_over_, opening = name - first_opening_;
+    const HalfSpace& half = opening < 0 ? zones_.over[over / 3][over % 3] : zones_.opening[opening / 2][opening % 2];
+    Plane made{};
+    made.name = name;
+    made.through.fill(-1);
+    made.D = Integer<2>(std::int64_t{1} << normal_bits) * Integer<1>(half.shift);
+    for (int d = 0; d < 3; ++d) made.N[d] = Integer<2>(half.N[d]);
+    return in_doubles(made, half.base, std::ldexp(1.0, -normal_bits));
+  }
+
+  // Adds N.x to D; unit: of N. The axis is the steepest one, -1: a facet without area.
+  Plane in_doubles(Plane made, const Integers3& x, double unit) const {
+    made.axis = -1;
     for (int d = 0; d < 3; ++d) {
-      const double x = distance(made.through[0], d);
-      made.d += made.n[d] * x;
-      made.d_size += made.n_size[d] * std::abs(x);
+      made.D += made.N[d] * Integer<1>(x[d] - origin_[d]);
+      made.n[d] = unit * made.N[d].value();
+      if (std::abs(made.n[d]) > (made.axis < 0 ? 0 : std::abs(made.n[made.axis]))) made.axis = d;
     }
+    made.d = unit * (to_unit * made.D.value());
     return made;
-  }
-
-  double step(int a, int b, int d) const {
-    return to_unit * static_cast<double>(lattice_.vertices[b][d] - lattice_.vertices[a][d]);
-  }
-
-  // -1: a facet without area
-  int steepest(const Plane& facet, const std::array<int, 3>& v) const {
-    int axis = 0;
-    for (int d = 1; d < 3; ++d)
-      if (std::abs(facet.n[d]) > std::abs(facet.n[axis])) axis = d;
-    if (std::abs(facet.n[axis]) > doubt * facet.n_size[axis]) return axis;
-    const auto n = exact_normal(v);
-    for (int d = 0; d < 3; ++d)
-      if (std::abs(n[d].value()) > std::abs(n[axis].value())) axis = d;
-    return n[axis].sign() ? axis : -1;
   }
 
   std::array<Integer<2>, 3> exact_normal(const std::array<int, 3>& v) const {
@@ -306,35 +370,19 @@ private:
     return n;
   }
 
-  const Plane& exact_plane(int number) {
-    Plane& p = planes[number];
-    if (p.exact) return p;
-    p.exact = true;
-    if (p.through[2] >= 0) {
-      p.N = exact_normal(p.through);
-    } else {
-      const auto facet = p.name - (p.name - lattice_.planes) % 4;
-      const int axis = planes[local_[facet]].axis, e = next(axis), f = next(e);
-      const auto &a = lattice_.vertices[p.through[0]], &b = lattice_.vertices[p.through[1]];
-      p.N[e] = Integer<2>(b[f] - a[f]);
-      p.N[f] = Integer<2>(a[e] - b[e]);
-    }
-    const auto& x = lattice_.vertices[p.through[0]];
-    for (int d = 0; d < 3; ++d) p.D += p.N[d] * Integer<1>(x[d] - origin_[d]);
-    return p;
-  }
-
   const ExactPoint& exact_point(int number) {
     if (points[number].exact >= 0) return exact_[points[number].exact];
     points[number].exact = static_cast<int>(exact_.size());
     ExactPoint made;
     const auto of = points[number].planes;
-    if (of[0] < 0) {
+    if (points[number].across >= 0) {
+      made = exact_crossing(points[number]);
+    } else if (of[0] < 0) {
       for (int d = 0; d < 3; ++d) made.X[d] = Integer<7>(lattice_.vertices[of[1]][d] - origin_[d]);
       made.W = Integer<6>(1);
     } else {
       for (int i = 0; i < 3; ++i) {
-        const Plane &p = exact_plane(of[i]), &q = exact_plane(of[(i + 1) % 3]), &r = exact_plane(of[(i + 2) % 3]);
+        const Plane &p = planes[of[i]], &q = planes[of[(i + 1) % 3]], &r = planes[of[(i + 2) % 3]];
         for (int d = 0; d < 3; ++d) {
           const int e = next(d), f = next(e);
           const auto minor = q.N[e] * r.N[f] - q.N[f] * r.N[e];
@@ -356,15 +404,14 @@ private:
       return 0;
     }
     if (point.edge[0] >= 0 && holds(p, point.edge[0]) && holds(p, point.edge[1])) return 0;
-    double sum = -p.d * point.X[3], size = p.d_size * point.size[3];
+    double sum = -p.d * point.X[3], size = std::abs(p.d) * point.size[3];
     for (int d = 0; d < 3; ++d) {
       sum += p.n[d] * point.X[d];
-      size += p.n_size[d] * point.size[d];
+      size += std::abs(p.n[d]) * point.size[d];
     }
     if (std::abs(sum) > doubt * size) return sum > 0 ? point.w : -point.w;
     const ExactPoint& at = exact_point(number);
-    const Plane& q = exact_plane(plane_number);
-    auto value = q.N[0] * at.X[0] + q.N[1] * at.X[1] + q.N[2] * at.X[2] - q.D * at.W;
+    const auto value = p.N[0] * at.X[0] + p.N[1] * at.X[1] + p.N[2] * at.X[2] - p.D * at.W;
     return value.sign() * at.W.sign();
   }
 
@@ -418,6 +465,8 @@ private:
   }
 
   const Lattice& lattice_;
+  const Zones& zones_;
+  std::int64_t first_over_, first_opening_;  // names of planes of zones
   Integers3 origin_{};
   std::vector<int> local_, stamp_;  // number here of each plane, valid where the stamp is `now_`
   int now_ = -1;

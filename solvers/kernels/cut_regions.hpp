@@ -25,7 +25,7 @@ struct WetEdge {
 };
 
 struct SurfacePiece {
-  int region, facet;
+  int region, facet;          // facet -1: where a zone ends, see cut_zones.hpp
   std::size_t first;  // of its corners in CellRegions::corners, counterclockwise as seen from the fluid
   int count;
 };
@@ -58,8 +58,10 @@ private:
 struct CellRegions {
   bool exact = false;
   bool cut = false;   // there is surface in the cell or in its faces
+  bool alone = true;  // only facets in the cell decided
   int regions = 0;
   std::vector<SurfacePiece> surface;
+  std::vector<SurfacePiece> closed;                    // where another facet touches; exact kernel only
   std::vector<Point3> corners;                         // relative to the cell
   OfFaces<Chord> chords;                               // of faces 2 axis + side; exact kernel: without ends
   OfFaces<WetEdge> wet;                                // fast kernel only

@@ -7,8 +7,10 @@
 #include <unordered_map>
 
 #include "cut_candidates.hpp"
+#include "cut_closing.hpp"
 #include "cut_exact.hpp"
 #include "cut_fast.hpp"
+#include "cut_memory.hpp"
 #include "cut_moments.hpp"
 
 namespace cut {
@@ -24,14 +26,22 @@ struct Table {
   std::vector<double> piece_area, piece_moments;
   std::vector<std::int64_t> face_axis, face_cells, face_regions;
   std::vector<double> face_area, face_moments;
+  std::vector<std::int64_t> closed_cell, closed_facet;
+  std::vector<double> closed_moments;
 };
 
 template <int N>
 class TableMaker {
 public:
-  TableMaker(const Lattice& lattice, const double* points, bool only_exact)
-    : lattice_(lattice), integrals_(points), only_exact_(only_exact), candidates_(candidates(lattice)),
-      cells_(candidates_.cells.size()) {}
+  // closing: length in quanta, 0: none; old: of a table of the same grid, facets, points and choices
+  TableMaker(const Lattice& lattice, const double* points, double closing, bool only_exact, Memory old)
+    : lattice_(lattice), integrals_(points), only_exact_(only_exact), old_(std::move(old)),
+      zones_(closing > 0 ? ZoneFinder(lattice, closing).find() : Zones{}),
+      zones_of_(zones_by_cell(lattice, zones_, closing)), candidates_(candidates(lattice)) {
+    candidates_.add(zones_of_.cells);
+    cells_.resize(candidates_.cells.size());
+    kept_.assign(cells_.size(), -1);
+  }
 
   Table make() {
     table_.state.assign(lattice_.count(), fluid);
@@ -40,38 +50,97 @@ public:
     for (std::size_t body = 0; body < lattice_.of_body.size(); ++body) fill(static_cast<int>(body));
     number_regions();
     integrate_surface();
+    flux_ = table_.moments;
     link_faces();
     return std::move(table_);
+  }
+
+  // After `make`, of what it made.
+  Memory memory(const Table& table) {
+    Memory made;
+    made.filled = true;
+    made.quantum = lattice_.quantum;
+    made.vertices = lattice_.vertices;
+    for (const char filled : filled_) made.whole.push_back(!filled);
+    made.pieces = {std::move(first_piece_), {}, table.piece_facet, table.piece_moments};
+    made.closed = {std::move(first_closed_), {}, table.closed_facet, table.closed_moments};
+    made.first_region.assign(first_region_.begin(), first_region_.end());
+    made.first_region.push_back(table.cell.size());
+    made.pieces.region = table.piece_region;
+    for (std::size_t c = 0; c < cells_.size(); ++c)
+      for (std::size_t k = made.pieces.first[c]; k < made.pieces.first[c + 1]; ++k)
+        made.pieces.region[k] -= first_region_[c];
+    made.closed.region.assign(table.closed_facet.size(), -1);
+    made.flux = std::move(flux_);
+    made.zones = std::move(zones_);
+    made.zones_of = std::move(zones_of_);
+    made.candidates = std::move(candidates_);
+    made.cells = std::move(cells_);
+    made.faces = std::move(faces_);
+    return made;
   }
 
 private:
   static constexpr int size = N * N * N, face_size = N * N;
 
   void compute_cells() {
+    keep_cells();
     FastCell fast(lattice_);
-    ExactCell exact(lattice_);
+    ExactCell exact(lattice_, zones_);
     std::vector<int> facets;
-    const ExactCell::Winding winding = [&](int body, const Point3& x) { return turns(body, x); };
+    const ExactCell::Winding winding = [&](int body, const Point3& x) {
+      alone_ = false;
+      return turns(body, x);
+    };
     for (std::size_t c = 0; c < cells_.size(); ++c) {
+      if (kept_[c] >= 0) continue;
       const auto at = lattice_.index(candidates_.cells[c]);
       const int* begin = candidates_.facets.data() + candidates_.first[c];
       const int count = static_cast<int>(candidates_.first[c + 1] - candidates_.first[c]);
-      if (!only_exact_ && fast.compute(at, begin, count, cells_[c])) continue;
+      const std::span<const int> zones = zones_of_.of(candidates_.cells[c]);
+      if (!only_exact_ && zones.empty() && fast.compute(at, begin, count, cells_[c])) continue;
       facets.assign(begin, begin + count);
       cells_[c] = {};
       std::array<const FaceParts*, 6> faces;
-      for (int k = 0; k < 6; ++k) faces[k] = &parts(k, at, facets);
+      for (int k = 0; k < 6; ++k) faces[k] = &parts(k, at, facets, zones);
       origin_ = lattice_.low(at);
-      exact.compute(at, facets, faces, winding, cells_[c]);
+      alone_ = true;
+      exact.compute(at, facets, zones, faces, winding, cells_[c]);
+      cells_[c].alone = alone_;
     }
   }
 
-  const FaceParts& parts(int face, std::array<int, 3> at, const std::vector<int>& facets) {
+  // Cells none of whose facets moved, with the same zones, and their faces.
+  void keep_cells() {
+    if (!old_.filled) return;
+    const auto moved = old_.moved(lattice_);
+    const bool same_zones = zones_ == old_.zones;
+    for (std::size_t c = 0; c < cells_.size(); ++c) {
+      const int cell = candidates_.cells[c], k = old_.candidates.find(cell);
+      if (k < 0 || !old_.cells[k].alone) continue;
+      const auto facets = candidates_.of(cell), before = old_.candidates.of(cell);
+      const auto zones = zones_of_.of(cell), zones_before = old_.zones_of.of(cell);
+      if (!std::ranges::equal(facets, before) || !std::ranges::equal(zones, zones_before)) continue;
+      if (!zones.empty() && !same_zones) continue;
+      if (std::any_of(facets.begin(), facets.end(), [&](int facet) { return moved[facet]; })) continue;
+      kept_[c] = k;
+      cells_[c] = std::move(old_.cells[k]);
+      if (!cells_[c].exact) continue;
+      for (int face = 0; face < 6; ++face)
+        faces_.insert(old_.faces.extract(face_key(face, lattice_.index(cell))));
+    }
+  }
+
+  std::int64_t face_key(int face, std::array<int, 3> at) const {
     at[face / 2] += face % 2;
-    const std::int64_t key = face / 2 + 3 * (at[0] + (lattice_.cells[0] + std::int64_t{1}) *
-                                                       (at[1] + (lattice_.cells[1] + std::int64_t{1}) * at[2]));
-    const auto [found, fresh] = faces_.try_emplace(key);
-    if (fresh) found->second = division_.divide(face / 2, at, facets);
+    return face / 2 + 3 * (at[0] + (lattice_.cells[0] + std::int64_t{1}) *
+                                     (at[1] + (lattice_.cells[1] + std::int64_t{1}) * at[2]));
+  }
+
+  const FaceParts& parts(int face, std::array<int, 3> at, const std::vector<int>& facets, std::span<const int> zones) {
+    const auto [found, fresh] = faces_.try_emplace(face_key(face, at));
+    at[face / 2] += face % 2;
+    if (fresh) found->second = division_.divide(face / 2, at, facets, zones);
     return found->second;
   }
 
@@ -157,12 +226,14 @@ private:
 
   void number_regions() {
     first_region_.assign(cells_.size(), 0);
+    filled_.assign(cells_.size(), 0);
     for (std::size_t c = 0; c < cells_.size(); ++c) {
       const int cell = candidates_.cells[c];
       CellRegions& here = cells_[c];
-      put_in_order(here);
+      if (kept_[c] < 0) put_in_order(here);
       first_region_[c] = static_cast<std::int64_t>(table_.cell.size());
       if (!here.cut) continue;
+      filled_[c] = table_.state[cell] == solid;
       table_.kernel[cell] = here.exact ? 2 : 1;
       if (table_.state[cell] == solid || here.regions == 0) {
         table_.state[cell] = solid;
@@ -186,38 +257,86 @@ private:
 
   void integrate_surface() {
     std::vector<int> order;
+    std::array<double, size> no_flux{};
     for (std::size_t c = 0; c < cells_.size(); ++c) {
-      if (!is_mixed(c)) continue;
+      first_piece_.push_back(table_.piece_facet.size());
+      first_closed_.push_back(table_.closed_facet.size());
+      if (kept_[c] >= 0 && !filled_[c] && old_.whole[kept_[c]]) {
+        copy_rows(c);
+        continue;
+      }
       const CellRegions& here = cells_[c];
       const auto at = lattice_.index(candidates_.cells[c]);
       const auto low = lattice_.low(at);
       const Point3 relative = cell_size(at);
       Point3 metres;
       for (int d = 0; d < 3; ++d) metres[d] = relative[d] * lattice_.quantum;
-      order.resize(here.surface.size());
-      std::iota(order.begin(), order.end(), 0);
-      const auto key = [&](int k) { return std::pair(here.surface[k].region, here.surface[k].facet); };
-      std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
-      for (std::size_t i = 0; i < order.size(); ++i) {
-        const SurfacePiece& piece = here.surface[order[i]];
-        const std::int64_t region = first_region_[c] + piece.region;
-        if (i == 0 || key(order[i - 1]) != key(order[i])) {
-          table_.piece_region.push_back(region);
-          table_.piece_facet.push_back(piece.facet);
-          table_.piece_moments.resize(table_.piece_moments.size() + 3 * size, 0);
+      // Pieces by region and facet; `start` begins the row of a new one and gives its moments and the flux.
+      const auto add = [&](const std::vector<SurfacePiece>& pieces, const auto& start, std::vector<double>& moments,
+                           const auto& flux) {
+        order.resize(pieces.size());
+        std::iota(order.begin(), order.end(), 0);
+        const auto key = [&](int k) { return std::pair(pieces[k].region, pieces[k].facet); };
+        std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
+        for (std::size_t i = 0; i < order.size(); ++i) {
+          const SurfacePiece& piece = pieces[order[i]];
+          const Point3* corners = here.corners.data() + piece.first;
+          if (piece.facet < 0) {
+            integrals_.add_flux(corners, piece.count, flux(piece));
+            continue;
+          }
+          if (i == 0 || key(order[i - 1]) != key(order[i])) {
+            start(piece);
+            moments.resize(moments.size() + 3 * size, 0);
+          }
+          std::array<Point3, 3> facet;
+          for (int v = 0; v < 3; ++v) {
+            const auto& corner = lattice_.vertices[lattice_.facets[piece.facet][v]];
+            for (int d = 0; d < 3; ++d) facet[v][d] = static_cast<double>(corner[d] - low[d]) / relative[d];
+          }
+          integrals_.add_surface(corners, piece.count, facet, metres, flux(piece),
+                                 moments.data() + moments.size() - 3 * size);
         }
-        std::array<Point3, 3> facet;
-        for (int v = 0; v < 3; ++v) {
-          const auto& corner = lattice_.vertices[lattice_.facets[piece.facet][v]];
-          for (int d = 0; d < 3; ++d) facet[v][d] = static_cast<double>(corner[d] - low[d]) / relative[d];
-        }
-        integrals_.add_surface(here.corners.data() + piece.first, piece.count, facet, metres,
-                               table_.moments.data() + region * size,
-                               table_.piece_moments.data() + table_.piece_moments.size() - 3 * size);
-      }
+      };
+      const auto start_closed = [&](const SurfacePiece& piece) {
+        table_.closed_cell.push_back(candidates_.cells[c]);
+        table_.closed_facet.push_back(piece.facet);
+      };
+      if (!filled_[c]) add(here.closed, start_closed, table_.closed_moments, [&](const SurfacePiece&) { return no_flux.data(); });
+      if (!is_mixed(c)) continue;
+      const auto start = [&](const SurfacePiece& piece) {
+        table_.piece_region.push_back(first_region_[c] + piece.region);
+        table_.piece_facet.push_back(piece.facet);
+      };
+      add(here.surface, start, table_.piece_moments, [&](const SurfacePiece& piece) {
+        return table_.moments.data() + (first_region_[c] + piece.region) * size;
+      });
       for (int k = 0; k < here.regions; ++k)
         integrals_.to_volume(table_.moments.data() + (first_region_[c] + k) * size);
     }
+    first_piece_.push_back(table_.piece_facet.size());
+    first_closed_.push_back(table_.closed_facet.size());
+  }
+
+  void copy_rows(std::size_t c) {
+    const int k = kept_[c];
+    const auto copy = [&](const MemoryRows& rows, std::vector<double>& moments, const auto& start) {
+      const std::size_t begin = rows.first[k], end = rows.first[k + 1];
+      for (std::size_t r = begin; r < end; ++r) start(rows.region[r], rows.facet[r]);
+      const auto from = rows.moments.begin();
+      moments.insert(moments.end(), from + 3 * size * begin, from + 3 * size * end);
+    };
+    copy(old_.closed, table_.closed_moments, [&](std::int64_t, std::int64_t facet) {
+      table_.closed_cell.push_back(candidates_.cells[c]);
+      table_.closed_facet.push_back(facet);
+    });
+    if (!is_mixed(c)) return;
+    copy(old_.pieces, table_.piece_moments, [&](std::int64_t region, std::int64_t facet) {
+      table_.piece_region.push_back(first_region_[c] + region);
+      table_.piece_facet.push_back(facet);
+    });
+    std::copy(old_.flux.begin() + old_.first_region[k] * size, old_.flux.begin() + old_.first_region[k + 1] * size,
+              table_.moments.begin() + first_region_[c] * size);
   }
 
   // What is on one side of a face.
@@ -266,7 +385,7 @@ private:
     rows_.clear();
     const bool by_parts = (!below.regions || below.regions->exact) && (!above.regions || above.regions->exact);
     if (by_parts) {
-      const FaceParts& face = parts(2 * axis, at, {});
+      const FaceParts& face = parts(2 * axis, at, {}, {});
       for (std::size_t j = 0; j < face.parts.size(); ++j) {
         const FacePart& part = face.parts[j];
         std::array<std::int64_t, 2> region;
@@ -350,9 +469,17 @@ private:
   const Lattice& lattice_;
   Integrals<N> integrals_;
   bool only_exact_;
+  Memory old_;
+  Zones zones_;
+  Candidates zones_of_;             // zones of each cell
   Candidates candidates_;
   std::vector<CellRegions> cells_;  // of each candidate
-  FaceDivision division_{lattice_};
+  std::vector<int> kept_;           // of each candidate, its number in the old table, -1: computed
+  std::vector<char> filled_;        // candidates inside of a body that does not cut them
+  std::vector<std::size_t> first_piece_, first_closed_;
+  std::vector<double> flux_;
+  bool alone_ = true;
+  FaceDivision division_{lattice_, zones_};
   std::unordered_map<std::int64_t, FaceParts> faces_;
   Integers3 origin_{};
   std::vector<std::int64_t> first_region_;

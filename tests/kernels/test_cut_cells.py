@@ -127,7 +127,8 @@ def test_mistakes_in_surfaces(facets, body, message):
 @pytest.mark.parametrize(
     ("edges", "x", "message"),
     [
-        (EVEN[:2], X, "3 arrays of grid lines and vertices of shape (n, 3) must fit the facets"),
+        (EVEN[:2], X, "3 arrays of grid lines must fit the facets, not 2"),
+        (EVEN, X[:, :2], "vertices must have the shape (n, 3), not (8, 2)"),
         (EVEN, np.where(X == 1.2, np.nan, X), "vertex 0 is not finite"),
         (EVEN, X[:4], "facets name vertices that are not there"),
         ((np.array([0.0, 1, 1]), *EVEN[1:]), X, "edges must increase"),

@@ -227,13 +227,13 @@ def test_plane_against_the_moments_kernel_and_its_finder(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_plane_against_three_layers_of_space(kind):
     """Each layer of walls that stand across three layers has the regions, pieces and faces of the plane."""
-    from solvers.cut_cells.layer import walls
+    from solvers.cut_cells.layer import wall_vertices, walls
 
     for seed in range(5):
         edges = SQUARE_GRIDS[seed % 2]
         x, facets, body = plane_scene(seed, kind)
         plane = table_of(edges, x, facets, body)
-        triangles, of_triangle, vertices = walls(facets, body, x, 3.0)
+        (triangles, of_triangle), vertices = walls(facets, body), wall_vertices(x, 3.0)
         layers = np.array([0.0, 0.9, 2.0, 3.0])
         space = table_of((*edges, layers), vertices, triangles, of_triangle)
         for layer in range(3):
