@@ -29,6 +29,9 @@ class FileMesh(PlacedMesh):
         "extrusions stay (.geo only)",
         unit="1",
     )
+    scale: Positive = setting(
+        1.0, "factor of all coordinates of the file, before anything else: 0.001 for a file in mm", unit="1"
+    )
     refine: CountOrZero = setting(
         0, "how often edges are halved, so that each cell becomes four, in 3D eight; the surface stays what it is"
     )

@@ -31,6 +31,7 @@ def build_mesh(settings: Any, folder: Path, *, rigid: bool = False) -> Mesh:
         order, parameters = getattr(settings, "order", None), getattr(settings, "parameters", None)
         size_factor = getattr(settings, "size_factor", 1.0)
         mesh = read_mesh(folder / settings.file, order, parameters, size_factor, rigid=rigid)
+        mesh = replace(mesh, points=mesh.points * getattr(settings, "scale", 1.0))
         mesh = _refined(mesh, getattr(settings, "refine", 0))
     if getattr(settings, "mirror", None) is not None:
         mesh = mirrored(mesh, "xyz".index(settings.mirror))

@@ -92,6 +92,27 @@ def test_size_factor_of_a_mesh(tmp_path):
         build(tmp_path, "one.vtu", size_factor=2.0)
 
 
+@pytest.mark.parametrize("name", ["part.geo", "part.msh", "part.vtu"])
+def test_scale_is_before_all_else(name, tmp_path):
+    """A script, a mesh of gmsh and another file in mm, halved, mirrored, turned, moved: as one in m."""
+    script = QUARTER + QUADS + EXTRUDED % "Recombine;"
+    (tmp_path / "part.geo").write_text(script)
+    mesh = build(tmp_path, "part.geo", order=1, parameters={})
+    if name != "part.geo":
+        named = {key: np.unique(facets) for key, facets in mesh.surfaces.items()}
+        form = {"file_format": "gmsh22", "binary": False} if name == "part.msh" else {}
+        cells = [(mesh.cell_type, mesh.cells)]
+        meshio.Mesh(mesh.points, cells, point_sets={} if form else named).write(tmp_path / name, **form)
+    turn = SimpleNamespace(axis=[1, 2, 3], angle=20.0)
+    placed = {"mirror": "x", "rotate": [turn], "refine": 1}
+    own = build(tmp_path, name, **placed, translate=[1.0, 2.0, 3.0])
+    other = build(tmp_path, name, **placed, scale=1e-3, translate=[1e-3, 2e-3, 3e-3])
+    assert other.points == pytest.approx(1e-3 * own.points, rel=1e-12, abs=1e-15)
+    assert np.array_equal(other.cells, own.cells)
+    assert other.surfaces.keys() == own.surfaces.keys()
+    assert volume(other) == pytest.approx(0.375e-9 * pi, rel=0.05)
+
+
 def test_parameters_reach_the_script(tmp_path):
     (tmp_path / "part.geo").write_text(QUARTER + QUADS + NAMES + "fixed = 1;\n")
     assert len(build(tmp_path, "part.geo", order=1, parameters={}).cells) == 2 * 4

@@ -13,7 +13,7 @@ from fsci.check.meshes import check_meshes
 from fsci.meshes.mesh import MeshError, build_mesh
 from fsci.meshes.of_case import read_body, read_obstacle, read_rigid_body
 from fsci.run.history import read_history
-from fsci.run.run import FINISHED, run_case
+from fsci.run.run import FINISHED, resume_run, run_case
 from solvers.mesh.tessellation import is_closed, tessellate
 from solvers.mesh.topology import signed_volumes
 from solvers.rigid.inertia import inertia_of_surface
@@ -189,6 +189,7 @@ def _files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write("ball.stl", facets_of(BALL)[0], ("triangle", facets_of(BALL)[1]))
     floor = shapes.box((10, 10, 1), (1, 1, 1))
+    write("ball_in_mm.stl", 1000.0 * facets_of(BALL)[0], ("triangle", facets_of(BALL)[1]))
     write("floor.obj", facets_of(floor)[0], ("triangle", facets_of(floor)[1]))
 
 
@@ -196,20 +197,26 @@ def _files(tmp_path, monkeypatch):
 def test_a_run_is_that_with_the_built_in_shapes():
     """Its history to rounding; the floor's squares are triangles in the file."""
     histories = []
-    for name, text in (("files", FILES), ("shapes", SHAPES)):
+    millimetres = FILES.replace("ball.stl", "ball_in_mm.stl, scale: 0.001")
+    for name, text in (("shapes", SHAPES), ("files", FILES), ("millimetres", millimetres)):
         case = load(text)
         assert not (found := check_meshes(case)).problems
         assert not found.notes
         assert run_case(case, Path(name)) == FINISHED
         histories.append(read_history(Path(name, "history.csv")))
+    resumed = load(millimetres, [("time.end", "0.06")])
+    assert run_case(resumed, Path("resumed")) == FINISHED
+    for name in Path().glob("*.stl"):
+        name.unlink()
+    assert resume_run(Path("resumed"), [("time.end", "0.1")]) == FINISHED
+    histories.append(read_history(Path("resumed", "history.csv")))
     assert np.abs(histories[0]["contact.down.z"]).max() > 0.1
-    assert {"spin.z", "centre.z"} < set(histories[1])
-    for column in histories[1]:
+    assert {"spin.z", "centre.z"} < set(histories[0])
+    for column, own in histories[0].items():
         if column.startswith(("centre.", "spin.", "contact.")):
-            size = np.abs(histories[1][column]).max()
-            assert histories[0][column] == pytest.approx(histories[1][column], rel=1e-8, abs=1e-8 * size + 1e-12), (
-                column
-            )
+            near = pytest.approx(own, rel=1e-8, abs=1e-8 * np.abs(own).max() + 1e-12)
+            assert all(other[column] == near for other in histories[1:]), column
+    assert all(np.array_equal(histories[2][column], histories[3][column]) for column in ("centre.z", "spin.z"))
 
 
 @pytest.mark.usefixtures("_files")

@@ -10,6 +10,7 @@ from pydantic import TypeAdapter
 
 from fsci.case import Case, load_case
 from fsci.case.grid import GridSection
+from fsci.case.mesh import FileMesh
 from fsci.case.shapes import AnyShape
 from fsci.expression import Expression
 from fsci.meshes.mesh import MeshError, build_mesh
@@ -42,6 +43,11 @@ def test_every_list_of_numbers_is_known():
             if (numbers or of_lists) and not placed and key not in OTHERS and name not in TURNING_VECTORS:
                 unknown.append(key)
     assert unknown == []
+
+
+def test_a_mesh_file_keeps_its_scale():
+    given = {"file": "part.vtu", "scale": 0.001, "refine": 1}
+    assert _Sections(MIRRORED, 2).mesh(FileMesh(**given)) == given | {"mirror": "x", "rotate": []}
 
 
 @pytest.mark.parametrize("frame", FRAMES, ids=lambda frame: frame.name)
