@@ -30,6 +30,10 @@ MESHED = tuple(name for name, cell_type in CELL_TYPES.items() if cell_type.facet
 class MeshError(Exception):
     """A mesh that cannot be built; the message gives the user the reason."""
 
+    def __init__(self, message: str, *keys: str | int):
+        super().__init__(message)
+        self.keys = keys  #: from the section of the mesh to the setting that is wrong
+
 
 def unknown(kind: str, name: str, names: Iterable[str]) -> MeshError:
     """The error of a name that is not among the names there are."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.meshes.files import MeshError, read_mesh, unknown
+from fsci.meshes.named import with_surfaces
 from fsci.meshes.refine import refined
 from fsci.rotation import rotation_matrix
 from solvers.mesh.cell_types import CELL_TYPES
@@ -32,6 +33,7 @@ def build_mesh(settings: Any, folder: Path, *, rigid: bool = False) -> Mesh:
         size_factor = getattr(settings, "size_factor", 1.0)
         mesh = read_mesh(folder / settings.file, order, parameters, size_factor, rigid=rigid)
         mesh = replace(mesh, points=mesh.points * getattr(settings, "scale", 1.0))
+        mesh = with_surfaces(mesh, getattr(settings, "surfaces", {}))
         mesh = _refined(mesh, getattr(settings, "refine", 0))
     if getattr(settings, "mirror", None) is not None:
         mesh = mirrored(mesh, "xyz".index(settings.mirror))

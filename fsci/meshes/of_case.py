@@ -84,7 +84,7 @@ def read_body(case: Case, name: str) -> Mesh:
             if keys[0] == "contact":
                 surface_facets(mesh, surface)
     except (MeshError, ValueError) as error:
-        raise case.error(keys, str(error)) from None
+        raise case.error((*keys, *getattr(error, "keys", ())), str(error)) from None
     case.meshes[f"structure.bodies.{name}"] = mesh_checksum(mesh)
     _check_lengths(case, name, mesh.points.shape[1])
     require_finite(case, name, mesh, find_locations(case, name, mesh))
@@ -168,7 +168,7 @@ def read_rigid_body(case: Case, name: str) -> tuple[Mesh, Array, NDArray[np.int6
         if not is_closed(facets):
             raise MeshError("these surfaces do not enclose the body: name all of them")
     except (MeshError, ValueError) as error:
-        raise case.error(keys, str(error)) from None
+        raise case.error((*keys, *getattr(error, "keys", ())), str(error)) from None
     case.meshes[".".join(settings.keys)] = mesh_checksum(mesh)
     if dim is None and (free := (case.rigid or {}).get(name)) is not None:
         whole = base if base[0] == "rigid" else (*base, "free")
@@ -193,7 +193,7 @@ def read_obstacle(case: Case, name: str) -> Mesh:
             require_surface(mesh, surface)
             surface_facets(mesh, surface)
     except (MeshError, ValueError) as error:
-        raise case.error(keys, str(error)) from None
+        raise case.error((*keys, *getattr(error, "keys", ())), str(error)) from None
     case.meshes[f"contact.obstacles.{name}"] = mesh_checksum(mesh)
     return mesh
 

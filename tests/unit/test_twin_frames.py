@@ -25,6 +25,7 @@ OTHERS = {
     ("Curve", "table"), ("Grid", "cells"), ("Grid", "from"), ("Grid", "to"), ("Output", "residuals"),
     ("PointSpring", "stiffness"), ("Free", "initial_angular_velocity"), ("FreeMotion", "initial_angular_velocity"),
     ("FreeBody", "initial_angular_velocity"), ("Rotation", "axis"), ("Turn", "axis"),
+    ("MeshSurface", "normal"),  # of the file: its mesh is placed as a whole
     ("Reference", "drag"), ("Reference", "lift"),
 }  # fmt: skip
 
@@ -45,8 +46,9 @@ def test_every_list_of_numbers_is_known():
     assert unknown == []
 
 
-def test_a_mesh_file_keeps_its_scale():
-    given = {"file": "part.vtu", "scale": 0.001, "refine": 1}
+def test_a_mesh_file_keeps_its_scale_and_surfaces():
+    surfaces = {"top": {"normal": (0.0, 1.0)}, "hole": {"box": ((0.0, 0.0), (1.0, 1.0))}}
+    given = {"file": "part.vtu", "scale": 0.001, "refine": 1, "surfaces": surfaces}
     assert _Sections(MIRRORED, 2).mesh(FileMesh(**given)) == given | {"mirror": "x", "rotate": []}
 
 
