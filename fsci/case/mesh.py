@@ -47,7 +47,7 @@ class MeshSurface(Section):
 
 
 class FileMesh(PlacedMesh):
-    """A mesh from a file: gmsh's .geo or .msh with physical names, or any format that meshio reads.
+    """A mesh from a file: gmsh's .geo or .msh with physical names, .unv, or any format that meshio reads.
 
     All cells are of one type: triangles or tetrahedra of first or second order, quadrilaterals or hexahedra of first or
     full second order. Cells with 8 and 20 nodes get nodes in the middle, so that they have 9 and 27. Prisms, pyramids

@@ -1,4 +1,4 @@
-"""Mesh files: gmsh's own through gmsh, any other format through meshio, to one `Mesh` with named parts."""
+"""Mesh files: gmsh's own and UNV through gmsh, any other format through meshio, to one `Mesh` with named parts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fsci.meshes.parts import beside
-from fsci.meshes.scripts import GMSH, SCRIPTS, RefusedScript, require_harmless
+from fsci.meshes.scripts import GMSH, MESHES, SCRIPTS, RefusedScript, require_harmless
 from fsci.meshes.serendipity import COMPLETE, complete
 from fsci.meshes.surface import BadSurface, cones, split
 from solvers.mesh.cell_types import CELL_TYPES, reference_nodes
@@ -96,7 +96,7 @@ def read_mesh(
         raise MeshError(f"parameters are for .geo files, {path.name} has none")
     elif size_factor != 1.0:
         raise MeshError(f"'size_factor' is for .geo files, the cells of {path.name} have their sizes")
-    elif path.suffix == ".msh":
+    elif path.suffix in MESHES:
         content = _read_gmsh(path, None, {})
     else:
         content = _read_meshio(path)
@@ -299,7 +299,7 @@ def _read_gmsh(path: Path, order: int | None, parameters: Mapping[str, float], s
         if parameters:
             _set_parameters(path, parameters)
         _merge(path)
-        if path.suffix != ".msh":
+        if path.suffix not in MESHES:
             _check_parameters(path, parameters)
             if order is not None:
                 gmsh.option.setNumber("Mesh.ElementOrder", order)

@@ -284,6 +284,38 @@ def test_families_of_med(tmp_path):
     assert np.array_equal(mesh.points[mesh.surfaces["left"]], [[[0, 1], [0, 0]]])
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_groups_of_unv(order, tmp_path):
+    """Written by gmsh from a box with names, which end up the same as in its own format."""
+    import gmsh
+
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Mesh.SaveGroupsOfElements", 1)
+        gmsh.option.setNumber("Mesh.ElementOrder", order)
+        gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [1], name="body")
+        top = [tag for dim, tag in gmsh.model.getEntities(2) if gmsh.model.occ.getCenterOfMass(dim, tag)[2] > 0.9]
+        gmsh.model.addPhysicalGroup(2, top, name="top")
+        gmsh.model.mesh.generate(3)
+        for name in ("part.unv", "part.msh"):
+            gmsh.write(str(tmp_path / name))
+    finally:
+        gmsh.finalize()
+    own, other = build(tmp_path, "part.msh"), build(tmp_path, "part.unv")
+    assert other.cell_type == own.cell_type == ("tetra" if order == 1 else "tetra10")
+    assert volume(other) == pytest.approx(1.0, rel=1e-12)
+    assert len(other.regions["body"]) == len(own.regions["body"]) == len(own.cells)
+    assert other.surfaces.keys() == {"top"}
+    assert len(other.surfaces["top"]) == len(own.surfaces["top"]) > 2
+    assert (other.points[other.surfaces["top"], 2] == 1.0).all()
+    (tmp_path / "part.unv.opt").write_text('SystemCall "touch ran";\n')
+    with pytest.raises(MeshError, match=r"part.unv.opt:1: 'SystemCall' runs a program"):
+        build(tmp_path, "part.unv")
+
+
 def test_second_order_cells_survive_another_format(tmp_path):
     torus = shapes.hollow_torus(3, 1, 2, (6, 6, 1), order=2)
     meshio.Mesh(torus.points, [(torus.cell_type, torus.cells)]).write(tmp_path / "torus.vtu")

@@ -75,7 +75,12 @@ def test_mistakes(tmp_path):
         ("part.vtu", {"normal": [0, 1]}, ("normal",), r"^it has 2 entries, but the mesh has 3 dimensions"),
         ("part.vtu", {"box": [[0, 0], [0, 1, 1]]}, ("box", 0), r"^it has 2 entries, but the mesh has 3 dimensions"),
         ("part.vtu", {"normal": [0, 1, 1]}, (), r"no facet of the boundary is there: the nearest normal is 45 deg"),
-        ("part.vtu", {"box": [[0.1, 0.1, 0.1], [0.9, 0.9, 0.9]]}, (), r"is in the box from \(0, 0, 0\) to \(2, 1, 1\), and"),
+        (
+            "part.vtu",
+            {"box": [[0.1, 0.1, 0.1], [0.9, 0.9, 0.9]]},
+            (),
+            r"is in the box from \(0, 0, 0\) to \(2, 1, 1\), and",
+        ),
     ):
         with pytest.raises(MeshError, match=words) as error:
             build(tmp_path, file, surfaces={"top": section})
